@@ -1,10 +1,10 @@
 # Copyright 2026 The armid_ros developers
 # SPDX-License-Identifier: Apache-2.0
 """
-Who answers: a process of its own, so that joint states of 1 kHz never wait for a diagnosis.
+Compute diagnoses in a separate process, so that joint states at 1 kHz never wait.
 
-Jobs go to the process and results come back through a pair of sockets. The process ends when the
-other end is closed, so it never outlives who started it, however that one ended.
+Jobs are sent to the process and results returned through a pair of sockets. The process ends when
+the other end is closed, so that it never outlives its parent.
 
 """
 
@@ -28,11 +28,11 @@ from armid_ros.excitation.files import excitation_text
 from armid_ros.live.request import Answer, answer, DiagnosisRequest
 import numpy as np
 
-#: One thread of linear algebra: the matrices are small, and the other cores have the arm.
+#: One thread of linear algebra: the matrices are small, and other processes need the cores.
 _ONE_THREAD = dict.fromkeys(('OMP_NUM_THREADS', 'OPENBLAS_NUM_THREADS'), '1')
-#: Courtesy towards the processes that must not wait.
+#: Increment of the nice value: the process has a lower priority than the nodes.
 _NICE = 10
-#: Of standard error, where what a library prints belongs.
+#: File descriptor of standard error, for output of libraries.
 _STDERR = 2
 
 
@@ -44,7 +44,7 @@ class Save:
     Attributes
     ----------
     folder : Path
-        Gets `FILES`.
+        Folder for `FILES`.
 
     """
 
@@ -55,7 +55,7 @@ class Save:
 
 @dataclass(frozen=True)
 class Plan:
-    """Plan the motion that separates the names of the last diagnosis."""
+    """Plan the motion that separates the candidates of the last diagnosis."""
 
     seed: int = 0
 
@@ -63,16 +63,16 @@ class Plan:
 @dataclass(frozen=True)
 class Done:
     """
-    What became of a job that is no request.
+    Result of a job other than a diagnosis.
 
     Attributes
     ----------
     text : str
-        What was done, or why not.
+        Result, or the reason of the failure.
     success : bool
-        Whether it was.
+        Whether the job succeeded.
     excitation : str
-        The planned motion as YAML; empty where none was.
+        Planned motion as YAML; empty if none was planned.
 
     """
 
@@ -86,7 +86,7 @@ Result = Answer | Done
 
 
 class InProcess:
-    """Answers at once, in the process that asks."""
+    """Computes diagnoses at once, in the calling process."""
 
     def __init__(self) -> None:
         self._last: tuple[DiagnosisRequest, Diagnosis] | None = None
@@ -94,11 +94,11 @@ class InProcess:
 
     @property
     def busy(self) -> bool:
-        """Whether a result waits to be taken."""
+        """Return whether a result is available."""
         return self._result is not None
 
     def ask(self, job: Job) -> None:
-        """Do a job."""
+        """Run a job."""
         try:
             self._result = self._done(job)
         except ArmidError as error:
@@ -108,12 +108,12 @@ class InProcess:
             self._result = Done(text, success=False)
 
     def poll(self) -> Result | None:
-        """Return the result, once."""
+        """Return the result, and clear it."""
         result, self._result = self._result, None
         return result
 
     def close(self) -> None:
-        """Nothing to end."""
+        """Do nothing: there is no process."""
 
     def _done(self, job: Job) -> Result:
         if isinstance(job, DiagnosisRequest):
@@ -129,13 +129,13 @@ class InProcess:
             return Done(f'wrote {", ".join(Save.FILES)} to {result.save(job.folder)}')
         run = next_run(diagnosis, np.random.default_rng(job.seed))
         if run is None:
-            return Done('no name is in doubt: there is nothing to separate', success=False)
+            return Done('no candidates are ambiguous: no motion is needed', success=False)
         return Done(run.sentence, excitation=excitation_text(run.excitation))
 
 
 class Assistant:
     """
-    Answers in a process of its own.
+    Computes diagnoses in a separate process.
 
     Raises
     ------
@@ -150,14 +150,14 @@ class Assistant:
 
     def ask(self, job: Job) -> None:
         """
-        Begin a job, in another process where the one before has ended.
+        Begin a job; a new process is started if the last one has ended.
 
         Raises
         ------
         IdentificationError
-            If another one is under way, or the process ends just now.
+            If another job is under way, or the process has just ended.
         OSError
-            If another process cannot be started.
+            If a new process cannot be started.
 
         """
         if self.busy:
@@ -172,20 +172,20 @@ class Assistant:
         self.busy = True
 
     def poll(self) -> Result | None:
-        """Return what came, once."""
+        """Return the result if one has arrived; None otherwise."""
         if self._pipe.closed or not self._pipe.poll():
             return None
         self.busy = False
         try:
             result: Result = self._pipe.recv()
-        except (EOFError, OSError):  # it ended, maybe while it wrote
+        except (EOFError, OSError):  # the process ended, maybe during the transfer
             self._pipe.close()
             code = self._process.wait()
             return Done(f'the process that diagnoses has ended with {code}', success=False)
         return result
 
     def close(self) -> None:
-        """End the process, whatever it does."""
+        """Kill the process."""
         self._process.kill()
         self._process.wait()
         self._pipe.close()
@@ -204,16 +204,16 @@ class Assistant:
                 stdout=_STDERR,
                 pass_fds=[other.fileno()],
                 env=os.environ | _ONE_THREAD,
-                start_new_session=True,  # Ctrl-C is for who started it
+                start_new_session=True,  # Ctrl-C must reach the parent only
             )
 
 
-#: Answers jobs one at a time.
+#: Runs jobs one at a time.
 Helper = Assistant | InProcess
 
 
 def main(fd: int) -> None:
-    """Answer what comes on a socket until its other end is closed."""
+    """Run jobs from a socket until its other end is closed."""
     os.nice(_NICE)
     helper = InProcess()
     with suppress(EOFError, OSError), Connection(fd) as pipe:
@@ -222,7 +222,9 @@ def main(fd: int) -> None:
             try:
                 helper.ask(job)
                 result = helper.poll()
-            except Exception as error:  # a window that nobody foresaw; the next one is another
+            except (
+                Exception
+            ) as error:  # an unexpected error of one window must not end the process
                 traceback.print_exc()
                 what = f'{type(job).__name__.lower()} failed: {type(error).__name__}: {error}'
                 result = Done(what, success=False)

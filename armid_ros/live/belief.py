@@ -1,9 +1,10 @@
 # Copyright 2026 The armid_ros developers
 # SPDX-License-Identifier: Apache-2.0
 """
-When to ask what is wrong with a moving arm, and what to believe of the answers.
+Schedule the diagnoses of a moving arm, and combine their results.
 
-A name counts when questions in a row agree on it, for a window may hold the moment of the change.
+An effect is proposed if several diagnoses in a row name it, since one window may contain the
+moment of a change.
 
 """
 
@@ -21,30 +22,30 @@ import numpy.typing as npt
 
 Named = tuple[str, tuple[str, ...]]
 
-#: Verdicts that put a name forward.
+#: Verdicts that name an effect.
 NAMING = ('named', 'ambiguous', 'partial')
 
 
 @dataclass(frozen=True)
 class LiveSettings:
     """
-    What a user chooses.
+    Settings of the live diagnosis.
 
     Attributes
     ----------
     window : float
-        Motion that is looked at, at most [s].
+        Longest motion that is diagnosed [s].
     shortest : float
-        ... and at least [s].
+        Shortest motion that is diagnosed [s].
     every : float
-        Motion between two questions [s].
+        Motion between two requests [s].
     rate : float
-        Samples per second that are kept [Hz].
+        Rate of the kept samples [Hz].
     confirmations : int
-        Questions in a row that have to agree on a name.
+        Diagnoses in a row that must agree on an effect.
     learning : float
-        Motion in which nothing is wrong yet, from which the model's own misfit is taken where
-        neither a baseline nor a misfit is known [s]; 0: all that the model lacks is looked for.
+        Motion at the beginning in which the arm is healthy [s]. The misfit of the model is
+        computed from it if neither a baseline nor a misfit is given. 0: no misfit is used.
     material : float
         Share of a joint's torque below which a cause does not matter.
 
@@ -59,29 +60,29 @@ class LiveSettings:
     material: float = 0.01
 
     def __post_init__(self) -> None:
-        """Refuse what never comes to a request."""
+        """Raise an IdentificationError if the window is shorter than the shortest motion."""
         if not 0.0 < self.shortest <= self.window:
             raise IdentificationError(
-                f'a window of {self.window:g} s is never as long as the shortest one that is '
-                f'looked at, {self.shortest:g} s'
+                f'a window of {self.window:g} s is shorter than the shortest motion that is '
+                f'diagnosed, {self.shortest:g} s'
             )
 
 
 @dataclass(frozen=True)
 class Belief:
     """
-    The model of the arm, and what is proposed.
+    Accepted and proposed model of the arm.
 
     Attributes
     ----------
     accepted : ArmModel
-        What everybody agrees on.
+        Model that the diagnoses use.
     proposed : ArmModel or None
-        The same with what was named last; None where nothing is.
+        Accepted model with the named effects; None if nothing is proposed.
     named : tuple of (str, tuple of str)
-        Names and joints of what is proposed.
+        Names and joints of the proposed effects.
     rejected : frozenset of (str, tuple of str)
-        What is not to be proposed again.
+        Names and joints of effects that are not proposed again.
 
     """
 
@@ -92,39 +93,39 @@ class Belief:
 
     @property
     def model(self) -> ArmModel:
-        """Return the best model there is."""
+        """Return the proposed model, or the accepted one if nothing is proposed."""
         return self.accepted if self.proposed is None else self.proposed
 
 
 class LiveDiagnosis:
     """
-    Decides when to ask, and what to make of the answers.
+    Schedules diagnoses, and combines their results.
 
     Parameters
     ----------
     arm : ArmModel
         The present model.
     settings : LiveSettings, optional
-        When to ask.
+        Settings of the diagnosis.
     baseline : tuple of Recording
-        From when nothing was wrong.
+        Recordings of the healthy arm.
     misfit : Misfit, optional
-        What the model left when it was identified.
+        Residual of the model when it was identified.
     seed : int
-        Of the diagnoses.
+        Random seed of the diagnoses.
 
     Attributes
     ----------
     settings : LiveSettings
-        When to ask; may be replaced.
+        Present settings; see `use`.
     belief : Belief
-        The model of the arm, and what is proposed.
+        Accepted and proposed model of the arm.
     window : SampleWindow
-        What came.
+        Latest samples.
     latest : Answer or None
-        The last answer that was a verdict.
+        Last answer with a verdict other than waiting.
     asked : int
-        Questions so far.
+        Number of requests so far.
 
     """
 
@@ -144,7 +145,7 @@ class LiveDiagnosis:
         self.reset()
 
     def reset(self) -> None:
-        """Begin anew with the model as it was given."""
+        """Restart with the original model."""
         arm, self._baseline, self._misfit = self._given
         self.belief = Belief(arm)
         self.latest: Answer | None = None
@@ -156,7 +157,7 @@ class LiveDiagnosis:
         self._learned = known or not self.settings.learning
 
     def use(self, settings: LiveSettings) -> None:
-        """Ask as other settings have it; the window begins anew."""
+        """Use other settings, and empty the window."""
         self.settings = settings
         joints, period = self.belief.accepted.robot.joints, 1.0 / settings.rate
         self.window = SampleWindow(joints, max(settings.window, settings.learning), period)
@@ -166,17 +167,17 @@ class LiveDiagnosis:
 
     @property
     def learning(self) -> bool:
-        """Whether the motion is still one in which nothing is wrong."""
+        """Return whether the motion of the healthy arm is still being collected."""
         return not self._learned
 
     @property
     def confirmed(self) -> bool:
-        """Whether the last questions agree on a name."""
+        """Return whether enough diagnoses in a row agree on an effect."""
         return bool(self._agreed) and len(self._agreed) >= self.settings.confirmations
 
     @property
     def due(self) -> bool:
-        """Whether enough motion came since the last request."""
+        """Return whether there was enough motion since the last request."""
         if self.learning or not self._holds(self.settings.shortest):
             return False
         return self.window.moved - self._asked_at >= self._next
@@ -184,11 +185,11 @@ class LiveDiagnosis:
     def add(
         self, t: float, q: npt.ArrayLike, dq: npt.ArrayLike | None, tau: npt.ArrayLike
     ) -> bool:
-        """Take a sample; arguments and result as of `SampleWindow.add`."""
+        """Add a sample; see `SampleWindow.add` for arguments and result."""
         held = len(self.window)
         kept = self.window.add(t, q, dq, tau)
         if kept and held and len(self.window) == 1:
-            # a gap: the stretch is another one
+            # after a gap a new stretch of motion begins
             self._asked_at, self.window.moved = 0.0, 0.0
             self._begin, self._changed = -np.inf, False
             self._outdate()
@@ -201,11 +202,11 @@ class LiveDiagnosis:
         return kept
 
     def _holds(self, seconds: float) -> bool:
-        """Return whether the window has motion of so many seconds."""
+        """Return whether the window contains motion of a given time [s]."""
         return self.window.moved >= seconds <= self.window.end - self.window.begin
 
     def request(self) -> DiagnosisRequest:
-        """Return what to ask now."""
+        """Return the next request, and register it."""
         self._asked_at, self._next = self.window.moved, self.settings.every
         self.asked += 1
         self._under_way, self._outdated = True, False
@@ -225,12 +226,12 @@ class LiveDiagnosis:
 
     def take(self, answer: Answer) -> bool:
         """
-        Take an answer into account, unless the arm or the time is another one by now.
+        Handle an answer; an outdated one is ignored.
 
         Returns
         -------
         bool
-            Whether the model is another one now.
+            Whether the model has changed.
 
         """
         outdated, self._under_way, self._outdated = self._outdated, False, False
@@ -238,7 +239,7 @@ class LiveDiagnosis:
             return False
         if answer.changed:
             self._begin, self._changed = answer.end - answer.window.duration, True
-        if answer.verdict == 'consistent':  # what changes now shows in the residual again
+        if answer.verdict == 'consistent':  # a later change shows in the residual again
             self._changed = False
         if answer.verdict == WAITING:
             self._agreed = []
@@ -247,7 +248,7 @@ class LiveDiagnosis:
         self.latest = answer
         before = self.belief.model
         if answer.verdict in NAMING and answer.named:
-            # count the questions in a row that put a name first
+            # count the diagnoses in a row with the same first effect
             named = answer.named[0]
             if self._agreed and self._agreed[-1] != named:
                 self._agreed = []
@@ -264,7 +265,7 @@ class LiveDiagnosis:
 
     def accept(self) -> None:
         """
-        Take what is proposed for the model; a baseline is none of the arm as it is now.
+        Accept the proposed model; the last window replaces the baseline.
 
         Raises
         ------
@@ -281,7 +282,7 @@ class LiveDiagnosis:
 
     def reject(self) -> None:
         """
-        Drop what is proposed, and do not propose it again.
+        Reject the proposed effects, and do not propose them again.
 
         Raises
         ------
@@ -301,5 +302,5 @@ class LiveDiagnosis:
         return self.belief.proposed
 
     def _outdate(self) -> None:
-        """Have the answer that is under way dropped when it comes."""
+        """Mark the pending answer as outdated."""
         self._outdated = self._under_way

@@ -1,6 +1,6 @@
 # Copyright 2026 The armid_ros developers
 # SPDX-License-Identifier: Apache-2.0
-"""When the model began to miss more, or less, than before: what came earlier is of another arm."""
+"""Find the time at which the residual of a model changed."""
 
 from __future__ import annotations
 
@@ -17,11 +17,12 @@ from armid_ros.motion import FloatArray
 from armid_ros.recording import Recording
 import numpy as np
 
-#: Stretches whose residual power is compared [s]: longer than what the residual remembers.
+#: Length of the blocks whose residual power is compared [s]; longer than the correlation of the
+#: residual.
 _BLOCK = 0.5
-#: Blocks before a change at least, for their spread to be one.
+#: Fewest blocks before a change, so that their variance can be estimated.
 _FEWEST = 4
-#: Probability of a change where nothing changes, over all times and joints that are tried.
+#: Probability of a false change, over all tested times and joints.
 _ERROR_RATE = 0.01
 
 
@@ -43,8 +44,8 @@ def onset(arm: ArmModel, recording: Recording) -> float | None:
     Returns
     -------
     float or None
-        Time since the begin of the recording from which on all is of one arm [s]; None where
-        nothing changed.
+        Time since the begin of the recording after which the arm did not change [s]; None without
+        a change.
 
     """
     power = _block_powers(arm, recording)
@@ -52,7 +53,7 @@ def onset(arm: ArmModel, recording: Recording) -> float | None:
     count = len(logs)
     if count <= _FEWEST:
         return None
-    # the F ratio of two means against one for every joint
+    # F ratio of two means against one mean, for every joint
     low, high, std = two_means(logs, np.ones_like(logs))
     between = ((high - low) / std)[_FEWEST - 1 :] ** 2
     within = ((logs - logs.mean(axis=0)) ** 2).sum(axis=0) - between
@@ -60,13 +61,13 @@ def onset(arm: ArmModel, recording: Recording) -> float | None:
     best = int(np.argmax(ratios))
     if tail(ratios[best], 1, count - 2) * len(ratios) * logs.shape[1] >= _ERROR_RATE:
         return None
-    edge = recording.duration - (times[-1] + _BLOCK)  # what the filter needs of the end
+    edge = recording.duration - (times[-1] + _BLOCK)  # time that the filter cuts off at the end
     return float(times[_FEWEST + best] + _BLOCK + edge)
 
 
 def _block_powers(arm: ArmModel, recording: Recording) -> FloatArray:
-    """Return begin [s] and mean squares of the residual of short blocks, shape (B, 1 + n)."""
-    # the last one ends with the motion
+    """Return begin [s] and mean squared residuals of short blocks, shape (B, 1 + n)."""
+    # the last block ends with the motion
     used = conditioning([recording], SignalSettings())
     rows = [np.empty((0, 1 + len(arm.robot.joints)))]
     for motion in segments(recording, used):

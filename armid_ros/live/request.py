@@ -1,6 +1,6 @@
 # Copyright 2026 The armid_ros developers
 # SPDX-License-Identifier: Apache-2.0
-"""The diagnosis of a window of samples: request and answer."""
+"""Request and answer of the diagnosis of a window of samples."""
 
 from __future__ import annotations
 
@@ -17,14 +17,14 @@ from armid_ros.live.onset import onset
 from armid_ros.recording import Recording
 import numpy as np
 
-#: The verdict where too little came since the arm changed.
+#: Verdict if the motion since the last change of the arm is too short.
 WAITING = 'waiting'
 
 
 @dataclass(frozen=True)
 class Healthy:
     """
-    Motion in which nothing was wrong, and the model of the arm as it was then.
+    Motion of the healthy arm, and its model at that time.
 
     Attributes
     ----------
@@ -40,7 +40,7 @@ class Healthy:
 
     def misfit(self, filters: Conditioning) -> Misfit:
         """
-        Measure what the model leaves of the motion: the narrower the band, the less noise.
+        Compute the misfit of the model in the band of the filters.
 
         Raises
         ------
@@ -54,31 +54,31 @@ class Healthy:
 @dataclass(frozen=True)
 class DiagnosisRequest:
     """
-    A window to be diagnosed.
+    Request to diagnose a window.
 
     Attributes
     ----------
     arm : ArmModel
         The present model.
     window : Recording
-        What came lately.
+        Latest samples of the arm.
     baseline : tuple of Recording
-        From when nothing was wrong.
+        Recordings of the healthy arm.
     misfit : Misfit or None
-        Residual of the model when it was identified, where there is no baseline.
+        Residual of the model when it was identified, used without a baseline.
     shortest : float
         Shortest window that is diagnosed [s].
     material : float
         Share of a joint's torque below which a cause does not matter.
     seed : int
-        Of the diagnosis.
+        Random seed of the diagnosis.
     end : float
-        When the last sample of the window was, in the time of the request [s].
+        Time of the last sample of the window, on the time base of the node [s].
     healthy : Healthy or None
-        Motion to compute the misfit from, where neither of them is known.
+        Motion of the healthy arm, from which the misfit is computed if no baseline is given.
     of_one_arm : bool
-        Whether all of the window is since the arm changed last. What a wrong model leaves comes
-        and goes with the motion, so that it hides any further change.
+        Whether the whole window lies after the last change of the arm. The residual of a wrong
+        model varies with the motion and hides further changes, so that none is searched for.
 
     """
 
@@ -96,7 +96,7 @@ class DiagnosisRequest:
 
 @dataclass(frozen=True)
 class GapOfJoint:
-    """Root mean square error of a joint before and after, and the floor [N m]."""
+    """Root mean square residual of a joint before and after the patch, and noise floor [N m]."""
 
     joint: str
     before: float
@@ -112,22 +112,22 @@ class Answer:
     Attributes
     ----------
     verdict : str
-        One of a diagnosis; 'waiting' where too little came since the arm changed; 'bad_data'
-        where the window cannot be diagnosed.
+        Verdict of a diagnosis; 'waiting' if the motion since the last change is too short;
+        'bad_data' if the window cannot be diagnosed.
     summary : str
-        The same in a sentence or two.
+        Verdict in one or two sentences.
     findings : tuple of Finding
-        What was named.
+        Named effects.
     gap : tuple of GapOfJoint
-        Errors of the joints.
+        Residuals of the joints.
     arm : ArmModel
-        The patched model; that of the question where nothing was named.
+        Patched model; the model of the request if no effect was named.
     window : Recording
-        What was looked at: the part of the window since the arm changed last.
+        Diagnosed part of the window, after the last change of the arm.
     end : float
-        When its last sample was, in the time of the request [s].
+        Time of its last sample, on the time base of the node [s].
     seconds : float
-        Processor time that it took [s].
+        Processor time of the diagnosis [s].
     changed : bool
         Whether the arm changed in the window.
 
@@ -145,15 +145,15 @@ class Answer:
 
     @property
     def named(self) -> tuple[tuple[str, tuple[str, ...]], ...]:
-        """Name and joints of what was named, the largest first."""
+        """Return names and joints of the named effects, the largest first."""
         return tuple((finding.name, finding.joints) for finding in self.findings)
 
 
 def answer(request: DiagnosisRequest) -> tuple[Answer, Diagnosis | None]:
     """
-    Diagnose a window; the diagnosis is None where that cannot be done.
+    Diagnose a window; the diagnosis is None if the window cannot be diagnosed.
 
-    What came before the residual of the model changed is of another arm, and is left out.
+    Samples before the last change of the residual are skipped.
 
     """
     begun, arm, window = time.process_time(), request.arm, request.window
@@ -180,11 +180,11 @@ def answer(request: DiagnosisRequest) -> tuple[Answer, Diagnosis | None]:
             window = window.select(window.t >= changed)
             window = replace(window, t=window.t - (window.t[0] if len(window) else 0.0))
         if window.duration < request.shortest:
-            text = f'the arm changed {window.duration:.0f} s ago: more motion is needed'
+            text = f'the arm changed {window.duration:.0f} s ago: the diagnosis needs more motion'
             return answered(WAITING, text), None
         rng, misfit = np.random.default_rng(request.seed), request.misfit
         if request.healthy is not None and not request.baseline:
-            # what the model left before, in the band in which the window is looked at
+            # misfit of the healthy arm, in the band of the window
             misfit = request.healthy.misfit(choose_filters(arm, [window], (), settings, rng))
         found = diagnose(
             arm,

@@ -1,32 +1,32 @@
 # Copyright 2026 The armid_ros developers
 # SPDX-License-Identifier: Apache-2.0
-"""Whether samples follow each other as those of an arm do."""
+"""Check the order of samples, and detect frozen positions."""
 
 from __future__ import annotations
 
 from armid_ros.motion import FloatArray
 import numpy as np
 
-#: A step back in time that is longer is none of samples out of order [s].
+#: A longer step back in time is a jump of the clock, not a sample out of order [s].
 _OUT_OF_ORDER = 0.1
-#: For so long no position has to change for an arm to be at rest [s].
+#: Time without a change of positions after which the arm is at rest [s].
 _STILL = 2.0
-#: Share of what the effort of a joint ranges over in motion, and multiple of its mean change from
-#: one sample to the next, that is no noise at rest: a million samples of that range over 9.
+#: Limits of the range of an effort at rest: a share of its range in motion, and a multiple of its
+#: mean change per sample. Noise of a million samples has a range of 9 mean changes.
 _SWING, _NOISE = 0.5, 10.0
 
 
 class StreamWatch:
     """
-    Looks for samples that are out of order, and for positions that nobody measures any more.
+    Detects samples out of order, and positions that are no longer measured.
 
-    The efforts of an arm at rest stay what they are, but for noise: where not one position changes
-    and an effort ranges over half of what it did in motion, the positions are not measured.
+    The efforts of an arm at rest are constant except for noise. If no position changes while an
+    effort varies over half of its range in motion, the positions are not measured.
 
     Parameters
     ----------
     n_joints : int
-        Of the arm.
+        Number of joints of the arm.
 
     """
 
@@ -43,7 +43,7 @@ class StreamWatch:
         self._begin(None)
 
     def take(self, t: float, q: FloatArray, tau: FloatArray) -> None:
-        """Take in a sample: time [s], position [rad or m] and torque [N m or N], each (n,)."""
+        """Check a sample: time [s], position [rad or m] and torque [N m or N], each (n,)."""
         if self._last is not None and t <= self._last:
             back = self._last - t > _OUT_OF_ORDER
             self._seen.add('jump_back' if back else 'out_of_order')
@@ -67,12 +67,12 @@ class StreamWatch:
                 self._seen.add('frozen')
 
     def news(self) -> frozenset[str]:
-        """Return what was seen since this was asked last: jump_back, out_of_order, frozen."""
+        """Return the faults since the last call: jump_back, out_of_order, frozen."""
         seen, self._seen = frozenset(self._seen), set()
         return seen
 
     def _begin(self, t: float | None) -> None:
-        """Begin to look for efforts that change though positions do not."""
+        """Restart the search for changing efforts at constant positions."""
         self._last = t
         self._since = np.inf if t is None else t
         self._q = self._tau = None
@@ -81,11 +81,11 @@ class StreamWatch:
 
 
 def _widen(ends: FloatArray, values: FloatArray) -> None:
-    """Widen lower and upper ends, shape (2, n), to include values, (n,)."""
+    """Extend lower and upper ends, shape (2, n), to include values, shape (n,)."""
     np.minimum(ends[0], values, out=ends[0])
     np.maximum(ends[1], values, out=ends[1])
 
 
 def _range(ends: FloatArray) -> FloatArray:
-    """Return how far ends are apart; infinite where there is nothing between them."""
+    """Return upper minus lower ends; infinite for an empty range."""
     return np.where(ends[1] >= ends[0], ends[1] - ends[0], np.inf)

@@ -1,6 +1,6 @@
 # Copyright 2026 The armid_ros developers
 # SPDX-License-Identifier: Apache-2.0
-"""What came from an arm lately: some of the samples, in memory that does not grow."""
+"""Keep the latest samples of an arm in a memory of constant size."""
 
 from __future__ import annotations
 
@@ -8,31 +8,30 @@ from armid_ros.recording import Recording
 import numpy as np
 import numpy.typing as npt
 
-#: A sample that is so much earlier than one is due counts as due, as a share of the period.
+#: Largest lead of a sample that counts as due, as a share of the period.
 _EARLY = 0.25
-#: Below it in all joints a sample is no motion [rad/s or m/s].
+#: Velocity of all joints below which the arm is at rest [rad/s or m/s].
 _REST_VELOCITY = 0.01
-#: Periods without a sample after which the stretch is broken, for its spectrum would have a hole;
-#: a step back in time that is as long is none of samples out of order.
+#: Longest gap, and longest step back in time, before the window begins anew [periods].
 _LONGEST_GAP = 20.0
 
 
 class SampleWindow:
     """
-    The latest samples of an arm, one of each period, without a gap among them.
+    Latest samples of an arm, one per period, without gaps.
 
-    Samples in between are left out, so that a period of 5 ms makes 200 samples a second of a
-    stream of any rate. A sample that comes late or twice is left out too. Where time jumps back or
-    nothing comes for long the window begins anew.
+    Further samples are skipped, so that a period of 5 ms gives 200 samples per second at any input
+    rate. Late and repeated samples are skipped too. The window begins anew after a gap or a jump
+    back in time.
 
     Parameters
     ----------
     joints : tuple of str
         Joint names, n of them.
     duration : float
-        What is kept at most [s].
+        Longest time that is kept [s].
     period : float
-        Between samples that are kept [s].
+        Time between kept samples [s].
 
     Attributes
     ----------
@@ -47,48 +46,49 @@ class SampleWindow:
         self._period = period
         self._capacity = int(np.ceil(duration / (period * (1.0 - _EARLY)))) + 1
         n = len(joints)
-        # twice the room: rows move to the front once in a while, and a window is one slice
+        # twice the capacity: the window is one slice, and is moved to the front when the end is
+        # reached
         self._rows = np.empty((2 * self._capacity, 1 + 3 * n))
         self._first = self._end = 0
 
     def __len__(self) -> int:
-        """Return the number of samples that are kept."""
+        """Return the number of kept samples."""
         return self._end - self._first
 
     @property
     def begin(self) -> float:
-        """Time of the oldest sample [s]; infinite without any."""
+        """Return the time of the oldest sample [s]; infinite for an empty window."""
         return float(self._rows[self._first, 0]) if len(self) else np.inf
 
     @property
     def end(self) -> float:
-        """Time of the newest sample [s]; minus infinity without any."""
+        """Return the time of the newest sample [s]; minus infinity for an empty window."""
         return float(self._rows[self._end - 1, 0]) if len(self) else -np.inf
 
     @property
     def nbytes(self) -> int:
-        """Memory of the samples [bytes]."""
+        """Return the memory of the samples [bytes]."""
         return self._rows.nbytes
 
     def add(
         self, t: float, q: npt.ArrayLike, dq: npt.ArrayLike | None, tau: npt.ArrayLike
     ) -> bool:
         """
-        Take a sample into the window if one is due.
+        Add a sample to the window if one is due.
 
         Parameters
         ----------
         t : float
-            When it was [s].
+            Time of the sample [s].
         q, tau : array_like, shape (n,)
             Position [rad or m], torque [N m or N].
         dq : array_like, shape (n,), or None
-            Velocity, where it is measured.
+            Velocity; None if not measured.
 
         Returns
         -------
         bool
-            Whether it was kept.
+            Whether the sample was kept.
 
         """
         since = t - self.end
@@ -115,7 +115,7 @@ class SampleWindow:
 
     def recording(self, since: float = -np.inf, source: str = 'window') -> Recording:
         """
-        Return the samples from some time on as a recording.
+        Return the samples from a given time on as a recording.
 
         Parameters
         ----------

@@ -1,3 +1,3 @@
 # Copyright 2026 The armid_ros developers
 # SPDX-License-Identifier: Apache-2.0
-"""ROS 2 nodes: the only place that imports rclpy."""
+"""ROS 2 nodes. No other package imports rclpy."""

@@ -1,6 +1,6 @@
 # Copyright 2026 The armid_ros developers
 # SPDX-License-Identifier: Apache-2.0
-"""What the joint states of an arm say of it: where it is, since when, and by which clock."""
+"""Watch the joint states of an arm: position, age and clock."""
 
 from __future__ import annotations
 
@@ -22,22 +22,22 @@ from rclpy.duration import Duration
 from rclpy.qos import qos_profile_sensor_data
 from sensor_msgs.msg import JointState
 
-#: Time that an arm has to be seen at rest before it is started [s].
+#: Time for which an arm must be at rest before a run starts [s].
 _REST = 0.25
-#: A simulated clock that advances by more at once was set; as for simulated_arm [s].
+#: A larger step of a simulated clock means that the clock was set, as in simulated_arm [s].
 _CLOCK_STEP = 60.0
 
 
 class ArmWatch:
     """
-    Subscription to joint_states, and the time that their ages are measured in.
+    Subscription to joint_states that checks position, age and stamps.
 
     Attributes
     ----------
     monitor : PoseMonitor
-        Decides which positions are believed.
+        Selects the positions that are accepted.
     stamps : StampDifference
-        Between stamps and the node's clock.
+        Difference between stamps and the node's clock.
 
     """
 
@@ -50,11 +50,11 @@ class ArmWatch:
         Parameters
         ----------
         node : ArmidNode
-            Gets the subscription.
+            Node that subscribes.
         robot : Robot
-            States the limits.
+            Robot with the position limits.
         tolerance : float
-            Distance beyond a position limit at which a position is believed [rad or m].
+            Largest distance beyond a position limit at which a position is accepted [rad or m].
         on_state : callable
             Called after every message.
 
@@ -80,19 +80,19 @@ class ArmWatch:
 
     @property
     def effort(self) -> FloatArray:
-        """Return the efforts of the last message, shape (n,) [N m or N]; NaN: none."""
+        """Return the efforts of the last message, shape (n,) [N m or N]; NaN if missing."""
         known = dict(zip(*self._efforts, strict=False))
         return np.array([known.get(joint, math.nan) for joint in self._joints])
 
     def now(self) -> float:
-        """Return the time of ages [s]: simulated without the steps of its clock, or steady."""
+        """Return the time for ages [s]: steady, or simulated time without clock steps."""
         clock = self._node.get_clock()
         if not clock.ros_time_is_active:
             return float(self._steady.now().nanoseconds * 1e-9)
         return float((clock.now().nanoseconds - self._stepped_ns) * 1e-9)
 
     def staleness(self, timeout: float) -> str:
-        """Return which joint had no new position for longer than a time [s]; empty: none."""
+        """Return a text that names joints without a new position for a time [s]; empty if none."""
         fault = self.monitor.pose.staleness(self.now(), timeout)
         topic = self._states.topic_name
         if (
@@ -105,16 +105,16 @@ class ArmWatch:
 
     def fault_at_start(self, timeout: float, difference: float, simulated: bool) -> str:
         """
-        Return why an arm must not be started; empty when it may.
+        Return why the arm must not be started; empty if it may.
 
         Parameters
         ----------
         timeout : float
-            Age of a position that is too old [s].
+            Age above which a position is too old [s].
         difference : float
-            Largest difference between the stamps and the node's clock [s]; infinite: any.
+            Largest permitted difference between stamps and the node's clock [s]; may be infinite.
         simulated : bool
-            Whether the arm is simulated, for the advice.
+            Whether the arm is simulated, which decides the remedy in the text.
 
         """
         topic = self._states.topic_name

@@ -1,6 +1,6 @@
 # Copyright 2026 The armid_ros developers
 # SPDX-License-Identifier: Apache-2.0
-"""The bag player node: what a bag holds, at a rate or in lock step with /clock."""
+"""Bag player node: publishes the messages of a bag, at a rate or in lock step with /clock."""
 
 from __future__ import annotations
 
@@ -36,14 +36,14 @@ from trajectory_msgs.msg import JointTrajectory
 
 #: How often due messages are published [s].
 _TICK = 0.001
-#: Messages published in one go; services are answered between.
+#: Messages published per timer call; services are answered between calls.
 _BURST = 1000
-#: How long a trajectory may take to arrive when the node ends [s].
+#: Longest wait at the end of the node for trajectories to arrive [s].
 _FAREWELL = 1.0
 
 
 class _JumpGuard:
-    """Compares the first waypoint of trajectories with where an arm is, by joint_states."""
+    """Compares the first waypoint of a trajectory with the measured joint positions."""
 
     def __init__(self, node: Node, tolerance: float, timeout: float) -> None:
         self.tolerance, self.timeout = tolerance, timeout
@@ -55,19 +55,19 @@ class _JumpGuard:
 
     @property
     def hears(self) -> bool:
-        """Whether any joint state has come."""
+        """Return whether a joint state was received."""
         return bool(self._latest)
 
     def describe(self, cdr: bytes) -> None:
-        """Take the velocity limits from a robot_description."""
+        """Read the velocity limits from a robot_description."""
         try:
             robot = robot_from_urdf(deserialize_message(cdr, String).data)
         except ArmidError:
-            return  # it is not for this guard to judge descriptions
+            return  # an invalid description is not checked here
         self._limits = dict(zip(robot.joints, robot.velocity_limit.tolist(), strict=True))
 
     def objection(self, cdr: bytes) -> str:
-        """Say why a JointTrajectory must not be sent to the arm; empty when it may."""
+        """Return why a JointTrajectory must not be sent to the arm; empty if it may."""
         try:
             reference = read_trajectory(deserialize_message(cdr, JointTrajectory))
         except ArmidError as error:
@@ -77,12 +77,12 @@ class _JumpGuard:
             pose = pose.updated(message.name, message.position, 0, seen)
         lost = pose.staleness(time.monotonic(), self.timeout)
         if lost:
-            return f'trajectory: {self._states.topic_name}: {lost}; it is not known where it is'
+            return f'trajectory: {self._states.topic_name}: {lost}; arm position unknown'
         speeds = reference.dq
         if speeds is None:
             speeds = np.diff(reference.q, axis=0) / np.diff(reference.t)[:, np.newaxis]
         top = np.abs(speeds).max(axis=0, initial=0.0)
-        # velocity limits; where none are known, the top speeds of the trajectory
+        # velocity limits, or for joints without a limit the top speeds of the trajectory
         known = [self._limits.get(joint, np.inf) for joint in reference.joints]
         fastest = np.where(np.isfinite(known), known, top)
         first = (float(reference.t[0]), reference.q[0])
@@ -103,35 +103,39 @@ class BagPlayerNode(ArmidNode):
     Publishes the messages of a bag, serialised as they were recorded.
 
     A JointTrajectory is sent only if no joint of the arm that publishes joint_states would jump.
-    A recording of an arm, which has joint_states of its own, has its trajectories sent only if no
-    other arm is heard of.
+    If the bag itself has joint_states, its trajectories are sent only if no other node publishes
+    joint_states.
 
-    With use_sim_time it keeps step with /clock: a message is due when as much time has passed
-    since the first /clock as passed since the first message of the bag.
+    With use_sim_time the node follows /clock: the time since the first /clock message is the bag
+    time that is played.
 
     Attributes
     ----------
     published : Counter of str
-        Messages published of each topic.
+        Number of published messages of each topic.
 
     """
 
     table = (
         NodeParameter('bag', '', 'Bag to play: a rosbag2 directory, or a .mcap or .db3 file.'),
-        NodeParameter('topics', [''], 'Topics to play; without names, all.'),
+        NodeParameter('topics', [''], 'Topics to play; all if empty.'),
         NodeParameter(
             'rate',
             1.0,
-            'Bag time per real time; of no effect in lock step.',
+            'Bag time per real time; no effect with use_sim_time.',
             limits=(0.001, 1000.0),
             read_only=False,
         ),
-        NodeParameter('loop', False, 'Begin again at the end.', read_only=False),
-        NodeParameter('start_offset', 0.0, 'Bag time to leave out.', 's', limits=(0.0, 1e9)),
+        NodeParameter(
+            'loop', False, 'Play again from the beginning at the end of the bag.', read_only=False
+        ),
+        NodeParameter(
+            'start_offset', 0.0, 'Bag time to skip at the beginning.', 's', limits=(0.0, 1e9)
+        ),
         NodeParameter(
             'clock_rate',
             0.0,
-            'How often bag time is published on /clock; 0 for not at all.',
+            'Rate at which bag time is published on /clock; 0: never.',
             'Hz',
             limits=(0.0, 10000.0),
             read_only=False,
@@ -148,7 +152,7 @@ class BagPlayerNode(ArmidNode):
         NodeParameter(
             'start_tolerance',
             0.01,
-            'How far a joint may be from the first point of a trajectory.',
+            'Largest distance of a joint from the first point of a trajectory.',
             'rad or m',
             limits=(0.0001, 1.0),
             read_only=False,
@@ -164,7 +168,7 @@ class BagPlayerNode(ArmidNode):
     )
 
     def __init__(self, **kwargs: Any) -> None:
-        """Open the bag that the parameter names."""
+        """Open the bag of the parameter bag."""
         super().__init__('bag_player', **kwargs)
         if not self.value('bag'):
             raise RecordingError("parameter 'bag' is empty: give a bag, -p bag:=PATH")
@@ -195,26 +199,26 @@ class BagPlayerNode(ArmidNode):
 
     @property
     def finished(self) -> bool:
-        """Whether all was played."""
+        """Return whether all messages were played."""
         return self._next is None
 
     @property
     def failure(self) -> str:
-        """Why a trajectory was not sent."""
+        """Return why a trajectory was not sent; empty if none was rejected."""
         return self._refused
 
     @property
     def waiting(self) -> bool:
-        """Whether it has yet to begin: for subscribers, or for /clock."""
+        """Return whether the node waits for subscribers or for /clock."""
         return self._anchor is None and not self.finished
 
     @property
     def position(self) -> float:
-        """Bag time played, since its first message [s]."""
+        """Return the played bag time since the first message [s]."""
         return (self._position - self._first) * 1e-9
 
     def play(self) -> None:
-        """Publish what is due."""
+        """Publish the messages that are due."""
         now = self._pace.now().nanoseconds
         if self._anchor is None:
             if (self._lock_step and now == 0) or not self._ready():
@@ -239,13 +243,13 @@ class BagPlayerNode(ArmidNode):
             self._timer.cancel()
 
     def objection(self, values: Mapping[str, Any]) -> str:
-        """Refuse to publish the clock that it follows."""
+        """Return an error if the node would publish the /clock that it follows."""
         if self.value('use_sim_time') and values.get('clock_rate'):
             return 'use_sim_time follows /clock; it cannot publish it too: clock_rate'
         return ''
 
     def changed(self, names: frozenset[str]) -> None:
-        """Publish /clock as often as the parameter says by now, and judge jumps by it."""
+        """Apply changed parameters for /clock and for the check of jumps."""
         if 'clock_rate' in names:
             self._keep_clock()
         if self._guard is not None:
@@ -259,7 +263,7 @@ class BagPlayerNode(ArmidNode):
             self._clock_publisher = self.create_publisher(ClockMessage, '/clock', 10)
 
     def condition(self) -> tuple[str, Mapping[str, object]]:
-        """Say how far it has played."""
+        """Return the number of published messages and the bag time."""
         values = {
             'messages': self.published.total(),
             'position': self.position,
@@ -267,7 +271,7 @@ class BagPlayerNode(ArmidNode):
         return ('waiting for subscribers' if self.waiting else ''), values
 
     def close(self) -> None:
-        """Let go of the bag, once trajectories have arrived."""
+        """Close the bag, and wait until trajectories have arrived."""
         self._bag.close()
         if self._guard is not None and self.context.ok():
             for topic in self._trajectories:
@@ -296,7 +300,7 @@ class BagPlayerNode(ArmidNode):
         return publishers
 
     def _make_guard(self) -> _JumpGuard | None:
-        """Listen to the arm where there is a trajectory to play."""
+        """Return a guard that subscribes to joint_states; None without a trajectory to play."""
         types = {t.name: t.type_name for t in self._bag.topics() if t.name in self._topics}
         self._trajectories = {n for n, kind in types.items() if kind == JOINT_TRAJECTORY}
         self._descriptions = {n for n in types if n.endswith('robot_description')}
@@ -307,7 +311,7 @@ class BagPlayerNode(ArmidNode):
         return _JumpGuard(self, self.value('start_tolerance'), self.value('state_timeout'))
 
     def _objection(self, message: RawMessage) -> str:
-        """Say why a message must not be published; empty when it may."""
+        """Return why a message must not be published; empty if it may."""
         if self._guard is None or message.topic not in self._trajectories:
             return ''
         if not self._has_states:
@@ -341,7 +345,7 @@ class BagPlayerNode(ArmidNode):
             self.published[message.topic] += 1
 
     def _take(self) -> None:
-        """Read the next message; at the end say what was left out, be it all of them."""
+        """Read the next message; at the end of the bag, log its damage."""
         self._next = next(self._messages, None)
         if self._next is None and self._bag.damage:
             self.complaints.say('damage', f'{self.value("bag")}: {self._bag.damage}')

@@ -1,6 +1,6 @@
 # Copyright 2026 The armid_ros developers
 # SPDX-License-Identifier: Apache-2.0
-"""What the nodes share: a table of parameters, complaints, and diagnostics once a second."""
+"""Base class of the nodes: parameters, complaints, and diagnostics once a second."""
 
 from __future__ import annotations
 
@@ -21,11 +21,10 @@ from rclpy.subscription import Subscription
 from rclpy.timer import Timer
 from std_srvs.srv import Trigger
 
-#: How long a simulation may take to publish /clock, and others to send what a node waits for,
-#: before it is said that nothing does [s].
+#: Time without /clock or awaited messages after which a warning is logged [s].
 _PATIENCE = 5.0
 
-#: How often new publishers and answers are looked for [s].
+#: Period of the check for new publishers and answers [s].
 LOOK_PERIOD = 0.1
 
 #: Parameters of every node.
@@ -40,13 +39,13 @@ COMMON = (
     NodeParameter(
         'end_with_parent',
         False,
-        'End in order when the process that has started the node ends, as a launch by SIGTERM.',
+        'Shut the node down when its parent process ends, such as a launch ended by SIGTERM.',
     ),
 )
 
 
 def key_values(values: Mapping[str, object]) -> list[KeyValue]:
-    """Return numbers and words as a status of /diagnostics shows them."""
+    """Convert numbers and texts to the key-value pairs of a /diagnostics status."""
     return [
         KeyValue(key=key, value=f'{value:.9g}' if isinstance(value, float) else str(value))
         for key, value in values.items()
@@ -55,24 +54,24 @@ def key_values(values: Mapping[str, object]) -> list[KeyValue]:
 
 class ArmidNode(Node):
     """
-    A node with parameters from a table, that says on /diagnostics what it does and what it missed.
+    Node with parameters from a table that publishes its state on /diagnostics.
 
-    No message and no timer ends it: what its callbacks raise is counted and said, but for errors
-    of the operating system, such as a full disk.
+    Exceptions in callbacks do not end the node: they are counted and logged. Errors of the
+    operating system, such as a full disk, do end the node.
 
     Attributes
     ----------
     table : tuple of NodeParameter
         The parameters of the node.
     complaints : Complaints
-        What the node was given and could not use.
+        Inputs that the node rejected.
 
     """
 
     table: ClassVar[tuple[NodeParameter, ...]]
 
     def __init__(self, name: str, **kwargs: Any) -> None:
-        """Take the keyword arguments of rclpy's Node: context, namespace, overrides and others."""
+        """Make the node with keyword arguments of rclpy's Node, such as context or namespace."""
         super().__init__(name, **kwargs)
         self.complaints = Complaints(self.get_logger())
         self._paced: dict[str, tuple[Callable[[], None], Timer]] = {}
@@ -92,7 +91,7 @@ class ArmidNode(Node):
     def create_subscription(
         self, msg_type: Any, topic: str, callback: Callable[[Any], None], *args: Any, **more: Any
     ) -> Subscription:
-        """Subscribe as rclpy does, with a callback that every message is survived by."""
+        """Subscribe as in rclpy; exceptions of the callback do not end the node."""
         return super().create_subscription(
             msg_type, topic, self._surviving(callback, topic), *args, **more
         )
@@ -100,24 +99,25 @@ class ArmidNode(Node):
     def create_timer(
         self, timer_period_sec: float, callback: Callable[[], None], *args: Any, **more: Any
     ) -> Timer:
-        """Make a timer as rclpy does, with a callback that may fail."""
+        """Make a timer as in rclpy; exceptions of the callback do not end the node."""
         guarded = self._surviving(callback, getattr(callback, '__name__', 'timer'))
         return super().create_timer(timer_period_sec, guarded, *args, **more)
 
     def look_every(self, seconds: float, callback: Callable[[], None]) -> Timer:
-        """Call something in real time, whatever /clock says."""
+        """Call a function periodically in real time, independent of /clock."""
         return self.create_timer(seconds, callback, clock=Clock(clock_type=ClockType.STEADY_TIME))
 
     def pace(self, parameter: str, callback: Callable[[], None]) -> None:
-        """Call something as often as a parameter says [Hz], also once it is set anew."""
-        if parameter in self._paced:  # a timer that is given another period waits for the old one
+        """Call a function at the rate of a parameter [Hz], also after the parameter changes."""
+        # a changed period of a timer takes effect only after the old one
+        if parameter in self._paced:
             self.destroy_timer(self._paced[parameter][1])
         timer = self.create_timer(1.0 / self.value(parameter), callback)
         self._paced[parameter] = callback, timer
 
     @property
     def missing_clock(self) -> str:
-        """Say that there is no time, simulated as it is; empty where there is one."""
+        """Return why simulated time is missing; empty if it is available or not used."""
         clock = self.get_clock()
         if not clock.ros_time_is_active:
             return ''
@@ -132,95 +132,95 @@ class ArmidNode(Node):
         return ''
 
     def look_for_clock(self) -> None:
-        """Log once that there is no simulated time: /diagnostics do not come without it."""
+        """Log once that simulated time is missing, since /diagnostics needs it."""
         missing = self.missing_clock
         if missing and not self._clock_missed:
             self.get_logger().warning(f'{missing}; until then the node waits')
         self._clock_missed = bool(missing)
 
     def look_for_trouble(self) -> None:
-        """Log once what keeps the node from its work: not everybody looks at /diagnostics."""
+        """Log once the problem that /diagnostics shows."""
         trouble = '' if self.missing_clock else self.condition()[0]
         if trouble and not self._trouble_said and not self.complaints.has_logged(trouble):
             self.get_logger().info(trouble)
         self._trouble_said = bool(trouble)
 
     def warn_of_unknown(self) -> None:
-        """Log the parameters that the node was started with and does not have."""
+        """Log start parameters that the node does not have."""
         said = unknown(self)
         if said:
             self.complaints.say('parameter', said)
 
     @property
     def finished(self) -> bool:
-        """Whether there is nothing left to do, so that the process may end."""
+        """Return whether the work of the node is done, so that the process may end."""
         return False
 
     @property
     def failure(self) -> str:
-        """Why the node did not do what it was started for; the process then ends with code 2."""
+        """Return why the task of the node failed; the process then ends with code 2."""
         return ''
 
     @property
     def activity(self) -> str:
-        """Return what the node does while all is well, in a word."""
+        """Return the status message when there is no problem."""
         return 'running'
 
     @property
     def hardware(self) -> str:
-        """Name of the robot, for diagnostics."""
+        """Return the name of the robot, for diagnostics."""
         return ''
 
     @abstractmethod
     def condition(self) -> tuple[str, Mapping[str, object]]:
         """
-        Say how the node is.
+        Return the state of the node for diagnostics.
 
         Returns
         -------
         trouble : str
-            What keeps it from its work; empty when all is well.
+            Problem that keeps the node from its task; empty if none.
         values : mapping of str to number or str
-            What diagnostics shows; plotters draw the numbers.
+            Values for diagnostics; numbers can be plotted.
 
         """
 
     def level(self, troubled: bool) -> bytes:
-        """Return the level of the status; a node that knows worse than a warning says so here."""
+        """Return the level of the status; overridden by nodes with levels above a warning."""
         return DiagnosticStatus.WARN if troubled else DiagnosticStatus.OK
 
     def further_statuses(self) -> Sequence[DiagnosticStatus]:
-        """Return what else to say on /diagnostics."""
+        """Return further statuses for /diagnostics."""
         return ()
 
     def objection(self, values: Mapping[str, Any]) -> str:
         """
-        Say why parameters cannot have new values while the node runs; empty when they can.
+        Return why parameters cannot take new values at run time; empty if they can.
 
         Parameters
         ----------
         values : mapping of str to value
-            What is to be set, all at once; each is of the right type and range.
+            New values, which are set together; types and ranges are already checked.
 
         """
         return ''
 
     def changed(self, names: frozenset[str]) -> None:
         """
-        Act on parameters that were set while the node runs.
+        Apply parameters that were set at run time.
 
         Parameters
         ----------
         names : frozenset of str
-            What was set.
+            Names of the parameters that were set.
 
         """
 
     def close(self) -> None:
-        """Finish what must not be lost."""
+        """Save results and stop motions at the end of the node."""
 
     def tell(self, text: str) -> str:
-        """Log a text, and return it; /rosout is gone once the process is told to end."""
+        """Log a text unless the context is shut down, and return the text."""
         if self.context.ok():
             self.get_logger().info(text)
         return text
@@ -230,7 +230,7 @@ class ArmidNode(Node):
         return self.get_parameter(parameter).value
 
     def folder(self, parameter: str) -> Path:
-        """Return the folder that a parameter names, made if it is not there; or OutputError."""
+        """Return the folder that a parameter names, and create it if necessary."""
         folder = Path(self.value(parameter)).expanduser()
         try:
             folder.mkdir(parents=True, exist_ok=True)
@@ -246,9 +246,9 @@ class ArmidNode(Node):
         Parameters
         ----------
         service : str
-            Its name, such as '~/reset'.
+            Name of the service, such as '~/reset'.
         action : callable
-            Does the work and says what it did; an ArmidError it raises is the answer.
+            Does the work and returns the answer; an ArmidError that it raises becomes the answer.
 
         """
 
@@ -273,10 +273,10 @@ class ArmidNode(Node):
 
     def set_parameters_atomically(self, parameter_list: list[Parameter]) -> SetParametersResult:
         """
-        Set parameters as rclpy does, and complain when they are refused.
+        Set parameters as in rclpy, and log rejected ones.
 
-        What has that value already is no change, so that all a node was dumped with can be loaded
-        again; a whole number is taken for a float.
+        Parameters with unchanged values are accepted, so that dumped parameters can be loaded
+        again. An integer is accepted for a float.
 
         """
         given = [as_declared(self, parameter) for parameter in parameter_list]
@@ -291,7 +291,7 @@ class ArmidNode(Node):
         return result
 
     def publish_diagnostics(self) -> None:
-        """Publish the condition of the node, and what it complained of."""
+        """Publish the state of the node and its complaints."""
         trouble, values = self.condition()
         status = DiagnosticStatus(
             name=f'{self.get_fully_qualified_name()[1:]}: state', hardware_id=self.hardware

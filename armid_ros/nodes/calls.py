@@ -1,6 +1,6 @@
 # Copyright 2026 The armid_ros developers
 # SPDX-License-Identifier: Apache-2.0
-"""Services of a running node, called from outside of ROS."""
+"""Call services of a running node from a process outside ROS."""
 
 from __future__ import annotations
 
@@ -28,7 +28,7 @@ def call_publisher(node: str, action: str, speed: float | None, timeout: float) 
     speed : float or None
         For 'speed': the share of the planned speed.
     timeout : float
-        How long to wait for an answer [s].
+        Timeout of the answer [s].
 
     Returns
     -------
@@ -38,7 +38,7 @@ def call_publisher(node: str, action: str, speed: float | None, timeout: float) 
     Raises
     ------
     TrajectoryError
-        If no node answers in time, or it refuses.
+        If no node answers in time, or the node rejects the call.
 
     """
     name = node if node.startswith('/') else f'/{node}'

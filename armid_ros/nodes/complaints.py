@@ -1,6 +1,6 @@
 # Copyright 2026 The armid_ros developers
 # SPDX-License-Identifier: Apache-2.0
-"""Input that cannot be used is logged once, counted always, and ends no callback."""
+"""Log unusable input once, and count every occurrence."""
 
 from __future__ import annotations
 
@@ -13,31 +13,31 @@ from typing import Any
 from armid_ros.errors import ArmidError, RecordingEnded
 from rclpy.impl.rcutils_logger import RcutilsLogger
 
-#: Different texts said of one kind; a sender of random rubbish must not fill the log.
+#: Largest number of different texts logged per kind, so that the log does not overflow.
 _TEXTS_PER_KIND = 10
-#: What is no matter of a message: a disk that is full ends a recorder, and should.
+#: Errors that end a node, such as a full disk during recording.
 FATAL = (OSError, MemoryError, RecordingEnded)
 
 
 class Complaints:
     """
-    What a node rejected, by kind.
+    Inputs that a node rejected, by kind.
 
     Attributes
     ----------
     counts : Counter of str
-        How often each kind was rejected.
+        Number of rejections of each kind.
     latest : str
-        Text of the last complaint; empty when there was none.
+        Text of the last complaint; empty before the first one.
     fresh : bool
-        Whether something was rejected since the last `settle`.
+        Whether an input was rejected since the last `settle`.
     defects : int
-        Rejections that nobody had foreseen.
+        Number of rejections by unexpected exceptions.
 
     """
 
     def __init__(self, logger: RcutilsLogger) -> None:
-        """Say things on the logger of a node, which is also /rosout."""
+        """Log complaints with the logger of a node."""
         self._logger = logger
         self.counts: Counter[str] = Counter()
         self._said: dict[str, set[str]] = {}
@@ -46,7 +46,7 @@ class Complaints:
         self.defects = 0
 
     def say(self, kind: str, text: str) -> None:
-        """Count a rejected input, and log it unless the same was said before."""
+        """Count a rejected input, and log the text unless it was logged before."""
         self.counts[kind] += 1
         self.latest = text
         self.fresh = True
@@ -56,11 +56,11 @@ class Complaints:
             self._logger.warning(text)
 
     def has_logged(self, text: str) -> bool:
-        """Whether a text is in the log."""
+        """Return whether a text was logged."""
         return any(text in said for said in self._said.values())
 
     def defect(self, kind: str, error: Exception) -> None:
-        """Count an input that led to an error which nobody had foreseen, and say where."""
+        """Count and log an input that caused an unexpected exception."""
         self.defects += 1
         self.say(kind, f'{kind}: left out, as it cannot be used ({type(error).__name__}: {error})')
         self._logger.debug(''.join(traceback.format_exception(error)))
@@ -72,16 +72,16 @@ class Complaints:
 
 def surviving(callback: Callable[..., Any], what: str, node: Any) -> Callable[..., Any]:
     """
-    Return a callback that complains where another one would raise.
+    Return a callback that logs exceptions as complaints instead of raising.
 
     Parameters
     ----------
     callback : callable
-        Of a subscription or a timer.
+        Callback of a subscription or a timer.
     what : str
-        What calls it, such as a topic.
+        Source of the call, such as a topic.
     node : ArmidNode
-        Takes the complaints; while ROS shuts down exceptions are its way to say so.
+        Node that logs the complaints. Exceptions during shutdown of ROS are raised.
 
     """
 

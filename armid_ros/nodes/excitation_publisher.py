@@ -1,6 +1,6 @@
 # Copyright 2026 The armid_ros developers
 # SPDX-License-Identifier: Apache-2.0
-"""The excitation publisher node: takes an arm into an excitation, watches it, and stops it."""
+"""Excitation publisher node: sends an excitation to an arm, and watches and stops the arm."""
 
 from __future__ import annotations
 
@@ -40,27 +40,27 @@ from armid_ros.nodes.trajectory.senders import TrajectorySenders
 import numpy as np
 from std_msgs.msg import String
 
-#: How often a subscriber is looked for, and whether the arm is still heard of [s].
+#: Period of the checks for subscribers and joint states [s].
 _LOOK_PERIOD = 0.05
-#: How often the arm is compared with the run, whatever the rate of joint_states [s].
+#: Shortest period of the comparison of arm and run [s].
 _TRACKING_PERIOD = 0.005
-#: How often in a row an effort has to be too large: one spike is no collision.
+#: Number of too large efforts in a row that count as a collision.
 _OVERLOADS = 3
-#: How long the last message may take to arrive when the node ends [s].
+#: Longest wait at the end of the node for the last message to arrive [s].
 _FAREWELL = 1.0
 
 
 class ExcitationPublisherNode(ArmidNode):
     """
-    Has a trajectory controller, real or simulated, run an excitation.
+    Sends an excitation to a real or simulated trajectory controller.
 
-    The run is a goal of the action follow_joint_trajectory where a controller offers it, else a
-    message. It begins where joint_states place the arm at rest, and goes from there to the
-    excitation slowly, past what stands around. The arm is stopped on the path it is on: by the
-    service, when the node ends, when the arm does not follow or takes an unforeseen effort, when
-    joint states are missing or contradict each other, and when the controller is gone. Every
-    motion that is sent passes one `MotionGate`. No message is latched, so that a controller that
-    starts later does not move the arm.
+    The run is sent as a goal of the action follow_joint_trajectory if a controller offers the
+    action, else as a message. The arm must be at rest at the start. It moves slowly from its
+    measured position to the excitation, and avoids known obstacles. The arm is stopped on its path
+    by the service ~/stop and at the end of the node. It is also stopped if it does not follow, an
+    effort is too large, joint states are missing or contradictory, or the controller disappears.
+    Every motion passes one `MotionGate`. No message is latched, so that a controller that starts
+    later does not move the arm.
 
     """
 
@@ -78,11 +78,11 @@ class ExcitationPublisherNode(ArmidNode):
         Parameters
         ----------
         excitation : Excitation, optional
-            What is to be run; by default the one the parameters describe.
+            Excitation to run; by default described by the parameters.
         planner : TransferPlanner, optional
-            Plans the way to it; by default for the robot that the parameters name.
+            Plans the path to the excitation; by default for the robot that the parameters name.
         **kwargs
-            For rclpy's Node.
+            Keyword arguments of rclpy's Node.
 
         """
         super().__init__('excitation_publisher', **kwargs)
@@ -95,7 +95,7 @@ class ExcitationPublisherNode(ArmidNode):
                 self.get_logger().info('making the excitation')
                 excitation = make_excitation(self.value, self._rate, planner)
         if excitation is None:
-            raise TrajectoryError('a planner needs an excitation to plan the way to')
+            raise TrajectoryError('a planner is given without an excitation')
         self._planner = planner
         self._excitation = excitation.for_joints(planner.arm.robot.joints)
         self._gate: MotionGate | None = None
@@ -119,19 +119,20 @@ class ExcitationPublisherNode(ArmidNode):
         self._timer = self.look_every(_LOOK_PERIOD, self.look)
 
     def parameters(self) -> Sequence[NodeParameter]:
-        """Return the parameters; those of a simulation have defaults of their own."""
+        """Return the parameters; for a simulation some defaults differ."""
         declare(self, (SIMULATION,))
         table = [p for p in super().parameters() if p is not SIMULATION]
         self._simulated = bool(self.value('simulation') or self.value('use_sim_time'))
         if not self._simulated:
             return table
-        # nothing breaks in a simulation, but it is silent while it works on a long trajectory
+        # A simulation needs no caution, but sends no joint states while it checks a long
+        # trajectory.
         lively = {'speed': 'fast', 'start': True, 'state_timeout': 5.0, 'effort_factor': 0.0}
         return [replace(p, default=lively.get(p.name, p.default)) for p in table]
 
     @property
     def duration(self) -> float:
-        """Time from the message to the end of the run, approach included [s]."""
+        """Return the duration of the run with its approach [s]."""
         if self._gate is not None:
             return self._gate.run.duration
         return float(self.value('approach') + self._excitation.sampled_duration(self._rate))
@@ -143,15 +144,15 @@ class ExcitationPublisherNode(ArmidNode):
 
     @property
     def last_stamp_ns(self) -> int:
-        """Stamp of the oldest believed position of a joint [ns]."""
+        """Return the oldest stamp of the accepted joint positions [ns]."""
         return min(self._arm.monitor.pose.stamps)
 
     @property
     def elapsed(self) -> float | None:
         """
-        Time since the run began, approach included [s]; None when there is no run.
+        Return the time since the begin of the approach [s]; None without a run.
 
-        A goal is under way until the controller says how it ended, whatever the time.
+        A goal counts as running until the controller reports its end.
 
         """
         if self._gate is None:
@@ -161,11 +162,11 @@ class ExcitationPublisherNode(ArmidNode):
         return elapsed if on_the_way else None
 
     def look(self) -> None:
-        """Begin when a controller and the arm are there; stop the arm when one is lost."""
+        """Start when controller and joint states are available; stop the arm if one is lost."""
         self._controller.look()
         now, patience = self._arm.now(), self.value('state_timeout')
         if self.elapsed is not None:
-            # while the way was planned nothing was received, whatever the arm sent
+            # no joint states were processed while the path was planned
             lost = self._arm.staleness(patience) if now - self._begun > patience else ''
             lost = lost or self._arm.monitor.contradiction(now)
             lost = lost or self._controller.trouble(patience)
@@ -182,11 +183,11 @@ class ExcitationPublisherNode(ArmidNode):
             self._look_for_partners()
 
     def start(self) -> str:
-        """Plan the way from where the arm is, and publish the run."""
+        """Plan the path from the measured position, and send the run."""
         return self._start(self.value('speed_scaling'))
 
     def rehearse(self) -> str:
-        """Run the excitation slowly; afterwards the status says how the arm followed."""
+        """Run the excitation slowly; afterwards the status reports how the arm followed."""
         speed = min(self.value('rehearsal_speed'), self.value('speed_scaling'))
         text = self._start(speed)
         assert self._gate is not None
@@ -210,13 +211,14 @@ class ExcitationPublisherNode(ArmidNode):
         )
         gate = MotionGate.of(planned, self._planner)
         motion = planned.motion()
-        first = max(math.ceil(HANDOVER * self._rate), 1)  # the set point is not where the arm is
+        # the set point differs from the measured position
+        first = max(math.ceil(HANDOVER * self._rate), 1)
         message = write_trajectory(motion.select(slice(first, None)), first / self._rate)
         now = self.get_clock().now()
         if not self.value('zero_stamp'):
             message.header.stamp = now.to_msg()
         receiver = self._controller.begin(message)
-        # the controller begins when its own clock has the stamp
+        # the controller begins when its own clock reaches the stamp
         late = self._arm.stamps.late if not (self.value('zero_stamp') or self._simulated) else 0.0
         self._begun_ns, self._begun = now.nanoseconds, self._arm.now() + late
         self._gate, self._ending, self._rehearsal = gate, None, None
@@ -229,14 +231,14 @@ class ExcitationPublisherNode(ArmidNode):
         )
 
     def _fault_at_start(self) -> str:
-        """Return why the arm must not be started, by its joint states; empty when it may."""
+        """Return why the joint states do not permit a start; empty if they do."""
         patience = self.value('state_timeout')
         difference = patience if self.value('simulation') else 0.1 * self.value('stopping')
         difference = math.inf if self.value('zero_stamp') else difference
         return self._arm.fault_at_start(patience, difference, self._simulated)
 
     def stop(self) -> str:
-        """Bring the arm to rest on the path it is on."""
+        """Bring the arm to rest on its path."""
         self._waiting = False
         if self._gate is not None:
             elapsed = self._arm.now() - self._begun
@@ -257,11 +259,11 @@ class ExcitationPublisherNode(ArmidNode):
 
     @property
     def activity(self) -> str:
-        """Whether the run is under way, and if not, how the last one ended."""
+        """Return 'running' during a run, else how the last run ended."""
         return 'running' if self.elapsed is not None else self._outcome
 
     def condition(self) -> tuple[str, Mapping[str, object]]:
-        """Say how far the run is."""
+        """Return the state and progress of the run."""
         elapsed = self.elapsed
         values = {
             'running': int(elapsed is not None),
@@ -275,11 +277,11 @@ class ExcitationPublisherNode(ArmidNode):
             values['controller_error'] = self._controller.error
         waiting = 'waiting for a controller and joint states' if self._waiting else ''
         if elapsed is not None and elapsed > self.duration + self.value('state_timeout'):
-            waiting = 'the controller does not say that the end is reached; ~/stop gives it up'
+            waiting = 'the controller does not report the end of the run; ~/stop ends the run'
         return self._trouble or waiting or self._rehearsed, values
 
     def objection(self, values: Mapping[str, Any]) -> str:
-        """Refuse files that are no excitation of this arm, and any while the arm runs."""
+        """Return why a new excitation file cannot be used; empty if it can."""
         if 'file' not in values:
             return ''
         if self.elapsed is not None:
@@ -291,30 +293,30 @@ class ExcitationPublisherNode(ArmidNode):
         return ''
 
     def changed(self, names: frozenset[str]) -> None:
-        """Take the excitation of a file that was set."""
+        """Load the excitation of a changed parameter file."""
         if 'file' in names:
             self._excitation = self._loaded(self.value('file'))
 
     def _loaded(self, path: str) -> Excitation:
         if not path:
-            raise TrajectoryError('a running node designs none; name a file')
+            raise TrajectoryError('a running node designs no excitation; name a file')
         return checked(load_excitation(path), self._planner, path)
 
     def close(self) -> None:
-        """Stop an arm that is not seen at rest, and see to it that the message arrives."""
+        """Stop the arm unless it is at rest, and wait until the message has arrived."""
         sent = self._gate is not None or (self._ending is not None and self._ending.last)
         if sent and self.context.ok():
             self.stop()
             self._controller.settle(_FAREWELL)
 
     def destroy_node(self) -> None:
-        """Stop the arm before the node is gone, whoever destroys it."""
+        """Stop the arm, then destroy the node."""
         self.close()
         self._controller.close()
         super().destroy_node()
 
     def _surviving(self, callback: Callable[..., Any], what: str) -> Callable[..., Any]:
-        """Stop the arm where a callback fails: nobody knows what it leaves undone."""
+        """Return a callback that stops the arm after an unexpected exception."""
 
         @wraps(callback)
         def stopping(*args: Any) -> Any:
@@ -330,7 +332,7 @@ class ExcitationPublisherNode(ArmidNode):
         return super()._surviving(stopping, what)
 
     def _on_state(self) -> None:
-        """Compare the arm with its run."""
+        """Compare the measured position and effort with the run."""
         now = self._arm.now()
         if 0.0 <= now - self._tracked < _TRACKING_PERIOD:
             return
@@ -345,7 +347,7 @@ class ExcitationPublisherNode(ArmidNode):
         phase = (min(pose.stamps) - self._begun_ns) * 1e-9
         strange = abs(phase - elapsed) > self.value('state_timeout')
         if not min(pose.stamps) or (strange and not self._simulated):
-            phase = elapsed  # the stamp is of another clock; a simulation may just be slow
+            phase = elapsed  # the stamp is from another clock; simulated joint states may be late
         if self._rehearsal is not None:
             self._rehearsal.add(phase, pose.q, effort)
         tolerance = self.value('tracking_tolerance')
@@ -366,10 +368,10 @@ class ExcitationPublisherNode(ArmidNode):
                 self._say_trouble(f'not started: {error}')
         elif time.monotonic() > self._deadline:
             self._waiting = False
-            self.get_logger().warning(f'{missing}; call ~/start when that has changed')
+            self.get_logger().warning(f'{missing}; call ~/start when this is solved')
 
     def _give_up(self, reason: str, *, blocked: bool = False) -> None:
-        """Stop the arm on its path; a blocked one is afterwards held where it stands."""
+        """Stop the arm on its path; a blocked arm is held at its position."""
         elapsed = self._arm.now() - self._begun
         self._end_run(reason, blocked)
         self._say_trouble(f'stopped {elapsed:.2f} s after the start: {reason}')
@@ -385,7 +387,7 @@ class ExcitationPublisherNode(ArmidNode):
         self._controller.bring_to_rest(write_trajectory(motion, float(motion.t[0])))
 
     def _watch_ending(self, ending: Ending) -> None:
-        """See to it that the arm comes to rest; hold it where it stands if it is blocked."""
+        """Check that the arm comes to rest; hold a blocked arm at its position."""
         limits = map(self.value, ('state_timeout', 'tracking_tolerance', 'stopping'))
         self._ending, motion, report = ending.looked(self._arm.monitor, self._arm.now(), *limits)
         if motion is not None:
@@ -399,10 +401,10 @@ class ExcitationPublisherNode(ArmidNode):
         self.tell(f'run complete: {gate.run.duration:.1f} s, approach included')
 
     def _on_goal_ended(self, reason: str) -> None:
-        """Take what a controller says of the run: that it is at its end, or why it is not."""
+        """Handle the result of the controller: empty at the end of the run, else the reason."""
         gate, now = self._gate, self._arm.now()
         if gate is None:
-            return  # it was stopped, and whether the arm is at rest is seen
+            return  # the run was stopped before
         if not reason:
             self._end_complete(gate)
             return
@@ -411,7 +413,7 @@ class ExcitationPublisherNode(ArmidNode):
         self._say_trouble(f'stopped {now - self._begun:.2f} s after the start: {reason}')
 
     def _end_rehearsal(self, rehearsal: Rehearsal) -> None:
-        """Say how the rehearsal went, and what to do next."""
+        """Report the result of the rehearsal and the next step."""
         self._rehearsal = None
         report, surprises = rehearsal.report()
         speed = 100.0 * self.value('speed_scaling')
@@ -422,9 +424,9 @@ class ExcitationPublisherNode(ArmidNode):
             self._rehearsed = self.tell(f'rehearsed: {report}; {advice}')
 
     def _on_experiment(self, message: String) -> None:
-        """Take an excitation that somebody planned; ~/start runs it, and nothing else does."""
+        """Take an excitation from the topic experiment; only ~/start runs it."""
         if self.elapsed is not None:
-            raise TrajectoryError('an excitation is under way; the new one is not taken')
+            raise TrajectoryError('an excitation is under way; the new excitation is ignored')
         excitation = read_excitation(message.data, self._experiments.topic_name)
         self._excitation = checked(excitation, self._planner, self._experiments.topic_name)
         self.tell(f'took an excitation of {self._excitation.duration:g} s; ~/start runs it')

@@ -1,6 +1,6 @@
 # Copyright 2026 The armid_ros developers
 # SPDX-License-Identifier: Apache-2.0
-"""The identification run node: excites, records, identifies, diagnoses, reports, and ends."""
+"""Identification run node: excites and records an arm, then identifies and diagnoses it."""
 
 from __future__ import annotations
 
@@ -26,13 +26,13 @@ from rclpy.client import Client
 from rclpy.task import Future
 from std_srvs.srv import Trigger
 
-#: How often it is looked what has happened [s].
+#: Period of the check for progress [s].
 _LOOK_PERIOD = 0.05
-#: How long a program may take to end that is told to [s].
+#: Time for a program to end after SIGTERM [s].
 _FAREWELL = 5.0
-#: How long to wait for a node to say that it has stopped [s]; under a launch it may be gone.
+#: Timeout of the answer of a node that is stopped [s]; the node may have ended already.
 _PARTING = 1.0
-#: What is said of a program that ended well, by command: the document it wrote, and its keys.
+#: Result document of each command, and the keys that are reported.
 _SAID = {
     'identify': ('identification.json', ('grade',)),
     'diagnose': ('diagnosis.json', ('verdict', 'summary')),
@@ -42,31 +42,30 @@ _SAID = {
 _FOLDERS = {'identification': IDENTIFICATION, 'diagnosis': DIAGNOSIS}
 #: A program: its command and arguments.
 Program = tuple[str, ...]
-#: What a step waits for, in words, and whether it has come.
+#: Name of the step, and a function that returns whether its condition is met.
 Wait = tuple[str, Callable[[], Any]]
 
 
 def start_program(program: Program) -> subprocess.Popen[bytes]:
-    """Begin an armid command in a process of its own."""
+    """Start an armid command in its own process."""
     return subprocess.Popen([sys.executable, '-P', '-m', 'armid_ros.cli', *program])
 
 
 class IdentificationRunNode(ArmidNode):
     """
-    Has an arm identified, from the excitation to the report, and ends by itself.
+    Runs an identification from excitation to report, and then ends.
 
-    It asks `recorder` and `excitation_publisher` for each run, and when all are recorded has
-    `armid identify` and `armid diagnose` make of them what they can. The last run is held out when
-    there are several. Whatever fails is said, and ends the node with code 2; what was recorded and
-    identified until then stays. What of that can be known beforehand is said before the arm moves.
-    When the node is ended, it stops the run and the recording that it has begun.
+    The node calls `recorder` and `excitation_publisher` for each run. After all runs it starts
+    `armid identify` and `armid diagnose` on the recordings. The last of several runs is held out.
+    An error is logged and ends the node with code 2; recordings and results until then are kept.
+    Inputs are checked before the arm moves. At its end, the node stops the run and the recording
+    that it began.
 
     """
 
     table = (
         NodeParameter('robot', 'humanoid_arm', 'A shipped robot, or the path of a URDF or xacro.'),
         NodeParameter('gravity', 'earth', 'earth, moon, or x,y,z in the base frame [m/s^2].'),
-        NodeParameter('joints', [''], 'Driven joints; without names, all but those of grippers.'),
         NodeParameter(
             'effects',
             [''],
@@ -75,13 +74,15 @@ class IdentificationRunNode(ArmidNode):
         NodeParameter(
             'save_to',
             'identification',
-            'Folder, in which identification and diagnosis get one each.',
+            'Folder for the subfolders identification and diagnosis.',
         ),
         NodeParameter('runs', 2, 'Number of runs of the excitation.', limits=(1, 20)),
         NodeParameter(
-            'rehearse', False, 'Run it slowly first, and go on only if that is as foreseen.'
+            'rehearse',
+            False,
+            'First run the excitation slowly; continue only if the arm moves as predicted.',
         ),
-        NodeParameter('diagnose', True, 'Look for what the model lacks, too.'),
+        NodeParameter('diagnose', True, 'Diagnose the arm after its identification.'),
         NodeParameter('publisher', 'excitation_publisher', 'Name of the node that excites.'),
         NodeParameter('recorder', 'recorder', 'Name of the node that records.'),
         NodeParameter(
@@ -96,12 +97,12 @@ class IdentificationRunNode(ArmidNode):
 
     def __init__(self, start: Callable[[Program], Any] = start_program, **kwargs: Any) -> None:
         """
-        Take what starts a program; by default it is a process of its own.
+        Make the node; ``start`` starts a program, by default in its own process.
 
         Raises
         ------
         ArmidError
-            If robot, effects or folder cannot be used.
+            If robot, effects or folder are not valid.
 
         """
         super().__init__('identification_run', **kwargs)
@@ -125,16 +126,16 @@ class IdentificationRunNode(ArmidNode):
 
     @property
     def finished(self) -> bool:
-        """Whether all is done, or something has failed."""
+        """Return whether all steps are done, or one has failed."""
         return self._done
 
     @property
     def failure(self) -> str:
-        """Say what has failed."""
+        """Return the error of the failed step; empty if none."""
         return self._failure
 
     def look(self) -> None:
-        """Take the next step when what it waits for has come."""
+        """Take the next step if the condition of the present step is met."""
         if self._done:
             return
         try:
@@ -151,14 +152,14 @@ class IdentificationRunNode(ArmidNode):
             self._stop_all()
 
     def condition(self) -> tuple[str, Mapping[str, object]]:
-        """Say what is under way, and what has come of it."""
+        """Return the present step and the results so far."""
         return self._failure or self._refused, {
             'step': self._step,
             'results': '; '.join(self._results),
         }
 
     def close(self) -> None:
-        """End the run, the recording and the program that are under way."""
+        """Stop the run, the recording and the program that this node began."""
         self._stop_all()
         for future in self._farewells:
             if self.executor is not None:
@@ -171,7 +172,7 @@ class IdentificationRunNode(ArmidNode):
                 self._program.kill()
 
     def _require_input(self) -> None:
-        """Refuse what armid would refuse after the arm has moved."""
+        """Raise an ArmidError for invalid input, before the arm moves."""
         joints, effects = names(self, 'joints') or None, ','.join(names(self, 'effects'))
         ArmModel.of(
             self.value('robot'), effects=effects, gravity=self.value('gravity'), joints=joints
@@ -182,21 +183,21 @@ class IdentificationRunNode(ArmidNode):
                 refuse_foreign(folder / name, schema)
 
     def _stop_all(self) -> None:
-        """Stop what this node has begun: the arm first."""
+        """Stop the run and the recording that this node began, the arm first."""
         for node in sorted(self._begun):
             if self._client(node, 'stop').service_is_ready():
                 self._farewells.append(self._call(node, 'stop'))
         self._begun = []
 
     def _steps(self) -> Iterator[Wait]:
-        """Go through all that is to be done."""
+        """Yield the conditions of all steps in order."""
         deadline = time.monotonic() + self.value('patience')
         yield (
             'waits for the other nodes',
             lambda: not self._missing() or time.monotonic() > deadline,
         )
         if self._missing():
-            raise ArmidError(f'{" and ".join(self._missing())} did not come up')
+            raise ArmidError(f'{" and ".join(self._missing())} did not start in time')
         if self.value('rehearse'):
             yield from self._excited('rehearse')
         bags = []
@@ -214,7 +215,7 @@ class IdentificationRunNode(ArmidNode):
             yield from self._ended('diagnose', folder / 'diagnosis', bags, *model)
 
     def _excited(self, service: str, what: str = 'rehearsal') -> Iterator[Wait]:
-        """Have the arm run, and wait until it has come to the end."""
+        """Start a run, and wait until it ends."""
         before = int(self._state.get('runs', 0))
         yield from self._started(service, what)
         self._begun.append('publisher')
@@ -229,14 +230,14 @@ class IdentificationRunNode(ArmidNode):
                 raise TrajectoryError(said)
 
     def _over(self, before: int, rehearsed: bool) -> bool:
-        """Return whether a run has ended that began after so many others."""
+        """Return whether a run after the first ``before`` runs has ended."""
         state = self._state
         if int(state.get('runs', 0)) <= before or state['run'] == 'under way':
             return False
         return not rehearsed or state['run'] == 'stopped' or 'rehearsed' in state['message']
 
     def _started(self, service: str, what: str) -> Iterator[Wait]:
-        """Ask again while a controller or joint states are still to come."""
+        """Call the service again until the run starts or the timeout has passed."""
         deadline = time.monotonic() + self.value('patience')
         while True:
             future = self._call('publisher', service)
@@ -253,7 +254,7 @@ class IdentificationRunNode(ArmidNode):
             yield f'{what} is planned', lambda later=later: time.monotonic() > later
 
     def _asked(self, node: str, service: str) -> Any:
-        """Call a service, and return what it says."""
+        """Call a service, and return its answer."""
         future = self._call(node, service)
         yield self._step, future.done
         answer = future.result()
@@ -262,7 +263,7 @@ class IdentificationRunNode(ArmidNode):
         return str(answer.message)
 
     def _ended(self, command: str, folder: Path, bags: list[str], *more: str) -> Iterator[Wait]:
-        """Run an armid command on the bags until it has ended."""
+        """Run an armid command on the bags, and wait for its end."""
         fitted, held_out = (bags[:-1], bags[-1:]) if len(bags) > 1 else (bags, [])
         validate = [part for bag in held_out for part in ('--validate', bag)]
         options = {name: self.value(name) for name in ('robot', 'gravity')}
@@ -277,7 +278,7 @@ class IdentificationRunNode(ArmidNode):
         document = {}
         if (folder / name).is_file():
             document = json.loads((folder / name).read_text(encoding='utf-8'))
-        # that data cannot be diagnosed is an answer
+        # bad_data is a valid verdict, not a failure
         if self._program.returncode and document.get('verdict') != 'bad_data':
             known = f'; until then: {"; ".join(self._results)}' if self._results else ''
             raise ArmidError(
@@ -288,7 +289,7 @@ class IdentificationRunNode(ArmidNode):
         self._results.append(f'{command}: {told or "done"} ({folder / "report.html"})')
 
     def _missing(self) -> list[str]:
-        """Return which of the other nodes are not there."""
+        """Return the names of the nodes that are not available."""
         return [
             name
             for node, name in self._full.items()

@@ -1,6 +1,6 @@
 # Copyright 2026 The armid_ros developers
 # SPDX-License-Identifier: Apache-2.0
-"""The joint state merger node: positions and torques of several senders as one joint state."""
+"""Joint state merger node: merges positions and torques of several topics."""
 
 from __future__ import annotations
 
@@ -34,11 +34,11 @@ _EFFORTS = (
 
 class JointStateMergerNode(ArmidNode):
     """
-    Puts together one joint state of all joints out of what several senders say.
+    Merges the messages of several senders into joint states of all joints.
 
-    Positions may come on several topics, each with some of the joints; torques may be on a topic
-    of their own, as efforts, or as currents that gains make torques of. All are interpolated to
-    the stamps of the first joint's position.
+    Positions may come from several topics, each with some of the joints. Torques may come from a
+    separate topic, as efforts or as currents that are multiplied by gains. All values are
+    interpolated at the stamps of the position of the first joint.
 
     """
 
@@ -46,12 +46,12 @@ class JointStateMergerNode(ArmidNode):
         NodeParameter(
             'joints',
             [''],
-            'Joints to publish, in this order; empty: the driven ones of robot_description.',
+            'Joints to publish, in this order; empty: the driven joints of robot_description.',
         ),
         NodeParameter(
             'position_topics',
             ['joint_states'],
-            'JointState topics with positions, each of any of the joints.',
+            'JointState topics with positions of some or all joints.',
         ),
         NodeParameter(
             'effort_topic',
@@ -63,12 +63,13 @@ class JointStateMergerNode(ArmidNode):
         NodeParameter(
             'effort_interface',
             'effort',
-            'Which value of a DynamicJointState it is, such as effort or current.',
+            'Interface of a DynamicJointState to read, such as effort or current.',
         ),
         NodeParameter(
             'effort_joints',
             [''],
-            'Names of the joints on effort_topic, in the order of joints; empty: the same.',
+            'Names of the joints on effort_topic, in the order of joints; empty: the '
+            'names in joints.',
         ),
         NodeParameter(
             'gains',
@@ -79,7 +80,7 @@ class JointStateMergerNode(ArmidNode):
     )
 
     def __init__(self, **kwargs: Any) -> None:
-        """Take the keyword arguments of rclpy's Node."""
+        """Make the node with keyword arguments of rclpy's Node."""
         super().__init__('joint_state_merger', **kwargs)
         self.joints: tuple[str, ...] = ()
         self._published = 0
@@ -101,7 +102,7 @@ class JointStateMergerNode(ArmidNode):
         self.look_every(LOOK_PERIOD, self.look)
 
     def look(self) -> None:
-        """Subscribe to what has appeared."""
+        """Subscribe to topics that have appeared."""
         for subscription in self._positions:
             subscription.match()
         topic = self.value('effort_topic')
@@ -113,14 +114,14 @@ class JointStateMergerNode(ArmidNode):
             if types:
                 if types[0] not in _EFFORTS:
                     raise RecordingError(
-                        f'{types[0]} holds no efforts; those that do: {", ".join(_EFFORTS)}'
+                        f'{types[0]} holds no efforts; types with efforts: {", ".join(_EFFORTS)}'
                     )
                 self._efforts = MatchedSubscription(
                     self, message_class(types[0]), topic, self._on_efforts
                 )
 
     def condition(self) -> tuple[str, Mapping[str, object]]:
-        """Say what comes."""
+        """Return the missing joints and the number of published messages."""
         values: dict[str, object] = {'published': self._published}
         if not self.joints:
             return 'waiting for robot_description', values
@@ -183,7 +184,7 @@ class JointStateMergerNode(ArmidNode):
         self._take_efforts(stamp, self._torques(message), self._effort_names)
 
     def _torques(self, message: Any) -> Mapping[str, float]:
-        """Return the torques or currents that a message of one of the types holds, by name."""
+        """Return the torques or currents in a message, by joint name."""
         if isinstance(message, JointState):
             names, values = message.name, message.effort
         elif hasattr(message, 'interface_values'):
@@ -212,16 +213,15 @@ class JointStateMergerNode(ArmidNode):
         n = len(self.joints)
         some = [k for k, name in enumerate(called) if math.isfinite(known.get(name, math.nan))]
         if not some:
-            raise RecordingError(
-                f'torques of {", ".join(known)}, and of none of {", ".join(called)}'
-            )
+            raise RecordingError(f'torques of {", ".join(known)}, but none of {", ".join(called)}')
         torques = np.array([known[called[k]] for k in some]) * self._gains[some]
         self._take(tuple(n + k for k in some), stamp, np.vstack([torques, torques]))
 
     def _take(self, some: tuple[int, ...], stamp: int, values: FloatArray) -> None:
-        """Publish what is complete with the values of some joints, positions or torques."""
+        """Add values of some joints, and publish the samples that are complete."""
         n = len(self.joints)
-        self._epoch_ns = self._epoch_ns or stamp  # a number of seconds has no room for all of it
+        # a float has too few digits for seconds since 1970
+        self._epoch_ns = self._epoch_ns or stamp
         for t, merged in self._merger.take(some, (stamp - self._epoch_ns) * 1e-9, values):
             q, dq, tau = merged[0, :n], merged[1, :n], merged[0, n:]
             message = JointState(name=list(self.joints), position=q.tolist(), effort=tau.tolist())
@@ -232,7 +232,7 @@ class JointStateMergerNode(ArmidNode):
             self._published += 1
 
     def _stamp(self, stamp: Any) -> int:
-        """Return a stamp [ns]; the time of reception where there is none."""
+        """Return a stamp [ns]; the time of reception if the stamp is zero."""
         return stamp.sec * 10**9 + stamp.nanosec or self.get_clock().now().nanoseconds
 
 

@@ -1,6 +1,6 @@
 # Copyright 2026 The armid_ros developers
 # SPDX-License-Identifier: Apache-2.0
-"""What nodes share that make something of the joint states of one robot."""
+"""Base class of nodes that process the joint states of one robot."""
 
 from __future__ import annotations
 
@@ -20,24 +20,24 @@ from std_msgs.msg import String
 
 class ListeningNode(ArmidNode):
     """
-    A node that reads the joint states of a robot, which parameters or robot_description name.
+    Node that reads the joint states of a robot, given by parameters or robot_description.
 
     Attributes
     ----------
     robot : Robot, or None
-        None until it is known.
+        None until the robot is known.
     received : int
-        Joint states received.
+        Number of received joint states.
     last_stamp_ns : int
-        Stamp of the last one [ns].
+        Stamp of the last joint state [ns].
     freshness : Freshness
-        Whether joint states still come.
+        Monitors whether joint states still arrive.
     stamps : StampDifference
-        How far their stamps are from the clock.
+        Monitors the difference of stamps and clock.
     reader : JointStateReader
-        Reads them, once the robot is known.
+        Decodes joint states; set when the robot is known.
     joint_states : MatchedSubscription
-        Brings them, once `listen` was called.
+        Subscription; set by `listen`.
 
     """
 
@@ -45,7 +45,7 @@ class ListeningNode(ArmidNode):
     joint_states: MatchedSubscription
 
     def __init__(self, name: str, **kwargs: Any) -> None:
-        """Take the keyword arguments of rclpy's Node."""
+        """Make the node with keyword arguments of rclpy's Node."""
         super().__init__(name, **kwargs)
         self.robot: Robot | None = None
         self.received = self.last_stamp_ns = 0
@@ -56,14 +56,14 @@ class ListeningNode(ArmidNode):
 
     @abstractmethod
     def take_description(self, urdf: str) -> None:
-        """Take the robot of robot_description, where it is another than that before."""
+        """Handle a new robot_description."""
 
     @abstractmethod
     def take_sample(self, sample: JointSample) -> None:
-        """Take a joint state of all joints of the robot."""
+        """Handle a joint state of all joints of the robot."""
 
     def adopt(self, robot: Robot) -> None:
-        """Read the joint states of a robot from now on."""
+        """Start to read the joint states of a robot."""
         self.robot = robot
         self.reader = JointStateReader(robot.joints, self.complaints, self.get_clock())
 
@@ -83,24 +83,24 @@ class ListeningNode(ArmidNode):
 
     @property
     def awaited(self) -> str:
-        """What has to come before there is anything to do; empty: nothing."""
+        """Return what the node waits for; empty if for nothing."""
         if self.robot is None:
             return 'waiting for robot_description'
         return '' if self.received else 'no joint states so far'
 
     def level(self, troubled: bool) -> bytes:
-        """Return STALE when joint states have stopped."""
+        """Return STALE if joint states have stopped."""
         return DiagnosticStatus.STALE if self.freshness.stopped else super().level(troubled)
 
     def look(self) -> None:
-        """Look at who publishes joint states, and say at once when they stop or come again."""
+        """Check the publishers, and publish diagnostics if joint states stop or resume."""
         self.joint_states.match()
         if self.freshness.stopped != self._stopped:
             self._stopped = self.freshness.stopped
             self.publish_diagnostics()
 
     def take_joint_states(self, data: bytes) -> None:
-        """Take a joint state as it came, serialised."""
+        """Decode a serialised joint state, and handle its samples."""
         self.received += 1
         self.freshness.heard()
         self.last_stamp_ns = header_stamp(data)

@@ -1,6 +1,6 @@
 # Copyright 2026 The armid_ros developers
 # SPDX-License-Identifier: Apache-2.0
-"""The live diagnosis node: says what the model lacks of an arm while it moves."""
+"""Live diagnosis node: diagnoses an arm while it moves."""
 
 from __future__ import annotations
 
@@ -30,7 +30,7 @@ from armid_ros.nodes.running.process import run
 from diagnostic_msgs.msg import DiagnosticStatus
 from std_msgs.msg import String
 
-#: What each verdict is in /diagnostics: something is wrong where it names or cannot name.
+#: Diagnostics level of verdicts; WARN for all others.
 _LEVELS = {
     'consistent': DiagnosticStatus.OK,
     'bad_data': DiagnosticStatus.ERROR,
@@ -41,10 +41,10 @@ class LiveDiagnosisNode(ListeningNode):
     """
     Diagnoses an arm while it moves.
 
-    Whenever enough new motion came, a process of its own is asked what the model lacks. What it
-    says is on ~/diagnosis; when diagnoses agree on a name, the model with it is on ~/model, which
-    a simulated arm and the online identifier take over. ~/accept makes it the model that is asked
-    about from then on, ~/reject takes it back.
+    After enough new motion, a separate process diagnoses the arm, and the result is published on
+    ~/diagnosis. If several diagnoses in a row agree, the patched model is published on ~/model,
+    which a simulated arm and the online identifier use. ~/accept makes the patched model the model
+    of later diagnoses, and ~/reject discards it.
 
     Attributes
     ----------
@@ -64,11 +64,11 @@ class LiveDiagnosisNode(ListeningNode):
         Parameters
         ----------
         live : LiveDiagnosis, optional
-            Decides when to ask; by default made from the parameters, once the robot is known.
+            Schedules the diagnoses; by default made from the parameters, once the robot is known.
         helper : Helper, optional
-            Answers; by default a process of its own.
+            Computes the diagnoses; by default in a separate process.
         **kwargs
-            For rclpy's Node.
+            Keyword arguments of rclpy's Node.
 
         """
         super().__init__('live_diagnosis', **kwargs)
@@ -89,11 +89,11 @@ class LiveDiagnosisNode(ListeningNode):
 
     @property
     def busy(self) -> bool:
-        """Whether a diagnosis is under way."""
+        """Return whether a diagnosis is under way."""
         return self._helper.busy
 
     def accept(self) -> str:
-        """Take what is proposed for the model."""
+        """Accept the proposed model."""
         live = self._require()
         named = _in_words(live)
         live.accept()
@@ -101,7 +101,7 @@ class LiveDiagnosisNode(ListeningNode):
         return self.tell(f'accepted: {named}')
 
     def reject(self) -> str:
-        """Take back what is proposed, and do not propose it again."""
+        """Reject the proposed effects, and do not propose them again."""
         live = self._require()
         named = _in_words(live)
         live.reject()
@@ -109,13 +109,13 @@ class LiveDiagnosisNode(ListeningNode):
         return self.tell(f'rejected: {named}')
 
     def reset(self) -> str:
-        """Begin anew with the model as it was given."""
+        """Restart with the original model."""
         self._require().reset()
         self._publish_model()
-        return 'the diagnosis begins anew, with the model as it was given'
+        return 'the diagnosis begins anew, with the original model'
 
     def save(self) -> str:
-        """Have the last diagnosis written; the log says when it is."""
+        """Start to write the last diagnosis; its end is logged."""
         self._require_diagnosis()
         folder = self.folder('save_to')
         refuse_replacing(folder, Save.FILES)
@@ -123,29 +123,29 @@ class LiveDiagnosisNode(ListeningNode):
         return f'writing {", ".join(Save.FILES)} to {folder}'
 
     def next_run(self) -> str:
-        """Have the motion planned that separates the names; it goes out on ~/experiment."""
+        """Start to plan the motion that separates the candidates, for ~/experiment."""
         self._require_diagnosis()
         self._begin(Plan(self.value('seed')))
         return f'planning; the motion goes out on {self._runs.topic_name}'
 
     def look(self) -> None:
-        """Look at who publishes joint states, and what has been answered."""
+        """Check the publishers of joint states, and take results of the process."""
         super().look()
         self.take_answer()
 
     def take_sample(self, sample: JointSample) -> None:
-        """Take a joint state of all joints, and ask when enough new motion came."""
+        """Add a joint state to the window, and start a diagnosis after enough new motion."""
         live = self._require()
         learning = live.learning
         self._watch.take(sample.t, sample.q, sample.tau)
         live.add(*sample)
         if learning and not live.learning:
-            self.tell('the misfit of the model is learned; from now on it is diagnosed')
+            self.tell('the misfit of the model is known; diagnoses begin')
         if live.due and not self._helper.busy:
             self._helper.ask(live.request())
 
     def take_answer(self) -> bool:
-        """Take what was answered, if anything; return whether something was."""
+        """Handle a result of the process; return whether there was one."""
         result = self._helper.poll()
         if result is None:
             return False
@@ -158,7 +158,7 @@ class LiveDiagnosisNode(ListeningNode):
         return True
 
     def condition(self) -> tuple[str, Mapping[str, object]]:
-        """Say how far it is."""
+        """Return the state of the diagnosis."""
         live = self.live
         if live is None:
             return self.awaited, {'received': self.received}
@@ -176,21 +176,21 @@ class LiveDiagnosisNode(ListeningNode):
         if self.awaited:
             return self.awaited, values
         if not (self.freshness.stopped or self.complaints.fresh) and live.learning:
-            return 'learning the misfit of the model: nothing may be wrong yet', values
+            return 'learning the misfit of the model: the arm must be healthy', values
         trouble = self.freshness.trouble()
         if not (trouble or self.complaints.fresh):
             trouble = self.stamps.of_results(self.joint_states.topic)
         return trouble, values
 
     def further_statuses(self) -> Sequence[DiagnosticStatus]:
-        """Say what the last diagnosis was."""
+        """Return the status of the last diagnosis."""
         if self.live is None:
             return ()
         name = f'{self.get_fully_qualified_name()[1:]}: diagnosis'
         return (_status(name, self.hardware, self.live.latest),)
 
     def objection(self, values: Mapping[str, Any]) -> str:
-        """Refuse settings that do not fit each other."""
+        """Return why settings do not fit each other; empty if they fit."""
         try:
             settings_of(lambda name: values.get(name, self.value(name)))
         except ArmidError as error:
@@ -198,7 +198,7 @@ class LiveDiagnosisNode(ListeningNode):
         return ''
 
     def changed(self, names: frozenset[str]) -> None:
-        """Use settings that were changed."""
+        """Apply changed settings."""
         if self.live is not None and names & {entry.name for entry in LIVE_SETTINGS}:
             self.live.use(settings_of(self.value))
 
@@ -211,7 +211,7 @@ class LiveDiagnosisNode(ListeningNode):
         self._adopt(make_diagnosis(self.value, urdf))
 
     def _take(self, answer: Answer) -> None:
-        """Publish a diagnosis, and the model if it is another one."""
+        """Publish a diagnosis, and the model if it has changed."""
         live = self._require()
         latest = live.latest
         changed = live.take(answer)
@@ -228,7 +228,7 @@ class LiveDiagnosisNode(ListeningNode):
             self.get_logger().warning(said) if answer.named else self.get_logger().info(said)
 
     def _note(self, done: Done) -> None:
-        """Say what became of saving or planning."""
+        """Log the result of saving or planning."""
         if not done.success:
             self.complaints.say('diagnosis', done.text)
             return
@@ -259,12 +259,12 @@ class LiveDiagnosisNode(ListeningNode):
 
     def _require(self) -> LiveDiagnosis:
         if self.live is None:
-            raise IdentificationError('there is no robot yet: robot_description has not come')
+            raise IdentificationError('no robot is known: robot_description was not received')
         return self.live
 
 
 def _message(answer: Answer, robot: str, confirmed: bool) -> Diagnosis:
-    """Return an answer as a message; the stamp is unset."""
+    """Convert an answer to a message without a stamp."""
     message = Diagnosis(
         robot=robot,
         verdict=answer.verdict,
@@ -292,7 +292,7 @@ def _message(answer: Answer, robot: str, confirmed: bool) -> Diagnosis:
 
 
 def _status(name: str, robot: str, answer: Answer | None) -> DiagnosticStatus:
-    """Return what /diagnostics says of the last answer: in words, and as numbers to plot."""
+    """Return the /diagnostics status of the last answer, with numbers to plot."""
     status = DiagnosticStatus(name=name, hardware_id=robot, message='nothing diagnosed so far')
     status.level = DiagnosticStatus.OK
     if answer is None:

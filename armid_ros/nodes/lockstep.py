@@ -1,10 +1,10 @@
 # Copyright 2026 The armid_ros developers
 # SPDX-License-Identifier: Apache-2.0
 """
-The nodes in one process over real topics, in lock step: as fast as the computer, nothing lost.
+Run the nodes in one process over real topics, in lock step and without losses.
 
-A step of the clock is taken when everybody has what the step before published; so the outcome
-does not depend on how fast the computer is, nor on what else it does.
+The clock advances when all nodes have received the messages of the previous step. The result
+therefore does not depend on the speed and load of the computer.
 
 """
 
@@ -41,15 +41,15 @@ from rosgraph_msgs.msg import Clock
 
 AnyNode = TypeVar('AnyNode', bound=ArmidNode)
 
-#: Without a message for so long something is broken [s]; discovery takes up to 3 s.
+#: Timeout of a message [s]; discovery takes up to 3 s.
 PATIENCE = 20.0
-#: The arm holds still for so long after the end, while filters run out [s].
+#: Time for which the arm rests after the run, so that filters settle [s].
 _REST = 0.5
-#: Begin of time: a stamp of zero would mean that there is none [ns].
+#: First time of the clock [ns]; zero would mean no stamp.
 EPOCH_NS = 1_000 * 10**9
-#: How long the arm is at rest before it is started [s]: what the publisher has to see.
+#: Time for which the arm rests before the run, as the publisher requires [s].
 _SEEN = 0.26
-#: What is recorded, and what is recorded of who learns.
+#: Recorded topics, and further topics with an online identifier.
 _TOPICS = ('joint_states', 'robot_description', 'joint_trajectory')
 _LEARNED = ('online_identifier/estimate',)
 #: Step of the clock of a replay [ns].
@@ -61,12 +61,12 @@ _PERIOD = 1.0
 @dataclass(frozen=True)
 class Progress:
     """
-    How a run is going.
+    Progress of a run.
 
     Attributes
     ----------
     t, duration : float
-        Simulated time since the start, and in all [s].
+        Simulated time since the start, and total simulated time [s].
     real_time_factor : float
         Simulated time per real time so far.
 
@@ -91,27 +91,27 @@ def run_lockstep(
     on_progress: OnProgress | None = None,
 ) -> Progress:
     """
-    Excite an arm and record it, and identify it online where somebody learns.
+    Excite and record a simulated arm, and optionally identify it online.
 
-    Three or four nodes do it: excitation_publisher, simulated_arm, recorder and, with an
-    identifier, online_identifier. They are heard on this machine only.
+    The nodes are excitation_publisher, simulated_arm, recorder and, with an identifier,
+    online_identifier. They communicate on this machine only.
 
     Parameters
     ----------
     arm : SimulatedArm
         The arm.
     excitation : Excitation
-        What it shall do.
+        Excitation to run.
     bag : Path
         Directory to record to; it must not exist.
     identifier : OnlineIdentifier, optional
-        Learns; without it, a run takes half of the time.
+        Identifies the arm online; without it, a run takes half of the time.
     rate : float
-        Of joint_states [Hz].
+        Rate of joint_states [Hz].
     approach : float
-        Time to get from where the arm stands to the start of the excitation [s].
+        Time to move from the initial position to the start of the excitation [s].
     on_progress : callable, optional
-        Told every second of simulated time how it is going.
+        Called with the progress every second of simulated time.
 
     Returns
     -------
@@ -121,7 +121,7 @@ def run_lockstep(
     Raises
     ------
     ArmidError
-        If the bag exists, the arm refuses the excitation, or a node does not get its messages.
+        If the bag exists, the arm rejects the excitation, or a node does not get its messages.
 
     """
     with Stage() as stage:
@@ -185,16 +185,16 @@ def replay_lockstep(
     """
     Play a bag to an online identifier in lock step with /clock.
 
-    Two nodes do it: bag_player and online_identifier.
+    The nodes are bag_player and online_identifier.
 
     Parameters
     ----------
     bag : Path
-        What was recorded, with joint_states.
+        Recording with joint_states.
     identifier : OnlineIdentifier
-        Learns.
+        Identifies the arm.
     duration : float
-        How much of it [s].
+        Time of the bag to play [s].
     on_progress : callable, optional
         As for `run_lockstep`.
 
@@ -230,7 +230,7 @@ def replay_lockstep(
 
 
 class Stage:
-    """Nodes in one process, and the executor that runs them; in the domain of ROS_DOMAIN_ID."""
+    """Nodes in one process with their executor, in the domain of ROS_DOMAIN_ID."""
 
     def __enter__(self) -> Stage:
         domain = os.environ.get('ROS_DOMAIN_ID')
@@ -268,7 +268,7 @@ class Stage:
             return
         deadline = time.monotonic() + PATIENCE
         while not done():
-            if time.monotonic() > deadline:  # a callback that took long may have brought it
+            if time.monotonic() > deadline:  # after the timeout, done() is checked once more
                 raise ArmidError(
                     f'{what}: no message for {PATIENCE:g} s; is UDP on the loopback interface '
                     'blocked?'
@@ -277,7 +277,7 @@ class Stage:
 
 
 class _Watch:
-    """Tells how far a run is."""
+    """Reports the progress of a run."""
 
     def __init__(self, duration: float, tell: OnProgress | None) -> None:
         self._tell, self._due = tell, _PERIOD

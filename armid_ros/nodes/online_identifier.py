@@ -1,6 +1,6 @@
 # Copyright 2026 The armid_ros developers
 # SPDX-License-Identifier: Apache-2.0
-"""The online identifier node: joint states in, an estimate that converges, out."""
+"""Online identifier node: estimates parameters from joint states."""
 
 from __future__ import annotations
 
@@ -46,9 +46,9 @@ from rclpy.publisher import Publisher
 from sensor_msgs.msg import JointState
 from std_msgs.msg import String
 
-#: Where ~/save writes to when nobody says.
+#: Default folder of ~/save.
 _FOLDER = 'online_identification'
-#: Update times that are kept for diagnostics.
+#: Number of update times kept for diagnostics.
 _TIMED = 2000
 
 
@@ -85,13 +85,13 @@ class OnlineIdentifierNode(ListeningNode):
     )
 
     def __init__(self, identifier: OnlineIdentifier | None = None, **kwargs: Any) -> None:
-        """Take the identifier; by default made from the parameters, once the robot is known."""
+        """Make the node; the identifier is by default made from the parameters."""
         super().__init__('online_identifier', **kwargs)
         self.identifier: OnlineIdentifier | None = None
         self.update_times: deque[float] = deque(maxlen=_TIMED)
         self._published = -1
         self._disturbed: Counter[str] = Counter()
-        if self.value('save_to'):  # said now, and not when all has been learned
+        if self.value('save_to'):  # check before the identification, not at its end
             refuse_replacing(Path(self.value('save_to')).expanduser(), FILES)
         if identifier is None and self.value('robot'):
             identifier = make_identifier(self.value)
@@ -108,7 +108,7 @@ class OnlineIdentifierNode(ListeningNode):
         self.pace('estimate_rate', self.publish_estimate)
 
     def reset(self) -> str:
-        """Forget everything that was learned."""
+        """Delete the estimate, and start again."""
         self._require().reset()
         self._progress.reset()
         self._disturbed.clear()
@@ -118,7 +118,7 @@ class OnlineIdentifierNode(ListeningNode):
         return 'the estimate begins anew'
 
     def save(self) -> str:
-        """Write what was learned."""
+        """Write the estimate to files."""
         if not self._require().samples:
             raise IdentificationError('nothing has been learned so far, so nothing is written')
         folder = Path(self.value('save_to') or _FOLDER).expanduser()
@@ -126,7 +126,7 @@ class OnlineIdentifierNode(ListeningNode):
         return f'wrote {", ".join(map(str, paths))}'
 
     def close(self) -> None:
-        """Save what was learned, where somebody has said where to."""
+        """Save the estimate if the parameter save_to is set."""
         if self.value('save_to') and self.identifier is not None and self.identifier.samples:
             try:
                 said = self.save()
@@ -143,7 +143,7 @@ class OnlineIdentifierNode(ListeningNode):
         self._publish(self._estimates, identifier.estimate(), self._last_sample_stamp)
 
     def condition(self) -> tuple[str, Mapping[str, object]]:
-        """Say how the identification goes."""
+        """Return the state of the identification."""
         identifier = self.identifier
         if identifier is None:
             return self.awaited, {'received': self.received}
@@ -167,7 +167,7 @@ class OnlineIdentifierNode(ListeningNode):
         return self._trouble(identifier), values
 
     def further_statuses(self) -> Sequence[DiagnosticStatus]:
-        """Say what was learned, with intervals, and what has changed."""
+        """Return the estimate with intervals, and the detected changes."""
         identifier, prefix = self.identifier, self.get_fully_qualified_name()[1:]
         if identifier is None:
             return ()
@@ -182,7 +182,7 @@ class OnlineIdentifierNode(ListeningNode):
         return statuses
 
     def objection(self, values: Mapping[str, Any]) -> str:
-        """Refuse settings that would need a new beginning."""
+        """Return why settings cannot change at run time; empty if they can."""
         if self.identifier is None:
             return ''
         try:
@@ -192,12 +192,12 @@ class OnlineIdentifierNode(ListeningNode):
         return ''
 
     def changed(self, names: frozenset[str]) -> None:
-        """Go on with settings that were changed."""
+        """Apply changed settings."""
         if self.identifier is not None:
             self.identifier.use(self._settings({}))
 
     def _settings(self, values: Mapping[str, Any]) -> OnlineSettings:
-        """Return the settings of the identifier with the parameters that can change."""
+        """Return the settings of the identifier, with new values of changeable parameters."""
         described = settings_of(
             lambda name: values.get(name, self.value(name)), self._require().arm
         )
@@ -205,7 +205,7 @@ class OnlineIdentifierNode(ListeningNode):
         return replace(self._require().settings, **can_change)
 
     def level(self, troubled: bool) -> bytes:
-        """Return STALE when joint states have stopped, ERROR when nothing can be learned."""
+        """Return STALE if joint states have stopped, ERROR if the identification failed."""
         failed = self.identifier is not None and bool(self.identifier.error)
         stopped = self.freshness.stopped
         return DiagnosticStatus.ERROR if failed and not stopped else super().level(troubled)
@@ -243,8 +243,8 @@ class OnlineIdentifierNode(ListeningNode):
         self._begin(make_identifier(self.value, urdf))
 
     def _on_model(self, message: String) -> None:
-        """Estimate the effects of a model from its values on, if it has others."""
-        # Effects of the parameters stay, as a model without friction is no reason to forget it.
+        """Restart with the effects and values of a model, if its effects are different."""
+        # Effects from the parameters are kept, even if the model lacks them.
         before = self._require()
         arm = read_model(message.data, before.arm.robot, 'model')
         kept = [e for e in self._own_effects if not any(_covers(m, e) for m in arm.effects)]
@@ -256,7 +256,7 @@ class OnlineIdentifierNode(ListeningNode):
             self._adopt(OnlineIdentifier(arm, before.settings, rng=rng))
 
     def take_sample(self, sample: JointSample) -> None:
-        """Learn from the joint state of all joints."""
+        """Update the estimate with a joint state of all joints."""
         identifier = self._require()
         begun = time.thread_time()
         identifier.update(*sample)
@@ -270,7 +270,7 @@ class OnlineIdentifierNode(ListeningNode):
             self._publish_effort(self._residuals, learned.residual)
         for change in identifier.changes[self._told :]:
             self._told += 1
-            self._progress.reset()  # what is learned anew has ten seconds, too
+            self._progress.reset()  # a new estimate gets the same time before a warning
             self.get_logger().warning(str(change))
             self._publish(self._changes, change.size, self.reader.stamp(change.t).to_msg())
 
@@ -313,7 +313,7 @@ class OnlineIdentifierNode(ListeningNode):
 
     def _require(self) -> OnlineIdentifier:
         if self.identifier is None:
-            raise IdentificationError('there is no robot yet: robot_description has not come')
+            raise IdentificationError('no robot is known: robot_description was not received')
         return self.identifier
 
 

@@ -1,6 +1,6 @@
 # Copyright 2026 The armid_ros developers
 # SPDX-License-Identifier: Apache-2.0
-"""Quality of service: what the nodes offer, and how they match what others offer."""
+"""Quality of service of the nodes, and its match with other publishers."""
 
 from __future__ import annotations
 
@@ -16,13 +16,13 @@ from rosbags.interfaces import Qos, QosDurability, QosReliability
 
 #: Commands, /clock and diagnostics.
 STREAM = QoSProfile(depth=10)
-#: The latest value, also for those who come late: descriptions, trajectories, estimates.
+#: Latest value, also for late subscribers: descriptions, models, estimates.
 LATCHED = QoSProfile(depth=1, durability=DurabilityPolicy.TRANSIENT_LOCAL)
 #: Messages a subscription holds while its node is busy: 1 s at 1 kHz.
 DEPTH = 1000
-#: Joint states, of which none may be lost. A process that gets no processor leaves what is sent to
-#: it in shared memory, which holds 512 messages, half a second at 1 kHz; what came after that is
-#: sent again from the history of the publisher, as far as that goes back.
+#: Joint states, of which none may be lost. While a subscriber is not scheduled, shared memory
+#: holds 512 messages, half a second at 1 kHz. Later messages are sent again from the history of
+#: the publisher, of this depth.
 SAMPLES = QoSProfile(depth=DEPTH)
 
 
@@ -30,8 +30,8 @@ def matching(publishers: Sequence[TopicEndpointInfo], depth: int) -> QoSProfile:
     """
     Return the strictest profile that all publishers of a topic satisfy, as rosbag2 does.
 
-    Reliable when all are reliable, transient local when all are; otherwise the lesser one, which
-    matches every publisher.
+    The profile is reliable if all publishers are reliable, and transient local if all are
+    transient local. Otherwise the weaker policy is used, which matches every publisher.
 
     """
     profiles = [publisher.qos_profile for publisher in publishers]
@@ -41,7 +41,7 @@ def matching(publishers: Sequence[TopicEndpointInfo], depth: int) -> QoSProfile:
 
 
 def recorded(publishers: Sequence[TopicEndpointInfo]) -> tuple[Qos, ...]:
-    """Return what the publishers of a topic offer, as a bag keeps it."""
+    """Return the QoS of the publishers of a topic in the format of a bag."""
     return tuple(
         VOLATILE._replace(
             reliability=QosReliability[publisher.qos_profile.reliability.name],
@@ -52,7 +52,7 @@ def recorded(publishers: Sequence[TopicEndpointInfo]) -> tuple[Qos, ...]:
 
 
 def offered(profiles: Sequence[Qos]) -> QoSProfile:
-    """Return the profile to publish a recorded topic with: the least that all recorded offer."""
+    """Return the profile for playing a recorded topic, the weakest of the recorded ones."""
     best_effort = any(p.reliability is QosReliability.BEST_EFFORT for p in profiles)
     latched = {p.durability for p in profiles} == {QosDurability.TRANSIENT_LOCAL}
     return _profile(DEPTH, not best_effort, latched)
@@ -68,17 +68,18 @@ def _profile(depth: int, reliable: bool, latched: bool) -> QoSProfile:
 
 class MatchedSubscription:
     """
-    A subscription that begins when its topic has a publisher, with the QoS of the publishers.
+    Subscription that starts when its topic has a publisher, with the QoS of the publishers.
 
-    A reliable subscription does not match a best-effort publisher, and a best-effort one loses
-    messages that a reliable publisher would send again; so neither can be chosen beforehand.
+    A reliable subscription does not match a best-effort publisher. A best-effort subscription
+    loses messages that a reliable publisher would send again. The policy therefore depends on the
+    publishers.
 
     Attributes
     ----------
     topic : str
         Full name of the topic, remapped.
     subscription : Subscription, or None
-        None while nobody publishes.
+        None while the topic has no publisher.
 
     """
 
@@ -92,7 +93,7 @@ class MatchedSubscription:
         raw: bool = False,
         depth: int = DEPTH,
     ) -> None:
-        """Subscribe at once if the topic has publishers; otherwise `match` does when it has."""
+        """Subscribe if the topic has publishers; otherwise `match` subscribes later."""
         self._node = node
         self._message_type = message_type
         self._callback = callback
@@ -105,12 +106,12 @@ class MatchedSubscription:
 
     @property
     def publishers(self) -> int:
-        """Return the number of publishers that it hears."""
+        """Return the number of matched publishers."""
         return int(self.subscription.get_publisher_count()) if self.subscription else 0
 
     @property
     def several(self) -> str:
-        """Say which nodes publish the topic, where it is more than one; empty where it is not."""
+        """Return a text that names several publishers of the topic; empty for one or none."""
         found = self._node.get_publishers_info_by_topic(self.topic)
         if len(found) < 2:
             return ''
@@ -118,7 +119,7 @@ class MatchedSubscription:
         return f'{len(found)} nodes publish {self.topic}: {", ".join(sorted(nodes))}; stop one'
 
     def match(self) -> None:
-        """Look at the publishers, and subscribe anew where they offer something else."""
+        """Check the publishers, and subscribe again if their QoS has changed."""
         publishers = self._node.get_publishers_info_by_topic(self.topic)
         if not publishers:
             return

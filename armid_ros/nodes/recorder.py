@@ -1,6 +1,6 @@
 # Copyright 2026 The armid_ros developers
 # SPDX-License-Identifier: Apache-2.0
-"""The recorder node: topics as they come, undecoded, into a bag that survives a kill."""
+"""Recorder node: writes serialised messages of topics to a bag that survives a kill."""
 
 from __future__ import annotations
 
@@ -23,13 +23,13 @@ from armid_ros.nodes.running.process import run
 from armid_ros.recording import BagWriter
 from armid_ros.recording.message_types import header_stamp
 
-#: How often what waits in memory is written out [s]; bounds what a kill loses.
+#: Period of writing messages in memory to the file [s]; limits the loss after a kill.
 _FLUSH_PERIOD = 0.1
-#: How often the disk is looked at [s].
+#: Period of the check of the disk [s].
 _WATCH_PERIOD = 1.0
-#: A disk that will be full within this time is warned of [s].
+#: A warning is logged if the disk will be full within this time [s].
 _WARNED = 60.0
-#: Messages kept while simulated time has not begun.
+#: Largest number of messages kept until simulated time begins.
 _HELD = 1000
 
 
@@ -40,9 +40,9 @@ class RecorderNode(ArmidNode):
     Attributes
     ----------
     message_count : int
-        Messages in the bag, or in the last one when none is open.
+        Messages in the open bag, or in the last one.
     last_stamps : dict of str to int
-        Header stamp of the last message of each topic that has one [ns].
+        Header stamp of the last message of each topic [ns]; 0 without a header.
 
     """
 
@@ -57,21 +57,21 @@ class RecorderNode(ArmidNode):
         NodeParameter(
             'topics',
             [''],
-            'Topics to record; without names, all that are published.',
+            'Topics to record; if empty, all published topics.',
             read_only=False,
         ),
         NodeParameter('record', True, 'Record from the start, without waiting for ~/start.'),
         NodeParameter(
             'compression',
             'zstd',
-            'Compression of the chunks, of the next bag where one is open.',
+            'Compression of the chunks; a change applies to the next bag.',
             choices=('zstd', 'lz4', 'none'),
             read_only=False,
         ),
         NodeParameter(
             'min_free',
             50.0,
-            'Free space on the disk below which the bag is completed and the node ends.',
+            'Free disk space below which the bag is completed and the node ends.',
             'MB',
             limits=(0.0, 1e6),
             read_only=False,
@@ -87,12 +87,12 @@ class RecorderNode(ArmidNode):
     )
 
     def __init__(self, **kwargs: Any) -> None:
-        """Begin to record where the parameters ask for it."""
+        """Make the node, and start to record if the parameter record is true."""
         super().__init__('recorder', **kwargs)
         self._wanted = self._topics_wanted()
         self._writer: BagWriter | None = None
         self._subscriptions_by_topic: dict[str, MatchedSubscription] = {}
-        self._refused: dict[str, Sequence[str]] = {}  # types of topics that are not recorded
+        self._refused: dict[str, Sequence[str]] = {}  # types of rejected topics
         self._held: list[tuple[str, bool, bytes]] = []  # topic, whether it has stamps, message
         self._bags = 0
         self.message_count = 0
@@ -109,21 +109,21 @@ class RecorderNode(ArmidNode):
 
     @property
     def recording(self) -> bool:
-        """Whether a bag is open."""
+        """Return whether a bag is open."""
         return self._writer is not None
 
     @property
     def missing(self) -> tuple[str, ...]:
-        """Topics that are to be recorded and that nobody publishes."""
+        """Return the topics to record that have no publisher."""
         heard = {t for t, s in self._subscriptions_by_topic.items() if s.publishers}
         return tuple(sorted(self._wanted - heard))
 
     def start(self) -> str:
-        """Open a bag and record; RecordingError when it cannot be made or one is open."""
+        """Open a bag and record; RecordingError if one is open or cannot be created."""
         if self._writer is not None:
             raise RecordingError(f'recording into {self._writer.path} already')
         name = self.value('bag') or f'armid_{datetime.now():%Y_%m_%d-%H_%M_%S}'
-        # The first bag must not exist; those of later ~/start are numbered.
+        # The first bag must not exist; bags of later ~/start calls get a number.
         path = Path(name).expanduser()
         number = self._bags
         while number and path.exists():
@@ -140,7 +140,7 @@ class RecorderNode(ArmidNode):
         return self.tell(f'recording into {self._writer.path}')
 
     def stop(self) -> str:
-        """Complete the bag, and say where it is and how many messages it holds."""
+        """Complete the bag, and return its path and number of messages."""
         if self._writer is None:
             raise RecordingError('nothing is being recorded')
         for subscription in self._subscriptions_by_topic.values():
@@ -169,12 +169,13 @@ class RecorderNode(ArmidNode):
 
     def watch(self) -> None:
         """
-        Look whether the bag is still there, and has room to grow.
+        Check that the bag exists and the disk has free space.
 
         Raises
         ------
         RecordingError
-            It was deleted or moved, or the disk is all but full; it is complete nevertheless.
+            If the bag was deleted or moved, or the disk is almost full. The bag is completed
+            before.
 
         """
         writer = self._writer
@@ -196,7 +197,7 @@ class RecorderNode(ArmidNode):
             )
 
     def changed(self, names: frozenset[str]) -> None:
-        """Record other topics, or write more often, from now on."""
+        """Apply changed topics, bag name and chunk age."""
         if 'topics' in names:
             self._wanted = self._topics_wanted()
             self.look()
@@ -206,11 +207,11 @@ class RecorderNode(ArmidNode):
             self._writer.chunk_age = self.value('chunk_age')
 
     def condition(self) -> tuple[str, Mapping[str, object]]:
-        """Say where the messages go and how many there are."""
+        """Return the path of the bag, the number of messages, and problems with topics."""
         refused = sorted(filter(self._is_wanted, self._refused))
         absent = sorted(set(self.missing) - set(refused))
         trouble = '; '.join(
-            [f'nobody publishes {", ".join(absent)}'] * bool(absent)
+            [f'no node publishes {", ".join(absent)}'] * bool(absent)
             + [f'not recorded: {", ".join(refused)}'] * bool(refused)
         )
         values: dict[str, object] = {
@@ -257,7 +258,7 @@ class RecorderNode(ArmidNode):
         if writer is None:
             return
         now = self.get_clock().now().nanoseconds
-        if now == 0:  # simulated time has not begun
+        if now == 0:  # before the first /clock
             if len(self._held) < _HELD:
                 self._held.append((topic, stamped, data))
             else:
@@ -274,7 +275,8 @@ class RecorderNode(ArmidNode):
 
     def _write(self, writer: BagWriter, topic: str, stamped: bool, data: bytes, now: int) -> None:
         sent = header_stamp(data) if stamped else 0
-        if self._simulated:  # /clock comes now and then only, but nothing comes before it is sent
+        # /clock has coarse steps, but no message is received before it was sent
+        if self._simulated:
             now = max(now, sent)
         try:
             writer.write(topic, data, now, sent or now)
@@ -291,13 +293,13 @@ class RecorderNode(ArmidNode):
                 self._give_up(str(error))
 
     def _give_up(self, reason: str) -> NoReturn:
-        """End the recording for a reason that keeps it from going on."""
+        """End the recording with an error."""
         writer, self._writer = self._writer, None
         assert writer is not None
         raise self._given_up(writer, reason)
 
     def _given_up(self, writer: BagWriter, reason: str) -> RecordingEnded:
-        """Return the error that says why a recording ended, and what there is of it."""
+        """Complete the bag, and return the error with the reason and the kept messages."""
         lacking = ''
         try:
             writer.close()
@@ -306,9 +308,9 @@ class RecorderNode(ArmidNode):
         count = sum(topic.count for topic in writer.topics)
         kept = f'{count} messages are in {writer.file}'
         if not os.path.lexists(writer.file):
-            kept = f'{count} messages went with it'
+            kept = f'its {count} messages are lost'
         elif lacking:
-            kept += f', without its index ({lacking}): `armid recover` makes it whole'
+            kept += f', without its index ({lacking}): `armid recover` restores the index'
         return RecordingEnded(f'{reason}; recording ends: {kept}')
 
 

@@ -1,6 +1,6 @@
 # Copyright 2026 The armid_ros developers
 # SPDX-License-Identifier: Apache-2.0
-"""The simulated arm node: takes trajectories like a controller, speaks like a robot's drivers."""
+"""Simulated arm node: follows trajectories, and publishes joint states like a driver."""
 
 from __future__ import annotations
 
@@ -41,25 +41,25 @@ from sensor_msgs.msg import Imu, JointState
 from std_msgs.msg import String
 from trajectory_msgs.msg import JointTrajectory
 
-#: How late or early a trajectory may be [s]; more is a message from another time.
+#: Largest delay and lead of the start of a trajectory [s]; otherwise the clocks differ.
 LATEST = 1.0
 EARLIEST = 60.0
-#: How long a trajectory may be [s]: each of its steps is held against the limits when it begins.
+#: Longest trajectory [s]; all its steps are checked against the limits at its start.
 LONGEST = 3600.0
-#: A clock that goes on by more at once was set, and there is nothing to make up [ns].
+#: A larger step of the clock means that it was set; the arm does not catch up [ns].
 LONGEST_NS = 60 * 10**9
-#: Timers cannot be much faster [s].
+#: Shortest period of a timer [s].
 _SHORTEST_PERIOD = 0.0005
 
 
 def _samples(node: Node, kind: type, topic: str) -> Publisher:
-    """Return a publisher of what is measured, whose quality of service a user may choose."""
+    """Return a publisher of measurements; users can override its quality of service."""
     options = QoSOverridingOptions.with_default_policies()
     return node.create_publisher(kind, topic.lstrip('/'), SAMPLES, qos_overriding_options=options)
 
 
 class _ElasticTopics:
-    """Publishers of link/joint_states, reference/joint_states and an imu topic for every link."""
+    """Publishers of link/joint_states, reference/joint_states and one imu topic per link."""
 
     def __init__(self, node: Node, arm: SimulatedArm) -> None:
         self._link = _samples(node, JointState, LINK), JointState(name=list(arm.joints))
@@ -91,14 +91,14 @@ class _ElasticTopics:
 
 class SimulatedArmNode(ArmidNode):
     """
-    A simulated arm on topics.
+    Simulates an arm that is commanded and measured by topics.
 
-    In real time its stamps are those of the system clock. At another real_time_factor it also
-    publishes /clock. With use_sim_time it moves as far as /clock does, and no further. A model on
-    the topic `model`, and effects that are set, make it another arm where it is and as it moves.
-    An arm with elastic joints is read on both sides: joint_states are its motors',
-    link/joint_states its links', reference/joint_states what its drives are asked for, and
-    <link>/imu accelerometers.
+    In real time the stamps are those of the system clock. At another real_time_factor the node
+    also publishes /clock. With use_sim_time the simulation follows /clock. A model on the topic
+    `model`, or a changed parameter effects, changes the dynamics while the arm moves. An arm with
+    elastic joints is measured on both sides: joint_states holds the motors and link/joint_states
+    the links. reference/joint_states holds the references of the drives, and <link>/imu the
+    accelerometers.
 
     """
 
@@ -123,7 +123,7 @@ class SimulatedArmNode(ArmidNode):
         NodeParameter(
             'clock_rate',
             100.0,
-            'Of /clock where it is published, at most that of joint_states; in simulated time.',
+            'Rate of /clock in simulated time; at most the rate of joint_states.',
             'Hz',
             limits=(0.1, 100000.0),
             read_only=False,
@@ -142,11 +142,11 @@ class SimulatedArmNode(ArmidNode):
         Parameters
         ----------
         arm : SimulatedArm, optional
-            The arm; by default the one the parameters describe.
+            Simulated arm; by default made from the parameters.
         start_ns : int, optional
-            Stamp of the beginning [ns]; by default that of the node's clock.
+            First stamp [ns]; by default the time of the node's clock.
         **kwargs
-            For rclpy's Node.
+            Keyword arguments of rclpy's Node.
 
         """
         super().__init__('simulated_arm', **kwargs)
@@ -176,11 +176,11 @@ class SimulatedArmNode(ArmidNode):
         self.offer('~/reset', self.reset)
 
     def _steps_at(self, rate: float) -> int:
-        """Return the steps of the plant between two samples."""
+        """Return the number of plant steps between two samples."""
         return whole_steps(1.0 / rate, self._arm.plant.dt, f'a rate of {rate:g} Hz')
 
     def _keep_pace(self) -> None:
-        """Move as often, and publish /clock as often, as the parameters say."""
+        """Set the rates of the simulation and of /clock from the parameters."""
         rate = self.value('rate')
         self._stride = self._steps_at(rate)
         self._factor = 0.0 if self._follows else self.value('real_time_factor')
@@ -199,17 +199,17 @@ class SimulatedArmNode(ArmidNode):
 
     @property
     def stamp_ns(self) -> int:
-        """Stamp of the present state of the arm [ns]."""
+        """Return the stamp of the present state of the arm [ns]."""
         return (self._origin_ns or 0) + self._arm.state.steps * self._dt_ns
 
     @property
     def joint_state(self) -> JointState:
-        """Return the joint state that was published last."""
+        """Return the last published joint state."""
         return self._message
 
     @property
     def moving(self) -> bool:
-        """Whether a trajectory is under way or about to begin."""
+        """Return whether a trajectory is under way or about to begin."""
         return self._pending is not None or self._arm.state.t < self._arm.ends_at
 
     @property
@@ -223,7 +223,7 @@ class SimulatedArmNode(ArmidNode):
         return str(self._arm.plant.robot.name)
 
     def step(self) -> int:
-        """Move on to the next sample, publish it, and return its stamp [ns]."""
+        """Simulate until the next sample, publish the sample, and return its stamp [ns]."""
         if self._pending is not None and self._pending[0] <= self.stamp_ns:
             (start_ns, reference), self._pending = self._pending, None
             self._begin(reference.remaining((self.stamp_ns - start_ns) * 1e-9))
@@ -243,13 +243,13 @@ class SimulatedArmNode(ArmidNode):
         return stamp_ns
 
     def publish_clock(self) -> None:
-        """Say what time it is, where this node keeps the time."""
+        """Publish /clock if this node is its source."""
         if self._clock_publisher is not None:
             stamp = Time(nanoseconds=self.stamp_ns).to_msg()
             self._clock_publisher.publish(ClockMessage(clock=stamp))
 
     def follow(self) -> None:
-        """Move as far as /clock has."""
+        """Simulate until the present time of /clock."""
         now = self.get_clock().now().nanoseconds
         if self._origin_ns is None or not 0 <= now - self.stamp_ns <= LONGEST_NS:
             self._origin_ns = now - self._arm.state.steps * self._dt_ns
@@ -257,23 +257,23 @@ class SimulatedArmNode(ArmidNode):
             self.step()
 
     def catch_up(self) -> None:
-        """Move as far as real time has, times the factor; what cannot be made up is given up."""
+        """Simulate until real time times the factor; time that cannot be made up is skipped."""
         self._owed += self.real_time.catch_up(self._factor, self._stride * self._arm.plant.dt)
-        # stamps become those of the computer again, but not amid a motion that is watched
+        # set the stamps to the system clock again, but not during a trajectory
         if self._owed and self._clock_publisher is None and not self.moving:
             self._origin_ns = (self._origin_ns or 0) + round(self._owed * 1e9)
             self._owed = 0.0
 
     def reset(self) -> str:
-        """Put the arm back to where it stood first; time goes on."""
+        """Move the arm to its initial position; time continues."""
         self._arm.reset(self._arm.state.steps)
         self._pending = None
         return f'{self.hardware} is where it began'
 
     def condition(self) -> tuple[str, Mapping[str, object]]:
-        """Say how far the simulation is."""
+        """Return the state of the simulation."""
         trouble = ''
-        if self._clock_publisher is None:  # else nobody is misled
+        if self._clock_publisher is None:  # with /clock, other nodes follow the simulated time
             trouble = self.real_time.trouble(
                 'lower its rate, or set a smaller real_time_factor, with use_sim_time on the '
                 'other nodes'
@@ -285,7 +285,7 @@ class SimulatedArmNode(ArmidNode):
         }
 
     def objection(self, values: Mapping[str, Any]) -> str:
-        """Refuse effects that the arm cannot have, and noise and rates that do not fit it."""
+        """Return why effects, noise or rates do not fit the arm; empty if they fit."""
         try:
             sensors_of(lambda name: values.get(name, self.value(name)), self._arm.joints)
             self._steps_at(values.get('rate', self.value('rate')))
@@ -296,7 +296,7 @@ class SimulatedArmNode(ArmidNode):
         return ''
 
     def changed(self, names: frozenset[str]) -> None:
-        """Go on from where the arm is with the effects that were set."""
+        """Apply changed effects, rates and sensors to the moving arm."""
         if 'effects' in names:
             self._become(self._with_effects(self.value('effects')))
         if names & {'rate', 'real_time_factor', 'clock_rate'}:
@@ -307,9 +307,11 @@ class SimulatedArmNode(ArmidNode):
         self._arm.sensors = replace(self._arm.sensors, **known)
 
     def _with_effects(self, texts: Sequence[str]) -> ArmModel:
-        """Return the arm as it was before any effects of the parameter, with others."""
+        """Return the arm of the parameters with other effects."""
         if self._bare is None:
-            raise ModelError('this arm was made in a program; the parameter describes none')
+            raise ModelError(
+                'this arm was made by a program, so that the parameter cannot change its effects'
+            )
         return with_effects(self._bare, texts)
 
     def _become(self, arm: ArmModel) -> None:

@@ -1,11 +1,11 @@
 # Copyright 2026 The armid_ros developers
 # SPDX-License-Identifier: Apache-2.0
 """
-Recordings of joints, and the rosbag2 bags they are kept in.
+Read and write recordings of joints, and the rosbag2 bags that hold them.
 
-Nothing else in the package knows a file format. ``read_recording`` takes any bag with JointState
-messages apart, ``write_recording`` makes one; ``BagWriter`` and ``Bag`` carry raw messages for
-the nodes; none of it needs ROS.
+This is the only package that depends on file formats. ``read_recording`` reads a bag with
+JointState messages, and ``write_recording`` writes one. ``BagWriter`` and ``Bag`` write and read
+raw messages for the nodes. ROS is not needed.
 
 """
 

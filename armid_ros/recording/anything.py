@@ -1,6 +1,6 @@
 # Copyright 2026 The armid_ros developers
 # SPDX-License-Identifier: Apache-2.0
-"""A recording from whatever holds one: a bag of ROS 2 or ROS 1, a table."""
+"""Read a recording from a bag of ROS 2 or ROS 1, or from a table."""
 
 from __future__ import annotations
 
@@ -43,26 +43,27 @@ def read_anything(
     Parameters
     ----------
     path : str or Path
-        What ``read_recording`` takes, a .bag of ROS 1, or a table: CSV, NPZ, MAT, Parquet, the
-        folder of a LeRobot dataset.
+        A bag that ``read_recording`` reads, or a table: CSV, NPZ, MAT, Parquet, or the folder of a
+        LeRobot dataset.
     joints : sequence of str
-        The joints wanted, in this order.
+        Joints to read, in this order.
     slides : sequence of bool, optional
-        Whether each of them is prismatic, which has no degrees.
+        Whether each joint is prismatic. Positions of prismatic joints are never in degrees.
     topic : str, optional
-        Of a bag, where it has several of JointState.
+        Topic of the bag. Needed if the bag has several topics of JointState.
     columns : ColumnSettings, optional
-        Of a table: which columns are what, in which unit; what is not said is guessed. Names,
-        units, zeros and gears count for bags too; which columns are what, and their rate, do not.
+        Which columns of a table hold which quantity, in which unit. Missing settings are guessed
+        from the file. Names, units, zeros and gears apply to bags too; columns and rate do not.
     show : callable, optional
-        Given the plan of a table before it is read.
+        Called with the plan of a table before the table is read.
     settings : ReadSettings, optional
-        How careful bags are read.
+        Which checks are made when a bag is read, and the memory limit.
 
     Raises
     ------
     RecordingError
-        Naming the file, and the topic, joint, column or line, and what to do.
+        If the file cannot be read. The message names the file, the topic, joint, column or line,
+        and the remedy.
 
     """
     path = Path(path)

@@ -1,6 +1,6 @@
 # Copyright 2026 The armid_ros developers
 # SPDX-License-Identifier: Apache-2.0
-"""A bag as one source of messages: a directory of files with or without metadata, or a file."""
+"""Read a bag as one source of messages: a file, or a directory with or without metadata."""
 
 from __future__ import annotations
 
@@ -25,7 +25,8 @@ from armid_ros.recording.sqlite_source import SqliteSource
 
 
 def _ros1(path: Path, settings: ReadSettings) -> Source:
-    from armid_ros.recording.ros1_source import Ros1Source  # takes as long as to read a bag
+    # this import takes as long as reading a bag
+    from armid_ros.recording.ros1_source import Ros1Source
 
     return Ros1Source(path, settings)
 
@@ -44,7 +45,7 @@ def topics(path: str | Path, settings: ReadSettings = DEFAULT) -> tuple[Topic, .
     Raises
     ------
     RecordingError
-        There is no bag that can be read.
+        If the path is not a readable bag.
 
     """
     with Bag(path, settings) as bag:
@@ -52,7 +53,7 @@ def topics(path: str | Path, settings: ReadSettings = DEFAULT) -> tuple[Topic, .
 
 
 class Bag(Source):
-    """All files of a bag, as one source; a context manager."""
+    """Source of the messages of all files of a bag; a context manager."""
 
     def __init__(self, path: str | Path, settings: ReadSettings = DEFAULT) -> None:
         """
@@ -63,12 +64,12 @@ class Bag(Source):
         path : str or Path
             A rosbag2 directory, a file .mcap, .db3, .mcap.zstd or .db3.zstd, or a .bag of ROS 1.
         settings : ReadSettings
-            What to check, and how much memory to take.
+            Which checks are made, and the memory limit.
 
         Raises
         ------
         RecordingError
-            There is no bag that can be read.
+            If the path is not a readable bag.
 
         """
         self.path = Path(path)
@@ -96,12 +97,12 @@ class Bag(Source):
 
     @property
     def damage(self) -> str:
-        """Return what is wrong with the files, as far as they were read; empty for a whole bag."""
+        """Return the damage found in the files so far; empty if none was found."""
         said = (*(source.damage for source in self._sources), str(self._damage))
         return '; '.join(dict.fromkeys(filter(None, said)))
 
     def close(self) -> None:
-        """Let go of the files."""
+        """Close the files."""
         self._stack.close()
 
     def topics(self) -> tuple[Topic, ...]:
@@ -116,17 +117,19 @@ class Bag(Source):
                     merged[topic.name] = replace(described, count=count)
         for name, count in self._metadata.counts.items():
             if count and name not in merged:
-                self._damage.add(f'{FILE_NAME} counts {count} messages of {name}, there are none')
+                self._damage.add(
+                    f'{FILE_NAME} states {count} messages of {name}, but the bag has none'
+                )
         return tuple(merged.values())
 
     def topic_of(self, type_name: str, wanted: str | None = None) -> Topic:
         """
-        Return the only topic of a type, or the one of it that is wanted.
+        Return the topic of a type: the only one, or the one of the given name.
 
         Raises
         ------
         RecordingError
-            There is none, or there are several.
+            If no topic, or more than one topic, fits.
 
         """
         name = None if wanted is None else '/' + wanted.lstrip('/')
@@ -146,7 +149,7 @@ class Bag(Source):
         )
 
     def blocks(self, topic: str) -> Iterator[MessageBlock]:
-        """Yield the messages of a topic, in the order they are stored."""
+        """Yield the messages of a topic in the order of storage."""
         count = 0
         with reading(self.path, RecordingError):
             for source in self._sources:
@@ -156,11 +159,11 @@ class Bag(Source):
         expected = self._metadata.counts.get(topic, count)
         if count != expected:
             self._damage.add(
-                f'{FILE_NAME} counts {expected} messages of {topic}, there are {count}'
+                f'{FILE_NAME} states {expected} messages of {topic}, but the bag has {count}'
             )
 
     def messages(self) -> Iterator[RawMessage]:
-        """Yield all messages in the order they were logged, a few chunks in memory at a time."""
+        """Yield all messages in the order of their log times, with few chunks in memory."""
         limit = self._settings.memory_limit
         streams = [source.messages() for source in self._sources]
         with reading(self.path, RecordingError):
@@ -171,7 +174,7 @@ class Bag(Source):
                     yield message
 
     def _packed(self, message: bytes) -> bool:
-        """Whether messages are compressed one by one, of which only the metadata knows."""
+        """Return whether a message is compressed, by the metadata or its first bytes."""
         return self._by_message or message[:4] == ZSTD
 
     def _open(self, file: Path) -> Source:
@@ -184,7 +187,7 @@ class Bag(Source):
         return source
 
     def _unpacked(self, file: Path) -> Path:
-        """Decompress a file to a temporary one, which is removed when the bag is closed."""
+        """Decompress a file to a temporary file, which is removed when the bag is closed."""
         folder = self._stack.enter_context(tempfile.TemporaryDirectory(prefix='armid-'))
         plain, size = Path(folder, file.stem), 0
         try:
@@ -209,17 +212,17 @@ class Bag(Source):
 
 
 def is_ros1(path: Path) -> bool:
-    """Whether a path is a bag of ROS 1 by its name."""
+    """Return whether the name of a path is that of a ROS 1 bag."""
     return path.suffix.lower() == '.bag'
 
 
 def _storage_suffix(file: Path) -> str:
-    """Return '.mcap', '.db3', or what else a file is called."""
+    """Return the suffix of a file, without that of its compression."""
     return Path(file.stem).suffix if file.suffix in _COMPRESSED else file.suffix
 
 
 def _files_of(path: Path) -> BagMetadata:
-    """Return the files of a bag and what its metadata says of them."""
+    """Return the metadata of a bag; without metadata.yaml, its files alone."""
     if not os.path.lexists(path):
         raise RecordingError(f'{path}: there is no such bag')
     if not path.is_dir():
@@ -248,6 +251,6 @@ def _files_of(path: Path) -> BagMetadata:
             f'{path}: holds both .mcap and .db3 files and no {FILE_NAME} that names those of '
             f'the bag; give one of {", ".join(sorted(file.name for file in found))}'
         )
-    # BAG_2.mcap is before BAG_10.mcap
+    # numeric order: BAG_2.mcap comes before BAG_10.mcap
     found.sort(key=lambda file: re.sub(r'\d+', lambda number: number[0].zfill(20), file.name))
     return BagMetadata(tuple(found))

@@ -1,10 +1,10 @@
 # Copyright 2026 The armid_ros developers
 # SPDX-License-Identifier: Apache-2.0
 """
-Decompression within bounds.
+Decompress data with a limit of the size.
 
-A few bytes can be compressed from any size, so a stated size is a bound: what does not come to
-exactly that is damaged, and nothing is unpacked beyond it.
+A few compressed bytes can expand to any size, so the stated size is the limit. Content of another
+size counts as damaged, and no more than the stated size is decompressed.
 
 """
 
@@ -19,16 +19,16 @@ import lz4.frame
 import zstandard
 
 _Buffer = bytes | memoryview
-#: What the decompressors raise for rubbish.
+#: Exceptions of the decompressors for damaged data.
 CORRUPT = (zstandard.ZstdError, RuntimeError, MemoryError, OverflowError, ValueError)
-#: What a frame of zstd begins with, and no message in CDR.
+#: First bytes of a zstd frame; no CDR message begins with them.
 ZSTD = b'\x28\xb5\x2f\xfd'
 _STEP = 1 << 20
 _PARTIAL_STEP = 1024
 
 
 def stated_size(stored: _Buffer, compression: str) -> int | None:
-    """Return the size that a compressed frame says it has; None when it says nothing."""
+    """Return the content size that a compressed frame states; None if it states none."""
     if compression == 'zstd':
         size = int(zstandard.frame_content_size(stored))
         return size if size >= 0 else None
@@ -47,7 +47,7 @@ def decompressed(stored: _Buffer, compression: str, size: int) -> bytes:
     compression : {'zstd', 'lz4'}
         Its kind.
     size : int
-        What its content has to have [bytes].
+        Size that the content must have [bytes].
 
     Raises
     ------
@@ -58,7 +58,7 @@ def decompressed(stored: _Buffer, compression: str, size: int) -> bytes:
     try:
         said = stated_size(stored, compression)
         if said is not None and said != size:
-            raise RecordingError(f'holds {said} bytes where {size} are stated')
+            raise RecordingError(f'holds {said} bytes, but {size} are stated')
         if not size:
             return b''
         if compression == 'zstd':
@@ -71,12 +71,12 @@ def decompressed(stored: _Buffer, compression: str, size: int) -> bytes:
     except CORRUPT as error:
         raise RecordingError(str(error) or 'it cannot be decompressed') from error
     if len(content) != size:
-        raise RecordingError(f'holds {len(content)} bytes where {size} are stated')
+        raise RecordingError(f'holds {len(content)} bytes, but {size} are stated')
     return content
 
 
 class _Zstd(threading.local):
-    """A decompressor of each thread's own, for to make one takes as long as to unpack 20 kB."""
+    """One decompressor per thread: making one takes as long as decompressing 20 kB."""
 
     def __init__(self) -> None:
         self.decompressor = zstandard.ZstdDecompressor()
@@ -86,7 +86,7 @@ _ZSTD = _Zstd()
 
 
 def partly_decompressed(stored: _Buffer, compression: str, size: int) -> bytes:
-    """Return what can be had of a frame that is cut off, at most a number of bytes."""
+    """Return the readable content of a truncated frame, at most ``size`` bytes."""
     content = bytearray()
     try:
         _decompress_into(content, stored, compression, size)
@@ -96,13 +96,13 @@ def partly_decompressed(stored: _Buffer, compression: str, size: int) -> bytes:
 
 
 def _decompress_into(content: bytearray, data: _Buffer, compression: str, size: int) -> None:
-    """Append the content of a frame until it has a number of bytes, or more by one step."""
+    """Append the content of a frame until ``size`` bytes, or one step more, are reached."""
     if compression == 'zstd':
         decompressor = zstandard.ZstdDecompressor().decompressobj()
     else:
         decompressor = lz4.frame.LZ4FrameDecompressor()
     for at in range(0, len(data), _PARTIAL_STEP):
-        # Compressors write blocks that stand on their own.
+        # Each block that a compressor writes can be decompressed on its own.
         content += decompressor.decompress(bytes(data[at : at + _PARTIAL_STEP]))
         if len(content) >= size:
             break
@@ -130,14 +130,14 @@ def unpacked(stream: BinaryIO) -> Iterator[bytes]:
 
 def message_content(data: bytes, limit: int) -> bytes:
     """
-    Return a message that rosbag2 compressed on its own, at most a number of bytes.
+    Decompress a message that rosbag2 compressed on its own.
 
-    Not every writer puts the size of the content into the frame.
+    Not every writer states the size of the content in the frame, so that a limit is needed.
 
     Raises
     ------
     RecordingError
-        It is damaged, or larger.
+        If the message is damaged, or its content exceeds the limit.
 
     """
     content = bytearray()

@@ -1,6 +1,6 @@
 # Copyright 2026 The armid_ros developers
 # SPDX-License-Identifier: Apache-2.0
-"""Copies of bags: of ROS 1 and ROS 2, with other names of joints, or of what a kill left."""
+"""Copy bags of ROS 1 and ROS 2, rename their joints, and recover damaged bags."""
 
 from __future__ import annotations
 
@@ -27,22 +27,22 @@ from rosbags.typesys import get_typestore, Stores
 @dataclass(frozen=True)
 class Copied:
     """
-    What was copied.
+    Result of copying a bag.
 
     Attributes
     ----------
     source, bag : Path
-        What was read, which is as it was, and the bag made of it.
+        The bag that was read, and the bag that was written. The source is not changed.
     topics : tuple of Topic
-        Its topics, with the number of messages.
+        Topics of the new bag, with the number of messages.
     damage : str
-        What is wrong with the source; empty for a whole one.
+        Damage of the source; empty if it is undamaged.
     duration : float
         Time from the first to the last message [s].
     left_out : tuple of str
         Topics that ROS 2 has no type for, with their types.
     renamed : tuple of (str, str)
-        Joints that got another name.
+        Old and new names of the renamed joints.
 
     """
 
@@ -60,7 +60,7 @@ class Copied:
         return sum(topic.count for topic in self.topics)
 
     def describe(self) -> str:
-        """Return the report as a few sentences."""
+        """Format the report as a few sentences."""
         listed = ', '.join(f'{topic.name} ({topic.count})' for topic in self.topics)
         return (
             f'{self.source}: {self.damage or "the file is whole"}. {self.messages} messages over '
@@ -72,22 +72,22 @@ def recover(file: str | Path, out: str | Path, settings: ReadSettings = DEFAULT)
     """
     Copy what can be read of an MCAP file into a complete bag, with index and metadata.yaml.
 
-    Complete chunks are taken over when their checksum is right; of a chunk the file ends in, the
-    messages before the end are.
+    Complete chunks are copied if their checksum is correct. If the file ends inside a chunk, the
+    messages before the end are copied.
 
     Parameters
     ----------
     file : str or Path
-        The file, which is not changed; a directory with a single .mcap file stands for that.
+        The file, which is not changed. A directory with a single .mcap file may be given instead.
     out : str or Path
-        The bag directory to be made; it must not exist.
+        Bag directory to create; it must not exist.
     settings : ReadSettings
-        Whether checksums are compared, and how much memory to take.
+        Whether checksums are compared, and the memory limit.
 
     Raises
     ------
     RecordingError
-        It is no MCAP file, or there is no message in it, or ``out`` exists.
+        If the file is not an MCAP file, has no message, or ``out`` exists.
 
     """
     path = Path(file)
@@ -126,16 +126,16 @@ def copy_bag(
     path : Path
         A bag of ROS 2, or the .bag of ROS 1.
     out : Path
-        The bag directory to be made; it must not exist.
+        Bag directory to create; it must not exist.
     rename : sequence of (str, str)
-        From beginnings of joint names, or whole names, to what they become.
+        Pairs of an old and a new name, or of an old and a new beginning of names.
     settings : ReadSettings
-        How careful the bag is read.
+        Which checks are made when the bag is read, and the memory limit.
 
     Raises
     ------
     RecordingError
-        It cannot be read, nothing in it has a type that ROS 2 has, or names cannot be changed.
+        If the bag cannot be read, has no type that ROS 2 has, or its joints cannot be renamed.
 
     """
     store = get_typestore(Stores.ROS2_JAZZY)

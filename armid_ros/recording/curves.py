@@ -1,6 +1,6 @@
 # Copyright 2026 The armid_ros developers
 # SPDX-License-Identifier: Apache-2.0
-"""Curves of all joints below each other, for a notebook."""
+"""Draw one curve per joint, one below the other."""
 
 from __future__ import annotations
 
@@ -22,9 +22,9 @@ def draw_joints(
     joints : sequence of str
         The joints.
     curves : mapping of str to (ndarray, ndarray)
-        By their label: times (N,) [s] and values (N, n).
+        Label of each curve, with its times (N,) [s] and values (N, n).
     quantity : str
-        What is drawn, with its unit.
+        Name and unit of the quantity, the label of the vertical axis.
 
     Returns
     -------

@@ -1,6 +1,6 @@
 # Copyright 2026 The armid_ros developers
 # SPDX-License-Identifier: Apache-2.0
-"""Bags of arms that are measured on both sides, with accelerations as sensor_msgs/Imu."""
+"""Read and write bags of arms with elastic joints, measured at motors and links."""
 
 from __future__ import annotations
 
@@ -23,12 +23,14 @@ import numpy as np
 if TYPE_CHECKING:
     from armid_ros.simulation.accelerometers import LinkAccelerometers
 
-#: Motors as seen at the joints, links, and what the loops are asked for.
+#: Topics of the motor positions (converted to the joint side), the link positions, and the
+#: references of the control loops.
 MOTOR, LINK, REFERENCE = '/joint_states', '/link/joint_states', '/reference/joint_states'
 IMU = 'sensor_msgs/msg/Imu'
-#: Between two experiments [ns].
+#: Pause between two experiments [ns].
 _PAUSE_NS = 10**9
-#: Orientation, its covariance, angular velocity, covariance, linear acceleration, covariance.
+#: Count of numbers in an Imu message: orientation, angular velocity and linear acceleration, each
+#: with a covariance.
 _NUMBERS = 37
 _ORIENTATION_COVARIANCE, _RATE_COVARIANCE, _ACCELERATION = 4, 16, slice(25, 28)
 
@@ -37,12 +39,12 @@ def write_runs(
     path: str | Path, runs: Sequence[ElasticRun], robot: Robot, sensors: LinkAccelerometers
 ) -> None:
     """
-    Write experiments with any arm to a bag, one after the other with a pause of 1 s.
+    Write experiments to one bag, one after the other with a pause of 1 s.
 
     Raises
     ------
     RecordingError
-        The bag exists already.
+        If the bag exists.
 
     """
     joints = robot.joints
@@ -73,7 +75,7 @@ def _write_accelerations(
     rows['sec'], rows['nanosec'] = np.divmod(stamps, 10**9)
     rows['length'] = len(frame_id.encode()) + 1
     rows['frame'] = frame_id.encode()
-    # what is not measured has a covariance of -1
+    # a covariance of -1 marks a quantity that is not measured
     rows['numbers'][:, _ORIENTATION_COVARIANCE] = -1.0
     rows['numbers'][:, _RATE_COVARIANCE] = -1.0
     rows['numbers'][:, _ACCELERATION] = acceleration
@@ -97,7 +99,7 @@ def read_accelerations(
     Raises
     ------
     RecordingError
-        There is no such bag or topic, or messages are not those of the type.
+        If the bag or topic does not exist, or a message is not an Imu message.
 
     """
     with Bag(path, settings) as bag:
@@ -121,7 +123,7 @@ def read_accelerations(
 
 
 def _layout(frame_length: int, order: str) -> np.dtype[np.void]:
-    """Return an Imu message in CDR with a frame name of some bytes, its final zero included."""
+    """Return the layout of an Imu message in CDR. The frame length counts the final zero."""
     end = 12 + frame_length
     padded = -(-end // 8) * 8
     return np.dtype(
@@ -142,6 +144,6 @@ def _layout(frame_length: int, order: str) -> np.dtype[np.void]:
 
 
 def imu_topic(link: str) -> str:
-    """Return the topic of the accelerometer on a link, whose name ROS may not take as it is."""
+    """Return the topic of the accelerometer on a link, with characters that ROS permits."""
     name = re.sub('[^A-Za-z0-9_]', '_', link)
     return f'/{"_" if name[:1].isdigit() else ""}{name}/imu'

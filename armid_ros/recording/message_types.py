@@ -1,11 +1,10 @@
 # Copyright 2026 The armid_ros developers
 # SPDX-License-Identifier: Apache-2.0
 """
-Definitions and hashes of ROS 2 message types, without ROS.
+Find definitions and hashes of ROS 2 message types, without ROS.
 
-The standard packages are those of rosbags' store of Jazzy; others are looked up where an installed
-workspace keeps them, share/PACKAGE/msg/TYPE.msg below AMENT_PREFIX_PATH and below the prefix of
-this Python, or given as text.
+Standard types come from the Jazzy store of rosbags. Other types are given as text, or read from
+share/PACKAGE/msg/TYPE.msg below AMENT_PREFIX_PATH and below the prefix of this Python.
 
 """
 
@@ -29,7 +28,7 @@ JOINT_TRAJECTORY = 'trajectory_msgs/msg/JointTrajectory'
 STRING = 'std_msgs/msg/String'
 #: Arrays of a JointState.
 QUANTITIES = ('position', 'velocity', 'effort')
-#: Byte order of CDR, by what it begins with.
+#: Byte order of CDR, by its first two bytes.
 BYTE_ORDERS = {b'\x00\x00': '>', b'\x00\x01': '<'}
 _BIG, _LITTLE = struct.Struct('>iI').unpack_from, struct.Struct('<iI').unpack_from
 
@@ -44,7 +43,8 @@ class MessageType:
     name : str
         Such as 'sensor_msgs/msg/JointState'.
     definition : str
-        Its definition followed by those of the types it contains; empty when the bag has none.
+        Definition of the type, followed by the definitions of the types it contains; empty if the
+        bag has none.
     encoding : str
         Language of the definition: 'ros2msg', 'ros2idl', or empty.
     type_hash : str
@@ -60,20 +60,20 @@ class MessageType:
 
 def message_type(name: str, definition: str | None = None) -> MessageType:
     """
-    Describe a message type completely, definition with dependencies and hash.
+    Return a message type with its definition, dependencies and hash.
 
     Parameters
     ----------
     name : str
         Such as 'sensor_msgs/msg/JointState'.
     definition : str, optional
-        Text of its .msg file, alone or followed by its dependencies in the way of rosbag2. Without
-        it the type is looked up.
+        Text of the .msg file, alone or followed by its dependencies in the format of rosbag2. By
+        default the type is looked up.
 
     Raises
     ------
     RecordingError
-        The type is not known, or the text is no message definition.
+        If the type is not known, or the text is not a message definition.
 
     """
     store = get_typestore(Stores.ROS2_JAZZY)
@@ -85,7 +85,7 @@ def message_type(name: str, definition: str | None = None) -> MessageType:
 
 
 def store_for(described: MessageType) -> Typestore:
-    """Return a type store that can decode messages of a type as its bag describes it."""
+    """Return a type store that decodes messages by the definition in the bag."""
     if not described.definition:
         store = get_typestore(Stores.ROS2_JAZZY)
         if described.name not in store.fielddefs:
@@ -100,7 +100,7 @@ def store_for(described: MessageType) -> Typestore:
 
 
 def _register(store: Typestore, name: str, definition: str | None) -> None:
-    """Register a type and, recursively, those it contains."""
+    """Register a type and, recursively, the types it contains."""
     known = get_typestore(Stores.ROS2_JAZZY).fielddefs
     if definition is None and name in known:
         types = {name: known[name]}

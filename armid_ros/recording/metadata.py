@@ -1,6 +1,6 @@
 # Copyright 2026 The armid_ros developers
 # SPDX-License-Identifier: Apache-2.0
-"""The metadata.yaml of a rosbag2 directory: written in version 9, read in all."""
+"""Read metadata.yaml of a rosbag2 directory in any version, and write version 9."""
 
 from __future__ import annotations
 
@@ -17,23 +17,23 @@ import yaml
 
 FILE_NAME = 'metadata.yaml'
 VERSION = 9
-# rosbag2 writes this as the start of a bag without messages.
+# rosbag2 writes this number as the start time of a bag without messages.
 _NO_TIME = 2**63 - 1
 
 
 @dataclass(frozen=True)
 class BagMetadata:
     """
-    What a reader needs of metadata.yaml.
+    Fields of metadata.yaml that are needed to read a bag.
 
     Attributes
     ----------
     files : tuple of Path
         The files of the bag, in order.
     compression_mode : {'', 'file', 'message', 'storage'}
-        What was compressed by rosbag2 itself.
+        Unit that rosbag2 compressed; empty if none.
     counts : mapping of str to int
-        Number of messages of each topic, as its writer counted them.
+        Number of messages of each topic, as stated by the writer.
 
     """
 
@@ -55,7 +55,7 @@ def bag_information(
     file_name : str or None
         The only file of the bag; None while it is being written.
     start_ns, end_ns : int
-        Log time of the first and the last message [ns]; ignored when there is none.
+        Log time of the first and the last message [ns]; ignored for a bag without messages.
 
     """
     count = sum(topic.count for topic in topics)
@@ -100,13 +100,13 @@ def bag_information(
 
 def dump(information: Mapping[str, Any] | Sequence[Mapping[str, Any]]) -> str:
     """Return a map, or a list of them, as YAML."""
-    # The dumper in C, where there is one, takes 1 ms; the other 10 ms, while messages wait.
+    # The C dumper takes 1 ms and may be missing; the Python dumper takes 10 ms.
     dumper = getattr(yaml, 'CSafeDumper', yaml.SafeDumper)
     return str(yaml.dump(information, Dumper=dumper, sort_keys=False, allow_unicode=True))
 
 
 def write_metadata(bag: Path, information: Mapping[str, Any]) -> None:
-    """Write metadata.yaml so that it is whole or absent."""
+    """Write metadata.yaml atomically: after an interruption it is complete or absent."""
     write_file(bag / FILE_NAME, dump({'rosbag2_bagfile_information': information}))
 
 
@@ -117,7 +117,7 @@ def read_metadata(bag: Path) -> BagMetadata:
     Raises
     ------
     RecordingError
-        It is not valid, or a file it names does not exist.
+        If the file is not valid, or names a file that does not exist.
 
     """
     path = bag / FILE_NAME

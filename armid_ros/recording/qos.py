@@ -1,6 +1,6 @@
 # Copyright 2026 The armid_ros developers
 # SPDX-License-Identifier: Apache-2.0
-"""Quality of service of a topic, in the two notations rosbag2 has written it in."""
+"""Convert quality of service from and to the two notations of rosbag2."""
 
 from __future__ import annotations
 
@@ -19,10 +19,10 @@ from rosbags.interfaces import (
 )
 import yaml
 
-#: Without a limit [s, ns].
+#: Duration without a limit [s, ns].
 _INFINITE = QosTime(9223372036, 854775807)
-#: A reliable publisher whose late subscribers get nothing; the middleware does not tell a recorder
-#: history and depth.
+#: Reliable publisher that keeps no messages for late subscribers. History and depth are unknown,
+#: since the middleware does not report them to a recorder.
 VOLATILE = Qos(
     QosHistory.UNKNOWN,
     0,
@@ -34,12 +34,12 @@ VOLATILE = Qos(
     _INFINITE,
     avoid_ros_namespace_conventions=False,
 )
-#: One whose late subscribers get the last messages.
+#: Reliable publisher that sends its last messages to late subscribers.
 LATCHED = VOLATILE._replace(durability=QosDurability.TRANSIENT_LOCAL)
 
 
 def dump_qos(profiles: Iterable[Qos]) -> list[dict[str, Any]]:
-    """Return profiles in the notation of metadata.yaml, version 9."""
+    """Convert profiles to the notation of metadata.yaml, version 9."""
 
     def written(value: object) -> object:
         if isinstance(value, Enum):
@@ -52,7 +52,7 @@ def dump_qos(profiles: Iterable[Qos]) -> list[dict[str, Any]]:
 
 
 def parse_qos(text: str | None) -> tuple[Qos, ...]:
-    """Return profiles from their YAML in either notation; none where it cannot be understood."""
+    """Read profiles from YAML in either notation; empty if the text is not valid."""
     try:
         listed = load_yaml(text or '')
         profiles = listed if isinstance(listed, list) else ()
@@ -62,12 +62,12 @@ def parse_qos(text: str | None) -> tuple[Qos, ...]:
             if isinstance(profile, Mapping)
         )
     except (yaml.YAMLError, ArithmeticError, ValueError, TypeError):
-        # What a publisher offered is good to know, but no reason not to read what it sent.
+        # Messages can be read without the QoS of their publisher.
         return ()
 
 
 def _read(value: Any, default: object) -> Any:
-    """Return a field; a policy by its name, or its integer in rmw/types.h as up to version 8."""
+    """Read a field. Policies are names, or up to version 8 integers of rmw/types.h."""
     if isinstance(default, Enum):
         named = {one.name.lower(): one for one in type(default)}
         unknown = named['unknown']

@@ -1,6 +1,6 @@
 # Copyright 2026 The armid_ros developers
 # SPDX-License-Identifier: Apache-2.0
-"""Reads the joint measurements of a bag."""
+"""Read the joint measurements of a bag."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ from armid_ros.recording.settings import DEFAULT, ReadSettings
 from armid_ros.recording.source import Topic
 import numpy as np
 
-#: This many messages tell which joints a topic names.
+#: Number of messages that are read to find the joints of a topic.
 _PEEK_MESSAGES = 1000
 
 
@@ -40,34 +40,34 @@ def read_recording(
     ----------
     path : str or Path
         A rosbag2 directory (MCAP or SQLite, split, compressed, with or without metadata.yaml), or
-        a file .mcap, .db3 or (ROS 1) .bag. A file cut off by a crash is read as far as it goes.
+        a file .mcap, .db3 or (ROS 1) .bag. A file truncated by a crash is read up to its end.
     joints : sequence of str
-        The joints wanted, in this order; of others in the messages (a gripper's) the range of the
-        positions is kept.
+        Joints to read, in this order. Of other joints in the messages, such as a gripper's, only
+        the range of the positions is kept.
     topic : str, optional
-        Topic of sensor_msgs/JointState; by default the only one, or the only one that names all
-        the joints, or of several such the only one called 'joint_states', or those that name all
-        joints together, none of them twice.
+        Topic of sensor_msgs/JointState. The default is the only topic of this type, or the only
+        one that names all joints. Of several such topics the one called 'joint_states' is taken.
+        If no topic names all joints, topics are combined that name each joint once.
     settings : ReadSettings
-        Whether checksums are compared, and how much memory to take.
+        Whether checksums are compared, and the memory limit.
 
     Returns
     -------
     Recording
-        Samples in order of time, without repeated stamps and values that are not finite; its
-        report says what was done to get them. Time is that of the message headers, unless their
-        stamps are zero, stand still or jump: then the time of reception, and ``clock`` says so.
+        Samples in order of time, without repeated stamps and non-finite values. The report lists
+        dropped and repaired messages. Time is taken from the message headers. If header stamps are
+        zero, stand still or jump, the time of reception is used and ``clock`` is 'receive'.
 
     Raises
     ------
     RecordingError
-        There is no such bag or topic, the topic does not name a joint, nothing usable is left, or
-        it takes more memory than the settings allow.
+        If the bag or topic does not exist, a joint is not named, no usable sample remains, or the
+        memory limit is exceeded.
 
     """
     joints = tuple(joints)
     if not joints or len(set(joints)) != len(joints):
-        raise RecordingError(f'{path}: joints wanted must differ and not be none, got {joints}')
+        raise RecordingError(f'{path}: give at least one joint, and each joint once; got {joints}')
     with Bag(path, settings) as bag:
         chosen = choose_topics(bag, joints, topic)
         decoder = JointStateDecoder(joints, sum(one.count for one in chosen))
@@ -93,7 +93,7 @@ def assembled(
     decoder: JointStateDecoder,
     damage: str,
 ) -> Recording:
-    """Make one recording of the messages of a topic; those decoded are let go."""
+    """Assemble a recording from decoded messages, and free their memory."""
     where = f'{path}: {topic}'
     check_joints(where, decoder, joints)
     if damage:
@@ -125,28 +125,30 @@ def read_pieces(
     settings: ReadSettings = DEFAULT,
 ) -> Iterator[tuple[Recording, bool]]:
     """
-    Yield the measurements of some joints piece by piece, in the order of storage.
+    Yield the measurements of some joints in pieces, in the order of storage.
 
     Parameters
     ----------
     path, joints, topic, settings
-        As of ``read_recording``.
+        See ``read_recording``.
     samples : int
-        Messages that a piece reads at most, besides those carried over from the one before.
+        Largest number of new messages per piece. Messages kept from the previous piece come on
+        top.
     keep : callable
-        Asked of every piece but the last; what lies before the stamp it returns [ns] is let go.
+        Called with every piece but the last. Messages before the stamp that it returns [ns] are
+        dropped.
 
     Yields
     ------
     piece : Recording
-        With times from its own first sample on.
+        Part of the recording; times count from its first sample.
     last : bool
-        Whether it is the last one.
+        Whether the piece is the last one.
 
     Raises
     ------
     RecordingError
-        As ``read_recording``.
+        See ``read_recording``.
 
     """
     joints = tuple(joints)
@@ -177,7 +179,7 @@ def read_pieces(
 def _parts(
     bag: Bag, topic: Topic, decoder: JointStateDecoder, most: int
 ) -> Iterator[JointSamples]:
-    """Yield the messages of a topic, so many at a time at most."""
+    """Yield the messages of a topic in parts of at most a given number."""
     with reading(bag.path, RecordingError):
         for block in joint_state_blocks(bag, topic):
             for states in decoder.decode(block):
@@ -186,7 +188,7 @@ def _parts(
 
 
 def _from(held: Sequence[JointSamples], stamp: int, clock: str) -> Iterator[JointSamples]:
-    """Yield what messages have from a stamp on."""
+    """Yield the samples from a stamp on."""
     for states in held:
         stamps = states.stamps if clock == 'header' else states.receive
         assert stamps is not None
@@ -196,7 +198,7 @@ def _from(held: Sequence[JointSamples], stamp: int, clock: str) -> Iterator[Join
 
 
 def choose_topics(bag: Bag, joints: Sequence[str], wanted: str | None) -> tuple[Topic, ...]:
-    """Return the topic to read, or the topics that name the joints between them."""
+    """Return the topic to read, or several topics that together name all joints."""
     topics = bag.topics()
     candidates = [topic for topic in topics if topic.type_name == JOINT_STATE]
     candidates = candidates or [topic for topic in topics if holds_joint_state(topic)]
@@ -255,12 +257,12 @@ def named_joints(bag: Bag, topic: Topic) -> tuple[str, ...]:
 
 def bag_contents(path: str | Path, settings: ReadSettings = DEFAULT) -> tuple[Topic, ...]:
     """
-    Return the topics of a bag, with the joints that those of JointState name.
+    Return the topics of a bag; topics of JointState with their joint names.
 
     Raises
     ------
     RecordingError
-        There is no bag that can be read.
+        If the path is not a readable bag.
 
     """
     with Bag(path, settings) as bag:
@@ -271,7 +273,7 @@ def bag_contents(path: str | Path, settings: ReadSettings = DEFAULT) -> tuple[To
 
 
 def check_joints(where: str, decoder: JointStateDecoder, joints: Sequence[str]) -> None:
-    """Refuse a topic that does not name all joints, or nothing at all."""
+    """Raise a RecordingError if a topic has no messages or does not name all joints."""
     if not decoder.messages:
         raise RecordingError(f'{where} has no messages')
     missing = [joint for joint in joints if joint not in decoder.names_seen]
@@ -287,7 +289,7 @@ def check_joints(where: str, decoder: JointStateDecoder, joints: Sequence[str]) 
     present = ','.join(name for name in joints if name in decoder.names_seen)
     hint = f'; --joints {present} reads the others' if present else ''
     if found:
-        hint = f"; if '{found}' is '{missing[0]}', say --rename {found}:{missing[0]}{hint}"
+        hint = f"; if '{found}' is '{missing[0]}', use --rename {found}:{missing[0]}{hint}"
     raise RecordingError(
         f'{where} does not name {"joint" if len(missing) == 1 else "joints"} {listed}; '
         f'its joints are {", ".join(decoder.names_seen)}{hint}'
@@ -296,25 +298,25 @@ def check_joints(where: str, decoder: JointStateDecoder, joints: Sequence[str]) 
 
 def read_robot_description(path: str | Path, settings: ReadSettings = DEFAULT) -> str | None:
     """
-    Return the robot description a bag holds.
+    Return the robot description in a bag.
 
     Parameters
     ----------
     path : str or Path
         A rosbag2 directory, or a bare file.
     settings : ReadSettings
-        Whether checksums are compared, and how much memory to take.
+        Whether checksums are compared, and the memory limit.
 
     Returns
     -------
     str or None
-        The last one published on a std_msgs/String topic whose name ends in 'robot_description';
-        None when there is none.
+        The last message on a std_msgs/String topic whose name ends in 'robot_description'; None
+        without such a topic.
 
     Raises
     ------
     RecordingError
-        The bag cannot be read, or holds several descriptions on topics of several robots.
+        If the bag cannot be read, or holds different descriptions on several topics.
 
     """
     with Bag(path, settings) as bag:
@@ -334,6 +336,6 @@ def read_robot_description(path: str | Path, settings: ReadSettings = DEFAULT) -
     if len(set(texts.values())) > 1:
         raise RecordingError(
             f'{path}: holds the descriptions of several robots ({", ".join(texts)}); '
-            'save the one meant as a URDF file'
+            'save the description of this arm as a URDF file'
         )
     return next(iter(texts.values()), None)

@@ -1,6 +1,6 @@
 # Copyright 2026 The armid_ros developers
 # SPDX-License-Identifier: Apache-2.0
-"""What was measured: joint positions, velocities and torques, as a bag holds them."""
+"""Recorded joint positions, velocities and torques."""
 
 from __future__ import annotations
 
@@ -26,7 +26,7 @@ _LABELS = {
     'dq': 'velocity [rad/s or m/s]',
     'tau': 'torque [N m or N]',
 }
-#: Samples in common that are any use.
+#: Fewest samples that two recordings must have in common.
 _LEAST = 4
 
 #: A stretch without samples is a gap when it is longer than this many sampling periods.
@@ -43,7 +43,7 @@ class TimeGap:
     t : float
         Time of the last sample before it [s], on the time base of the recording.
     length : float
-        How long nothing was measured [s].
+        Duration of the gap [s].
 
     """
 
@@ -61,7 +61,7 @@ def gaps(t: FloatArray) -> tuple[TimeGap, ...]:
 @dataclass(frozen=True)
 class PositionRange:
     """
-    Where a joint was that was recorded beside those asked for.
+    Range of positions of a recorded joint that was not requested.
 
     Attributes
     ----------
@@ -87,7 +87,7 @@ class PartnerMotion:
     robot : Robot
         Its description; its base frame is that of the arm.
     ties : tuple of Tie
-        Where the two may be tied.
+        Ties that may connect the two machines.
     q : ndarray, shape (N, m)
         Its joint positions [rad or m].
 
@@ -105,7 +105,7 @@ class PartnerMotion:
 @dataclass(frozen=True)
 class ReadReport:
     """
-    What reading a recording met on the way, by count.
+    Counts of samples and messages that were dropped or repaired while reading.
 
     Attributes
     ----------
@@ -114,35 +114,35 @@ class ReadReport:
     samples : int
         Samples of the recording.
     merged : int
-        Samples put together from messages that carry a part of the joints each.
+        Samples merged from messages that each hold some of the joints.
     interpolated : int
-        Merged samples of which a part was interpolated in time, as its stamps differ.
+        Merged samples with a part that was interpolated in time, because its stamps differ.
     incomplete : int
-        Samples dropped since a part of the joints was not measured around their time.
+        Samples dropped because some joints were not measured around their time.
     duplicates : int
-        Messages dropped since they repeat the stamp of an earlier one.
+        Messages dropped because they repeat the stamp of an earlier message.
     out_of_order : int
-        Messages older than one before them; they are sorted in.
+        Messages with an earlier stamp than a previous message; they are sorted by time.
     restarted : int
-        Messages dropped since the clock jumped back: the longest run between jumps is kept.
+        Messages dropped because the clock jumped back. The longest stretch between jumps is kept.
     nan : int
-        Samples dropped since a position, velocity or torque is not finite.
+        Samples dropped because a position, velocity or torque is not finite.
     not_finite : tuple of str
-        Which these are and in how many samples, in words: 'effort of wrist in 10'.
+        Quantities that are not finite, and in how many samples: 'effort of wrist in 10'.
     malformed : int
-        Messages dropped since they cannot be decoded, or have arrays of the wrong length.
+        Messages dropped because they cannot be decoded, or have arrays of the wrong length.
     unstamped : int
-        Messages dropped since their header stamp is zero.
+        Messages dropped because their header stamp is zero or far from those of their neighbours.
     gaps : tuple of TimeGap
         Stretches of more than five sampling periods without a sample.
     absent : tuple of str
-        Quantities some or all joints lack, in words: 'effort of wrist'.
+        Quantities that were not recorded, of all joints or of some: 'effort of wrist'.
     unwrapped : tuple of str
-        Joints whose positions jumped by whole turns, and are continuous now.
+        Joints from whose positions jumps by whole turns were removed.
     clock_note : str
-        Why the receive time was used; empty when the header's was.
+        Why the receive time was used; empty if the header time was used.
     damage : str
-        What is wrong with the file itself; empty for a whole file.
+        Damage of the file; empty if it is undamaged.
 
     """
 
@@ -171,11 +171,11 @@ class ReadReport:
 
     @property
     def unharmed(self) -> bool:
-        """Whether reading lost and repaired nothing; velocities are not needed."""
+        """Whether no sample was dropped or repaired; missing quantities do not count."""
         return replace(self, absent=(), unwrapped=()).clean
 
     def describe(self) -> str:
-        """Return the report as one or a few sentences."""
+        """Format the report as one or a few sentences."""
         whose = f' ({", ".join(self.not_finite)})' if self.not_finite else ''
         sentences = [f'{self.samples} samples from {self.messages} messages']
         counted = (
@@ -209,7 +209,7 @@ class ReadReport:
 @dataclass(frozen=True, kw_only=True, repr=False)
 class Recording:
     """
-    Joint measurements of one arm, as recorded.
+    Recorded joint measurements of one arm.
 
     Attributes
     ----------
@@ -224,17 +224,17 @@ class Recording:
     start_ns : int
         Stamp of the first sample [ns since the epoch of the clock].
     source : str
-        The bag it was read from; empty when it was made in memory.
+        Bag that the recording was read from; empty if it was made in memory.
     topic : str
         Name of the JointState topic.
     clock : {'header', 'receive'}
-        Whose time the stamps are: the sender's header, or the recorder's reception.
+        Source of the stamps: the header of the sender, or the time of reception at the recorder.
     report : ReadReport
-        What was repaired or dropped on the way.
+        Counts of repaired and dropped messages.
     partner : PartnerMotion or None
         Another machine that was recorded with the arm.
     others : tuple of PositionRange
-        Joints in the same messages or columns that were not asked for.
+        Position ranges of further joints in the same messages or columns.
 
     Examples
     --------
@@ -243,7 +243,7 @@ class Recording:
     >>> run.joints, run.q.shape == run.tau.shape
     (('waist', 'shoulder', 'elbow'), True)
 
-    Of arrays of yours:
+    From arrays:
 
     >>> import numpy as np
     >>> t = np.arange(200) / 100.0
@@ -294,7 +294,7 @@ class Recording:
         return len(self.t)
 
     def __repr__(self) -> str:
-        """Return what was recorded in two lines."""
+        """Return a summary of the recording in two lines."""
         rate = f'{1.0 / self.period:.4g} Hz' if self.period else 'one sample'
         held = [
             name
@@ -328,7 +328,7 @@ class Recording:
         Parameters
         ----------
         quantity : {'q', 'dq', 'tau'}
-            What is drawn.
+            Quantity to draw.
 
         Returns
         -------
@@ -337,7 +337,7 @@ class Recording:
         Raises
         ------
         RecordingError
-            If it was not recorded.
+            If the quantity was not recorded.
 
         """
         values = getattr(self, quantity)
@@ -352,18 +352,18 @@ class Recording:
         Parameters
         ----------
         cutoff : float, optional
-            Cut-off of the position filter [Hz]; from the noise by default.
+            Cut-off of the position filter [Hz]; chosen from the noise by default.
 
         Returns
         -------
         Motion
-            The longest stretch without a gap, on even times, without both ends, where the filter
-            has no neighbours.
+            The longest stretch without a gap, at a constant rate. Both ends are cut off, since the
+            filter needs neighbouring samples.
 
         Raises
         ------
         IdentificationError
-            No stretch is long enough, or the cut-off is beyond half of the rate.
+            If no stretch is long enough, or the cut-off exceeds half of the rate.
 
         """
         # the filters of identification are above this package
@@ -372,7 +372,7 @@ class Recording:
         return filtered
 
     def select(self, samples: slice | npt.NDArray[np.intp] | npt.NDArray[np.bool_]) -> Recording:
-        """Return the recording at some of its samples, on the same time base."""
+        """Return a recording of some of the samples, on the same time base."""
         partner = self.partner
         return replace(
             self,
@@ -388,23 +388,23 @@ def recorded_together(
     recording: Recording, other: Recording, robot: Robot, ties: Sequence[Tie] = ()
 ) -> Recording:
     """
-    Add the motion of another machine to a recording, at its stamps.
+    Add the motion of another machine, interpolated at the stamps of a recording.
 
     Parameters
     ----------
     recording : Recording
-        Of the arm.
+        Recording of the arm.
     other : Recording
-        Of the other machine, on the same clock.
+        Recording of the other machine, on the same clock.
     robot : Robot
         Its description.
     ties : sequence of Tie
-        Where the two may be tied.
+        Ties that may connect the two machines.
 
     Returns
     -------
     Recording
-        Of the arm, where both were recorded.
+        Recording of the arm, at the times when both were recorded.
 
     Raises
     ------

@@ -1,6 +1,6 @@
 # Copyright 2026 The armid_ros developers
 # SPDX-License-Identifier: Apache-2.0
-"""Messages of a bag of ROS 1, as those of ROS 2."""
+"""Read messages of a ROS 1 bag, converted to ROS 2."""
 
 from __future__ import annotations
 
@@ -26,10 +26,10 @@ _BLOCK_MESSAGES = 4096
 
 
 class Ros1Source(Source):
-    """One .bag file; topics whose types ROS 2 has not are listed, without messages."""
+    """Source for one .bag file; topics with types unknown to ROS 2 have no messages."""
 
     def __init__(self, path: Path, settings: ReadSettings = DEFAULT) -> None:
-        """Open a bag of ROS 1, whose chunks have no checksums; one is in memory at a time."""
+        """Open a bag of ROS 1. One chunk at a time is in memory; chunks have no checksums."""
         super().__init__(path, settings)
         self._old = get_typestore(Stores.ROS1_NOETIC)
         self._new = get_typestore(Stores.ROS2_JAZZY)
@@ -83,11 +83,11 @@ class Ros1Source(Source):
             self._damage.add(f'the bag is damaged: {error}')
 
     def _is_known(self, one: Connection) -> bool:
-        """Whether both ROS 1 and ROS 2 have the type of a connection."""
+        """Return whether ROS 1 and ROS 2 both have the type of a connection."""
         return one.msgtype in self._new.fielddefs and one.msgtype in self._old.fielddefs
 
     def _make_converter(self, kind: str) -> Callable[[bytes | memoryview], memoryview]:
-        """Return what makes a message of ROS 2 of one of ROS 1."""
+        """Return a function that converts a ROS 1 message to ROS 2."""
         old, new = self._old, self._new
         if is_same_wireformat(old, new, kind, kind):
             return partial(new.ros1_to_cdr, typename=kind)

@@ -1,10 +1,10 @@
 # Copyright 2026 The armid_ros developers
 # SPDX-License-Identifier: Apache-2.0
 """
-From decoded messages to samples on one time base.
+Assemble decoded messages into samples on one time base.
 
-Messages that name the same joints are a series. Of several series the one with the most samples
-gives the time base; the others are interpolated linearly, but not over their gaps.
+Messages that name the same joints form a series. The series with the most samples gives the time
+base. The other series are interpolated linearly, except over their gaps.
 
 """
 
@@ -29,17 +29,17 @@ from scipy.ndimage import median_filter
 # A backward step of the clock of more than this is a restart (a simulation reset, a bag played in
 # a loop), not a late message.
 RESTART_NS = 10**9
-# Messages around one, itself among them, whose median is its time; half as many may be rubbish.
+# Window of the median that checks a stamp [messages]; fewer than half of them may be wrong.
 _AROUND = 5
-# As many messages in a row, in time that others have had, are no late messages any more.
+# So many messages in a row with earlier stamps mean that the clock was set back.
 _FEWEST_AGAIN = 10
-# No position, velocity or torque is as large; memory that nobody wrote to is.
+# Limit of positions, velocities and torques; uninitialised memory can exceed it.
 LARGEST = 1e15
-# A torque that varies by less is none: memory that nobody wrote to [N m].
+# A torque with less variation is not a measurement but uninitialised memory [N m].
 NOTHING = 1e-9
-#: More samples than this part being not finite is no glitch but a fault of the recording.
+#: Largest share of samples that may be not finite.
 MAX_NOT_FINITE = 0.2
-# Beyond these fractions of the messages the header's clock is not believed.
+# Header stamps are rejected if more than these shares of them are faulty.
 _MAX_ZERO = 0.01
 _MAX_REPEATED = 0.5
 _MAX_BACKWARD = 0.1
@@ -47,7 +47,7 @@ _MAX_SPAN_RATIO = 1000.0
 
 
 def gather(pieces: Sequence[JointSamples]) -> list[JointSamples]:
-    """Put pieces that name the same joints together, each in the order of storage."""
+    """Concatenate the pieces that name the same joints, in the order of storage."""
     by_joints: dict[tuple[str, ...], list[JointSamples]] = {}
     for piece in pieces:
         by_joints.setdefault(piece.joints, []).append(piece)
@@ -64,10 +64,10 @@ def gather(pieces: Sequence[JointSamples]) -> list[JointSamples]:
 def clock_problem(
     stamps: IntArray, position: FloatArray | None, receive: IntArray | None = None
 ) -> str:
-    """Say why stamps cannot be believed; nothing if they can."""
+    """Return why stamps are not usable; empty if they are."""
     first = int(np.argmax(stamps != 0))
     if first and np.count_nonzero(stamps[first:] == 0) <= _MAX_ZERO * len(stamps):
-        stamps = stamps[first:]  # before /clock there is no time
+        stamps = stamps[first:]  # simulated time is zero until the first /clock
         position = None if position is None else position[first:]
     zero = int((stamps == 0).sum())
     if zero > _MAX_ZERO * len(stamps):
@@ -77,7 +77,7 @@ def clock_problem(
         return ''
     repeated = steps == 0
     if position is not None and not zero and repeated.any():
-        # A message recorded twice repeats its values too; that speaks not against the clock.
+        # A message recorded twice also repeats its values; it is no fault of the clock.
         at = np.flatnonzero(repeated)
         repeated[at] = (position[at] != position[at + 1]).any(axis=1)
     if repeated.mean() > _MAX_REPEATED:
@@ -94,7 +94,7 @@ def clock_problem(
 
 
 def ordered(series: JointSamples, clock: Clock, counts: Counter[str]) -> JointSamples:
-    """Return the longest stretch between restarts of the clock, in order of time."""
+    """Return the samples of the longest stretch between clock restarts, in order of time."""
     if clock == 'receive':
         assert series.receive is not None
         series = replace(series, stamps=series.receive)
@@ -117,7 +117,7 @@ def ordered(series: JointSamples, clock: Clock, counts: Counter[str]) -> JointSa
 def merged(
     series: Sequence[JointSamples], joints: Sequence[str], counts: Counter[str]
 ) -> JointSamples:
-    """Put the joints of several series on one time base."""
+    """Merge several series into samples of all joints on one time base."""
     holders: dict[tuple[int, ...], list[str]] = {}
     for joint in joints:
         key = tuple(i for i, one in enumerate(series) if joint in one.joints)
@@ -152,7 +152,7 @@ def merged(
 
 
 def _concatenated(parts: Sequence[JointSamples]) -> JointSamples:
-    """Put samples of the same joints behind each other."""
+    """Concatenate samples of the same joints."""
     if len(parts) == 1:
         return parts[0]
     values = tuple(_stacked([part.values[field] for part in parts], parts) for field in range(3))
@@ -169,7 +169,7 @@ def _concatenated(parts: Sequence[JointSamples]) -> JointSamples:
 def _stacked(
     arrays: Sequence[FloatArray | None], parts: Sequence[JointSamples], axis: int = 0
 ) -> FloatArray | None:
-    """Concatenate along time or along joints, NaN for what is missing."""
+    """Concatenate along time or joints, with NaN for missing quantities."""
     if all(values is None for values in arrays):
         return None
     whole = [
@@ -181,7 +181,7 @@ def _stacked(
 
 
 def _adjacent(arrays: Sequence[FloatArray]) -> FloatArray | None:
-    """Return the part of an array that others are, each behind the one before; or None."""
+    """Return the slice of one array that adjacent views form; None if they are not adjacent."""
     whole = arrays[0].base
     if not isinstance(whole, np.ndarray) or whole.ndim != 2:
         return None
@@ -200,12 +200,12 @@ def _adjacent(arrays: Sequence[FloatArray]) -> FloatArray | None:
 
 
 def longest_run(stamps: IntArray) -> slice | None:
-    """Return the longest stretch between restarts of the clock, None if it never restarted."""
+    """Return the longest stretch between clock restarts; None without a restart."""
     if len(stamps) < 3:
         return None
     steps = np.diff(stamps)
     down = steps < -RESTART_NS
-    # The message after the step must be early as well; otherwise one message was late.
+    # The next message must also be earlier; otherwise a single message was late.
     down[:-1] &= stamps[2:] - stamps[:-2] < -RESTART_NS
     for back in np.flatnonzero((steps < 0) & ~down):
         down[back] = _runs_again(stamps, int(back))
@@ -217,9 +217,9 @@ def longest_run(stamps: IntArray) -> slice | None:
 
 
 def _runs_again(stamps: IntArray, back: int) -> bool:
-    """Whether the clock runs a second time through what it had been through before a step back."""
-    # Messages that were late fill a hole; together with those before them they are as many as the
-    # time holds. A clock that was set back gives twice as many.
+    """Return whether the clock repeats a stretch of time after a step back."""
+    # Late messages fill a hole, so that the total matches the sampling rate. A clock that was set
+    # back gives twice as many messages.
     first, last = stamps[back + 1], stamps[back]
     steps = np.diff(stamps)
     period = float(np.median(steps[steps > 0]))
@@ -230,7 +230,7 @@ def _runs_again(stamps: IntArray, back: int) -> bool:
 
 
 def _sorted(series: JointSamples, counts: Counter[str]) -> JointSamples:
-    """Sort by time and drop repeated stamps; of equal ones the first stays."""
+    """Sort by time, and keep the first of several samples with equal stamps."""
     steps = np.diff(series.stamps)
     if (steps > 0).all():
         return series
@@ -247,7 +247,7 @@ def _sorted(series: JointSamples, counts: Counter[str]) -> JointSamples:
 def _resampled(
     series: JointSamples, stamps: IntArray
 ) -> tuple[JointSamples, npt.NDArray[np.bool_], npt.NDArray[np.bool_]]:
-    """Return a series at other stamps, where that is possible, and where it is exact."""
+    """Interpolate a series at other stamps; also return which values are valid, and exact."""
     if len(series) == len(stamps) and np.array_equal(series.stamps, stamps):
         everywhere = np.ones(len(stamps), np.bool_)
         return series, everywhere, everywhere
@@ -269,14 +269,14 @@ def _resampled(
 def _finite(
     where: str, joints: tuple[str, ...], series: JointSamples, counts: Counter[str]
 ) -> tuple[JointSamples, tuple[str, ...], tuple[str, ...]]:
-    """Return the finite samples, the quantities that are absent, and what is not finite."""
+    """Return the finite samples, the absent quantities, and the non-finite quantities."""
     absent: list[str] = []
     quantities: list[FloatArray | None] = []
     for name, values in zip(QUANTITIES, series.values, strict=True):
         if values is None:
             lacking = list(joints)
         else:
-            # NaN in the first sample of a joint is a matter of its column, and rare.
+            # a joint without measurements has NaN in its first sample too
             suspect = np.flatnonzero(np.isnan(values[:1]).any(axis=0))
             lacking = [joints[j] for j in suspect if np.isnan(values[:, j]).all()]
         if lacking:
@@ -311,27 +311,27 @@ def assemble(
     **about: Any,
 ) -> Recording:
     """
-    Make one recording of samples that may be late, repeated, spread or not finite.
+    Assemble a recording from samples that may be late, repeated, split or not finite.
 
     Parameters
     ----------
     where : str
-        File and topic or column, for messages.
+        File and topic or column, for error messages.
     joints : tuple of str
         In the order of the recording.
     pieces : list of JointSamples
-        In the order of storage; the list is emptied, so that memory is let go.
+        Samples in the order of storage. The list is emptied to free its memory.
     counts : Counter
-        What was counted so far, by attribute of the report.
+        Counts so far, by attribute of the report.
     met : mapping of str to value
-        What else was met, by attribute of the report; its messages among it.
+        Other attributes of the report, with the number of messages among them.
     **about
         Other attributes of the recording.
 
     Raises
     ------
     RecordingError
-        There is no usable time, or too little is left.
+        If no clock is usable, or fewer than two samples remain.
 
     """
     gathered = gather(pieces)
@@ -362,7 +362,7 @@ def assemble(
     t = (stamps - stamps[0]) * 1e-9
     for array in (t, q, dq, tau):
         if array is not None:
-            array.setflags(write=False)  # so that it need not be copied
+            array.setflags(write=False)  # a read-only array is not copied by Recording
     found = {'not_finite': culprits, 'absent': absent, 'clock_note': note, **counts, **met}
     report = ReadReport(
         **found,

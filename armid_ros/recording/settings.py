@@ -1,6 +1,6 @@
 # Copyright 2026 The armid_ros developers
 # SPDX-License-Identifier: Apache-2.0
-"""How bags are read: what is checked, and how much memory they may take."""
+"""Settings for reading bags: checks and memory limit."""
 
 from __future__ import annotations
 
@@ -13,16 +13,16 @@ from armid_ros.files import default_memory_limit, size_text
 @dataclass(frozen=True)
 class ReadSettings:
     """
-    How a bag is read.
+    Settings for reading a bag.
 
     Attributes
     ----------
     check_crc : bool
-        Whether checksums are compared, and what is damaged is left out. Reading takes about a
-        tenth longer than without.
+        Whether checksums are compared and damaged parts are skipped. Reading takes about a tenth
+        longer.
     memory_limit : int
-        What the messages of one bag, one chunk or one file that has to be unpacked may take
-        [bytes]; by default a quarter of the memory.
+        Memory limit for the messages of one bag, one chunk, or one unpacked file [bytes]; by
+        default a quarter of the memory.
 
     """
 
@@ -36,19 +36,19 @@ class ReadSettings:
 
     def require(self, size: int, what: str) -> None:
         """
-        Refuse what takes more memory than allowed.
+        Raise a RecordingError if an object exceeds the memory limit.
 
         Parameters
         ----------
         size : int
-            What it takes [bytes].
+            Size of the object [bytes].
         what : str
-            What it is, to begin the message with.
+            Name of the object, the beginning of the error message.
 
         Raises
         ------
         RecordingError
-            It takes more than the limit.
+            If the size exceeds the limit.
 
         """
         if size > self.memory_limit:

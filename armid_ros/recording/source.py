@@ -1,6 +1,6 @@
 # Copyright 2026 The armid_ros developers
 # SPDX-License-Identifier: Apache-2.0
-"""What every storage of messages offers: its topics, and their messages as raw CDR."""
+"""Interface of all storages: topics, and their messages as raw CDR."""
 
 from __future__ import annotations
 
@@ -20,9 +20,9 @@ import numpy.typing as npt
 from rosbags.interfaces import Qos
 
 IntArray = npt.NDArray[np.int64]
-#: Encoding of topics that are listed, and whose messages a source cannot give.
+#: Encoding of listed topics whose messages the source cannot return.
 UNREADABLE = 'unreadable'
-#: Problems said one by one; a file that is damaged all over is not described byte by byte.
+#: Largest number of problems that are listed one by one.
 _SAID = 8
 
 
@@ -38,13 +38,14 @@ class Topic:
     message_type : MessageType
         Its type, as the bag describes it.
     qos : tuple of rosbags.interfaces.Qos
-        What its publishers offered; empty when unknown.
+        QoS that the publishers offered; empty if unknown.
     count : int
         Number of messages.
     encoding : str
-        How messages are serialised: 'cdr' in ROS 2, `UNREADABLE` where the source has none.
+        Serialisation of the messages: 'cdr' in ROS 2, `UNREADABLE` if the source cannot return
+        them.
     joints : tuple of str
-        Joints that its first messages name, as far as `bag_contents` has looked.
+        Joints that its first messages name; set by `bag_contents`.
 
     """
 
@@ -64,16 +65,16 @@ class Topic:
 @dataclass(frozen=True)
 class MessageBlock:
     """
-    Many messages of one topic, in one buffer.
+    Messages of one topic in one buffer.
 
     Attributes
     ----------
     data : bytes or mmap
         The buffer.
     start, length : ndarray, shape (N,)
-        Where the CDR of each message begins, and its number of bytes.
+        Begin and number of bytes of the CDR of each message.
     log_time, publish_time : ndarray, shape (N,)
-        When it was recorded, and when sent [ns].
+        Times of recording and of sending [ns].
 
     """
 
@@ -87,7 +88,7 @@ class MessageBlock:
     def joined(
         cls, messages: Sequence[bytes], log_time: IntArray, publish_time: IntArray
     ) -> MessageBlock:
-        """Return messages in a buffer of their own."""
+        """Copy messages into one buffer."""
         length = np.array([len(message) for message in messages], np.int64)
         start = np.cumsum(length) - length
         return cls(b''.join(messages), start, length, log_time, publish_time)
@@ -112,19 +113,19 @@ class RawMessage(NamedTuple):
 
 
 class Damage:
-    """A list of what is wrong; the same is said once."""
+    """List of problems of a file, without repeats."""
 
     def __init__(self) -> None:
         self._problems: dict[str, None] = {}
 
     def __str__(self) -> str:
-        """Return what is wrong; empty when nothing is."""
+        """Return the problems as a text; empty without problems."""
         said = list(self._problems)[:_SAID]
         more = len(self._problems) - len(said)
         return '; '.join([*said, *([f'and {more} more'] if more else [])])
 
     def add(self, problem: str) -> None:
-        """Note a problem."""
+        """Add a problem."""
         self._problems[problem] = None
 
 
@@ -140,20 +141,20 @@ class Source(ABC):
         path : Path
             Its file.
         settings : ReadSettings
-            What to check, and how much memory to take.
+            Which checks are made, and the memory limit.
 
         Raises
         ------
         RecordingError
-            It cannot be read, or is none of the kind.
+            If the file cannot be read, or is of another kind.
 
         """
-        open_regular(path, RecordingError).close()  # a FIFO would be waited for
+        open_regular(path, RecordingError).close()  # opening a FIFO would block
         self._path, self._settings, self._damage = path, settings, Damage()
 
     @property
     def damage(self) -> str:
-        """Return what is wrong with it, as far as it was read; empty for a whole one."""
+        """Return the damage found so far; empty if none was found."""
         return str(self._damage)
 
     @abstractmethod
@@ -162,34 +163,34 @@ class Source(ABC):
 
     @abstractmethod
     def blocks(self, topic: str) -> Iterator[MessageBlock]:
-        """Yield the messages of a topic, in the order they are stored."""
+        """Yield the messages of a topic in the order of storage."""
 
     @abstractmethod
     def messages(self) -> Iterator[RawMessage]:
-        """Yield all messages in the order they were logged."""
+        """Yield all messages in the order of their log times."""
 
     @abstractmethod
     def close(self) -> None:
-        """Let go of the files."""
+        """Close the files."""
 
 
 def records_at(data: bytes | mmap.mmap, start: IntArray, length: int) -> npt.NDArray[np.void]:
     """
-    Return pieces of a buffer, without a copy where they are evenly spaced.
+    Return pieces of a buffer, without a copy if they are evenly spaced.
 
     Parameters
     ----------
     data : bytes or mmap
         The buffer; the pieces lie within it.
     start : ndarray, shape (N,)
-        Where they begin.
+        Begin of each piece.
     length : int
         Number of bytes of each.
 
     Returns
     -------
     ndarray, shape (N,)
-        Void records, to be viewed as structured ones.
+        Void records, which can be viewed as structured records.
 
     """
     record = np.dtype((np.void, length))

@@ -1,10 +1,10 @@
 # Copyright 2026 The armid_ros developers
 # SPDX-License-Identifier: Apache-2.0
 """
-Messages of an SQLite file, as rosbag2 of any distribution writes it.
+Read messages of an SQLite file of rosbag2, of any distribution.
 
-SQLite has no checksums: what it can tell is that its pages fit together, and that a column holds
-what it should. Bytes changed within a message cannot be noticed.
+SQLite has no checksums. The structure of pages and the types of columns are checked. Changed bytes
+inside a message cannot be detected.
 
 """
 
@@ -28,19 +28,19 @@ _BLOCK_MESSAGES = 4096
 _BLOCK_BYTES = 8 << 20
 _LONGEST = 2**31 - 1
 _JOURNALS = ('-wal', '-journal')
-# A time and bytes; whatever else a row holds was not written by a recorder.
+# Condition for a valid row: an integer time and binary data.
 _WHOLE = "typeof(timestamp) = 'integer' AND timestamp >= 0 AND typeof(data) = 'blob'"
 _ERRORS = (sqlite3.Error, UnicodeDecodeError, OverflowError, MemoryError)
 
 
 class SqliteSource(Source):
-    """One SQLite file."""
+    """Source for one SQLite file."""
 
     def __init__(self, path: Path, settings: ReadSettings = DEFAULT) -> None:
         """Open a file of rosbag2."""
         super().__init__(path, settings)
-        # A file left behind by a crash has a journal beside it that SQLite must play back;
-        # 'immutable' would ignore it, and works where the folder cannot be written to.
+        # After a crash SQLite must replay the journal beside the file, which 'immutable' ignores.
+        # Without a journal 'immutable' also works in a read-only folder.
         journal = any(is_file(path.with_name(path.name + end)) for end in _JOURNALS)
         mode = 'mode=ro' if journal else 'immutable=1'
         try:
@@ -110,13 +110,13 @@ class SqliteSource(Source):
                 yield RawMessage(_text(name), time, time, data)
 
     def _opened(self) -> dict[str, set[str]]:
-        """Return the columns of the tables, once the file is known to be one of rosbag2."""
+        """Check that the file is one of rosbag2, and return the columns of its tables."""
         database = self._database
         database.text_factory = lambda text: text.decode('utf-8', 'replace')
         database.setlimit(sqlite3.SQLITE_LIMIT_LENGTH, min(self._settings.memory_limit, _LONGEST))
-        with suppress(sqlite3.Error):  # not known to old versions
+        with suppress(sqlite3.Error):  # old versions of SQLite lack this pragma
             database.execute('PRAGMA trusted_schema = OFF')
-        # A view could compute anything, for ever.
+        # Only tables are read: a view could run an endless computation.
         tables = {
             name
             for (name,) in database.execute("SELECT name FROM sqlite_master WHERE type = 'table'")
@@ -142,7 +142,7 @@ class SqliteSource(Source):
         return columns
 
     def _check(self) -> None:
-        """Note what is wrong with the pages and the rows of the file."""
+        """Check pages and rows of the file, and note their damage."""
         (verdict,) = self._database.execute('PRAGMA quick_check(1)').fetchone()
         if verdict != 'ok':
             self._damage.add(f'the database is damaged: {" ".join(_text(verdict).split())}')
@@ -160,7 +160,7 @@ class SqliteSource(Source):
             self._damage.add(f'{lost} rows of messages have no topic; they are left out')
 
     def _fetch(self, query: str, parameters: tuple[str, ...]) -> Iterator[list[tuple[Any, ...]]]:
-        """Yield rows by the thousand, up to where the database is damaged."""
+        """Yield rows in batches, up to the first damage of the database."""
         rows: list[tuple[Any, ...]] = []
         size = 0
         try:
@@ -177,5 +177,5 @@ class SqliteSource(Source):
 
 
 def _text(value: object) -> str:
-    """Return what should be a text; empty where the column has something else."""
+    """Return a value if it is a text; empty otherwise."""
     return value if isinstance(value, str) else ''

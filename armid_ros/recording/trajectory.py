@@ -1,6 +1,6 @@
 # Copyright 2026 The armid_ros developers
 # SPDX-License-Identifier: Apache-2.0
-"""Reference motions as trajectory_msgs/JointTrajectory, what a ROS 2 controller takes."""
+"""Read and write reference motions as trajectory_msgs/JointTrajectory."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ from rosbags.typesys import get_typestore, Stores
 
 
 class Waypoints(Measured, Protocol):
-    """What a JointTrajectory can say: a `Motion`, or less than that; torques are its efforts."""
+    """Contents of a JointTrajectory: a `Motion`, or a subset of its fields."""
 
     @property
     def ddq(self) -> FloatArray | None:
@@ -33,7 +33,7 @@ class Waypoints(Measured, Protocol):
 
 @dataclass(frozen=True)
 class ReadWaypoints:
-    """The waypoints that a message has; see `Waypoints`."""
+    """Waypoints read from a message; see `Waypoints`."""
 
     joints: tuple[str, ...]
     t: FloatArray
@@ -43,7 +43,7 @@ class ReadWaypoints:
     tau: FloatArray | None
 
 
-#: Topic of the message in a bag, and when it counts as recorded [ns].
+#: Topic and log time [ns] of the message in a bag.
 _TOPIC, _LOG_TIME = '/joint_trajectory', 10**9
 
 
@@ -54,7 +54,7 @@ def joint_trajectory_cdr(motion: Waypoints) -> bytes:
     Parameters
     ----------
     motion : Motion or other Waypoints
-        What to do over time; time_from_start is its time, and the stamp 0 means now.
+        Motion to serialise. Its times become time_from_start; the stamp 0 means now.
 
     """
     store = get_typestore(Stores.ROS2_JAZZY)
@@ -100,16 +100,16 @@ def write_joint_trajectory(
     Parameters
     ----------
     path : str or Path
-        The bag directory to be made; it must not exist.
+        Bag directory to create; it must not exist.
     motion : Motion or other Waypoints
-        What to do; its torque, if it has one, is effort on top of what follows it.
+        Motion to write. Its torque, if any, is a feedforward effort.
     robot_description : str, optional
         URDF to be written to /robot_description.
 
     Raises
     ------
     RecordingError
-        The bag exists already.
+        If the bag exists.
 
     """
     with whole_bag(path) as writer:
@@ -134,21 +134,22 @@ def read_waypoints(
     path : str or Path
         A rosbag2 directory, or a bare file.
     joints : sequence of str
-        The joints wanted, in this order.
+        Joints to read, in this order.
     topic : str, optional
         Topic of the message; by default the only one of its type.
     settings : ReadSettings
-        Whether checksums are compared, and how much memory to take.
+        Whether checksums are compared, and the memory limit.
 
     Returns
     -------
     ReadWaypoints
-        What the message has itself; None for rates and efforts that it does not give.
+        Waypoints of the message; velocities, accelerations and efforts are None if the message has
+        none.
 
     Raises
     ------
     RecordingError
-        There is no such bag or topic, or the trajectory does not name a joint or is not valid.
+        If the bag or topic does not exist, or the trajectory is not valid or lacks a joint.
 
     """
     with Bag(path, settings) as bag:
@@ -182,12 +183,12 @@ def read_waypoints(
 
 def waypoints_of(message: Any) -> ReadWaypoints:
     """
-    Return the waypoints of a JointTrajectory that ROS or rosbags decoded.
+    Return the waypoints of a JointTrajectory message decoded by ROS or rosbags.
 
     Raises
     ------
     TrajectoryError
-        It has no points, or they do not all have the fields that the first one has.
+        If the trajectory has no points, or its points differ in their fields.
 
     """
     points, joints = message.points, tuple(message.joint_names)

@@ -1,15 +1,15 @@
 # Copyright 2026 The armid_ros developers
 # SPDX-License-Identifier: Apache-2.0
-"""Positions kept within one turn."""
+"""Remove jumps by whole turns from positions."""
 
 from __future__ import annotations
 
 from armid_ros.motion import FloatArray
 import numpy as np
 
-#: A whole turn in the units that positions come in [rad, degrees].
+#: One turn in each unit of positions [rad, degrees].
 _TURNS = (2.0 * np.pi, 360.0)
-#: What a step that is a jump by a whole turn may be off it, as a share of the turn.
+#: Largest deviation of a jump from a whole turn, as a share of the turn.
 _OFF_A_TURN = 0.15
 
 
@@ -17,8 +17,8 @@ def unwrapped(q: FloatArray) -> tuple[FloatArray, list[int]]:
     """
     Undo jumps by a whole turn.
 
-    A joint is wrapped if it stays within one turn and every step of more than half a turn is one
-    of a whole turn but for what the joint moves otherwise.
+    A joint is wrapped if its positions stay within one turn and each step of more than half a turn
+    is about a whole turn. The tolerance depends on the other steps of the joint.
 
     Parameters
     ----------
@@ -28,10 +28,10 @@ def unwrapped(q: FloatArray) -> tuple[FloatArray, list[int]]:
     Returns
     -------
     q : ndarray, shape (N, n)
-        Continuous positions, by whole turns as near to zero as may be; the same object where
-        nothing was wrapped.
+        Continuous positions, shifted by whole turns to be near zero; the same object if no joint
+        was wrapped.
     joints : list of int
-        Those that were.
+        Indices of the wrapped joints.
 
     """
     steps = np.diff(q, axis=0)

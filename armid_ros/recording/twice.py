@@ -1,6 +1,6 @@
 # Copyright 2026 The armid_ros developers
 # SPDX-License-Identifier: Apache-2.0
-"""Recordings that are given more than once."""
+"""Check that no recording is given more than once."""
 
 from __future__ import annotations
 
@@ -13,20 +13,21 @@ import numpy as np
 
 def given_twice(fitted: Sequence[Recording], held_out: Sequence[Recording] = ()) -> str:
     """
-    Say which recordings are among those that are fitted already.
+    Return a text that names the recordings that are given twice.
 
-    What is fitted twice counts twice, and what is fitted is not held out. Two runs of a simulated
-    trajectory have the same positions; only the same torques as well make them one.
+    A recording that is fitted twice has twice the weight, and a fitted recording is not held out.
+    Two recordings are the same if positions and torques agree: two simulated runs may share their
+    positions.
 
     Parameters
     ----------
     fitted, held_out : sequence of Recording
-        What a model is fitted to, and what it is only to predict.
+        Recordings that the model is fitted to, and held-out recordings.
 
     Returns
     -------
     str
-        Their names, and those of what they are the same as; empty if there are none.
+        Names of the repeated recordings and of their originals; empty if there are none.
 
     """
     again = [
@@ -39,7 +40,7 @@ def given_twice(fitted: Sequence[Recording], held_out: Sequence[Recording] = ())
 
 
 def require_once(fitted: Sequence[Recording], held_out: Sequence[Recording] = ()) -> None:
-    """Raise a RecordingError that names the recordings that are given twice."""
+    """Raise a RecordingError if recordings are given twice."""
     said = given_twice(fitted, held_out)
     if said:
         raise RecordingError(f'{said}; give each recording once')

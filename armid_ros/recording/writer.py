@@ -1,10 +1,10 @@
 # Copyright 2026 The armid_ros developers
 # SPDX-License-Identifier: Apache-2.0
 """
-Writes rosbag2 directories: BAG/BAG_0.mcap and BAG/metadata.yaml, as rosbag2 of Jazzy does.
+Write rosbag2 directories: BAG/BAG_0.mcap and BAG/metadata.yaml, as in Jazzy.
 
-What is in a finished chunk survives the end of the process however it comes; chunks are therefore
-closed early, by size or by age.
+Messages in a finished chunk survive a crash or a kill of the process. Chunks are therefore closed
+early, by size or by age.
 
 """
 
@@ -33,9 +33,9 @@ import numpy as np
 import numpy.typing as npt
 from rosbags.interfaces import Qos
 
-# At 3 kHz of JointState, 1 MB/s, the age of a chunk closes it, not its size.
+# For JointState at 3 kHz (1 MB/s) chunks are closed by age, not by size.
 DEFAULT_CHUNK_SIZE = 512 * 1024
-# Together with the time to write it out this keeps what a kill can lose below 0.3 s.
+# With the time of writing, a kill loses less than 0.3 s of messages.
 DEFAULT_CHUNK_AGE = 0.2
 
 
@@ -47,9 +47,10 @@ def whole_bag(
     chunk_size: int = DEFAULT_CHUNK_SIZE,
 ) -> Iterator[BagWriter]:
     """
-    Write a bag of which all is known: it is whole, or absent when something ends the writing.
+    Write a complete bag; if the writing is interrupted, the bag is removed.
 
-    A recorder keeps what it has; but half of a result would pass for all of it.
+    A recorder keeps an incomplete bag. An incomplete result could be mistaken for the whole
+    result.
 
     Parameters
     ----------
@@ -63,7 +64,7 @@ def whole_bag(
     Raises
     ------
     RecordingError
-        The directory exists, or cannot be made or written to.
+        If the directory exists, or cannot be created or written to.
 
     """
     writer = BagWriter(path, compression=compression, chunk_size=chunk_size)
@@ -78,13 +79,13 @@ def whole_bag(
 
 
 def require_new(path: Path) -> None:
-    """Raise a RecordingError where a bag, or anything, is already."""
+    """Raise a RecordingError if the path exists."""
     if os.path.lexists(path):
         raise RecordingError(f'{path}: exists already; choose another name, or remove it')
 
 
 class _OpenChunk(NamedTuple):
-    """The records of a chunk that is not written yet."""
+    """Records of the chunk that is not written yet."""
 
     number: int
     records: list[bytes]
@@ -92,10 +93,10 @@ class _OpenChunk(NamedTuple):
 
 class BagWriter:
     """
-    Writes a bag; a context manager.
+    Writer of a bag; a context manager.
 
-    The bag is complete, also on an exception, when the context ends: what was recorded before
-    something went wrong is worth keeping.
+    The bag is completed at the end of the context, also after an exception. Messages recorded
+    before the exception are kept.
 
     """
 
@@ -114,20 +115,20 @@ class BagWriter:
         Parameters
         ----------
         path : str or Path
-            The directory to be made; it must not exist.
+            Directory to create; it must not exist.
         chunk_size : int
-            Bytes of messages after which a chunk is written out.
+            Size of the messages at which a chunk is written [bytes].
         chunk_age : float
-            Time after which a chunk is written out when the next message comes [s].
+            Age at which a chunk is written when the next message arrives [s].
         compression : {'zstd', 'lz4', 'none'}
-            Of the chunks.
+            Compression of the chunks.
         clock : callable
-            Time that ages chunks [s].
+            Returns the time that the age of chunks is measured with [s].
 
         Raises
         ------
         RecordingError
-            The directory exists, or cannot be made.
+            If the directory exists, or cannot be created.
 
         """
         self.path = Path(path)
@@ -161,7 +162,7 @@ class BagWriter:
 
     @property
     def topics(self) -> tuple[Topic, ...]:
-        """Return the topics, with the number of messages written out."""
+        """Return the topics, with the number of messages in the file."""
         counts = self._mcap.counts
         return tuple(
             replace(topic, count=counts[self._channels[name]])
@@ -170,17 +171,17 @@ class BagWriter:
 
     @property
     def size(self) -> int:
-        """Return the number of bytes written out."""
+        """Return the number of bytes in the file."""
         return self._mcap.size
 
     @property
     def in_place(self) -> bool:
-        """Whether the file is still where it was made: neither deleted nor moved."""
+        """Whether the file was neither deleted nor moved since it was created."""
         return self._mcap.in_place
 
     @property
     def time_range(self) -> tuple[int, int]:
-        """Log time of the first and the last message written out [ns]."""
+        """Log times of the first and the last message in the file [ns]."""
         return self._mcap.time_range
 
     def add_topic(
@@ -194,7 +195,7 @@ class BagWriter:
         encoding: str = 'ros2msg',
     ) -> None:
         """
-        Announce a topic; doing so again for the same type changes nothing.
+        Add a topic; adding it again with the same type has no effect.
 
         Parameters
         ----------
@@ -203,19 +204,19 @@ class BagWriter:
         type_name : str
             Such as 'sensor_msgs/msg/JointState'.
         qos : sequence of rosbags.interfaces.Qos
-            What its publishers offer; by default one reliable, volatile publisher.
+            QoS that the publishers offer; by default one reliable, volatile publisher.
         definition : str, optional
             Text of the type's .msg file, with or without its dependencies; needed for types that
             are neither standard nor installed.
         type_hash : str, optional
-            RIHS01 hash; given together with a definition, both are written as they are.
+            RIHS01 hash. With a definition and a hash, both are written unchanged.
         encoding : {'ros2msg', 'ros2idl'}
-            Language of such a definition.
+            Language of the definition.
 
         Raises
         ------
         RecordingError
-            The topic has another type already, or its type is not known.
+            If the topic exists with another type, or the type is not known.
 
         """
         self._check_open()
@@ -265,18 +266,18 @@ class BagWriter:
         Parameters
         ----------
         topic : str
-            A topic announced before.
+            Topic that was added before.
         cdr : bytes
             The message, serialised.
         log_time_ns : int
-            When it was received [ns].
+            Time of reception [ns].
         publish_time_ns : int, optional
-            When it was sent [ns]; by default when it was received.
+            Time of sending [ns]; by default the time of reception.
 
         Raises
         ------
         RecordingError
-            The topic was not announced, or the bag is closed.
+            If the topic was not added, or the bag is closed.
 
         """
         channel = self._channel(topic)
@@ -300,21 +301,21 @@ class BagWriter:
         self, topic: str, messages: npt.NDArray[np.void], log_times_ns: IntArray
     ) -> None:
         """
-        Write many messages of equal length, without a Python object for each.
+        Write many messages of equal length from one array.
 
         Parameters
         ----------
         topic : str
-            A topic announced before.
+            Topic that was added before.
         messages : ndarray of void, shape (N,)
             The messages, serialised.
         log_times_ns : ndarray, shape (N,)
-            When they were received, and sent [ns].
+            Times of reception, written as times of sending too [ns].
 
         Raises
         ------
         RecordingError
-            The topic was not announced, or the bag is closed.
+            If the topic was not added, or the bag is closed.
 
         """
         channel = self._channel(topic)
@@ -323,7 +324,7 @@ class BagWriter:
         at_once = max(1, self._chunk_size // record.itemsize)
         for at in range(0, len(messages), at_once):
             some = messages[at : at + at_once]
-            # The sequence number between the fields stays zero.
+            # The sequence number, a field between them, stays zero.
             records = np.zeros(len(some), record)
             head = records['head']
             head['opcode'] = Opcode.MESSAGE
@@ -337,16 +338,16 @@ class BagWriter:
 
     def copy(self, source: Source, change: Callable[[Topic, bytes], bytes] | None = None) -> None:
         """
-        Write all topics and messages of a source, with types, QoS and times as they are.
+        Copy all topics and messages of a source, with unchanged types, QoS and times.
 
-        Topics whose messages the source cannot give are left out.
+        Topics whose messages the source cannot return are skipped.
 
         Parameters
         ----------
         source : Source
             A bag, or one of its files.
         change : callable, optional
-            Returns what is written in place of a message, given its topic and CDR.
+            Returns the CDR to write in place of a message; called with topic and CDR.
 
         """
         topics = {one.name: one for one in source.topics() if one.encoding != UNREADABLE}
@@ -356,7 +357,7 @@ class BagWriter:
                 self.add_topic, topic.name, kept.name, qos=topic.qos, encoding=kept.encoding
             )
             text, digest = kept.definition, kept.type_hash
-            try:  # what the source does not describe is looked up
+            try:  # look up a definition or hash that the source lacks
                 add(definition=text or None, type_hash=digest or None)
             except RecordingError:
                 add(definition=text, type_hash=digest)
@@ -365,15 +366,15 @@ class BagWriter:
             self.write(message.topic, cdr, message.log_time_ns, message.publish_time_ns)
 
     def flush(self) -> None:
-        """Write out what is in memory; for a timer, should messages stop coming."""
+        """Write the messages in memory to the file; call it from a timer."""
         self._check_open()
         content, offsets = _joined(self._open_records())
-        # Without a message there is nothing to lose.
+        # A chunk without messages need not be written.
         if len(offsets):
             self._mcap.write_chunk(content, offsets)
 
     def close(self) -> None:
-        """Complete the file, and write metadata.yaml; a closed bag stays as it is."""
+        """Complete the file and write metadata.yaml; no effect on a closed bag."""
         if self._closed:
             return
         if not self._mcap.finished:
@@ -385,13 +386,13 @@ class BagWriter:
 
     def save(self) -> str:
         """
-        Complete the bag without what waits in memory, after it could not be written out.
+        Complete the bag without the messages in memory, after a write error.
 
         Returns
         -------
         str
-            What could not be done; empty if the bag is complete. In either case every chunk that
-            was written can be read.
+            Error message; empty if the bag is complete. In both cases every written chunk can be
+            read.
 
         """
         if self._closed:
@@ -406,9 +407,9 @@ class BagWriter:
         return ''
 
     def _open_records(self) -> list[bytes]:
-        """Return the records of the chunk to come."""
-        # Not emptied by flush(), which may be interrupted between writing and emptying: records
-        # belong to a chunk by its number, and are over with once it is in the file.
+        """Return the records of the next chunk."""
+        # flush() does not empty the list, since it may be interrupted after writing. Records carry
+        # the number of their chunk, and are dropped once that chunk is in the file.
         if self._open.number != self._mcap.chunk_count:
             self._open = _OpenChunk(self._mcap.chunk_count, [])
         return self._open.records
@@ -417,7 +418,7 @@ class BagWriter:
         return bag_information(self.topics, file_name, *self.time_range)
 
     def _write_information(self, file_name: str | None) -> None:
-        """Put into the file what rosbag2 puts there at its beginning and end."""
+        """Write the metadata record that rosbag2 writes at the beginning and end of the file."""
         text = dump(self._information(file_name))
         self._mcap.write_metadata('rosbag2', {'serialized_metadata': text})
 
@@ -426,7 +427,7 @@ class BagWriter:
             raise RecordingError(f'{self.path}: the bag is closed')
 
     def _channel(self, topic: str) -> int:
-        """Return the channel of a topic; RecordingError where the bag takes no message of it."""
+        """Return the channel of a topic; RecordingError if unknown or the bag is closed."""
         channel = self._channels.get(topic)
         if channel is None or self._closed:
             self._check_open()
@@ -438,7 +439,7 @@ class BagWriter:
 
 
 def _joined(records: list[bytes]) -> tuple[bytes, IntArray]:
-    """Return records as one, and where the messages among them begin."""
+    """Join records, and return the begin of each message among them."""
     lengths = np.array([len(record) for record in records], np.int64)
     is_message = np.array([record[0] == Opcode.MESSAGE for record in records], np.bool_)
     return b''.join(records), (np.cumsum(lengths) - lengths)[is_message]

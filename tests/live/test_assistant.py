@@ -101,6 +101,6 @@ def test_a_plan_is_a_motion_that_can_be_read(known_arm, changed):
     if not any(f.rivals for f in here.poll().findings):
         here.ask(Plan())
         done = here.poll()
-        assert done.excitation or 'no name is in doubt' in done.text
+        assert done.excitation or 'no candidates are ambiguous' in done.text
         if done.excitation:
             assert read_excitation(done.excitation, 'plan').duration > 0.0

@@ -198,5 +198,5 @@ def test_what_was_learned_is_of_the_arm_as_it_was_then(known_arm, patched):
 
 
 def test_settings_that_never_ask_are_refused():
-    with pytest.raises(IdentificationError, match='never as long'):
+    with pytest.raises(IdentificationError, match='is shorter than the shortest'):
         LiveSettings(window=5.0, shortest=8.0)

@@ -43,7 +43,7 @@ def test_a_damaged_chunk_is_left_out_and_said_with_its_time(bag, tmp_path):
         (time - recording.start_ns) * 1e-9 for time in (chunk.start_time, chunk.end_time)
     )
     assert f'messages from {begin:.3f} to {end:.3f} s' in got.report.damage
-    assert 'where the writer counted 300' in got.report.damage
+    assert 'but the writer counted 300' in got.report.damage
     left = (recording.t < begin - 1e-6) | (recording.t > end + 1e-6)
     assert 0 < left.sum() < 300
     np.testing.assert_array_equal(got.q, recording.q[left])
@@ -79,7 +79,7 @@ def test_an_index_record_that_is_lost_costs_no_message_or_is_said(bag):
     at, _ = chunks_of(path)[1].indexes[1]
     change(path, at - 6, struct.pack('<H', 77))  # the index of a channel that does not exist
     got = read_recording(path, joints=JOINTS)
-    assert len(got) == 300 or 'where the writer counted 300' in got.report.damage
+    assert len(got) == 300 or 'but the writer counted 300' in got.report.damage
 
 
 def test_messages_that_are_lost_with_their_chunk_record_are_missed(bag):
@@ -90,7 +90,7 @@ def test_messages_that_are_lost_with_their_chunk_record_are_missed(bag):
     assert path.read_bytes()[opcode] == 6
     change(path, opcode, b'\x0c')
     got = read_recording(path, joints=JOINTS)
-    assert len(got) < 300 and 'where the writer counted 300' in got.report.damage
+    assert len(got) < 300 and 'but the writer counted 300' in got.report.damage
 
 
 def test_a_summary_that_is_damaged_is_not_believed(bag):
@@ -106,8 +106,12 @@ def test_a_summary_that_is_damaged_is_not_believed(bag):
 @pytest.mark.parametrize(
     ('old', 'new', 'damage'),
     [
-        ('count: 300', 'count: 310', 'counts 310 messages of /joint_states, there are 300'),
-        ('name: /joint_states', 'name: /other', 'counts 300 messages of /other, there are none'),
+        ('count: 300', 'count: 310', 'states 310 messages of /joint_states, but the bag has 300'),
+        (
+            'name: /joint_states',
+            'name: /other',
+            'states 300 messages of /other, but the bag has none',
+        ),
     ],
 )
 def test_counts_and_topics_of_metadata_are_compared(make_swing, tmp_path, old, new, damage):

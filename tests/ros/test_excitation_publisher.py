@@ -239,7 +239,7 @@ def test_with_nobody_to_take_the_trajectory_it_does_not_start(bench, robot, exci
     arm.stand()
     answer = bench.call('excitation_publisher/start')
     assert not answer.success and node.elapsed is None
-    assert answer.message == 'nobody subscribes to /joint_trajectory; the arm is not started'
+    assert answer.message == 'no node subscribes to /joint_trajectory; the arm is not started'
     arm.listen()
     bench.spin_until(lambda: node.readers, 'a subscriber')
     assert bench.call('excitation_publisher/start').success

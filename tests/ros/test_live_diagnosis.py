@@ -191,7 +191,7 @@ def test_joint_states_that_jump_back_are_said(bench, idle, seconds):
         take(node, 100.99 - seconds, 0.0, 0.0)
     bench.diagnose(node, diagnostics)
     said = {d.status[0].message for d in diagnostics}
-    back = 'joint states jump back in time: what is made of them begins anew'
+    back = 'joint states jump back in time: their processing begins anew'
     late = 'joint states whose stamp is not after that of the one before are left out'
     assert (back in said) is (seconds == 5.0)
     assert (late in said) is (seconds == 0.004)

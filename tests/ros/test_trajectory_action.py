@@ -61,7 +61,7 @@ def test_a_run_ends_when_the_controller_says_so(bench, arm, excitation):
     refused = bench.call('excitation_publisher/start')
     assert not refused.success and 'under way' in refused.message
     arm.run(end + 0.7)
-    assert 'does not say that the end is reached' in node.condition()[0]
+    assert 'does not report the end of the run' in node.condition()[0]
     arm.run(end + 1.7)
     assert arm.ends == ['succeed']
     assert node.elapsed is None

@@ -1,3 +1,3 @@
 # Copyright 2026 The armid_ros developers
 # SPDX-License-Identifier: Apache-2.0
-"""Messages of ROS 2 as what the package computes with, and back."""
+"""Convert ROS 2 messages to and from types of the package."""

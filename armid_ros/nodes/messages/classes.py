@@ -1,6 +1,6 @@
 # Copyright 2026 The armid_ros developers
 # SPDX-License-Identifier: Apache-2.0
-"""Message types by name: the class to subscribe with."""
+"""Find message classes by type name."""
 
 from __future__ import annotations
 
@@ -18,14 +18,14 @@ def message_class(type_name: str) -> type[Any]:
     Raises
     ------
     RecordingError
-        Its package is not installed, has no such message, or cannot be loaded.
+        If the package is not installed, has no such message, or cannot be loaded.
 
     """
     package, _, name = type_name.partition('/msg/')
     try:
         message_type: type[Any] = getattr(import_module(f'{package}.msg'), name)
         check_for_type_support(message_type)
-    except Exception as error:  # a package that is built for another system raises anything
+    except Exception as error:  # packages built for another system raise arbitrary exceptions
         raise RecordingError(
             f'type {type_name} is not available ({error}): install or source the package '
             f"'{package}'"
@@ -34,6 +34,6 @@ def message_class(type_name: str) -> type[Any]:
 
 
 def is_stamped(message_type: type[Any]) -> bool:
-    """Whether messages begin with a std_msgs/Header, and so with a stamp."""
+    """Return whether messages of a class begin with a std_msgs/Header."""
     fields: dict[str, str] = message_type.get_fields_and_field_types()
     return next(iter(fields.items()), None) == ('header', 'std_msgs/Header')

@@ -1,6 +1,6 @@
 # Copyright 2026 The armid_ros developers
 # SPDX-License-Identifier: Apache-2.0
-"""Estimates as messages, as statuses of /diagnostics and as files."""
+"""Convert estimates to messages, statuses of /diagnostics and files."""
 
 from __future__ import annotations
 
@@ -20,16 +20,16 @@ from diagnostic_msgs.msg import DiagnosticStatus
 import yaml
 
 SCHEMA = 'armid/estimate/1'
-#: What is written: the estimate, a model that has it, and the robot of that.
+#: Written files: the estimate, the model with the estimate, and its robot.
 FILES = ('estimate.yaml', 'model.yaml', 'robot.urdf')
-#: A change is a warning for so long [s].
+#: Time for which a change is shown as a warning [s].
 RECENT = 60.0
 
 
 def estimate_message(
     estimate: Estimate, samples: int, condition_number: float = 0.0
 ) -> ParameterEstimate:
-    """Return an estimate as the message that plotters and rosbags know; the stamp is unset."""
+    """Convert an estimate to a ParameterEstimate message without a stamp."""
     return ParameterEstimate(
         name=[p.name for p in estimate.parameters],
         joint=[p.joint for p in estimate.parameters],
@@ -43,22 +43,22 @@ def estimate_message(
 
 def save_identification(folder: Path, identifier: OnlineIdentifier) -> tuple[Path, ...]:
     """
-    Write what was learned.
+    Write the estimate to files.
 
     Parameters
     ----------
     folder : Path
-        Gets estimate.yaml (base parameters as estimated), model.yaml (an arm model that has
-        them, for the simulated arm) and robot.urdf, to which the model refers.
+        Folder for estimate.yaml (estimated base parameters), model.yaml (an arm model with these
+        parameters, for the simulated arm) and robot.urdf, to which the model refers.
     identifier : OnlineIdentifier
-        Has learned.
+        Identifier with the estimate.
 
     Raises
     ------
     ModelError
         If the folder cannot be written to.
     OutputError
-        If it has files of these names that are no results.
+        If files of these names exist that are not results.
 
     """
     refuse_replacing(folder, FILES)
@@ -86,14 +86,14 @@ def save_identification(folder: Path, identifier: OnlineIdentifier) -> tuple[Pat
 
 def parameter_status(name: str, estimate: Estimate | None) -> DiagnosticStatus:
     """
-    Return the estimate with its intervals.
+    Return the /diagnostics status of an estimate with its intervals.
 
     Parameters
     ----------
     name : str
-        Of the status.
+        Name of the status.
     estimate : Estimate or None
-        None before there is one.
+        None before the first estimate.
 
     """
     status = DiagnosticStatus(name=name, level=DiagnosticStatus.OK)
@@ -106,12 +106,12 @@ def parameter_status(name: str, estimate: Estimate | None) -> DiagnosticStatus:
 
 def change_status(name: str, changes: Sequence[Change], now: float) -> DiagnosticStatus:
     """
-    Return what has changed about the arm; a warning while it is new.
+    Return the /diagnostics status of the changes of the arm, a warning for recent ones.
 
     Parameters
     ----------
     name : str
-        Of the status.
+        Name of the status.
     changes : sequence of Change
         Oldest first.
     now : float

@@ -1,6 +1,6 @@
 # Copyright 2026 The armid_ros developers
 # SPDX-License-Identifier: Apache-2.0
-"""Joint states as numbers in the order of the robot, whatever order and rubbish they come in."""
+"""Decode joint states, check them, and sort them in the order of the robot."""
 
 from __future__ import annotations
 
@@ -19,9 +19,9 @@ import numpy.typing as npt
 from rclpy.clock import Clock
 from rclpy.time import Time
 
-#: Messages that name some of the joints before it is said that the others do not come.
+#: Messages with some of the joints after which missing joints are reported.
 _PATIENCE = 100
-#: What nodes that learn say of joint states that do not follow each other, by reason.
+#: Texts about faulty sequences of joint states, by reason.
 DISTURBANCES = {
     'out_of_order': 'joint states whose stamp is not after that of the one before are left out',
     'impossible': 'joint states with numbers that no arm has are left out',
@@ -37,7 +37,7 @@ DISTURBANCES = {
     'frozen': 'positions stay at the same numbers while efforts change: look whether the driver '
     'still reads the encoders',
 }
-#: What two nodes bring about that publish the same joints.
+#: Reasons that two publishers of the same joints can cause.
 _OF_TWO = frozenset({'out_of_order', 'stamp', 'erratic', 'jump_back', 'position_step', 'spike'})
 
 
@@ -48,7 +48,7 @@ class JointSample(NamedTuple):
     Attributes
     ----------
     t : float
-        Time since the second in which the first sample came [s].
+        Time since the full second before the first sample [s].
     q, tau : ndarray, shape (n,)
         Position [rad or m], torque [N m or N].
     dq : ndarray, shape (n,), or None
@@ -64,16 +64,16 @@ class JointSample(NamedTuple):
 
 class JointStateReader:
     """
-    Reads JointState messages, and complains of those that cannot be read.
+    Reads JointState messages, and reports unreadable ones as complaints.
 
     Parameters
     ----------
     joints : tuple of str
-        The joints that are wanted, in their order.
+        Joints to read, in this order.
     complaints : Complaints
-        Told of what is left out.
+        Logs skipped messages.
     clock : Clock
-        Gives the time of reception, for messages without a stamp.
+        Clock for the time of reception of messages without a stamp.
 
     """
 
@@ -92,10 +92,10 @@ class JointStateReader:
 
     def read(self, data: bytes) -> list[JointSample]:
         """
-        Return the samples of all joints that a message completes, as it came, serialised.
+        Decode a serialised message, and return the samples of all joints that it completes.
 
-        One as a rule; none when it cannot be used. Messages that name some of the joints are put
-        together with those of other senders.
+        Usually one sample; none for an unusable message. Messages with some of the joints are
+        merged with those of other senders.
 
         """
         try:
@@ -108,7 +108,7 @@ class JointStateReader:
             dq = None
             if len(message.velocity):
                 dq = self._ordered(message.names, message.velocity, 'velocity')
-                # a broadcaster fills the velocities of a hardware that has none with NaN
+                # joint_state_broadcaster publishes NaN for velocities that are not measured
                 dq = dq if math.isfinite(np.add.reduce(dq)) else None
             tau = self._values(message.names, message.effort, 'effort')
         except (MalformedMessage, RecordingError) as error:
@@ -119,7 +119,7 @@ class JointStateReader:
         return self._merged(stamp, q, dq, tau)
 
     def _match(self, names: Sequence[str]) -> None:
-        """Learn where the joints are in messages with these names."""
+        """Find the indices of the joints in messages with these names."""
         self._names = None
         some = tuple(k for k, joint in enumerate(self._joints) if joint in names)
         whole = len(some) == len(self._joints)
@@ -134,7 +134,7 @@ class JointStateReader:
     def _merged(
         self, stamp: float, q: FloatArray, dq: FloatArray | None, tau: FloatArray
     ) -> list[JointSample]:
-        """Return what the samples of several senders have become with one more."""
+        """Add a sample of one sender, and return the merged samples that are complete."""
         assert self._merger is not None
         parts = [q, np.full(len(q), np.nan) if dq is None else dq, tau]
         found = [
@@ -153,7 +153,7 @@ class JointStateReader:
         return found
 
     def stamp(self, t: float) -> Time:
-        """Return the stamp of a time of this reader."""
+        """Convert a time of this reader to a stamp."""
         return Time(nanoseconds=(self._epoch or 0) * 10**9 + round(t * 1e9))
 
     def _time(self, sec: int, nanosec: int) -> float:
@@ -178,7 +178,7 @@ class JointStateReader:
 
     def _values(self, names: Sequence[str], field: FloatArray, name: str) -> FloatArray:
         values = self._ordered(names, field, name)
-        # one sum instead of isfinite; joints left out may well be NaN
+        # a sum is faster than isfinite; skipped joints may be NaN
         if not math.isfinite(np.add.reduce(values)) and not np.all(np.isfinite(values)):
             bad = int(np.argmin(np.isfinite(values)))
             joint = self._joints[bad if self._merger is None else self._some[bad]]
@@ -188,16 +188,16 @@ class JointStateReader:
 
 def disturbance(reason: str, several: str, text: str = '') -> str:
     """
-    Say what was wrong with joint states.
+    Return a text on faulty joint states.
 
     Parameters
     ----------
     reason : str
         A key of `DISTURBANCES`, or 'spike'.
     several : str
-        Says which nodes publish them, where it is more than one.
+        Text that names several publishers; empty for one.
     text : str
-        What to say where it is no key.
+        Text for a reason that is not a key.
 
     """
     said = text or DISTURBANCES[reason]

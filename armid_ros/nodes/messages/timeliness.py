@@ -1,6 +1,6 @@
 # Copyright 2026 The armid_ros developers
 # SPDX-License-Identifier: Apache-2.0
-"""Whether messages still come, and how far their stamps are from the clock of a node."""
+"""Monitor the arrival of messages, and the difference of stamps and clock."""
 
 from __future__ import annotations
 
@@ -9,25 +9,25 @@ import time
 
 from rclpy.clock import ROSClock
 
-#: Silence after which a stream of messages has stopped [s]; who publishes joint states slower than
-#: at 2 Hz has nothing to identify from.
+#: Time without messages after which a topic counts as stopped [s]. Joint states slower than 2 Hz
+#: are not usable for identification.
 STOPPED = 0.5
-#: How old results may be when they are published [s]: tf2, and so RViz, keeps ten seconds, and
-#: nothing that was measured is drawn of what is older. What waits while a node is busy, 1000
-#: messages at most, is younger.
+#: Largest difference of stamps and clock for results [s]: tf2 keeps ten seconds, so that RViz
+#: cannot draw older results. The messages that wait in the queue of a busy node, at most 1000, are
+#: younger.
 SHOWN = 10.0
-#: Messages of which the one that waited least shows the difference of the clocks.
+#: Number of messages of which the shortest delay gives the difference of the clocks.
 _RECENT = 20
 
 
 class Freshness:
     """
-    How long a topic has been silent, in the time of the machine, which no clock on topics stops.
+    Measures the time since the last message of a topic, independent of /clock.
 
     Parameters
     ----------
     what : str
-        What comes, such as 'joint states'.
+        Name of the messages, such as 'joint states'.
 
     """
 
@@ -37,32 +37,32 @@ class Freshness:
         self._heard: float | None = None
 
     def heard(self) -> None:
-        """Take note of a message."""
+        """Register a message."""
         self._heard = self.now()
 
     @property
     def silence(self) -> float:
-        """Time since the last message [s]; 0 before the first one."""
+        """Return the time since the last message [s]; 0 before the first message."""
         return 0.0 if self._heard is None else self.now() - self._heard
 
     @property
     def stopped(self) -> bool:
-        """Whether messages came and come no more."""
+        """Return whether messages have stopped after the first one."""
         return self.silence > STOPPED
 
     def trouble(self) -> str:
-        """Say that nothing comes; empty while something does, and before the first message."""
+        """Return a text if messages have stopped; empty otherwise."""
         return f'{self._what} stopped {self.silence:.1f} s ago' if self.stopped else ''
 
 
 class StampDifference:
     """
-    Compares the stamps of messages with the time at which they come.
+    Compares the stamps of messages with their time of reception.
 
     Parameters
     ----------
     clock : ROSClock
-        Of the node.
+        Clock of the node.
 
     """
 
@@ -73,28 +73,28 @@ class StampDifference:
 
     @property
     def late(self) -> float:
-        """Smallest difference of the last stamps from the clock [s]: a message may wait."""
+        """Return the smallest difference of clock and recent stamps [s]."""
         return min(self._recent, key=abs, default=0.0)
 
     def take(self, stamp_ns: int) -> None:
-        """Take note of the stamp of a message that came now [ns]; 0: it has none."""
+        """Register the stamp of a message received now [ns]; 0: no stamp."""
         now = self._clock.now().nanoseconds
         self._late = (now - stamp_ns) * 1e-9 if stamp_ns and now else 0.0
         self._recent.append(self._late)
 
     def of_start(self, topic: str, allowed: float, simulated: bool) -> str:
         """
-        Return why a trajectory that is stamped with the time of the node must not be sent.
+        Return why a trajectory stamped by this node must not be sent; empty if it may.
 
-        A controller with another clock begins it later or further on by the difference. A small
+        A controller with another clock begins the trajectory late, or skips its beginning. A small
         difference is compensated.
 
         Parameters
         ----------
         topic : str
-            Where the stamps are from.
+            Topic of the stamps.
         allowed : float
-            How far they may be from the clock [s].
+            Largest permitted difference of stamps and clock [s].
         simulated : bool
             Whether the arm is.
 
@@ -115,7 +115,7 @@ class StampDifference:
         return f'{"behind" if late > 0.0 else "ahead of"} {clock}'
 
     def of_results(self, topic: str) -> str:
-        """Say what follows for results, which carry the stamps of what they were made of."""
+        """Return a text if the stamps of results are far from the clock; empty otherwise."""
         if abs(self._late) <= SHOWN:
             return ''
         return (

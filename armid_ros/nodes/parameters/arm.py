@@ -1,6 +1,6 @@
 # Copyright 2026 The armid_ros developers
 # SPDX-License-Identifier: Apache-2.0
-"""What the parameters of the simulated arm say, as the arm they describe."""
+"""Parameters of the simulated arm, and the arm that they describe."""
 
 from __future__ import annotations
 
@@ -38,18 +38,24 @@ ARM_PARAMETERS = (
         'effects',
         [''],
         'Effects, each as NAME[@joint+joint]:quantity=value,quantity=value; set on the running '
-        'node, the arm goes on with them from where it is.',
+        'node, the arm continues with them.',
         read_only=False,
     ),
-    NodeParameter('start', '', 'Where it stands, as q1,q2,...; empty: in mid-range [rad or m].'),
+    NodeParameter(
+        'start',
+        '',
+        'Initial position, as q1,q2,...; empty: middle of the position limits [rad or m].',
+    ),
     NodeParameter(
         'controller',
         'computed_torque',
-        'What makes an arm with rigid joints follow its trajectory.',
+        'Controller of an arm with rigid joints.',
         choices=('computed_torque', 'gravity_pd'),
     ),
     *(
-        NodeParameter(name, [0.0], f'{what}, one or one a joint; 0: none.', unit, read_only=False)
+        NodeParameter(
+            name, [0.0], f'{what}, one or one per joint; 0: none.', unit, read_only=False
+        )
         for name, what, unit in (
             ('torque_noise', 'Standard deviation', 'N m or N'),
             ('position_noise', 'Standard deviation', 'rad or m'),
@@ -60,10 +66,12 @@ ARM_PARAMETERS = (
     NodeParameter(
         'velocity_from_encoder',
         False,
-        'Differentiate positions for the velocity.',
+        'Compute the velocity by differentiating positions.',
         read_only=False,
     ),
-    NodeParameter('torque_delay', 0, 'Steps by which torque is read late.', limits=(0, 100000)),
+    NodeParameter(
+        'torque_delay', 0, 'Delay of the torque measurement in time steps.', limits=(0, 100000)
+    ),
     NodeParameter(
         'acceleration_noise',
         0.0,
@@ -75,7 +83,7 @@ ARM_PARAMETERS = (
     NodeParameter(
         'loop_gain',
         1.0,
-        'Share of the gains of the velocity loops that drive elastic joints.',
+        'Factor on the gains of the velocity loops of elastic joints.',
         limits=(0.0, 10.0),
     ),
     NodeParameter('seed', 0, 'Random seed of the noise.', limits=(0, 2**62)),
@@ -90,14 +98,14 @@ SENSOR_PARAMETERS = {*_PER_JOINT, 'velocity_from_encoder', 'acceleration_noise'}
 
 def make_arm(value: Values, warn: Callable[[str], object]) -> SimulatedArm:
     """
-    Make the simulated arm that parameters describe, elastic where its joints are.
+    Make the simulated arm that parameters describe, with elastic joints if it has any.
 
     Parameters
     ----------
     value : callable
         Returns the value of a parameter of `ARM_PARAMETERS`.
     warn : callable
-        Is told what cannot be simulated as the model has it.
+        Called with texts on parts of the model that cannot be simulated.
 
     Raises
     ------
@@ -142,7 +150,7 @@ def sensors_of(value: Values, joints: Sequence[str]) -> Sensors:
     Raises
     ------
     ArmidError
-        If there are not as many numbers as joints, or one is negative.
+        If the count of numbers differs from that of the joints, or a number is negative.
 
     """
     return Sensors(
@@ -155,19 +163,19 @@ def sensors_of(value: Values, joints: Sequence[str]) -> Sensors:
 
 def with_effects(arm: ArmModel, texts: Iterable[str]) -> ArmModel:
     """
-    Return an arm with effects.
+    Return an arm model with effects added.
 
     Parameters
     ----------
     arm : ArmModel
-        Without them.
+        Arm model without the effects.
     texts : iterable of str
-        Each NAME[@joint+joint]:quantity=value,quantity=value; empty ones stand for none.
+        Each NAME[@joint+joint]:quantity=value,quantity=value; empty texts are ignored.
 
     Raises
     ------
     ArmidError
-        If there is no such effect or joint.
+        If an effect or joint does not exist.
 
     """
     for text in filter(None, texts):
@@ -176,7 +184,7 @@ def with_effects(arm: ArmModel, texts: Iterable[str]) -> ArmModel:
 
 
 def described_arm(value: Values) -> tuple[ArmModel, TwoLinkSet | None]:
-    """Return the arm that parameters describe, but for `effects`, and its drives if shipped."""
+    """Return the arm of the parameters without `effects`, and its drives if shipped."""
     gravity, drives = value('gravity'), None
     if value('model'):
         arm = load_model(value('model'))

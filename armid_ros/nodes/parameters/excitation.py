@@ -30,7 +30,8 @@ import numpy as np
 SIMULATION = NodeParameter(
     'simulation',
     False,
-    'The arm is simulated: by default it begins by itself, and fast. So it is with use_sim_time.',
+    'The arm is simulated: by default the run begins without ~/start, and fast. '
+    'use_sim_time has the same effect.',
 )
 #: All parameters of the excitation publisher.
 PUBLISHER_PARAMETERS = (
@@ -42,7 +43,7 @@ PUBLISHER_PARAMETERS = (
         'model.yaml of the arm with its payload and friction, for the torque limits; empty: the '
         'rigid body of the description alone.',
     ),
-    NodeParameter('joints', [''], 'Driven joints; without names, those of arms.'),
+    NodeParameter('joints', [''], 'Driven joints; if empty, the joints of arms.'),
     NodeParameter('joint_limits', '', 'joint_limits.yaml of MoveIt; empty: none.'),
     NodeParameter('velocity', [''], 'Velocity limits, joint:=value [rad/s or m/s].'),
     NodeParameter(
@@ -118,7 +119,7 @@ PUBLISHER_PARAMETERS = (
     NodeParameter(
         'goal_time_tolerance',
         0.0,
-        'How much later than planned the end may be reached; 0: what the controller has.',
+        'Largest delay of the end of the run; 0: default of the controller.',
         's',
         limits=(0.0, 60.0),
         read_only=False,
@@ -127,7 +128,8 @@ PUBLISHER_PARAMETERS = (
     NodeParameter(
         'approach',
         3.0,
-        'Shortest time to get to the first point; more where distance and limits ask for it.',
+        'Shortest time of the approach to the first point; longer if distance and limits '
+        'require it.',
         's',
         limits=(0.1, 60.0),
         read_only=False,
@@ -135,14 +137,14 @@ PUBLISHER_PARAMETERS = (
     NodeParameter(
         'speed_scaling',
         1.0,
-        'Share of its speed at which ~/start runs the excitation.',
+        'Share of the planned speed at which ~/start runs the excitation.',
         limits=(0.1, 1.0),
         read_only=False,
     ),
     NodeParameter(
         'rehearsal_speed',
         0.2,
-        'Share of its speed at which ~/rehearse runs it.',
+        'Share of the planned speed at which ~/rehearse runs the excitation.',
         limits=(0.05, 1.0),
         read_only=False,
     ),
@@ -155,7 +157,7 @@ PUBLISHER_PARAMETERS = (
     NodeParameter(
         'stopping',
         0.5,
-        'Time in which the arm is brought to rest; longer where its limits require it. Without '
+        'Time in which the arm is brought to rest; longer if its limits require it. Without '
         'zero_stamp the arm is not started where clocks differ by more than a tenth of it.',
         's',
         limits=(0.1, 10.0),
@@ -171,7 +173,7 @@ PUBLISHER_PARAMETERS = (
     NodeParameter(
         'tracking_tolerance',
         0.2,
-        'The arm is stopped when a joint is further from where it should be.',
+        'The arm is stopped if a joint is further from its planned position.',
         'rad or m',
         limits=(0.001, 10.0),
         read_only=False,
@@ -205,7 +207,7 @@ PUBLISHER_PARAMETERS = (
 
 def make_planner(value: Values) -> tuple[TransferPlanner, tuple[str, ...]]:
     """
-    Load the robot that parameters describe, and what stands around it.
+    Load the robot and its obstacles that parameters describe.
 
     Parameters
     ----------
@@ -215,14 +217,14 @@ def make_planner(value: Values) -> tuple[TransferPlanner, tuple[str, ...]]:
     Returns
     -------
     planner : TransferPlanner
-        Plans the way to an excitation; knows the arm, and what it must not hit.
+        Plans the path to an excitation, with arm and obstacles.
     unchecked : tuple of str
-        What cannot be checked.
+        Checks that are not possible.
 
     Raises
     ------
     ArmidError
-        If there is no such file or robot, or nobody knows where its floor is.
+        If a file or robot does not exist, or the height of the floor is unknown.
 
     """
     robot, others = load_arms(
@@ -253,12 +255,12 @@ def make_excitation(value: Values, rate: float, planner: TransferPlanner) -> Exc
     rate : float
         Samples per second at which it will be sent [Hz].
     planner : TransferPlanner
-        Knows the arm, and what it must not hit.
+        Planner with arm and obstacles.
 
     Raises
     ------
     ArmidError
-        If there is no such file, or the excitation does not keep the limits or hits something.
+        If the file does not exist, or the excitation violates limits or collides.
 
     """
     if value('file'):
@@ -286,21 +288,21 @@ def make_excitation(value: Values, rate: float, planner: TransferPlanner) -> Exc
 
 def checked(excitation: Excitation, planner: TransferPlanner, source: str) -> Excitation:
     """
-    Return an excitation with the joints in the order of the arm.
+    Check an excitation, and return it with the joints in the order of the arm.
 
     Parameters
     ----------
     excitation : Excitation
         From a file or a topic.
     planner : TransferPlanner
-        Knows the arm, and what it must not hit.
+        Planner with arm and obstacles.
     source : str
-        Where it came from, for messages.
+        Origin of the excitation, for messages.
 
     Raises
     ------
     TrajectoryError
-        If it is of other joints, does not keep the limits or hits something.
+        If the excitation has other joints, violates limits or collides.
 
     """
     robot = planner.arm.robot

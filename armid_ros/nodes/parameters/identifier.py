@@ -1,6 +1,6 @@
 # Copyright 2026 The armid_ros developers
 # SPDX-License-Identifier: Apache-2.0
-"""What the parameters of the online identifier say, as the identifier they describe."""
+"""Parameters of the online identifier, and the identifier that they describe."""
 
 from __future__ import annotations
 
@@ -12,10 +12,10 @@ from armid_ros.nodes.parameters.table import NodeParameter, Values
 from armid_ros.robots import load_robot, parse_gravity, Robot, robot_from_urdf
 import numpy as np
 
-#: Parameters of nodes that learn of the robot on robot_description, where none is named.
+#: Parameters of nodes that can take the robot from robot_description.
 ROBOT_PARAMETERS = (
     NodeParameter(
-        'robot', '', 'A shipped robot, or a path; empty: what comes on robot_description.'
+        'robot', '', 'A shipped robot, or a path; empty: the robot of robot_description.'
     ),
     NodeParameter(
         'gravity',
@@ -23,7 +23,7 @@ ROBOT_PARAMETERS = (
         'earth, moon, or x,y,z in the base frame [m/s^2]; that of the model where there is one.',
         check=parse_gravity,
     ),
-    NodeParameter('joints', [''], 'Driven joints; without names, all but those of grippers.'),
+    NodeParameter('joints', [''], 'Driven joints; if empty, all joints except those of grippers.'),
 )
 IDENTIFIER_PARAMETERS = (
     *ROBOT_PARAMETERS,
@@ -32,7 +32,13 @@ IDENTIFIER_PARAMETERS = (
         list(USUAL_EFFECTS),
         'Effects to estimate with the rigid body, each as NAME[@joint+joint].',
     ),
-    NodeParameter('cutoff', 5.0, 'Low-pass on torque and regressor.', 'Hz', limits=(0.01, 1000.0)),
+    NodeParameter(
+        'cutoff',
+        5.0,
+        'Cut-off of the low-pass filter of torque and regressor.',
+        'Hz',
+        limits=(0.01, 1000.0),
+    ),
     NodeParameter(
         'row_rate',
         0.0,
@@ -43,20 +49,20 @@ IDENTIFIER_PARAMETERS = (
     NodeParameter(
         'forgetting',
         1.0,
-        'Forgetting factor per sample used; 1 keeps all.',
+        'Forgetting factor per used sample; 1: no forgetting.',
         limits=(0.9, 1.0),
         read_only=False,
     ),
     NodeParameter(
         'torque_noise',
         [0.0],
-        'Standard deviation of a torque sample, one a joint; [0.0]: from the residuals.',
+        'Standard deviation of a torque sample, one per joint; [0.0]: from the residuals.',
         'N m or N',
     ),
     NodeParameter(
         'max_gap',
         10,
-        'Missing samples that are interpolated across.',
+        'Longest gap that is interpolated.',
         limits=(1, 1000),
         read_only=False,
     ),
@@ -75,7 +81,7 @@ IDENTIFIER_PARAMETERS = (
 
 
 def robot_of(value: Values, description: str | None) -> Robot:
-    """Return the robot of a description (URDF), or else the one that parameters name."""
+    """Return the robot of a URDF, or without a URDF the robot that parameters name."""
     given = {
         'gravity': value('gravity'),
         'joints': tuple(filter(None, value('joints'))) or None,
@@ -94,7 +100,7 @@ def make_identifier(value: Values, description: str | None = None) -> OnlineIden
     value : callable
         Returns the value of a parameter of `IDENTIFIER_PARAMETERS`.
     description : str, optional
-        URDF, in place of the robot that the parameter names.
+        URDF that replaces the robot of the parameter.
 
     Raises
     ------

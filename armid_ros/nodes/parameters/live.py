@@ -1,6 +1,6 @@
 # Copyright 2026 The armid_ros developers
 # SPDX-License-Identifier: Apache-2.0
-"""What the parameters of the live diagnosis say, as the diagnosis they describe."""
+"""Parameters of the live diagnosis, and the diagnosis that they describe."""
 
 from __future__ import annotations
 
@@ -15,12 +15,12 @@ from armid_ros.live import LiveDiagnosis, LiveSettings
 from armid_ros.nodes.parameters.identifier import robot_of, ROBOT_PARAMETERS
 from armid_ros.nodes.parameters.table import NodeParameter, Values
 
-#: Parameters that are fields of LiveSettings; they can be set while the node runs.
+#: Parameters for the fields of LiveSettings; they can be set at run time.
 LIVE_SETTINGS = (
     NodeParameter(
         'window',
         20.0,
-        'Motion that is looked at, at most; the window begins anew when it is set.',
+        'Longest motion that is diagnosed; a change empties the window.',
         's',
         limits=(4.0, 600.0),
         read_only=False,
@@ -28,7 +28,7 @@ LIVE_SETTINGS = (
     NodeParameter(
         'shortest',
         8.0,
-        'Motion since the arm changed that is looked at, at least.',
+        'Shortest motion after a change of the arm that is diagnosed.',
         's',
         limits=(2.0, 600.0),
         read_only=False,
@@ -52,7 +52,7 @@ LIVE_SETTINGS = (
     NodeParameter(
         'confirmations',
         2,
-        'Diagnoses in a row that have to agree on a name before it is proposed.',
+        'Diagnoses in a row that must agree on an effect before it is proposed.',
         limits=(1, 100),
         read_only=False,
     ),
@@ -70,14 +70,14 @@ LIVE_PARAMETERS = (
     NodeParameter(
         'model',
         '',
-        'model.yaml with what is known of the arm; empty: the description and the effects.',
+        'model.yaml of the arm; empty: the robot description and the effects.',
     ),
     NodeParameter(
         'effects',
         [''],
         'Known effects of the arm, each as NAME[@joint+joint]:quantity=value.',
     ),
-    NodeParameter('baseline', [''], 'Bags from when nothing was wrong.'),
+    NodeParameter('baseline', [''], 'Bags of the baseline.'),
     NodeParameter(
         'learning',
         20.0,
@@ -121,7 +121,7 @@ def make_diagnosis(value: Values, description: str | None = None) -> LiveDiagnos
     value : callable
         Returns the value of a parameter of `LIVE_PARAMETERS`.
     description : str, optional
-        URDF, in place of the robot that the parameters name.
+        URDF that replaces the robot of the parameters.
 
     Raises
     ------
@@ -135,7 +135,7 @@ def make_diagnosis(value: Values, description: str | None = None) -> LiveDiagnos
     if value('model'):
         arm = load_model(Path(value('model')).expanduser(), robot)
     else:
-        assert robot is not None  # the node waits for robot_description
+        assert robot is not None  # the node then waits for robot_description
         arm = ArmModel(robot)
     for text in filter(None, value('effects')):
         effect, values = parse_effect(text, arm.robot)

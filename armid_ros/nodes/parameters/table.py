@@ -1,6 +1,6 @@
 # Copyright 2026 The armid_ros developers
 # SPDX-License-Identifier: Apache-2.0
-"""Node parameters as one table per node: descriptors, checks and documentation are made of it."""
+"""Tables of node parameters, for descriptors, checks and documentation."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ from rclpy.exceptions import InvalidParameterTypeException, InvalidParameterValu
 from rclpy.node import Node
 from rclpy.parameter import Parameter
 
-#: Parameters that ROS gives to nodes.
+#: Parameters that ROS declares on every node.
 _ROS = ('use_sim_time', 'start_type_description_service')
 
 Value = bool | int | float | str | list[str] | list[float]
@@ -39,20 +39,20 @@ class NodeParameter:
     name : str
         Its name.
     default : bool, int, float, str, list of str or list of float
-        Value when nothing else is said; it fixes the type. A list must not be empty, since ROS
-        cannot tell the type of an empty one: [''] stands for no names, and [] is taken for it.
+        Default value, which also fixes the type. ROS cannot infer the type of an empty list, so
+        that [''] stands for no names; [] is accepted for it.
     description : str
-        What it does, in one sentence.
+        Description of the parameter.
     unit : str
         SI unit of a number.
     limits : tuple of two floats, or None
         Range of a number.
     choices : tuple of str
-        What a text may be; empty for any text.
+        Permitted texts; empty if any text is permitted.
     read_only : bool
-        Whether it is fixed once the node runs.
+        Whether the parameter cannot change at run time.
     check : callable, or None
-        Raises ArmidError for a value that no range can exclude.
+        Raises ArmidError for an invalid value inside the range.
 
     """
 
@@ -66,7 +66,7 @@ class NodeParameter:
     check: Callable[[Any], object] | None = None
 
     def descriptor(self) -> ParameterDescriptor:
-        """Return the descriptor that ROS shows and checks."""
+        """Return the ROS parameter descriptor."""
         descriptor = ParameterDescriptor(description=self.text(), read_only=self.read_only)
         if self.limits is not None and isinstance(self.default, float):
             ends = dict(zip(('from_value', 'to_value'), self.limits, strict=True))
@@ -83,7 +83,7 @@ class NodeParameter:
         return f'{self.description}{unit}{choices}'
 
     def objection(self, value: object) -> str:
-        """Say why a value of the right type and range cannot be; empty when it can."""
+        """Return why a value of the right type and range is invalid; empty if it is valid."""
         if isinstance(value, float) and not math.isfinite(value):
             return f"parameter '{self.name}' must be a finite number"
         if self.choices and value not in self.choices:
@@ -97,18 +97,18 @@ class NodeParameter:
 
 
 class ParameterError(ArmidError):
-    """A node was started with a parameter it cannot have."""
+    """A node was started with an invalid parameter."""
 
 
 def declare(node: Node, table: Iterable[NodeParameter]) -> None:
     """
-    Declare the parameters of a table on a node, and check all that is set later.
+    Declare the parameters of a table on a node, and check later changes.
 
     Raises
     ------
     ParameterError
-        For an override of the wrong type, out of range or otherwise impossible, with what to
-        write instead.
+        If an override has the wrong type, is out of range or invalid. The message contains the
+        remedy.
 
     """
     entries = {entry.name: entry for entry in table}
@@ -137,13 +137,13 @@ def declare(node: Node, table: Iterable[NodeParameter]) -> None:
 
 
 def overrides(node: Node) -> Mapping[str, Parameter]:
-    """Return what a node was given when it was started, by name, declared or not."""
+    """Return the parameter overrides of a node by name, declared or not."""
     given: Mapping[str, Parameter] = node._parameter_overrides
     return given
 
 
 def unknown(node: Node) -> str:
-    """Say which parameters a node was given that it does not have; empty if none."""
+    """Return a text that names overrides that the node does not have; empty if none."""
     mine = {name for name in node.get_parameters_by_prefix('') if not _of_ros(name)}
     wrong = [name for name in overrides(node) if name not in mine and not _of_ros(name)]
     if not wrong:
@@ -153,7 +153,7 @@ def unknown(node: Node) -> str:
 
 
 def as_declared(node: Node, parameter: Parameter) -> Parameter:
-    """Return a parameter of the type that the node declared: numbers, and no names."""
+    """Convert integers and empty lists to the declared type of a parameter."""
     floats = {
         Parameter.Type.DOUBLE: (Parameter.Type.INTEGER, float),
         Parameter.Type.DOUBLE_ARRAY: (Parameter.Type.INTEGER_ARRAY, lambda v: list(map(float, v))),
@@ -169,7 +169,7 @@ def as_declared(node: Node, parameter: Parameter) -> Parameter:
 
 
 def is_as(node: Node, parameter: Parameter) -> bool:
-    """Return whether a parameter of a node has a value already."""
+    """Return whether a parameter of a node already has a value."""
     if not node.has_parameter(parameter.name):
         return False
     now = node.get_parameter(parameter.name).get_parameter_value()
@@ -177,36 +177,36 @@ def is_as(node: Node, parameter: Parameter) -> bool:
 
 
 def names(node: Node, parameter: str) -> tuple[str, ...]:
-    """Return a list of names, without the empty one that stands for none."""
+    """Return a parameter with a list of names, without empty names."""
     values: list[str] = node.get_parameter(parameter).value
     return tuple(name for name in values if name)
 
 
 def _has_type(parameter: Parameter) -> bool:
-    """Whether a value says what it is; an empty list has lost that, or has any."""
+    """Return whether the type of a value is known; that of an empty list is not."""
     return parameter.type_ is not Parameter.Type.NOT_SET and parameter.value != []
 
 
 def _none_of(entry: NodeParameter) -> Value:
-    """Return what stands for an empty list of names; of anything else there is none."""
+    """Return the value for an empty list of names; ParameterError for other parameters."""
     if isinstance(entry.default, list) and all(isinstance(one, str) for one in entry.default):
         return ['']
     raise ParameterError(f"parameter '{entry.name}' is empty; {_instead(entry)}")
 
 
 def _instead(entry: NodeParameter) -> str:
-    """Say what a value may look like."""
+    """Return a hint with an example of a valid value."""
     value = str(entry.default).lower() if isinstance(entry.default, bool) else entry.default
     return f'use a value such as {value}' if value != '' else 'give it a text, or leave it out'
 
 
 def _of_ros(name: str) -> bool:
-    """Whether ROS itself has a parameter, in any node."""
+    """Return whether ROS declares a parameter on every node."""
     return name in _ROS or name.startswith('qos_overrides.')
 
 
 def _explain_type(entry: NodeParameter, text: str) -> str:
-    """Say what to write instead, for the mistake everybody makes: 100 for 100.0."""
+    """Explain a wrong type, such as 100 instead of 100.0, with the correct form."""
     found = re.search(r"to '(.*)' of type '(\w+)'", text, re.DOTALL)
     value, given = found.groups() if found else ('?', '?')
     if isinstance(entry.default, float):

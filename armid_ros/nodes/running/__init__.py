@@ -1,3 +1,3 @@
 # Copyright 2026 The armid_ros developers
 # SPDX-License-Identifier: Apache-2.0
-"""A node as a process: threads, domains, clocks, and what it outlives."""
+"""Run nodes as processes: arguments, domains, launch files and real time."""

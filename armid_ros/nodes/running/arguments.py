@@ -1,6 +1,6 @@
 # Copyright 2026 The armid_ros developers
 # SPDX-License-Identifier: Apache-2.0
-"""Arguments of a node: what is wrong with them, in a line that names them, and its help."""
+"""Check the arguments of a node, and format its help."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from armid_ros.nodes.base import ArmidNode, COMMON
 from armid_ros.nodes.parameters.table import NodeParameter
 from rclpy.utilities import remove_ros_args
 
-#: How rules of ROS are written.
+#: Syntax of ROS arguments.
 _WRITTEN = {'-p': '-p NAME:=VALUE', '-r': '-r NAME:=OTHER_NAME'}
 _FILE = '--params-file'
 _WIDTH = 99
@@ -22,12 +22,12 @@ _WIDTH = 99
 
 def unreadable(error: Exception) -> str:
     """
-    Say which argument ROS cannot read, and how it is written.
+    Return a text that names the argument ROS cannot read, with its syntax.
 
     Parameters
     ----------
     error : Exception
-        What rclpy raised of them.
+        Exception that rclpy raised for the arguments.
 
     """
     text = re.sub(r',? at /\S+:\d+', '', str(error)).removeprefix('failed to initialize rcl: ')
@@ -55,39 +55,39 @@ def unreadable(error: Exception) -> str:
 
 def stray(args: Sequence[str], program: str) -> str:
     """
-    Say which arguments are none of ROS, as nodes have no others; empty where there are none.
+    Return a text that names arguments that are not ROS arguments; empty if none.
 
     Parameters
     ----------
     args : sequence of str
-        All arguments, without the name of the program; ROS can read them.
+        All arguments without the name of the program; the ROS arguments are valid.
     program : str
-        Its name.
+        Name of the program.
 
     """
     others = remove_ros_args([program, *args])[1:]
     if not others:
         return ''
     return (
-        f'{" ".join(others)}: {program} takes arguments of ROS alone; write parameters as '
+        f'{" ".join(others)}: {program} takes only ROS arguments; write parameters as '
         '--ros-args -p NAME:=VALUE, and see --help'
     )
 
 
 def is_asked_for(args: Sequence[str]) -> bool:
-    """Return whether arguments ask for help; what follows --ros-args is for ROS."""
+    """Return whether --help is among the arguments before --ros-args."""
     own = args[: list(args).index('--ros-args')] if '--ros-args' in args else args
     return bool({'-h', '--help'} & set(own))
 
 
 def usage(node: type[ArmidNode]) -> str:
     """
-    Return what a node is for, and its parameters.
+    Format the help of a node: its purpose and parameters.
 
     Parameters
     ----------
     node : type
-        Class of the node, in the module that is named as its executable.
+        Class of the node; its module has the name of the executable.
 
     """
     program = Path(inspect.getfile(node)).stem

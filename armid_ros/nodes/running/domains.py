@@ -1,6 +1,6 @@
 # Copyright 2026 The armid_ros developers
 # SPDX-License-Identifier: Apache-2.0
-"""ROS domains for runs that must neither hear other robots nor be heard by them."""
+"""Reserve ROS domains for runs without communication with other robots."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ import socket
 from armid_ros.errors import ArmidError
 from rclpy.context import Context
 
-#: Domains whose ports Linux does not hand out otherwise; 0 is everybody's.
+#: Domains with ports below the ephemeral ports of Linux; 0 is the default domain.
 _DOMAINS = range(1, 102)
 _RANGE = 'ROS_AUTOMATIC_DISCOVERY_RANGE'
 
@@ -20,22 +20,22 @@ _RANGE = 'ROS_AUTOMATIC_DISCOVERY_RANGE'
 @contextmanager
 def private_context(domain: int | None = None) -> Iterator[Context]:
     """
-    Open a ROS context that only this machine hears.
+    Open a ROS context that communicates on this machine only.
 
     Parameters
     ----------
     domain : int, optional
-        Its domain; by default one that no other private context is on.
+        ROS domain; by default one that no other private context uses.
 
     Raises
     ------
     ArmidError
-        If all domains are taken.
+        If all domains are in use.
 
     """
     with reserved_domain() if domain is None else nullcontext(domain) as chosen:
         context = Context()
-        # rmw reads the range when a context is made; there is no argument for it
+        # rmw reads the range from the environment when a context is made
         before = os.environ.get(_RANGE)
         os.environ[_RANGE] = 'LOCALHOST'
         try:
@@ -53,18 +53,18 @@ def private_context(domain: int | None = None) -> Iterator[Context]:
 @contextmanager
 def reserved_domain() -> Iterator[int]:
     """
-    Reserve a domain on this machine, for as long as the context is open or the process lives.
+    Reserve a domain until the context is closed or the process ends.
 
     Raises
     ------
     ArmidError
-        If all domains are taken.
+        If all domains are in use.
 
     """
     first = os.getpid() % len(_DOMAINS)
     for shift in range(len(_DOMAINS)):
         domain = _DOMAINS[(first + shift) % len(_DOMAINS)]
-        # An abstract socket is a name that vanishes with its process: no port, no file.
+        # The name of an abstract socket is free again when its process ends.
         with socket.socket(socket.AF_UNIX) as reservation:
             try:
                 reservation.bind(f'\0armid_ros/domain/{domain}')

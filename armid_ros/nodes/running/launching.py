@@ -1,6 +1,6 @@
 # Copyright 2026 The armid_ros developers
 # SPDX-License-Identifier: Apache-2.0
-"""Launch files: arguments that count only where they are given, and nodes that take them."""
+"""Build launch files with optional arguments, and nodes that use them."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from typing import Any, NamedTuple
 from armid_ros.files.cells import listed
 import yaml
 
-#: Parameters of the simulated arm, where neither an argument nor a parameter file sets them.
+#: Default parameters of the simulated arm in launch files.
 SIMULATED_DRIVES: Mapping[str, Any] = {
     'rate': 500.0,
     'torque_noise': [0.05],
@@ -25,17 +25,16 @@ SIMULATED_DRIVES: Mapping[str, Any] = {
 
 class Argument(NamedTuple):
     """
-    An argument of a launch file.
+    Argument of a launch file.
 
     Attributes
     ----------
     name, description : str
         For `ros2 launch --show-args`.
     kind : type
-        str, bool, int, float, or list for names with commas.
+        str, bool, int, float, or list for names separated by commas.
     default : str or None
-        Text where none is given: empty for what is left to parameter files and nodes. None: it
-        has to be given.
+        Default text; empty if parameter files and nodes decide. None: the argument is required.
 
     """
 
@@ -45,7 +44,7 @@ class Argument(NamedTuple):
     default: str | None = ''
 
     def read(self, text: str) -> Any:
-        """Return the value of a text; RuntimeError, with the argument, where it is none."""
+        """Convert a text to the type of the argument; RuntimeError if that fails."""
         try:
             if self.kind is list:
                 return [part.strip() for part in listed(text) if part.strip()]
@@ -61,14 +60,14 @@ def described(
     arguments: Sequence[Argument], start: Callable[[dict[str, Any]], Sequence[Any]]
 ) -> Any:
     """
-    Return the description of a launch.
+    Return a launch description.
 
     Parameters
     ----------
     arguments : sequence of Argument
-        What `ros2 launch` takes.
+        Arguments of `ros2 launch`.
     start : callable
-        Takes the values of the arguments that are not empty, and returns the actions.
+        Returns the actions; called with the values of the arguments that are not empty.
 
     """
     from launch import LaunchDescription
@@ -96,20 +95,20 @@ def node(
     **more: Any,
 ) -> Any:
     """
-    Return a node of this package.
+    Return the launch action of a node of this package.
 
     Parameters
     ----------
     given : mapping
-        Values of the arguments; of these namespace, params_file and use_sim_time are used.
+        Values of the arguments; only namespace, params_file and use_sim_time are used.
     executable : str
         Name of executable and node.
     chosen : mapping
-        Parameters that arguments set. They overrule the parameter file.
+        Parameters set by arguments; they override the parameter file.
     usual : mapping
-        Parameters that hold where neither an argument nor the parameter file sets them.
+        Parameters that are used if neither an argument nor the parameter file sets them.
     shipped : str
-        Parameter file to use where none is given.
+        Parameter file that is used if none is given.
 
     """
     from launch_ros.actions import Node
@@ -119,7 +118,7 @@ def node(
     said = parameters_named(file, full_name(given, executable)) if file else set()
     usual = {'end_with_parent': True, **usual}
     values = {k: v for k, v in usual.items() if k not in said} | clock | dict(chosen)
-    # A later pattern of the parameter files overrules an earlier one that matches as well. With
+    # Of two matching patterns in parameter files, the later one takes precedence. With
     # name and namespace, launch writes the values under the full name, which comes last.
     return Node(
         package='armid_ros',
@@ -133,7 +132,7 @@ def node(
 
 
 def full_name(given: Mapping[str, Any], executable: str) -> str:
-    """Return the name of a node in the namespace that is given."""
+    """Return the full name of a node in its namespace."""
     return '/'.join(['', *filter(None, given.get('namespace', '').split('/')), executable])
 
 
@@ -166,7 +165,7 @@ def parameters_named(file: str, name: str) -> set[str]:
             if key != 'ros__parameters':
                 pending.append((f'{pattern}/{str(key).lstrip("/")}', value))
                 continue
-            # as rcl_yaml_param_parser has it
+            # patterns as in rcl_yaml_param_parser
             expression = re.escape(pattern).replace(r'/\*\*', r'(/\w+)*').replace(r'/\*', r'/\w+')
             if re.fullmatch(expression, name):
                 found |= set(_flat(value))

@@ -1,6 +1,6 @@
 # Copyright 2026 The armid_ros developers
 # SPDX-License-Identifier: Apache-2.0
-"""A node as a process of its own: started in one line, ended quietly."""
+"""Run a node in its own process, and handle signals."""
 
 from __future__ import annotations
 
@@ -25,22 +25,23 @@ from rclpy.experimental import EventsExecutor
 from rclpy.signals import SignalHandlerOptions
 from threadpoolctl import threadpool_limits
 
-#: How long leaving DDS may take [s].
+#: Timeout of the shutdown of DDS [s].
 LEAVING = 20.0
-#: How often it is looked whether the process is to end [s].
+#: Period of the check for signals [s].
 _LOOK_PERIOD = 0.1
 
 
 def make_executor(kind: str, context: Context | None = None) -> Executor:
     """
-    Make an executor; never the multi-threaded one, which starves topics of 100 Hz and more.
+    Make an executor. The multi-threaded one is not used: it delays topics above 100 Hz.
 
     Parameters
     ----------
     kind : {'single', 'events'}
-        Events takes a fifth to a half of the processor time, and is experimental in Jazzy.
+        The events executor needs a fifth to a half of the processor time, but is experimental in
+        Jazzy.
     context : Context, optional
-        The default one without.
+        Default context if omitted.
 
     """
     if kind == 'events':
@@ -51,11 +52,11 @@ def make_executor(kind: str, context: Context | None = None) -> Executor:
 @contextmanager
 def steady() -> Iterator[None]:
     """
-    Use one thread of linear algebra, and search no object for garbage that is there already.
+    Use one linear algebra thread, and exclude existing objects from garbage collection.
 
-    Matrices of a hundred rows are done sooner than threads have met; where another process has
-    the second core, they wait for each other, and 0.2 ms become 20. Objects of the libraries stay
-    for good, but a collection that looks through them stops the process for 70 ms.
+    For matrices of a hundred rows, synchronising threads takes longer than the computation: with a
+    busy second core 0.2 ms become 20 ms. A garbage collection of the objects of imported libraries
+    would stop the process for 70 ms.
 
     """
     gc.collect()
@@ -68,29 +69,29 @@ def steady() -> Iterator[None]:
 
 
 class _Ending:
-    """What signals do to a process: they end it, but not in the middle of a callback."""
+    """Signal handler that ends the process between two callbacks."""
 
-    # A node that stops an arm has to be able to publish when it is told to end; the handlers of
-    # rclpy would have shut down its context by then. While a node is being made there is nothing
-    # to stop, and making it may take long: then SIGINT and SIGTERM end the process at once.
+    # A node must publish the stop of an arm after a signal, but the handlers of rclpy shut down
+    # its context. During the construction of a node, SIGINT and SIGTERM end the process at once.
 
     def __init__(self) -> None:
         self._asked = self._at_once = self.with_parent = self.hung_up = False
         self._parent = os.getppid()
         for number in (signal.SIGINT, signal.SIGTERM):
             signal.signal(number, self._on_signal)
-        if signal.getsignal(signal.SIGHUP) is not signal.SIG_IGN:  # as under nohup
+        # ignored signals stay ignored, as under nohup
+        if signal.getsignal(signal.SIGHUP) is not signal.SIG_IGN:
             signal.signal(signal.SIGHUP, self._on_hang_up)
 
     @property
     def due(self) -> bool:
-        """Whether the process is to end, also as its parent has where it goes with that."""
+        """Return whether the process must end, by a signal or because its parent has ended."""
         ended = self.with_parent and os.getppid() != self._parent
         return self._asked or self.hung_up or ended
 
     @contextmanager
     def at_once(self) -> Iterator[None]:
-        """Have signals end the process wherever it is."""
+        """Make signals end the process at once."""
         self._at_once = True
         try:
             yield
@@ -108,18 +109,18 @@ class _Ending:
 
 
 class _EndedAtOnce(BaseException):
-    """A signal came while the node was being made; nothing catches it but `run`."""
+    """A signal arrived while the node was made; caught by `run` only."""
 
 
 def run(make_node: Callable[[], ArmidNode], args: Sequence[str] | None = None) -> None:
     """
-    Run a node until it is finished, told to end or hung up; only say what it is with --help.
+    Run a node until it is finished or a signal arrives; with --help print its help only.
 
     Raises
     ------
     SystemExit
-        After one line on stderr: with status 2 when the node cannot be made or refuses what it is
-        asked, with status 1 when it cannot go on, or was hung up as by a terminal that is closed.
+        After one line on stderr: with status 2 if the node cannot be made or its task failed, with
+        status 1 after a fatal error or SIGHUP.
 
     """
     if isinstance(make_node, type) and is_asked_for(sys.argv[1:] if args is None else args):
@@ -136,10 +137,10 @@ def run(make_node: Callable[[], ArmidNode], args: Sequence[str] | None = None) -
         ending.with_parent = node.value('end_with_parent')
         with steady():
             while rclpy.ok() and not (node.finished or ending.due):
-                executor.spin_once(timeout_sec=_LOOK_PERIOD)  # events: else it hangs
+                executor.spin_once(timeout_sec=_LOOK_PERIOD)  # the events executor hangs otherwise
     except (_EndedAtOnce, ExternalShutdownException):
         pass
-    except RCLError:  # the context is shut down between looking at it and waiting on it
+    except RCLError:  # the context was shut down between the check and the wait
         if rclpy.ok():
             raise
     except ArmidError as error:
@@ -151,13 +152,13 @@ def run(make_node: Callable[[], ArmidNode], args: Sequence[str] | None = None) -
     if node is not None and node.failure:
         trouble.append(node.failure)
     if trouble:
-        with suppress(OSError):  # the terminal may be gone
+        with suppress(OSError):  # the terminal may be closed
             print('; '.join(trouble), file=sys.stderr)
         raise SystemExit(2 if node is None or node.failure else 1)
 
 
 def _made(make_node: Callable[[], ArmidNode], args: Sequence[str] | None) -> ArmidNode:
-    """Begin with ROS and make a node; ParameterError for arguments that are none of ROS."""
+    """Initialise ROS and make a node; ParameterError for arguments that are not of ROS."""
     own = sys.argv[1:] if args is None else args
     try:
         rclpy.init(args=args, signal_handler_options=SignalHandlerOptions.NO)
@@ -172,8 +173,8 @@ def _made(make_node: Callable[[], ArmidNode], args: Sequence[str] | None) -> Arm
 
 
 def _leave(node: ArmidNode | None) -> list[str]:
-    """Let a node finish what must not be lost, and leave DDS; return what went wrong."""
-    # Ctrl-C under `ros2 launch` arrives twice; the second must not interrupt closing.
+    """Close a node, and shut down DDS; return the error of closing."""
+    # Under `ros2 launch` Ctrl-C arrives twice; the second must not interrupt closing.
     for number in (signal.SIGINT, signal.SIGTERM, signal.SIGHUP):
         signal.signal(number, signal.SIG_IGN)
     trouble: list[str] = []
@@ -182,8 +183,8 @@ def _leave(node: ArmidNode | None) -> list[str]:
             node.close()
         except ArmidError as error:
             trouble.append(str(error))
-    # Fast DDS waits for what other processes hold in shared memory, and for ever where one of
-    # them was killed. The watchdog is a thread in C: it says where the process hangs, and ends it.
+    # Fast DDS waits for other processes that hold shared memory, without end if one was killed.
+    # The watchdog, a thread in C, prints the stack of the process and ends it.
     faulthandler.dump_traceback_later(LEAVING, exit=True, file=sys.__stderr__)
     if node is not None:
         node.destroy_node()

@@ -1,34 +1,34 @@
 # Copyright 2026 The armid_ros developers
 # SPDX-License-Identifier: Apache-2.0
-"""A simulation that goes as fast as real time, times a factor, and says where it cannot."""
+"""Run a simulation at real time times a factor, and report skipped time."""
 
 from __future__ import annotations
 
 from collections.abc import Callable
 import time
 
-#: Longest stretch of work before services are answered, and backlog that is given up [s].
+#: Longest work before services are answered, and backlog above which time is skipped [s].
 _BURST = 0.005
 _BACKLOG = 0.2
-#: Time skipped from which on it is said [s]; a start may take as long.
+#: Skipped time above which a warning is given [s]; a start may take as long.
 _BEHIND = 0.5
 
 
 class RealTime:
     """
-    How far a simulation is due, and by how much it is behind.
+    Keeps a simulation in step with real time.
 
     Parameters
     ----------
     elapsed : callable
         Returns the time of the simulation [s].
     step : callable
-        Takes it one sample further.
+        Advances the simulation by one sample.
 
     Attributes
     ----------
     given_up : float
-        Real time that could not be made up [s].
+        Skipped real time [s].
 
     """
 
@@ -38,24 +38,24 @@ class RealTime:
         self.begin()
 
     def begin(self) -> None:
-        """Go on from now; what was given up is kept."""
+        """Restart at the present time; skipped time is kept."""
         self._anchor = self._clock(), self._elapsed()
 
     def catch_up(self, factor: float, period: float) -> float:
         """
-        Move as far as real time has, times a factor; what cannot be made up is given up.
+        Simulate until real time times a factor; time that cannot be made up is skipped.
 
         Parameters
         ----------
         factor : float
             Simulated time per real time.
         period : float
-            What a step takes the simulation further by [s]; one that takes it nowhere ends it.
+            Simulated time of a step [s]; the loop ends after a step without progress.
 
         Returns
         -------
         float
-            Real time that is given up now [s].
+            Real time that is skipped now [s].
 
         """
         now = self._clock()
@@ -74,7 +74,7 @@ class RealTime:
         return behind
 
     def trouble(self, advice: str) -> str:
-        """Say how much was skipped, and what to do; empty where it keeps up."""
+        """Return a text with the skipped time and the remedy; empty if none was skipped."""
         if self.given_up <= _BEHIND:
             return ''
         return f'{self.given_up:.1f} s of real time were skipped: {advice}'

@@ -1,3 +1,3 @@
 # Copyright 2026 The armid_ros developers
 # SPDX-License-Identifier: Apache-2.0
-"""How a trajectory reaches a controller: as a topic or as goals of an action."""
+"""Send trajectories to a controller, by topic or as goals of an action."""

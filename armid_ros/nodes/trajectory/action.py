@@ -1,6 +1,6 @@
 # Copyright 2026 The armid_ros developers
 # SPDX-License-Identifier: Apache-2.0
-"""A trajectory controller as an action: goals that it accepts, reports on, and can be stopped."""
+"""Client of the action of a trajectory controller."""
 
 from __future__ import annotations
 
@@ -22,15 +22,15 @@ from rclpy.task import Future
 from trajectory_msgs.msg import JointTrajectory
 from unique_identifier_msgs.msg import UUID
 
-#: What a tolerance is that lets a joint be wherever it is; zero leaves it to the controller.
+#: Tolerance that permits any joint position; zero means the default of the controller.
 ANYWHERE = -1.0
-#: How often it is looked whether a controller is known [s].
+#: Period of the check for a controller [s].
 _GLANCE = 0.005
-#: How long an answer to a goal may take [s]: a controller checks every waypoint before.
+#: Timeout of the answer to a goal [s]; a controller first checks every waypoint.
 _ANSWER = 5.0
-#: Error code of a goal that another one replaced, once it was accepted.
+#: Error code of an accepted goal that another goal replaced.
 _REPLACED = -1
-#: What control_msgs/action/FollowJointTrajectory calls its error codes.
+#: Texts of the error codes of control_msgs/action/FollowJointTrajectory.
 _ERRORS = {
     _REPLACED: 'the goal is not valid',
     -2: 'the joints are not those of the controller',
@@ -42,7 +42,7 @@ _ERRORS = {
 
 @dataclass
 class _Goal:
-    """A goal that was sent: since when it is unanswered [s], and whether it is to be cancelled."""
+    """Goal that was sent, with the time of sending [s] and a flag for cancelling."""
 
     sent: float
     handle: ClientGoalHandle | None = None
@@ -58,23 +58,23 @@ class TrajectoryAction:
     name : str
         Full name of the action.
     error : float
-        Largest distance of a joint from where the controller wants it, of the last feedback
-        [rad or m]; NaN before.
+        Largest joint error in the last feedback of the controller [rad or m]; NaN before the first
+        feedback.
 
     """
 
     def __init__(self, node: Any, name: str, on_end: Callable[[str], None]) -> None:
         """
-        Look for the action; nothing is sent.
+        Make the client; no goal is sent.
 
         Parameters
         ----------
         node : ArmidNode
-            Whose executor brings the answers.
+            Node of the client.
         name : str
-            Of the action, relative to the namespace of the node or not.
+            Name of the action, relative or absolute.
         on_end : callable
-            Told why the goal under way ended before it was reached; empty when it was reached.
+            Called at the end of a goal with the reason of its failure; empty if it was reached.
 
         Raises
         ------
@@ -99,43 +99,43 @@ class TrajectoryAction:
         self._seen = -math.inf
 
     def __str__(self) -> str:
-        """Say what is sent to."""
+        """Return the name of the receiver for messages."""
         return f'the action {self.name}'
 
     @property
     def ready(self) -> bool:
-        """Whether there is a controller that takes goals."""
+        """Return whether a controller accepts goals."""
         return bool(self._client.server_is_ready())
 
     def wait(self, patience: float) -> None:
-        """Wait until a controller that offers it is known, at most a time [s]."""
+        """Wait for a controller that offers the action, with a timeout [s]."""
         deadline = time.monotonic() + patience
         while not self.ready and time.monotonic() < deadline:
             time.sleep(_GLANCE)
 
     @property
     def under_way(self) -> bool:
-        """Whether a goal was sent that the controller has not ended."""
+        """Return whether a goal was sent that the controller has not ended."""
         return self._goal is not None
 
     def send(
         self, trajectory: JointTrajectory, path: float, end: float, late: float = 0.0
     ) -> None:
         """
-        Send a goal in the place of the one under way.
+        Send a goal that replaces the present one.
 
-        A controller of ros2_control goes from the old goal to the new one; the old one is
-        cancelled all the same, for others do not.
+        A controller of ros2_control replaces the old goal by itself. The old goal is cancelled as
+        well, since other controllers do not replace it.
 
         Parameters
         ----------
         trajectory : JointTrajectory
-            What the arm shall do.
+            Motion for the arm.
         path, end : float
-            Tolerance of each joint on the way, and at its end [rad or m]; 0 leaves it to the
-            controller, `ANYWHERE`: none.
+            Tolerance of each joint on the path, and at its end [rad or m]. 0: default of the
+            controller, `ANYWHERE`: no limit.
         late : float
-            How long after its time the end may be reached [s]; 0 leaves it to the controller.
+            Largest delay of the end [s]; 0: default of the controller.
 
         """
         before, self._goal = self._goal, _Goal(time.monotonic())
@@ -158,7 +158,7 @@ class TrajectoryAction:
             self._cancel(before)
 
     def trouble(self, patience: float) -> str:
-        """Say that the controller has been gone for a time [s], or is silent; empty: neither."""
+        """Return a text if the controller is gone or does not answer for a time [s]; or empty."""
         goal, now = self._goal, time.monotonic()
         if goal is None:
             return ''
@@ -171,7 +171,7 @@ class TrajectoryAction:
         return ''
 
     def settle(self, patience: float) -> None:
-        """Wait until all is answered, at most a time [s], where nobody spins the node any more."""
+        """Spin the node until all calls are answered, with a timeout [s]."""
         executor = SingleThreadedExecutor(context=self._node.context)
         before, deadline = self._node.executor, time.monotonic() + patience
         executor.add_node(self._node)
@@ -185,11 +185,11 @@ class TrajectoryAction:
                 before.add_node(self._node)
 
     def close(self) -> None:
-        """End the client."""
+        """Destroy the client."""
         self._client.destroy()
 
     def _cancel(self, goal: _Goal) -> None:
-        """Cancel a goal, or as soon as it is accepted."""
+        """Cancel a goal at once, or when it is accepted."""
         goal.unwanted = True
         if goal.handle is not None:
             self._ask(goal.handle.cancel_goal_async(), lambda _: None)
@@ -200,7 +200,7 @@ class TrajectoryAction:
             self._end(goal, f'{self.name} refused the trajectory; {reason}')
             return
         goal.handle = handle
-        # not among what `settle` waits for: it comes when the arm is there
+        # `settle` does not wait for the result, which comes at the end of the motion
         result = handle.get_result_async()
         result.add_done_callback(self._guarded(lambda f: self._on_result(goal, f.result())))
         if goal.unwanted:
@@ -218,7 +218,7 @@ class TrajectoryAction:
             self._end(goal, f'{self.name} gave up the trajectory: {why}{detail}')
 
     def _on_status(self, message: GoalStatusArray) -> None:
-        """End the goal under way where the controller has accepted another one since."""
+        """End the present goal if the controller has accepted a later one."""
         active = (GoalStatus.STATUS_ACCEPTED, GoalStatus.STATUS_EXECUTING)
         goals = {
             bytes(s.goal_info.goal_id.uuid) for s in message.status_list if s.status in active
@@ -230,7 +230,7 @@ class TrajectoryAction:
             self._end(goal, self._taken_over())
 
     def _taken_over(self) -> str:
-        """Return that the controller is another client's, and whose."""
+        """Return a text that the goal was replaced by another client, with its name."""
         node, service = self._node, f'{self.name}/_action/send_goal'
         found = []
         for name, space in node.get_node_names_and_namespaces():
@@ -265,5 +265,5 @@ class TrajectoryAction:
 
 
 def beside(topic: str) -> str:
-    """Return the action that a controller has beside its topic joint_trajectory."""
+    """Return the name of the action in the namespace of a topic joint_trajectory."""
     return f'{topic.rpartition("/")[0]}/follow_joint_trajectory'

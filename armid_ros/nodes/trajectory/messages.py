@@ -1,6 +1,6 @@
 # Copyright 2026 The armid_ros developers
 # SPDX-License-Identifier: Apache-2.0
-"""Joint trajectories between messages and what the arm follows."""
+"""Convert joint trajectories from and to messages."""
 
 from __future__ import annotations
 
@@ -18,8 +18,8 @@ def read_trajectory(message: JointTrajectory) -> Reference:
     Raises
     ------
     TrajectoryError
-        If it has no points, or they do not all have the fields that the first one has, or a
-        number is not finite, or time does not increase.
+        If the trajectory has no points, its points differ in their fields, a number is not finite,
+        or time does not increase.
 
     """
     found = waypoints_of(message)
@@ -28,14 +28,14 @@ def read_trajectory(message: JointTrajectory) -> Reference:
 
 def write_trajectory(motion: Motion, lead: float) -> JointTrajectory:
     """
-    Return the message that holds every sample of a motion.
+    Convert a motion to a message with one point per sample.
 
     Parameters
     ----------
     motion : Motion
-        What the arm shall do.
+        Motion for the arm.
     lead : float
-        Time it has to get to the first sample [s].
+        Time from the start to the first sample [s].
 
     """
     message = JointTrajectory(joint_names=list(motion.joints))

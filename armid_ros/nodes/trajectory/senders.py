@@ -1,6 +1,6 @@
 # Copyright 2026 The armid_ros developers
 # SPDX-License-Identifier: Apache-2.0
-"""How trajectories get to a controller: as a goal of its action where it has one, or by topic."""
+"""Send trajectories to a controller by its action if available, else by topic."""
 
 from __future__ import annotations
 
@@ -13,39 +13,39 @@ from armid_ros.nodes.trajectory.action import ANYWHERE, beside, TrajectoryAction
 from rclpy.duration import Duration
 from trajectory_msgs.msg import JointTrajectory
 
-#: How long it takes at most to know an action that somebody offers [s].
+#: Longest time of the discovery of an action [s].
 _DISCOVERY = 1.0
 
 
 class TrajectorySenders:
     """
-    The topic and the action of one controller; a run keeps to the one it was begun with.
+    Topic and action of one controller; a run uses the same one until its end.
 
     Attributes
     ----------
     topic : str
         Full name of the topic.
     action : TrajectoryAction or None
-        None where only the topic is to be used, nobody has offered the action so far, or
+        None if only the topic is used, no controller has offered the action so far, or
         control_msgs is not installed.
 
     """
 
     def __init__(self, node: Any, on_end: Callable[[str], None]) -> None:
         """
-        Offer the topic, and look for the action.
+        Make the publisher, and look for the action.
 
         Parameters
         ----------
         node : ArmidNode
             With the parameters `interface`, `action` and `zero_stamp`, and tolerances.
         on_end : callable
-            Told why the goal under way ended before it was reached; empty when it was reached.
+            Called at the end of a goal with the reason of its failure; empty if it was reached.
 
         Raises
         ------
         TrajectoryError
-            If the action is asked for and control_msgs is not installed.
+            If the action is required and control_msgs is not installed.
 
         """
         self._publisher = node.create_publisher(JointTrajectory, 'joint_trajectory', STREAM)
@@ -70,36 +70,36 @@ class TrajectorySenders:
 
     @property
     def missing(self) -> str:
-        """Say who is not there to take a trajectory; empty when somebody is."""
+        """Return why no controller can receive a trajectory; empty if one can."""
         if self._has_action:
             return ''
         if self._kind == 'action':
             return f'no controller offers the action {self._name}'
-        return '' if self.readers else f'nobody subscribes to {self.topic}'
+        return '' if self.readers else f'no node subscribes to {self.topic}'
 
     @property
     def under_way(self) -> bool:
-        """Whether a goal was sent that the controller has not ended."""
+        """Return whether a goal was sent that the controller has not ended."""
         return self._by_action and self.action.under_way
 
     @property
     def error(self) -> float:
-        """Largest joint error that the controller reported [rad or m]; NaN: none."""
+        """Return the largest joint error that the controller reported [rad or m]; or NaN."""
         return float(self.action.error) if self.under_way else float('nan')
 
     def look(self) -> None:
-        """Make a client of the action as soon as somebody offers it; before it costs nothing."""
+        """Make a client of the action when a controller offers it."""
         if self._possible and self.action is None and self._offered:
             self._make_action()
 
     def begin(self, trajectory: JointTrajectory) -> str:
         """
-        Send the trajectory of a run, and say where to.
+        Send the trajectory of a run, and return the name of the receiver.
 
         Raises
         ------
         TrajectoryError
-            If nobody is there to take it.
+            If no controller can receive the trajectory.
 
         """
         self.look()
@@ -116,31 +116,31 @@ class TrajectorySenders:
         return f'{self.readers} subscribers'
 
     def bring_to_rest(self, trajectory: JointTrajectory) -> None:
-        """Send what ends a run, wherever the joints are."""
+        """Send the trajectory that stops a run, without tolerances."""
         if self._by_action:
             self.action.send(trajectory, ANYWHERE, ANYWHERE)
         else:
             self._publisher.publish(trajectory)
 
     def insist(self, trajectory: JointTrajectory) -> None:
-        """Send it to a controller that goes on with the own run, and publish it as well."""
+        """Send a trajectory to the controller of the present run, by action and by topic."""
         self.bring_to_rest(trajectory)
         if self._by_action:
             self._publisher.publish(trajectory)
 
     def trouble(self, patience: float) -> str:
-        """Say what is wrong with the controller for longer than a time [s]; empty: nothing."""
+        """Return the problem of the controller that lasts longer than a time [s]; or empty."""
         return self.action.trouble(patience) if self._by_action else ''
 
     def settle(self, patience: float) -> None:
-        """Wait until what was sent has arrived, at most a time [s]."""
+        """Wait until sent messages have arrived, with a timeout [s]."""
         if self._by_action:
             self.action.settle(patience)
         else:
             self._publisher.wait_for_all_acked(Duration(seconds=patience))
 
     def close(self) -> None:
-        """Let go of the action; nothing is heard of it any more."""
+        """Close the client of the action."""
         if self.action is not None:
             self.action.close()
 

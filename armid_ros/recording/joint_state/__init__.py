@@ -1,3 +1,3 @@
 # Copyright 2026 The armid_ros developers
 # SPDX-License-Identifier: Apache-2.0
-"""Serialised JointState messages to and from arrays."""
+"""Convert serialised JointState messages to and from arrays."""

@@ -1,6 +1,6 @@
 # Copyright 2026 The armid_ros developers
 # SPDX-License-Identifier: Apache-2.0
-"""Messages of any schema that hold a JointState, in the CDR of sensor_msgs/JointState."""
+"""Convert messages that contain a JointState to CDR of sensor_msgs/JointState."""
 
 from __future__ import annotations
 
@@ -21,24 +21,24 @@ Convert = Callable[[bytes], Any]
 
 
 def holds_joint_state(topic: Topic) -> bool:
-    """Whether the messages of a topic are a JointState, or have one inside."""
+    """Return whether the messages of a topic are, or contain, a JointState."""
     return topic.type_name == JOINT_STATE or bool(_inside(topic.message_type))
 
 
 def is_plain(topic: Topic) -> bool:
-    """Whether the messages of a topic are a JointState of ROS 2 in CDR."""
+    """Return whether the messages of a topic are JointState of ROS 2 in CDR."""
     described = topic.message_type
     return topic.encoding == 'cdr' and described.name == JOINT_STATE and _standard(described)
 
 
 def joint_state_blocks(bag: Bag, topic: Topic) -> Iterator[MessageBlock]:
     """
-    Yield the messages of a topic as JointState in CDR, in the order they are stored.
+    Yield the messages of a topic as JointState in CDR, in the order of storage.
 
     Raises
     ------
     RecordingError
-        The bag's schema of them has no names or positions, or they are not in CDR.
+        If the schema in the bag lacks header, names or positions, or messages are not in CDR.
 
     """
     where = f'{bag.path}: {topic.name}'
@@ -48,7 +48,7 @@ def joint_state_blocks(bag: Bag, topic: Topic) -> Iterator[MessageBlock]:
 
 
 def _converter(where: str, topic: Topic) -> Convert | None:
-    """Return what makes an object with the fields of a JointState; None where CDR is one."""
+    """Return a function that decodes a JointState; None if no conversion is needed."""
     described = topic.message_type
     if topic.encoding != 'cdr':
         raise RecordingError(
@@ -72,7 +72,7 @@ def _converter(where: str, topic: Topic) -> Convert | None:
 
 
 def _converted(block: MessageBlock, convert: Convert) -> MessageBlock:
-    """Return a block with other messages; one that cannot be read stays unreadable."""
+    """Convert the messages of a block; unreadable messages become invalid CDR."""
     store = get_typestore(Stores.ROS2_JAZZY)
     types, messages = store.types, []
     for at in range(len(block)):
@@ -91,7 +91,7 @@ def _converted(block: MessageBlock, convert: Convert) -> MessageBlock:
 
 
 def _inside(described: MessageType) -> str:
-    """Return the field of a type that is a JointState, the measured one of several; '' if none."""
+    """Return the JointState field of a type, the measured one of several; '' if none."""
     own = described.definition.split('\n===', 1)[0]
     found = _INSIDE.findall(own)
     return next((name for name in found if 'measured' in name), found[0] if found else '')
@@ -99,7 +99,7 @@ def _inside(described: MessageType) -> str:
 
 @cache
 def _standard(described: MessageType) -> bool:
-    """Whether a bag describes JointState, and what it consists of, as ROS 2 does."""
+    """Return whether the definition of JointState in a bag is that of ROS 2."""
     if not described.definition:
         return True
     standard, store = get_typestore(Stores.ROS2_JAZZY), store_for(described)

@@ -1,6 +1,6 @@
 # Copyright 2026 The armid_ros developers
 # SPDX-License-Identifier: Apache-2.0
-"""From blocks of serialised JointState messages to arrays, without a Python object a message."""
+"""Decode blocks of JointState messages to arrays, without a Python object per message."""
 
 from __future__ import annotations
 
@@ -14,9 +14,9 @@ from armid_ros.recording.source import IntArray, MessageBlock, records_at
 import numpy as np
 import numpy.typing as npt
 
-# A topic of more layouts in one block is not one publisher's; messages are then read one by one.
+# With more layouts in one block, messages are decoded one by one.
 _LAYOUTS_A_BLOCK = 32
-#: What is reserved at once of a quantity, as counts of damaged files may be anything [bytes].
+#: Largest memory reserved at once for a quantity; counts in damaged files are unreliable [bytes].
 _MOST_ROOM = 1 << 30
 
 
@@ -28,14 +28,14 @@ class JointSamples:
     Attributes
     ----------
     joints : tuple of str
-        k names, of messages in the order asked for.
+        Names of the k joints, in the requested order.
     stamps : ndarray, shape (N,)
-        Time stamps, of messages those of their headers [ns].
+        Time stamps, for messages the header stamps [ns].
     values : ndarray, shape (3, N, k), as a tuple of three
-        Positions, velocities, efforts [rad or m, their rate, N m or N]; None for a quantity no
-        message has, NaN where nothing was measured.
+        Positions, velocities, efforts [rad or m, their rate, N m or N]; None for a quantity that
+        no message has, NaN for missing values.
     receive, number : ndarray, shape (N,), or None
-        When each message was recorded [ns], and its position among all of the topic.
+        Time at which each message was recorded [ns], and its index in the topic.
 
     """
 
@@ -76,33 +76,33 @@ class JointSamples:
 
 class JointStateDecoder:
     """
-    Decodes the messages of one topic, remembering the layouts it met.
+    Decoder of the messages of one topic, with a cache of layouts.
 
     Attributes
     ----------
     messages : int
         Messages decoded or dropped so far.
     malformed : int
-        Messages dropped: no JointState, or arrays that do not fit the names.
+        Number of dropped messages: not a JointState, or arrays that do not fit the names.
     first_problem : str
-        What was wrong with the first of them.
+        Error of the first dropped message.
     names_seen : tuple of str
-        All joint names met, in order of appearance.
+        All joint names found so far, in order of appearance.
     others : mapping of str to (float, float)
-        Lowest and highest position of the joints that were not asked for [rad or m].
+        Lowest and highest position of joints that were not requested [rad or m].
 
     """
 
     def __init__(self, joints: Sequence[str], expected: int = 0) -> None:
         """
-        Decode the values of these joints, as far as messages name them.
+        Make a decoder for some joints.
 
         Parameters
         ----------
         joints : sequence of str
             The joints.
         expected : int
-            How many messages are put together in the end, for which room is made at once.
+            Expected number of messages, for which memory is reserved.
 
         """
         self._wanted = tuple(joints)
@@ -116,11 +116,11 @@ class JointStateDecoder:
 
     @property
     def names_seen(self) -> tuple[str, ...]:
-        """Return all joint names met, in order of appearance."""
+        """Return all joint names found so far, in order of appearance."""
         return tuple(self._names)
 
     def decode(self, block: MessageBlock) -> Iterator[JointSamples]:
-        """Yield the messages of a block that name a joint asked for, grouped by layout."""
+        """Yield the samples of a block that name a requested joint, grouped by layout."""
         numbers = np.arange(self.messages, self.messages + len(block), dtype=np.int64)
         self.messages += len(block)
         lengths = block.length
@@ -142,7 +142,7 @@ class JointStateDecoder:
                 return
             plan = self._plan_for(raw[:1])
             if plan is None:
-                # What equals a message that cannot be read cannot be read either.
+                # Messages equal to an unreadable one are unreadable too.
                 other = raw != raw[0]
                 self.malformed += len(raw) - 1 - int(other.sum())
                 raw, numbers, receive = raw[other], numbers[other], receive[other]
@@ -163,14 +163,14 @@ class JointStateDecoder:
     def _read(
         self, plan: _Plan, rows: npt.NDArray[np.void], numbers: IntArray, receive: IntArray
     ) -> Iterator[JointSamples]:
-        """Yield what was asked for of messages, and keep where the other joints are."""
+        """Yield the values of requested joints, and update the ranges of other joints."""
         for joint, lowest, highest in plan.ranges_of_others(rows):
             known = self.others.get(joint, (lowest, highest))
             self.others[joint] = (min(known[0], lowest), max(known[1], highest))
         yield from plan.read(rows, numbers, receive, self._room)
 
     def _plan_for(self, first: npt.NDArray[np.void]) -> _Plan | None:
-        """Return how to read a message; None, and the message counted, if there is no way."""
+        """Return the plan for a message; if it is malformed, count it and return None."""
         length = first.dtype.itemsize
         known = self._plans.setdefault(length, [])
         for plan in known:
@@ -190,14 +190,14 @@ class JointStateDecoder:
 
 
 class _Room:
-    """Room for the values of messages, so that those of one kind follow each other in memory."""
+    """Memory for values, so that values of one quantity are contiguous."""
 
     def __init__(self, expected: int) -> None:
         self._expected = expected
         self._free: dict[tuple[str, int], FloatArray] = {}
 
     def take(self, name: str, count: int, joints: int) -> FloatArray:
-        """Return an array of shape (count, joints), behind the one before if there is room."""
+        """Return an array of shape (count, joints), adjacent to the previous one if possible."""
         expected = min(self._expected, _MOST_ROOM // (8 * joints))
         free = self._free.get((name, joints))
         if free is None:
@@ -210,7 +210,7 @@ class _Room:
 
 @dataclass(frozen=True)
 class _Plan:
-    """How to read the joints asked for out of messages of one layout."""
+    """Plan to read requested joints from messages of one layout."""
 
     layout: JointStateLayout
     dtype: np.dtype[np.void]
@@ -221,7 +221,7 @@ class _Plan:
 
     @classmethod
     def make(cls, layout: JointStateLayout, length: int, wanted: Sequence[str]) -> _Plan:
-        """Find the columns of the joints asked for."""
+        """Find the columns of the requested joints."""
         if len(set(layout.names)) != len(layout.names):
             raise MalformedMessage(f'a joint is named twice: {", ".join(layout.names)}')
         for name, count in zip(QUANTITIES, layout.counts, strict=True):
@@ -244,7 +244,7 @@ class _Plan:
         )
 
     def ranges_of_others(self, rows: npt.NDArray[np.void]) -> Iterator[tuple[str, float, float]]:
-        """Yield name, lowest and highest position of the joints that were not asked for."""
+        """Yield name, lowest and highest position of other joints."""
         if not (self.others and self.layout.counts[0] and len(rows)):
             return
         positions = rows[QUANTITIES[0]][:, self.columns_of_others]
@@ -255,7 +255,7 @@ class _Plan:
     def read(
         self, rows: npt.NDArray[np.void], numbers: IntArray, receive: IntArray, room: _Room
     ) -> Iterator[JointSamples]:
-        """Yield the values of messages of this layout, if there is a joint asked for in them."""
+        """Yield the values of messages of this layout, if they have a requested joint."""
         if not self.joints:
             return
         header = rows['sec'].astype(np.int64)

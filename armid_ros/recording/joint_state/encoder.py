@@ -1,6 +1,6 @@
 # Copyright 2026 The armid_ros developers
 # SPDX-License-Identifier: Apache-2.0
-"""Serialised JointState messages from arrays, and bags of them."""
+"""Serialise JointState messages from arrays, and write bags."""
 
 from __future__ import annotations
 
@@ -55,7 +55,7 @@ def joint_state_cdr(
     frame_id: str = '',
 ) -> list[bytes]:
     """
-    Serialise joint measurements, one message a sample.
+    Serialise joint measurements, one message per sample.
 
     Parameters
     ----------
@@ -66,7 +66,7 @@ def joint_state_cdr(
     q, dq, tau : array_like, shape (N, n), or None
         Positions, velocities, efforts; None leaves the field empty.
     frame_id : str
-        Of the headers.
+        Frame of the headers.
 
     Returns
     -------
@@ -93,7 +93,7 @@ def write_joint_states(
     """
     Write joint measurements to a topic of a bag, logged at their stamps.
 
-    Parameters are those of ``joint_state_cdr``, but for ``frame_id``, which is empty.
+    See ``joint_state_cdr`` for the parameters; ``frame_id`` is empty.
 
     """
     stamps = np.asarray(stamps_ns, np.int64)
@@ -120,18 +120,18 @@ def write_recording(
     Parameters
     ----------
     path : str or Path
-        The bag directory to be made; it must not exist.
+        Bag directory to create; it must not exist.
     measured : Recording, Motion or alike
-        What was measured or simulated; velocities and torques may be None.
+        Measured or simulated motion; velocities and torques may be None.
     topic : str
         Topic of the messages.
     start_ns : int, optional
-        What is added to the times [ns]; by default that of a recording, else 1 s, as a stamp of
-        zero means that there is none.
+        Offset of the times [ns]; by default that of the recording, else 1 s, since a stamp of zero
+        means no stamp.
     robot_description : str, optional
         URDF to be written to /robot_description.
     compression : {'zstd', 'lz4', 'none'}
-        Of the chunks.
+        Compression of the chunks.
     chunk_size : int
         Bytes of messages a chunk holds.
 
@@ -175,7 +175,7 @@ def _encoded(
     given: Sequence[npt.ArrayLike | None],
     frame_id: str,
 ) -> Iterator[npt.NDArray[np.void]]:
-    """Yield messages as records, some thousand at a time."""
+    """Yield messages as records, in batches."""
     fields = [None if v is None else np.asarray(v, np.float64) for v in given]
     n = len(joints)
     for name, values in zip(('q', 'dq', 'tau'), fields, strict=True):

@@ -1,7 +1,7 @@
 # Copyright 2026 The armid_ros developers
 # SPDX-License-Identifier: Apache-2.0
 """
-Where the fields of a serialised sensor_msgs/JointState are.
+Find the fields of a serialised sensor_msgs/JointState.
 
 CDR: four bytes of encapsulation, then fields aligned to their size counted from byte 4; a string
 is a 4-byte length with the terminating zero counted, a sequence a 4-byte count. Messages of one
@@ -153,7 +153,7 @@ class JointStateLayout:
         return np.frombuffer(bytes(text), '<u4'), np.frombuffer(bytes(mask), '<u4')
 
     def fits(self, rows: npt.NDArray[np.void]) -> npt.NDArray[np.bool_]:
-        """Tell which of the messages, read as records of this layout, have this layout."""
+        """Return which messages, read as records of this layout, have this layout."""
         expected, mask = self.names_pattern
         names = rows['names']
         # As a rule all padding is alike, and plain comparison of the first row's is enough.

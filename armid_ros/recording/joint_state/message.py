@@ -1,6 +1,6 @@
 # Copyright 2026 The armid_ros developers
 # SPDX-License-Identifier: Apache-2.0
-"""Serialised JointState messages as they come, one at a time and without a Python object each."""
+"""Decode serialised JointState messages one at a time, with few Python objects."""
 
 from __future__ import annotations
 
@@ -11,14 +11,14 @@ from armid_ros.motion import FloatArray
 from armid_ros.recording.joint_state.layout import JointStateLayout
 import numpy as np
 
-#: Layouts that are remembered: as many as senders that share a topic as a rule.
+#: Number of cached layouts, one per sender on a topic.
 _REMEMBERED = 8
 _NOTHING = np.empty(0)
 
 
 class JointStateValues(NamedTuple):
     """
-    What one message says.
+    Values of one message.
 
     Attributes
     ----------
@@ -40,7 +40,7 @@ class JointStateValues(NamedTuple):
 
 
 class JointStateMessages:
-    """Reads serialised messages, remembering where the fields of those before were."""
+    """Decoder of serialised messages, with a cache of layouts."""
 
     def __init__(self) -> None:
         self._known: list[_Fields] = []
@@ -64,7 +64,7 @@ class JointStateMessages:
 
 
 class _Fields:
-    """The fields of messages of one layout, and the bytes by which they are known."""
+    """Fields of messages of one layout, and the bytes that identify it."""
 
     def __init__(self, layout: JointStateLayout) -> None:
         order = layout.order
@@ -84,7 +84,7 @@ class _Fields:
         self._places = list(zip(layout.counts, begins, strict=True))
 
     def fit(self, data: bytes) -> bool:
-        """Return whether a message is of this layout; bytes of padding may be anything."""
+        """Return whether a message has this layout; padding is not compared."""
         if data[:2] != self._code or not self._end <= len(data) <= self._end + 7:
             return False
         if int.from_bytes(data[self._named], 'little') & self._mask != self._text:

@@ -1,6 +1,6 @@
 # Copyright 2026 The armid_ros developers
 # SPDX-License-Identifier: Apache-2.0
-"""The content of the chunks of an MCAP file: unpacked, and compared with its checksum."""
+"""Decompress chunks of an MCAP file, and compare their checksums."""
 
 from __future__ import annotations
 
@@ -18,15 +18,15 @@ from armid_ros.recording.mcap.records import Chunk, FileMap
 from armid_ros.recording.settings import ReadSettings
 
 _COMPRESSIONS = ('', 'zstd', 'lz4')
-#: Threads that unpack ahead of what is read. Decompression and checksums let others run meanwhile.
+#: Threads that decompress chunks ahead of the reader. Decompression and checksums release the GIL.
 _THREADS = 2
-#: What a thread unpacks at a time, as handing over takes a tenth of what a chunk takes, and what
-#: may lie unpacked ahead [bytes]; a larger chunk is unpacked when nothing else is.
+#: Size that a thread decompresses at a time, and limit of decompressed data ahead of the reader
+#: [bytes]. A larger chunk is decompressed alone.
 _AT_A_TIME, _AHEAD = 2 << 20, 16 << 20
 
 
 class Content(NamedTuple):
-    """What holds the content of a chunk, and where in it."""
+    """Content of a chunk: a buffer, and the range in it."""
 
     data: bytes | mmap.mmap
     begin: int
@@ -37,9 +37,9 @@ def contents(
     found: FileMap, chunks: Iterable[Chunk], settings: ReadSettings
 ) -> Iterator[tuple[Chunk, Content]]:
     """
-    Yield the contents of some chunks of a file, in their order, without damaged ones.
+    Yield the contents of some chunks of a file in their order, without damaged chunks.
 
-    What is wrong with the others is noted in the damage of the file.
+    Damaged chunks are noted in the damage of the file.
 
     Raises
     ------
@@ -48,11 +48,11 @@ def contents(
 
     """
     chunks = list(chunks)
-    # A writer makes checksums or does not.
+    # Either all chunks of a writer have checksums, or none.
     check = settings.check_crc and any(chunk.crc for chunk in found.chunks)
     if any(chunk.compression for chunk in chunks):
         pieces = _unpacked_ahead(found, chunks, settings, check)
-    else:  # their checksums are quicker than to hand them over
+    else:  # checksums of small chunks are faster without threads
         pieces = ((chunk, _checked(found, chunk, settings, check)) for chunk in chunks)
     for chunk, content in pieces:
         if isinstance(content, Content):
@@ -64,7 +64,7 @@ def contents(
 def _unpacked_ahead(
     found: FileMap, chunks: Sequence[Chunk], settings: ReadSettings, check: bool
 ) -> Iterator[tuple[Chunk, Content | str]]:
-    """Yield contents that threads unpack, several of them ahead of what is read."""
+    """Yield contents that threads decompress ahead of the reader."""
 
     def unpack(part: Sequence[Chunk]) -> list[tuple[Chunk, Content | str]]:
         return [(chunk, _checked(found, chunk, settings, check)) for chunk in part]
@@ -86,7 +86,7 @@ def _unpacked_ahead(
 
 
 def _checked(found: FileMap, chunk: Chunk, settings: ReadSettings, check: bool) -> Content | str:
-    """Return a content whose checksum is right, or what is wrong with it."""
+    """Return the content of a chunk, or its error as a text."""
     where = f'{chunk.compression} chunk' if chunk.compression else 'chunk'
     where = f'the {where} at byte {chunk.begin}'
     if chunk.compression not in _COMPRESSIONS:

@@ -1,6 +1,6 @@
 # Copyright 2026 The armid_ros developers
 # SPDX-License-Identifier: Apache-2.0
-"""The messages in the content of MCAP chunks, and their way to blocks for array code."""
+"""Find messages in MCAP chunks, and gather them into blocks."""
 
 from __future__ import annotations
 
@@ -14,14 +14,14 @@ from mcap.opcode import Opcode
 import numpy as np
 import numpy.typing as npt
 
-# Chunks are put together to blocks of about this size, for small chunks would leave array code
-# little to do at a time, and large blocks fall out of the processor's cache.
+# Chunks are gathered into blocks of about this size. Small blocks are slow in array code, and
+# large blocks exceed the processor cache.
 _BLOCK_BYTES = 1 << 20
 BLOCK_MESSAGES = 4096
 
 
 class Gathered:
-    """Messages of chunks on the way to a block."""
+    """Collects messages of chunks for a block."""
 
     def __init__(self, data: bytes | mmap.mmap) -> None:
         self._file = data
@@ -30,7 +30,7 @@ class Gathered:
         self._size = self._count = 0
 
     def add(self, content: bytes | mmap.mmap, offsets: IntArray) -> Iterator[MessageBlock]:
-        """Add messages of a content of their own, or that lie in the file as they are."""
+        """Add messages of a decompressed content, or of the file itself."""
         own = isinstance(content, bytes) and content is not self._file
         if own != bool(self._parts):
             yield from self.flush()
@@ -45,7 +45,7 @@ class Gathered:
             yield from self.flush()
 
     def flush(self) -> Iterator[MessageBlock]:
-        """Yield what was added, if it is something."""
+        """Yield the added messages, if any."""
         data = self._parts[0] if len(self._parts) == 1 else b''.join(self._parts)
         if self._count:
             yield message_block(data if self._parts else self._file, np.concatenate(self._offsets))
@@ -53,12 +53,12 @@ class Gathered:
 
 
 def heads(data: bytes | mmap.mmap, offsets: IntArray) -> npt.NDArray[np.void]:
-    """Return the heads of the messages whose records begin there, as `MESSAGE`."""
+    """Return the heads of the messages at given record positions, as `MESSAGE`."""
     return records_at(data, offsets, MESSAGE.itemsize).view(MESSAGE)
 
 
 def message_block(data: bytes | mmap.mmap, offsets: IntArray) -> MessageBlock:
-    """Return the messages whose records begin there."""
+    """Return the messages at given record positions."""
     rows = heads(data, offsets)
     return MessageBlock(
         data,
@@ -73,24 +73,24 @@ def tiled(
     data: bytes | mmap.mmap, offsets: IntArray, begin: int, end: int
 ) -> npt.NDArray[np.void] | None:
     """
-    Return the heads of messages, if they and definitions fill a chunk without a gap.
+    Return the heads of messages if the index of the chunk is complete and correct.
 
-    That shows the index of a chunk to be complete and right: the first record begins where the
-    content does, and every other one where the one before it ends.
+    The index is correct if messages and definitions fill the chunk without gaps: each record
+    begins at the end of the previous one.
 
     Parameters
     ----------
     data : bytes or mmap
-        What holds the content.
+        Buffer with the content.
     offsets : ndarray, shape (N,)
-        Where messages begin, by the index; in ascending order.
+        Begin of each message by the index, in ascending order.
     begin, end : int
-        Where the content of the chunk is.
+        Range of the content in the buffer.
 
     Returns
     -------
     ndarray of `MESSAGE`, shape (N,), or None
-        None if the index is not to be trusted.
+        None if the index is wrong.
 
     """
     if not len(offsets) or offsets[0] < begin or offsets[-1] + MESSAGE.itemsize > end:
@@ -120,18 +120,18 @@ def walk(
     Parameters
     ----------
     content : bytes or mmap
-        What holds the content.
+        Buffer with the content.
     begin, end : int
-        Where the content is; all of it by default.
+        Range of the content in the buffer; the whole buffer by default.
 
     Returns
     -------
     offsets : ndarray, shape (N,)
-        Where messages begin.
+        Begin of each message.
     definitions : list of (int, int, int)
         Opcode, beginning and end of schemas and channels.
     position : int
-        Where the last record ends; before ``end`` if what follows is none.
+        End of the last record; less than ``end`` if invalid data follow.
 
     """
     offsets: list[int] = []
@@ -147,13 +147,13 @@ def walk(
             offsets.append(position)
         elif opcode in (Opcode.SCHEMA, Opcode.CHANNEL):
             definitions.append((opcode, position + RECORD_HEADER, stop))
-        else:  # a chunk has nothing else
+        else:  # chunks contain only these records
             break
         position = stop
     return np.array(offsets, np.int64), definitions, position
 
 
 def _are_definitions(data: bytes | mmap.mmap, begin: int, end: int) -> bool:
-    """Tell whether schemas and channels fill a stretch."""
+    """Return whether schemas and channels fill a range."""
     offsets, _, position = walk(data, begin, end)
     return position == end and not len(offsets)

@@ -1,13 +1,12 @@
 # Copyright 2026 The armid_ros developers
 # SPDX-License-Identifier: Apache-2.0
 """
-The records of an MCAP file, found without its index.
+Find the records of an MCAP file without its index.
 
 An MCAP file is a sequence of records, each an opcode, a length and a content; messages are as a
-rule inside chunks, and after each chunk come the offsets of its messages. Walking from the start
-finds everything, whether or not the writer lived to write the summary at the end. Nothing that the
-file says of itself is believed where it can be compared.
-Specification: https://mcap.dev/spec
+rule inside chunks, and after each chunk come the offsets of its messages. A walk from the start
+finds all records, even if the writer was killed before it wrote the summary. Statements of the
+file are checked if possible. Specification: https://mcap.dev/spec
 
 """
 
@@ -45,7 +44,7 @@ MESSAGE_HEADER = MESSAGE.itemsize - RECORD_HEADER
 _CHUNK_HEADER = struct.Struct('<QQQII')
 _FOOTER = struct.Struct('<QQI')
 _INDEX_ENTRY = 16
-# Opcodes from here to _PRIVATE are none; those beyond are for whoever wants one.
+# Opcodes from here to _PRIVATE are not defined; higher ones are for private use.
 _UNKNOWN, _PRIVATE = 0x10, 0x80
 _DEFINITIONS = (Opcode.SCHEMA, Opcode.CHANNEL, Opcode.STATISTICS)
 
@@ -53,7 +52,7 @@ _DEFINITIONS = (Opcode.SCHEMA, Opcode.CHANNEL, Opcode.STATISTICS)
 @dataclass(frozen=True)
 class Chunk:
     """
-    Where a chunk is in its file.
+    Position of a chunk in its file.
 
     Attributes
     ----------
@@ -62,15 +61,15 @@ class Chunk:
     compression : str
         'zstd', 'lz4' or empty.
     size : int
-        Bytes of its content once decompressed.
+        Size of the decompressed content [bytes].
     crc : int
-        CRC-32 of the content, 0 if the writer left it out.
+        CRC-32 of the content; 0 if the writer did not compute it.
     begin, end : int
-        Where its content, as stored, begins and ends in the file.
+        Range of the stored content in the file.
     whole : bool
-        False for the last chunk of a file that ends within it.
+        Whether the chunk is complete; False if the file ends inside the chunk.
     indexes : dict
-        Where the offsets of a channel's messages are in the file, and how many.
+        Position and count of the message offsets of each channel.
 
     """
 
@@ -88,7 +87,7 @@ class Chunk:
 @dataclass
 class FileMap:
     """
-    What a walk over the records of a file found.
+    Records that a walk over a file found.
 
     Attributes
     ----------
@@ -97,15 +96,15 @@ class FileMap:
     chunks : list of Chunk
         Its chunks, in order.
     loose : list of int
-        Where the records of messages outside chunks begin.
+        Begin of each message record outside chunks.
     schemas, channels : dict
-        Those met outside chunks, which in a finished file are all.
+        Definitions outside chunks; in a finished file these are all definitions.
     statistics : Statistics, optional
-        The summary's.
+        Statistics of the summary.
     finished : bool
-        Whether the file has its footer, and a summary before it that can be believed.
+        Whether the file has a footer and a valid summary.
     damage : Damage
-        What is wrong with it.
+        Damage of the file.
 
     """
 
@@ -119,7 +118,7 @@ class FileMap:
     damage: Damage = field(default_factory=Damage)
 
     def span(self, chunk: Chunk) -> str:
-        """Return when the messages of a chunk were logged, in words."""
+        """Format the time range of the messages of a chunk."""
         begin = min((c.start_time for c in self.chunks if c.end_time), default=0)
         start, end = (1e-9 * (time - begin) for time in (chunk.start_time, chunk.end_time))
         return f'from {start:.3f} to {end:.3f} s after the beginning'
@@ -134,14 +133,14 @@ def map_file(data: bytes | mmap.mmap, path: Path, *, check: bool = True) -> File
     data : mmap or bytes
         The file.
     path : Path
-        Its name, for the message.
+        Name of the file, for error messages.
     check : bool
-        Whether to compare the checksums of what is outside chunks.
+        Whether to compare checksums of data outside chunks.
 
     Raises
     ------
     RecordingError
-        It is no MCAP file.
+        If the file is not an MCAP file.
 
     """
     if data[: len(MAGIC)] != MAGIC:
@@ -170,7 +169,7 @@ def map_file(data: bytes | mmap.mmap, path: Path, *, check: bool = True) -> File
 
 
 def _walk(found: FileMap) -> tuple[list[tuple[int, int, int]], int | None, int | None, int]:
-    """Note chunks and loose messages; return definitions, data end, footer, and how far it is."""
+    """Note chunks and loose messages; return definitions, data end, footer and position."""
     data = found.data
     definitions: list[tuple[int, int, int]] = []
     data_end = footer = None
@@ -262,7 +261,7 @@ def _add_loose(found: FileMap, begin: int, end: int) -> None:
     found.loose.append(begin - RECORD_HEADER)
 
 
-#: What is noted of records as they come.
+#: Handlers of the records, by opcode.
 _NOTED: dict[int, Callable[[FileMap, int, int], None]] = {
     Opcode.CHUNK: _add_chunk,
     Opcode.MESSAGE_INDEX: _add_index,
@@ -273,7 +272,7 @@ _NOTED: dict[int, Callable[[FileMap, int, int], None]] = {
 def _believed(
     found: FileMap, definitions: list[tuple[int, int, int]], footer: int
 ) -> list[tuple[int, int, int]]:
-    """Return the definitions without those of a summary whose checksum is wrong."""
+    """Return the definitions, without those of a summary with a wrong checksum."""
     start, _, crc = _FOOTER.unpack_from(found.data, footer)
     end = footer + _FOOTER.size - 4
     if not crc or not start:

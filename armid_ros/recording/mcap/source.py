@@ -1,10 +1,10 @@
 # Copyright 2026 The armid_ros developers
 # SPDX-License-Identifier: Apache-2.0
 """
-Messages of an MCAP file, with or without its index, chunked or not, compressed or not.
+Read messages of an MCAP file, with or without index, chunks and compression.
 
-What the file says of its messages - checksums, indexes, counts - is compared with them. A chunk
-that is damaged is left out as a whole, for no message in it can be told from a whole one.
+Checksums, indexes and counts are compared with the messages. A damaged chunk is skipped
+completely, since its undamaged messages cannot be recognised.
 
 """
 
@@ -36,12 +36,12 @@ import numpy as np
 import numpy.typing as npt
 
 _Rows = npt.NDArray[np.void]
-#: Of a message that is kept as an object [bytes].
+#: Memory overhead of a message object [bytes].
 _OVERHEAD = 400
 
 
 class McapSource(Source):
-    """One MCAP file."""
+    """Source for one MCAP file."""
 
     def __init__(self, path: Path, settings: ReadSettings = DEFAULT) -> None:
         """Open an MCAP file."""
@@ -105,8 +105,8 @@ class McapSource(Source):
                 heapq.heappush(pending, (log_time, number, raw))
                 number += 1
                 size += len(raw.cdr) + _OVERHEAD
-            # Chunks that overlap in time have to be kept until it is clear which message is first.
-            self._settings.require(size, 'what has to be put in order of time')
+            # Chunks that overlap in time are kept in memory until their messages are sorted.
+            self._settings.require(size, 'the messages to sort by time')
         while pending:
             yield heapq.heappop(pending)[2]
         self._compare_count('all topics', list(names), number)
@@ -114,7 +114,7 @@ class McapSource(Source):
     def _pieces(
         self, chunks: Sequence[Chunk], channels: Sequence[int], *, by_time: bool = False
     ) -> Iterator[tuple[int, bytes | mmap.mmap, IntArray]]:
-        """Yield first log time, content, and where in it messages of some channels begin."""
+        """Yield first log time, content, and begin of the messages of some channels."""
         data = self._found.data
         for chunk, unpacked in contents(self._found, chunks, self._settings):
             content, offsets, rows = self._messages_in(chunk, unpacked)
@@ -128,7 +128,7 @@ class McapSource(Source):
             yield int(heads(data, some)['log_time'][0]), data, some
 
     def _survey(self) -> dict[int, int]:
-        """Make sure all channels are known, and return the number of messages of each."""
+        """Find all channels, and return the number of messages of each."""
         if self._counts is not None:
             return self._counts
         found, summary = self._found, self._found.statistics
@@ -156,8 +156,8 @@ class McapSource(Source):
         return heads(content, offsets)['channel'].copy()
 
     def _is_without(self, chunk: Chunk, wanted: Collection[int]) -> bool:
-        """Tell whether a chunk has no message of some channels, by an index that is compared."""
-        # A damaged index shows in the count, which a file that was not finished does not have.
+        """Return whether a chunk has no message of some channels, by its checked index."""
+        # The message count reveals a damaged index; unfinished files have no count.
         return bool(
             self._found.finished
             and self._found.statistics
@@ -169,7 +169,7 @@ class McapSource(Source):
     def _messages_in(
         self, chunk: Chunk, unpacked: Content
     ) -> tuple[bytes | mmap.mmap, IntArray, _Rows]:
-        """Return the content of a chunk, where messages begin in it, and their heads."""
+        """Return the content of a chunk, and begin and heads of its messages."""
         content, begin, end = unpacked
         if chunk.indexes and chunk.whole and end > begin:
             offsets = self._indexed(chunk) + begin
@@ -185,8 +185,8 @@ class McapSource(Source):
         return content, offsets, heads(content, offsets)
 
     def _indexed(self, chunk: Chunk) -> IntArray:
-        """Return where the index of a chunk says that messages begin in its content."""
-        # What lies beyond the content is put at its end, where no message can begin.
+        """Return the begin of the messages in a chunk by its index."""
+        # Offsets beyond the content are set to its end, where no message can begin.
         parts = [
             np.minimum(
                 np.frombuffer(self._found.data, '<u8', 2 * count, at)[1::2], chunk.size
@@ -199,7 +199,7 @@ class McapSource(Source):
         return np.sort(np.concatenate(parts), kind='stable')
 
     def _possible(self, offsets: IntArray, rows: _Rows, wanted: Sequence[int]) -> IntArray:
-        """Return those of messages that are of some channels and have a time."""
+        """Return the messages that are of some channels and have a valid time."""
         channels = rows['channel']
         chosen = np.isin(channels, wanted) if len(wanted) != 1 else channels == wanted[0]
         late = (rows['log_time'] < 0) | (rows['publish_time'] < 0)
@@ -212,14 +212,14 @@ class McapSource(Source):
         return offsets if chosen.all() else offsets[chosen]
 
     def _compare_count(self, what: str, channels: Collection[int], count: int) -> None:
-        """Hold the number of messages against the one that the writer counted."""
+        """Compare the number of messages with the count of the writer."""
         summary = self._found.statistics
         if not (self._found.finished and summary and summary.channel_message_counts):
             return
         expected = sum(summary.channel_message_counts.get(channel, 0) for channel in channels)
         if count != expected:
             self._found.damage.add(
-                f'{count} messages of {what} where the writer counted {expected}'
+                f'{count} messages of {what}, but the writer counted {expected}'
             )
 
     def _describe(self, channel: Channel, count: int) -> Topic:
@@ -227,7 +227,7 @@ class McapSource(Source):
         schema = self._found.schemas.get(channel.schema_id)
         name = schema.name if schema else ''
         package, _, rest = name.partition('/')
-        if rest and '/' not in rest:  # some writers leave the namespace out
+        if rest and '/' not in rest:  # some writers omit the namespace
             name = f'{package}/msg/{rest}'
         described = MessageType(
             name=name,

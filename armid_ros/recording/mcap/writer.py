@@ -1,12 +1,12 @@
 # Copyright 2026 The armid_ros developers
 # SPDX-License-Identifier: Apache-2.0
 """
-Writes MCAP files a chunk at a time, each in one system call.
+Write MCAP files, one system call per chunk.
 
-Unlike mcap's own writer it can be interrupted anywhere, by KeyboardInterrupt in the middle of a
-function too: what a step has done is noted in one assignment at its end, and the next step begins
-by cutting off what an interrupted one left behind. It also takes thousands of messages at once.
-Specification: https://mcap.dev/spec
+Unlike the writer of mcap, this one may be interrupted anywhere, for example by KeyboardInterrupt.
+Each step commits its result in one assignment at its end. The next step first truncates the file
+to the committed size. Thousands of messages can be written at once. Specification:
+https://mcap.dev/spec
 
 """
 
@@ -47,7 +47,7 @@ import zstandard
 
 Compression = Literal['zstd', 'lz4', 'none']
 
-# On joint states, level 1 is as small as the default within a percent, in half the time.
+# For joint states, level 1 takes half the time of the default; sizes differ by 1 %.
 _ZSTD_LEVEL = 1
 _COMPRESSORS: dict[str, Callable[[bytes], bytes]] = {
     'zstd': zstandard.ZstdCompressor(level=_ZSTD_LEVEL).compress,
@@ -58,7 +58,7 @@ _MESSAGE_HEAD = struct.Struct('<BQHIQQ')
 
 
 class _Committed(NamedTuple):
-    """How much is in the file for good."""
+    """Committed state of the file."""
 
     position: int = 0
     chunks: int = 0
@@ -78,7 +78,7 @@ class McapWriter:
         Raises
         ------
         RecordingError
-            It exists, or cannot be written, or there is no such compression.
+            If the file exists or cannot be written, or the compression is not known.
 
         """
         if compression not in _COMPRESSORS:
@@ -94,7 +94,7 @@ class McapWriter:
         self._done = _Committed()
         try:
             self._stream = path.open('xb', buffering=0)
-            # In a file without a name, for a recorder that runs for days has millions of chunks.
+            # The indexes are kept in a temporary file: long recordings have millions of chunks.
             self._index = TemporaryFile(dir=path.parent, buffering=0)
         except OSError as error:
             raise RecordingError(f'{path}: cannot be written: {error.strerror}') from error
@@ -108,12 +108,12 @@ class McapWriter:
 
     @property
     def size(self) -> int:
-        """Return the number of bytes in the file for good."""
+        """Return the number of committed bytes."""
         return self._done.position
 
     @property
     def in_place(self) -> bool:
-        """Whether the file is still where it was made: neither deleted nor moved."""
+        """Whether the file was neither deleted nor moved since it was created."""
         try:
             there, here = os.stat(self._path), os.fstat(self._stream.fileno())
         except (OSError, ValueError):
@@ -136,7 +136,7 @@ class McapWriter:
         return self._done.time_range
 
     def add_schema(self, name: str, encoding: str, data: bytes) -> tuple[int, bytes]:
-        """Return the number of a new schema, and the record that must be in the next chunk."""
+        """Add a schema; return its number, and its record for the next chunk."""
         schema = Schema(id=len(self._schemas) + 1, name=name, encoding=encoding, data=data)
         self._schemas.append(schema)
         return schema.id, _record(schema)
@@ -144,7 +144,7 @@ class McapWriter:
     def add_channel(
         self, topic: str, schema_id: int, metadata: dict[str, str]
     ) -> tuple[int, bytes]:
-        """Return the number of a new channel, and the record that must be in the next chunk."""
+        """Add a channel; return its number, and its record for the next chunk."""
         channel = Channel(
             id=len(self._channels) + 1,
             topic=topic,
@@ -164,7 +164,7 @@ class McapWriter:
         content : bytes
             Schema, channel and message records.
         offsets : ndarray, shape (N,)
-            Where message records begin.
+            Begin of each message record.
 
         """
         rows = records_at(content, offsets, MESSAGE.itemsize).view(MESSAGE)
@@ -232,14 +232,14 @@ class McapWriter:
         self._done = self._done._replace(position=end, metadata=len(self._metadata))
 
     def finish(self) -> None:
-        """Write the summary and close the file; may be called again if it was interrupted."""
+        """Write the summary and close the file; may be repeated after an interruption."""
         if not self._stream.closed:
             self._append(self._tail())
             self._stream.close()
         self._index.close()
 
     def _tail(self) -> bytes:
-        """Return what is behind the last chunk."""
+        """Return the summary and the footer, which follow the last chunk."""
         data_end = _record(DataEnd(0))
         begin = self._done.position + len(data_end)
         start, end = self.time_range
@@ -272,12 +272,12 @@ class McapWriter:
         return data_end + summary + offsets + _record(Footer(begin, offsets_begin, crc)) + MAGIC
 
     def give_up(self) -> None:
-        """Close the file as it is; every chunk that was written can be read."""
+        """Close the file without a summary; all written chunks can be read."""
         self._stream.close()
         self._index.close()
 
     def _note(self, record: bytes) -> int:
-        """Put the index of a chunk behind those of the others, and return where it ends."""
+        """Append the index of a chunk to the index file, and return its end."""
         position, rest = self._done.index_size, memoryview(record)
         try:
             while len(rest):
@@ -288,7 +288,7 @@ class McapWriter:
         return position
 
     def _noted(self) -> bytes:
-        """Return the indexes of all chunks that are in the file for good."""
+        """Return the indexes of all committed chunks."""
         content = b''
         while len(content) < self._done.index_size:
             missing = self._done.index_size - len(content)
@@ -296,7 +296,7 @@ class McapWriter:
         return content
 
     def _append(self, data: bytes) -> int:
-        """Write behind what is in the file for good, and return where that ends."""
+        """Write data after the committed data, and return their end."""
         position = self._done.position
         try:
             if self._stream.tell() != position:
@@ -306,7 +306,8 @@ class McapWriter:
             while len(rest):
                 rest = rest[self._stream.write(rest) :]
         except OSError as error:
-            # A disk that is full takes the beginning; what is in the file ends with a whole step.
+            # A full disk stores a part of the data; it is cut off, so that the file ends with a
+            # step.
             with suppress(OSError):
                 self._stream.truncate(position)
             raise RecordingError(f'{self._path}: cannot be written: {error.strerror}') from error

@@ -1,6 +1,6 @@
 # Copyright 2026 The armid_ros developers
 # SPDX-License-Identifier: Apache-2.0
-"""Recordings that are not bags: CSV, NPZ, MAT, Parquet, LeRobot datasets."""
+"""Read recordings from tables: CSV, NPZ, MAT, Parquet, LeRobot datasets."""
 
 from armid_ros.recording.tables.files import is_table, open_table
 from armid_ros.recording.tables.measured import measured

@@ -1,6 +1,6 @@
 # Copyright 2026 The armid_ros developers
 # SPDX-License-Identifier: Apache-2.0
-"""Tables in files of arrays: NumPy's .npy and .npz, MATLAB's .mat, HDF5."""
+"""Read tables from array files: .npy and .npz of NumPy, .mat of MATLAB, HDF5."""
 
 from __future__ import annotations
 
@@ -17,9 +17,9 @@ from armid_ros.recording.tables.table import imported, read_content, Table, tabl
 import numpy as np
 import numpy.typing as npt
 
-#: What an HDF5 file begins with; MATLAB puts 512 bytes before it.
+#: First bytes of an HDF5 file; in MATLAB files they follow 512 other bytes.
 HDF5 = b'\x89HDF'
-#: Bytes that one byte of deflate can stand for, with some to spare.
+#: Upper bound of the compression ratio of deflate.
 _MOST_PACKED = 1100
 
 Arrays = dict[str, npt.NDArray[np.generic]]
@@ -31,11 +31,11 @@ def read_numpy(path: Path) -> Table:
     if zipfile.is_zipfile(io.BytesIO(raw)):
         with zipfile.ZipFile(io.BytesIO(raw)) as archive:
             unpacked = sum(member.file_size for member in archive.infolist())
-        DEFAULT.require(unpacked, f'{path}: what is packed in it')
+        DEFAULT.require(unpacked, f'{path}: the decompressed content')
     loaded = np.load(io.BytesIO(raw), allow_pickle=False)
     arrays = {'': loaded} if isinstance(loaded, np.ndarray) else dict(loaded)
     described = 'one NumPy array' if '' in arrays else 'NumPy arrays'
-    # take structured arrays apart
+    # split structured arrays into their fields
     apart: Arrays = {}
     for name, values in arrays.items():
         if values.dtype.names:
@@ -67,7 +67,7 @@ def read_matlab(path: Path) -> Table:
 
 
 def read_hdf5(path: Path) -> Table:
-    """Read an HDF5 file, which a .mat of version 7.3 is."""
+    """Read an HDF5 file, such as a .mat file of version 7.3."""
     h5py = imported('h5py', path, 'HDF5, which MAT files of version 7.3 are,')
     arrays: Arrays = {}
 
@@ -83,9 +83,9 @@ def read_hdf5(path: Path) -> Table:
 
 
 def _require_packed(what: str, size: int, stored: int) -> None:
-    """Refuse an array that states more than its bytes can hold, or than memory is allowed."""
+    """Raise a RecordingError if the stated size of an array is impossible or over the limit."""
     if size > _MOST_PACKED * stored:
-        raise RecordingError(f'{what} states {size} bytes, of which {stored} are there')
+        raise RecordingError(f'{what} states {size} bytes, but the file has {stored}')
     DEFAULT.require(size, what)
 
 

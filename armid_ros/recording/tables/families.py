@@ -1,9 +1,9 @@
 # Copyright 2026 The armid_ros developers
 # SPDX-License-Identifier: Apache-2.0
 """
-Which columns belong together, named by a person ('q{}') or guessed from what they are called.
+Group columns of a table into quantities, by a pattern ('q{}') or by their names.
 
-Columns that are alike but for a joint's name or number form a family, judged by its name.
+Columns whose names differ only in the name or number of a joint form a family.
 
 """
 
@@ -40,13 +40,14 @@ class Family:
     Attributes
     ----------
     pattern : str
-        How a person would ask for them.
+        Pattern that selects the columns.
     columns : tuple of TableColumn
-        One a joint.
+        One column per joint.
     labels : tuple of str
-        What of each name stands for the joint: its name, a number, or the whole name.
+        Part of each column name that identifies the joint: its name, a number, or the whole column
+        name.
     rest : mapping of str to TableColumn
-        Columns that are called alike and are of other joints, by their label.
+        Columns of other joints with the same pattern, by their label.
 
     """
 
@@ -56,7 +57,7 @@ class Family:
     rest: Mapping[str, TableColumn] = field(default_factory=dict)
 
     def joints(self, rename: Rules = ()) -> tuple[str, ...]:
-        """Return the joints' names as far as the columns have them; joint_1 and so on if not."""
+        """Return the joint names in the column names; otherwise joint_1 and so on."""
         if all(label.isdigit() for label in self.labels):
             return tuple(f'joint_{k + 1}' for k in range(len(self.labels)))
         return tuple(renamed(label, rename) for label in self.labels)
@@ -66,25 +67,25 @@ def choose(
     table: Table, pattern: str, joints: Sequence[str] | None, what: str, rename: Rules = ()
 ) -> Family:
     """
-    Return the columns that a person asks for.
+    Return the columns that a pattern selects.
 
     Parameters
     ----------
     table : Table
-        Where they are.
+        Table with the columns.
     pattern : str
         See ColumnSettings.
     joints : sequence of str or None
-        The joints, where they are known: columns are matched to them by name, else by number.
+        Joints, if known; columns are matched to them by name, else by number.
     what : str
-        The quantity, for messages.
+        Name of the quantity, for error messages.
     rename : sequence of (str, str)
         From names in the file to names of the joints.
 
     Raises
     ------
     RecordingError
-        Nothing fits, or not as many columns as there are joints.
+        If no column fits, or the number of columns differs from that of the joints.
 
     """
     found = _matching(table, pattern)
@@ -128,16 +129,16 @@ def guess(
     table: Table, quantity: QuantityName, joints: Sequence[str] | None, rename: Rules = ()
 ) -> list[Family]:
     """
-    Return the families that may be a quantity, the likeliest first.
+    Return the families that may hold a quantity, the most likely first.
 
     Parameters
     ----------
     table : Table
-        Where they are.
+        Table with the columns.
     quantity : {'position', 'velocity', 'effort'}
-        What is looked for.
+        Quantity to find.
     joints : sequence of str or None
-        The joints, where they are known: a family has to have a column for each.
+        Joints, if known; a family must have a column for each.
     rename : sequence of (str, str)
         From names in the file to names of the joints.
 
@@ -146,7 +147,7 @@ def guess(
     for pattern, members in _groups(table, joints, rename).items():
         family = _family(pattern, members, joints, rename)
         if family is not None:
-            # columns that never change were not filled
+            # constant columns hold no measurements
             still = any(not np.any(np.diff(column.finite)) for column in family.columns)
             scored.append((_score(pattern, quantity) - still, family))
     likely = [one for one in scored if one[0] > 0.0]
@@ -160,14 +161,14 @@ def incomplete(
     table: Table, quantity: QuantityName, joints: Sequence[str], rename: Rules = ()
 ) -> tuple[str, tuple[str, ...]]:
     """
-    Return the family that has the most joints by name, where none has all.
+    Return the family with the most joints by name, if no family has all.
 
     Returns
     -------
     pattern : str
-        Of its columns; empty where no family has a joint.
+        Pattern of the columns; empty if no family has a joint.
     lacking : tuple of str
-        The joints for which there is no column with numbers.
+        Joints without a column of numbers.
 
     """
     best = '', tuple(joints)
@@ -180,7 +181,7 @@ def incomplete(
 
 
 def guess_time(table: Table) -> TableColumn | None:
-    """Return the column that is named like a time and increases, or else decreases throughout."""
+    """Return the column with the name of a time that increases, or else decreases."""
     for way in (1.0, -1.0):
         scores = {}
         for column in table.columns:
@@ -214,13 +215,13 @@ def _family(
 
 
 def _by_number(label: str) -> tuple[int, str]:
-    """Return what sorts labels of digits by their number, of whatever length."""
+    """Return the sort key of labels of digits, by their number."""
     digits = label.lstrip('0')
     return len(digits), digits
 
 
 def _matching(table: Table, pattern: str) -> list[tuple[str, TableColumn]]:
-    """Return the columns that fit a pattern, each behind what stands for its joint."""
+    """Return the columns that fit a pattern, by the label of their joint."""
     exact = table.column(pattern)
     if exact is not None:
         return [('1', exact)]
@@ -263,7 +264,7 @@ def _by_placeholder(table: Table, pattern: str) -> list[tuple[str, TableColumn]]
 def _groups(
     table: Table, joints: Sequence[str] | None, rename: Rules
 ) -> dict[str, dict[str, TableColumn]]:
-    """Return the columns by what they have in common and by what stands for a joint."""
+    """Return the columns by pattern and by label of the joint."""
     groups: dict[str, dict[str, TableColumn]] = {}
     for column in table.columns:
         for pattern, label in _readings(column, joints, rename):
@@ -274,7 +275,7 @@ def _groups(
 def _readings(
     column: TableColumn, joints: Sequence[str] | None, rename: Rules
 ) -> Iterator[tuple[str, str]]:
-    """Yield the ways to read a name as a pattern and what stands for the joint."""
+    """Yield all splits of a column name into pattern and label of the joint."""
     name = column.bare_name
     if column.array and name.endswith(']'):
         element = name[len(column.array) + 1 : -1]
@@ -296,7 +297,7 @@ def _readings(
 
 
 def _named(name: str) -> Iterator[tuple[str, str]]:
-    """Read a name as a joint's with the quantity behind or in front: 'elbow/position'."""
+    """Split a column name into joint and quantity, in either order: 'elbow/position'."""
     behind = re.fullmatch(r'(.*[/.])?([^/.]+)([/._ ])([A-Za-z]+)', name)
     if behind and is_quantity(behind[4]) and not behind[2].isdigit():
         yield f'{behind[1] or ""}{{}}{behind[3]}{behind[4]}', behind[2]
@@ -306,7 +307,7 @@ def _named(name: str) -> Iterator[tuple[str, str]]:
 
 
 def _score(pattern: str, quantity: QuantityName) -> float:
-    """Return how likely a family is a quantity by its name; zero where it is another one."""
+    """Return the score of a family for a quantity by its name; zero if it does not fit."""
     words = words_of(pattern)
     scores = {
         name: max((table.get(word, 0.0) for word in words), default=0.0)

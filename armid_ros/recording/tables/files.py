@@ -1,6 +1,6 @@
 # Copyright 2026 The armid_ros developers
 # SPDX-License-Identifier: Apache-2.0
-"""Which files are tables, and who reads them."""
+"""Find the reader of a table file."""
 
 from __future__ import annotations
 
@@ -30,7 +30,7 @@ _READERS: dict[str, Callable[[Path], Table]] = {
 
 
 def is_table(path: Path) -> bool:
-    """Whether a path is a table by its name, or a LeRobot dataset."""
+    """Return whether a path is a LeRobot dataset, or has the name of a table."""
     return _suffix(path) in _READERS or (path / INFO).is_file()
 
 
@@ -44,12 +44,12 @@ def open_table(path: Path, *, episode: int | None = None) -> Table:
         CSV (also with semicolons, tabs, blanks; .gz too), NPY, NPZ, MAT, HDF5, Parquet, or the
         folder of a LeRobot dataset.
     episode : int, optional
-        Of a LeRobot dataset; the first by default.
+        Episode of a LeRobot dataset; the first by default.
 
     Raises
     ------
     RecordingError
-        There is no such file, nobody reads it, or what is in it is no table.
+        If the file does not exist, has no reader, or is not a table.
 
     """
     if not path.exists():
@@ -59,13 +59,13 @@ def open_table(path: Path, *, episode: int | None = None) -> Table:
         known = ', '.join(_READERS)
         raise RecordingError(f'{path}: no table; tables are {known} and LeRobot datasets')
     if not lerobot:
-        with open_regular(path, RecordingError):  # a FIFO would be waited for
+        with open_regular(path, RecordingError):  # opening a FIFO would block
             pass
     try:
         return settled(read_lerobot(path, episode) if lerobot else _READERS[_suffix(path)](path))
     except RecordingError:
         raise
-    except Exception as problem:  # libraries raise whatever their parsers stumble over
+    except Exception as problem:  # the libraries raise arbitrary exceptions
         said = ' '.join(str(problem).split())[:500]
         raise RecordingError(
             f'{path}: cannot be read, it may be damaged: {type(problem).__name__}: {said}'

@@ -1,6 +1,6 @@
 # Copyright 2026 The armid_ros developers
 # SPDX-License-Identifier: Apache-2.0
-"""From a table and a plan to a recording."""
+"""Convert a table to a recording by a plan."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ from armid_ros.recording.tables.plan import TablePlan
 from armid_ros.recording.tables.settings import in_si, renamed, TIME_UNITS
 import numpy as np
 
-#: Times later than this count from 1970 [s].
+#: Times later than this are counted from 1970 [s].
 _EPOCH = 1e8
 #: No stamp is later: nanoseconds beyond the year 2255 do not fit into 64 bits [s].
 _LATEST = 9e9
@@ -25,12 +25,12 @@ _LATEST = 9e9
 
 def measured(plan: TablePlan) -> Recording:
     """
-    Return what a table holds.
+    Convert a table to a recording.
 
     Raises
     ------
     RecordingError
-        Time stands still, or too many rows have a value that is no number.
+        If time does not increase, or too many rows have a value that is not a number.
 
     """
     table = plan.table
@@ -77,11 +77,11 @@ def measured(plan: TablePlan) -> Recording:
         others=tuple(_others(plan)),
     )
     sides = replace(plan.settings, degrees=False, position_scale=(), effort_scale=())
-    return in_si(recording, sides)  # units are those of the plan
+    return in_si(recording, sides)  # units are converted by the plan
 
 
 def _times(plan: TablePlan) -> tuple[FloatArray, int]:
-    """Return times [s] since a stamp, and that stamp [ns]; 1 s where none is known."""
+    """Return times [s] since a stamp, and this stamp [ns]; 1 s if none is known."""
     if plan.time is None:
         assert plan.rate_hz is not None
         return np.arange(len(plan.table)) / plan.rate_hz, 10**9
@@ -89,7 +89,7 @@ def _times(plan: TablePlan) -> tuple[FloatArray, int]:
     values = np.where(np.abs(plan.time.values * scale) < _LATEST, plan.time.values, np.nan)
     stamped = np.flatnonzero(np.isfinite(values) & (values != 0.0))  # noqa: RUF069 - as it is written
     if len(stamped) and np.count_nonzero(values[: stamped[0]] == 0.0) > 1:  # noqa: RUF069 - as it is written
-        values[: stamped[0]] = np.nan  # simulation time before /clock
+        values[: stamped[0]] = np.nan  # simulated time is zero before the first /clock
     there = values[np.isfinite(values)]
     if not len(there):
         raise RecordingError(f'{plan.table.source}: column {plan.time.name} has no time in it')
@@ -100,7 +100,7 @@ def _times(plan: TablePlan) -> tuple[FloatArray, int]:
 
 
 def _others(plan: TablePlan) -> Iterator[PositionRange]:
-    """Yield where joints are that were not asked for, as far as their unit is known."""
+    """Yield the position ranges of joints not requested, if their unit is known."""
     source, settings = plan.sources[0], plan.settings
     if settings.gear or settings.zero or len(set(source.factor)) != 1:
         return

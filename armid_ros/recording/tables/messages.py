@@ -1,6 +1,6 @@
 # Copyright 2026 The armid_ros developers
 # SPDX-License-Identifier: Apache-2.0
-"""What exports of messages write into cells: names of joints, stamps in two columns, dates."""
+"""Interpret cells of exported messages: joint names, stamps in two columns, dates."""
 
 from __future__ import annotations
 
@@ -22,12 +22,12 @@ _NANOSECONDS = re.compile(r'(.*?)(?:ns|nsecs?|nanosecs?|nanoseconds)', re.IGNORE
 
 
 def settled(table: Table) -> Table:
-    """Return a table whose columns have the names and the times that are in its cells."""
+    """Return a table with column names and times taken from its cells."""
     return _with_stamps(_with_dates(_with_names(table)))
 
 
 def _with_names(table: Table) -> Table:
-    """Call values by the joints that cells name, whose order may change from row to row."""
+    """Name columns by the joints in cells; their order may change between rows."""
     names: dict[str, dict[str, npt.NDArray[np.str_]]] = {}  # by what precedes 'name', and number
     for name, cells in table.words.items():
         match = _NAME.fullmatch(name)
@@ -71,7 +71,7 @@ def _with_dates(table: Table) -> Table:
 
 
 def _with_stamps(table: Table) -> Table:
-    """Put seconds and nanoseconds of one stamp into one column."""
+    """Merge seconds and nanoseconds of a stamp into one column."""
     for seconds, nanoseconds, name in _pairs(table.columns):
         finite = nanoseconds.values[np.isfinite(nanoseconds.values)]
         whole = np.all(finite == np.rint(finite)) and np.all((finite >= 0.0) & (finite < 1e9))

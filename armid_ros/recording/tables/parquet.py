@@ -1,6 +1,6 @@
 # Copyright 2026 The armid_ros developers
 # SPDX-License-Identifier: Apache-2.0
-"""Tables in Parquet, LeRobot's datasets among them."""
+"""Read tables from Parquet files, and LeRobot datasets."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ INFO = Path('meta', 'info.json')
 
 
 def read_parquet(path: Path) -> Table:
-    """Read a Parquet file; columns of lists become as many columns as they have elements."""
+    """Read a Parquet file; a column of lists becomes one column per element."""
     columns, words = _columns(path, {})
     return Table(str(path), columns, 'Parquet', words=words)
 
@@ -69,13 +69,13 @@ def read_lerobot(path: Path, episode: int | None = None) -> Table:
 def _columns(
     path: Path, names: Mapping[str, Sequence[str]]
 ) -> tuple[tuple[TableColumn, ...], dict[str, Sequence[str]]]:
-    """Return the columns with numbers, and the cells of those with words."""
+    """Return the columns of numbers, and the cells of columns of words."""
     parquet = imported('pyarrow.parquet', path, 'Parquet')
     types = imported('pyarrow', path, 'Parquet').types
     stated = parquet.read_metadata(path)
     groups = [stated.row_group(k) for k in range(stated.num_row_groups)]
     cells = sum(g.column(k).num_values for g in groups for k in range(g.num_columns))
-    DEFAULT.require(8 * max(cells, stated.num_rows), f'{path}: what it states to hold')
+    DEFAULT.require(8 * max(cells, stated.num_rows), f'{path}: the stated content')
     table = parquet.read_table(path)
     while any(types.is_struct(field.type) for field in table.schema):
         table = table.flatten()
@@ -104,7 +104,7 @@ def _columns(
 def _elements(
     path: Path, name: str, cells: Sequence[Sequence[Any] | None], labels: Sequence[str]
 ) -> Iterator[tuple[str, list[Any]]]:
-    """Yield name and cells of each element of lists of equal length; None where a row has none."""
+    """Yield name and cells of each element of lists; None for missing rows."""
     rows = [one or () for one in cells]
     width = max(map(len, rows), default=0)
     if any(isinstance(row[0], (list, dict)) for row in rows if row):

@@ -1,6 +1,6 @@
 # Copyright 2026 The armid_ros developers
 # SPDX-License-Identifier: Apache-2.0
-"""What is read from which column, in which unit: settled, and shown, before anything is read."""
+"""Plan which column and unit each quantity is read from."""
 
 from __future__ import annotations
 
@@ -19,20 +19,20 @@ import numpy.typing as npt
 
 _OTHERS: tuple[QuantityName, ...] = ('velocity', 'effort')
 _SI = {'position': 'rad', 'velocity': 'rad/s', 'effort': 'N m'}
-#: What a unit is in SI.
+#: Factors from units to SI.
 _FACTORS = {'deg': np.pi / 180, 'deg/s': np.pi / 180, 'mN m': 1e-3, 'N mm': 1e-3, 'mA': 1e-3}
 _FACTORS |= {'mrad': 1e-3, 'kN m': 1e3, 'rpm': 2 * np.pi / 60, 'mm': 1e-3, 'mm/s': 1e-3}
 _TURNS = ('deg', 'deg/s', 'rpm', 'mrad')
-#: Sampling periods that are recognised from the numbers alone [s].
+#: Sampling periods that identify the unit of time [s].
 _STEP = (2e-5, 0.5)
-#: Positions further from zero are hardly in rad or m.
+#: Positions beyond this are probably not in rad or m.
 _FAR = 4.5 * np.pi
 
 
 @dataclass(frozen=True)
 class QuantitySource:
     """
-    Where one quantity comes from.
+    Columns and unit of one quantity.
 
     Attributes
     ----------
@@ -41,13 +41,13 @@ class QuantitySource:
     chosen : Family
         Columns.
     unit : str
-        Of the file.
+        Unit in the file.
     factor : ndarray, shape (n,)
         To SI.
     guessed : bool
-        Whether nobody said so.
+        Whether the columns were guessed.
     rivals : tuple of str
-        What else would have fitted.
+        Patterns of other columns that also fit.
 
     """
 
@@ -66,28 +66,28 @@ class QuantitySource:
 @dataclass(frozen=True)
 class TablePlan:
     """
-    What is read from where.
+    Columns and units of all quantities of a table.
 
     Attributes
     ----------
     table : Table
         The file.
     joints : tuple of str
-        In the order of the columns.
+        Joint names, in the order of the columns.
     time : TableColumn or None
-        None for even steps of a known rate.
+        Column of time; None for a constant known rate.
     time_unit : str
-        Of that column.
+        Unit of the column of time.
     rate_hz : float or None
-        Where there is no column of time.
+        Samples per second, if there is no column of time.
     sources : tuple of QuantitySource
         Position first.
     settings : ColumnSettings
-        What was said.
+        Settings of the user.
     notes : tuple of str
-        What a person should look at.
+        Notes for the user.
     missing : dict
-        By quantity that is not read: pattern of columns for some joints, and those it lacks.
+        By missing quantity: pattern of columns for some joints, and the joints without a column.
 
     """
 
@@ -103,21 +103,21 @@ class TablePlan:
 
     @property
     def time_guessed(self) -> bool:
-        """Whether nobody named the column of time."""
+        """Whether the column of time was guessed."""
         return self.settings.time is None and self.time is not None
 
     @property
     def guessed(self) -> bool:
-        """Whether anything was not said but guessed."""
+        """Whether any column or unit was guessed."""
         return self.time_guessed or any(source.guessed for source in self.sources)
 
     def source(self, quantity: QuantityName) -> QuantitySource | None:
-        """Return where a quantity comes from; None where it does not."""
+        """Return the source of a quantity; None if it is not read."""
         return next((one for one in self.sources if one.quantity == quantity), None)
 
     @property
     def absent(self) -> tuple[str, ...]:
-        """Return what is not read, in words: 'effort of wrist'."""
+        """Return texts on missing quantities, such as 'effort of wrist'."""
         return tuple(
             f'{quantity} of {", ".join(lacking)}' if pattern else quantity
             for quantity, (pattern, lacking) in self.missing.items()
@@ -125,13 +125,13 @@ class TablePlan:
 
     @property
     def unread(self) -> str:
-        """Return the names of the columns that are not read, in words."""
+        """Return the names of the columns that are not read, as a text."""
         taken = [self.time, *(one for source in self.sources for one in source.chosen.columns)]
         rest = tuple(one for one in self.table.columns if one not in taken)
         return replace(self.table, columns=rest).listed() if rest else ''
 
     def lines(self) -> list[str]:
-        """Return the plan for a person, in lines."""
+        """Format the plan as lines."""
         table = self.table
         lines = [f'{table.source}: {table.described}, {len(table)} rows of {len(table.columns)}']
         if self.time is None:
@@ -166,23 +166,23 @@ def plan(
     slides: Sequence[bool] | None = None,
 ) -> TablePlan:
     """
-    Settle what is read from where.
+    Make the plan of a table.
 
     Parameters
     ----------
     table : Table
         The file.
     settings : ColumnSettings
-        What a person says; the rest is guessed.
+        Settings of the user; missing ones are guessed.
     joints : sequence of str, optional
-        Joints of the robot, in order; by default as the columns call them.
+        Joints of the robot, in order; by default named by the columns.
     slides : sequence of bool, optional
-        Whether each of them is prismatic; by default none is.
+        Whether each joint is prismatic; by default none is.
 
     Raises
     ------
     RecordingError
-        There are no positions, what was asked for is not there, or does not fit the joints.
+        If there are no positions, or requested columns are missing or do not fit the joints.
 
     """
     position = _source(table, 'position', settings, joints)
@@ -207,7 +207,7 @@ def plan(
         asked = getattr(settings, quantity) is not None
         found = _source(table, quantity, settings, names)
         if found is None and joints is None and not asked:
-            # its joints are called otherwise, or not at all: their number decides
+            # match the joints by number, as the names differ or are missing
             numbers = [str(k) for k in range(len(position.chosen.columns))]
             found = _source(table, quantity, settings, numbers)
         if found is not None:
@@ -234,7 +234,7 @@ def _source(
     settings: ColumnSettings,
     joints: Sequence[str] | None,
 ) -> QuantitySource | None:
-    """Return where a quantity comes from, as asked or as guessed; None where it does not."""
+    """Return the source of a quantity, given or guessed; None if it is not read."""
     asked = getattr(settings, quantity)
     if asked is not None and asked.lower() == 'none':
         return None
@@ -269,7 +269,7 @@ def _scaled(
     joints: Sequence[str],
     slides: npt.NDArray[np.bool_],
 ) -> QuantitySource:
-    """Apply what a person says of units; degrees are those of joints that turn."""
+    """Apply unit settings of the user; degrees apply to revolute joints only."""
     if source.quantity == 'effort':
         if not settings.effort_scale:
             return source
@@ -300,7 +300,7 @@ def _short(values: FloatArray) -> str:
 def _far(
     position: QuantitySource, settings: ColumnSettings, slides: npt.NDArray[np.bool_]
 ) -> Iterator[str]:
-    """Doubt the unit of positions by how far each joint is from zero."""
+    """Return notes on positions that are too large for rad or m."""
     if position.unit != 'rad' or settings.gear or settings.position_scale:
         return
     reach = np.fmax.reduce(np.abs(position.values()))
@@ -340,10 +340,10 @@ def _time(table: Table, settings: ColumnSettings) -> tuple[TableColumn | None, s
 
 
 def _time_unit(table: Table, column: TableColumn, said: str | None) -> str:
-    """Return the unit of a column of time: said, in its name, or likely by its steps."""
+    """Return the unit of a column of time, from settings, its name, or its steps."""
     where = f'{table.source}: column {column.name}'
     steps = np.diff(column.finite)
-    if len(steps) and np.mean(steps < 0.0) > 0.5:  # sorting would turn the motion round
+    if len(steps) and np.mean(steps < 0.0) > 0.5:  # sorting would reverse the motion
         raise RecordingError(
             f'{where} runs backwards, from {column.values[0]:.6g} to {column.values[-1]:.6g}. '
             'Turn the rows round if the last was measured first, or leave the column out with '

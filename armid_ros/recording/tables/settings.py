@@ -1,6 +1,6 @@
 # Copyright 2026 The armid_ros developers
 # SPDX-License-Identifier: Apache-2.0
-"""What a person says of the columns of a table: which they are, in which unit, on which side."""
+"""Settings for the columns of a table: names, units, and motor or joint side."""
 
 from __future__ import annotations
 
@@ -14,11 +14,11 @@ from armid_ros.motion import FloatArray
 from armid_ros.recording.recording import PositionRange, Recording
 import numpy as np
 
-#: Beginnings of joint names in the file, or whole names, and what to put there instead.
+#: Pairs of joint names, or beginnings of them, in the file and their replacements.
 Rules = Sequence[tuple[str, str]]
 #: Seconds in a unit of time.
 TIME_UNITS = {'s': 1.0, 'ms': 1e-3, 'us': 1e-6, 'ns': 1e-9}
-#: Settings that say where a table has what a bag has by itself, and their options.
+#: Settings for tables only, and their command-line options.
 _WHERE = {
     'time': '--time',
     'time_unit': '--time-unit',
@@ -28,7 +28,7 @@ _WHERE = {
     'effort': '--effort',
     'episode': '--episode',
 }
-#: Settings that say what numbers mean.
+#: Settings for the meaning of numbers, for tables and bags.
 _WHAT = {
     'degrees': '--degrees',
     'position_scale': '--position-scale',
@@ -41,7 +41,7 @@ _WHAT = {
 @dataclass(frozen=True)
 class ColumnSettings:
     """
-    Which columns are what; None where that is to be guessed.
+    Columns and units of the quantities; None for guessed ones.
 
     Attributes
     ----------
@@ -56,19 +56,19 @@ class ColumnSettings:
     degrees : bool
         Whether positions and velocities are in degrees.
     position_scale, effort_scale : tuple of float
-        What values are multiplied with to be rad and N m: one number, or one a joint; a current's
-        is the torque constant. Empty for what the unit says.
+        Factors of the values to rad and N m: one number, or one per joint; for currents the torque
+        constants. Empty: by the unit.
     zero : tuple of float
-        What is added to the positions [rad or m] after all, one a joint; empty for nothing.
+        Offsets added to the converted positions [rad or m], one per joint; empty for none.
     gear : tuple of float
-        Turns of the motor for one of the joint, one or one a joint; with them positions,
+        Gear ratios, motor turns per joint turn, one or one per joint. With gears, positions,
         velocities and efforts are those of the motors. Empty for none.
     coupling : tuple of (str, str, float)
         Motor, joint, and turns of that motor for one of that other joint, for wrists.
     rename : tuple of (str, str)
-        Beginnings of joint names in the file, or whole names, and what to put there instead.
+        Pairs of joint names, or beginnings of them, in the file and their replacements.
     episode : int or None
-        Of a LeRobot dataset.
+        Episode of a LeRobot dataset.
 
     """
 
@@ -88,7 +88,7 @@ class ColumnSettings:
     episode: int | None = None
 
     def __post_init__(self) -> None:
-        """Refuse what means nothing."""
+        """Raise a RecordingError for invalid settings."""
         if self.time_unit is not None and self.time_unit not in TIME_UNITS:
             raise RecordingError(f"time unit '{self.time_unit}'; it is {', '.join(TIME_UNITS)}")
         if self.rate_hz is not None and not self.rate_hz > 0.0:
@@ -98,7 +98,7 @@ class ColumnSettings:
 
 
 def renamed(name: str, rules: Rules) -> str:
-    """Return a joint's name after the first rule that fits: the whole name, or its beginning."""
+    """Rename a joint by the first rule that fits the whole name or its beginning."""
     for old, new in rules:
         if name == old:
             return new
@@ -109,7 +109,7 @@ def renamed(name: str, rules: Rules) -> str:
 
 
 def name_in_file(name: str, rules: Rules) -> str:
-    """Return what a joint is called in the file, which is what ``renamed`` makes its name of."""
+    """Return the name of a joint in the file, the inverse of ``renamed``."""
     for old, new in rules:
         if name == new:
             return old
@@ -121,12 +121,12 @@ def name_in_file(name: str, rules: Rules) -> str:
 
 def number(text: str) -> float:
     """
-    Return a number as people write ratios and angles: '1798/7', '-pi/2', '2*pi', '0.5'.
+    Parse a number, ratio or angle: '1798/7', '-pi/2', '2*pi', '0.5'.
 
     Raises
     ------
     RecordingError
-        It is none.
+        If the text is not a number.
 
     """
     value, sign = 1.0, 1
@@ -145,12 +145,12 @@ def number(text: str) -> float:
 
 
 def numbers(text: str | None) -> tuple[float, ...]:
-    """Return numbers with commas between them; none for no text."""
+    """Parse numbers separated by commas; empty for an empty text."""
     return tuple(number(part) for part in text.split(',')) if text else ()
 
 
 def per_joint(values: Sequence[float], joints: Sequence[str], what: str) -> FloatArray:
-    """Return one value a joint, shape (n,); RecordingError where their number does not fit."""
+    """Return one value per joint, shape (n,); RecordingError for a wrong count."""
     if len(values) not in (1, len(joints)):
         raise RecordingError(
             f'{what} has {len(values)} values; give one, or {len(joints)} for {", ".join(joints)}'
@@ -160,16 +160,16 @@ def per_joint(values: Sequence[float], joints: Sequence[str], what: str) -> Floa
 
 def refuse_columns(path: str | Path, settings: ColumnSettings, *, copied: bool = False) -> None:
     """
-    Raise a RecordingError where a bag is told which of its columns are what, or its rate.
+    Raise a RecordingError if settings for tables are given for a bag.
 
     Parameters
     ----------
     path : str or Path
         The bag.
     settings : ColumnSettings
-        What was said.
+        Settings of the user.
     copied : bool
-        Whether it is copied as it is, which allows no other units either.
+        Whether the bag is copied unchanged, so that unit settings are not permitted either.
 
     """
     reasons = dict.fromkeys(
@@ -189,12 +189,12 @@ def in_si(
     recording: Recording, settings: ColumnSettings, slides: Collection[bool] | None = None
 ) -> Recording:
     """
-    Return what a bag holds with its numbers in SI, on the side of the joints.
+    Convert a recording of a bag to SI units on the joint side.
 
     Parameters
     ----------
     recording : Recording
-        Positions, velocities and efforts as they are in the bag.
+        Recording with the numbers of the bag.
     settings : ColumnSettings
         Scales, degrees, gears and zeros.
     slides : collection of bool, optional
@@ -222,7 +222,7 @@ def in_si(
     if settings.zero:
         q = q + per_joint(settings.zero, joints, 'the zero of positions')
     others: list[PositionRange] = []
-    if not (settings.gear or settings.zero) and len(set(turn)) == 1:  # their unit is known
+    if not (settings.gear or settings.zero) and len(set(turn)) == 1:  # with known unit
         for one in recording.others:
             ends = sorted([float(one.lowest * turn[0]), float(one.highest * turn[0])])
             others.append(PositionRange(one.joint, *ends))

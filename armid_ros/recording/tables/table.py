@@ -1,6 +1,6 @@
 # Copyright 2026 The armid_ros developers
 # SPDX-License-Identifier: Apache-2.0
-"""A table of samples: named columns of equal length, whatever file they came from."""
+"""Tables of samples: named columns of equal length."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ import numpy as np
 import numpy.typing as npt
 
 _BRACKETS = re.compile(r'\s*[(\[]\s*([^()\[\]\d][^()\[\]]*)\s*[)\]]\s*$')
-#: Units by what people write for them.
+#: Units by their common spellings.
 _UNITS = dict.fromkeys(('nm', 'n*m', 'n.m', 'n·m', 'newton meter'), 'N m')
 _UNITS |= dict.fromkeys(('deg', 'degree', 'degrees'), 'deg')
 _UNITS |= dict.fromkeys(('deg/sec', 'dps', 'deg_per_s'), 'deg/s')
@@ -33,7 +33,7 @@ _UNITS |= dict.fromkeys(('rad/sec', 'rad_per_s'), 'rad/s')
 _UNITS |= dict.fromkeys(('s', 'sec', 'seconds'), 's')
 _UNITS |= dict.fromkeys(('amp', 'amps'), 'A') | {'ma': 'mA', 'mnm': 'mN m', 'nmm': 'N mm'}
 _UNITS |= {'ms': 'ms', 'us': 'us', 'ns': 'ns', 'nsec': 'ns'}
-#: Those that names end in without brackets around them, such as 'angle_deg'.
+#: Units at the end of names without brackets, such as 'angle_deg'.
 _ENDINGS: tuple[str, ...] = ('deg_per_s', 'rad_per_s', 'deg', 'degrees', 'rad', 'nm', 'mnm', 'ma')
 _ENDINGS += ('ms', 'us', 'ns', 'nsec', 'sec', 's')
 
@@ -48,13 +48,13 @@ class TableColumn:
     name : str
         As in the file; an element of an array is 'q[0]', or '[0]' where the array has no name.
     values : ndarray, shape (N,)
-        NaN where the file has no number, or one beyond all quantities.
+        Values; NaN for cells without a number or with a too large one.
     array : str
-        Name of the array it is an element of; empty for a column of its own.
+        Name of the array that contains the column; empty for a single column.
     unit : str
-        What the name, or a line below the names, says; empty where nothing does.
+        Unit in the name, or in a line below the names; empty if none is given.
     filled : bool
-        Whether the file has a finite number in it, be it beyond all quantities.
+        Whether the column has a finite number in the file, even a too large one.
 
     """
 
@@ -65,9 +65,9 @@ class TableColumn:
     filled: bool = field(init=False)
 
     def __post_init__(self) -> None:
-        """Freeze the values, and take the unit from the name where none was given."""
+        """Freeze the values, and take a missing unit from the name."""
         object.__setattr__(self, 'filled', bool(np.isfinite(self.values).any()))
-        with np.errstate(invalid='ignore'):  # of rubbish that is a signalling NaN
+        with np.errstate(invalid='ignore'):  # ignore warnings for signalling NaN
             values = np.where(np.abs(self.values) <= LARGEST, self.values, np.nan)
         object.__setattr__(self, 'values', read_only(values))
         unit = _normal_unit(self.unit) or _unit_of(self.array or self.name)
@@ -75,12 +75,12 @@ class TableColumn:
 
     @property
     def bare_name(self) -> str:
-        """Return the name without a unit in brackets behind it."""
+        """Return the name without a final unit in brackets."""
         return self.name if self.array else _BRACKETS.sub('', self.name)
 
     @property
     def finite(self) -> FloatArray:
-        """Return the values that are numbers."""
+        """Return the finite values."""
         return self.values[np.isfinite(self.values)]
 
 
@@ -94,17 +94,17 @@ class Table:
     source : str
         The file.
     columns : tuple of TableColumn
-        Those with numbers in them.
+        Columns with numbers.
     described : str
-        What kind of file it is, for a person.
+        Kind of the file, for the user.
     first_line : int or None
         Line of the first row, in a text file.
     rate_hz : float or None
-        Samples per second, where the file says so and not each row.
+        Samples per second, if the file states a rate instead of times.
     notes : tuple of str
-        What reading it met.
+        Notes from reading the file.
     words : mapping of str to sequence of str
-        Columns of words, and those without anything in them.
+        Columns of words, and empty columns.
 
     """
 
@@ -117,7 +117,7 @@ class Table:
     words: Mapping[str, Sequence[str]] = field(default_factory=dict)
 
     def __post_init__(self) -> None:
-        """Set columns without numbers apart; refuse tables that are empty or ragged."""
+        """Separate columns without numbers; raise a RecordingError for invalid tables."""
         there = tuple(one for one in self.columns if one.filled)
         empty = {one.name: () for one in self.columns if one not in there}
         object.__setattr__(self, 'columns', there)
@@ -139,12 +139,12 @@ class Table:
 
     def column(self, name: str) -> TableColumn | None:
         """
-        Return the column of a name, with or without the unit in brackets; None if none has.
+        Return a column by its name, with or without unit; None if not found.
 
         Raises
         ------
         RecordingError
-            Several have it, with different values.
+            If several columns of this name have different values.
 
         """
         named = [column for column in self.columns if column.name == name]
@@ -160,11 +160,11 @@ class Table:
         return named[0] if named else None
 
     def where(self, row: int) -> str:
-        """Return where a row is, for a message."""
+        """Format the position of a row, for messages."""
         return f'row {row}' if self.first_line is None else f'line {self.first_line + row}'
 
     def listed(self) -> str:
-        """Return the names of the columns, elements of arrays in short, for a message."""
+        """Format the names of the columns, with short forms of arrays, for messages."""
         arrays = Counter(column.array for column in self.columns)
         shown = dict.fromkeys(
             f'{c.array.removeprefix("[]")}[0..{arrays[c.array] - 1}]' if c.array else c.name
@@ -184,19 +184,19 @@ class Table:
 
 
 def _at_most(names: Sequence[str], most: int = 40) -> str:
-    """Return names with commas, and how many more there are."""
+    """Format the first names of a list, and the number of further ones."""
     more = f' and {len(names) - most} more' if len(names) > most else ''
     return ', '.join(names[:most]) + more
 
 
 def _normal_unit(text: str) -> str:
-    """Return a unit as it is written here: 'deg', 'rad/s', 'N m', 'ms'."""
+    """Return the standard spelling of a unit: 'deg', 'rad/s', 'N m', 'ms'."""
     text = text.strip().strip('[]()').replace('°', 'deg').replace('\u00b5', 'u')
     return _UNITS.get(text.lower(), text)
 
 
 def _unit_of(name: str) -> str:
-    """Return the unit that a name says: 'deg' of 'q1 [deg]' and of 'act_pos_deg[3]'."""
+    """Return the unit in a name: 'deg' of 'q1 [deg]' and of 'act_pos_deg[3]'."""
     bracket = _BRACKETS.search(name)
     if bracket:
         return _normal_unit(bracket[1])
@@ -208,16 +208,16 @@ def table_of_arrays(
     source: str, arrays: Mapping[str, npt.NDArray[np.generic]], described: str
 ) -> Table:
     """
-    Make a table of named arrays, of which samples run along the axis that most have in common.
+    Make a table of named arrays; the most common axis length is that of samples.
 
     Parameters
     ----------
     source : str
         The file.
     arrays : mapping of str to ndarray
-        Numeric ones; scalars and those of other lengths are passed over.
+        Numeric arrays; scalars and arrays of other lengths are skipped.
     described : str
-        What kind of file it is.
+        Kind of the file.
 
     """
     usable = {
@@ -244,14 +244,14 @@ def table_of_arrays(
 
 def side_by_side(tables: Sequence[Table]) -> Table:
     """
-    Join tables of the same samples, column by column.
+    Join the columns of tables of the same samples.
 
-    Names that several have are preceded by the file's: 'currents:Joint_1'.
+    Names that occur in several files get the file name as a prefix: 'currents:Joint_1'.
 
     Raises
     ------
     RecordingError
-        They differ in length.
+        If the tables differ in length.
 
     """
     if len(tables) == 1:
@@ -284,7 +284,7 @@ def read_content(path: Path) -> bytes:
     Raises
     ------
     RecordingError
-        It is no regular file, takes too much memory, or is no gzip where its name says so.
+        If the path is not a regular file, the content is too large, or a .gz file is not gzip.
 
     """
     limit = DEFAULT.memory_limit
@@ -297,12 +297,12 @@ def read_content(path: Path) -> bytes:
                 content = packed.read(limit + 1)
         except (OSError, EOFError, zlib.error) as error:
             raise RecordingError(f'{path}: cannot be unpacked: {error}') from error
-    DEFAULT.require(len(content), f'{path}: what is packed in it')
+    DEFAULT.require(len(content), f'{path}: the decompressed content')
     return content
 
 
 def imported(library: str, path: Path, format_name: str) -> Any:
-    """Import a library; RecordingError says how to install it."""
+    """Import a library; RecordingError with the remedy if it is not installed."""
     try:
         return import_module(library)
     except ImportError:

@@ -1,6 +1,6 @@
 # Copyright 2026 The armid_ros developers
 # SPDX-License-Identifier: Apache-2.0
-"""Tables in text: values with commas, semicolons, tabs or blanks between them."""
+"""Read tables from text: values separated by commas, semicolons, tabs or blanks."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ _EMPTY = ('', 'nan', 'na', 'n/a', 'null', 'none', '-')
 _LIST = re.compile(r'[\[(]([^\[\]()]*)[\])]\s*\)?$')
 _COMMAS = re.compile(r'[,;\s]+')
 _DECIMAL_COMMA = re.compile(r'[-+]?\d+,\d+([eE][-+]?\d+)?')
-#: A column with fewer numbers than this share is one of words.
+#: Share of numbers below which a column counts as one of words.
 _NUMERIC = 0.5
 
 
@@ -34,7 +34,7 @@ def read_text(path: Path) -> Table:
     Raises
     ------
     RecordingError
-        Naming the line and the column of what is no number.
+        If a cell is not a number. The message names line and column.
 
     """
     lines = _lines(path)
@@ -87,7 +87,7 @@ def _lines(path: Path) -> list[str]:
 
 
 def _heading(path: Path, lines: list[str]) -> tuple[int, str, str]:
-    """Return where the rows begin, the line of names, and one of units; empty for none."""
+    """Return the first row, the line of names, and the line of units; empty if missing."""
     words: list[str] = []
     comment = ''
     for number, line in enumerate(lines):
@@ -109,7 +109,7 @@ def _heading(path: Path, lines: list[str]) -> tuple[int, str, str]:
 
 
 def _has_numbers(line: str) -> bool:
-    """Whether more of a line is numbers than not."""
+    """Return whether most cells of a line are numbers."""
     cells = [cell for cell in _split(line, _separator([line])) if cell.lower() not in _EMPTY]
     count = 0
     for cell in cells:
@@ -121,13 +121,13 @@ def _has_numbers(line: str) -> bool:
 
 
 def _as_many(header: str, row: str) -> bool:
-    """Whether two lines have as many cells."""
+    """Return whether two lines have equally many cells."""
     separator = _separator([row])
     return bool(header) and len(_split(header, separator)) == len(_split(row, separator))
 
 
 def _separator(lines: list[str]) -> str:
-    """Return what stands between values: the first kind that every line has."""
+    """Return the separator of values: the first kind that occurs in every line."""
     there = [line for line in lines if line.strip()]
     return next((s for s in _SEPARATORS if all(s in line for line in there)), ' ')
 
@@ -139,13 +139,13 @@ def _split(line: str, separator: str) -> list[str]:
 
 
 def _elements(cell: str) -> list[str]:
-    """Return the elements of a list, as '[1, 2]', '(1, 2)' and '[1 2]'; none of other cells."""
+    """Return the elements of a list such as '[1, 2]', '(1, 2)' or '[1 2]'; empty if no list."""
     found = _LIST.search(cell) if cell[:1] in ('[', '(', 'a') else None
     return [part.strip('\'"') for part in _COMMAS.split(found[1]) if part] if found else []
 
 
 def _number(cell: str, separator: str) -> float:
-    """Return a number, NaN for an empty cell; raise a ValueError for a word."""
+    """Convert a cell to a number, NaN if empty; raise a ValueError for a word."""
     if cell.lower() in _EMPTY:
         return np.nan
     if separator != ',' and _DECIMAL_COMMA.fullmatch(cell):
@@ -161,8 +161,8 @@ def _numbers(
     widths: list[int | None],
     first_line: int,
 ) -> tuple[FloatArray, dict[str, Sequence[str]], tuple[str, ...]]:
-    """Return the values, shape (N, columns), cells of words by column, and what was met."""
-    with suppress(ValueError):  # quick where every cell is a number
+    """Return the values, shape (N, columns), cells of words by column, and notes."""
+    with suppress(ValueError):  # fast path if every cell is a number
         delimiter = None if separator == ' ' else separator
         values = np.loadtxt(io.StringIO('\n'.join(rows)), delimiter=delimiter, ndmin=2)
         if values.shape[1] == len(names):
@@ -202,7 +202,7 @@ def _numbers(
 
 
 def _gaps(at: npt.NDArray[np.intp], names: list[str], first_line: int) -> list[str]:
-    """Say how many cells of columns of numbers are empty, shape (k, 2), and where the first is."""
+    """Format a note on empty cells, shape (k, 2): their number, and the first one."""
     if not len(at):
         return []
     many = '1 cell is' if len(at) == 1 else f'{len(at)} cells are'
@@ -213,7 +213,7 @@ def _gaps(at: npt.NDArray[np.intp], names: list[str], first_line: int) -> list[s
 
 
 def _taken_apart(cells: list[str], widths: list[int | None], where: str) -> Iterator[str]:
-    """Yield cells, and the elements of those that are lists."""
+    """Yield cells, and for lists their elements."""
     for k, (cell, width) in enumerate(zip(cells, widths, strict=True)):
         elements = [cell] if width is None else _elements(cell)
         if width is not None and len(elements) != width:

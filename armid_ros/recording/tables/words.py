@@ -1,6 +1,6 @@
 # Copyright 2026 The armid_ros developers
 # SPDX-License-Identifier: Apache-2.0
-"""Words in the names of columns, and what they say; larger numbers are surer."""
+"""Words in column names, with their weights for each quantity."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ from typing import Literal
 
 QuantityName = Literal['position', 'velocity', 'effort']
 
-#: Words for a current, which a gain makes a torque of.
+#: Words for a current, which a gain converts to a torque.
 CURRENTS = ('current', 'currents', 'curr', 'cur', 'i', 'iq', 'amp', 'amps', 'ampere', 'amperes')
 WORDS: dict[QuantityName, dict[str, float]] = {
     'position': dict.fromkeys(('position', 'positions', 'pos', 'q', 'qpos', 'jpos'), 3.0)
@@ -26,9 +26,9 @@ WORDS: dict[QuantityName, dict[str, float]] = {
 TIMES = dict.fromkeys(('time', 't', 'timestamp', 'timestamps'), 3.0) | dict.fromkeys(
     ('secs', 'seconds', 'elapsed', 'date', 'datetime'), 2.0
 )
-#: When the driver measured, which is better than when somebody received it.
+#: Words for the time of measurement, preferred to the time of reception.
 TIMES |= {'stamp': 3.5}
-#: Said of what was measured.
+#: Words for measured quantities.
 MEASURED = dict.fromkeys(
     ('meas', 'measured', 'act', 'actual', 'fb', 'feedback', 'observation'), 1.0
 )
@@ -40,7 +40,8 @@ _OF_OTHER_THINGS = (
     'err error ext external fric friction pert model pred predicted residual limit min max std '
     'temp temperature tcp ee cart cartesian acc ddq imu rel init gravity kin dyn'
 )
-#: Said of what was not measured, or not of the joints; and, weakly, of what was worked on.
+#: Words for quantities that were not measured or are not of joints; with less weight, words for
+#: processed quantities.
 OTHERWISE = dict.fromkeys((_COMMANDED + ' ' + _OF_OTHER_THINGS).split(), -2.0) | dict.fromkeys(
     ('filt', 'filtered', 'est', 'estimated', 'se', 'disc', 'mot', 'motor'), -0.3
 )

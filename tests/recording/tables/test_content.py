@@ -15,7 +15,7 @@ def test_what_is_packed_has_a_limit(tmp_path, monkeypatch):
     monkeypatch.setattr(table, 'DEFAULT', replace(DEFAULT, memory_limit=1_000_000))
     path = tmp_path / 'bomb.csv.gz'
     path.write_bytes(gzip.compress(b'0,' * 10_000_000))
-    with pytest.raises(RecordingError, match=r'bomb.csv.gz: what is packed in it takes'):
+    with pytest.raises(RecordingError, match=r'bomb.csv.gz: the decompressed content takes'):
         open_table(path)
 
 
