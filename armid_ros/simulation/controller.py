@@ -219,8 +219,9 @@ class GravityPD(Controller):
     """
     A spring and a damper on every joint, plus the gravity torque of the nominal arm.
 
-    tau = kp (q_d - q) + kd (dq_d - dq) + g(q). Source: Siciliano et al. 2009, section 8.5.1.
-    Each joint on its own, in the middle of the range of motion, is critically damped at 50 rad/s.
+    tau = kp (q_d - q) + kd (dq_d - dq) + g(q).
+    Source: Siciliano et al. 2009, section 8.5.1. Each joint on its own, in the middle of the range
+    of motion, is critically damped at 50 rad/s.
 
     Attributes
     ----------

@@ -3,8 +3,8 @@
 """
 Collision-free paths in joint space: straight lines if possible.
 
-Otherwise, two trees of straight lines grow from both ends until they meet. Source: Kuffner and
-LaValle 2000, RRT-Connect.
+Otherwise, two trees of straight lines grow from both ends until they meet.
+Source: Kuffner and LaValle 2000, RRT-Connect.
 
 """
 
