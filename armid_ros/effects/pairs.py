@@ -160,7 +160,7 @@ class JointCoupling(_Pairs):
         twice = [joint for joint in self.owners if self.owners.count(joint) > 1]
         if twice:
             raise ModelError(
-                f'{self.name}: {twice[0]}  is first in two pairs; put it second in one of them'
+                f'{self.name}: {twice[0]} is first in two pairs; put it second in one of them'
             )
 
     @classmethod

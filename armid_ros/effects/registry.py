@@ -173,7 +173,7 @@ def check_kind(kind: type[Effect]) -> None:
 
     """
     if not (inspect.isclass(kind) and issubclass(kind, Effect)):
-        raise ModelError(f'{kind!r}  is not an effect class; derive it from armid_ros.Effect')
+        raise ModelError(f'{kind!r} is not an effect class; derive it from armid_ros.Effect')
     where = _home(kind)
     name = getattr(kind, 'name', None)
     if not isinstance(name, str) or not _NAME.fullmatch(name):

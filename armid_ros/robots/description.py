@@ -262,8 +262,8 @@ def _inertial(link: ElementTree.Element, name: str) -> Inertial | None:
     )
     if inertial.mass < 0.0:
         raise RobotError(
-            f'{where} has a negative mass, {inertial.mass:g} kg; what comes '
-            'from an identification is a body with --physical'
+            f'{where} has a negative mass, {inertial.mass:g} kg; parameters '
+            'identified with --physical are those of a possible body'
         )
     return inertial
 

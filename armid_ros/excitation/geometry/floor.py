@@ -101,8 +101,8 @@ def find_floor(
     reason = _why_not_standing(collision, up)
     if reason:
         raise TrajectoryError(
-            f'{robot.name}: {reason}, so its base plane is not its floor; say how high the floor '
-            f'is above the origin of the base [m], --floor Z, or --floor {NO_FLOOR}'
+            f'{robot.name}: {reason}, so its base plane is not its floor; give the height of the '
+            f'floor above the origin of the base [m], --floor Z, or --floor {NO_FLOOR}'
         )
     return Floor(0.0, np.array([0.0, 0.0, 1.0]), 'base plane')
 
