@@ -1,11 +1,11 @@
 # Copyright 2026 The armid_ros developers
 # SPDX-License-Identifier: Apache-2.0
 """
-What acts on the joints of an arm beside its rigid body, one family a file.
+Effects: causes of joint torque besides the rigid body, one family per file.
 
-An effect of one's own derives from ``Effect``; ``register`` puts it into the catalogue,
-``joint_columns`` and ``scatter`` place what acts on each joint alone, and
-``armid_ros.effects.testing`` checks it.
+A user-defined effect derives from ``Effect``. ``register`` adds it to the catalogue.
+``joint_columns`` and ``scatter`` arrange the columns and values of an effect that acts on each
+joint separately. ``armid_ros.effects.testing`` checks the class.
 
 """
 

@@ -1,11 +1,11 @@
 # Copyright 2026 The armid_ros developers
 # SPDX-License-Identifier: Apache-2.0
 """
-How effects act: on the joints of the plant, and on what its sensors say of them.
+Actions of effects on the joints of the plant and on its sensor readings.
 
-A plant has two sides where its transmissions are elastic: the motors with everything that rubs
-and turns there, and the links with the rigid body and what is attached to it. Without elasticity
-they are one.
+A plant with elastic transmissions has two sides. The motor side has all friction and the rotor
+inertia. The link side has the rigid body and everything attached to it. Without elasticity, both
+sides have the same motion.
 
 """
 
@@ -23,10 +23,9 @@ import numpy as np
 #: Torque of the actuators [N m] as a function of time, position and velocity.
 TorqueLaw = Callable[[FloatArray, FloatArray, FloatArray], FloatArray]
 
-#: Step of the differences of a torque law [rad or m, rad/s or m/s].
+#: Step of the finite differences of a torque law [rad or m, rad/s or m/s].
 _STEP = 1e-6
-#: Dry friction below this is the rounding of levels that sum to zero [N m], and so is a share of
-#: the load [-].
+#: Dry friction [N m], or a share of the load [-], below this counts as zero.
 NO_FRICTION = 1e-12
 
 
@@ -41,7 +40,7 @@ class Displacement(NamedTuple):
 @dataclass(frozen=True)
 class DryFriction:
     """
-    Friction that can hold: a torque of any size between two levels while its velocity is zero.
+    Dry friction: at zero velocity, the torque takes any value between two levels.
 
     Attributes
     ----------
@@ -50,7 +49,7 @@ class DryFriction:
     lower, upper : ndarray, shape (m,)
         Torque while the element moves backwards, and forwards [N m]; lower <= upper.
     load_share : ndarray, shape (m,), or None
-        By how much both levels move apart per torque that the rigid body takes [-].
+        Change of both levels, away from each other, per torque of the rigid body [-].
 
     """
 
@@ -61,14 +60,14 @@ class DryFriction:
 
     def torque(self, dq: FloatArray, load: FloatArray | None = None) -> FloatArray:
         """
-        Return the joint torques for moving joints; the middle of the levels for one at rest.
+        Return the joint torques; an element at rest has the mean of its levels.
 
         Parameters
         ----------
         dq : ndarray, shape (..., n)
             Joint velocities.
         load : ndarray, shape (..., n), optional
-            Torque of the rigid body [N m], where friction depends on it.
+            Torque of the rigid body [N m], if friction depends on it.
 
         """
         half, middle = (self.upper - self.lower) / 2, (self.upper + self.lower) / 2
@@ -77,12 +76,12 @@ class DryFriction:
         return np.asarray((half * np.sign(dq @ self.directions.T) + middle) @ self.directions)
 
     def largest(self, load: FloatArray) -> FloatArray:
-        """Return the most that it can be of each joint under a load (..., n), the same shape."""
+        """Return the largest friction torque of each joint under a load, both (..., n)."""
         half = (self.upper - self.lower) / 2 + self.widening(load)
         return np.asarray(half @ np.abs(self.directions))
 
     def widening(self, load: FloatArray) -> FloatArray:
-        """Return by how much load moves the levels apart, shape (..., m) [N m]."""
+        """Return the change of the levels due to a load, shape (..., m) [N m]."""
         if self.load_share is None:
             return np.zeros((*load.shape[:-1], len(self.lower)))
         return np.asarray(self.load_share * np.abs(load @ self.directions.T))
@@ -91,16 +90,16 @@ class DryFriction:
 @dataclass(frozen=True)
 class Transmission:
     """
-    What is between motors and links, where that is not rigid.
+    Springs, dampers and free play between motors and links.
 
-    The link of joint j is twisted against its motor by x = q_motor - q_link, which carries the
-    torque K (x - gap) + D dx beyond the gap and none within it. Position readings are those of
-    the motors.
+    The link of joint j is twisted against its motor by x = q_motor - q_link, and carries the
+    torque K (x - gap) + D dx beyond the gap. Within the gap the torque is zero. Position readings
+    are those of the motors.
 
     Attributes
     ----------
     stiffness : ndarray, shape (n,)
-        K [N m/rad]; infinite where the transmission is rigid.
+        K [N m/rad]; infinite for a rigid transmission.
     damping : ndarray, shape (n,)
         D [N m s/rad].
     gap : ndarray, shape (n,)
@@ -116,37 +115,37 @@ class Transmission:
 @dataclass(frozen=True)
 class Action:
     """
-    How effects with given values act on the plant and its sensors; what is not used stays None.
+    Action of effects with given values on the plant and its sensors; None: not used.
 
     The actuators have to supply damping @ dq + inertia @ ddq + dry friction + hysteresis +
-    torque(t, q, dq) on the side of the motors, and the rigid body's torque + link_torque(t, q, dq)
-    on that of the links.
+    torque(t, q, dq) on the motor side, and the rigid body's torque + link_torque(t, q, dq) on the
+    link side.
 
     Attributes
     ----------
     damping : ndarray, shape (n, n), or None
         Viscous matrix [N m s/rad].
     inertia : ndarray, shape (n, n), or None
-        Constant inertia seen by the joints only [kg m^2].
+        Constant inertia added at the joints [kg m^2].
     dry_friction : DryFriction, or None
-        Friction with a sticking phase.
+        Dry friction, which can stick.
     hysteresis : Hysteresis, or None
-        Friction with a state.
+        Friction with a state, such as presliding.
     torque, link_torque : callable (t, q, dq) -> ndarray (..., n), or None
-        Anything else that depends smoothly on the state [N m].
+        Any other torque that depends smoothly on the state [N m].
     robot : Robot, or None
-        The rigid body that takes the place of the nominal one.
+        The rigid body that replaces the nominal rigid body.
     transmission : Transmission, or None
         Springs and gaps between motors and links.
     drive : callable ndarray (..., n) -> ndarray (..., n), or None
-        From the torque that a drive is asked for, which is what it reports, to what it gives.
+        Function from the commanded torque, which the drives report, to the actual torque.
     displacement : callable Motion -> Displacement, or None
-        What the true motion of the links is beyond the recorded one.
+        Function from the recorded motion to the true minus the recorded motion of the links.
     reading : callable (Motion, ndarray (N, n)) -> ndarray (N, n), or None
-        From the true torque along a motion to what the sensors read. The motion's own torque, if
-        it has one, is what the drives report.
+        Function from a motion and its true torque to the torque readings. The torque of the
+        motion, if any, is the torque that the drives report.
     reading_memory : float
-        How far back in time a reading depends on the torque [s].
+        Time span of the past torque on which a reading depends [s].
 
     """
 
@@ -165,12 +164,12 @@ class Action:
 
     def effort(self, motors: Motion, links: Motion, load: FloatArray) -> FloatArray:
         """
-        Return what the actuators supply in addition to the rigid body's torque, (N, n) [N m].
+        Return the actuator torque in addition to the torque of the rigid body, (N, n) [N m].
 
         Parameters
         ----------
         motors, links : Motion
-            True motion on either side of the transmissions; the same where they are rigid.
+            True motion on both sides of the transmissions; the same if they are rigid.
         load : ndarray, shape (N, n)
             Torque of the rigid body [N m].
 
@@ -209,8 +208,8 @@ def merge_actions(robot: Robot, actions: Sequence[Action]) -> Action:
     """
     Join the actions of several effects on one robot.
 
-    Matrices and torques add up; dry friction along one direction becomes one element; what acts on
-    the recording acts in the order given.
+    Matrices and torques add up; dry friction along one direction becomes one element; actions on
+    the recording are applied in the given order.
 
     """
     zero = np.zeros((robot.n_joints, robot.n_joints))
@@ -249,7 +248,7 @@ def merge_actions(robot: Robot, actions: Sequence[Action]) -> Action:
 
 
 def sum_laws(laws: Sequence[TorqueLaw]) -> TorqueLaw | None:
-    """Return the sum of torque laws; None of none."""
+    """Return the sum of torque laws; None without a law."""
 
     def torque(t: FloatArray, q: FloatArray, dq: FloatArray) -> FloatArray:
         return np.asarray(sum(law(t, q, dq) for law in laws))
@@ -283,7 +282,7 @@ def _merge_hysteresis(elements: list[Hysteresis]) -> Hysteresis | None:
     if not elements:
         return None
     level = np.concatenate([e.level for e in elements])
-    active = level != 0.0  # noqa: RUF069 - any other level is an element
+    active = level != 0.0  # noqa: RUF069 - only exact zero is no element
     if not np.any(active):
         return None
     directions = np.vstack([e.directions for e in elements])

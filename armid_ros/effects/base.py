@@ -1,15 +1,16 @@
 # Copyright 2026 The armid_ros developers
 # SPDX-License-Identifier: Apache-2.0
 """
-What an effect is: one physical cause of joint torque beside the rigid body.
+The base class of effects: one physical cause of joint torque besides the rigid body.
 
-An effect is written once and used three times. The simulator asks how it acts (``action``), the
-identifier how the torques depend on its parameters (``columns``), the diagnosis whether that
-dependence explains a residual. An effect of the joints has its quantities once per joint; an
-effect of the whole arm has no joints and its quantities once.
+The simulation uses how an effect acts (``action``). The identification uses how the torques depend
+on its parameters (``columns``). The diagnosis checks whether this dependence explains a residual.
+An effect on joints has its quantities once per joint. An effect on the whole arm has no joints,
+and has its quantities once.
 
-Quantities are amplitudes: the torque is linear in them, or nearly so. What it is not linear in,
-such as a Stribeck velocity, is a shape: it belongs to the effect, which has columns with it.
+Quantities are amplitudes: the torque is linear in them, or nearly so. Nonlinear parameters, such
+as a Stribeck velocity, are shapes. The shape values are attributes of the effect, and the columns
+depend on them.
 
 """
 
@@ -42,7 +43,7 @@ class Effect(ABC):
     Attributes
     ----------
     joints : tuple of str
-        The joints it acts on; empty for an effect of the whole arm.
+        The joints on which the effect acts; empty for an effect on the whole arm.
     shape : tuple of float
         Shape parameters, owner by owner; the defaults if none are given.
 
@@ -69,29 +70,29 @@ class Effect(ABC):
     summary: ClassVar[str]
     quantities: ClassVar[tuple[Quantity, ...]]
     shapes: ClassVar[tuple[Shape, ...]] = ()
-    #: Words and prior knowledge; those of shipped effects are in a table.
+    #: Descriptions and prior knowledge; a table has those of the shipped effects.
     traits: ClassVar[Traits] = Traits()
-    #: Whether the torque of a joint at rest is anything between two levels, and so says nothing.
+    #: Whether the torque of a joint at rest is undetermined between two levels.
     holds_at_rest: ClassVar[bool] = False
-    #: Whether the torque is linear in the quantities; to the first order only where it is not.
+    #: Whether the torque is exactly linear in the quantities; if not, columns are first-order.
     linear: ClassVar[bool] = True
-    #: Whether the columns of a sample depend on that sample alone, or on those around it as well.
+    #: Whether the columns of a sample depend on that sample only, not on its neighbours.
     instantaneous: ClassVar[bool] = True
-    #: Whether it changes the rigid body or its gravity.
+    #: Whether the effect changes the rigid body or its gravity.
     changes_body: ClassVar[bool] = False
-    #: Whether it is learned from the residual, and so names no cause.
+    #: Whether the effect is learned from the residual, and so has no physical cause.
     learned: ClassVar[bool] = False
-    #: Whether its torque changes smoothly with position and velocity.
+    #: Whether the torque changes smoothly with position and velocity.
     smooth: ClassVar[bool] = False
 
     def __init_subclass__(cls) -> None:
-        """Give a shipped effect its traits."""
+        """Set the traits of a shipped effect."""
         super().__init_subclass__()
         if vars(cls).get('name') in TRAITS:
             cls.traits = TRAITS[cls.name]
 
     def __post_init__(self) -> None:
-        """Fill in the default shape and check what was given."""
+        """Fill in the default shape, and check joints and shape."""
         defaults = tuple(s.default for s in self.shapes) * len(self.owners)
         values = tuple(float(value) for value in self.shape) or defaults
         if len(values) != len(defaults):
@@ -111,7 +112,7 @@ class Effect(ABC):
     @classmethod
     def on(cls, robot: Robot, joints: tuple[str, ...] | None = None) -> Effect:
         """
-        Make the effect for a robot: on the joints named, or wherever it applies by default.
+        Make the effect for a robot, on the given joints or on its default joints.
 
         Raises
         ------
@@ -134,19 +135,19 @@ class Effect(ABC):
         return robot.joints
 
     def in_usual_place(self, robot: Robot) -> bool:
-        """Return whether it is where such an effect is as a rule: see `on`."""
+        """Return whether the effect is on its default joints; see `on`."""
         default = self._default_joints(robot)
         return bool(self.joints) == bool(default) and set(self.joints) <= set(default)
 
     @classmethod
     def places(cls, robot: Robot) -> tuple[tuple[str, ...], ...]:
         """
-        Return the sets of joints on which it is one cause: single joints, pairs, the whole arm.
+        Return the sets of joints of single causes: single joints, pairs or the whole arm.
 
         Raises
         ------
         ModelError
-            If the robot has no place for it.
+            If the effect is impossible on the robot.
 
         """
         joints = cls._default_joints(robot)
@@ -154,27 +155,27 @@ class Effect(ABC):
 
     @classmethod
     def as_change(cls) -> type[Effect]:
-        """Return what is looked for between two days: something may have been there before."""
+        """Return the class for a change between two days, when the effect may exist already."""
         return cls
 
     def particulars(self) -> dict[str, Any]:
-        """Return what model.yaml holds of it in addition to joints, parameters and shapes."""
+        """Return the entries for model.yaml in addition to joints, parameters and shapes."""
         return {}
 
     def with_particulars(self, entry: Mapping[str, Any]) -> Self:
-        """Return the effect with what an entry of model.yaml has of `particulars`."""
+        """Return the effect with the `particulars` in an entry of model.yaml."""
         return self
 
     def named_as(self, values: FloatArray, arm: Arm) -> tuple[tuple[Effect, FloatArray], ...]:
-        """Return the effects, with values, that say the same in the words of the catalogue."""
+        """Return the equivalent effects of the catalogue, with values."""
         return ((self, values),)
 
     def when_found(self, values: FloatArray) -> tuple[Effect, FloatArray]:
-        """Return what is fitted in its place once a search has found it, and first values."""
+        """Return the effect that is fitted once this one is found, and initial values."""
         return self, values
 
     def _default_shape(self, robot: Robot) -> FloatArray:
-        """Return a shape to begin with on this robot, shape (number of owners, S)."""
+        """Return an initial shape on this robot, shape (number of owners, S)."""
         return self.shape_values
 
     @property
@@ -183,7 +184,7 @@ class Effect(ABC):
         return np.array(self.shape).reshape(len(self.owners), len(self.shapes))
 
     def shape_over_joints(self, robot: Robot) -> FloatArray:
-        """Return every shape over the joints of a robot, defaults elsewhere, shape (S, n)."""
+        """Return each shape parameter for all joints of a robot, with defaults, shape (S, n)."""
         return _spread_shape(self.shapes, self.shape, self.joints, robot.joints)
 
     def with_shape(self, values: npt.ArrayLike) -> Effect:
@@ -193,7 +194,7 @@ class Effect(ABC):
         Parameters
         ----------
         values : array_like, shape (S,) or (number of owners, S)
-            Shape parameters, the same for every owner or for each its own.
+            Shape parameters, the same for all owners or separate for each owner.
 
         Raises
         ------
@@ -213,7 +214,7 @@ class Effect(ABC):
         return replace(self, shape=tuple(spread.ravel().tolist()))
 
     def spread(self, robot: Robot, found: Sequence[FloatArray] | None = None) -> FloatArray:
-        """Return how large values may be, shape (P,); found ones and their std limit others."""
+        """Return the largest expected values, shape (P,); found values and std reduce them."""
         return np.full(len(self.parameters(robot)), np.inf)
 
     def shape_parameters(self, robot: Robot) -> tuple[ParameterName, ...]:
@@ -226,12 +227,12 @@ class Effect(ABC):
 
     def shape_starts(self, unexplained: Unexplained, arm: Arm) -> tuple[FloatArray, ...]:
         """
-        Return where a search for a shape should start, for each shape (number of owners, G).
+        Return start values of a search, for each shape an array (number of owners, G).
 
         Parameters
         ----------
         unexplained : Unexplained
-            The data that the shape is to explain.
+            The residual that the shape should explain.
         arm : Arm
             The arm without the effect.
 
@@ -240,12 +241,12 @@ class Effect(ABC):
 
     @property
     def said_as(self) -> str:
-        """Return what it is called in the catalogue."""
+        """Return the name of the effect in the catalogue."""
         return self.name
 
     @property
     def owners(self) -> tuple[str, ...]:
-        """Joints that have the quantities once each; one empty name for the whole arm."""
+        """Joints that each have their own quantities; one empty name for the whole arm."""
         return self.joints or ('',)
 
     def parameters(self, robot: Robot) -> tuple[ParameterName, ...]:
@@ -257,41 +258,41 @@ class Effect(ABC):
         )
 
     def bounds(self) -> tuple[FloatArray, FloatArray]:
-        """Return what is physically possible: lower and upper bounds, each of shape (P,)."""
+        """Return the physical bounds of the parameters: lower and upper, each of shape (P,)."""
         lower = np.array([q.lower for q in self.quantities] * len(self.owners))
         upper = np.array([q.upper for q in self.quantities] * len(self.owners))
         return lower, upper
 
     def adds_to(self, robot: Robot) -> tuple[int, ...]:
-        """Return the rigid parameters that its own add to, one each; none for most effects."""
+        """Return the rigid-body parameter to which each parameter adds; empty for most effects."""
         return ()
 
     @property
     def points(self) -> tuple[str, ...]:
-        """Names of the points beside the arm that it ends at."""
+        """Names of the points outside the arm to which the effect is attached."""
         return ()
 
     def along(self, motion: Motion) -> Self:
-        """Return the effect with the motion of the other machine that it acts through."""
+        """Return the effect with the recorded motion of the other machine."""
         return self
 
     @abstractmethod
     def columns(self, motion: Motion, arm: Arm) -> FloatArray:
         """
-        Differentiate the torques by the parameters, at the arm as it is.
+        Return the derivatives of the torques by the parameters.
 
         Parameters
         ----------
         motion : Motion
-            As recorded; of a whole unbroken stretch, unless the effect is instantaneous.
+            The recorded motion; a whole stretch without gaps, unless the effect is instantaneous.
         arm : Arm
-            The arm as it is, with or without this effect.
+            The arm model, with or without this effect.
 
         Returns
         -------
         ndarray, shape (N, n, P)
-            dtau/dtheta, exact for an effect that is linear in its parameters. What torque sensors
-            make of it is not in it yet: see ``ArmModel.columns_of``.
+            dtau/dtheta, exact for an effect that is linear in its parameters. Effects on torque
+            readings are not applied; see ``ArmModel.columns_of``.
 
         """
 
@@ -299,15 +300,15 @@ class Effect(ABC):
         """
         Return how the effect acts on the plant with given parameter values.
 
-        By default the links are held by columns @ values: right for a torque that is linear in the
-        values and depends on time, position and velocity alone.
+        By default, the torque on the link side is columns @ values. This is correct for a torque
+        that is linear in the values and depends on time, position and velocity only.
 
         Parameters
         ----------
         values : ndarray, shape (P,)
             Parameter values.
         arm : Arm
-            The arm it acts on, with the effects before it applied.
+            The arm, with the preceding effects applied.
 
         """
         joints = arm.robot.joints
@@ -322,21 +323,22 @@ class Effect(ABC):
 
     def plausible(self, values: FloatArray, std: FloatArray, arm: Arm) -> bool:
         """
-        Return whether values within the bounds are what one would call by this name.
+        Return whether values within the bounds are plausible for this effect.
 
-        Deviations of the values, each (P,), are those of white noise; the arm is without them.
+        ``std``, shape (P,), are standard deviations for white noise. The arm does not contain the
+        effect.
 
         """
         return True
 
     def indices(self, motion_joints: tuple[str, ...]) -> list[int]:
-        """Return the columns of the effect's joints among the joints of a motion or robot."""
+        """Return the indices of the effect's joints among the joints of a motion or robot."""
         return list(_places(self.joints, motion_joints))
 
 
 @lru_cache(maxsize=1024)
 def _places(joints: tuple[str, ...], among: tuple[str, ...]) -> tuple[int, ...]:
-    """Return where joints are among others; a stream asks the same for every sample."""
+    """Return the indices of joints; cached, because streams repeat the call per sample."""
     return tuple(among.index(joint) for joint in joints)
 
 
@@ -347,7 +349,7 @@ def _spread_shape(
     joints: tuple[str, ...],
     among: tuple[str, ...],
 ) -> FloatArray:
-    """Return shape parameters over joints of which some have their own, shape (S, n)."""
+    """Return shape parameters for all joints, with defaults, shape (S, n)."""
     spread = np.tile([[s.default] for s in shapes], len(among))
     spread[:, _places(joints, among)] = np.array(values).reshape(-1, len(shapes)).T
     return read_only(spread)
@@ -358,33 +360,33 @@ class Arm(Protocol):
 
     @property
     def robot(self) -> Robot:
-        """Its description."""
+        """The robot."""
 
     @property
     def body(self) -> Robot:
-        """Return the rigid body that effects make: with payload, under the gravity there is."""
+        """Return the rigid body with effects, such as a payload or a changed gravity."""
 
     @property
     def middle_frames(self) -> LinkFrames:
-        """Where all links are in the middle of the range of motion."""
+        """Frames of all links in the middle of the range of motion."""
 
     def values_of(self, effect: Effect) -> FloatArray:
         """Return the values of an effect, shape (P_e,)."""
 
     def action(self) -> Action:
-        """Return how all its effects act together."""
+        """Return the merged action of all effects."""
 
     def link_motion(self, motion: Motion) -> Motion:
-        """Return the true motion of the links where another one was recorded."""
+        """Return the true motion of the links for a recorded motion."""
 
     def link_frames(self, motion: Motion) -> LinkFrames:
-        """Return where all links are along a recorded motion."""
+        """Return the frames of all links along a recorded motion."""
 
     def smoothed(self, motion: Motion) -> Motion:
-        """Return a recorded motion without what is beyond its band."""
+        """Return a recorded motion without frequencies beyond its band."""
 
     def load(self, motion: Motion) -> FloatArray:
-        """Return what the rigid body takes along a motion of the links, (N, n) [N m]."""
+        """Return the torque of the rigid body along a motion of the links, (N, n) [N m]."""
 
     def load_derivatives(self, motion: Motion) -> tuple[FloatArray, FloatArray, FloatArray]:
         """Differentiate the load by position, velocity, acceleration, each (N, n, n)."""
@@ -399,10 +401,10 @@ class Arm(Protocol):
         """Return the true torques of a recorded motion, (N, n) [N m]."""
 
     def torque_before(self, effect: Effect, motion: Motion) -> FloatArray:
-        """Return the torque that an effect of the sensors is given to read, (N, n) [N m]."""
+        """Return the torque before the action of an effect on readings, (N, n) [N m]."""
 
     def torque_change(self, motion: Motion, change: Displacement) -> FloatArray:
-        """Differentiate the true torque by changes of the links' motion."""
+        """Return the change of the true torque due to changes of the links' motion."""
 
     def columns_of(self, effect: Effect, motion: Motion) -> FloatArray:
-        """Return the sensitivities of what is read to the parameters of an effect."""
+        """Return the sensitivities of the torque readings to the parameters of an effect."""

@@ -3,7 +3,8 @@
 """
 The catalogue: every effect that can be simulated, estimated and named.
 
-Those below are shipped. Others come from installed packages, see ``registry``, or by ``register``.
+The effects below are shipped. Other effects come from installed packages, see ``registry``, or
+from ``register``.
 
 """
 
@@ -78,7 +79,7 @@ CATALOGUE = Catalogue(_EFFECTS)
 #: Effects that are fitted with the rigid body by default.
 USUAL_EFFECTS = tuple(effect.name for effect in _EFFECTS if effect.traits.usual)
 
-#: Friction of one law that arms have as a rule, though nobody asks for it.
+#: Effects without a shape that are nuisance parameters if they are not requested.
 UNASKED_FRICTION = tuple(e for e in _EFFECTS if e.traits.nuisance == ((),) and not e.traits.usual)
 
 _Kind = TypeVar('_Kind', bound=type[Effect])
@@ -86,11 +87,11 @@ _Kind = TypeVar('_Kind', bound=type[Effect])
 
 def register(kind: _Kind) -> _Kind:
     """
-    Put an effect of one's own into the catalogue; a decorator of its class.
+    Add a user-defined effect to the catalogue; a decorator for its class.
 
-    From then on it can be named like those that are shipped: by ``make_effect``, in model.yaml,
-    in ``effects='...'``, and the diagnosis looks for it. A class that is defined anew, as in a
-    notebook, takes the place of the old one.
+    The effect can then be named like a shipped effect: in ``make_effect``, in model.yaml and in
+    ``effects='...'``. The diagnosis searches for it. A new definition of a class, as in a
+    notebook, replaces the old one.
 
     Parameters
     ----------
@@ -105,7 +106,7 @@ def register(kind: _Kind) -> _Kind:
     Raises
     ------
     ModelError
-        If something is missing in the class, or its name or that of a quantity is taken.
+        If the class is incomplete, or its name or the name of a quantity is already used.
 
     Examples
     --------
@@ -130,7 +131,7 @@ def register(kind: _Kind) -> _Kind:
 
 def make_effect(text: str, robot: Robot) -> Effect:
     """
-    Make an effect from its name, with joints where the default is not wanted.
+    Make an effect from its name, optionally with joints.
 
     Parameters
     ----------
@@ -147,7 +148,7 @@ def make_effect(text: str, robot: Robot) -> Effect:
     Returns
     -------
     Effect
-        Without values; ``ArmModel.with_effect`` takes them.
+        The effect, without values; ``ArmModel.with_effect`` adds values.
 
     Examples
     --------
@@ -161,7 +162,7 @@ def make_effect(text: str, robot: Robot) -> Effect:
     return CATALOGUE.find(name).on(robot, listed(joints, '+') if joints else None)
 
 
-#: Two texts that `parse_effect` takes, for those who are asked for one.
+#: Two examples of texts for `parse_effect`, for help texts and messages.
 EXAMPLES = 'viscous_friction:viscous_coefficient=0.1 or payload@wrist:payload_m=0.3'
 
 
@@ -174,14 +175,15 @@ def parse_effect(text: str, robot: Robot) -> tuple[Effect, FloatArray]:
     text : str
         'coulomb_friction:coulomb_torque=0.2', or 'payload@wrist:payload_m=0.3,payload_mz=0.01', or
         with a shape 'stribeck_friction:stribeck_torque=0.1,stribeck_velocity=0.05'. Every joint of
-        the effect gets the values; a quantity not given is zero, a shape as it is by default.
+        the effect gets the values; a quantity not given is zero, a shape not given has its
+        default.
     robot : Robot
         The arm it acts on.
 
     Raises
     ------
     ModelError
-        If effect, joint, quantity or shape do not exist or a value is not a number.
+        If the effect, joint, quantity or shape does not exist, or a value is not a number.
 
     """
     head, *rest = parted(text, ':')
@@ -209,7 +211,7 @@ def parse_effect(text: str, robot: Robot) -> tuple[Effect, FloatArray]:
 
 
 def _number(text: str, effect: Effect, key: str, number: str) -> float:
-    """Read the value of a quantity or a shape; say how joints get values of their own."""
+    """Return the value of a quantity or a shape; the error explains values per joint."""
     try:
         value = float(number)
     except ValueError:
@@ -226,7 +228,7 @@ def _number(text: str, effect: Effect, key: str, number: str) -> float:
 
 
 def _require_possible(name: str, quantity: Quantity, value: float) -> None:
-    """Refuse a value that no arm can have."""
+    """Raise a ModelError if a value is outside the physical bounds."""
     if quantity.lower <= value <= quantity.upper:
         return
     bounds = f'{quantity.lower:g} or more'

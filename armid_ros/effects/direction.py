@@ -1,10 +1,10 @@
 # Copyright 2026 The armid_ros developers
 # SPDX-License-Identifier: Apache-2.0
 """
-The direction of motion, which dry friction jumps with.
+The direction of motion, on which dry friction depends.
 
-A jump has no gradient. A search for a trajectory evaluates columns along a `BlurredMotion`, whose
-direction is tanh(dq / width).
+The sign of a velocity has no useful gradient. Therefore the search for a trajectory evaluates
+columns along a `BlurredMotion`, whose direction is tanh(dq / width).
 
 """
 
@@ -46,7 +46,7 @@ def direction(motion: Motion, joints: Sequence[int] | None = None) -> FloatArray
     motion : Motion
         N samples of n joints.
     joints : sequence of int, optional
-        Joints with the sum of which a shaft turns.
+        Joints whose velocities add up to the velocity of a shaft.
 
     Returns
     -------

@@ -1,6 +1,6 @@
 # Copyright 2026 The armid_ros developers
 # SPDX-License-Identifier: Apache-2.0
-"""The drives: what turns before the gear, the ripple of motor and gear, the end of their range."""
+"""Effects of the drives: rotor inertia, torque ripple and saturation."""
 
 from __future__ import annotations
 
@@ -19,11 +19,11 @@ import numpy as np
 if TYPE_CHECKING:
     from armid_ros.robots import Robot
 
-#: A drive that gives nothing beyond its level cannot be asked for more than it gives: without a
-#: report of what it was asked for, this share of the excess is the most that it can lose.
+#: Largest lost share of the excess. If the commanded torque was not recorded, a share of 1 cannot
+#: be represented, because no torque beyond the level is measured.
 _MOST_LOST = 0.99
-#: Orders of a ripple that a search looks at [1/rad, 1/m]: below, it is gravity and springs; above,
-#: filters take it away. Screws and racks have a tooth or turn every 4 to 60 mm.
+#: Range of ripple orders in a search [1/rad, 1/m]. Gravity and springs cause lower orders; filters
+#: remove higher orders. Screws and racks have a tooth or turn every 4 to 60 mm.
 _IN_A_TURN, _ON_A_WAY = (3.0, 80.0), (100.0, 1600.0)
 
 
@@ -32,8 +32,8 @@ class RotorInertia(Effect):
     """
     Inertia of the rotor and gear, seen at the joint, tau = Ia ddq.
 
-    Ia is the rotor's inertia times the gear ratio squared; gyroscopic coupling is neglected, as
-    is usual for geared arms. The same as Izz of the link for the first joint, exactly.
+    Ia is the rotor's inertia times the gear ratio squared; gyroscopic coupling is neglected, as is
+    usual for geared arms. For the first joint, it is exactly collinear with Izz of the link.
     Source: Khalil and Dombre 2002, section 9.4.
 
     """
@@ -52,7 +52,7 @@ class RotorInertia(Effect):
         return Action(inertia=np.diag(inertia))
 
 
-#: Lowest order of a ripple [1/rev]: gravity and springs are slower.
+#: Lowest order of a ripple [1/rev]; gravity and springs have lower orders.
 _SLOWEST, _EDGE = 1.5, 1.05
 
 
@@ -62,9 +62,9 @@ class TorqueRipple(Effect):
     Torque that repeats at a fixed angle, tau = A sin(n q) + B cos(n q).
 
     Cogging of a motor with N_c cycles per turn behind a gear of ratio N has n = N N_c per turn of
-    the joint; the kinematic error of a strain-wave gear n = 2 N. A line at a fixed order whatever
-    the speed: search for it before filters of fixed frequency take it away. Confounded with
-    joint_spring and gravity at orders of 1 and below, which are not looked at.
+    the joint; the kinematic error of a strain-wave gear n = 2 N. The order does not depend on the
+    speed: search for it before filters of fixed frequency remove it. Confounded with joint_spring
+    and gravity at orders of 1 and below, which are not searched.
     Source: Taghirad and Belanger 1998.
 
     """
@@ -82,7 +82,7 @@ class TorqueRipple(Effect):
     )
 
     def shape_starts(self, unexplained: Unexplained, arm: Arm) -> tuple[FloatArray, ...]:
-        """Return the orders at which waves over the angle take most of what is left."""
+        """Return the orders at which waves over the angle explain most of the residual."""
         robot = arm.robot
         orders = [
             wave_orders(unexplained, joint, _ON_A_WAY if robot.prismatic[joint] else _IN_A_TURN)
@@ -91,7 +91,7 @@ class TorqueRipple(Effect):
         return (np.array(orders),)
 
     def plausible(self, values: FloatArray, std: FloatArray, arm: Arm) -> bool:
-        """Return whether the order is told: at the lowest one, something slower is there."""
+        """Return whether the order is above the lowest one, which other causes explain."""
         return bool(np.all(self.shape_values > _EDGE * _SLOWEST))
 
     def columns(self, motion: Motion, arm: Arm) -> FloatArray:
@@ -114,18 +114,18 @@ class TorqueRipple(Effect):
 @dataclass(frozen=True)
 class ActuatorSaturation(TorqueReading):
     """
-    Torque beyond a level that a drive does not give, or that its report does not show.
+    Saturation: torque beyond a level that a drive does not supply or does not report.
 
-    With e(x) = sign(x) max(|x| - L, 0), what is beyond the level L:
+    With the excess over the level L, e(x) = sign(x) max(|x| - L, 0):
 
         reading = tau + lost e(reported) - clipped e(tau),
 
-    where the drive reports what it was asked for and gives tau = reported - lost e(reported):
-    lost = 1 is a hard limit of the torque, a smaller one a motor constant that sinks at high
-    current; clipped = 1 is a report that ends at L. The column of ``lost`` is taken from the
-    measured torque, where a recording has one: it is linear there, and explains what lies beyond
-    L only. Confounded with quadratic_friction where high torque means high speed, with torque_gain
-    if L is low; a sweep of amplitudes tells them apart.
+    where the drive reports the commanded torque and supplies tau = reported - lost e(reported). A
+    value of lost = 1 is a hard torque limit; a smaller value is a motor constant that decreases at
+    high current. A value of clipped = 1 is a report that is limited to L. The column of ``lost``
+    is computed from the measured torque, if it was recorded: it is linear there, and explains only
+    torque beyond L. Confounded with quadratic_friction where high torque means high speed, with
+    torque_gain if L is low; a sweep of amplitudes distinguishes them.
 
     """
 
@@ -135,7 +135,8 @@ class ActuatorSaturation(TorqueReading):
         Quantity('lost_share', '', lower=0.0, upper=1.0, typical=(0.05, 1.0)),
         Quantity('clipped_share', '', lower=0.0, upper=1.0, typical=(0.05, 1.0)),
     )
-    #: Near the highest torque that is measured; far below it, it would be the torque.
+    #: Start values near the highest measured torque; far below, the effect would be the whole
+    #: torque.
     shapes = (
         Shape('saturation_torque', 'N m', 1e-6, 1e6, 10.0, (0.3, 1.0, 3.0, 10.0, 30.0), near=0.08),
     )
@@ -146,14 +147,14 @@ class ActuatorSaturation(TorqueReading):
         return np.where(known, 0.8 * limits, self.shape_values)
 
     def shape_starts(self, unexplained: Unexplained, arm: Arm) -> tuple[FloatArray, ...]:
-        """Return shares of the highest torque that was measured."""
+        """Return start levels as shares of the highest measured torque."""
         motion = unexplained.motion
         tau = arm.joint_torque(motion) if motion.tau is None else motion.tau
         highest = np.maximum(np.max(np.abs(tau[:, self.indices(motion.joints)]), axis=0), 1e-3)
         return (np.outer(highest, [0.3, 0.4, *np.linspace(0.5, 0.95, 10)]),)
 
     def action(self, values: FloatArray, arm: Arm) -> Action:
-        """Return what the drives give of what they are asked for, and the reading."""
+        """Return the law of the drives and the law of the reading."""
         lost = scatter(self, values, arm.robot)[0]
         (level,) = self.shape_over_joints(arm.robot)
 
@@ -164,7 +165,7 @@ class ActuatorSaturation(TorqueReading):
         return Action(drive=drive if np.any(lost) else None, reading=reading.reading)
 
     def read(self, values: FloatArray, motion: Motion, tau: FloatArray) -> FloatArray:
-        """Return what is reported of the torque, shape (N, n) [N m]."""
+        """Return the reported torque, shape (N, n) [N m]."""
         lost, clipped, level = self._spread(values, motion)
         hidden = clipped * _beyond(tau, level)
         if motion.tau is None:
@@ -174,20 +175,20 @@ class ActuatorSaturation(TorqueReading):
     def transfer(
         self, values: FloatArray, motion: Motion, tau: FloatArray, columns: FloatArray
     ) -> FloatArray:
-        """Scale columns where the torque is beyond the level."""
+        """Scale the columns of samples whose torque is beyond the level."""
         lost, clipped, level = self._spread(values, motion)
         slope = (lost / (1.0 - lost) if motion.tau is None else 0.0) - clipped
         return np.asarray((1.0 + slope * (np.abs(tau) > level))[:, :, np.newaxis] * columns)
 
     def sensitivity(self, values: FloatArray, motion: Motion, tau: FloatArray) -> FloatArray:
-        """Return what is beyond the level, of the report and of the torque, shape (N, n, P)."""
+        """Return the excess over the level, of the report and of the torque, shape (N, n, P)."""
         lost, _, level = self._spread(values, motion)
         beyond = _beyond(tau, level)
         asked = beyond / (1.0 - lost) ** 2 if motion.tau is None else _beyond(motion.tau, level)
         return joint_columns(self, motion, asked, -beyond)
 
     def _spread(self, values: FloatArray, motion: Motion) -> tuple[FloatArray, ...]:
-        """Return both shares and the level over the joints of a motion, each of shape (n,)."""
+        """Return both shares and the level for all joints of a motion, each of shape (n,)."""
         spread = np.zeros((3, motion.n_joints))
         spread[2] = np.inf
         columns = self.indices(motion.joints)

@@ -1,6 +1,6 @@
 # Copyright 2026 The armid_ros developers
 # SPDX-License-Identifier: Apache-2.0
-"""Friction that depends on velocity: viscous, Coulomb, what these leave out, and its level."""
+"""Friction that depends on velocity: viscous, Coulomb, further laws, and a common factor."""
 
 from __future__ import annotations
 
@@ -47,8 +47,8 @@ class CoulombFriction(Effect):
     """
     Friction torque that depends on the direction of motion only, tau = Fc sign(dq).
 
-    At rest it holds with any torque up to Fc. Confounded with a torque offset when a joint moves
-    in one direction only.
+    At rest, the torque takes any value up to Fc. Confounded with a torque offset when a joint
+    moves in one direction only.
     Source: Armstrong-Helouvry, Dupont and Canudas de Wit 1994.
 
     """
@@ -71,11 +71,11 @@ class CoulombFriction(Effect):
 @dataclass(frozen=True)
 class AsymmetricFriction(Effect):
     """
-    What friction differs by between the two directions of motion.
+    Difference of friction between the two directions of motion.
 
     tau = dFc |sign(dq)| + dFv |dq|, where dFc = (Fc+ - Fc-) / 2 and dFv = (Fv+ - Fv-) / 2 of a
     joint with Fc+, Fv+ forwards and Fc-, Fv- backwards; the means belong to coulomb_friction and
-    viscous_friction. While the joint moves, dFc is the same as a torque offset, exactly.
+    viscous_friction. While the joint moves, dFc is exactly collinear with a torque offset.
 
     """
 
@@ -88,7 +88,7 @@ class AsymmetricFriction(Effect):
     holds_at_rest = True
 
     def plausible(self, values: FloatArray, std: FloatArray, arm: Arm) -> bool:
-        """Return whether what is known of friction still opposes motion in both directions."""
+        """Return whether the total friction still opposes motion in both directions."""
         friction = arm.action().dry_friction
         if friction is None:
             return True
@@ -102,7 +102,7 @@ class AsymmetricFriction(Effect):
         return joint_columns(self, motion, forwards**2, forwards * motion.dq)
 
     def action(self, values: FloatArray, arm: Arm) -> Action:
-        """Return the shift of the dry friction's levels, and the torque that grows with |dq|."""
+        """Return the shift of the dry friction levels, and the torque that grows with |dq|."""
         coulomb, viscous = scatter(self, values, arm.robot)
 
         def torque(t: FloatArray, q: FloatArray, dq: FloatArray) -> FloatArray:
@@ -117,10 +117,10 @@ class QuadraticFriction(Effect):
     """
     Friction torque that grows with the square of the joint velocity, tau = Fq dq |dq|.
 
-    Drag of air or oil where Fq is positive; with viscous friction, a negative one is the
-    flattening at high speed that grease in strain-wave gears shows. Confounded with
-    stribeck_friction, whose curvature lies at low speed, and with saturation of the drive; a wider
-    range of speeds tells.
+    A positive Fq is drag of air or oil. A negative Fq, with viscous friction, is the flattening at
+    high speed that grease in strain-wave gears shows. Confounded with stribeck_friction, whose
+    curvature lies at low speed, and with saturation of the drive; a wider range of speeds
+    distinguishes them.
     Source: Armstrong-Helouvry, Dupont and Canudas de Wit 1994, section 3.
 
     """
@@ -146,12 +146,12 @@ class QuadraticFriction(Effect):
 @dataclass(frozen=True)
 class StribeckFriction(Effect):
     """
-    Friction beyond Coulomb's that lubrication takes away as the joint gets faster.
+    Friction in addition to Coulomb friction that decreases with velocity by lubrication.
 
     tau = dFs exp(-|dq / vs|^d) sign(dq), where dFs = Fs - Fc is the breakaway torque beyond the
     Coulomb torque. The hump lies below 3 vs. Confounded with presliding_hysteresis, with the
     curvature of quadratic_friction, and with a velocity that was filtered too much at reversals;
-    constant velocities from 0.01 to 2 rad/s in both directions tell them apart.
+    constant velocities from 0.01 to 2 rad/s in both directions distinguish them.
     Source: Bo and Pavelescu 1982; Armstrong-Helouvry, Dupont and Canudas de Wit 1994.
 
     """
@@ -170,7 +170,7 @@ class StribeckFriction(Effect):
         return joint_columns(self, motion, self._left(motion.dq, arm) * direction(motion))
 
     def action(self, values: FloatArray, arm: Arm) -> Action:
-        """Return dry friction of the breakaway torque, and what motion takes away of it."""
+        """Return dry friction of the breakaway torque, and its decrease with velocity."""
         (breakaway,) = scatter(self, values, arm.robot)
 
         def torque(t: FloatArray, q: FloatArray, dq: FloatArray) -> FloatArray:
@@ -190,9 +190,9 @@ class ThermalFriction(Effect):
     """
     Viscous friction that changes while the joint warms up, tau = dFv (1 - exp(-t / T)) dq.
 
-    Time counts from the beginning of the recording; dFv is negative where grease gets thin, by 20
-    to 60 % of the cold coefficient. Two equal periods differ by it, which tells it from every
-    effect that depends on velocity alone; torque_drift differs as well, but not with velocity.
+    Time counts from the beginning of the recording; dFv is negative if the grease gets thin, by 20
+    to 60 % of the cold coefficient. The effect makes two equal periods different, unlike effects
+    that depend on velocity only. torque_drift does so too, but does not depend on velocity.
     Source: Bittencourt, Wernholt, Sander-Tavallaey and Brogardh 2010, in the form of one time
     constant.
 
@@ -207,7 +207,7 @@ class ThermalFriction(Effect):
 
     @classmethod
     def as_change(cls) -> type[Effect]:
-        """Return friction that may have been another one from the beginning."""
+        """Return the class that also contains a change from the beginning."""
         return ThermalChange
 
     def columns(self, motion: Motion, arm: Arm) -> FloatArray:
@@ -231,10 +231,10 @@ class ThermalFriction(Effect):
 @dataclass(frozen=True)
 class ThermalChange(ThermalFriction):
     """
-    Viscous friction other than it was, from the beginning and while the joint warms up.
+    Change of viscous friction, from the beginning and while the joint warms up.
 
-    tau = (c + dFv (1 - exp(-t / T))) dq. A joint that starts colder has more friction at first,
-    and as much in the end. Said as thermal_friction and viscous_friction.
+    tau = (c + dFv (1 - exp(-t / T))) dq. A joint that starts colder has more friction at first and
+    the same friction in the end. Reported as thermal_friction and viscous_friction.
 
     """
 
@@ -243,7 +243,7 @@ class ThermalChange(ThermalFriction):
 
     @property
     def said_as(self) -> str:
-        """Return the change while the joint warms up."""
+        """Return the name of the change while the joint warms up."""
         return ThermalFriction.name
 
     def columns(self, motion: Motion, arm: Arm) -> FloatArray:
@@ -251,12 +251,12 @@ class ThermalChange(ThermalFriction):
         return joint_columns(self, motion, self._warm(motion.t, arm) * motion.dq, motion.dq)
 
     def action(self, values: FloatArray, arm: Arm) -> Action:
-        """Return what both do."""
+        """Return the sum of both torques."""
         both = self.named_as(values, arm)
         return merge_actions(arm.robot, [part.action(own, arm) for part, own in both])
 
     def named_as(self, values: FloatArray, arm: Arm) -> tuple[tuple[Effect, FloatArray], ...]:
-        """Return both."""
+        """Return both effects."""
         change, first = values.reshape(-1, 2).T
         return (
             (ThermalFriction(self.joints, self.shape), change),
@@ -264,27 +264,28 @@ class ThermalChange(ThermalFriction):
         )
 
 
-#: What has a factor in common where all of the friction changes.
+#: Kinds of friction that a common factor changes.
 _PARTS = ViscousFriction, CoulombFriction
 
 
 @dataclass(frozen=True)
 class FrictionLevel(Effect):
     """
-    What several joints have of friction, changed by one factor, tau = k (Fv dq + Fc sign(dq)).
+    Relative change of the friction of several joints, tau = k (Fv dq + Fc sign(dq)).
 
-    An arm that is warm has less of it everywhere, and one that stood in the cold more, above all
-    of viscous friction. A search looks for one value, of both or of the viscous part; it is fitted
-    with a factor for each joint, as no two warm up alike, and said as friction of its kinds.
+    A warm arm has less friction in all joints and a cold arm more, mainly viscous friction. A
+    search uses one factor, on both kinds or on viscous friction only. The fit then uses one factor
+    per joint, because joints warm up differently. The result is reported as viscous and Coulomb
+    friction.
     Source: Bittencourt and Gunnarsson, Static friction in a robot joint - modeling and
     identification of load and temperature effects, 2012.
 
     Attributes
     ----------
     viscous, coulomb : tuple of float
-        Coefficients Fv and torques Fc that its joints have.
+        Known coefficients Fv and torques Fc of the joints.
     each : bool
-        Whether each joint has a factor of its own.
+        Whether each joint has its own factor.
 
     """
 
@@ -299,20 +300,20 @@ class FrictionLevel(Effect):
 
     @property
     def owners(self) -> tuple[str, ...]:
-        """Return what has a factor: the joints, or the arm once."""
+        """Return the owners of a factor: the joints, or the whole arm."""
         return self.joints if self.each else ('',)
 
     @property
     def said_as(self) -> str:
-        """Return the part of which there is something."""
+        """Return coulomb_friction if any joint has it, otherwise viscous_friction."""
         return CoulombFriction.name if any(self.coulomb) else ViscousFriction.name
 
     def when_found(self, values: FloatArray) -> tuple[Effect, FloatArray]:
-        """Return the same with a factor of its own for each joint."""
+        """Return the effect with one factor per joint."""
         return replace(self, each=True), np.resize(values, len(self.joints))
 
     def columns(self, motion: Motion, arm: Arm) -> FloatArray:
-        """Return dtau/dk, the friction torque that there was [N m], shape (N, n, P)."""
+        """Return dtau/dk, the known friction torque [N m], shape (N, n, P)."""
         of_joints = [kind(self.joints).columns(motion, arm) * own for kind, own in self._parts]
         each = np.sum(of_joints, axis=0)
         return np.asarray(each if self.each else each.sum(axis=2, keepdims=True))
@@ -325,7 +326,7 @@ class FrictionLevel(Effect):
         return Action(damping=viscous.damping, dry_friction=coulomb.dry_friction)
 
     def named_as(self, values: FloatArray, arm: Arm) -> tuple[tuple[Effect, FloatArray], ...]:
-        """Return viscous and Coulomb friction of the joints that have any."""
+        """Return viscous and Coulomb friction of the joints with friction."""
         said: list[tuple[Effect, FloatArray]] = []
         for kind, own in self._parts:
             there = own != 0.0  # noqa: RUF069 - as described
@@ -336,28 +337,28 @@ class FrictionLevel(Effect):
 
     @property
     def _parts(self) -> tuple[tuple[type[Effect], FloatArray], ...]:
-        """Kinds of friction, and what each joint has of them, (n,)."""
+        """Kinds of friction, each with the known values of the joints, (n,)."""
         levels = (np.array(own) for own in (self.viscous, self.coulomb))
         return tuple(zip(_PARTS, levels, strict=True))
 
 
 @dataclass(frozen=True)
 class FrictionOfJoints:
-    """The friction that an arm has, as a kind of effect: see `FrictionLevel`."""
+    """The known friction of an arm, as a kind of effect; see `FrictionLevel`."""
 
     effect: FrictionLevel
     name: str = FrictionLevel.name
 
     def on(self, robot: Robot, joints: tuple[str, ...] | None = None) -> Effect:
-        """Return the effect, whose joints are those that have friction."""
+        """Return the effect on the joints with friction."""
         return self.effect
 
     def places(self, robot: Robot) -> tuple[tuple[str, ...], ...]:
-        """Return all of its joints together."""
+        """Return all its joints as one place."""
         return (self.effect.joints,)
 
     def as_change(self) -> FrictionOfJoints:
-        """Return itself: the factor is that since the friction was known."""
+        """Return this kind: the factor already is a change of the known friction."""
         return self
 
 
@@ -365,16 +366,16 @@ def friction_level(
     effects: Iterable[tuple[Effect, FloatArray]], robot: Robot, library: Collection[str]
 ) -> tuple[FrictionOfJoints, ...]:
     """
-    Return what is to be looked for where effects with values give two joints friction or more.
+    Return the kind of a common friction change, if at least two joints have friction.
 
     Parameters
     ----------
     effects : iterable of (Effect, ndarray)
-        What the arm has, with values.
+        Effects of the arm, with values.
     robot : Robot
         The arm.
     library : collection of str
-        Names that may be given: both kinds of friction have to be among them.
+        Names of effects that a result may contain; both kinds of friction are required.
 
     """
     if not {kind.name for kind in _PARTS} <= set(library):

@@ -1,9 +1,9 @@
 # Copyright 2026 The armid_ros developers
 # SPDX-License-Identifier: Apache-2.0
 """
-Gravity that is not what the model says: its magnitude, or the tilt of the base.
+Difference of gravity from the model: magnitude, or tilt of the base.
 
-Joint torques are linear in the gravity vector, so both read off the same three exact columns.
+Joint torques are linear in the gravity vector. Both effects use the same three exact columns.
 
 """
 
@@ -27,7 +27,7 @@ _STEP = 1e-5
 
 
 class _GravityEffect(Effect):
-    """An effect of the whole arm."""
+    """An effect on the whole arm."""
 
     changes_body = True
 
@@ -36,7 +36,7 @@ class _GravityEffect(Effect):
         return ()
 
     def __post_init__(self) -> None:
-        """Refuse joints."""
+        """Raise a ModelError if joints are given."""
         if self.joints:
             raise ModelError(f'{self.name} belongs to the whole arm, not to {self.joints[0]}')
         super().__post_init__()
@@ -47,8 +47,8 @@ class GravityMagnitude(_GravityEffect):
     """
     Difference of the magnitude of gravity from the model's, |g| = |g_model| + dg.
 
-    After a fit of the base parameters only the part shows in which masses act by inertia as well;
-    moving fast makes it visible.
+    After a fit of the base parameters, it is identifiable only through masses that also cause
+    inertia torques. Fast motion makes it identifiable.
 
     """
 
@@ -62,7 +62,7 @@ class GravityMagnitude(_GravityEffect):
         return np.asarray(arm.gravity_columns(motion) @ direction)
 
     def plausible(self, values: FloatArray, std: FloatArray, arm: Arm) -> bool:
-        """Return whether gravity keeps its direction; else the base is upside down."""
+        """Return whether gravity keeps its direction; otherwise the base would be upside down."""
         return bool(values[0] > -np.linalg.norm(arm.robot.gravity))
 
     def action(self, values: FloatArray, arm: Arm) -> Action:
@@ -74,11 +74,11 @@ class GravityMagnitude(_GravityEffect):
 @dataclass(frozen=True)
 class BaseTilt(_GravityEffect):
     """
-    Rotation of the base against the world that the model does not know of.
+    Rotation of the base relative to the world that the model does not contain.
 
     The base is turned by the rotation vector (tilt_x, tilt_y) about two axes normal to gravity:
-    the base's own x and y for a base that the model has upright. Turning about gravity changes
-    nothing. Confounded with an encoder offset of the first joint when its axis is horizontal.
+    the base's own x and y for a base that is upright in the model. A rotation about gravity has no
+    effect. Confounded with an encoder offset of the first joint when its axis is horizontal.
 
     """
 
@@ -91,7 +91,7 @@ class BaseTilt(_GravityEffect):
     linear = False
 
     def columns(self, motion: Motion, arm: Arm) -> FloatArray:
-        """Return dtau/dtilt [N m/rad], shape (N, n, 2), at the tilt that the arm has."""
+        """Return dtau/dtilt [N m/rad], shape (N, n, 2), at the tilt of the arm model."""
         values = arm.values_of(self)
         turned = [
             (_turned(arm.robot.gravity, values + step) - _turned(arm.robot.gravity, values - step))
@@ -101,7 +101,7 @@ class BaseTilt(_GravityEffect):
         return np.asarray(arm.gravity_columns(motion) @ np.transpose(turned))
 
     def action(self, values: FloatArray, arm: Arm) -> Action:
-        """Return the robot under gravity as the tilted base sees it."""
+        """Return the robot with gravity in the frame of the tilted base."""
         return Action(robot=arm.robot.with_gravity(_turned(arm.robot.gravity, values)))
 
 
@@ -110,8 +110,8 @@ class GravityVector(_GravityEffect):
     """
     Difference of the gravity vector from the model's: any mounting on any planet.
 
-    The torque is linear in it, exactly, at any angle; a search looks for this one and says what it
-    finds as base_tilt and gravity_magnitude.
+    The torque is exactly linear in the vector at any angle. A search uses this effect, and reports
+    the result as base_tilt and gravity_magnitude.
 
     """
 
@@ -121,7 +121,7 @@ class GravityVector(_GravityEffect):
 
     @property
     def said_as(self) -> str:
-        """Return the tilt, which is what it is beyond gravity_magnitude."""
+        """Return the name of the tilt."""
         return BaseTilt.name
 
     def columns(self, motion: Motion, arm: Arm) -> FloatArray:
@@ -129,11 +129,11 @@ class GravityVector(_GravityEffect):
         return arm.gravity_columns(motion)
 
     def action(self, values: FloatArray, arm: Arm) -> Action:
-        """Return the robot under the other gravity."""
+        """Return the robot with the changed gravity."""
         return Action(robot=arm.robot.with_gravity(arm.robot.gravity + values))
 
     def named_as(self, values: FloatArray, arm: Arm) -> tuple[tuple[Effect, FloatArray], ...]:
-        """Return the tilt of the base, and the magnitude of gravity."""
+        """Return base_tilt and gravity_magnitude with their values."""
         before = np.array(arm.robot.gravity)
         after = before + values
         magnitude = np.linalg.norm(after) - np.linalg.norm(before)
@@ -144,13 +144,13 @@ class GravityVector(_GravityEffect):
 
 
 def with_exact_vector(kinds: Sequence[Kind]) -> list[Kind]:
-    """Return kinds to look for: where tilt and size may both be named, the vector for the tilt."""
+    """Return kinds for a search; with both tilt and magnitude, the vector replaces the tilt."""
     both = BaseTilt in kinds and GravityMagnitude in kinds
     return [GravityVector if both and kind is BaseTilt else kind for kind in kinds]
 
 
 def _tilt(before: FloatArray, after: FloatArray) -> FloatArray:
-    """Return the rotation vector, (2,) [rad], by which a base is turned that sees gravity so."""
+    """Return the rotation vector of the base, (2,) [rad], for a gravity vector."""
     axes = _horizontal_axes(before)
     axis = np.cross(after, before)
     sine, cosine = float(np.linalg.norm(axis)), float(after @ before)
@@ -160,7 +160,7 @@ def _tilt(before: FloatArray, after: FloatArray) -> FloatArray:
 
 
 def _turned(gravity: FloatArray, tilt: FloatArray) -> FloatArray:
-    """Return gravity as a base sees it that is turned by a rotation vector, (2,) [rad]."""
+    """Return gravity in the frame of a base turned by a rotation vector, (2,) [rad]."""
     rotation = Rotation.from_rotvec(tilt @ _horizontal_axes(gravity))
     return np.asarray(rotation.inv().apply(np.array(gravity)))
 

@@ -1,6 +1,6 @@
 # Copyright 2026 The armid_ros developers
 # SPDX-License-Identifier: Apache-2.0
-"""Friction that depends on more than velocity: on load, or on the way since the last reversal."""
+"""Friction that depends on the load, or on the travel since the last reversal."""
 
 from __future__ import annotations
 
@@ -19,10 +19,11 @@ import numpy as np
 @dataclass(frozen=True)
 class LoadDependentFriction(Effect):
     """
-    Dry friction in proportion to the torque that the gear passes on, tau = Kl |tau_load| sign(dq).
+    Dry friction proportional to the load of the gear, tau = Kl |tau_load| sign(dq).
 
-    tau_load is what the rigid body takes. At rest it holds. Confounded with torque_gain, which
-    it is half of whenever the joint lifts; the same motion with two known payloads tells.
+    tau_load is the torque of the rigid body. At rest, the joint can stick. Confounded with
+    torque_gain while the joint lifts its load; the same motion with two known payloads
+    distinguishes them.
     Source: Bittencourt and Gunnarsson 2012; Duclusaud et al. 2024 (BAM), model M2.
 
     """
@@ -47,13 +48,14 @@ class LoadDependentFriction(Effect):
 @dataclass(frozen=True)
 class PreslidingHysteresis(Effect):
     """
-    Friction that builds up over a short way after each reversal, tau = F h.
+    Friction that builds up over a short travel after each reversal, tau = F h.
 
-    dh = (1 - h sign(dq)) |dq| / s: asperities bend before they slip. The torque depends on the way
-    since the last reversal, not on velocity: its loops are the same at any rate, and even slow
-    motion dissipates. Far from reversals it is coulomb_friction; where both are in a model, F
-    is the part that is not there at once. Confounded with stribeck_friction, backlash and a
-    velocity that was filtered too much; triangles of less than 0.02 rad at two rates tell.
+    dh = (1 - h sign(dq)) |dq| / s: asperities bend before they slip. The torque depends on the
+    travel since the last reversal, not on velocity. The hysteresis loops are the same at any rate,
+    and even slow motion dissipates energy. Far from reversals it equals coulomb_friction. If a
+    model contains both, F is the part that builds up gradually. Confounded with stribeck_friction,
+    backlash and a velocity that was filtered too much; triangles of less than 0.02 rad at two
+    rates distinguish them.
     Source: Dahl 1968.
 
     """
@@ -77,7 +79,7 @@ class PreslidingHysteresis(Effect):
         return columns
 
     def action(self, values: FloatArray, arm: Arm) -> Action:
-        """Return the friction with its state."""
+        """Return the friction as a `Hysteresis`."""
         return Action(hysteresis=self._elements(values, arm.robot.joints))
 
     def _elements(self, level: FloatArray, joints: tuple[str, ...]) -> Hysteresis:

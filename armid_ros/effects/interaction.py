@@ -1,11 +1,11 @@
 # Copyright 2026 The armid_ros developers
 # SPDX-License-Identifier: Apache-2.0
 """
-What holds a link: a spring and a damper to a person, to another machine or to the world.
+Springs and dampers between a link and a person, another machine or the world.
 
 The spring is between a point of a link (``attachment``, in the frame of its joint) and an anchor:
 a fixed point of the base frame, or one whose motion was recorded, see ``tied``. The force of the
-spring works on the arm, the opposite one on the anchor.
+spring acts on the arm, the opposite force on the anchor.
 
 """
 
@@ -28,15 +28,15 @@ import numpy as np
 #: Positions and velocities of all k anchors [m, m/s] at times of shape (N,), each (N or 1, k, 3).
 Anchor = Callable[[FloatArray], tuple[FloatArray, FloatArray]]
 
-#: How far a link reaches from its joint where the arm has no other to tell it [m].
+#: Assumed reach of a link from its joint if the arm has no other joint [m].
 _REACH = 1.0
-#: A way so short that it has no direction [m].
+#: Distance below which a direction is undefined [m].
 _SHORTEST = 1e-12
 
-#: Anchors of straps that are tried: how far from the middle of where the attachment comes to, over
-#: the spread of that, in all directions of a cube. Slacks are quantiles of the length.
+#: Anchors of straps to try: distances from the mean position of the attachment, over the spread of
+#: its positions, in all directions of a cube. Slacks are quantiles of the length.
 _DISTANCES, _SLACKS = (0.0, 0.7, 1.5, 3.0), (0.0, 0.2, 0.4, 0.6, 0.8)
-#: Straps that go on to be compared with other causes; rows that are looked at.
+#: Number of straps that are compared with other causes, and number of rows used.
 _STRAPS, _ROWS = 2, 400
 
 _AXES = ('x', 'y', 'z')
@@ -50,7 +50,7 @@ class Attached(Effect):
     """An effect between a point of each link and an anchor."""
 
     def _default_shape(self, robot: Robot) -> FloatArray:
-        """Attach at the centres of mass: where links are, if a fit has put them beyond the arm."""
+        """Attach at the centres of mass, or at the links if a centre is beyond the arm."""
         values, model = self.shape_values, robot.model
         reach = max(float(np.linalg.norm(place.translation)) for place in model.jointPlacements)
         for row, joint in zip(values, self.joints, strict=True):
@@ -60,7 +60,7 @@ class Attached(Effect):
         return values
 
     def shape_starts(self, unexplained: Unexplained, arm: Arm) -> tuple[FloatArray, ...]:
-        """Return the geometry as it is; other shapes have their grids."""
+        """Return the present geometry; other shapes have their grids."""
         return tuple(
             self.shape_values[:, [index]]
             if shape.unit == 'm' and shape.lower < 0.0
@@ -70,15 +70,15 @@ class Attached(Effect):
 
     @property
     def _attachments(self) -> FloatArray:
-        """Points of the links that springs are attached to, shape (k, 3) [m]."""
+        """Attachment points of the springs on the links, shape (k, 3) [m]."""
         return self.shape_values[:, :3]
 
     @abstractmethod
     def _anchor(self, arm: Arm) -> Anchor:
-        """Return where the springs end."""
+        """Return the anchors of the springs."""
 
     def action(self, values: FloatArray, arm: Arm) -> Action:
-        """Return the torque against the springs."""
+        """Return the torque that the springs require."""
         robot, anchor = arm.robot, self._anchor(arm)
 
         def torque(t: FloatArray, q: FloatArray, dq: FloatArray) -> FloatArray:
@@ -106,11 +106,11 @@ class HumanInteraction(Attached):
     """
     Spring and damper between a link and an anchor, tau = J^T (k (p - r) + d (v - w) - f).
 
-    p and v are position and velocity of the attachment, r and w those of the anchor, which is
-    where the attachment is in the middle of the range of motion, at rest; a spring fixed at r' has
-    the force f = k (r' - r) there, so that an anchor nobody knows is three linear parameters.
-    Confounded with joint_spring on a single moving joint and
-    with the weight of the limb; the sum of the torques of a pair does not have it, their
+    p and v are position and velocity of the attachment, r and w those of the anchor. By default,
+    the anchor is at rest at the position of the attachment in the middle of the range of motion. A
+    spring fixed at another point r' has the force f = k (r' - r), so that an unknown anchor is
+    three linear parameters. Confounded with joint_spring on a single moving joint and with the
+    weight of the limb; the sum of the torques of a pair does not contain the spring, their
     difference does.
     Source: the human-exoskeleton leg pair, springs between segments of equal number.
 
@@ -147,11 +147,12 @@ class HumanInteraction(Attached):
 @dataclass(frozen=True)
 class InterfaceSlack(Attached):
     """
-    Spring between a link and an anchor that pulls beyond a slack only, like a strap.
+    Strap between a link and an anchor: a spring that pulls only beyond a slack.
 
-    tau = k J^T e max(|x| - slack, 0), where x = p - r is the way from the anchor to the attachment
-    and e its direction. Without slack it is a human_interaction with a known anchor; different
-    tensions of the strap tell. The anchor is a shape: a point of the base frame.
+    tau = k J^T e max(|x| - slack, 0), where x = p - r is the vector from the anchor to the
+    attachment and e its direction. Without slack it equals human_interaction with a known anchor;
+    different tensions of the strap distinguish them. The anchor is a shape: a point of the base
+    frame.
 
     """
 
@@ -169,7 +170,7 @@ class InterfaceSlack(Attached):
     )
 
     def _default_shape(self, robot: Robot) -> FloatArray:
-        """Anchor each attachment where it is in the middle of the range of motion."""
+        """Put each anchor at its attachment in the middle of the range of motion."""
         values = super()._default_shape(robot)
         middle = LinkFrames.in_the_middle(robot)
         for row, joint in zip(values, self.joints, strict=True):
@@ -177,7 +178,7 @@ class InterfaceSlack(Attached):
         return values
 
     def shape_starts(self, unexplained: Unexplained, arm: Arm) -> tuple[FloatArray, ...]:
-        """Return the anchors and slacks that take most of what is left."""
+        """Return the anchors and slacks that explain most of the residual."""
         thin = unexplained.thinned(_ROWS)
         target = thin.rest(thin.residual[:, :, np.newaxis])[:, 0]
         starts, frames = [], LinkFrames.of(arm.robot, thin.q)
@@ -215,13 +216,13 @@ class InterfaceSlack(Attached):
 
 
 def _pulls(ways: FloatArray, slack: float) -> FloatArray:
-    """Return the force, over stiffness, of a strap that reaches over ways, shape (N, 3) [m]."""
+    """Return the force over stiffness of a strap along vectors, shape (N, 3) [m]."""
     length = np.sqrt(np.einsum('nx,nx->n', ways, ways))[:, np.newaxis]
     return np.asarray(ways * np.maximum(1.0 - slack / np.maximum(length, _SHORTEST), 0.0))
 
 
 def _proposals(places: FloatArray) -> tuple[FloatArray, FloatArray]:
-    """Return anchors (A, 3) and slacks (A,) around where an attachment comes to."""
+    """Return anchors (A, 3) and slacks (A,) around the positions of an attachment."""
     middle, spread = places.mean(axis=0), float(places.std(axis=0).max())
     ways = np.array([way for way in product((-1.0, 0.0, 1.0), repeat=3) if any(way)])
     ways /= np.linalg.norm(ways, axis=1, keepdims=True)

@@ -1,6 +1,6 @@
 # Copyright 2026 The armid_ros developers
 # SPDX-License-Identifier: Apache-2.0
-"""Where the parameters of an effect are among those of all joints."""
+"""Arrangement of the parameters of an effect among those of all joints."""
 
 from __future__ import annotations
 
@@ -16,14 +16,14 @@ import numpy.typing as npt
 
 def joint_columns(effect: Effect, motion: Motion, *quantities: FloatArray) -> FloatArray:
     """
-    Place the sensitivities of an effect that acts on each of its joints alone.
+    Return the columns of an effect that acts on each of its joints separately.
 
     Parameters
     ----------
     effect : Effect
-        Gives the joints.
+        Effect with the joints.
     motion : Motion
-        Gives the joint order.
+        Motion with the joint order.
     *quantities : ndarray, shape (N, n)
         One array per quantity of the effect: dtau_j / dtheta_j for all joints of the motion.
 
@@ -42,7 +42,7 @@ def joint_columns(effect: Effect, motion: Motion, *quantities: FloatArray) -> Fl
 
 
 class _Places(NamedTuple):
-    """Joints of an effect, and where its values are among the flattened columns of a sample."""
+    """Joints of an effect, and indices of its values in the flattened columns of a sample."""
 
     joints: npt.NDArray[np.intp]
     of_quantity: tuple[npt.NDArray[np.intp], ...]
@@ -50,7 +50,7 @@ class _Places(NamedTuple):
 
 @lru_cache(maxsize=1024)
 def _places(joints: tuple[int, ...], n_joints: int, count: int) -> _Places:
-    """Return where values go; a stream asks the same for every sample."""
+    """Return the indices of the values; cached, because streams repeat the call."""
     own = np.array(joints, dtype=np.intp)
     size = count * len(own)
     return _Places(

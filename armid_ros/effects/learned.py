@@ -1,11 +1,11 @@
 # Copyright 2026 The armid_ros developers
 # SPDX-License-Identifier: Apache-2.0
 """
-Torque that was learned from recordings and has no name.
+Torque that was learned from recordings, without a physical cause.
 
-Of each joint a map from its position, its velocity and its load to a torque: the mean of a
-Gaussian process on inducing points. Far from all points it is zero, and its deviation is that of
-the prior. It says where a model is off and by how much; a law it is not.
+Each joint has a map from position, velocity and load to torque: the mean of a Gaussian process on
+inducing points. Far from all points the mean is zero, and the standard deviation is that of the
+prior. The map shows where a model is wrong and by how much. It is not a physical law.
 
 """
 
@@ -30,7 +30,7 @@ from scipy.linalg import cho_factor, cho_solve
 
 #: Inputs of a map, in the order of its columns.
 INPUTS = ('position', 'velocity', 'load')
-#: Digits of the points in files: a map is known to three.
+#: Significant digits of the points in files; a map is accurate to three.
 _DIGITS = '.9g'
 
 
@@ -39,9 +39,9 @@ class TorqueMap:
     """
     The posterior of a Gaussian process over position, velocity and load of one joint.
 
-    k(x, x') = s^2 exp(-sum of ((u_i - u_i') / l_i)^2 / 2); the mean is the sum of
-    a_m k(x, x_m) / s^2. The velocity counts as u = v asinh(dq / v): below the knee v it is
-    proportional, beyond it logarithmic, as friction changes most where a joint turns round.
+    k(x, x') = s^2 exp(-sum of ((u_i - u_i') / l_i)^2 / 2); the mean is the sum of a_m k(x, x_m) /
+    s^2. The velocity counts as u = v asinh(dq / v): proportional below the knee v and logarithmic
+    beyond it, because friction changes most at low velocity.
     Source: Rasmussen and Williams 2006, eqs. 2.25 and 2.26.
 
     Attributes
@@ -53,11 +53,11 @@ class TorqueMap:
     noise : ndarray, shape (M,)
         Standard deviation of the torque at each point [N m or N].
     lengths : ndarray, shape (3,)
-        Length scales l; infinite for an input that does not matter.
+        Length scales l; infinite for an input without influence.
     amplitude : float
         Standard deviation s of the prior [N m or N].
     knee : float
-        Velocity v from which on velocities count by their ratio [rad/s or m/s].
+        Velocity v above which the scale is logarithmic [rad/s or m/s].
 
     """
 
@@ -101,7 +101,7 @@ class TorqueMap:
         return bool(np.isfinite(self.lengths[2]))
 
     def given(self, torque: FloatArray) -> TorqueMap:
-        """Return the map with the weights that torques at its points give it, shape (M,) [N m]."""
+        """Return the map with weights from torques at its points, shape (M,) [N m]."""
         return replace(self, weights=cho_solve(self._factor, torque))
 
     def torque(self, inputs: FloatArray) -> FloatArray:
@@ -127,7 +127,7 @@ class TorqueMap:
         return np.asarray(np.exp(-0.5 * np.sum(difference**2, axis=-1)))
 
     def document(self) -> dict[str, Any]:
-        """Return what model.yaml holds: a line a point."""
+        """Return the entry for model.yaml, one line per point."""
         rows = np.column_stack([self.points, self.weights, self.noise])
         return {
             'amplitude': float(self.amplitude),
@@ -139,12 +139,12 @@ class TorqueMap:
     @classmethod
     def of_document(cls, entry: Mapping[str, Any], joint: str) -> TorqueMap:
         """
-        Read what `document` wrote.
+        Return the map of an entry written by `document`.
 
         Raises
         ------
         ModelError
-            Naming the joint and what is wrong.
+            If the entry is invalid; the message names the joint and the fault.
 
         """
         what = f"torque map of joint '{joint}'"
@@ -163,17 +163,18 @@ class TorqueMap:
 @dataclass(frozen=True)
 class LearnedTorque(Effect):
     """
-    Torque of joints over position, velocity and load, learned where no name was found.
+    Learned torque of joints over position, velocity and load, if no known effect explains it.
 
-    The load is what holds the arm where it is. Nothing is known of it far from the motions that
-    it was learned from: there it is zero. It is confounded with everything, and so never named.
-    Source: Nguyen-Tuong and Peters 2010 (semiparametric models); Quinonero-Candela and
-    Rasmussen 2005 (inducing points).
+    The load is the torque that holds the arm at its position. Far from the motions of the training
+    data, the learned torque is zero. The effect is confounded with every other effect, and is
+    therefore never named by a diagnosis.
+    Source: Nguyen-Tuong and Peters 2010 (semiparametric models); Quinonero-Candela and Rasmussen
+    2005 (inducing points).
 
     Attributes
     ----------
     maps : tuple of TorqueMap
-        One for each of the joints; none: no torque.
+        One map for each joint; empty: no torque.
 
     """
 
@@ -199,7 +200,7 @@ class LearnedTorque(Effect):
         return {'maps': [{'joint': joint, **own.document()} for joint, own in rows]}
 
     def with_particulars(self, entry: Mapping[str, Any]) -> Self:
-        """Return the effect with the maps that a file has."""
+        """Return the effect with the maps of a file."""
         found = {str(row['joint']): row for row in entry.get('maps', ())}
         if not found:
             return self
@@ -211,12 +212,12 @@ class LearnedTorque(Effect):
 
     def inputs(self, robot: Robot, q: FloatArray, dq: FloatArray) -> FloatArray:
         """
-        Return what the maps take, of all joints.
+        Return the inputs of the maps for all joints.
 
         Parameters
         ----------
         robot : Robot
-            Gives the load.
+            Robot for the load.
         q, dq : ndarray, shape (..., n)
             Position and velocity of the links.
 
@@ -255,13 +256,13 @@ class LearnedTorque(Effect):
 
 
 def counted(inputs: FloatArray, knee: float) -> FloatArray:
-    """Return inputs (..., 3) with velocities as they count beyond a knee."""
+    """Return inputs (..., 3) with velocities on the scale with a knee."""
     velocity = knee * np.arcsinh(inputs[..., 1] / knee)
     return np.stack([inputs[..., 0], velocity, inputs[..., 2]], axis=-1)
 
 
 def weight(robot: Robot, q: FloatArray) -> FloatArray:
-    """Return the torque that holds the rigid body where it is, shape (..., n) [N m]."""
+    """Return the torque that holds the rigid body at rest, shape (..., n) [N m]."""
     flat = np.reshape(q, (-1, robot.n_joints))
     still = np.zeros_like(flat)
     there = Motion(robot.joints, np.arange(len(flat), dtype=float), flat, still, still)

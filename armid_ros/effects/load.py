@@ -1,6 +1,6 @@
 # Copyright 2026 The armid_ros developers
 # SPDX-License-Identifier: Apache-2.0
-"""Bodies: what an arm carries, and links that are not as described."""
+"""Effects on bodies: payloads, and links that differ from the description."""
 
 from __future__ import annotations
 
@@ -16,9 +16,9 @@ from armid_ros.motion import FloatArray, Motion
 from armid_ros.robots import Robot
 import numpy as np
 
-#: How far from its joint a link's mass may be without a word in the description [m].
+#: Assumed distance of a link's mass from its joint if the description has none [m].
 _REACH = 0.1
-#: Moments of inertia among the parameters of a link: Ixx, Iyy, Izz.
+#: Indices of the moments of inertia in the parameters of a link: Ixx, Iyy, Izz.
 _MOMENTS = 4, 6, 9
 
 
@@ -29,13 +29,13 @@ class _LinkBody(Effect):
     changes_body = True
 
     def parameters(self, robot: Robot) -> tuple[ParameterName, ...]:
-        """Name them; a body has the same units on a joint that slides."""
+        """Names of the parameters; their units are the same on a prismatic joint."""
         return tuple(
             ParameterName(q.name, owner, q.unit) for owner in self.owners for q in self.quantities
         )
 
     def columns(self, motion: Motion, arm: Arm) -> FloatArray:
-        """Return the links' own columns of the regressor, shape (N, n, P)."""
+        """Return the regressor columns of the links, shape (N, n, P)."""
         return arm.body_columns(motion)[:, :, list(self.adds_to(arm.robot))]
 
     def action(self, values: FloatArray, arm: Arm) -> Action:
@@ -45,20 +45,21 @@ class _LinkBody(Effect):
         return Action(robot=arm.robot.with_inertias(parameters))
 
     def spread(self, robot: Robot, found: Sequence[FloatArray] | None = None) -> FloatArray:
-        """Return what descriptions of the links are off by at the most, shape (P,)."""
+        """Return the largest expected errors of the description of the links, shape (P,)."""
         return described_spread(robot).ravel()[list(self.adds_to(robot))]
 
     def adds_to(self, robot: Robot) -> tuple[int, ...]:
-        """Return the parameters of its links."""
+        """Return the rigid-body parameters of its links."""
         size = len(LINK_PARAMETERS)
         return tuple(size * joint + i for joint in self.indices(robot.joints) for i in range(size))
 
 
 def described_spread(robot: Robot) -> FloatArray:
     """
-    Return how far rigid parameters may be from their description, shape (n, 10).
+    Return the largest expected errors of the described rigid parameters, shape (n, 10).
 
-    It is believed to a factor or so, and where it gives nothing, a tenth of a mean link is there.
+    A described value may be wrong by about its own size. For a missing value, a tenth of a mean
+    link is assumed.
 
     """
     body = np.abs(robot.rigid_parameters.reshape(-1, len(LINK_PARAMETERS)))
@@ -71,9 +72,9 @@ class Payload(_LinkBody):
     """
     A body fixed to a link, the last one by default: mass, first moments and inertia.
 
-    All ten are about the frame of the link's joint, so they add to the link's own and are linear.
-    They are exactly collinear with the parameters of the last link: a payload is identifiable only
-    against a model that is known without it.
+    All ten parameters are about the frame of the link's joint. They add to the parameters of the
+    link, and the torque is linear in them. They are exactly collinear with the parameters of the
+    last link: a payload is identifiable only relative to a known model without it.
 
     """
 
@@ -95,21 +96,21 @@ class Payload(_LinkBody):
 
     @classmethod
     def places(cls, robot: Robot) -> tuple[tuple[str, ...], ...]:
-        """Return all links: any may carry something that is none of its own mass."""
+        """Return all links, because any link may carry a body."""
         return tuple((joint,) for joint in robot.joints)
 
     @classmethod
     def as_change(cls) -> type[Effect]:
-        """Return a load that may have been put down."""
+        """Return the class for a load that may have been put down."""
         return PayloadChange
 
     def plausible(self, values: FloatArray, std: FloatArray, arm: Arm) -> bool:
-        """Return whether a body may have such values, not farther away than the arm is long."""
+        """Return whether a body can have the values, with its centre within the arm's length."""
         return self._weighs(values, std, arm) and not self._is_no_body(values, std, arm)
 
     def _weighs(self, values: FloatArray, std: FloatArray, arm: Arm) -> bool:
-        """Return whether it may weigh something, not farther away than the arm is long."""
-        if std[0] == 0.0:  # noqa: RUF069 - set where no motion shows it, as of an inner link
+        """Return whether a positive mass with a centre within the arm's length is possible."""
+        if std[0] == 0.0:  # noqa: RUF069 - set exactly to zero if no motion identifies it, as for an inner link
             return bool(np.any(values[1:4]))
         places = [placement.translation for placement in arm.robot.model.jointPlacements]
         length = float(np.sum(np.linalg.norm(places, axis=1))) + _REACH
@@ -117,12 +118,12 @@ class Payload(_LinkBody):
         return bool(heaviest > 0.0 and np.linalg.norm(values[1:4]) < length * heaviest)
 
     def _is_no_body(self, values: FloatArray, std: FloatArray, arm: Arm) -> bool:
-        """Return whether no body can have such values, as far as the motion tells them."""
-        # about the joint its inertia is no less than that of its mass in one point, at its centre
+        """Return whether no body can have the values, as far as the motion identifies them."""
+        # its inertia about the joint is at least that of a point mass at its centre
         axis = arm.robot.geometry[self.indices(arm.robot.joints)[0]].turn
         x, y, z = axis
         share = np.array([x * x, 2.0 * x * y, y * y, 2.0 * x * z, 2.0 * y * z, z * z])
-        if not np.all(std[4:][share != 0.0] > 0.0) or not axis.any():  # noqa: RUF069 - an axis as described
+        if not np.all(std[4:][share != 0.0] > 0.0) or not axis.any():  # noqa: RUF069 - exact zero from the description
             return False
         aside = np.linalg.norm(np.cross(axis, values[1:4])) - SURELY * np.linalg.norm(std[1:4])
         most = share @ values[4:] + SURELY * np.abs(share) @ std[4:]
@@ -131,9 +132,9 @@ class Payload(_LinkBody):
 
     def spread(self, robot: Robot, found: Sequence[FloatArray] | None = None) -> FloatArray:
         """
-        Return what an arm may carry at the most: as much as it weighs, a little off, shape (P,).
+        Return the largest payload: the mass of the arm, with a small offset, shape (P,).
 
-        First moments and inertia go with the mass: a light load has no large ones.
+        First moments and inertia are proportional to the mass.
 
         """
         mass = float(robot.rigid_parameters[:: len(LINK_PARAMETERS)].sum())
@@ -146,9 +147,9 @@ class Payload(_LinkBody):
 @dataclass(frozen=True)
 class PayloadChange(Payload):
     """
-    Difference of what a link holds from what it held, which may be nothing now.
+    Change of the payload of a link; a payload may have been put down.
 
-    A payload of less than nothing was put down: the model has it in the link that held it.
+    A negative mass is a payload that was put down. The model contains it in the link that held it.
 
     """
 
@@ -156,15 +157,16 @@ class PayloadChange(Payload):
 
     def plausible(self, values: FloatArray, std: FloatArray, arm: Arm) -> bool:
         """
-        Return whether what was taken or put down may be called a load.
+        Return whether the change can be a load that was picked up or put down.
 
-        It may weigh more than the links: a description often lacks what the arm held before.
+        The load may be heavier than the links, because a description often lacks the load that the
+        arm held before.
 
         """
         return self._weighs(np.concatenate([np.abs(values[:1]), values[1:]]), std, arm)
 
     def named_as(self, values: FloatArray, arm: Arm) -> tuple[tuple[Effect, FloatArray], ...]:
-        """Return the payload."""
+        """Return the change as a payload."""
         return ((Payload(self.joints), values),)
 
 
@@ -173,9 +175,10 @@ class LinkInertia(_LinkBody):
     """
     Difference of a link's mass, first moments and inertia from the description's.
 
-    The same directions as the rigid parameters themselves: visible against a model whose other
-    values are trusted, and swallowed by a fit of all of them. For a body put onto the last link
-    see payload; a first moment turned about the joint's axis is an encoder_offset as well.
+    The columns are those of the rigid-body parameters. The effect is identifiable only if the
+    other parameters are known; a fit of all parameters absorbs it. For a body on the last link,
+    see payload. A first moment turned about the axis of the joint is collinear with an
+    encoder_offset.
 
     """
 
@@ -188,10 +191,10 @@ class LinkInertia(_LinkBody):
 
     def plausible(self, values: FloatArray, std: FloatArray, arm: Arm) -> bool:
         """
-        Return whether what is left of the link has no inertia of less than nothing.
+        Return whether the changed link has positive moments of inertia.
 
-        Nothing is said where values stand for others that the motion does not tell from them, nor
-        of links that a fit has left without such an inertia before.
+        The result is True if the motion does not identify the values separately, or if the link
+        had no positive inertia before.
 
         """
         if not np.all(std[4:] > 0.0):

@@ -1,6 +1,6 @@
 # Copyright 2026 The armid_ros developers
 # SPDX-License-Identifier: Apache-2.0
-"""What ties two joints together: a shared shaft, a cable, torque sensors that hear each other."""
+"""Coupling of two joints: a shared shaft, a cable, or crosstalk of torque sensors."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ import numpy as np
 
 @dataclass(frozen=True)
 class _Pairs(Effect):
-    """An effect of pairs of joints (i, k), one after the other in ``joints``."""
+    """An effect on pairs of joints (i, k), which are consecutive in ``joints``."""
 
     def __post_init__(self) -> None:
         """Check that the joints are pairs."""
@@ -35,18 +35,21 @@ class _Pairs(Effect):
         for first, second in pairs:
             if first == second or pairs.count((first, second)) > 1:
                 raise ModelError(
-                    f'{self.name}: {first} and {second} are no pair, or one that is there twice'
+                    f'{self.name}: {first} and {second} are the same joint, or a pair that is '
+                    'given twice'
                 )
         super().__post_init__()
 
     @classmethod
     def _default_joints(cls, robot: Robot) -> tuple[str, ...]:
         if robot.n_joints < 2:
-            raise ModelError(f'{cls.name}: {robot.name} has one joint only, nothing to couple')
+            raise ModelError(
+                f'{cls.name}: {robot.name} has only one joint, so that no pair exists'
+            )
         return cls._default_pairs(robot.joints)
 
     def in_usual_place(self, robot: Robot) -> bool:
-        """Return that any pair of joints is as usual as another one."""
+        """Return True: no pair of joints is more usual than another."""
         return True
 
     @classmethod
@@ -55,7 +58,7 @@ class _Pairs(Effect):
 
     @classmethod
     def places(cls, robot: Robot) -> tuple[tuple[str, ...], ...]:
-        """Return the pairs of joints that may be tied to each other."""
+        """Return the pairs of joints that may be coupled."""
         return tuple(cls._likely_pairs(robot.joints))
 
     @staticmethod
@@ -68,7 +71,7 @@ class _Pairs(Effect):
         return self.joints[::2]
 
     def parameters(self, robot: Robot) -> tuple[ParameterName, ...]:
-        """Name the parameters, pair by pair, with the unit that they have between the two."""
+        """Name the parameters, pair by pair, with the units between the two joints."""
         return tuple(
             ParameterName(q.name, first, pair_unit(q.unit, first, second, robot))
             for first, second in zip(self.joints[::2], self.joints[1::2], strict=True)
@@ -76,7 +79,7 @@ class _Pairs(Effect):
         )
 
     def pairs(self, joints: tuple[str, ...]) -> list[tuple[int, int]]:
-        """Return the columns of every pair among the joints of a motion or robot."""
+        """Return the indices of every pair among the joints of a motion or robot."""
         columns = self.indices(joints)
         return list(zip(columns[::2], columns[1::2], strict=True))
 
@@ -84,15 +87,15 @@ class _Pairs(Effect):
 @dataclass(frozen=True)
 class CoupledJointFriction(_Pairs):
     """
-    Friction and inertia of a shaft that turns with the sum of two joints, as in a wrist drive.
+    Friction and inertia of a shaft that turns with the sum of two joints, as in a wrist.
 
-    The joints are pairs (i, k), one after the other. With the shaft's velocity dq_i + dq_k,
+    The joints are consecutive pairs (i, k). With the shaft's velocity dq_i + dq_k,
 
         tau_i = Ia ddq_k + Fv dq_k + Fc sign(dq_i + dq_k),
         tau_k = Ia ddq_i + Fv dq_i + Fc sign(dq_i + dq_k);
 
-    the parts of Ia and Fv that act on a joint from its own motion belong to rotor_inertia and
-    viscous_friction.
+    the parts of Ia and Fv that depend on the motion of the joint itself belong to rotor_inertia
+    and viscous_friction.
     Source: the model of the Staubli TX40's wrist in Janot, Vandanjon and Gautier 2014.
 
     """
@@ -141,9 +144,9 @@ class JointCoupling(_Pairs):
     """
     Elastic coupling of two joints by a cable or a tendon, tau_i = -K q_k and tau_k = -K q_i.
 
-    That is what the energy K (q_i - q_k)^2 / 2 has between the two; its parts in one joint alone
-    belong to joint_spring. K is negative for a cable that is crossed. Confounded with
-    torque_crosstalk where gravity is all there is, and with the coupling of the links' weights.
+    This is the coupling term of the energy K (q_i - q_k)^2 / 2; its terms in one joint belong to
+    joint_spring. K is negative for a crossed cable. Confounded with torque_crosstalk in static
+    holds, and with the coupling of the links' weights.
 
     """
 
@@ -152,12 +155,12 @@ class JointCoupling(_Pairs):
     quantities = (Quantity('coupling_stiffness', 'N m/rad', typical=(0.1, 50.0)),)
 
     def __post_init__(self) -> None:
-        """Check that no joint leads two pairs, as names would be the same."""
+        """Check that no joint is first in two pairs, because parameter names would be equal."""
         super().__post_init__()
         twice = [joint for joint in self.owners if self.owners.count(joint) > 1]
         if twice:
             raise ModelError(
-                f'{self.name}: {twice[0]} leads two pairs; put it second in one of them'
+                f'{self.name}: {twice[0]} is first in two pairs; put it second in one of them'
             )
 
     @classmethod
@@ -181,11 +184,11 @@ class JointCoupling(_Pairs):
 @dataclass(frozen=True)
 class TorqueCrosstalk(_Pairs, TorqueReading):
     """
-    Torque sensors that hear those of other joints, reading_i = tau_i + sum of epsilon_ik tau_k.
+    Crosstalk of torque sensors, reading_i = tau_i + sum of epsilon_ik tau_k.
 
     The joints are pairs (i, k): the reading of i contains a share of the torque of k; all ordered
-    pairs by default. Confounded with first moments and products of inertia of the links; joint k
-    loaded and i still tells them apart.
+    pairs by default. Confounded with first moments and products of inertia of the links; loading
+    joint k while joint i rests distinguishes them.
 
     """
 
@@ -202,7 +205,7 @@ class TorqueCrosstalk(_Pairs, TorqueReading):
         return permutations(joints, 2)
 
     def parameters(self, robot: Robot) -> tuple[ParameterName, ...]:
-        """Name the shares: whose reading, and from which joint."""
+        """Name the shares, each with the joint of the reading and the joint of the torque."""
         (quantity,) = self.quantities
         return tuple(
             ParameterName(
@@ -214,17 +217,17 @@ class TorqueCrosstalk(_Pairs, TorqueReading):
         )
 
     def read(self, values: FloatArray, motion: Motion, tau: FloatArray) -> FloatArray:
-        """Return the torque with shares of the others, shape (N, n) [N m]."""
+        """Return the torque plus shares of the other torques, shape (N, n) [N m]."""
         return tau + tau @ self._shares(values, motion).T
 
     def transfer(
         self, values: FloatArray, motion: Motion, tau: FloatArray, columns: FloatArray
     ) -> FloatArray:
-        """Apply the same to columns."""
+        """Apply the crosstalk to columns."""
         return np.asarray(columns + self._shares(values, motion) @ columns)
 
     def sensitivity(self, values: FloatArray, motion: Motion, tau: FloatArray) -> FloatArray:
-        """Return the torque of the other joint in the row of the reader, shape (N, n, P)."""
+        """Return the torque of joint k in the row of joint i, shape (N, n, P)."""
         columns = np.zeros((*tau.shape, len(values)))
         for position, (i, k) in enumerate(self.pairs(motion.joints)):
             columns[:, i, position] = tau[:, k]

@@ -1,6 +1,6 @@
 # Copyright 2026 The armid_ros developers
 # SPDX-License-Identifier: Apache-2.0
-"""What describes an effect in numbers: its quantities, its shapes, and their units."""
+"""Quantities and shapes of effects, and their units."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ from dataclasses import dataclass
 from armid_ros.robots import Robot
 import numpy as np
 
-#: A unit of a revolute joint and what it becomes on a prismatic one.
+#: Units on a revolute joint, and the corresponding units on a prismatic joint.
 _PRISMATIC_UNITS = {
     'N m': 'N',
     'N m s/rad': 'N s/m',
@@ -22,8 +22,8 @@ _PRISMATIC_UNITS = {
     '1/rev': '1/(2 pi m)',
 }
 
-#: Units of two joints that turn, and what they are where the first slides and the second turns, or
-#: the other way round.
+#: Units for two revolute joints, and the corresponding units if the first is prismatic and the
+#: second revolute, or vice versa.
 _MIXED_UNITS = {
     'kg m^2': ('kg m', 'kg m'),
     'N m s/rad': ('N s/rad', 'N s/rad'),
@@ -32,19 +32,20 @@ _MIXED_UNITS = {
     '': ('1/m', 'm'),
 }
 
-#: No arm has more than so many times what arms of 1 to 10 kg have, but where it weighs more.
+#: Largest ratio of a quantity to its typical size in arms of 1 to 10 kg, if the arm is not
+#: heavier.
 _BEYOND_TYPICAL = 10.0
 _TYPICAL_MASS = 10.0
-#: Multiple of a scale from which on the half width of its interval says nothing of it.
+#: Ratio of half width to value above which a confidence interval is uninformative.
 _SCALE_KNOWN = 3.0
-#: Standard deviations by which a value surely differs from another.
+#: Number of standard deviations of a significant difference.
 SURELY = 3.0
 
 
 @dataclass(frozen=True)
 class Quantity:
     """
-    One physical quantity that an effect has per joint, or once for the arm.
+    One physical quantity of an effect, per joint or once for the arm.
 
     Attributes
     ----------
@@ -53,9 +54,9 @@ class Quantity:
     unit : str
         SI unit on a revolute joint.
     lower, upper : float
-        What is physically possible.
+        Physical bounds.
     typical : tuple of float, or None
-        Smallest and largest size that arms of 1 to 10 kg have, where it matters; a sign does not.
+        Smallest and largest relevant absolute value in arms of 1 to 10 kg.
 
     Examples
     --------
@@ -73,10 +74,10 @@ class Quantity:
 
     def largest(self, joint: str, robot: Robot) -> float:
         """
-        Return the largest size that it can have on a joint of a robot, or on all of it (`''`).
+        Return the largest size of the quantity on a joint of a robot, or on the whole arm (`''`).
 
-        It is within the bounds, no torque is more than the drive gives where that is described,
-        and nothing is far beyond what is typical; inf where none of these says anything.
+        The size is limited by the bounds, by the torque limit of the joint if described, and by a
+        multiple of the typical size. It is inf without any of these limits.
 
         """
         size = max(self.upper, -self.lower)
@@ -92,7 +93,7 @@ class Quantity:
 @dataclass(frozen=True)
 class Shape:
     """
-    One parameter that the torque does not depend on linearly, per owner of an effect.
+    One nonlinear parameter of the torque, per owner of an effect.
 
     Attributes
     ----------
@@ -101,13 +102,13 @@ class Shape:
     unit : str
         SI unit on a revolute joint.
     lower, upper : float
-        What is physically possible.
+        Physical bounds.
     default : float
-        Value of an effect that was given none.
+        Default value.
     grid : tuple of float
-        Where a search starts from; values between which the best one is refined.
+        Start values of a search; the best value is refined between its neighbours.
     near : float or None
-        Share of a start from the data by which it may be wrong; None where a start is a guess.
+        Relative error of a start value from the data; None if start values are guesses.
 
     """
 
@@ -121,11 +122,12 @@ class Shape:
 
     def determined(self, value: float, half_width: float) -> bool:
         """
-        Return whether an interval of it says anything.
+        Return whether a confidence interval of the shape is informative.
 
-        It does not where it leaves out nothing that is possible, or for a scale, which is not
-        negative, is wider than three times its value. A scale that may be nothing is compared with
-        the smallest that is looked for, any other shape with the range of those.
+        The interval is uninformative if it covers all possible values. For a non-negative shape,
+        it is also uninformative if its half width exceeds a multiple of the value, or of the
+        smallest start value if that is larger. For any other shape, the half width is compared
+        with the range of the start values.
 
         Parameters
         ----------
@@ -145,18 +147,18 @@ class Shape:
 
 
 def joint_unit(unit: str, joint: str, robot: Robot) -> str:
-    """Return a unit as it is on the joint: 'N m' is 'N' on a prismatic one."""
+    """Return a unit for a joint: 'N m' becomes 'N' on a prismatic joint."""
     slides = joint and robot.prismatic[robot.joints.index(joint)]
     return _PRISMATIC_UNITS.get(unit, unit) if slides else unit
 
 
 def pair_unit(unit: str, first: str, second: str, robot: Robot) -> str:
     """
-    Return a unit as it is between two joints, one of which may slide.
+    Return a unit for a pair of joints, one of which may be prismatic.
 
-    A stiffness makes of the turn of one a force of the other, and of its way a torque: both are
-    N/rad. Dry friction is a force of the one and a torque of the other. A share of a torque in the
-    reading of a force is 1/m.
+    A coupling stiffness between a revolute and a prismatic joint has the unit N/rad. Dry friction
+    is a force on one joint and a torque on the other. A share of a torque in the reading of a
+    force has the unit 1/m.
 
     """
     slides = [bool(robot.prismatic[robot.joints.index(joint)]) for joint in (first, second)]
@@ -166,7 +168,7 @@ def pair_unit(unit: str, first: str, second: str, robot: Robot) -> str:
 
 
 def written_units(unit: str) -> tuple[str, ...]:
-    """Return all that a unit can be on joints that turn or slide, or between two of them."""
+    """Return all forms of a unit on revolute and prismatic joints, and between two joints."""
     return tuple(
         dict.fromkeys((unit, _PRISMATIC_UNITS.get(unit, unit), *_MIXED_UNITS.get(unit, ())))
     )

@@ -1,14 +1,14 @@
 # Copyright 2026 The armid_ros developers
 # SPDX-License-Identifier: Apache-2.0
 """
-Two kinds of effects that act on what is recorded, as each other one acts on the arm.
+Base classes of effects on the recording: on positions, or on torque readings.
 
 A recording is the motion of an arm seen through position sensors and its torque seen through
 torque sensors. The torque that a model predicts for a recorded motion is
 
     reading(torque(motion + displacement)),
 
-where the displacement is what the position sensors do not show.
+where the displacement is the true minus the recorded motion.
 
 """
 
@@ -60,14 +60,14 @@ class TorqueReading(Effect):
     @abstractmethod
     def read(self, values: FloatArray, motion: Motion, tau: FloatArray) -> FloatArray:
         """
-        Return what is read where the true torque along a motion is tau, shape (N, n) [N m].
+        Return the torque readings for a true torque along a motion, shape (N, n) [N m].
 
         Parameters
         ----------
         values : ndarray, shape (P,)
-            Parameter values; zero reads the truth.
+            Parameter values; zeros give the true torque.
         motion : Motion
-            Gives the time base and, where it was measured, the torque that the drives report.
+            Motion with the time base and, if measured, the torque that the drives report.
         tau : ndarray, shape (N, n)
             True torque [N m].
 
@@ -84,15 +84,15 @@ class TorqueReading(Effect):
         """Differentiate the reading by the values, shape (N, n, P)."""
 
     def memory(self, values: FloatArray) -> float:
-        """Return how far back in time the reading depends on the torque [s]."""
+        """Return the time span of the past torque on which the reading depends [s]."""
         return 0.0
 
     def columns(self, motion: Motion, arm: Arm) -> FloatArray:
-        """Return the derivative of the reading, at the torque that it is given (N, n, P)."""
+        """Return the derivative of the reading at the torque before the effect, (N, n, P)."""
         return self.sensitivity(arm.values_of(self), motion, arm.torque_before(self, motion))
 
     def action(self, values: FloatArray, arm: Arm) -> Action:
-        """Return the reading."""
+        """Return the law of the reading."""
         if not np.any(values):
             return Action()
 

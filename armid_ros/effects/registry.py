@@ -1,11 +1,11 @@
 # Copyright 2026 The armid_ros developers
 # SPDX-License-Identifier: Apache-2.0
 """
-The registry of effects: those that are shipped, those of other packages, and one's own.
+The registry of effects: shipped effects, effects of other packages, user-defined effects.
 
-A package brings effects by an entry point of the group ``armid_ros.effects``, which names a class
-or a module that registers classes. Packages are looked for when something that is not shipped is
-asked for, or everything is.
+A package provides effects by an entry point of the group ``armid_ros.effects``, which names a
+class or a module that registers classes. Packages are loaded when a name is not shipped, or when
+all names are listed.
 
 """
 
@@ -24,27 +24,27 @@ from armid_ros.effects.quantities import Quantity, Shape
 from armid_ros.errors import ModelError, nearest
 from armid_ros.robots import Robot
 
-#: Entry-point group of packages that bring effects.
+#: Entry-point group of packages that provide effects.
 GROUP = 'armid_ros.effects'
-#: Names stand in files, on command lines and between '@', '+', ':' and ','.
+#: Pattern of names, which occur in files, on command lines and between '@', '+', ':' and ','.
 _NAME = re.compile(r'[a-z][a-z0-9_]*')
 
 
 class Kind(Protocol):
-    """A kind of effect: a class of the catalogue, or anything else that makes effects so."""
+    """A kind of effect: a class of the catalogue, or an object with the same methods."""
 
     @property
     def name(self) -> str:
-        """Return what its effects are called."""
+        """Return the name of the effects."""
 
     def on(self, robot: Robot, joints: tuple[str, ...] | None = None) -> Effect:
         """Make the effect for a robot."""
 
     def places(self, robot: Robot) -> tuple[tuple[str, ...], ...]:
-        """Return the sets of joints on which it is one cause."""
+        """Return the sets of joints of single causes."""
 
     def as_change(self) -> Kind:
-        """Return what is looked for between two days."""
+        """Return the kind for a change between two days."""
 
 
 class Catalogue(Mapping[str, type[Effect]]):
@@ -54,7 +54,7 @@ class Catalogue(Mapping[str, type[Effect]]):
     Attributes
     ----------
     broken : dict of str to str
-        Packages whose effects cannot be loaded, and why.
+        Packages whose effects cannot be loaded, each with the reason.
 
     """
 
@@ -65,18 +65,18 @@ class Catalogue(Mapping[str, type[Effect]]):
         self.broken: dict[str, str] = {}
 
     def __getitem__(self, name: str) -> type[Effect]:
-        """Return a class, of a package too."""
+        """Return a class by its name; packages are loaded if needed."""
         if name not in self._kinds:
             self._complete_once()
         return self._kinds[name]
 
     def __iter__(self) -> Iterator[str]:
-        """Iterate over all names, those of packages and one's own last."""
+        """Iterate over all names; shipped names come first."""
         self._complete_once()
         return iter(tuple(self._kinds))
 
     def __len__(self) -> int:
-        """Count all of them."""
+        """Return the number of all effects."""
         self._complete_once()
         return len(self._kinds)
 
@@ -87,8 +87,8 @@ class Catalogue(Mapping[str, type[Effect]]):
         Raises
         ------
         ModelError
-            If there is none; the message has the nearest name, or lists them, and packages that
-            cannot be loaded.
+            If the name is unknown. The message contains the nearest name or all names, and
+            packages that cannot be loaded.
 
         """
         if name in self:
@@ -103,17 +103,17 @@ class Catalogue(Mapping[str, type[Effect]]):
         )
         raise ModelError(
             f"no effect '{name}'; the catalogue has {', '.join(self)}{lost}"
-            '; effects of other packages are there once those are installed'
+            '; install a package to add its effects'
         )
 
     def add(self, kind: type[Effect]) -> None:
         """
-        Add a class, or put a new version of it in the place of the old one.
+        Add a class, or replace an old version of the class.
 
         Raises
         ------
         ModelError
-            If something is missing in it, or its name or that of a quantity is taken.
+            If the class is incomplete, or its name or the name of a quantity is already used.
 
         """
         check_kind(kind)
@@ -133,12 +133,12 @@ class Catalogue(Mapping[str, type[Effect]]):
             if name in taken:
                 raise ModelError(
                     f"{kind.name}: the name '{name}' is that of a quantity of "
-                    f'{taken[name]}; one model may have both, so choose another name'
+                    f'{taken[name]}; one model may contain both, so choose another name'
                 )
         self._kinds[kind.name] = kind
 
     def remove(self, name: str) -> None:
-        """Take away a class that is not shipped; nothing happens if it is not there."""
+        """Remove a class that is not shipped, if it exists."""
         if name not in self._shipped:
             self._kinds.pop(name, None)
 
@@ -152,11 +152,11 @@ class Catalogue(Mapping[str, type[Effect]]):
                 loaded = entry.load()
                 if not isinstance(loaded, ModuleType):
                     self.add(loaded)
-            except Exception as error:  # a package of somebody else may fail in any way
+            except Exception as error:  # another package may raise any exception
                 package = entry.dist.name if entry.dist else entry.value
                 self.broken[package] = f'{type(error).__name__}: {error}'
                 logging.getLogger('armid_ros').warning(
-                    'armid_ros: effects of %s cannot be loaded: %s; mend or uninstall it',
+                    'armid_ros: effects of %s cannot be loaded: %s; repair or uninstall it',
                     package,
                     self.broken[package],
                 )
@@ -164,16 +164,16 @@ class Catalogue(Mapping[str, type[Effect]]):
 
 def check_kind(kind: type[Effect]) -> None:
     """
-    Check that a class has what every effect has.
+    Check that a class has the required attributes of an effect.
 
     Raises
     ------
     ModelError
-        Naming the class and what is missing in it.
+        If an attribute is missing; the message names the class and the attribute.
 
     """
     if not (inspect.isclass(kind) and issubclass(kind, Effect)):
-        raise ModelError(f'{kind!r} is no class of effects; derive it from armid_ros.Effect')
+        raise ModelError(f'{kind!r} is not an effect class; derive it from armid_ros.Effect')
     where = _home(kind)
     name = getattr(kind, 'name', None)
     if not isinstance(name, str) or not _NAME.fullmatch(name):
@@ -183,7 +183,7 @@ def check_kind(kind: type[Effect]) -> None:
         raise ModelError(f'{name} ({where}) has no {" and no ".join(lacking)}')
     summary = getattr(kind, 'summary', None)
     if not isinstance(summary, str) or not summary.strip():
-        raise ModelError(f"{name} ({where}): 'summary' has to say in one line what it is")
+        raise ModelError(f"{name} ({where}): 'summary' has to be a text of one line")
     quantities: tuple[Quantity, ...] = getattr(kind, 'quantities', ())
     if not quantities or not all(isinstance(one, Quantity) for one in quantities):
         raise ModelError(f"{name} ({where}): 'quantities' has to be a tuple of Quantity")

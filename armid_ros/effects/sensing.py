@@ -1,6 +1,6 @@
 # Copyright 2026 The armid_ros developers
 # SPDX-License-Identifier: Apache-2.0
-"""What a reading of a torque or of a position contains that the arm does not need."""
+"""Errors of torque and position readings."""
 
 from __future__ import annotations
 
@@ -15,7 +15,8 @@ from armid_ros.effects.unexplained import Unexplained
 from armid_ros.motion import FloatArray, Motion
 import numpy as np
 
-#: Times of a drift that are looked at, over the length of a recording: faster, it is an offset.
+#: Time constants of a drift in a search, over the length of a recording; a faster drift is an
+#: offset.
 _TIMES = (0.3, 1.0, 3.0)
 
 
@@ -53,9 +54,9 @@ class TorqueGain(TorqueReading):
     """
     Torque readings that are too large by a share, reading = (1 + epsilon) tau.
 
-    A motor constant or a sensor scale that is not what it is taken for. The same share in all
-    joints is the same as all masses, inertias and friction scaled by it, exactly; one known
-    payload tells.
+    The cause is a wrong motor constant or sensor scale. The same share in all joints is exactly
+    collinear with a scaling of all masses, inertias and friction; one known payload distinguishes
+    them.
 
     """
 
@@ -89,8 +90,8 @@ class TorqueDrift(TorqueReading):
     Torque readings that drift while sensor or electronics warm up, d (1 - exp(-t / T)).
 
     Time counts from the beginning of the recording. Independent of the motion, unlike
-    thermal_friction; equal periods differ by it. Confounded with torque_offset where the recording
-    is long after the warming, and, seen over one short recording, with a payload that slips.
+    thermal_friction; equal periods differ by it. Confounded with torque_offset if the recording
+    begins long after the warming and, in one short recording, with a payload that slips.
 
     """
 
@@ -100,7 +101,7 @@ class TorqueDrift(TorqueReading):
     shapes = (Shape('drift_time', 's', 0.1, 1e5, 600.0, (10.0, 60.0, 300.0, 1000.0, 3000.0)),)
 
     def shape_starts(self, unexplained: Unexplained, arm: Arm) -> tuple[FloatArray, ...]:
-        """Return times that differ on a recording: beyond three of it, a drift is a line."""
+        """Return distinguishable times; beyond three recording lengths, a drift is a line."""
         times = np.maximum(
             float(np.ptp(unexplained.motion.t)) * np.array(_TIMES), self.shapes[0].lower
         )
@@ -113,7 +114,7 @@ class TorqueDrift(TorqueReading):
     def transfer(
         self, values: FloatArray, motion: Motion, tau: FloatArray, columns: FloatArray
     ) -> FloatArray:
-        """Return the columns as they are."""
+        """Return the columns without change."""
         return columns
 
     def sensitivity(self, values: FloatArray, motion: Motion, tau: FloatArray) -> FloatArray:
@@ -126,12 +127,12 @@ class TorqueDrift(TorqueReading):
 @dataclass(frozen=True)
 class EncoderOffset(Displacing):
     """
-    Zero of an encoder that is off, q = reading + offset.
+    Offset of the zero of an encoder, q = reading + offset.
 
     The first order is dtau/dq times the offset, the same offset at all loads. Confounded with
     base_tilt (exactly, for the first joint of a planar arm), and with the direction of the link's
-    first moment: free rigid parameters of a planar arm swallow the second joint's offset exactly.
-    Hard stops, or centres of mass known from drawings, tell.
+    first moment: free rigid parameters of a planar arm absorb the second joint's offset exactly.
+    Hard stops, or centres of mass known from drawings, distinguish them.
 
     """
 

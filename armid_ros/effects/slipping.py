@@ -1,6 +1,6 @@
 # Copyright 2026 The armid_ros developers
 # SPDX-License-Identifier: Apache-2.0
-"""Springs that slip: friction that depends on the way since the last reversal."""
+"""Slipping springs: friction that depends on the travel since the last reversal."""
 
 from __future__ import annotations
 
@@ -9,27 +9,27 @@ from dataclasses import dataclass
 from armid_ros.motion import FloatArray
 import numpy as np
 
-#: A joint slower than this share of the top speed of its motion rests.
+#: Share of the top speed of a motion below which a joint is at rest.
 _REST = 0.02
 
 
 @dataclass(frozen=True)
 class Hysteresis:
     """
-    Friction that grows with the way since the last reversal: m springs that slip.
+    Friction that grows with the travel since the last reversal: m slipping springs.
 
     The state h of an element, from -1 to 1, follows dh = (1 - h sign(dx)) |dx| / distance along
-    its way x, whatever the speed. Its torque is level * h.
+    its travel x, at any speed. Its torque is level * h.
     Source: Dahl 1968 with exponent 1.
 
     Attributes
     ----------
     directions : ndarray, shape (m, n)
-        Way of each element as a combination of the joint positions.
+        Travel of each element as a combination of the joint positions.
     level : ndarray, shape (m,)
-        Torque after a long way [N m].
+        Torque after a long travel [N m].
     distance : ndarray, shape (m,)
-        Way after which 1 - 1/e of the level is reached, from rest [rad or m].
+        Travel from rest after which 1 - 1/e of the level is reached [rad or m].
 
     """
 
@@ -38,7 +38,7 @@ class Hysteresis:
     distance: FloatArray
 
     def start(self, dq: FloatArray) -> FloatArray:
-        """Return the state of an arm that has moved like this for long, or rests relaxed (m,)."""
+        """Return the state after a long motion at this velocity, or zero at rest, (m,)."""
         return np.asarray(np.sign(self.directions @ dq))
 
     def advance(self, state: FloatArray, dq: FloatArray) -> FloatArray:
@@ -63,7 +63,7 @@ class Hysteresis:
         """
         way = q @ self.directions.T
         states = np.empty_like(way)
-        moves = np.abs(dq[0]) > _REST * np.abs(dq).max(axis=0)  # the rest is noise of a sensor
+        moves = np.abs(dq[0]) > _REST * np.abs(dq).max(axis=0)  # slower motion is sensor noise
         states[0] = self.start(np.where(moves, dq[0], 0.0))
         for element, distance in enumerate(self.distance):
             own, state = way[:, element], states[:, element]
@@ -79,7 +79,7 @@ class Hysteresis:
         Parameters
         ----------
         q, dq : ndarray, shape (N, n)
-            As for ``along``.
+            Positions and velocities, as for ``along``.
         weights : ndarray, shape (N, n)
             One per torque.
 
@@ -113,7 +113,7 @@ def _stretches(way: FloatArray) -> list[tuple[int, int, float]]:
 def _slip_pullback(
     way: FloatArray, state: FloatArray, by_state: FloatArray, distance: float
 ) -> FloatArray:
-    """Turn derivatives by the states of one element into those by its way, both (N,)."""
+    """Convert derivatives by the states of one element to derivatives by its travel, both (N,)."""
     by_way, by_state = np.zeros_like(way), by_state.copy()
     for first, last, end in reversed(_stretches(way)):
         own = slice(first + 1, last + 1)

@@ -15,9 +15,9 @@ from armid_ros.motion import FloatArray, Motion
 from armid_ros.robots import Robot
 import numpy as np
 
-#: Where bumpers begin by default: this share of the range of motion from either end ...
+#: Default position of bumpers: this share of the range of motion from either end.
 _BUMPER = 0.15
-#: ... and shares of the range that was moved through between which a search looks for them.
+#: Shares of the range of the recorded motion between which a search places bumpers.
 _EDGES = (0.02, 0.05, 0.1, 0.2, 0.3)
 
 
@@ -26,10 +26,10 @@ class JointSpring(Effect):
     """
     Spring on a joint, such as a cable, a hose or a balancer, tau = k q + preload.
 
-    The preload is the torque at q = 0, which is -k times the position of rest. It depends on
-    position alone, whatever the speed, the payload and gravity; without the stiffness it is a
-    torque_offset. Confounded with the first moment of the link over a small range; tilting the
-    base, or unplugging the hose, tells.
+    The preload is the torque at q = 0, which is -k times the rest position. The torque depends on
+    position only, not on speed, payload or gravity. Without stiffness it equals a torque_offset.
+    Confounded with the first moment of the link over a small range; tilting the base, or removing
+    the hose, distinguishes them.
 
     """
 
@@ -45,7 +45,7 @@ class JointSpring(Effect):
         return joint_columns(self, motion, arm.link_motion(motion).q, np.ones_like(motion.q))
 
     def action(self, values: FloatArray, arm: Arm) -> Action:
-        """Return the torque of the springs, without columns: simulations have many of them."""
+        """Return the torque of the springs, without columns to save time in simulations."""
         stiffness, preload = scatter(self, values, arm.robot)
 
         def torque(t: FloatArray, q: FloatArray, dq: FloatArray) -> FloatArray:
@@ -54,7 +54,7 @@ class JointSpring(Effect):
         return Action(link_torque=torque)
 
     def plausible(self, values: FloatArray, std: FloatArray, arm: Arm) -> bool:
-        """Return whether there is surely a stiffness; a preload alone is an offset."""
+        """Return whether the stiffness is significant; a preload alone is an offset."""
         return bool(values[0] > SURELY * std[0])
 
 
@@ -63,8 +63,8 @@ class SoftLimit(Effect):
     """
     Bumpers that push back beyond a position at either end of the range of motion.
 
-    tau = k_up max(q - q_up, 0) - k_low max(q_low - q, 0); nothing between q_low and q_up.
-    Confounded with a hardening joint_spring; motion that keeps out of the zone tells.
+    tau = k_up max(q - q_up, 0) - k_low max(q_low - q, 0); zero between q_low and q_up. Confounded
+    with a hardening joint_spring; motion outside the zones distinguishes them.
 
     """
 
@@ -88,7 +88,7 @@ class SoftLimit(Effect):
         return np.where(known[:, np.newaxis], edges, self.shape_values)
 
     def shape_starts(self, unexplained: Unexplained, arm: Arm) -> tuple[FloatArray, ...]:
-        """Return positions near the ends of what was moved through."""
+        """Return positions near both ends of the recorded motion."""
         motion = unexplained.motion
         q = arm.link_motion(motion).q[:, self.indices(motion.joints)]
         lowest, highest = q.min(axis=0)[:, np.newaxis], q.max(axis=0)[:, np.newaxis]
@@ -96,7 +96,7 @@ class SoftLimit(Effect):
         return lowest + depth, highest - depth
 
     def columns(self, motion: Motion, arm: Arm) -> FloatArray:
-        """Return how deep each bumper is pressed, with its sign [rad], shape (N, n, P)."""
+        """Return the signed compression of each bumper [rad], shape (N, n, P)."""
         q = arm.link_motion(motion).q
         lower, upper = self.shape_over_joints(arm.robot)
         return joint_columns(self, motion, -np.maximum(lower - q, 0.0), np.maximum(q - upper, 0.0))

@@ -1,17 +1,17 @@
 # Copyright 2026 The armid_ros developers
 # SPDX-License-Identifier: Apache-2.0
 """
-The contract of effects, for the tests of whoever writes one.
+Checks of the contract of effects, for tests of user-defined effects.
 
-In a test of a package that brings an effect::
+In a test of a package that provides an effect::
 
     from armid_ros.effects.testing import check_effect
 
     def test_hose_keeps_the_contract():
         check_effect(Hose)
 
-Simulation, identification and diagnosis rely on what is checked, and on nothing else. Each check
-is a function of an ``EffectCase`` that raises AssertionError; ``CHECKS`` has them all.
+Simulation, identification and diagnosis rely only on the checked properties. Each check is a
+function of an ``EffectCase`` that raises AssertionError. ``CHECKS`` contains all checks.
 
 """
 
@@ -30,27 +30,27 @@ from armid_ros.robots import load_robot, Robot
 import numpy as np
 import numpy.typing as npt
 
-#: Size of a quantity that does not say what is typical.
+#: Size of a quantity without a typical size.
 _SIZE = 0.1
-#: Step of the differences, and how far derivatives may be from them, relative to the largest.
+#: Step of the finite differences, and tolerance of derivatives relative to the largest one.
 _STEP, _TOLERANCE = 1e-6, 2e-5
 
 
 @dataclass(frozen=True)
 class EffectCase:
     """
-    An effect on a robot, with values and a motion to try it with.
+    A test case: an effect on a robot, with values and a motion.
 
     Attributes
     ----------
     effect : Effect
-        On all joints that it acts on by default.
+        The effect on all its default joints.
     robot : Robot
         The arm.
     motion : Motion
         N samples in sines, with a measured torque.
     values : ndarray, shape (P,)
-        Typical ones, of both signs where both are possible.
+        Typical values, of both signs if both are possible.
 
     """
 
@@ -69,7 +69,7 @@ class EffectCase:
         seed: int = 3,
     ) -> EffectCase:
         """
-        Make the trial of a class.
+        Make the test case of a class.
 
         Parameters
         ----------
@@ -78,9 +78,9 @@ class EffectCase:
         robot : Robot, optional
             The shipped arm by default.
         size : array_like, optional
-            Of each quantity; the geometric mean of what is typical by default.
+            Size of each quantity; by default the geometric mean of the typical range.
         seed : int
-            Of values and torque.
+            Seed of values and torque.
 
         """
         robot = robot or load_robot('humanoid_arm')
@@ -100,12 +100,12 @@ class EffectCase:
         return ArmModel(self.robot).with_effect(self.effect, values)
 
     def torque(self, values: FloatArray) -> FloatArray:
-        """Return what the arm with the effect takes along the motion, shape (N, n)."""
+        """Return the torque of the arm with the effect along the motion, shape (N, n)."""
         return np.asarray(self.arm(values).torque(self.motion))
 
 
 def sines(robot: Robot, duration: float = 0.5, rate: float = 200.0) -> Motion:
-    """Return a motion in sines inside the limits, a different one in every joint, no torque."""
+    """Return a motion of sines within the limits, different in every joint, without torque."""
     t = np.arange(0.0, duration, 1.0 / rate)
     frequency = 2.0 * np.pi * np.linspace(0.4, 2.1, robot.n_joints)
     phase = frequency * t[:, np.newaxis] + np.arange(robot.n_joints)
@@ -130,16 +130,16 @@ def check_effect(kind: type[Effect], robot: Robot | None = None, *, seed: int = 
     kind : type of Effect
         The class; it need not be registered.
     robot : Robot, optional
-        An arm that it is meant for; the shipped one by default.
+        An arm for which the effect is meant; a shipped arm by default.
     seed : int
-        Of values and torque.
+        Seed of values and torque.
 
     Raises
     ------
     AssertionError
-        Naming all that is wrong.
+        If a check fails; the message names all faults.
     ModelError
-        If something that every class has is missing.
+        If the class lacks a required attribute.
 
     Examples
     --------
@@ -154,7 +154,7 @@ def check_effect(kind: type[Effect], robot: Robot | None = None, *, seed: int = 
     for check in CHECKS:
         try:
             check(trial)
-        except Exception as fault:  # code of somebody else may fail in any way
+        except Exception as fault:  # a user-defined effect may raise any exception
             said = ' '.join(str(fault).split())
             kind_of_fault = '' if isinstance(fault, AssertionError) else type(fault).__name__ + ' '
             wrong.append(f'{check.__name__.replace("_", " ")}: {kind_of_fault}{said}')
@@ -163,7 +163,7 @@ def check_effect(kind: type[Effect], robot: Robot | None = None, *, seed: int = 
 
 
 def it_says_what_it_is(trial: EffectCase) -> None:
-    """Fail where docstring, bounds or names are missing."""
+    """Fail if docstring, bounds or names are missing."""
     kind = type(trial.effect)
     assert kind.__doc__ and not kind.__doc__.startswith(f'{kind.__name__}('), 'no docstring'
     for quantity in kind.quantities:
@@ -178,7 +178,7 @@ def it_says_what_it_is(trial: EffectCase) -> None:
 
 
 def columns_have_one_place_per_parameter(trial: EffectCase) -> None:
-    """Fail where columns are not finite, or not of shape (N, n, P)."""
+    """Fail if columns are not finite, or not of shape (N, n, P)."""
     columns = ArmModel(trial.robot).columns_of(trial.effect, trial.motion)
     wanted = (*trial.motion.q.shape, len(trial.values))
     assert columns.shape == wanted, f'columns have shape {columns.shape}, not {wanted}'
@@ -186,25 +186,25 @@ def columns_have_one_place_per_parameter(trial: EffectCase) -> None:
 
 
 def size_zero_changes_nothing(trial: EffectCase) -> None:
-    """Fail where the effect acts without being there."""
+    """Fail if the effect acts with zero values."""
     bare = ArmModel(trial.robot).torque(trial.motion)
     np.testing.assert_allclose(trial.torque(0.0 * trial.values), bare, atol=1e-12)
 
 
 def columns_are_the_derivative_at_zero(trial: EffectCase) -> None:
-    """Fail where ``columns`` and ``action`` do not agree for a small effect."""
+    """Fail if ``columns`` and ``action`` do not agree for a small effect."""
     columns = ArmModel(trial.robot).columns_of(trial.effect, trial.motion)
     _compare(trial, np.zeros_like(trial.values), columns)
 
 
 def columns_are_the_derivative_at_any_size(trial: EffectCase) -> None:
-    """Fail where they do not agree for an effect of typical size."""
+    """Fail if ``columns`` and ``action`` do not agree for an effect of typical size."""
     columns = trial.arm(trial.values).columns(trial.motion)
     _compare(trial, trial.values, columns[:, :, -len(trial.values) :])
 
 
 def linear_means_exact(trial: EffectCase) -> None:
-    """Fail where the torque of an effect that says it is linear is not columns times values."""
+    """Fail if the torque of a linear effect is not columns times values."""
     if trial.effect.linear:
         bare = ArmModel(trial.robot)
         columns = bare.columns_of(trial.effect, trial.motion)
@@ -214,7 +214,7 @@ def linear_means_exact(trial: EffectCase) -> None:
 
 
 def instantaneous_means_sample_by_sample(trial: EffectCase) -> None:
-    """Fail where columns depend on the samples around, and the effect says they do not."""
+    """Fail if columns of an instantaneous effect depend on neighbouring samples."""
     if trial.effect.instantaneous:
         arm, part = ArmModel(trial.robot), slice(40, 60)
         whole = arm.columns_of(trial.effect, trial.motion)[part]
@@ -224,7 +224,7 @@ def instantaneous_means_sample_by_sample(trial: EffectCase) -> None:
 
 
 def shapes_stay_possible(trial: EffectCase) -> None:
-    """Fail where default shapes or the starts of a search are outside of the bounds."""
+    """Fail if default shapes or start values of a search are outside the bounds."""
     effect, motion = trial.effect, trial.motion
     assert motion.tau is not None
     nothing = np.zeros((*motion.q.shape, 0))
@@ -239,12 +239,12 @@ def shapes_stay_possible(trial: EffectCase) -> None:
 
 
 def it_goes_to_other_processes(trial: EffectCase) -> None:
-    """Fail where it does not survive being pickled."""
+    """Fail if the effect cannot be pickled."""
     assert pickle.loads(pickle.dumps(trial.effect)) == trial.effect
 
 
 def _compare(trial: EffectCase, values: FloatArray, columns: FloatArray) -> None:
-    """Compare columns with differences, to one side at a lower bound."""
+    """Compare columns with finite differences, one-sided at a lower bound."""
     lower, _ = trial.effect.bounds()
     for parameter, step in enumerate(_STEP * np.eye(len(values))):
         if values[parameter] - _STEP > lower[parameter]:

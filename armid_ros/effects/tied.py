@@ -1,10 +1,10 @@
 # Copyright 2026 The armid_ros developers
 # SPDX-License-Identifier: Apache-2.0
 """
-What holds a link to a machine or a person whose motion was recorded beside that of the arm.
+Springs between a link and a machine or person whose motion was recorded too.
 
-The springs are those of ``interaction``. Where they end on the other side is known: points of
-``Motion.partner`` with the names of the ties. So neither attachments nor anchors are to be found.
+The springs are those of ``interaction``. Their anchors are known: points of ``Motion.partner``
+with the names of the ties. Therefore neither attachments nor anchors are estimated.
 
 """
 
@@ -25,23 +25,23 @@ from armid_ros.robots import Robot
 import numpy as np
 from scipy.interpolate import CubicHermiteSpline
 
-#: Slacks that a search starts from [m]: straps are drawn out by millimetres.
+#: Start values of slacks in a search [m]; straps stretch by millimetres.
 _SLACKS = (0.001, 0.002, 0.004, 0.008)
 
 
 @dataclass(frozen=True)
 class Tied(Attached):
     """
-    Springs to points of another machine that moved.
+    Base class of springs to points of another machine in motion.
 
     Attributes
     ----------
     ties : tuple of Tie
-        Where they are, one on each joint.
+        The ties, one on each joint.
     partner : str
         The description of the other machine: a shipped name or a path.
     anchor : callable, or None
-        Where the points are along a motion, see `along`.
+        Function that returns the points along a motion; see `along`.
 
     """
 
@@ -51,7 +51,7 @@ class Tied(Attached):
 
     @property
     def points(self) -> tuple[str, ...]:
-        """Names of the points beside the arm that it ends at."""
+        """Names of the points of the other machine."""
         return tuple(tie.name for tie in self.ties)
 
     def along(self, motion: Motion) -> Self:
@@ -94,14 +94,14 @@ class Tied(Attached):
         return self.anchor or unknown
 
     def shape_starts(self, unexplained: Unexplained, arm: Arm) -> tuple[FloatArray, ...]:
-        """Return the slacks to start from: where straps end is known."""
+        """Return the start values of the slacks; the anchors are known."""
         return Attached.shape_starts(self, unexplained, arm)
 
     def _default_shape(self, robot: Robot) -> FloatArray:
         return self.shape_values
 
     def particulars(self) -> dict[str, Any]:
-        """Return the other machine and the points of both where the springs end."""
+        """Return the other machine and the end points of the springs."""
         rows = [
             {
                 'name': tie.name,
@@ -125,7 +125,7 @@ class TiedInteraction(Tied, HumanInteraction):
 
 @dataclass(frozen=True)
 class TiedSlack(Tied, InterfaceSlack):
-    """Strap to a point whose motion is known: it pulls beyond a slack only."""
+    """Strap to a point whose motion is known; it pulls only beyond a slack."""
 
     shapes = (replace(InterfaceSlack.shapes[-1], default=0.003, grid=_SLACKS),)
 
@@ -133,14 +133,14 @@ class TiedSlack(Tied, InterfaceSlack):
 @dataclass(frozen=True)
 class TiedKind:
     """
-    A kind of tied effect with its ties, which makes effects as a class of the catalogue does.
+    A kind of tied effect with its ties, with the interface of a class of the catalogue.
 
     Attributes
     ----------
     effect : type of Tied
         The class.
     ties : tuple of Tie
-        Where there may be springs, one on each joint at most.
+        Possible springs, at most one on each joint.
     partner : str
         The description of the other machine.
 
@@ -151,7 +151,7 @@ class TiedKind:
     partner: str = ''
 
     def __post_init__(self) -> None:
-        """Refuse two ties on one joint, whose parameters would have one name."""
+        """Raise a ModelError for two ties on one joint, whose parameter names would be equal."""
         joints = [tie.joint for tie in self.ties]
         twice = [joint for joint in joints if joints.count(joint) > 1]
         if twice:
@@ -169,7 +169,7 @@ class TiedKind:
         return tuple((tie.joint,) for tie in self.ties)
 
     def as_change(self) -> TiedKind:
-        """Return the same: it has no values from before."""
+        """Return the same kind."""
         return self
 
     def on(self, robot: Robot, joints: Sequence[str] | None = None) -> Effect:
@@ -179,7 +179,7 @@ class TiedKind:
         Raises
         ------
         ModelError
-            If a joint has none.
+            If a joint has no tie.
 
         """
         by_joint = {tie.joint: tie for tie in self.ties}
@@ -199,19 +199,19 @@ class TiedKind:
 
 def tied_kind(name: str, particulars: Mapping[str, Any]) -> TiedKind:
     """
-    Return what makes a tied effect with the ``particulars`` that another one gave.
+    Return the kind of a tied effect from the ``particulars`` of an effect.
 
     Raises
     ------
     ModelError
         If effects of that name are not tied.
     ValueError
-        If a coordinate is no number.
+        If a coordinate is not a number.
 
     """
     known = {kind.name: kind for kind in (TiedInteraction, TiedSlack)}
     if name not in known:
-        raise ModelError(f"{name} has 'ties'; those that can be tied are {', '.join(known)}")
+        raise ModelError(f"{name} has 'ties'; effects that can have ties are {', '.join(known)}")
     ties = [
         Tie(
             str(row['name']),
@@ -233,14 +233,14 @@ def _point(values: Sequence[float]) -> tuple[float, float, float]:
 @dataclass(frozen=True)
 class Partner:
     """
-    A second machine, and where the arm may be tied to it.
+    A second machine, and possible ties of the arm to it.
 
     Attributes
     ----------
     robot : Robot
         Its description; its base frame is that of the arm.
     ties : tuple of Tie
-        Where there may be springs, one on each joint of the arm at most.
+        Possible springs, at most one on each joint of the arm.
     source : str
         The description's shipped name or path.
 
@@ -252,10 +252,10 @@ class Partner:
 
     @property
     def interaction(self) -> TiedKind:
-        """Return what makes springs and dampers."""
+        """Return the kind of springs and dampers."""
         return TiedKind(TiedInteraction, self.ties, self.source or self.robot.name)
 
     @property
     def slack(self) -> TiedKind:
-        """Return what makes straps with slack."""
+        """Return the kind of straps with slack."""
         return TiedKind(TiedSlack, self.ties, self.source or self.robot.name)

@@ -1,6 +1,6 @@
 # Copyright 2026 The armid_ros developers
 # SPDX-License-Identifier: Apache-2.0
-"""Torque readings that come late: by a delay, or through a low-pass."""
+"""Late torque readings: by a delay, or by a low-pass filter."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ import numpy as np
 from scipy.signal import butter, lfilter, sosfiltfilt
 from scipy.sparse import csr_array
 
-#: Time constants after which a low-pass has forgotten what went in.
+#: Number of time constants after which a low-pass output no longer depends on an input.
 _FORGOTTEN = 20.0
 #: Factor between two lags whose difference is the derivative.
 _MORE = 1.0001
@@ -26,39 +26,39 @@ _MORE = 1.0001
 
 @dataclass(frozen=True)
 class LateReading(TorqueReading):
-    """A reading that comes late, which shows in how fast the torque changes."""
+    """A late torque reading, whose error is proportional to the rate of the torque."""
 
     @abstractmethod
     def _late(self, values: FloatArray, motion: Motion, x: FloatArray) -> FloatArray:
-        """Return what has come of signals of all joints, shape (N, n, ...)."""
+        """Return late signals of all joints, shape (N, n, ...)."""
 
     def read(self, values: FloatArray, motion: Motion, tau: FloatArray) -> FloatArray:
-        """Return the torque as it comes, shape (N, n) [N m]."""
+        """Return the late torque, shape (N, n) [N m]."""
         return self._late(values, motion, tau)
 
     def transfer(
         self, values: FloatArray, motion: Motion, tau: FloatArray, columns: FloatArray
     ) -> FloatArray:
-        """Return the columns, as late as the torque."""
+        """Return the columns, late by the same amount as the torque."""
         return self._late(values, motion, columns)
 
     def columns(self, motion: Motion, arm: Arm) -> FloatArray:
         """
         Return the derivative of the reading, shape (N, n, P).
 
-        It is taken along the motion without the noise of positions: the rate of a torque is a
-        third derivative of them, and noise in columns makes the values too small.
+        The derivative is computed along a smoothed motion. The rate of a torque contains the third
+        derivative of the positions, and noise in columns biases the values towards zero.
 
         """
         return super().columns(arm.smoothed(motion), arm)
 
     @classmethod
     def places(cls, robot: Robot) -> tuple[tuple[str, ...], ...]:
-        """Return the whole arm, whose drives and clocks are alike, and every joint."""
+        """Return the whole arm, with one delay of all joints, and every single joint."""
         return ((), *((joint,) for joint in robot.joints))
 
     def _owned(self, motion: Motion) -> list[list[int]]:
-        """Return the joints that each of its owners has: all of them, or one."""
+        """Return the joints of each owner: all joints, or one."""
         joints = self.indices(motion.joints)
         return [[joint] for joint in joints] or [list(range(motion.n_joints))]
 
@@ -68,11 +68,11 @@ class TimeDelay(LateReading):
     """
     Torque readings older than the positions they are recorded with, reading(t) = tau(t - delay).
 
-    Of the whole arm by default, where one clock or one bus is behind; of joints that are named,
-    each has its own. The first order is -dtau/dt. At low frequency it looks like viscous friction
-    where the joint is loaded, at high frequency like negative one; confounded with torque_lag,
-    which attenuates as well, with joint_elasticity and with clocks that disagree. Two frequencies,
-    or the slope of the phase, tell.
+    By default, the whole arm has one delay, as with one late clock or bus; named joints have one
+    delay each. The first order is -dtau/dt. At low frequency it looks like viscous friction of a
+    loaded joint, at high frequency like negative viscous friction. Confounded with torque_lag,
+    which attenuates as well, with joint_elasticity and with clocks that differ. Two frequencies,
+    or the slope of the phase, distinguish them.
 
     """
 
@@ -87,7 +87,7 @@ class TimeDelay(LateReading):
         return ()
 
     def sensitivity(self, values: FloatArray, motion: Motion, tau: FloatArray) -> FloatArray:
-        """Return -dtau/dt of earlier [N m/s], shape (N, n, P)."""
+        """Return -dtau/dt at the earlier time [N m/s], shape (N, n, P)."""
         slope = -self._late(values, motion, tau, derivative=1)
         return _by_owner(self, motion, slope)
 
@@ -111,11 +111,11 @@ class TimeDelay(LateReading):
 @dataclass(frozen=True)
 class TorqueLag(LateReading):
     """
-    Torque readings through a low-pass of the first order, T dreading/dt + reading = tau.
+    Torque readings behind a first-order low-pass, T dreading/dt + reading = tau.
 
-    A current loop, or the filter of a sensor. The first order is -dtau/dt, as of time_delay;
-    beyond it the lag attenuates by 1 / sqrt(1 + (omega T)^2), which motion up to half its
-    bandwidth shows.
+    The cause is a current loop or the filter of a sensor. The first order is -dtau/dt, as for
+    time_delay. In addition the lag attenuates by 1 / sqrt(1 + (omega T)^2), which is visible in
+    motion up to half the bandwidth of the filter.
 
     """
 
@@ -133,7 +133,7 @@ class TorqueLag(LateReading):
         return result
 
     def sensitivity(self, values: FloatArray, motion: Motion, tau: FloatArray) -> FloatArray:
-        """Return dreading/dT [N m/s], which is -dtau/dt where the lag is zero, (N, n, P)."""
+        """Return dreading/dT [N m/s], which is -dtau/dt for a zero lag, (N, n, P)."""
         rates = -rate_of_change(motion.t, tau)
         for lag, rows in zip(values, self._owned(motion), strict=True):
             if lag > 0.0:
@@ -142,7 +142,7 @@ class TorqueLag(LateReading):
         return _by_owner(self, motion, rates)
 
     def memory(self, values: FloatArray) -> float:
-        """Return the time after which the slowest filter has forgotten [s]."""
+        """Return the time after which the slowest filter has settled [s]."""
         return _FORGOTTEN * float(np.max(np.abs(values)))
 
 
@@ -162,11 +162,11 @@ def _require_change(t: FloatArray) -> None:
 
 def earlier_samples(t: FloatArray, delay: float, derivative: int = 0) -> csr_array:
     """
-    Return how samples of earlier, or their derivative, are made of samples, shape (N, N).
+    Return the interpolation matrix for earlier samples, or their derivative, shape (N, N).
 
-    By the cubic between neighbours with the slopes of `rate_of_change` at both; beyond the ends
-    the first and the last cubic go on. All columns of a model are delayed alike, so that the
-    weights are made once and few.
+    The interpolation is cubic between neighbours, with the slopes of `rate_of_change` at both.
+    Beyond the ends, the first and the last cubic are extrapolated. All columns of a model have the
+    same delay, so that the matrix is computed once.
 
     """
     _require_change(t)
@@ -196,7 +196,7 @@ def earlier_samples(t: FloatArray, delay: float, derivative: int = 0) -> csr_arr
 
 
 def _slopes(t: FloatArray) -> tuple[FloatArray, FloatArray, FloatArray]:
-    """Return the weights of the sample before, of its own and after in `rate_of_change`, (N,)."""
+    """Return the weights of the previous, same and next sample in `rate_of_change`, (N,)."""
     before, after = np.diff(t)[:-1], np.diff(t)[1:]
     first, last = 1.0 / (t[1] - t[0]), 1.0 / (t[-1] - t[-2])
     lower = np.concatenate([[0.0], -after / (before * (before + after)), [-last]])
@@ -207,10 +207,11 @@ def _slopes(t: FloatArray) -> tuple[FloatArray, FloatArray, FloatArray]:
 
 def within_band(motion: Motion, x: FloatArray) -> FloatArray:
     """
-    Take from what follows a motion what is beyond the band of the motion.
+    Remove frequencies beyond the band of a motion from a signal computed from it.
 
-    The second derivative of a torque is the fourth of positions, of which noise is the larger
-    part at high frequency. The filter goes forth and back, without a shift in time.
+    The second derivative of a torque contains the fourth derivative of the positions, in which
+    noise dominates at high frequency. The filter runs forwards and backwards, without a time
+    shift.
 
     """
     if np.isinf(motion.band_hz):
@@ -222,7 +223,7 @@ def within_band(motion: Motion, x: FloatArray) -> FloatArray:
 
 
 def smoothed(motion: Motion) -> Motion:
-    """Take from positions, velocities and accelerations what is beyond the band of the motion."""
+    """Remove frequencies beyond the band of a motion from q, dq and ddq."""
     q, dq, ddq = (within_band(motion, x) for x in (motion.q, motion.dq, motion.ddq))
     return replace(motion, q=q, dq=dq, ddq=ddq)
 
@@ -231,8 +232,9 @@ def low_pass(t: FloatArray, x: FloatArray, lag: float) -> FloatArray:
     """
     Filter samples on an even time base, T dy/dt + y = x, from a start in steady change.
 
-    As y = x - T v, where v is the filtered rate of x, with the rate linear between samples: right
-    to second order in the step for lags longer and shorter than it. A negative lag leads.
+    The filter is computed as y = x - T v, where v is the filtered rate of x, and the rate is
+    linear between samples. It is of second order in the step for any ratio of lag and step. A
+    negative lag leads.
 
     """
     rate = rate_of_change(t, x)
@@ -248,7 +250,7 @@ def low_pass(t: FloatArray, x: FloatArray, lag: float) -> FloatArray:
 
 
 def _by_owner(effect: TorqueReading, motion: Motion, values: FloatArray) -> FloatArray:
-    """Place sensitivities (N, n): in a column per joint, or in one for the whole arm."""
+    """Return the columns of sensitivities (N, n): one per joint, or one for the whole arm."""
     if effect.joints:
         return joint_columns(effect, motion, values)
     return values[:, :, np.newaxis]

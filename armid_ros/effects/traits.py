@@ -1,10 +1,10 @@
 # Copyright 2026 The armid_ros developers
 # SPDX-License-Identifier: Apache-2.0
 """
-Words and prior knowledge of the shipped effects, one table.
+Descriptions and prior knowledge of the shipped effects, in one table.
 
-A law has columns and an action; what is said of it, how often it occurs, and where a description
-has a place for it do not change its torque and stand here.
+The classes of effects contain the law of the torque. This table contains everything else: texts,
+frequency of occurrence, and the attributes of a description that hold the quantities.
 
 """
 
@@ -16,33 +16,33 @@ from dataclasses import dataclass
 @dataclass(frozen=True)
 class Traits:
     """
-    What is known of a kind of effect apart from its law.
+    Knowledge on a kind of effect apart from its torque law.
 
     Attributes
     ----------
     shown_by : str
-        The experiment that shows it best, as an engineer would do it.
+        The experiment that identifies the effect best, in words.
     look_at : str
-        What to inspect on the robot before anything else is recorded.
+        Part of the robot to inspect before the next recording.
     sign : str
-        What a positive value means, where the name does not say it.
+        Meaning of a positive value, if the name is not clear.
     weighs : bool
-        Whether it is carried, and so described by its mass, the first quantity, and where it is;
-        it is put down and picked up all day.
+        Whether the effect is a carried load, described by its mass (the first quantity) and its
+        position. A load may be picked up or put down at any time.
     usual : bool
-        Whether it is fitted by default: nearly every joint of every arm has it.
+        Whether the effect is fitted by default, because nearly every joint has it.
     friction : bool
-        Whether it is friction: all friction of a joint may change at once.
+        Whether the effect is friction; all friction of a joint may change together.
     external : bool
-        Whether it comes from outside the arm: a person, another machine.
+        Whether the cause is outside the arm, such as a person or another machine.
     corrects : bool
-        Whether it is an error of the description, and never happens to the arm.
+        Whether the effect is an error of the description, not a change of the arm.
     nuisance : tuple of tuple of float
-        Shapes with which it is a nuisance parameter where nobody asked for it; () if it is none.
+        Shapes of the effect as a nuisance parameter, if it was not requested; () if never.
     separate : tuple of tuple of int
-        Quantities that are causes of their own, if not all of them are one together.
+        Groups of quantities that are separate causes; empty if all quantities are one cause.
     urdf_attribute, mjcf_attribute : str
-        Attribute of a joint of URDF and of MJCF that holds its quantity; '' if none does.
+        Attribute of a joint in URDF and in MJCF that holds the quantity; '' if none.
 
     """
 
@@ -60,7 +60,7 @@ class Traits:
     mjcf_attribute: str = ''
 
 
-#: Traits of the shipped effects by name; other effects have an attribute ``traits``.
+#: Traits of the shipped effects by name; other effects define the attribute ``traits``.
 TRAITS = {
     'encoder_offset': Traits(
         shown_by='hard stops, or a payload at two poses',

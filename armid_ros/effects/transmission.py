@@ -1,12 +1,11 @@
 # Copyright 2026 The armid_ros developers
 # SPDX-License-Identifier: Apache-2.0
 """
-Transmissions that give way between motor and link: elasticity and backlash.
+Elasticity and backlash of transmissions between motor and link.
 
-Positions are read at the motors, and the links are where the load has pushed them. The torque that
-twists a transmission is the rigid body's along the recorded motion, which is the first order of
-what the links do. Everything that is not the rigid body or attached to the links (friction, rotor
-inertia) acts on the side of the motors.
+Positions are measured at the motors; the load displaces the links. The torque that twists a
+transmission is the torque of the rigid body along the recorded motion, which is a first-order
+approximation. Friction and rotor inertia act on the motor side.
 
 """
 
@@ -24,7 +23,7 @@ from armid_ros.motion import FloatArray, Motion
 import numpy as np
 from scipy.integrate import cumulative_trapezoid
 
-#: Inertia about a joint that is taken as some, of a link whose description gives none [kg m^2].
+#: Assumed inertia about a joint of a link without inertia in the description [kg m^2].
 _LIGHTEST = 1e-9
 
 
@@ -33,11 +32,11 @@ class JointElasticity(Displacing):
     """
     Elastic transmission, q_link = q_motor - tau / K, with K = 1 / compliance.
 
-    The first order of the torque is
-    -(dtau/dq tau + dtau/ddq dtau/dt + M d^2tau/dt^2) / K, summed over the joints that
-    give way. A damper D beside the spring makes the twist follow the torque with the retardation
-    time D / K. Confounded with time_delay and torque_lag at low frequency, with a base that
-    gives way; a sweep through antiresonance and resonance, or an encoder at the link, tells.
+    The first order of the torque is -(dtau/dq tau + dtau/ddq dtau/dt + M d^2tau/dt^2) / K, summed
+    over the elastic joints. A damper D beside the spring makes the twist follow the torque with
+    the retardation time D / K. Confounded with time_delay and torque_lag at low frequency, with an
+    elastic base; a sweep through antiresonance and resonance, or an encoder at the link,
+    distinguishes them.
     Source: Spong 1987.
 
     """
@@ -50,7 +49,7 @@ class JointElasticity(Displacing):
     instantaneous = False
 
     def displacements(self, motion: Motion, arm: Arm) -> Displacement:
-        """Return minus the torque that twists the transmission, and its derivatives."""
+        """Return minus the torque that twists the transmission, and derivatives of the torque."""
         load = within_band(motion, arm.load(motion))
         (retardation,) = self.shape_over_joints(arm.robot)
         for joint in np.flatnonzero(retardation):
@@ -58,7 +57,7 @@ class JointElasticity(Displacing):
         return _twist(self, motion, load)
 
     def action(self, values: FloatArray, arm: Arm) -> Action:
-        """Return springs and dampers, and what encoders at the motors make of them."""
+        """Return springs and dampers, and their effect on motor encoder readings."""
         (compliance,) = scatter(self, values, arm.robot)
         (retardation,) = self.shape_over_joints(arm.robot)
         with np.errstate(divide='ignore'):
@@ -77,12 +76,12 @@ class Backlash(Displacing):
     """
     Free play of a gear, q_link = q_motor - b / 2 on the flank that carries the load.
 
-    Where the load changes its sign the link leaves its flank and flies to the other one, with
-    the acceleration load / M_jj relative to the motor, and lands without a bounce. How wide the
-    gap is shows twice: in the size of the torque, which is linear in the play, and in the time
-    that a crossing takes, which is the shape; a gap has them equal. Confounded with
-    presliding_hysteresis and with a spring that hardens; reversals with and without load, or an
-    encoder at the link, tell.
+    When the load changes its sign, the link leaves its flank and crosses to the other flank, with
+    the acceleration load / M_jj relative to the motor, and lands without a bounce. The width of
+    the gap determines two things: the size of the torque, which is linear in the play, and the
+    duration of a crossing, which is the shape. Both are equal for a real gap. Confounded with
+    presliding_hysteresis and with a hardening spring; reversals with and without load, or an
+    encoder at the link, distinguish them.
     Source: Nordin and Gutman 2002.
 
     """
@@ -95,7 +94,7 @@ class Backlash(Displacing):
     instantaneous = False
 
     def displacements(self, motion: Motion, arm: Arm) -> Displacement:
-        """Return minus the place of the motor in the gap, and its derivatives, over the gap."""
+        """Return minus the motor position within the gap over the gap, and its derivatives."""
         (width,) = self.shape_over_joints(arm.robot)
         load = arm.load(motion)
         inertia = np.diagonal(arm.load_derivatives(motion)[2], axis1=1, axis2=2)
@@ -106,7 +105,7 @@ class Backlash(Displacing):
         return _twist(self, motion, place / width)
 
     def action(self, values: FloatArray, arm: Arm) -> Action:
-        """Return the gaps, and what encoders at the motors make of them."""
+        """Return the gaps, and their effect on motor encoder readings."""
         (gap,) = scatter(self, values, arm.robot)
         if not np.any(values):
             return Action()
@@ -116,7 +115,7 @@ class Backlash(Displacing):
 
 
 def place_in_gap(t: FloatArray, pull: FloatArray, width: float) -> FloatArray:
-    """Return where between two stops something is that an acceleration pulls, shape (N,)."""
+    """Return the position between two stops of a body under an acceleration, shape (N,)."""
     speed = cumulative_trapezoid(pull, t, initial=0.0)
     way = cumulative_trapezoid(speed, t, initial=0.0)
     times, speeds, ways = t.tolist(), speed.tolist(), way.tolist()
@@ -140,7 +139,7 @@ def place_in_gap(t: FloatArray, pull: FloatArray, width: float) -> FloatArray:
 
 
 def _twist(effect: Displacing, motion: Motion, twist: FloatArray) -> Displacement:
-    """Place twists of the motors against the links, (N, n), in columns, with derivatives."""
+    """Return columns of the twists between motors and links, (N, n), with derivatives."""
     speed = rate_of_change(motion.t, twist)
     parts = (-twist, -speed, -rate_of_change(motion.t, speed))
     return Displacement(*(joint_columns(effect, motion, part) for part in parts))

@@ -1,6 +1,6 @@
 # Copyright 2026 The armid_ros developers
 # SPDX-License-Identifier: Apache-2.0
-"""What is left of the torque where an effect is looked for, and waves in it."""
+"""The residual torque in which effects are searched, and waves in this residual."""
 
 from __future__ import annotations
 
@@ -10,27 +10,27 @@ from functools import cached_property
 from armid_ros.motion import FloatArray, Motion
 import numpy as np
 
-#: Orders of waves that go on to be compared, of how many likely ones that are looked at finely.
+#: Number of wave orders that are compared, and of likely orders that are refined.
 _MOST_PEAKS, _LIKELY, _FINER = 3, 12, 8
 
 
 @dataclass(frozen=True)
 class Unexplained:
     """
-    What a model leaves of the torque, in rows of all recordings.
+    Torque residual of a model, in rows of all recordings.
 
     Attributes
     ----------
     motion : Motion
-        All samples, one recording behind the other.
+        All samples, with the recordings concatenated.
     q : ndarray, shape (M, n)
         Positions of the rows [rad or m].
     residual : ndarray, shape (M, n)
-        What is left [N m].
+        Residual torque [N m].
     weight : ndarray, shape (M, n)
-        One over its noise, zero where a row tells nothing [1/(N m)].
+        One over the standard deviation of the noise, zero for a row without information [1/(N m)].
     beside : ndarray, shape (M, n, f)
-        Columns of what is fitted anew beside any effect.
+        Columns of parameters that are fitted together with any effect.
 
     """
 
@@ -41,13 +41,13 @@ class Unexplained:
     beside: FloatArray
 
     def thinned(self, count: int) -> Unexplained:
-        """Return so many of the rows, spread evenly."""
+        """Return a given number of rows, spread evenly."""
         rows = np.unique(np.linspace(0, len(self.q) - 1, count).astype(int))
         parts = (self.q, self.residual, self.weight, self.beside)
         return Unexplained(self.motion, *(part[rows] for part in parts))
 
     def rest(self, values: FloatArray) -> FloatArray:
-        """Return what the columns beside leave of values (M, n, A), weighted, shape (M n, A)."""
+        """Return values (M, n, A), weighted and orthogonal to `beside`, shape (M n, A)."""
         flat = self._weighted(values)
         return np.asarray(flat - self._basis @ (self._basis.T @ flat))
 
@@ -62,14 +62,14 @@ class Unexplained:
 
 def wave_orders(unexplained: Unexplained, joint: int, between: tuple[float, float]) -> FloatArray:
     """
-    Return the orders at which waves over the place of a joint take most of what is left, (K,).
+    Return the orders of waves over a joint position that explain most of the residual, (K,).
 
-    The rows of all recordings count together, as a ripple has one order and phase in all.
+    All recordings are used together, because a ripple has the same order and phase in each.
 
     Parameters
     ----------
     unexplained : Unexplained
-        What is left.
+        The residual.
     joint : int
         The joint.
     between : (float, float)
@@ -99,10 +99,10 @@ def wave_gains(
     angle: FloatArray, rest: FloatArray, weight: FloatArray, orders: FloatArray
 ) -> FloatArray:
     """
-    Return what a sine and cosine of each order take of the squares of a weighted rest, (K,).
+    Return the reduction of the squares of a residual by a sine and cosine of each order, (K,).
 
-    Few cycles of a wave leak into each other; least squares tell them apart where the height of
-    a spectrum does not.
+    With few cycles, orders leak into each other; least squares separate them better than a
+    spectrum.
 
     """
     wave = np.exp(1j * np.outer(orders, angle))

@@ -1,11 +1,11 @@
 # Copyright 2026 The armid_ros developers
 # SPDX-License-Identifier: Apache-2.0
 """
-Excitation: trajectories that make the parameters of an arm visible.
+Excitation: trajectories that make the parameters of an arm identifiable.
 
-`design` finds a `FourierTrajectory` inside the `Limits` of a robot, clear of itself and of
-every `Obstacle`, that shows the parameters of an `ArmModel` best; an `Excitation` runs through it
-from rest to rest.
+`design` finds the `FourierTrajectory` that carries the most information on the parameters of an
+`ArmModel`. The trajectory keeps the `Limits` of the robot and avoids collisions with itself and
+with every `Obstacle`. An `Excitation` runs the trajectory from rest to rest.
 
 """
 

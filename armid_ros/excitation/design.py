@@ -1,6 +1,6 @@
 # Copyright 2026 The armid_ros developers
 # SPDX-License-Identifier: Apache-2.0
-"""Design of an excitation: the trajectory that shows the parameters best."""
+"""Design of an excitation: the trajectory with the most information on the parameters."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ from armid_ros.motion import FloatArray
 from armid_ros.robots import CollisionModel
 import numpy as np
 
-#: Points of the period at which it may be entered.
+#: Number of points of the period at which a run may enter the trajectory.
 _ENTRIES = 48
 
 #: Factor by which the run-in is made longer, and how often.
@@ -32,7 +32,7 @@ _LONGER, _TRIES = 1.5, 12
 @dataclass(frozen=True)
 class DesignProgress:
     """
-    How far a design has come.
+    Progress of a design.
 
     Attributes
     ----------
@@ -50,28 +50,28 @@ class DesignProgress:
 @dataclass(frozen=True)
 class Design:
     """
-    An excitation and what it will show.
+    A designed excitation and its predicted information.
 
     Attributes
     ----------
     excitation : Excitation
-        The run.
+        The designed run.
     information : Information
-        What the whole run, all periods recorded, tells about the base parameters, what was known
-        before included.
+        Information of the whole run on the base parameters, with all periods recorded; prior
+        information included.
     described : ndarray, shape (r,)
         Values of these parameters in the prior model.
     noise : ndarray, shape (n,)
-        Torque noise that was reckoned with [N m or N].
+        Assumed standard deviation of the torque noise [N m or N].
     cost : float
-        What was made small; see `Criterion`.
+        Cost of the design; see `Criterion`.
     limits : Limits
-        The limits it keeps.
+        The limits that the excitation keeps.
     settings : DesignSettings
-        What was asked for.
+        Settings of the design.
     stopped : str
-        '' when the search ran to its end; 'time budget' or 'interrupted' when the best so far
-        was taken, which the same seed need not give again.
+        '' if the search ran to its end; 'time budget' or 'interrupted' if the best trajectory so
+        far was taken. The same seed may then give another trajectory.
 
     """
 
@@ -86,7 +86,7 @@ class Design:
 
     def limits_used(self, arm: ArmModel) -> dict[str, FloatArray]:
         """
-        Say how much of every limit the excitation uses, which the ways there and back do not keep.
+        Return the used share of every limit; the ways to and from the excitation are not included.
 
         Parameters
         ----------
@@ -114,37 +114,37 @@ def design(
     progress: Callable[[DesignProgress], None] | None = None,
 ) -> Design:
     """
-    Find the trajectory that shows the parameters best.
+    Find the trajectory with the most information on the parameters.
 
     Parameters
     ----------
     arm : ArmModel
-        Prior model: the robot, and the effects whose parameters are wanted.
+        Prior model: the robot, and the effects whose parameters are to be identified.
     settings : DesignSettings
-        What to design.
+        Settings of the design.
     rng : Generator
         Source of randomness; the same state gives the same trajectory.
     collision : CollisionModel, optional
         Bodies to keep apart by ``settings.clearance``, such as ``collision_model(arm.robot)``, or
         ``with_obstacles`` of it.
     prior_information : ndarray, shape (r, r), optional
-        Information of what was recorded before, over the same base parameters: the sum of
+        Information of earlier recordings on the same base parameters: the sum of
         ``DesignProblem.information(motion).matrix`` of the recordings.
     rival : ArmModel, optional
-        With criterion 'T': the model to tell ``arm`` from.
+        The model to distinguish ``arm`` from, with criterion 'T'.
     progress : callable, optional
-        Receives the progress after every step.
+        Called with the progress after every step.
 
     Returns
     -------
     Design
-        The best found. KeyboardInterrupt ends the search and the best so far is returned.
+        The best design found. A KeyboardInterrupt ends the search, and the best design so far is
+        returned.
 
     Raises
     ------
     TrajectoryError
-        If nothing is feasible; says which limit of which joint, or which bodies, stand in the
-        way.
+        If no trajectory is feasible; the message names the joint and its limit, or the bodies.
 
     """
     problem = DesignProblem.of(arm, settings, rng, rival)
@@ -164,21 +164,21 @@ def design(
 
 def placed(problem: DesignProblem, trajectory: FourierTrajectory) -> Excitation:
     """
-    Make a run of a trajectory that is within all limits from rest to rest.
+    Return a run of a trajectory that keeps all limits from rest to rest.
 
-    The trajectory is entered where that takes least of the limits, and the run-in made longer
-    until nothing is wrong.
+    The run enters the trajectory at the point where the run-in uses the smallest share of the
+    limits. The run-in is made longer until all limits are kept.
 
     Raises
     ------
     TrajectoryError
-        If there is no way in; names the limit in the way.
+        If no run-in keeps the limits; the message names the limit.
 
     """
     settings, limits = problem.settings, problem.limits
 
     def effort(run: Excitation) -> float:
-        """Return the largest share of a velocity or acceleration limit on the way in."""
+        """Return the largest share of a velocity or acceleration limit during the run-in."""
         way = run.at(np.linspace(0.0, run.run_in, 40))
         velocity = np.abs(way.dq) / limits.velocity
         acceleration = np.abs(way.ddq) / limits.acceleration
@@ -212,16 +212,16 @@ def evaluate(
     stopped: str = '',
 ) -> Design:
     """
-    Say what a run, or a trajectory with the settings of a problem, is worth.
+    Return the design of a given run, or of a trajectory with the settings of a problem.
 
     Parameters
     ----------
     problem : DesignProblem
-        What is wanted.
+        The design problem.
     excitation : Excitation or FourierTrajectory
-        What is to be run.
+        The run or trajectory.
     prior_information : ndarray, shape (r, r), optional
-        Information that is there already.
+        Information of earlier recordings.
     stopped : str
         See `Design`.
 

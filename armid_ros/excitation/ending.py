@@ -1,6 +1,6 @@
 # Copyright 2026 The armid_ros developers
 # SPDX-License-Identifier: Apache-2.0
-"""What is done between the end of a run and the arm at rest."""
+"""Supervision of an arm from the end of a run until the arm is at rest."""
 
 from __future__ import annotations
 
@@ -12,34 +12,34 @@ from armid_ros.excitation.pose_monitor import PoseMonitor
 from armid_ros.motion import FloatArray, Motion
 import numpy as np
 
-#: Time that an arm has to be seen at rest [s].
+#: Time for which an arm has to be measured at rest [s].
 _REST = 0.1
-#: Largest step to where a blocked arm stands, in units of the tracking tolerance.
+#: Largest step of the set point to a blocked arm, in units of the tracking tolerance.
 _RELIEF = 3.0
 
 
 @dataclass(frozen=True)
 class Ending:
     """
-    A run that ended, until the arm is seen at rest.
+    State of a run that ended, until the arm is measured at rest.
 
     Attributes
     ----------
     gate : MotionGate
-        Checks what is sent.
+        Check of every motion that is sent.
     begun : float
         When the run began [s].
     last : Motion or None
-        Motion that was sent last, without an approach to its first sample; None: another client
-        has the controller, and nothing is sent.
+        Motion that was sent last, without an approach to its first sample. None: another client
+        uses the controller, and no motion is sent.
     sent : float
-        When it was sent [s].
+        Time at which the motion was sent [s].
     reason : str
         Why the run ended.
     blocked : bool
-        Whether the arm did not follow, and is to be held where it stands.
+        Whether the arm did not follow and has to be held at its present position.
     warned : bool
-        Whether it was reported that the arm goes on moving.
+        Whether a warning that the arm still moves was reported.
 
     """
 
@@ -52,7 +52,7 @@ class Ending:
     warned: bool = False
 
     def set_point(self, now: float) -> FloatArray:
-        """Return where the controller should have the arm, shape (n,) [rad or m]."""
+        """Return the set point of the controller, shape (n,) [rad or m]."""
         assert self.last is not None
         row = int(np.searchsorted(self.last.t, now - self.sent))
         return np.asarray(self.last.q[min(row, len(self.last.t) - 1)])
@@ -60,7 +60,7 @@ class Ending:
     def stopped_again(
         self, monitor: PoseMonitor, now: float, tolerance: float, duration: float
     ) -> Motion | None:
-        """Return another stop for an arm that is still on the path of the run; None: it is not."""
+        """Return a new stop if the arm still moves along the path of the run; otherwise None."""
         phase = now - self.begun
         if self.last is None or now - self.sent < self.last.t[-1]:
             return None
@@ -80,29 +80,29 @@ class Ending:
         duration: float,
     ) -> tuple[Ending | None, Motion | None, str]:
         """
-        Look at the arm.
+        Check whether the arm is at rest, and return the next state.
 
         Parameters
         ----------
         monitor : PoseMonitor
-            Knows where the arm is.
+            Measured positions of the arm.
         now : float
             Time [s].
         patience : float
             How long after the end of a motion the arm may still move [s].
         tolerance : float
-            Distance from the set point from which an arm does not follow [rad or m].
+            Largest distance from the set point of an arm that follows [rad or m].
         duration : float
-            Time of another stop [s].
+            Duration of a new stop [s].
 
         Returns
         -------
         Ending or None
-            What to look at next; None: the arm is at rest.
+            The next state; None: the arm is at rest.
         Motion or None
-            What to send.
+            Motion to send, if any.
         str
-            What to report.
+            Message to report; empty if none.
 
         """
         if self.last is not None and self.blocked and monitor.unsteady(_REST) == '':
@@ -124,13 +124,13 @@ class Ending:
         return (
             ending,
             motion,
-            (f'the arm goes on moving though it was stopped: {moving}; use the emergency stop'),
+            (f'the arm still moves although it was stopped: {moving}; use the emergency stop'),
         )
 
     def _relieved(
         self, measured: FloatArray, now: float, tolerance: float
     ) -> tuple[Ending, Motion | None, str]:
-        """Hold an arm where it stands, if that is a small step that may be made."""
+        """Hold a blocked arm at its present position, if the step of the set point is allowed."""
         ending, set_point = replace(self, blocked=False), self.set_point(now)
         if np.abs(measured - set_point).max() <= tolerance:
             return ending, None, ''

@@ -1,10 +1,10 @@
 # Copyright 2026 The armid_ros developers
 # SPDX-License-Identifier: Apache-2.0
 """
-Whether a trajectory is fit to run: looked at so closely that nothing fits between the samples.
+Check that a trajectory keeps all limits and the clearance, at and between all samples.
 
-Position, velocity, acceleration and torque are sampled densely and what a curve can gain between
-two samples is added; the clearance is proven on every interval.
+Position, velocity, acceleration and torque are sampled densely. A bound on the increase of a curve
+between two samples is added. The clearance is proven on every interval.
 
 """
 
@@ -21,17 +21,17 @@ import numpy as np
 #: Samples per period and harmonic.
 _DENSITY = 200
 
-#: Poses per period and harmonic with which the proof of clearance begins.
+#: Poses per period and harmonic at the beginning of the proof of clearance.
 _INTERVALS = 20
 
 
 class Faults(tuple[Violation | Approach, ...]):
-    """What stands against running a trajectory: limits exceeded, and bodies too near."""
+    """Reasons not to run a trajectory: exceeded limits, and bodies too close to each other."""
 
     __slots__ = ()
 
     def __str__(self) -> str:
-        """List them all in a line."""
+        """Return all faults in one line."""
         return '; '.join(map(str, self))
 
 
@@ -43,16 +43,16 @@ def trajectory_faults(
     margin: float,
 ) -> Faults:
     """
-    Look for anything wrong anywhere on a periodic trajectory.
+    Return the faults of a periodic trajectory, at and between all samples.
 
     Parameters
     ----------
     arm : ArmModel
         Prior model, for the torque.
     limits : Limits
-        What is allowed.
+        The limits.
     trajectory : FourierTrajectory
-        What is to be run.
+        The trajectory.
     clearance : ClearanceModel or None
         Bodies to keep apart.
     margin : float
@@ -71,9 +71,9 @@ def trajectory_faults(
 
 def excitation_faults(arm: ArmModel, limits: Limits, excitation: Excitation) -> Faults:
     """
-    Look for limits exceeded on the way in and out of a trajectory, along its own path.
+    Return the exceeded limits of run-in and run-out, which follow the path of the trajectory.
 
-    The clearance of that path is what `trajectory_faults` proves.
+    `trajectory_faults` proves the clearance of this path.
 
     """
     step = excitation.trajectory.period / (_DENSITY * excitation.trajectory.harmonics)
@@ -98,9 +98,9 @@ def _violations(
 
 
 def _outward(values: FloatArray, periodic: bool) -> FloatArray:
-    """Move samples away from their mean by what a curve can gain between two of them."""
-    # h^2 M / 8 at most with second derivatives below M, which is read off the second differences;
-    # these jump where dry friction does: there nothing is added
+    """Move samples away from their mean by a bound on the error between two samples."""
+    # the bound is h^2 M / 8 for second derivatives below M, estimated from second differences;
+    # nothing is added where dry friction makes the second differences jump
     if periodic:
         bend = np.roll(values, -1, axis=0) - 2.0 * values + np.roll(values, 1, axis=0)
     else:

@@ -1,9 +1,10 @@
 # Copyright 2026 The armid_ros developers
 # SPDX-License-Identifier: Apache-2.0
 """
-Excitations as files: YAML, which is read again, or CSV for a spreadsheet.
+Writing of excitations as YAML or CSV, and reading from YAML.
 
-CSV holds the trajectory, a row per joint and coefficient, and the run in comment lines.
+A CSV file, for spreadsheets, has one row per joint and coefficient of the trajectory; comment
+lines contain the run.
 
 """
 
@@ -25,7 +26,7 @@ SCHEMA = 'armid/excitation/1'
 
 
 def save_excitation(excitation: Excitation, path: str | Path) -> None:
-    """Write an excitation; the suffix, .yaml, .yml or .csv, says how."""
+    """Write an excitation in the format of the suffix: .yaml, .yml or .csv."""
     path = Path(path)
     writer = {'.yaml': excitation_text, '.yml': excitation_text, '.csv': _to_csv}.get(path.suffix)
     if writer is None:
@@ -40,7 +41,8 @@ def load_excitation(path: str | Path) -> Excitation:
     Raises
     ------
     TrajectoryError
-        If the file cannot be read or is not an excitation; names the file and what is wrong.
+        If the file cannot be read or is not an excitation; the message names the file and the
+        fault.
 
     """
     path = Path(path)
@@ -51,29 +53,29 @@ def load_excitation(path: str | Path) -> Excitation:
 
 def read_excitation(text: str, source: str) -> Excitation:
     """
-    Return the excitation that a text in YAML holds.
+    Return the excitation in a YAML text.
 
     Parameters
     ----------
     text : str
-        As `excitation_text` makes it.
+        YAML text, as returned by `excitation_text`.
     source : str
-        Where it came from, for messages.
+        Name of the text in messages.
 
     Raises
     ------
     TrajectoryError
-        If it is no excitation; names the source and what is wrong.
+        If the text is not an excitation; the message names the source and the fault.
 
     """
     with reading(source, TrajectoryError):
         content: Any = load_yaml(text)
         if not isinstance(content, dict) or content.get('schema') != SCHEMA:
-            raise TrajectoryError(f'not an excitation: it has to say schema: {SCHEMA}')
-        if content.get('start') is not None:  # without it, it would be another motion
+            raise TrajectoryError(f'not an excitation: it has to contain schema: {SCHEMA}')
+        if content.get('start') is not None:  # an ignored start pose would change the motion
             raise TrajectoryError(
-                'an excitation has no start pose of its own; take it out, and plan the way from '
-                'that pose with --start'
+                'an excitation has no start pose; remove it, and plan the way from that pose '
+                'with --start'
             )
         joints = content['joints']
         trajectory = FourierTrajectory(

@@ -1,6 +1,6 @@
 # Copyright 2026 The armid_ros developers
 # SPDX-License-Identifier: Apache-2.0
-"""Whether a run is fit to be run: what was checked, what came out, and what was not checked."""
+"""Summary of the safety checks of a run: results, and items that could not be checked."""
 
 from __future__ import annotations
 
@@ -19,18 +19,18 @@ FIT, PARTLY, UNFIT = 'fit to run', 'partly checked', 'not to be run'
 @dataclass(frozen=True)
 class Fitness:
     """
-    What was checked of a run.
+    Results of the checks of a run.
 
     Attributes
     ----------
     lowest : LowestPoint
         The lowest point of the motion.
     floor : Floor
-        What was reckoned with as the floor.
+        The assumed floor.
     nearest : Approach or None
-        Where bodies come closest; None where none are kept apart.
+        The closest approach of two bodies; None if no pair is checked.
     unchecked : tuple of str
-        What nobody could check.
+        Items that could not be checked.
 
     """
 
@@ -41,7 +41,7 @@ class Fitness:
 
     @property
     def word(self) -> str:
-        """Return the verdict in a few words: `FIT` only when all was checked and is clear."""
+        """Return the verdict: `FIT` only if everything was checked and no fault was found."""
         if self.nearest is not None and self.nearest.distance < 0.0:
             return UNFIT
         if self.floor.height is not None and self.lowest.height < self.floor.height:
@@ -49,7 +49,7 @@ class Fitness:
         return PARTLY if self.unchecked else FIT
 
     def __str__(self) -> str:
-        """Say in one sentence what was found and what was not checked."""
+        """Return a sentence on the results and on the unchecked items."""
         parts = ['no limit violated']
         if self.nearest is not None:
             parts.append(
@@ -64,7 +64,7 @@ class Fitness:
         return sentence
 
     def height(self) -> str:
-        """Say how low the motion comes."""
+        """Return a phrase on the lowest point of the motion."""
         height, what = self.lowest.height, 'base'
         if self.floor.height is not None:
             height, what = height - self.floor.height, 'floor'
@@ -74,16 +74,16 @@ class Fitness:
 
 def fitness(motion: Motion, limits: Limits, scene: CollisionScene) -> Fitness:
     """
-    Look at a run that keeps its limits and its clearance.
+    Return the results for a run that keeps its limits and its clearance.
 
     Parameters
     ----------
     motion : Motion
-        From the first sample to the last.
+        The whole run.
     limits : Limits
         Limits in force.
     scene : CollisionScene
-        What it was kept clear of.
+        Bodies, floor and obstacles of the clearance check.
 
     """
     exempt = [link for o in scene.obstacles if o.kind == 'plane' for link in o.ignore]

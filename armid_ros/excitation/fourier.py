@@ -11,7 +11,7 @@ from armid_ros.motion import FloatArray, Motion, read_only
 import numpy as np
 import numpy.typing as npt
 
-#: Samples before and after a period that columns of effects may depend on.
+#: Samples before and after a period on which regressor columns of effects may depend.
 MARGIN = 8
 
 
@@ -125,7 +125,7 @@ class FourierTrajectory:
         return Motion(self.joints, time, q @ x, dq @ x, ddq @ x)
 
     def one_period(self, n_samples: int) -> Motion:
-        """Return n_samples equally spaced samples of one period, the end left out."""
+        """Return n_samples equally spaced samples of one period, without its end."""
         return self.motion(np.arange(n_samples) * (self.period / n_samples))
 
     def with_margins(self, n_samples: int) -> Motion:
@@ -134,27 +134,27 @@ class FourierTrajectory:
         return self.motion(np.arange(-MARGIN, n_samples + MARGIN) * step)
 
     def shifted(self, time: float) -> FourierTrajectory:
-        """Return the same orbit entered later, by a time [s]: its beginning is the motion then."""
+        """Return the same orbit, begun later by a time [s]."""
         angle = self.angular_frequency * time * np.arange(1, self.harmonics + 1)
         cosine, sine = np.cos(angle), np.sin(angle)
         a = self.a * cosine + self.b * sine
         return replace(self, a=a, b=self.b * cosine - self.a * sine)
 
     def scaled(self, factor: npt.ArrayLike) -> FourierTrajectory:
-        """Return the trajectory with the amplitude of every joint, shape (n,), times a factor."""
+        """Return the trajectory with the amplitudes times a factor per joint, shape (n,)."""
         factors = np.broadcast_to(np.asarray(factor, dtype=float), (self.n_joints,))[:, np.newaxis]
         return replace(self, a=self.a * factors, b=self.b * factors)
 
     def stretched(self, period: float) -> FourierTrajectory:
-        """Return the same path run through in another period [s]."""
+        """Return the same path with another period [s]."""
         ratio = self.period / period
         return replace(self, period=period, a=self.a * ratio, b=self.b * ratio)
 
     def bounds(self) -> tuple[FloatArray, FloatArray, FloatArray]:
         """
-        Bound speed, acceleration and jerk over the whole period, each of shape (n,).
+        Return bounds on speed, acceleration and jerk over the whole period, each of shape (n,).
 
-        Sums of the amplitudes: never exceeded, rarely reached.
+        The bounds are sums of the amplitudes, which the trajectory rarely reaches.
 
         """
         amplitude = np.hypot(self.a, self.b)
@@ -166,7 +166,7 @@ def fourier_basis(
     t: FloatArray, period: float, harmonics: int
 ) -> tuple[FloatArray, FloatArray, FloatArray]:
     """
-    Evaluate the functions whose combination a joint's trajectory is.
+    Evaluate the basis functions of the trajectory of a joint.
 
     Parameters
     ----------

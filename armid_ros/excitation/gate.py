@@ -1,6 +1,6 @@
 # Copyright 2026 The armid_ros developers
 # SPDX-License-Identifier: Apache-2.0
-"""The one check that every motion passes before it is sent to an arm."""
+"""The check of every motion before it is sent to an arm."""
 
 from __future__ import annotations
 
@@ -16,37 +16,37 @@ from armid_ros.excitation.transfer import TransferPlanner
 from armid_ros.motion import FloatArray, Motion
 import numpy as np
 
-#: A stop that exceeds an acceleration limit is planned again in this many times its duration, so
-#: often at most: the last one takes 4.8 times the duration.
+#: Factor on the duration of a stop that exceeds an acceleration limit, and the largest number of
+#: new plans. The last plan takes 4.8 times the duration.
 _LONGER, _TRIES = 1.25, 8
-#: Time of a small step, in units of what it takes at the velocity limit, and of the root of the
-#: step over the acceleration limit: 1.875 and 2.4 for a quintic from rest to rest. A quintic that
+#: Time of a small step, in units of its time at the velocity limit, and of the root of the step
+#: over the acceleration limit: 1.875 and 2.4 for a quintic from rest to rest. A quintic that
 #: begins with a speed needs 3.94 times the speed over the acceleration limit: at most 6 are taken.
 _STEP = 3.0
-#: Interval with which the proof of clearance begins [s].
+#: Interval at the beginning of the proof of clearance [s].
 _INTERVAL = 0.1
-#: Effort of a joint that is expected at least, as a share of its limit: dry friction of a wrist.
+#: Smallest expected effort of a joint, as a share of its limit, because of dry friction.
 _LEAST_EFFORT = 0.1
 
 
 @dataclass(frozen=True)
 class MotionGate:
     """
-    What every motion that is sent during a run has to keep.
+    Conditions for every motion that is sent during a run.
 
     Attributes
     ----------
     run : Run
         Run that was planned.
     limits : Limits
-        Limits of the robot; the acceleration is that of the run where the run has more than a
-        description without acceleration limits would allow.
+        Limits of the robot. Without acceleration limits in the description, the acceleration limit
+        is at least the largest acceleration of the run.
     clearance : ClearanceModel or None
         Bodies to keep apart, the floor among them.
     margin : float
         Clearance to keep [m].
     effort : ndarray, shape (n,)
-        Largest foreseen effort of each joint, and at least 10 % of its limit [N m or N].
+        Largest predicted effort of each joint, at least 10 % of its limit [N m or N].
 
     """
 
@@ -59,19 +59,19 @@ class MotionGate:
     @classmethod
     def of(cls, run: Run, planner: TransferPlanner) -> MotionGate:
         """
-        Check a run at all its samples, and return the gate for what follows it.
+        Check a run at all its samples, and return the gate for later motions.
 
         Parameters
         ----------
         run : Run
-            What is to be sent.
+            The run to send.
         planner : TransferPlanner
-            Arm, limits and bodies. Without limits none are checked.
+            Planner with the arm, limits and bodies. Without limits, no limit is checked.
 
         Raises
         ------
         TrajectoryError
-            If the run exceeds a limit or comes too near to something; names the joint or the
+            If the run exceeds a limit or bodies come too close; the message names the joint or the
             bodies.
 
         """
@@ -104,23 +104,23 @@ class MotionGate:
         self, phase: float, duration: float, measured: FloatArray, velocity: FloatArray
     ) -> Motion:
         """
-        Return the way to rest along the run, which was checked as a whole.
+        Return a stop along the path of the run, which was checked as a whole.
 
         Parameters
         ----------
         phase : float
-            Where on the run the arm is [s].
+            Time since the start of the run [s].
         duration : float
-            Time to come to rest [s]; longer where the acceleration limits require it.
+            Time to come to rest [s]; longer if the acceleration limits require it.
         measured, velocity : ndarray, shape (n,)
-            Position [rad or m] and velocity [rad/s or m/s] of the arm; NaN: unknown. A controller
-            that begins there needs time to get to the path.
+            Position [rad or m] and velocity [rad/s or m/s] of the arm; NaN: unknown. The
+            controller needs time to return to the path from there.
 
         Returns
         -------
         Motion
-            Within the positions and velocities of the run. An acceleration limit is exceeded only
-            if the longest stop exceeds it, too: a stop is always sent.
+            The stop, within the positions and velocities of the run. It exceeds an acceleration
+            limit only if the longest stop exceeds it too, because a stop is always sent.
 
         """
         phase = float(np.clip(phase, 0.0, self.run.duration))
@@ -139,19 +139,19 @@ class MotionGate:
 
     def hold(self, set_point: FloatArray, measured: FloatArray, largest: float) -> Motion:
         """
-        Return the small straight step from the set point to where the arm stands.
+        Return the small straight step from the set point to the measured position.
 
         Parameters
         ----------
         set_point, measured : ndarray, shape (n,)
-            Where the controller holds the arm, and where the arm is [rad or m].
+            Set point of the controller, and measured position [rad or m].
         largest : float
             Largest step of a joint [rad or m].
 
         Raises
         ------
         TrajectoryError
-            If the step is larger, leaves the limits or comes too near to something.
+            If the step is larger, leaves the limits or brings bodies too close.
 
         """
         step = np.abs(measured - set_point)
@@ -172,14 +172,14 @@ class MotionGate:
 
     def overload(self, effort: FloatArray, factor: float) -> str:
         """
-        Return which joint takes more effort than is foreseen.
+        Return a message if a joint exceeds its predicted effort; otherwise an empty string.
 
         Parameters
         ----------
         effort : ndarray, shape (n,)
             Measured effort [N m or N]; NaN: none.
         factor : float
-            Multiple of the foreseen effort that is allowed; 0: any.
+            Multiple of the predicted effort that is allowed; 0: any effort.
 
         """
         beyond = np.nan_to_num(np.abs(effort)) - factor * self.effort
@@ -193,7 +193,7 @@ class MotionGate:
         )
 
     def _time_of(self, step: FloatArray, speed: FloatArray | float = 0.0) -> float:
-        """Return the time of a small step that begins with a speed, within the limits [s]."""
+        """Return the time of a small step with an initial speed, within the limits [s]."""
         velocity = np.where(np.isfinite(self.limits.velocity), self.limits.velocity, SLOW_VELOCITY)
         stopping = speed / self.limits.acceleration
         slowest = stopping + np.sqrt(stopping**2 + step / self.limits.acceleration)

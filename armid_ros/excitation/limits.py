@@ -1,6 +1,6 @@
 # Copyright 2026 The armid_ros developers
 # SPDX-License-Identifier: Apache-2.0
-"""What the joints may do, as a description and people say, and where a motion does more."""
+"""Limits of the joints, from the description and from the user, and checks of a motion."""
 
 from __future__ import annotations
 
@@ -17,24 +17,24 @@ from armid_ros.robots import Robot
 import numpy as np
 import numpy.typing as npt
 
-#: URDF has no acceleration limit; without a better number a joint may reach its top speed in this
-#: time [s], which is 8.7 rad/s^2 for the first joint of a Panda (its data sheet says 15).
+#: URDF has no acceleration limit. By default, a joint may reach its top speed in this time [s],
+#: which is 8.7 rad/s^2 for the first joint of a Panda (its data sheet says 15).
 TIME_TO_TOP_SPEED = 0.25
 
-#: Velocity limit of a joint whose description has none, or 0: half a metre a second at the end of
-#: an arm of a metre [rad/s or m/s].
+#: Velocity limit of a joint without a velocity limit, or with the limit 0 [rad/s or m/s]: half a
+#: metre per second at the end of an arm of a metre.
 SLOW_VELOCITY = 0.5
 
 #: Share of the velocity and acceleration limits that a run of each speed class may use.
 SPEED_CLASSES = {'slow': 0.15, 'medium': 0.4, 'fast': 0.9}
 
-#: Share of the range of a joint that is kept free at each end, and of its torque.
+#: Shares of the range of a joint, at each end, and of its torque limit that are kept free.
 _POSITION_RESERVE, _TORQUE_RESERVE = 0.02, 0.1
 
-#: Positions and rates are compared with this relative slack, which is rounding.
+#: Relative tolerance of the comparison of positions and rates with limits.
 _ROUNDING = 1e-9
 
-#: Position limits of a revolute joint beyond two turns, rounded, may be degrees [rad].
+#: Position limits of a revolute joint above this, about two turns, may be degrees [rad].
 _TWO_TURNS = 1.01 * 4.0 * math.pi
 
 
@@ -65,7 +65,7 @@ class Limits:
     prismatic: npt.NDArray[np.bool_]
 
     def __post_init__(self) -> None:
-        """Freeze the arrays and refuse empty ranges, with the joint's name."""
+        """Freeze the arrays; raise a TrajectoryError for an empty range."""
         n = len(self.joints)
         for name in ('lower', 'upper', 'velocity', 'acceleration', 'torque'):
             values = read_only(getattr(self, name))
@@ -95,12 +95,12 @@ class Limits:
         acceleration: npt.ArrayLike | None = None,
     ) -> Limits:
         """
-        Take the limits of a robot, by default with room to spare.
+        Return the limits of a robot, by default with a reserve.
 
         Parameters
         ----------
         robot : Robot
-            Gives position, velocity and torque limits; a joint without a velocity limit gets
+            Robot with position, velocity and torque limits; a joint without a velocity limit gets
             `SLOW_VELOCITY`.
         speed : str or float
             'slow', 'medium' or 'fast', or the share of the velocity and acceleration limits that
@@ -115,7 +115,7 @@ class Limits:
         Raises
         ------
         TrajectoryError
-            If there is no such speed class, or a limit leaves no room.
+            If the speed class does not exist, or a limit leaves no range.
 
         """
         if isinstance(speed, str) and speed not in SPEED_CLASSES:
@@ -155,14 +155,14 @@ class Limits:
 
 
 def has_velocity_limit(robot: Robot) -> npt.NDArray[np.bool_]:
-    """Return which joints have a finite, positive velocity limit; others get `SLOW_VELOCITY`."""
+    """Return the mask of joints with a finite, positive velocity limit."""
     return np.isfinite(robot.velocity_limit) & (robot.velocity_limit > 0.0)
 
 
 @dataclass(frozen=True)
 class Violation:
     """
-    One limit of one joint, exceeded; where it is worst.
+    One exceeded limit of one joint, at its largest excess.
 
     Attributes
     ----------
@@ -171,9 +171,9 @@ class Violation:
     limit : str
         'lower position', 'upper position', 'velocity', 'acceleration' or 'torque'.
     time : float
-        When the excess is largest [s].
+        Time of the largest excess [s].
     value, bound : float
-        What the motion does then and what is allowed, in ``unit``.
+        Value of the motion at this time, and the limit, in ``unit``.
     samples : int
         Number of samples beyond the limit.
     unit : str
@@ -190,7 +190,7 @@ class Violation:
     unit: str
 
     def __str__(self) -> str:
-        """Say it in a line."""
+        """Return the violation in one line."""
         return (
             f'joint {self.joint}: {self.limit} {self.value:.4g} {self.unit} at {self.time:.3f} s, '
             f'limit {self.bound:.4g} {self.unit} ({self.samples} samples beyond it)'
@@ -201,17 +201,17 @@ def check_limits(
     limits: Limits, motion: Motion, torque: FloatArray | None = None
 ) -> tuple[Violation, ...]:
     """
-    Compare a motion with the limits.
+    Return the limits that a motion exceeds.
 
     Parameters
     ----------
     limits : Limits
-        What is allowed.
+        The limits.
     motion : Motion
-        What is done.
+        The motion.
     torque : ndarray, shape (N, n), optional
-        Joint torques the motion takes, such as ``arm.torque(motion)``; by default those of the
-        motion, and no check of the torque where it has none.
+        Joint torques of the motion, such as ``arm.torque(motion)``; by default ``motion.tau``.
+        Without torques, the torque limit is not checked.
 
     Returns
     -------
@@ -221,7 +221,7 @@ def check_limits(
     Raises
     ------
     TrajectoryError
-        If the motion is not one of these joints.
+        If the joints of the motion are not those of the limits.
 
     """
     if motion.joints != limits.joints:
@@ -257,7 +257,7 @@ def check_limits(
 def _rates(
     limits: Limits, motion: Motion, torque: FloatArray | None
 ) -> list[tuple[str, FloatArray, FloatArray]]:
-    """Return name, values and limits of what is limited either way."""
+    """Return name, values and limits of velocity, acceleration and torque."""
     rates = [
         ('velocity', motion.dq, limits.velocity),
         ('acceleration', motion.ddq, limits.acceleration),
@@ -267,14 +267,13 @@ def _rates(
 
 def used_shares(limits: Limits, motion: Motion, torque: FloatArray) -> dict[str, FloatArray]:
     """
-    Say how much of every limit a motion uses.
+    Return the share of every limit that a motion uses.
 
     Returns
     -------
     dict of str to ndarray, shape (n,)
         'position': largest distance from the middle of the range over half of it; 'velocity',
-        'acceleration' and 'torque': largest absolute value over the limit. 0 where there is no
-        limit.
+        'acceleration' and 'torque': largest absolute value over the limit. 0 without a limit.
 
     """
     half = 0.5 * (limits.upper - limits.lower)
@@ -286,7 +285,7 @@ def used_shares(limits: Limits, motion: Motion, torque: FloatArray) -> dict[str,
 
 
 def require_radians(robot: Robot) -> None:
-    """Raise a TrajectoryError where a revolute joint has limits beyond two turns."""
+    """Raise a TrajectoryError if a revolute joint has position limits beyond two turns."""
     for joint, lower, upper, slides in zip(
         robot.joints, robot.lower, robot.upper, robot.prismatic, strict=True
     ):
@@ -303,29 +302,29 @@ def with_joint_limits(
     robot: Robot, path: str | Path | None = None, velocity: Sequence[str] = ()
 ) -> tuple[Robot, FloatArray | None]:
     """
-    Return a robot with the position and velocity limits that are given, and acceleration limits.
+    Return a robot with the given position and velocity limits, and its acceleration limits.
 
     Parameters
     ----------
     robot : Robot
         The arm.
     path : str or Path, optional
-        ``joint_limits.yaml`` of MoveIt; limits apply where its ``has_..._limits`` says so.
-        Position and velocity limits beyond those of the description are not taken.
+        ``joint_limits.yaml`` of MoveIt; a limit applies if its ``has_..._limits`` is true.
+        Position and velocity limits wider than those of the description are ignored.
     velocity : sequence of str
-        'joint:=value' [rad/s or m/s]; these replace all others.
+        'joint:=value' [rad/s or m/s]; these replace all other velocity limits.
 
     Returns
     -------
     robot : Robot
-        With these position and velocity limits.
+        The robot with these position and velocity limits.
     acceleration : ndarray, shape (n,), or None
         Limits [rad/s^2 or m/s^2], NaN where none is given; None without a file.
 
     Raises
     ------
     TrajectoryError
-        If the file has no limits of the arm's joints, a limit is no positive number, a position
+        If the file has no limits of the arm's joints, a limit is not a positive number, a position
         range is empty, or a joint is unknown.
 
     """
@@ -345,7 +344,7 @@ def with_joint_limits(
 
 
 def _with_file(robot: Robot, path: Path) -> tuple[Robot, FloatArray]:
-    """Return a robot with the limits of a file, and its acceleration limits, NaN without, (n,)."""
+    """Return a robot with the limits of a file, and acceleration limits (n,), NaN if not given."""
     top, lower, upper = (
         np.array(limit) for limit in (robot.velocity_limit, robot.lower, robot.upper)
     )

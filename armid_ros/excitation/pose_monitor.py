@@ -1,6 +1,6 @@
 # Copyright 2026 The armid_ros developers
 # SPDX-License-Identifier: Apache-2.0
-"""Which measured positions of an arm are believed, and whether the arm is at rest."""
+"""Plausibility check of measured positions, and detection of an arm at rest."""
 
 from __future__ import annotations
 
@@ -14,29 +14,30 @@ from armid_ros.robots import Robot
 import numpy as np
 import numpy.typing as npt
 
-#: Joint states that have to agree before anything is done because of where the arm is.
+#: Number of joint states that have to agree before a position outside the expected range is
+#: accepted.
 AGREEING = 5
-#: A joint that is slower is at rest [rad/s or m/s].
+#: Velocity below which a joint is at rest [rad/s or m/s].
 AT_REST = 0.02
 #: Range of the positions of a joint at rest, encoder noise included [rad or m].
 _STILL = 0.004
-#: How long a rejected position counts against the others [s].
+#: Time for which a rejected position is counted [s].
 _WINDOW = 0.5
-#: Error of a position that the velocity limit does not bound: encoder noise [rad or m].
+#: Encoder noise, added to the change of position that the velocity limit allows [rad or m].
 _NOISE = 0.02
-#: Time over which a velocity is a difference of positions [s]: noise of 0.0001 rad is 0.01 rad/s.
+#: Time of the position differences for a velocity [s]: noise of 0.0001 rad gives 0.01 rad/s.
 _DIFFERENCE = 0.01
-#: Delay of a transport: stamps may be further apart than arrivals by this much [s].
+#: Transport delay: the difference of stamps may exceed that of arrivals by this time [s].
 _TRANSPORT = 0.1
-#: Velocity of a joint whose description states none [rad/s or m/s]: a turn a second.
+#: Velocity limit of a joint without one in the description [rad/s or m/s]: a turn per second.
 _UNSTATED_VELOCITY = 2.0 * np.pi
-#: Largest position of a joint without position limits [rad or m]; beyond, it is no position.
+#: Largest valid position of a joint without position limits [rad or m].
 _FARTHEST = 1e4
 
 
 class JointState(NamedTuple):
     """
-    Joint state of some joints, of the arm or not.
+    Joint state of some joints, which may include joints of other devices.
 
     Attributes
     ----------
@@ -45,7 +46,7 @@ class JointState(NamedTuple):
     position, velocity : ndarray
         Position [rad or m] and velocity [rad/s or m/s] of each; velocity may be empty.
     stamp_ns : int
-        Stamp [ns]; 0: none.
+        Timestamp [ns]; 0: none.
 
     """
 
@@ -56,7 +57,7 @@ class JointState(NamedTuple):
 
 
 class _State(NamedTuple):
-    """Positions and velocities of the arm's joints of one message, and when it arrived [s]."""
+    """Positions and velocities of the arm's joints in one message, and its arrival time [s]."""
 
     arrived: float
     stamp_ns: int
@@ -66,7 +67,7 @@ class _State(NamedTuple):
 
 @dataclass
 class _Source:
-    """Messages with one list of names: where the arm's joints are in it, and recent states."""
+    """Messages with the same list of names: indices of the arm's joints, and recent states."""
 
     columns: npt.NDArray[np.int_]
     joints: npt.NDArray[np.int_]
@@ -86,16 +87,16 @@ class PoseMonitor:
     Parameters
     ----------
     robot : Robot
-        States the limits.
+        Robot with the limits.
     tolerance : float
-        Distance beyond a position limit at which a position is still believed [rad or m].
+        Largest distance beyond a position limit of a valid position [rad or m].
 
     Attributes
     ----------
     pose : MeasuredPose
         Last believed positions.
     rejected : int
-        Joint states that were not believed.
+        Number of rejected joint states.
 
     """
 
@@ -112,11 +113,11 @@ class PoseMonitor:
 
     @property
     def sources(self) -> int:
-        """Count the different lists of joints that were received."""
+        """Number of different lists of joint names that were received."""
         return len(self._sources)
 
     def update(self, message: JointState, now: float) -> None:
-        """Take the joint state of a message that arrived now [s] into account."""
+        """Update the filter with the joint state of a message that arrived at time `now` [s]."""
         source = self._source(message.names)
         if not len(source.joints):
             return
@@ -134,7 +135,7 @@ class PoseMonitor:
         last = source.states[-1] if source.states else None
         if last is not None and last.stamp_ns == state.stamp_ns and np.array_equal(last.q, q):
             if state.stamp_ns:
-                return  # the same message once more
+                return  # the same message again
         seen = self.pose.seen[source.joints].max()
         before = self.pose.q[source.joints]
         fault = self._unreachable(source.joints, state, last or _State(seen, 0, before, dq))
@@ -150,7 +151,7 @@ class PoseMonitor:
         self._believe(source, state, message)
 
     def contradiction(self, now: float, count: int = AGREEING) -> str:
-        """Return why so many positions of the last 0.5 s were rejected; empty: fewer were."""
+        """Return why many positions of the last 0.5 s were rejected; empty if few were."""
         recent = [fault for arrived, fault in self._rejections if now - arrived <= _WINDOW]
         return recent[-1] if len(recent) >= count else ''
 
@@ -168,19 +169,19 @@ class PoseMonitor:
 
     def unsteady(self, span: float, count: int = AGREEING) -> str | None:
         """
-        Return why the arm is not at rest.
+        Return a message if the arm is not at rest.
 
         Parameters
         ----------
         span : float
             Time that the joint states have to cover [s].
         count : int
-            Joint states of each joint that are needed.
+            Required number of joint states of each joint.
 
         Returns
         -------
         str or None
-            Empty: it is at rest. None: there are too few joint states to decide.
+            Empty: the arm is at rest. None: there are too few joint states to decide.
 
         """
         decided: set[int] = set()
@@ -214,7 +215,7 @@ class PoseMonitor:
         return source
 
     def _outside(self, joints: npt.NDArray[np.int_], q: FloatArray) -> str:
-        """Return which position is no number or outside the limits."""
+        """Return a message if a position is not finite or is outside the limits."""
         inside = (q >= self._lower[joints]) & (q <= self._upper[joints])
         if inside.all():
             return ''
@@ -226,12 +227,12 @@ class PoseMonitor:
         )
 
     def _unreachable(self, joints: npt.NDArray[np.int_], state: _State, last: _State) -> str:
-        """Return which position cannot be reached from the last one, or that a stamp is older."""
+        """Return a message if a position is unreachable from the last, or a stamp is older."""
         if state.stamp_ns and state.stamp_ns <= last.stamp_ns:
             back = (last.stamp_ns - state.stamp_ns) * 1e-9
             return (
-                f'different joint states are stamped alike, or {back:.3g} s back in time: is '
-                'there another publisher?'
+                f'different joint states have the same stamp, or a stamp {back:.3g} s back in '
+                'time: is there another publisher?'
             )
         passed = state.arrived - last.arrived
         if state.stamp_ns and last.stamp_ns:
@@ -240,7 +241,7 @@ class PoseMonitor:
         step = np.abs(state.q - last.q)
         beyond = step - _NOISE - self._velocity[joints] * max(passed, 0.0)
         k = int(np.argmax(beyond))
-        if not beyond[k] > 0.0:  # NaN where nothing was known
+        if not beyond[k] > 0.0:  # NaN if no position was known
             return ''
         j, unit = joints[k], self._units[joints[k]]
         return (

@@ -1,6 +1,6 @@
 # Copyright 2026 The armid_ros developers
 # SPDX-License-Identifier: Apache-2.0
-"""A design problem: which parameters to see, through which noise, within which limits."""
+"""A design problem: parameters to identify, noise and limits."""
 
 from __future__ import annotations
 
@@ -19,28 +19,28 @@ from armid_ros.motion import FloatArray, Motion, read_only
 import numpy as np
 import numpy.typing as npt
 
-#: Share of the torque limit that a sensor's noise is taken to be when nothing is known of it.
+#: Assumed standard deviation of unknown torque noise, as a share of the torque limit.
 NOISE_SHARE = 0.01
 
-#: Samples per sample of the search with which information is computed.
+#: Number of samples for the information, per sample of the search.
 _EXACT = 6
 
 
 @dataclass(frozen=True)
 class DesignProblem:
     """
-    What a design is for, with everything that does not change while it is being solved.
+    A design problem, with all quantities that stay constant during the search.
 
     Attributes
     ----------
     arm : ArmModel
-        Prior model: rigid body, and all effects whose columns count.
+        Prior model: rigid body, and all effects that are identified.
     settings : DesignSettings
-        What was asked for.
+        Settings of the design.
     limits : Limits
         Limits in force.
     base : BaseParameters
-        The parameters to see.
+        The parameters to identify.
     noise : ndarray, shape (n,)
         Standard deviation of the torque noise [N m or N].
     scale : ndarray, shape (r,)
@@ -72,7 +72,7 @@ class DesignProblem:
         Raises
         ------
         TrajectoryError
-            If the arm has no such parameter, or no motion can tell it from the rival.
+            If the arm has no such parameter, or no motion can distinguish the arm from the rival.
 
         """
         limits = Limits.of(arm.robot, speed=settings.speed, acceleration=settings.acceleration)
@@ -105,13 +105,13 @@ class DesignProblem:
         return problem
 
     def _require_visible(self, matrix: FloatArray) -> None:
-        """Raise a TrajectoryError where random motions tell nothing of what is wanted."""
+        """Raise a TrajectoryError if random motions carry no information on the target."""
         criterion = self.criterion
         if criterion.name != 'T':
             if not criterion.wanted.any():
                 raise TrajectoryError(
-                    f'focus: no motion tells {", ".join(self.settings.focus)} from the rigid '
-                    "body; take target 'effects', where the rigid body counts as known"
+                    f'focus: no motion distinguishes {", ".join(self.settings.focus)} from the '
+                    "rigid body; take target 'effects', where the rigid body counts as known"
                 )
         elif not np.isfinite(criterion.cost(matrix)):
             names = ', '.join(effect.name for effect in self.arm.effects) or 'nothing'
@@ -126,7 +126,7 @@ class DesignProblem:
         return (columns / self.noise[:, np.newaxis]).reshape(-1, columns.shape[-1])
 
     def recorded(self, trajectory: FourierTrajectory, n_periods: int) -> Information:
-        """Return what a recording of a number of periods tells about the base parameters."""
+        """Return the information of a recording of some periods on the base parameters."""
         count, margin = _EXACT * self.settings.samples, MARGIN * trajectory.n_joints
         columns = self.columns(trajectory.with_margins(count))[margin:-margin]
         weight = self.settings.rate * trajectory.period * n_periods / count
@@ -134,12 +134,12 @@ class DesignProblem:
 
     def information(self, motion: Motion, n_recorded: float | None = None) -> Information:
         """
-        Return what a motion tells about the base parameters.
+        Return the information of a motion on the base parameters.
 
         Parameters
         ----------
         motion : Motion
-            Samples that stand for the whole run, or a motion that was recorded.
+            Samples that represent the whole run, or a recorded motion.
         n_recorded : float, optional
             Number of samples that will be recorded; by default those of the motion.
 
@@ -185,7 +185,7 @@ def _noise(arm: ArmModel, settings: DesignSettings) -> FloatArray:
 
 
 def _joined(arm: ArmModel, rival: ArmModel) -> ArmModel:
-    """Return the rival's effects and those it lacks, these last."""
+    """Return the effects of the rival, followed by the effects that only the arm has."""
     known = {(effect.name, effect.joints) for effect in rival.effects}
     joined = replace(rival, robot=arm.robot)
     for effect, values in zip(arm.effects, arm.values, strict=True):

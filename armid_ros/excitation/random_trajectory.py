@@ -1,6 +1,6 @@
 # Copyright 2026 The armid_ros developers
 # SPDX-License-Identifier: Apache-2.0
-"""Random trajectories within the limits: where a search starts, and what it has to beat."""
+"""Random feasible trajectories: starting points of a search, and its reference."""
 
 from __future__ import annotations
 
@@ -15,16 +15,16 @@ from armid_ros.robots import CollisionModel
 from armid_ros.robots.robot import position_range
 import numpy as np
 
-#: Trajectories drawn before the rest is looked for around single poses.
+#: Number of trajectories drawn before the search around single poses.
 _ATTEMPTS = 60
 
-#: Poses tried when no trajectory was found.
+#: Number of poses tried if no trajectory was found.
 _POSES = 2000
 
-#: Factors by which a trajectory is made smaller until it fits.
+#: Factors on the amplitudes of a trajectory, tried until it is feasible.
 _SHRINK, _SHRINKS = 0.75, 6
 
-#: Samples per period and harmonic at which a drawn trajectory is looked at first.
+#: Samples per period and harmonic for the first check of a drawn trajectory.
 _SAMPLES = 40
 
 
@@ -39,18 +39,18 @@ def random_feasible(
     margin: float = 0.0,
 ) -> FourierTrajectory:
     """
-    Draw a random trajectory that keeps the limits and hits nothing, at and between all samples.
+    Draw a random trajectory that keeps all limits and the clearance, also between samples.
 
-    Coefficients are normal, position amplitudes equal over the harmonics; each joint is scaled
-    to a random share of the most that its limits allow, about a random centre, and all of them
-    made smaller until nothing is wrong.
+    The coefficients are normally distributed, with equal position amplitudes in all harmonics.
+    Each joint moves about a random centre, with a random share of the largest amplitude that its
+    limits allow. All amplitudes are reduced until the trajectory is feasible.
 
     Parameters
     ----------
     arm : ArmModel
         Prior model, for the torque.
     limits : Limits
-        What is allowed.
+        The limits.
     period : float
         Period [s].
     harmonics : int
@@ -65,7 +65,7 @@ def random_feasible(
     Raises
     ------
     TrajectoryError
-        If there is none; names the limit of the joint, or the bodies, in the way.
+        If no solution was found; the message names the joint and its limit, or the bodies.
 
     """
     clearance = (
@@ -82,7 +82,7 @@ def random_feasible(
     found = _shrunk(arm, limits, around, clearance, margin, 8 * _SHRINKS)
     if found is None:
         raise TrajectoryError(
-            f'nothing but standing still is possible about {", ".join(f"{x:.2f}" for x in centre)}'
+            f'no motion is possible about the pose {", ".join(f"{x:.2f}" for x in centre)}'
             f': {trajectory_faults(arm, limits, around.scaled(0.01), clearance, margin)}'
         )
     return found
@@ -96,12 +96,12 @@ def feasible_pose(
     margin: float,
 ) -> FloatArray:
     """
-    Find a pose that the arm can hold clear of everything, as clear as any that was tried.
+    Return the pose with the largest clearance among random poses that the arm can hold.
 
     Raises
     ------
     TrajectoryError
-        If there is none; names the limit of the joint, or the bodies, in the way.
+        If no solution was found; the message names the joint and its limit, or the bodies.
 
     """
     lower, upper = position_range(limits.lower, limits.upper)
@@ -131,7 +131,7 @@ def feasible_pose(
     best = int(np.argmax(apart))
     if apart[best] <= margin:
         nearest = clearance.closest(motion.select(np.array([best])))
-        assert nearest is not None  # without pairs all is apart
+        assert nearest is not None  # without pairs the clearance is infinite
         raise TrajectoryError(
             f'no pose keeps a clearance of {margin:g} m; in the best one '
             f'{nearest.first} and {nearest.second} are {nearest.distance:.4f} m apart'
@@ -175,7 +175,7 @@ def _shrunk(
     margin: float,
     shrinks: int,
 ) -> FourierTrajectory | None:
-    """Make a trajectory smaller about its centre until nothing is wrong with it."""
+    """Reduce the amplitudes of a trajectory until it is feasible."""
 
     def clear(q: FloatArray) -> bool:
         return clearance is None or bool(clearance.smallest(q, margin + 1e-6).min() > margin)

@@ -1,6 +1,6 @@
 # Copyright 2026 The armid_ros developers
 # SPDX-License-Identifier: Apache-2.0
-"""A slow run before the real one: whether the arm follows, and takes the torques foreseen."""
+"""A slow run before the real run: check of tracking errors and torques."""
 
 from __future__ import annotations
 
@@ -9,30 +9,30 @@ from armid_ros.excitation.supervision import Path
 from armid_ros.motion import FloatArray
 import numpy as np
 
-#: Samples of the path at which the torque is foreseen.
+#: Number of samples of the path at which the torque is predicted.
 _SAMPLES = 4000
-#: A torque is as foreseen within this factor of its largest foreseen value: a description knows no
-#: friction, and friction is most of what a slow arm takes.
+#: Largest accepted ratio of a measured torque to the largest predicted torque. The ratio is large
+#: because a description has no friction, and friction dominates the torque of a slow arm.
 _SURPRISING = 3.0
 
 
 class Rehearsal:
     """
-    What came of an arm while it rehearsed.
+    Results of a rehearsal.
 
     Parameters
     ----------
     path : Path
-        What it should follow.
+        The path to follow.
     arm : ArmModel
-        Foresees the torque.
+        Model for the torque prediction.
 
     Attributes
     ----------
     tracking : ndarray, shape (n,)
-        Largest distance from where each joint should have been [rad or m].
+        Largest tracking error of each joint [rad or m].
     torque : ndarray, shape (n,)
-        Largest torque that was measured [N m or N]; NaN where none was.
+        Largest measured torque [N m or N]; NaN if none was measured.
 
     """
 
@@ -43,14 +43,14 @@ class Rehearsal:
 
     def add(self, phase: float, q: FloatArray, tau: FloatArray) -> None:
         """
-        Take a joint state.
+        Add a joint state.
 
         Parameters
         ----------
         phase : float
             Time since the start of the path [s].
         q, tau : ndarray, shape (n,)
-            Measured position and torque; NaN where there is none.
+            Measured position and torque; NaN if not measured.
 
         """
         distance = np.abs(q - self._path.at([phase]).q[0])
@@ -59,14 +59,14 @@ class Rehearsal:
         self._count, self._until = self._count + 1, max(self._until, phase)
 
     def foreseen(self) -> FloatArray:
-        """Return the largest torque that the description foresees so far, shape (n,)."""
+        """Return the largest predicted torque so far, shape (n,)."""
         wanted = self._path.at(np.linspace(0.0, self._until, _SAMPLES))
         return np.asarray(np.abs(self._arm.joint_torque(wanted)).max(axis=0))
 
     def report(self) -> tuple[str, tuple[str, ...]]:
-        """Return how it went so far, and what of it was not as foreseen, a sentence a joint."""
+        """Return a summary so far, and a sentence on each joint with an unexpected torque."""
         if not self._count:
-            said = 'no joint state came during the rehearsal'
+            said = 'no joint state was received during the rehearsal'
             return said, (said,)
         robot, foreseen = self._arm.robot, self.foreseen()
         surprises: list[str] = []

@@ -1,6 +1,6 @@
 # Copyright 2026 The armid_ros developers
 # SPDX-License-Identifier: Apache-2.0
-"""All that an arm does for an excitation: the way there, the excitation, and the way back."""
+"""A complete run: the way to the excitation, the excitation, and the way back."""
 
 from __future__ import annotations
 
@@ -16,26 +16,26 @@ from armid_ros.motion import FloatArray, Motion
 import numpy as np
 import numpy.typing as npt
 
-#: How far the end of the way there may be from the start of the excitation [rad or m].
+#: Largest distance between the end of the approach and the start of the excitation [rad or m].
 _GAP = 1e-9
 _TURN = 2.0 * np.pi
-#: Samples of the period at which range and torque are looked at.
+#: Number of samples of the period at which range and torque are checked.
 _SAMPLES = 400
-#: Torques that differ by less are the same, as a share of the largest.
+#: Relative tolerance for equal torques, as a share of the largest torque.
 _SAME = 1e-6
 
 
 @dataclass(frozen=True)
 class Run:
     """
-    The way to an excitation, the excitation, and the way back to where the arm was.
+    The way to an excitation, the excitation, and the way back to the start pose.
 
     Attributes
     ----------
     approach : Transfer
         Ends where the excitation begins.
     excitation : Excitation
-        What is to be seen.
+        The excitation.
     back : Transfer or None
         Begins where the excitation ends; None: the arm stays there.
     rate : float
@@ -49,7 +49,7 @@ class Run:
     rate: float
 
     def __post_init__(self) -> None:
-        """Make the ways whole numbers of samples long, and check that they meet."""
+        """Round the ways to whole numbers of samples, and check that they meet the excitation."""
         ends = self.excitation.at([0.0, self.excitation.duration]).q
         for way, own, end in ((self.approach, -1, 0), (self.back, 0, 1)):
             if way is not None and np.abs(way.q[own] - ends[end]).max() > _GAP:
@@ -109,29 +109,29 @@ def plan_run(
     seed: int = 0,
 ) -> Run:
     """
-    Plan how an arm gets from where it stands into an excitation, and back.
+    Plan the run of an excitation from the present pose of the arm, and back.
 
     Parameters
     ----------
     excitation : Excitation
-        What is to be run; its joints may be turned by whole turns.
+        The excitation; its joints may be shifted by whole turns.
     planner : TransferPlanner
-        What the ways have to keep.
+        Planner of the ways.
     start : ndarray, shape (n,)
-        Where the arm stands [rad or m].
+        Present pose of the arm [rad or m].
     rate : float
         Samples per second [Hz].
     shortest : float
-        Time of a way at least [s].
+        Shortest duration of a way [s].
     back : bool
-        Whether it returns to where it stood.
+        Whether the arm returns to its start pose.
     seed : int
-        Of the search for a way.
+        Seed of the search for a way.
 
     Raises
     ------
     TrajectoryError
-        If there is no way; names what stands in it.
+        If no way was found; the message names the obstruction.
 
     """
     if planner.limits is not None:
@@ -146,21 +146,22 @@ def unwound(
     excitation: Excitation, arm: ArmModel, limits: Limits, start: FloatArray
 ) -> Excitation:
     """
-    Return an excitation whose joints are as few turns from a start as the limits allow.
+    Return the excitation shifted by whole turns, as close to a start pose as the limits allow.
 
-    A joint that may turn twice reaches most poses in two ways, and above a floor one of them is
-    often cut off: the shoulder would have to swing through the ground.
+    A joint with a range of two turns reaches most poses at two positions. Above a floor, the way
+    to one of them is often blocked: the shoulder would have to swing through the floor.
 
     Parameters
     ----------
     excitation : Excitation
-        What is to be run.
+        The excitation.
     arm : ArmModel
-        Prior model; where it tells whole turns apart, as springs do, nothing is changed.
+        Prior model. If its torques change with whole turns, as with springs, the excitation is not
+        changed.
     limits : Limits
         Position limits in force.
     start : ndarray, shape (n,)
-        Where the arm stands [rad or m].
+        Present pose of the arm [rad or m].
 
     """
     trajectory = excitation.trajectory

@@ -1,6 +1,6 @@
 # Copyright 2026 The armid_ros developers
 # SPDX-License-Identifier: Apache-2.0
-"""The bodies of an arm, its floor and its surroundings: what a motion must not touch."""
+"""The bodies of an arm, its floor and the obstacles around it."""
 
 from __future__ import annotations
 
@@ -20,25 +20,25 @@ from armid_ros.excitation.limits import (
 from armid_ros.robots import collision_model, CollisionModel, Robot
 import numpy as np
 
-#: Names that are listed before the rest is counted.
+#: Number of names that are listed; the other names are counted.
 _NAMED = 4
 
 
 @dataclass(frozen=True)
 class CollisionScene:
     """
-    What a motion must not touch.
+    Bodies, floor and obstacles that a motion must not touch.
 
     Attributes
     ----------
     collision : CollisionModel
         Bodies of the robot.
     floor : Floor
-        What it stands on.
+        The floor.
     obstacles : sequence of Obstacle
-        What stands around it, the floor among it.
+        Obstacles around the arm, including the floor.
     clearance : float
-        Between bodies [m].
+        Distance to keep between bodies [m].
 
     """
 
@@ -68,9 +68,9 @@ class CollisionScene:
         floor : str, optional
             Height above the origin of the base [m], or 'none'; see `find_floor` for the default.
         environment : str or Path, optional
-            File with what stands around the arm; by default nothing does.
+            File with the obstacles around the arm; by default no obstacles.
         progress : callable, optional
-            Receives the share of the meshes that is read.
+            Called with the share of the meshes that is read.
 
         Raises
         ------
@@ -88,16 +88,16 @@ class CollisionScene:
 
     @property
     def bodies(self) -> CollisionModel:
-        """Return the bodies of the robot together with what stands around it."""
+        """Return the bodies of the robot together with the obstacles."""
         return with_obstacles(self.collision, self.obstacles)
 
     @property
     def unchecked(self) -> tuple[str, ...]:
-        """Return what cannot be checked of any motion."""
+        """Return the items that cannot be checked for any motion."""
         return self.not_checked(Limits.of(self.collision.robot, speed=1.0))
 
     def not_checked(self, limits: Limits) -> tuple[str, ...]:
-        """Return what cannot be checked of a run within limits, each in a few words."""
+        """Return the items that cannot be checked for a run within limits."""
         robot = self.collision.robot
         found: list[str] = []
         if self.floor.height is None and not any(o.kind == 'plane' for o in self.obstacles):

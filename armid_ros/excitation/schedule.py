@@ -3,8 +3,8 @@
 """
 A whole excitation run: from rest into a periodic trajectory, through it, and back to rest.
 
-The arm speeds up and slows down along the trajectory's own path, so the run-in and the run-out
-visit no pose that the periods do not visit. The way from another pose is a `Transfer`.
+The arm accelerates and decelerates along the path of the trajectory. Run-in and run-out therefore
+visit only poses of the periods. The way from another pose is a `Transfer`.
 
 """
 
@@ -18,7 +18,7 @@ from armid_ros.motion import FloatArray, Motion
 import numpy as np
 import numpy.typing as npt
 
-#: How far period * rate may be from a whole number for the periods to count as identical.
+#: Largest difference of period * rate from a whole number for identical periods.
 _WHOLE_SAMPLES = 1e-6
 #: The longest run [s]. Its samples are kept in memory, 1 GB for six joints at 50 Hz.
 MAX_DURATION = 86400.0
@@ -32,9 +32,9 @@ class Excitation:
     Attributes
     ----------
     trajectory : FourierTrajectory
-        What is repeated.
+        The periodic trajectory.
     n_periods : int
-        Number of identical periods; from two on their difference shows the noise floor.
+        Number of identical periods; with two or more, their difference is the noise floor.
     run_in : float
         Duration of the run-in, and of the run-out [s].
 
@@ -101,7 +101,7 @@ class Excitation:
         Raises
         ------
         TrajectoryError
-            If they are not the same joints.
+            If the joints are not the same.
 
         """
         if set(joints) != set(self.joints):
@@ -115,12 +115,12 @@ class Excitation:
 
     def at_speed(self, share: float, rate: float) -> Excitation:
         """
-        Return the same path run through more slowly.
+        Return the excitation along the same path at a lower speed.
 
         Parameters
         ----------
         share : float
-            Of the speed; the next smaller one at which a period is a whole number of samples.
+            Share of the speed, rounded down such that a period is a whole number of samples.
         rate : float
             Samples per second [Hz].
 
@@ -155,7 +155,7 @@ class Excitation:
         Raises
         ------
         TrajectoryError
-            If a period is not a whole number of samples; names the nearest rate that fits.
+            If a period is not a whole number of samples; the message names the nearest valid rate.
 
         """
         lead = self._run_in_samples(rate)
@@ -169,7 +169,7 @@ class Excitation:
         return samples / rate
 
     def period_slices(self, rate: float) -> tuple[slice, ...]:
-        """Return which samples of ``motion(rate)`` belong to each period."""
+        """Return the slice of the samples of ``motion(rate)`` for each period."""
         lead, length = self._run_in_samples(rate), self._period_samples(rate)
         return tuple(
             slice(lead + k * length, lead + (k + 1) * length) for k in range(self.n_periods)

@@ -1,6 +1,6 @@
 # Copyright 2026 The armid_ros developers
 # SPDX-License-Identifier: Apache-2.0
-"""What to design, and how hard to try."""
+"""Settings of a design."""
 
 from __future__ import annotations
 
@@ -12,21 +12,21 @@ from armid_ros.excitation.search.criteria import CRITERIA
 from armid_ros.motion import FloatArray
 import numpy as np
 
-#: Which parameters a design is for.
+#: Parameter sets that a design can target.
 TARGETS = {
     'all': 'all base parameters of the rigid body, and those of the effects',
     'gravity': 'masses and first moments as an arm moving slowly shows them, and the effects',
     'effects': 'those of the effects alone, the rigid body being known',
 }
 
-#: Samples of one period at which a search looks: at least, and per harmonic.
+#: Samples of one period in a search: smallest number, and number per harmonic.
 _SAMPLES, _PER_HARMONIC = 64, 12
 
 
 @dataclass(frozen=True)
 class DesignSettings:
     """
-    What to design.
+    Settings of a design: trajectory, limits, criterion and effort of the search.
 
     Attributes
     ----------
@@ -35,45 +35,45 @@ class DesignSettings:
     harmonics : int
         Number of harmonics per joint.
     n_periods : int
-        How often the period is run through.
+        Number of periods.
     run_in : float
-        Shortest duration of the run-in and of the run-out [s]; they are made longer where the
-        limits need it.
+        Shortest duration of the run-in and of the run-out [s]; they are made longer if the limits
+        require it.
     speed : str or float
         'slow', 'medium', 'fast' or a share of the velocity and acceleration limits.
     acceleration : ndarray, shape (n,), or None
-        What the drives can do [rad/s^2 or m/s^2], which no URDF says; None: the top speed in
-        0.25 s. ``speed`` applies to it.
+        Acceleration limits of the drives [rad/s^2 or m/s^2], which a URDF does not contain. None:
+        the top speed is reached in 0.25 s. ``speed`` applies to these limits.
     clearance : float
         Distance to keep between bodies that may touch [m].
     criterion : str
-        'D', 'A', 'E', 'condition', or 'T' to tell the arm from a rival.
+        'D', 'A', 'E', 'condition', or 'T' to distinguish the arm from a rival.
     balance : float
-        Criterion 'D' minimises -log det / r + balance * log(condition number), r parameters: of
-        trajectories that tell about equally much it takes the one without a blind direction. 0:
-        D-optimality and nothing else.
+        Criterion 'D' minimises -log det / r + balance * log(condition number), with r parameters.
+        Among trajectories of similar information, it prefers one without a poorly identifiable
+        direction. 0: D-optimality only.
     target : str
         'all', 'gravity' or 'effects'.
     focus : tuple of str
-        Names of effects: see these as well as possible, the other parameters being fitted too.
-        Empty: see all alike. Not with criterion 'T'.
+        Names of effects to identify as precisely as possible, while the other parameters are
+        fitted too. Empty: all parameters count. Not with criterion 'T'.
     noise : ndarray, shape (n,), or None
         Standard deviation of the torque noise of each joint [N m or N]; None: 1 % of the torque
         limit, or of the largest such limit where a joint has none.
     rate : float
         Samples per second that the noise refers to [Hz], for the predicted deviations.
     candidates : int
-        Number of random feasible trajectories to begin with; of an arm of more than 10 joints,
-        fewer in proportion.
+        Number of random feasible trajectories at the start; proportionally fewer for an arm with
+        more than 10 joints.
     starts : int
-        Number of them, the best ones, that are improved; of these the better half goes on after
-        every second round.
+        Number of the best candidates that are improved; after every second round only the better
+        half continues.
     iterations : int
-        Iterations of each of them. This, not the time, decides between results.
+        Iterations per start. The result depends on this number, not on the computing time.
     time_budget : float
-        Processor time [s]; infinite by default. A search that uses more is stopped once it has
-        found something; the same seed then need not give the same trajectory, and the design
-        says so.
+        Processor time [s]; infinite by default. A search that uses more is stopped as soon as it
+        has found a trajectory. The same seed may then give another trajectory; `Design.stopped`
+        states this.
 
     """
 
@@ -96,7 +96,7 @@ class DesignSettings:
     time_budget: float = np.inf
 
     def __post_init__(self) -> None:
-        """Check names and numbers."""
+        """Check the names and numbers."""
         for kind, name, known in (
             ('criterion', self.criterion, CRITERIA),
             ('target', self.target, TARGETS),
@@ -104,11 +104,13 @@ class DesignSettings:
             if name not in known:
                 raise TrajectoryError(f"no {kind} '{name}'; there are {', '.join(known)}")
         if self.focus and self.criterion == 'T':
-            raise TrajectoryError("focus goes with every criterion but 'T', which has a rival")
+            raise TrajectoryError(
+                "focus is possible with every criterion except 'T', which has a rival"
+            )
         self._require_numbers()
 
     def _require_numbers(self) -> None:
-        """Refuse counts below one, times that are not positive, and negative sizes."""
+        """Raise a TrajectoryError for an impossible count, time or size."""
         for name in (
             'harmonics',
             'n_periods',
@@ -133,20 +135,21 @@ class DesignSettings:
 
     @property
     def samples(self) -> int:
-        """Samples of one period at which a search looks."""
+        """Number of samples of one period in a search."""
         return max(_SAMPLES, _PER_HARMONIC * self.harmonics)
 
 
 def whole_period(duration: float, n_periods: int, run_in: float, rate: float) -> float:
     """
-    Return the period that fills a run, a whole number of samples long [s].
+    Return the period of a run of given duration, a whole number of samples long [s].
 
     Parameters
     ----------
     duration : float
-        From rest to rest [s]; the run may become half a sample a period longer or shorter.
+        Duration from rest to rest [s]; the run may become longer or shorter by half a sample per
+        period.
     n_periods : int
-        How often the period is run through.
+        Number of periods.
     run_in : float
         Duration of the run-in, and of the run-out [s].
     rate : float

@@ -1,6 +1,6 @@
 # Copyright 2026 The armid_ros developers
 # SPDX-License-Identifier: Apache-2.0
-"""Where an arm is while it runs, whether it follows, and how it is brought to rest."""
+"""Supervision of a running arm: measured pose, tracking error and stop."""
 
 from __future__ import annotations
 
@@ -13,32 +13,32 @@ from armid_ros.motion import FloatArray, Motion, read_only
 import numpy as np
 import numpy.typing as npt
 
-#: How long a controller may take to begin with a trajectory that slows the arm down [s].
+#: Largest delay of a controller before it begins a stop trajectory [s].
 HANDOVER = 0.05
 
 
 class Path(Protocol):
-    """What an arm follows: a `Run`, an `Excitation` or a `Transfer`."""
+    """A path to follow: a `Run`, an `Excitation` or a `Transfer`."""
 
     def at(self, t: npt.ArrayLike) -> Motion:
-        """Evaluate it at times [s]."""
+        """Evaluate the path at times [s]."""
 
 
 @dataclass(frozen=True)
 class MeasuredPose:
     """
-    Where the joints of an arm were measured to be, whoever published them.
+    Latest measured positions of the joints of an arm, from all publishers.
 
     Attributes
     ----------
     joints : tuple of str
         n joint names.
     q : ndarray, shape (n,)
-        Latest positions [rad or m]; NaN where none came.
+        Latest positions [rad or m]; NaN if none was received.
     seen : ndarray, shape (n,)
-        When each of them came [s]; minus infinity where none came.
+        Arrival time of each position [s]; minus infinity if none was received.
     stamps : tuple of int
-        Their stamps [ns]; a stamp that comes again is no news.
+        Timestamps of the positions [ns]; a message with the same stamp is ignored.
 
     """
 
@@ -54,7 +54,7 @@ class MeasuredPose:
 
     @classmethod
     def unknown(cls, joints: tuple[str, ...]) -> MeasuredPose:
-        """Return the pose of an arm that was not heard of yet."""
+        """Return the pose of an arm without any received position."""
         n = len(joints)
         return cls(joints, np.full(n, np.nan), np.full(n, -np.inf), (0,) * n)
 
@@ -62,18 +62,18 @@ class MeasuredPose:
         self, names: Sequence[str], positions: Sequence[float], stamp_ns: int, now: float
     ) -> MeasuredPose:
         """
-        Take a message into account.
+        Return the pose updated with a message.
 
         Parameters
         ----------
         names : sequence of str
-            Joints that it names, in any order; others than the arm's are passed over.
+            Joints of the message, in any order; joints of other devices are ignored.
         positions : sequence of float
-            Their positions [rad or m]; those that are no numbers are passed over.
+            Positions of these joints [rad or m]; values that are not finite are ignored.
         stamp_ns : int
-            Its stamp [ns]; 0 where it has none.
+            Timestamp of the message [ns]; 0 if it has none.
         now : float
-            When it came [s].
+            Arrival time [s].
 
         """
         q, seen, stamps = self.q.copy(), self.seen.copy(), list(self.stamps)
@@ -87,7 +87,7 @@ class MeasuredPose:
         return replace(self, q=q, seen=seen, stamps=tuple(stamps))
 
     def staleness(self, now: float, timeout: float) -> str:
-        """Say which joint was not heard of for longer than a timeout [s]; empty when none."""
+        """Return a message if a joint position is older than a timeout [s]; otherwise empty."""
         age = now - self.seen
         oldest = int(np.argmax(age))
         if age[oldest] <= timeout:
@@ -108,7 +108,7 @@ def tracking_fault(
     measured: FloatArray,
     tolerance: float,
 ) -> str:
-    """Say which joint is how far from where it should be, each (n,); empty within tolerance."""
+    """Return a message if a tracking error exceeds a tolerance, each (n,); otherwise empty."""
     error = measured - wanted
     worst = int(np.argmax(np.abs(error)))
     if abs(error[worst]) <= tolerance:
@@ -127,7 +127,7 @@ def jump_fault(
     tolerance: float,
 ) -> str:
     """
-    Say which joint would jump, and how far, if a trajectory began now.
+    Return a message if a joint would jump when a trajectory began now.
 
     Parameters
     ----------
@@ -136,16 +136,16 @@ def jump_fault(
     first : tuple of float and ndarray, shape (n,)
         Time [s] and positions [rad or m] of its first waypoint.
     measured : ndarray, shape (n,)
-        Where the arm is [rad or m].
+        Measured positions [rad or m].
     fastest : ndarray, shape (n,)
-        Largest velocity on the way to a first waypoint later than time 0 [rad/s or m/s].
+        Largest velocity of the move to a first waypoint later than time 0 [rad/s or m/s].
     tolerance : float
-        How far the arm may be from a first waypoint at time 0 [rad or m].
+        Largest distance of the arm from a first waypoint at time 0 [rad or m].
 
     Returns
     -------
     str
-        Empty when nothing jumps.
+        Message; empty if no joint jumps.
 
     """
     time, q = first
@@ -163,14 +163,14 @@ def jump_fault(
 
 def slowed(path: Path, phase: float, duration: float, rate: float) -> Motion:
     """
-    Return the way to rest from somewhere on a path, along the path itself.
+    Return a stop along a path from a given time on the path.
 
     Parameters
     ----------
     path : Run, Excitation or Transfer
-        What is left of it.
+        The path.
     phase : float
-        Where it is, time since its start [s].
+        Time since the start of the path [s].
     duration : float
         Time to come to rest [s].
     rate : float

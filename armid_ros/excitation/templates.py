@@ -1,6 +1,6 @@
 # Copyright 2026 The armid_ros developers
 # SPDX-License-Identifier: Apache-2.0
-"""Motions to choose from: of the whole arm or of single joints, slow and fast, with a payload."""
+"""Templates of motions: of all or single joints, slow or fast, with or without a payload."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ from armid_ros.excitation.limits import Limits
 from armid_ros.excitation.random_trajectory import random_feasible
 import numpy as np
 
-#: Draws before a motion of single joints is given up: what a pose of the others allows differs.
+#: Number of draws of a motion of single joints; each draw has another pose of the other joints.
 _DRAWS = 6
 #: Clearance between links [m], as excitations keep it.
 CLEARANCE = 0.01
@@ -25,12 +25,12 @@ CLEARANCE = 0.01
 @dataclass(frozen=True)
 class Template:
     """
-    One kind of motion.
+    Template of a motion.
 
     Attributes
     ----------
     name : str
-        What it is, in words.
+        Description of the motion.
     speed : float
         Share of the velocity and acceleration limits.
     period : float
@@ -42,7 +42,7 @@ class Template:
     amplitude : float
         Largest amplitude [rad or m].
     loaded : bool
-        Whether it is run twice, without and with a known payload.
+        Whether the motion is run twice, without and with a known payload.
 
     """
 
@@ -58,12 +58,12 @@ class Template:
         self, arm: ArmModel, clearance: ClearanceModel, rng: np.random.Generator
     ) -> FourierTrajectory:
         """
-        Draw a motion within all limits that hits nothing.
+        Draw a motion that keeps all limits and the clearance.
 
         Raises
         ------
         TrajectoryError
-            If there is none; says what stands in the way.
+            If no motion is feasible; the message names the obstruction.
 
         """
         limits = Limits.of(arm.robot, speed=self.speed)
@@ -89,7 +89,7 @@ class Template:
         raise TrajectoryError(f'{self.name}: {faults}')
 
 
-#: All joints together, slow to fast, and as quick as accelerations allow.
+#: Motions of all joints, slow to fast, and as fast as the accelerations allow.
 _WHOLE = (
     Template('slow motion of all joints', 0.1, 12.0, 3),
     Template('motion of all joints at medium speed', 0.4, 10.0, 5),
@@ -99,7 +99,7 @@ _WHOLE = (
 
 
 def templates(joints: Sequence[str]) -> tuple[Template, ...]:
-    """Return the motions to choose from, where certain joints are in doubt; none: the arm."""
+    """Return motions that identify effects on some joints; without joints, on the arm."""
     chosen = list(_WHOLE)
     if joints:
         names, alone = ', '.join(joints), tuple(joints)

@@ -1,6 +1,6 @@
 # Copyright 2026 The armid_ros developers
 # SPDX-License-Identifier: Apache-2.0
-"""The way of an arm from one pose to another, from rest to rest, past what stands around it."""
+"""Motion of an arm from one pose to another, from rest to rest, around obstacles."""
 
 from __future__ import annotations
 
@@ -19,15 +19,15 @@ import numpy.typing as npt
 
 #: Largest velocity and acceleration of a quintic from 0 to 1 in unit time.
 _TOP_VELOCITY, _TOP_ACCELERATION = 1.875, 10.0 / np.sqrt(3.0)
-#: What is slow for a joint whatever its limits are, with `SLOW_VELOCITY` [rad/s^2 or m/s^2].
+#: Acceleration that is slow for any joint, used with `SLOW_VELOCITY` [rad/s^2 or m/s^2].
 _SLOW_ACCELERATION = 1.0
-#: Samples of a way at which its torque is looked at; how it is slowed down, and how often.
+#: Samples of a way at which its torque is checked; factor on its duration, and number of trials.
 _SAMPLES, _SLOWER, _TRIES = 200, 1.3, 20
-#: How far beyond a position limit a joint may be measured before it is said to be [rad or m].
+#: Tolerance beyond a position limit for a measured position [rad or m].
 _BEYOND = 0.01
-#: Poses about zero that are tried, at each of these distances, where zero itself is not free.
+#: Number of poses about zero that are tried at each of these distances if zero is not free.
 _NEARBY, _DISTANCES = 200, (0.1, 0.2, 0.4, 0.8, 1.6, 3.2)
-#: Digits of a pose that was found, so that a person can type it.
+#: Decimals of a pose that was found, so that a person can type it.
 _DIGITS = 2
 _SEED = 0
 
@@ -42,7 +42,7 @@ class Transfer:
     joints : tuple of str
         n joint names.
     t : ndarray, shape (K,)
-        When it is at each pose, from 0 on [s].
+        Time at each pose, from 0 on [s].
     q : ndarray, shape (K, n)
         Poses [rad or m].
 
@@ -59,7 +59,7 @@ class Transfer:
 
     @property
     def duration(self) -> float:
-        """From rest to rest [s]."""
+        """Duration from rest to rest [s]."""
         return float(self.t[-1])
 
     def at(self, t: npt.ArrayLike) -> Motion:
@@ -78,7 +78,7 @@ class Transfer:
         )
 
     def lasting(self, duration: float) -> Transfer:
-        """Return the same way in another time [s]."""
+        """Return the same way with another duration [s]."""
         if not self.duration > 0.0:
             return replace(self, t=np.linspace(0.0, duration, len(self.t)))
         return replace(self, t=self.t * (duration / self.duration))
@@ -91,20 +91,20 @@ class Transfer:
 @dataclass(frozen=True)
 class TransferPlanner:
     """
-    What a way has to keep.
+    Planner of ways between poses, within limits and clearance.
 
     Attributes
     ----------
     arm : ArmModel
         Prior model, for the torque.
     limits : Limits or None
-        Limits in force; None: none is looked at, and the time is the shortest asked for.
+        Limits in force. None: no limit is checked, and the duration is ``shortest``.
     clearance : ClearanceModel or None
         Bodies to keep apart, the floor among them.
     margin : float
         Clearance to keep [m].
     acceleration : ndarray, shape (n,), or None
-        Acceleration limits that are given for any motion [rad/s^2 or m/s^2]; NaN: none is.
+        Given acceleration limits of any motion [rad/s^2 or m/s^2]; NaN: not given.
 
     """
 
@@ -116,7 +116,7 @@ class TransferPlanner:
 
     @property
     def given_acceleration(self) -> FloatArray:
-        """Return the acceleration limits [rad/s^2 or m/s^2]; infinite where none is given."""
+        """Return the acceleration limits [rad/s^2 or m/s^2]; infinite if not given."""
         if self.acceleration is None:
             return np.full(self.arm.robot.n_joints, np.inf)
         return np.nan_to_num(self.acceleration, nan=np.inf)
@@ -132,21 +132,21 @@ class TransferPlanner:
         start, goal : ndarray, shape (n,)
             Poses [rad or m].
         shortest : float
-            Time to take at least [s].
+            Shortest duration [s].
         seed : int
-            Of the search for a way around what stands in the straight one.
+            Seed of the search for a way around obstacles.
 
         Raises
         ------
         TrajectoryError
-            If the start or the goal is not allowed, or no way was found; names the limit or the
-            bodies in the way.
+            If the start or the goal is not allowed, or no way was found. The message names the
+            limit or the bodies.
 
         """
         joints = self.arm.robot.joints
         if self.limits is None:
             return Transfer(joints, np.array([0.0, shortest]), np.vstack([start, goal]))
-        # a pose that is measured a little beyond a limit is put onto it
+        # a pose measured slightly beyond a limit is moved onto the limit
         inside = np.clip(start, self.limits.lower, self.limits.upper)
         start = np.where(np.abs(start - inside) <= _BEYOND, inside, start)
         for name, q in (('it would leave from', start), ('it would go to', goal)):
@@ -164,7 +164,7 @@ class TransferPlanner:
         return self._timed(poses, shortest)
 
     def fault(self, q: FloatArray) -> str:
-        """Say why an arm may not stand in a pose, shape (n,); empty where it may."""
+        """Return why an arm may not stand in a pose, shape (n,); empty if it may."""
         assert self.limits is not None
         violations = check_limits(self.limits, Motion.of_states(self.limits.joints, q, 0.0, 0.0))
         overload = self._overload(q[np.newaxis])
@@ -180,7 +180,7 @@ class TransferPlanner:
 
     def free_start(self) -> FloatArray:
         """
-        Return the zero of the description, or the pose nearest to it that is free, shape (n,).
+        Return the zero pose, or the nearest pose found that is free, shape (n,).
 
         Raises
         ------
@@ -207,7 +207,7 @@ class TransferPlanner:
         )
 
     def _always_near(self, poses: FloatArray) -> str:
-        """Name the two bodies that most poses take too close, and a clearance that they keep."""
+        """Return a phrase on the bodies that are most often too close, and a clearance."""
         near = [clear_line(self.clearance, self.margin, q, q) for q in poses]
         pairs = Counter((one.first, one.second) for one in near if one is not None)
         if not pairs:
@@ -220,7 +220,7 @@ class TransferPlanner:
         return f'; {first} and {second} are too close in {count} of {len(near)} poses{then}'
 
     def _simplified(self, q: FloatArray, zero: FloatArray) -> FloatArray:
-        """Put joints back to zero that need not leave it, and round the others."""
+        """Set joints to zero if the pose stays free, and round the other joints."""
         for j in np.argsort(np.abs(q - zero)):
             other = q.copy()
             other[j] = zero[j]
@@ -230,7 +230,7 @@ class TransferPlanner:
         return q if self.fault(rounded) else rounded
 
     def _overload(self, q: FloatArray) -> str:
-        """Say which joint cannot hold some of the poses, shape (N, n)."""
+        """Return a message if a joint cannot hold some of the poses, shape (N, n)."""
         assert self.limits is not None
         if not np.isfinite(self.limits.torque).any():
             return ''
@@ -246,7 +246,7 @@ class TransferPlanner:
         )
 
     def _timed(self, poses: FloatArray, shortest: float) -> Transfer:
-        """Give a path the time that the limits ask for."""
+        """Return a path with the duration that the limits require."""
         limits = self.limits
         assert limits is not None
         way = np.abs(np.diff(poses, axis=0))
@@ -271,14 +271,15 @@ def transfer_limits(
     robot: Robot, speed: str | float = 'slow', acceleration: FloatArray | None = None
 ) -> Limits:
     """
-    Return the limits of a way, which has nothing to show and so is slow.
+    Return the limits of a way, which is slow because it identifies no parameters.
 
     Parameters
     ----------
     robot : Robot
-        Gives the limits; its whole range may be used, for the arm may stand at the end of it.
+        Robot with the limits; the whole range of motion is used, because the arm may stand at its
+        end.
     speed : str or float
-        Of the run: a way is never faster than that.
+        Speed of the run; a way is never faster.
     acceleration : ndarray, shape (n,), optional
         Acceleration limits [rad/s^2 or m/s^2].
 

@@ -1,11 +1,11 @@
 # Copyright 2026 The armid_ros developers
 # SPDX-License-Identifier: Apache-2.0
 """
-Robots: what a URDF says of an arm, and the robots that come with the package.
+Loading of robots from URDF, xacro and MJCF files, and the robots shipped with the package.
 
-`load_robot` takes a shipped name, a URDF or xacro file, or the text of a URDF, and gives a
-`Robot`: the rigid model of its driven joints with their limits, in any gravity.
-`collision_model` adds how far its links are from each other.
+`load_robot` returns a `Robot` from a shipped name, a URDF or xacro file, or the text of a URDF. A
+`Robot` holds the rigid-body model of the driven joints, their limits and the gravity vector.
+`collision_model` computes distances between the links.
 
 """
 

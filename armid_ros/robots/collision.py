@@ -1,6 +1,6 @@
 # Copyright 2026 The armid_ros developers
 # SPDX-License-Identifier: Apache-2.0
-"""How far the links of a robot are from each other."""
+"""Distances between the links of a robot."""
 
 from __future__ import annotations
 
@@ -32,13 +32,13 @@ class CollisionModel:
     geometry : pinocchio.GeometryModel
         Collision bodies and pairs; never changed.
     notes : tuple of str
-        Bodies left out and pairs not checked, for a person to read.
+        Sentences on bodies that are left out and pairs that are not checked.
     left_out : tuple of str
         Links with a body that was left out, because its mesh was not found.
     touching : tuple of (str, str)
         Pairs of links that are not checked, because they touch at zero.
     excluded : str
-        How many pairs of links which SRDF excludes; empty without one.
+        Name of the SRDF and the number of pairs of links that it excludes; empty without an SRDF.
 
     """
 
@@ -60,20 +60,22 @@ def collision_model(
     robot: Robot, *, progress: Callable[[float], None] | None = None
 ) -> CollisionModel:
     """
-    Return the collision bodies of a robot and the pairs of links that may touch.
+    Return the collision bodies of a robot and the pairs of links that are checked.
 
-    Not checked are links that cannot move against each other, links joined by a joint, pairs that
-    one joint moves and that do not touch anywhere in its range, and pairs that the SRDF disables:
-    the one with the URDF's or the robot's name (or the only one) beside the URDF or in ../srdf.
-    Without an SRDF, pairs that touch when the robot stands at zero (or its limits nearest to it)
-    are left out and noted: they are bodies drawn too large.
+    Four kinds of pairs are not checked: links that cannot move against each other, links joined by
+    a joint, pairs that one joint moves and that touch nowhere in its range, and pairs that the
+    SRDF disables. The SRDF is looked for beside the URDF and in ../srdf: the file with the name of
+    the URDF or of the robot, or the only file. Without an SRDF, pairs that touch at zero (or at
+    the limits nearest to zero) are left out and noted, because their collision bodies are drawn
+    too large.
 
     Parameters
     ----------
     robot : Robot
         The robot.
     progress : callable, optional
-        Called with the share that is done, 0 to 1, while meshes become convex bodies.
+        Called with the share of the work done, 0 to 1, while meshes are converted to convex
+        bodies.
 
     Raises
     ------
@@ -110,7 +112,7 @@ def collision_model(
 
 
 def _leave_out_touching(robot: Robot, geometry: pin.GeometryModel) -> tuple[tuple[str, str], ...]:
-    """Remove the pairs of links that touch at zero; return them in alphabetical order."""
+    """Remove the pairs of links that touch at zero; return these pairs in alphabetical order."""
     data, placed = robot.model.createData(), geometry.createData()
     pin.computeDistances(robot.model, data, geometry, placed, robot.zero_pose)
     touching = {
@@ -124,7 +126,7 @@ def _leave_out_touching(robot: Robot, geometry: pin.GeometryModel) -> tuple[tupl
 
 
 def _leave_out_separate(robot: Robot, geometry: pin.GeometryModel) -> None:
-    """Remove pairs that one joint moves and that never touch, as a flange and its wrist."""
+    """Remove pairs that one joint moves and that never touch, such as flange and wrist."""
     data, placed = robot.model.createData(), geometry.createData()
     by_joint: dict[int, list[int]] = {}
     for number, pair in enumerate(geometry.collisionPairs):

@@ -1,6 +1,6 @@
 # Copyright 2026 The armid_ros developers
 # SPDX-License-Identifier: Apache-2.0
-"""The kinematic tree in a URDF, checked so that what is wrong is said by name."""
+"""Reading of the kinematic tree in a URDF; errors name the faulty link or joint."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ KNOWN = (*MOVABLE, 'fixed', 'floating', 'planar')
 ROUNDING = 1e-6  # relative; descriptions print six digits
 NEGLIGIBLE = 1e-12  # kg m^2
 MAX_CHAIN = 500  # joints one behind the other; Pinocchio's reader descends by recursion
-SHORTEST_AXIS = 1e-100  # below, a component divided by it is no direction any more
+SHORTEST_AXIS = 1e-100  # an axis shorter than this cannot be normalised
 
 Vector = tuple[float, float, float]
 
@@ -37,7 +37,7 @@ class Inertial:
     inertia: tuple[float, float, float, float, float, float]
 
     def doubt(self) -> str | None:
-        """Say why no mass distribution has this inertia, or None when one has."""
+        """Return why no mass distribution has this inertia; None if one exists."""
         ixx, ixy, ixz, iyy, iyz, izz = self.inertia
         tensor = np.array([[ixx, ixy, ixz], [ixy, iyy, iyz], [ixz, iyz, izz]])
         moments = np.linalg.eigvalsh(tensor)
@@ -63,7 +63,7 @@ class Mimic:
 
 @dataclass(frozen=True)
 class Joint:
-    """A joint as the URDF has it; a limit that is not given is infinite."""
+    """A joint of the URDF; a limit that is not given is infinite."""
 
     name: str
     kind: str
@@ -83,12 +83,12 @@ class Joint:
 
     @property
     def movable(self) -> bool:
-        """Whether it has a degree of freedom."""
+        """Whether the joint has a degree of freedom."""
         return self.kind in MOVABLE
 
     @property
     def unit(self) -> str:
-        """Return the unit of its position: 'rad' or 'm'."""
+        """Return the unit of the joint position: 'rad' or 'm'."""
         return 'm' if self.kind == 'prismatic' else 'rad'
 
 
@@ -118,9 +118,9 @@ class Description:
 
 def parse_xml(text: str) -> ElementTree.Element:
     """
-    Return the root element of a URDF; RobotError says the line where the XML is broken.
+    Return the root element of a URDF; a RobotError names the line of malformed XML.
 
-    Prefixes of names are not looked up, as tools add attributes of theirs without declaring them.
+    Namespace prefixes need no declaration, because tools add attributes without declaring them.
 
     """
     if len(text) > TEXT_LIMIT:
@@ -131,7 +131,7 @@ def parse_xml(text: str) -> ElementTree.Element:
     try:
         parser.Parse(text, True)
         root = builder.close()
-    except ValueError as error:  # an encoding that is not known, characters that are none
+    except ValueError as error:  # an unknown encoding, or invalid characters
         raise RobotError(f'malformed XML: {error}') from None
     except expat.ExpatError as error:
         reason = str(error).split(':')[0]
@@ -146,7 +146,7 @@ def parse_xml(text: str) -> ElementTree.Element:
     return root
 
 
-#: A parent of this name stands for the ground in Drake, Bullet and Gazebo, without a link of it.
+#: A parent link of this name means the ground in Drake, Bullet and Gazebo; it needs no <link>.
 GROUND = 'world'
 
 
@@ -157,9 +157,9 @@ def parse_description(root: ElementTree.Element) -> Description:
     Raises
     ------
     RobotError
-        For what a URDF must not have (names used twice, links that do not exist, loops, more
-        than one root, numbers that are none) and what an arm cannot have (floating or planar
-        joints), with the name of the link or joint.
+        If the URDF is invalid (a name used twice, a missing link, a loop, more than one root, a
+        value that is not a number) or a joint is floating or planar. The message names the link or
+        joint.
 
     """
     notes: list[str] = []
@@ -186,7 +186,7 @@ def parse_description(root: ElementTree.Element) -> Description:
 
 
 def _carriers(links: Iterable[str], joints: Iterable[Joint]) -> dict[str, Joint]:
-    """Return the joint that carries each link; of a tree every link but the base has one."""
+    """Return the joint that carries each link; in a tree, every link except the base has one."""
     carriers: dict[str, Joint] = {}
     for joint in joints:
         for role, link in (('parent', joint.parent), ('child', joint.child)):
@@ -262,8 +262,8 @@ def _inertial(link: ElementTree.Element, name: str) -> Inertial | None:
     )
     if inertial.mass < 0.0:
         raise RobotError(
-            f'{where} has a negative mass, {inertial.mass:g} kg; what comes '
-            'from an identification is a body with --physical'
+            f'{where} has a negative mass, {inertial.mass:g} kg; parameters '
+            'identified with --physical are those of a possible body'
         )
     return inertial
 
@@ -363,7 +363,7 @@ def _origin(element: ElementTree.Element, where: str) -> tuple[Vector, Vector]:
 
 
 def _vector(element: ElementTree.Element, name: str, where: str) -> Vector:
-    """Return three numbers that arithmetic bears, zero where there are none."""
+    """Return three finite numbers of limited size; zeros if the attribute is missing."""
     text = element.get(name, '0 0 0')
     said = f"{where}: {name}='{text}' of <{element.tag}> is"
     try:
@@ -385,7 +385,7 @@ def _number(
     *,
     endless: bool = False,
 ) -> float:
-    """Return a number that arithmetic bears; only limits may be infinite."""
+    """Return a number of limited size; only limits may be infinite."""
     text = element.get(name, '' if default is None else repr(default))
     said = f"{where}: {name}='{text}' of <{element.tag}> is"
     try:

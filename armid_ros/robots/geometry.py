@@ -1,6 +1,6 @@
 # Copyright 2026 The armid_ros developers
 # SPDX-License-Identifier: Apache-2.0
-"""The shapes of a URDF, placed on the bodies of a robot's model."""
+"""The visual and collision shapes of a URDF, placed on the bodies of the model."""
 
 from __future__ import annotations
 
@@ -40,19 +40,20 @@ class LinkShape(NamedTuple):
     link : str
         The link.
     frame : int
-        Its frame in the model.
+        Frame of the link in the model.
     number : int
-        Of the shape within the link.
+        Number of the shape within the link.
     placement : pinocchio.SE3
-        In the frame of the joint that carries it.
+        Placement in the frame of the joint that carries the shape.
     kind : {'box', 'sphere', 'cylinder', 'capsule', 'mesh'}
-        What it is.
+        Kind of the shape.
     size : tuple of float
-        Edges of a box, radius and length of others [m], or scale of a mesh.
+        Edges of a box [m], radius and length of a sphere, cylinder or capsule [m], or scale of a
+        mesh.
     mesh : str
-        Name of the file as it is written; empty for others.
+        File name of the mesh as written in the URDF; empty for other kinds.
     path : Path or None
-        Where the file is; None where it is not found.
+        Path of the mesh file; None if the file is not found.
 
     """
 
@@ -80,16 +81,16 @@ def shapes_of(
     robot : Robot
         The robot.
     tag : {'visual', 'collision'}
-        Which of them.
+        Kind of the shapes.
     other : {'visual', 'collision'}, optional
-        Taken of links that have none of the first.
+        Kind of the shapes of links that have no shape of the kind `tag`.
     progress : callable, optional
-        Receives the share of the links that is done.
+        Called with the share of the links done, 0 to 1.
 
     Raises
     ------
     RobotError
-        If a shape has no geometry, or numbers that are none.
+        If a shape has no geometry, or a value is not a number.
 
     """
     frames = {
@@ -125,10 +126,10 @@ def collision_geometry(
     other: Literal['visual', 'collision'] = 'collision',
 ) -> tuple[pin.GeometryModel, dict[str, str]]:
     """
-    Return the collision bodies of a robot, and notes on those that had to be left out.
+    Return the collision bodies of a robot, and notes on bodies that are left out.
 
-    Boxes, spheres and cylinders are exact; a mesh becomes convex bodies that contain it; a mesh
-    that is not found is left out and noted.
+    Boxes, spheres and cylinders are exact. A mesh is replaced by convex bodies that contain the
+    mesh. A mesh that is not found is left out and noted.
 
     Returns
     -------
@@ -140,7 +141,7 @@ def collision_geometry(
     Raises
     ------
     RobotError
-        If a <collision> has no geometry or numbers that are none, or a mesh cannot be read.
+        If a <collision> has no geometry, a value is not a number, or a mesh cannot be read.
 
     """
     geometry = pin.GeometryModel()
@@ -161,10 +162,10 @@ def collision_geometry(
 
 def sticks(model: pin.Model) -> list[tuple[int, FloatArray]]:
     """
-    Return lines that begin at joints: index of the joint in the model, and the end in its frame.
+    Return lines from joints, each as the joint index and the end point in the joint frame.
 
-    A line ends at a joint that the body carries; that of a last body beyond its centre of mass.
-    Index 0 is the base.
+    A line ends at the next joint; the line of the last body ends beyond its centre of mass. Index
+    0 is the base.
 
     """
     lines = []
@@ -185,7 +186,7 @@ def all_in_one(notes: Sequence[str]) -> tuple[str, ...]:
 
 
 def _bodies(shape: LinkShape, meshes: _Meshes) -> list[tuple[coal.CollisionGeometry, float]]:
-    """Return the bodies of a shape, and how far along its z axis each is."""
+    """Return the bodies of a shape, each with its offset along the z axis of the shape."""
     if shape.kind == 'box':
         return [(coal.Box(*shape.size), 0.0)]
     if shape.kind == 'sphere':
@@ -202,7 +203,7 @@ def _bodies(shape: LinkShape, meshes: _Meshes) -> list[tuple[coal.CollisionGeome
 
 
 def _geometry(element: ElementTree.Element) -> tuple[str, tuple[float, ...], str]:
-    """Return the kind of a shape, its numbers, and the name of its mesh."""
+    """Return the kind, the dimensions and the mesh name of a shape."""
     for shape in element.findall('geometry/*'):
         if shape.tag in _SIZES:
             texts = [shape.get(name, '') for name in _SIZES[shape.tag]]

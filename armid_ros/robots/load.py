@@ -25,7 +25,7 @@ from armid_ros.robots.xacro_expansion import expand_xacro
 import numpy as np
 import pinocchio as pin
 
-#: What a folder of a package begins with among the arguments of a description.
+#: Prefix of a package folder among the arguments of a description.
 PACKAGE = 'package:'
 NO_INERTIA = 1e-12  # kg m^2 or kg; the smallest motor rotor is five orders above
 
@@ -46,17 +46,17 @@ def load_robot(
         A shipped name (see `shipped_robots`), the path of a URDF, xacro or MJCF file, or the text
         of a URDF, such as a /robot_description. Meshes need not exist. A xacro file is a program,
         which can read any file and the environment, so name only one that you trust. It is
-        expanded in a process of its own, for 20 s of processor time at most; a text never is.
-        Packages that it refers to are looked for around it, in ROS_PACKAGE_PATH and in
-        AMENT_PREFIX_PATH. Behind a path may be arguments and folders of other packages:
-        'arm.xacro tool:=true package:grippers:=../grippers'.
+        expanded in a process of its own, for 20 s of processor time at most; a text is never
+        expanded. Packages that it refers to are looked for around it, in ROS_PACKAGE_PATH and in
+        AMENT_PREFIX_PATH. Arguments and folders of other packages may follow the path: 'arm.xacro
+        tool:=true package:grippers:=../grippers'.
     gravity : str or array_like, shape (3,)
         'earth', 'moon', 'x,y,z' or a vector [m/s^2], in the frame of the base link.
     joints : sequence of str, optional
-        The driven joints, in any order; the robot has them in its own order. Without it, all
-        revolute, continuous and prismatic joints except those of a gripper (mimic joints, joints
-        they follow, names with finger, gripper or jaw). Other joints are locked at 0, or at their
-        limit nearest to it, and their links become part of the body that carries them.
+        The driven joints, in any order; the robot keeps the order of its description. By default,
+        all revolute, continuous and prismatic joints except those of a gripper (mimic joints,
+        joints they follow, names with finger, gripper or jaw). Other joints are locked at 0, or at
+        their limit nearest to it, and their links become part of the body that carries them.
     xacro_arguments : mapping of str to str, optional
         Values of ``<xacro:arg>``.
 
@@ -68,8 +68,8 @@ def load_robot(
     Raises
     ------
     RobotError
-        If there is no such robot or it cannot be used; the message names the file and the line,
-        link or joint.
+        If the robot does not exist or its description is invalid. The message names the file and
+        the line, link or joint.
 
     Examples
     --------
@@ -118,7 +118,7 @@ def robot_from_urdf(
     path: Path | None = None,
 ) -> Robot:
     """
-    Make a robot of the text of a URDF; see `load_robot`.
+    Make a robot from the text of a URDF; see `load_robot`.
 
     Parameters
     ----------
@@ -127,14 +127,14 @@ def robot_from_urdf(
     gravity, joints
         As for `load_robot`.
     source : str
-        What error messages call the text.
+        Name of the text in error messages.
     path : Path, optional
-        File it was read from, from where meshes and the SRDF are looked for.
+        File of the text; meshes and the SRDF are looked for from its folder.
 
     Raises
     ------
     RobotError
-        If the description cannot be used.
+        If the description is invalid.
 
     """
     with reading(source, RobotError):
@@ -169,12 +169,14 @@ def robot_from_urdf(
         path=path,
     )
     if not np.isfinite(robot.rigid_parameters).all():
-        raise RobotError(f'{source}: its masses, lengths and inertias are beyond all numbers')
+        raise RobotError(
+            f'{source}: masses, lengths or inertias are too large for floating-point numbers'
+        )
     return replace(robot, notes=robot.notes + _inertia_notes(robot))
 
 
 def _written_out(source: str | Path) -> tuple[str | Path, dict[str, str], dict[str, str]]:
-    """Take path, arguments and packages apart: 'arm.xacro tool:=true package:grippers:=/a/b'."""
+    """Split into path, arguments and packages: 'arm.xacro tool:=true package:grippers:=/a/b'."""
     if not isinstance(source, str) or ':=' not in source:
         return source, {}, {}
     first, *rest = shlex.split(source)
@@ -182,12 +184,12 @@ def _written_out(source: str | Path) -> tuple[str | Path, dict[str, str], dict[s
     for text in rest:
         name, assigned, value = text.partition(':=')
         if not assigned or not name:
-            raise RobotError(f"{source}: '{text}' is no argument; write name:=value")
+            raise RobotError(f"{source}: '{text}' is not an argument; write name:=value")
         package = name.removeprefix(PACKAGE)
         if package == name:
             arguments[name] = value
         elif not Path(value).is_dir():
-            raise RobotError(f"{source}: the package '{package}' is no folder: {value}")
+            raise RobotError(f"{source}: the package '{package}' is not a folder: {value}")
         else:
             packages[package] = str(Path(value).resolve())
     return first, arguments, packages
@@ -195,15 +197,15 @@ def _written_out(source: str | Path) -> tuple[str | Path, dict[str, str], dict[s
 
 def described_at(robot: Robot, positions: Mapping[str, float]) -> Robot:
     """
-    Return the robot of the description with joints that are not driven where they are.
+    Return the robot of the description with joints that are not driven at given positions.
 
     Parameters
     ----------
     robot : Robot
-        Its inertias are passed over for those of its description; its gravity is kept.
+        The robot; its inertias are replaced by those of the description, its gravity is kept.
     positions : mapping of str to float
-        Of joints that are not driven [rad or m]; what mimics one of them follows it, and those
-        that are not named are where ``load_robot`` has them.
+        Positions of joints that are not driven [rad or m]. Mimic joints follow their leader.
+        Joints that are not named keep the position that ``load_robot`` gives them.
 
     """
     description = robot.description
@@ -215,7 +217,7 @@ def described_at(robot: Robot, positions: Mapping[str, float]) -> Robot:
 def _kinematic_model(
     description: Description, driven: Sequence[Joint], known: Mapping[str, float]
 ) -> tuple[pin.Model, tuple[str, ...]]:
-    """Build the model of the driven joints; also say where the others are locked."""
+    """Return the model of the driven joints, and notes on where the other joints are locked."""
     moving = {joint.name for joint in driven}
     positions = {
         joint.name: standing_position(description, joint, known)
@@ -234,7 +236,7 @@ def _kinematic_model(
 
 
 def _kinematic_urdf(description: Description, positions: Mapping[str, float]) -> str:
-    """Write what Pinocchio needs, joints at positions locked, continuous ones as revolute."""
+    """Return a URDF for Pinocchio: some joints locked, continuous joints made revolute."""
     root = ElementTree.Element('robot', name=description.name)
     for name, inertial in description.links.items():
         link = ElementTree.SubElement(root, 'link', name=name)
@@ -279,7 +281,7 @@ def _join(numbers: Sequence[float]) -> str:
 
 
 def _inertia_notes(robot: Robot) -> tuple[str, ...]:
-    """Note a joint that moves no mass in any of several poses: it cannot be simulated as it is."""
+    """Return notes on joints that move no mass in several poses, which cannot be simulated."""
     data = robot.model.createData()
     generator = np.random.default_rng(0)
     moved = np.zeros(robot.n_joints)

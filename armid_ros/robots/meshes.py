@@ -1,13 +1,13 @@
 # Copyright 2026 The armid_ros developers
 # SPDX-License-Identifier: Apache-2.0
 """
-Collision meshes as a few convex bodies.
+Replacement of collision meshes by a few convex bodies.
 
-Distances between convex bodies take microseconds, between meshes milliseconds. But the convex
-hull of a forearm with a housing at each end fills the gap between them and collides with a wrist
-that is free. So a mesh is cut into slabs across the axis that suits it best, each slab is
-replaced by its hull, and neighbours are joined as long as their common hull is not much larger.
-The bodies together contain the mesh: a clearance never looks larger than it is.
+A distance between convex bodies takes microseconds, a distance between meshes milliseconds. But
+the convex hull of a forearm with a housing at each end fills the gap between the housings, and
+collides with a wrist that is free. Therefore a mesh is cut into slabs across the best of its axes.
+Each slab is replaced by its hull, and neighbours are joined while their common hull is not much
+larger. The bodies together contain the mesh, so that a clearance is never overestimated.
 
 """
 
@@ -27,17 +27,17 @@ import numpy as np
 import numpy.typing as npt
 
 SLABS = 12
-GROWTH = 1.1  # volume of a hull over what it stands for: less is close enough
+GROWTH = 1.1  # largest accepted ratio of the volume of a hull to the volume that it replaces
 FLAT = 1e-5  # thickness over length of points that span no volume
-NO_VOLUME = (RuntimeError, ValueError)  # what comes of points that a hull cannot be made of
+NO_VOLUME = (RuntimeError, ValueError)  # errors that qhull raises for degenerate points
 
 
 def find_mesh(name: str, urdf: Path | None) -> Path | None:
     """
-    Return the file a URDF's mesh name means, or None when it is nowhere.
+    Return the file of a mesh name in a URDF; None if the file is not found.
 
-    'package://NAME/...' is looked for as `package_folders` says; a relative path starts at the
-    URDF.
+    'package://NAME/...' is looked for in the `package_folders`. A relative path starts at the
+    folder of the URDF.
 
     """
     candidates: Iterable[Path]
@@ -60,7 +60,7 @@ def load_mesh(path: Path, scale: FloatArray) -> Any:
 
 def convex_bodies(path: Path, scale: FloatArray) -> tuple[coal.CollisionGeometry, ...]:
     """
-    Return convex bodies that together contain a mesh and little else; a flat mesh stays one.
+    Return convex bodies that tightly contain a mesh; a flat mesh becomes one body.
 
     Parameters
     ----------
@@ -72,7 +72,7 @@ def convex_bodies(path: Path, scale: FloatArray) -> tuple[coal.CollisionGeometry
     Raises
     ------
     RobotError
-        If the file is no mesh.
+        If the file is not a mesh.
 
     """
     mesh = load_mesh(path, scale)
@@ -97,7 +97,7 @@ def convex_bodies(path: Path, scale: FloatArray) -> tuple[coal.CollisionGeometry
 def _slabs(
     vertices: FloatArray, ends: npt.NDArray[np.intp], axis: FloatArray
 ) -> tuple[coal.ConvexBase, ...]:
-    """Hulls of slabs across an axis; a slab too thin for a hull goes with the one before it."""
+    """Return hulls of slabs across an axis; too thin a slab joins the slab before it."""
     along = vertices @ axis
     hulls: list[coal.ConvexBase] = []
     thin = np.empty((0, 3))
@@ -114,7 +114,7 @@ def _slabs(
 
 
 def _join(slabs: Sequence[coal.ConvexBase]) -> tuple[coal.ConvexBase, ...]:
-    """Join neighbours, those first whose common hull grows least."""
+    """Join neighbours, first the pair whose common hull grows least."""
     bodies = list(slabs)
     apart = [body.computeVolume() for body in bodies]
     common = [_common_hull(*pair) for pair in pairwise(bodies)]
@@ -146,7 +146,7 @@ def _volume(bodies: Sequence[coal.ConvexBase]) -> float:
 def _slab(
     vertices: FloatArray, ends: npt.NDArray[np.intp], along: FloatArray, low: float, high: float
 ) -> FloatArray:
-    """Vertices within a slab, and where edges of the mesh cross its two planes."""
+    """Return vertices within a slab, and points where edges of the mesh cross its two planes."""
     points = [vertices[(along >= low) & (along <= high)]]
     start, end = along[ends[:, 0]], along[ends[:, 1]]
     for plane in (low, high):
@@ -158,7 +158,7 @@ def _slab(
 
 
 def _hull(points: FloatArray) -> coal.ConvexBase:
-    """Convex hull of points, shape (k, 3); ValueError when they are flat, which kills qhull."""
+    """Return the convex hull of points (k, 3); ValueError for flat points, which crash qhull."""
     if len(points) < 4:
         raise ValueError('fewer than four points')
     spread = np.linalg.svd(points - points.mean(axis=0), compute_uv=False)

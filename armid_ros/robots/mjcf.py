@@ -1,10 +1,11 @@
 # Copyright 2026 The armid_ros developers
 # SPDX-License-Identifier: Apache-2.0
 """
-A MuJoCo model (MJCF) as a URDF.
+Conversion of a MuJoCo model (MJCF) to a URDF.
 
-MuJoCo itself reads the file, so defaults, includes, frames and inertias from shapes are what they
-are there. A body with several joints becomes a link for each; the frame of a link is at its joint.
+MuJoCo itself reads the file, so that defaults, includes, frames and inertias from shapes have the
+same values as in MuJoCo. A body with several joints becomes one link per joint. The frame of a
+link is at its joint.
 
 """
 
@@ -24,35 +25,35 @@ import numpy as np
 import pinocchio as pin
 
 _EARTH = (0.0, 0.0, -9.81)
-#: What comes before the root element of an MJCF, and its name.
+#: Pattern of the text before the root element of an MJCF, and of the name of that element.
 _ROOT = re.compile(r'(?:\s|<\?(?>.*?\?>)|<!--(?>.*?-->))*+<mujoco[\s/>]', re.DOTALL)
 
 
 def is_mjcf(text: str) -> bool:
-    """Tell whether the root element of a text is that of an MJCF."""
+    """Return whether the root element of a text is the one of an MJCF."""
     return _ROOT.match(text) is not None
 
 
 def urdf_of_mjcf(path: Path) -> tuple[str, tuple[str, ...]]:
     """
-    Return what an MJCF file says of an arm, as a URDF.
+    Return the URDF of the arm in an MJCF file.
 
     Parameters
     ----------
     path : Path
-        The file; what it includes, and its meshes, are read too.
+        The file; included files and meshes are read too.
 
     Returns
     -------
     urdf : str
         Links, joints with damping, friction and armature, and shapes.
     notes : tuple of str
-        What of the file has no place in it.
+        Notes on contents of the file that a URDF cannot express.
 
     Raises
     ------
     RobotError
-        MuJoCo is not installed or refuses the file, or a joint is a ball joint.
+        If MuJoCo is not installed or rejects the file, or a joint is a ball joint.
 
     """
     try:
@@ -76,7 +77,7 @@ def urdf_of_mjcf(path: Path) -> tuple[str, tuple[str, ...]]:
 
 
 def _compiled(mujoco: ModuleType, path: Path, notes: list[str]) -> Any:
-    """Compile a file without textures, and without the meshes that are not there."""
+    """Compile a file without textures and without missing meshes."""
     spec = mujoco.MjSpec.from_file(str(path))
     folder = Path(spec.modelfiledir) / spec.meshdir
     missing = {
@@ -99,7 +100,7 @@ def _compiled(mujoco: ModuleType, path: Path, notes: list[str]) -> Any:
 
 
 class _Writer:
-    """Writes one compiled model."""
+    """Writer of the URDF of one compiled model."""
 
     def __init__(self, mujoco: ModuleType, model: Any, path: Path, notes: list[str]) -> None:
         self.mujoco, self.model, self.path, self.notes = mujoco, model, path, notes
@@ -136,7 +137,7 @@ class _Writer:
     def _link(
         self, body: int, parent: int, joints: list[int], parent_anchor: FloatArray
     ) -> FloatArray:
-        """Write a body with its joints; return where its frame is in that of the body."""
+        """Write a body with its joints; return the link frame in the body frame."""
         model, name = self.model, self.bodies[body]
         placement = pin.SE3(_rotation(model.body_quat[body]), np.array(model.body_pos[body]))
         placement.translation = placement.translation - parent_anchor
@@ -200,11 +201,11 @@ class _Writer:
         if np.any(model.jnt_stiffness[joint]):
             self.notes.append(f"joint '{name}': its spring (stiffness) is not read")
         if np.any(getattr(model, 'dof_dampingpoly', np.zeros((model.nv, 1)))[dof]):
-            self.notes.append(f"joint '{name}': its damping is a polynomial, of which the rest is "
-                              'not read')  # fmt: skip
+            self.notes.append(f"joint '{name}': its damping is a polynomial; only its linear term "
+                              'is read')  # fmt: skip
 
     def _effort(self, joint: int) -> float:
-        """Return the largest torque or force of a joint [N m or N]: its own, or its actuator's."""
+        """Return the torque or force limit of a joint or of its actuator [N m or N]."""
         model = self.model
         limits = [math.inf]
         if model.jnt_actfrclimited[joint]:
@@ -227,7 +228,7 @@ class _Writer:
         return min(limits)
 
     def _mimic(self, element: ElementTree.Element, joint: int) -> None:
-        """Write an equality of two joints that is linear."""
+        """Write a linear equality of two joints as a mimic joint."""
         model = self.model
         for number in range(model.neq):
             follows, leader = int(model.eq_obj1id[number]), int(model.eq_obj2id[number])
@@ -280,7 +281,7 @@ class _Writer:
                 ElementTree.SubElement(ElementTree.SubElement(element, 'geometry'), shape, values)
 
     def _not_read(self) -> None:
-        """Note what acts in MuJoCo and is not in a URDF."""
+        """Add notes on elements that act in MuJoCo and do not exist in a URDF."""
         model, kinds = self.model, self.mujoco.mjtEq
         if not np.allclose(model.opt.gravity, _EARTH, atol=0.01):
             gravity = ','.join(f'{value:g}' for value in model.opt.gravity)
@@ -299,7 +300,7 @@ class _Writer:
 
 
 def _names(kind: str, given: list[str]) -> list[str]:
-    """Return names, of those that have none the kind and number."""
+    """Return the names; an element without a name gets its kind and number."""
     return [one or _unused(f'{kind}_{number}', given) for number, one in enumerate(given)]
 
 
@@ -329,7 +330,7 @@ def _place(element: ElementTree.Element, parent: str, child: str, placement: pin
 
 
 def _origin(element: ElementTree.Element, placement: pin.SE3) -> None:
-    """Write a placement; the angles keep all digits where roll and yaw turn about one axis."""
+    """Write a placement; the angles keep all digits in gimbal lock."""
     r = np.array(placement.rotation)
     roll = math.atan2(r[2, 1], r[2, 2])
     pitch = math.atan2(-r[2, 0], math.hypot(r[2, 1], r[2, 2]))

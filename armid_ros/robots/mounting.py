@@ -1,6 +1,6 @@
 # Copyright 2026 The armid_ros developers
 # SPDX-License-Identifier: Apache-2.0
-"""How a robot is mounted: what a file beside its description says of the floor below it."""
+"""Reading of the floor height from a mounting file beside the description of a robot."""
 
 from __future__ import annotations
 
@@ -11,25 +11,25 @@ from armid_ros.errors import RobotError
 from armid_ros.files import load_yaml, read_text, reading
 from armid_ros.robots.robot import Robot
 
-#: Of the file beside NAME.urdf or NAME.urdf.xacro.
+#: Suffix of the mounting file beside NAME.urdf or NAME.urdf.xacro.
 SUFFIX = '.mounting.yaml'
 
 
 def read_mounting(robot: Robot) -> tuple[float | None, Path] | None:
     """
-    Read NAME.mounting.yaml beside the description of a robot; None where there is none.
+    Read NAME.mounting.yaml beside the description of a robot; return None without a file.
 
     Returns
     -------
     floor : float or None
-        Height of the floor above the origin of the base [m]; None: there is none within reach.
+        Height of the floor above the origin of the base [m]; None: no floor is within reach.
     path : Path
-        The file that says so.
+        The mounting file.
 
     Raises
     ------
     RobotError
-        If the file cannot be read, or does not say `floor: HEIGHT` or `floor: none`.
+        If the file cannot be read, or does not contain `floor: HEIGHT` or `floor: none`.
 
     """
     if robot.path is None:

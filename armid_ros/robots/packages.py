@@ -1,6 +1,6 @@
 # Copyright 2026 The armid_ros developers
 # SPDX-License-Identifier: Apache-2.0
-"""Where a ROS package is, without ROS; also loaded by the process that expands a xacro."""
+"""Search for the folder of a ROS package without ROS; used by the xacro process as well."""
 
 from __future__ import annotations
 
@@ -14,23 +14,24 @@ def package_folders(
     name: str, file: Path | None, given: Mapping[str, str | Path] | None = None
 ) -> Iterator[Path]:
     """
-    Yield the folders that may be a package, the most likely one first.
+    Yield the possible folders of a package, the most likely folder first.
 
     Parameters
     ----------
     name : str
-        Of the package.
+        Name of the package.
     file : Path or None
         The description that refers to it.
     given : mapping of str to str or Path, optional
-        Folders of packages by name; such a package is nowhere else.
+        Folders of packages by name; a package in this mapping is not looked for elsewhere.
 
     Yields
     ------
     Path
-        The given folder; else folders whose package.xml has the name: enclosing the file or beside
-        such a folder, then in ROS_PACKAGE_PATH; then the one in AMENT_PREFIX_PATH; then folders
-        of that name without a package.xml that enclose the file or are beside such a folder.
+        The given folder, if any. Otherwise, in this order: folders whose package.xml has the name,
+        which enclose the file or lie beside an enclosing folder; such folders in ROS_PACKAGE_PATH;
+        the folder in AMENT_PREFIX_PATH; folders of that name without a package.xml, which enclose
+        the file or lie beside an enclosing folder.
 
     """
     if given and name in given:
@@ -45,7 +46,7 @@ def package_folders(
 
 
 def _below(root: Path, name: str) -> Iterator[Path]:
-    """Yield a folder, those in it, and those of a name one level deeper."""
+    """Yield a folder, its subfolders, and folders of the given name one level deeper."""
     yield root
     if root == root.parent:
         return

@@ -1,6 +1,6 @@
 # Copyright 2026 The armid_ros developers
 # SPDX-License-Identifier: Apache-2.0
-"""A robot as everything above sees it: the rigid model of its driven joints, and their limits."""
+"""The `Robot`: rigid-body model of the driven joints and their limits."""
 
 from __future__ import annotations
 
@@ -19,12 +19,12 @@ import pinocchio as pin
 GRAVITIES = {'earth': (0.0, 0.0, -9.81), 'moon': (0.0, 0.0, -1.62)}
 PARAMETERS_PER_BODY = 10
 
-#: A mass below this is the rounding of zero [kg], and so is a first moment below this [kg m]. Each
-#: BLAS kernel rounds differently; a first moment of 1 kg m over more mass than this keeps the
-#: inertia about its centre to 1e-7.
+#: A mass [kg] or a first moment [kg m] below this counts as zero. Each BLAS kernel rounds
+#: differently; a first moment of 1 kg m over more mass than this keeps the inertia about its
+#: centre to 1e-7.
 NO_MASS = 1e-9
 
-#: Half range that a joint without position limits is given [rad or m].
+#: Half the range of a joint without position limits [rad or m].
 UNLIMITED_HALF_RANGE = np.pi
 
 
@@ -42,8 +42,8 @@ class Robot:
     name : str
         Name in the description, or the shipped name.
     model : pinocchio.Model
-        Rigid bodies of the driven joints, nq == nv == n. What hangs on joints that are not
-        driven is part of the body that carries them.
+        Rigid bodies of the driven joints, nq == nv == n. Links on joints that are not driven are
+        part of the body that carries them.
     joints : tuple of str
         Driven joints in velocity order.
     links : tuple of str
@@ -59,12 +59,12 @@ class Robot:
     urdf : str
         The description, xacro expanded.
     urdf_damping, urdf_friction, urdf_armature : ndarray, shape (n,)
-        What the description says in ``<dynamics>`` [N m s/rad, N m, kg m^2]; zero where it says
-        nothing. A URDF of an MJCF has the armature there too.
+        Values in ``<dynamics>`` of the description [N m s/rad, N m, kg m^2]; zero if missing. A
+        URDF from an MJCF contains the armature there too.
     notes : tuple of str
-        What was assumed or is doubtful in the description, for a person to read.
+        Sentences on assumptions and doubtful values in the description.
     path : Path or None
-        The file that was loaded; meshes and collision exceptions (SRDF) are looked for from here.
+        The loaded file; meshes and collision exceptions (SRDF) are looked for from its folder.
 
     Examples
     --------
@@ -138,7 +138,7 @@ class Robot:
 
     @cached_property
     def geometry(self) -> tuple[JointGeometry, ...]:
-        """How each joint moves its link."""
+        """Geometry of each joint."""
         return tuple(JointGeometry.of(self.model, k) for k in range(self.n_joints))
 
     @property
@@ -148,7 +148,7 @@ class Robot:
 
     @property
     def base(self) -> str:
-        """Name of the base link, in whose frame the arm is described."""
+        """Name of the base link, whose frame is the base frame."""
         for frame in self.model.frames:
             if frame.type == pin.FrameType.BODY:
                 return str(frame.name)
@@ -179,22 +179,22 @@ class Robot:
 
     @property
     def zero_pose(self) -> FloatArray:
-        """Return where all joints are at zero, or at the limits nearest to it, shape (n,)."""
+        """Return the pose with joints at zero, or at their limits nearest to zero, (n,)."""
         return np.clip(np.zeros(self.n_joints), self.lower, self.upper)
 
     @property
     def middle_pose(self) -> FloatArray:
-        """Return the middle of the range of every joint, 0 where there is none, shape (n,)."""
+        """Return the middle of each joint's range, shape (n,); 0 without limits."""
         limited = np.isfinite(self.lower) & np.isfinite(self.upper)
         lower, upper = (np.where(limited, end, 0.0) for end in (self.lower, self.upper))
         return np.asarray((lower + upper) / 2)
 
     def position_range(self) -> tuple[FloatArray, FloatArray]:
-        """Return the position limits, shape (n,); `UNLIMITED_HALF_RANGE` where there is none."""
+        """Return the position limits, (n,); +-`UNLIMITED_HALF_RANGE` for an unlimited joint."""
         return position_range(self.lower, self.upper)
 
     def index(self, joint: str) -> int:
-        """Return the position of a driven joint; RobotError lists those that exist."""
+        """Return the index of a driven joint; a RobotError lists the known names."""
         try:
             return self.joints.index(joint)
         except ValueError:
@@ -246,15 +246,16 @@ class JointGeometry:
     Attributes
     ----------
     parent : int
-        Number of the joint that moves the link it is on; -1 for the base.
+        Index of the joint that moves the parent link; -1 for the base.
     movers : tuple of int
-        The joints that move its link, from the base on.
+        Indices of the joints that move the child link, from the base on.
     slide, turn : ndarray, shape (3,)
-        What it does to its link per unit, in the link's frame: translation and rotation.
+        Translation and rotation of the child link per unit of the joint position, in the link's
+        frame.
     origin, sliding : ndarray, shape (3,)
-        Where it is on the link before at zero [m], and where it slides per unit.
+        Position of the joint on the parent link at zero [m], and its displacement per unit.
     turning : ndarray, shape (3, 3, 3)
-        Rotation of the link on the link before: this times (1, sin q, 1 - cos q).
+        Rotation of the child link on the parent link: this times (1, sin q, 1 - cos q).
 
     """
 
@@ -268,7 +269,7 @@ class JointGeometry:
 
     @classmethod
     def of(cls, model: pin.Model, number: int) -> JointGeometry:
-        """Look up a joint of a model."""
+        """Return the geometry of a joint of a model."""
         joint, placement = model.joints[number + 1], model.jointPlacements[number + 1]
         data = joint.createData()
         joint.calc(data, np.zeros(joint.nq))
@@ -287,7 +288,7 @@ class JointGeometry:
 
 
 def position_range(lower: FloatArray, upper: FloatArray) -> tuple[FloatArray, FloatArray]:
-    """Return position limits, those of an unlimited joint `UNLIMITED_HALF_RANGE` either way."""
+    """Return position limits; an unlimited joint gets +-`UNLIMITED_HALF_RANGE`."""
     return (
         np.where(np.isfinite(lower), lower, -UNLIMITED_HALF_RANGE),
         np.where(np.isfinite(upper), upper, UNLIMITED_HALF_RANGE),
@@ -296,7 +297,7 @@ def position_range(lower: FloatArray, upper: FloatArray) -> tuple[FloatArray, Fl
 
 def parse_gravity(value: str | Sequence[float] | FloatArray) -> FloatArray:
     """
-    Return the gravity vector that a name, a string 'x,y,z' or three numbers stand for.
+    Return the gravity vector of a name, a string 'x,y,z' or three numbers.
 
     Parameters
     ----------
@@ -311,7 +312,7 @@ def parse_gravity(value: str | Sequence[float] | FloatArray) -> FloatArray:
     Raises
     ------
     RobotError
-        If it is neither a known name nor three finite numbers.
+        If the value is neither a known name nor three finite numbers.
 
     """
     if isinstance(value, str) and value.strip().lower() in GRAVITIES:
@@ -330,7 +331,7 @@ def parse_gravity(value: str | Sequence[float] | FloatArray) -> FloatArray:
 
 
 def _inertia(place: str, values: FloatArray) -> pin.Inertia:
-    """Spatial inertia of the ten parameters; pinocchio's own conversion divides by the mass."""
+    """Return the spatial inertia of ten parameters; pinocchio's conversion divides by the mass."""
     mass, moment, about_origin = values[0], values[1:4], values[4:]
     if abs(mass) >= NO_MASS:
         return pin.Inertia.FromDynamicParameters(values)
@@ -340,6 +341,6 @@ def _inertia(place: str, values: FloatArray) -> pin.Inertia:
             'with a rough one'
         )
     ixx, ixy, iyy, ixz, iyz, izz = about_origin
-    inertia = pin.Inertia.Zero()  # the constructor takes none that is not positive
+    inertia = pin.Inertia.Zero()  # the constructor accepts positive masses only
     inertia.inertia = np.array([[ixx, ixy, ixz], [ixy, iyy, iyz], [ixz, iyz, izz]])
     return inertia

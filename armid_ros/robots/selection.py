@@ -1,6 +1,6 @@
 # Copyright 2026 The armid_ros developers
 # SPDX-License-Identifier: Apache-2.0
-"""Which joints of a description are driven, and where the others stand."""
+"""Selection of the driven joints, and positions of the other joints."""
 
 from __future__ import annotations
 
@@ -14,9 +14,9 @@ from armid_ros.robots.robot import Robot
 #: Pinocchio keeps tensors of the joints cubed, 1 GB for 250; a humanoid with both hands has 70.
 MAX_DRIVEN = 150
 GRIPPER_WORDS = ('finger', 'gripper', 'jaw')
-#: Joints that a line names.
+#: Number of joints that a note names.
 _NAMED = 8
-#: Branches of fewer joints are no arms: a head, a trunk.
+#: A branch of fewer joints, such as a head or a trunk, is not an arm.
 SHORTEST_ARM = 3
 
 
@@ -28,15 +28,15 @@ class HeldJoint:
     Attributes
     ----------
     name : str
-        In the description.
+        Name in the description.
     position : float
-        Where the model holds it [rad or m].
+        Position at which the model locks the joint [rad or m].
     unit : str
         'rad' or 'm'.
     follows : str
-        The joint that it mimics; empty for one of its own.
+        The joint that this joint mimics; empty if none.
     carries : tuple of str
-        The driven joints that it moves.
+        The driven joints that this joint moves.
 
     """
 
@@ -49,17 +49,17 @@ class HeldJoint:
 
 def driven_joints(description: Description, names: Sequence[str] | None) -> tuple[Joint, ...]:
     """
-    Return the driven joints: those named, or all but the gripper's.
+    Return the driven joints: the named joints, or all except those of a gripper.
 
-    A joint that mimics another one is never driven. By default neither is a joint that opens and
-    closes a gripper: one that a mimic joint follows, or whose name says finger, gripper
-    or jaw, as long as it carries no joint of the arm.
+    A joint that mimics another one is never driven. By default, a joint of a gripper is not driven
+    either: a joint that a mimic joint follows, or whose name contains finger, gripper or jaw, if
+    it carries no joint of the arm.
 
     Raises
     ------
     RobotError
-        If a name is unknown, repeated, not movable, a mimic joint, or followed by one; the
-        message lists the joints that could be named.
+        If a name is unknown, repeated, not movable, a mimic joint, or followed by a mimic joint.
+        The message lists the joints that can be named.
 
     """
     chosen = _by_default(description) if names is None else _by_name(description, names)
@@ -72,7 +72,7 @@ def driven_joints(description: Description, names: Sequence[str] | None) -> tupl
                 f"of the driven joints, or make '{followers[joint.name].name}' fixed"
             )
     if not chosen:
-        raise RobotError('no joint can be driven; a robot needs one at least')
+        raise RobotError('no joint can be driven; a robot needs at least one')
     if len(chosen) > MAX_DRIVEN:
         raise RobotError(
             f'{len(chosen)} joints are driven; {MAX_DRIVEN} are the most that can be '
@@ -82,7 +82,7 @@ def driven_joints(description: Description, names: Sequence[str] | None) -> tupl
 
 
 def several_arms(description: Description, driven: Sequence[Joint]) -> tuple[str, ...]:
-    """Return a note where the driven joints are those of several arms; none where of one."""
+    """Return a note if the driven joints belong to several arms; otherwise no note."""
     arms = _arms(description, [joint.name for joint in driven])
     if len(arms) < 2:
         return ()
@@ -91,7 +91,7 @@ def several_arms(description: Description, driven: Sequence[Joint]) -> tuple[str
 
 
 def _arms(description: Description, joints: Sequence[str]) -> list[list[str]]:
-    """Return the arms among driven joints: chains from the last fork to a tip, not too short."""
+    """Return the arms among the driven joints: long enough chains from the last fork to a tip."""
     carriers = {name: _carriers(description, [description.by_name[name]]) for name in joints}
     kept = list(joints)
     while kept:
@@ -107,7 +107,7 @@ def _arms(description: Description, joints: Sequence[str]) -> list[list[str]]:
 
 
 def driven_in_words(robot: Robot) -> tuple[str, ...]:
-    """Say which joints that could move are not driven, and whether those of several arms are."""
+    """Return notes on joints that are not driven, and on driven joints of several arms."""
     description = robot.description
     locked = [
         f'{joint.name} (follows {joint.follows})' if joint.follows else joint.name
@@ -123,9 +123,9 @@ def driven_in_words(robot: Robot) -> tuple[str, ...]:
 
 def joints_beside_arms(robot: Robot) -> tuple[str, ...]:
     """
-    Return the driven joints that belong to no arm: wheels, a head, a torso that carries arms.
+    Return the driven joints that belong to no arm, such as wheels, a head or a torso.
 
-    Nothing is returned for a robot without any arm.
+    The result is empty for a robot without an arm.
 
     """
     of_arms = {joint for arm in _arms(robot.description, robot.joints) for joint in arm}
@@ -135,7 +135,7 @@ def joints_beside_arms(robot: Robot) -> tuple[str, ...]:
 def load_arms(
     load: Callable[[Sequence[str] | None], Robot], joints: Sequence[str] | None
 ) -> tuple[Robot, tuple[str, ...]]:
-    """Load a robot by the joints to drive; by default those of its arms, and the others too."""
+    """Load a robot with the joints of its arms; return the other driven joints too."""
     robot = load(joints)
     others = () if joints else joints_beside_arms(robot)
     if others:
@@ -144,7 +144,7 @@ def load_arms(
 
 
 def held_joints(robot: Robot) -> tuple[HeldJoint, ...]:
-    """Return the joints of the description that could move and are not driven."""
+    """Return the movable joints of the description that are not driven."""
     description = robot.description
     carriers = {name: _carriers(description, [description.by_name[name]]) for name in robot.joints}
     return tuple(
@@ -161,7 +161,7 @@ def held_joints(robot: Robot) -> tuple[HeldJoint, ...]:
 
 
 def standing_position(description: Description, joint: Joint, known: Mapping[str, float]) -> float:
-    """Return where a joint stands that is not driven [rad or m]: if not known, 0 or next to it."""
+    """Return the position of a joint that is not driven [rad or m]; by default nearest to 0."""
     multiplier, offset = 1.0, 0.0
     followed = {joint.name}
     while joint.mimic and joint.name not in known:
@@ -171,7 +171,9 @@ def standing_position(description: Description, joint: Joint, known: Mapping[str
         if leader is None:
             return offset
         if leader.name in followed:
-            raise RobotError(f"joint '{leader.name}' mimics itself, by way of others or not")
+            raise RobotError(
+                f"joint '{leader.name}' mimics itself, directly or through other joints"
+            )
         followed.add(leader.name)
         joint = leader
     position = known.get(joint.name, min(max(0.0, joint.lower), joint.upper))
@@ -212,7 +214,7 @@ def _by_default(description: Description) -> tuple[Joint, ...]:
 
 
 def _carriers(description: Description, joints: Sequence[Joint]) -> set[str]:
-    """Return the joints that carry one of these."""
+    """Return the joints that carry one of the given joints."""
     by_child = {joint.child: joint for joint in description.joints}
     found: set[str] = set()
     for joint in joints:

@@ -33,7 +33,7 @@ _SHIPPED = {
 
 def shipped_robots() -> dict[str, str]:
     """
-    Return the names of the robots that come with the package, each with one line on it.
+    Return the names and one-line descriptions of the robots shipped with the package.
 
     Returns
     -------

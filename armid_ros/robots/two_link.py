@@ -1,6 +1,6 @@
 # Copyright 2026 The armid_ros developers
 # SPDX-License-Identifier: Apache-2.0
-"""The serial two-link arm with elastic joints: its parameters, and the sets that are shipped."""
+"""The serial two-link arm with elastic joints: its parameters and the shipped parameter sets."""
 
 from __future__ import annotations
 
@@ -68,7 +68,7 @@ class TwoLinkParameters:
     gear: FloatArray
 
     def __post_init__(self) -> None:
-        """Freeze the arrays and check that bodies like these exist."""
+        """Freeze the arrays and check that the inertia parameters are physically possible."""
         for field in fields(self)[3:]:
             values = read_only(getattr(self, field.name))
             object.__setattr__(self, field.name, values)
@@ -82,7 +82,7 @@ class TwoLinkParameters:
 
     @property
     def inertia(self) -> FloatArray:
-        """Inertia of each joint on its own, alpha and beta, shape (2,) [kg m^2]."""
+        """Constant part of the inertia at each joint, alpha and beta, shape (2,) [kg m^2]."""
         return np.array([self.alpha, self.beta])
 
     @property
@@ -118,10 +118,10 @@ class TwoLinkParameters:
 
     def body(self, robot: Robot) -> Robot:
         """
-        Return the two links with these alpha, beta and gamma.
+        Return the robot of two links with this alpha, beta and gamma.
 
-        Masses, lengths and the first link's centroid stay; centroid and inertia of the second
-        link, and the inertia of the first, give way.
+        Masses, lengths and the centroid of the first link do not change. The centroid and inertia
+        of the second link and the inertia of the first link are adapted.
 
         """
         pi = np.array(robot.rigid_parameters).reshape(2, 10)
@@ -135,14 +135,14 @@ class TwoLinkParameters:
 @dataclass(frozen=True, eq=False)
 class TwoLinkSet:
     """
-    What is shipped with the two-link arm.
+    A shipped parameter set of the two-link arm, with the assumptions for a simulation.
 
     Attributes
     ----------
     parameters : TwoLinkParameters
-        One of the printed sets.
+        One of the published parameter sets.
     assumptions : mapping of str to value
-        Link length, radii of the accelerometers, gains: what the source does not print.
+        Values that the source does not give: link length, radii of the accelerometers, gains.
 
     """
 
@@ -151,7 +151,7 @@ class TwoLinkSet:
 
 
 def planar_pair(robot: Robot) -> bool:
-    """Whether a robot is two links that turn about parallel axes, without weight on either."""
+    """Return whether a robot is two links with parallel axes that gravity does not load."""
     if robot.n_joints != 2 or np.any(robot.prismatic):
         return False
     data = robot.model.createData()
@@ -170,7 +170,7 @@ def two_link_set(name: str) -> TwoLinkSet:
     Raises
     ------
     RobotError
-        If there is no such set.
+        If the set does not exist.
 
     """
     path = Path(str(resources.files('armid_ros.robots').joinpath(ROBOT, 'parameters.yaml')))

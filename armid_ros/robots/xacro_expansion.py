@@ -1,12 +1,11 @@
 # Copyright 2026 The armid_ros developers
 # SPDX-License-Identifier: Apache-2.0
 """
-Expansion of xacro, which is a program more than a document.
+Expansion of xacro files in a separate process.
 
-A xacro file can include any file that its reader may read, ask for environment variables, and
-repeat itself without end. It is therefore expanded in a process of its own, with a limit of time
-and memory, and only where a person names the file: a description that comes over a topic or out of
-a bag is never expanded.
+A xacro file is a program: it can include any readable file, read environment variables and loop
+without end. It is therefore expanded in a separate process with limits of time and memory, and
+only if a person names the file. A description from a topic or a bag is never expanded.
 
 """
 
@@ -25,29 +24,29 @@ from armid_ros.errors import RobotError
 
 #: Processor time that an expansion may take [s]; the largest descriptions take one or two.
 TIME_LIMIT = 20.0
-#: How long it may last, with other processes on the machine [s]; what waits for a file ends so.
+#: Largest elapsed time of an expansion [s]; this ends an expansion that waits for a file.
 PATIENCE = 300.0
-#: The most memory [bytes].
+#: Largest memory of an expansion [bytes].
 MEMORY_LIMIT = 2 << 30
 
 
 def expand_xacro(path: Path, arguments: Mapping[str, str], packages: Mapping[str, str]) -> str:
     """
-    Return what a xacro file expands to.
+    Return the expanded text of a xacro file.
 
     Parameters
     ----------
     path : Path
-        The file; it is trusted as a program is, except for time and memory.
+        The file. It is trusted like a program; only its time and memory are limited.
     arguments : mapping of str to str
         Values of <xacro:arg>.
     packages : mapping of str to str
-        Folders of packages by name, where `package_folders` would not find them.
+        Folders by name of packages that `package_folders` does not find.
 
     Raises
     ------
     RobotError
-        It cannot be expanded, or not within the limits.
+        If the file cannot be expanded within the limits.
 
     """
     request = {
@@ -78,7 +77,7 @@ def expand_xacro(path: Path, arguments: Mapping[str, str], packages: Mapping[str
             f'{MEMORY_LIMIT >> 20} MiB'
         )
     answer: dict[str, Any] = {}
-    with suppress(ValueError):  # it died before it gave an answer
+    with suppress(ValueError):  # the process died before it answered
         answer = json.loads(done.stdout)
     if 'text' not in answer:
         reason = answer.get('error') or f'not expanded within {MEMORY_LIMIT >> 20} MiB'

@@ -1,10 +1,10 @@
 # Copyright 2026 The armid_ros developers
 # SPDX-License-Identifier: Apache-2.0
 """
-Expands one xacro file, as a process of its own; started by `armid_ros.robots.xacro_expansion`.
+The process that expands one xacro file; started by `armid_ros.robots.xacro_expansion`.
 
-A request comes on stdin and the answer goes to stdout, both in JSON. The process limits itself in
-memory and processor time before it reads a line of the file.
+The request is read from stdin and the answer is written to stdout, both in JSON. The process
+limits its memory and processor time before it reads the file.
 
 """
 
@@ -21,17 +21,17 @@ import signal
 import sys
 from typing import Any
 
-#: What stands for the folder of a package that is not found.
+#: Placeholder for the folder of a package that is not found.
 NOWHERE = '/package-not-found/'
-#: What includes and macros are called that describe drives and simulators, and no link or joint.
+#: Names of includes and macros for drives and simulators, which define no link or joint.
 DRIVES = ('ros2_control', 'ros_control', 'gazebo', 'transmission')
 
 
 def main() -> None:
-    """Answer one request."""
+    """Read one request and write the answer."""
     request = json.load(sys.stdin)
     answers = os.fdopen(os.dup(1), 'w', encoding='utf-8')
-    os.dup2(2, 1)  # what an expansion prints is no answer
+    os.dup2(2, 1)  # output of the expansion must not mix with the answer
     seconds, memory = float(request['seconds']), int(request['memory'])
     signal.setitimer(signal.ITIMER_PROF, seconds)
     resource.setrlimit(resource.RLIMIT_CPU, (int(seconds) + 1, int(seconds) + 1))
@@ -41,7 +41,7 @@ def main() -> None:
 
 
 def expanded(request: dict[str, Any]) -> dict[str, str]:
-    """Return the text that a file expands to, or the error why it does not."""
+    """Return the expanded text of a file, or the error message."""
     answer: dict[str, str] = {}
     missing: dict[str, str] = {}
     try:
@@ -62,15 +62,15 @@ def expanded(request: dict[str, Any]) -> dict[str, str]:
     except RecursionError:
         answer['error'] = 'nested too deep'
     except SystemExit:
-        answer['error'] = 'it cannot be expanded'
-    except Exception as error:  # xacro evaluates Python expressions: anything can come out
+        answer['error'] = 'the file cannot be expanded'
+    except Exception as error:  # xacro evaluates Python expressions, which can raise any error
         answer['error'] = _reason(error, request, missing)
     return answer
 
 
 def _find_packages(xacro: Any, request: dict[str, Any], missing: dict[str, str]) -> None:
-    """Have xacro find packages without ROS, and pass over those of drives and simulators."""
-    # a package that is not found matters only where a file of it is read: drivers name paths
+    """Make xacro find packages without ROS and skip packages of drives and simulators."""
+    # a missing package is an error only if one of its files is read: drivers name paths
     folders = runpy.run_path(str(Path(__file__).with_name('packages.py')))['package_folders']
     arguments = xacro.substitution_args
     include_files, macro_call = xacro.get_include_files, xacro.handle_macro_call
@@ -104,7 +104,7 @@ def _find_packages(xacro: Any, request: dict[str, Any], missing: dict[str, str])
 
 
 def _reason(error: Exception, request: dict[str, Any], missing: dict[str, str]) -> str:
-    """Return why a file is not expanded, and what would help."""
+    """Return why a file cannot be expanded, and a remedy."""
     import xacro.substitution_args
 
     text = ' '.join(str(error).split()) or type(error).__name__
@@ -127,7 +127,7 @@ def _reason(error: Exception, request: dict[str, Any], missing: dict[str, str]) 
 
 
 def _unknown(xacro: Any, request: dict[str, Any]) -> str:
-    """Name an argument that no file declares or uses; '' where there is none."""
+    """Return a message on an argument that no file declares or uses; '' if there is none."""
     declared = _declared(xacro, request['path'])
     files = [Path(file) for file in (request['path'], *xacro.all_includes)]
     texts = [file.read_text('utf-8', 'replace') for file in files if file.is_file()]
@@ -135,23 +135,23 @@ def _unknown(xacro: Any, request: dict[str, Any]) -> str:
         used = re.compile(rf'\$\(arg\s+{re.escape(name)}\s*\)')
         if name not in declared and not any(used.search(text) for text in texts):
             known = ', '.join(f'{one} ({how})' for one, how in declared.items()) or 'none'
-            return f"it has no argument '{name}'; the arguments are {known}"
+            return f"the file has no argument '{name}'; the arguments are {known}"
     return ''
 
 
 def _place(xacro: Any) -> str:
-    """Return the file that is expanded: that of the macro, if one is."""
+    """Return the file in expansion: the file of the macro, if a macro is expanded."""
     macros, files = xacro.macrostack, xacro.filestack
     return str(macros[-1].history[-1][-1] if macros else files[-1])
 
 
 def _declared(xacro: Any, path: str) -> dict[str, str]:
-    """Return the arguments that the files declare, with their defaults in words."""
+    """Return the declared arguments with a description of their default."""
     known: dict[str, str] = {}
     for file in (path, *xacro.all_includes):
         try:
             elements = xacro.parse(None, file).getElementsByTagName('xacro:arg')
-        except Exception:  # it is the error of another file that is reported
+        except Exception:  # the error of the main file is reported elsewhere
             continue
         for element in elements:
             default = element.getAttribute('default') if element.hasAttribute('default') else None

@@ -1,11 +1,11 @@
 # Copyright 2026 The armid_ros developers
 # SPDX-License-Identifier: Apache-2.0
 """
-The simulated arm: a plant with friction that sticks, a controller, drives and sensors.
+The simulated arm: a plant with stick-slip friction, a controller, drives and sensors.
 
-`simulate` runs an arm along a reference and records it. `SimulatedArm` stands there and takes
-trajectories while time goes on. `step` is one step of the plant alone. Joints are rigid unless a
-plant is given `Elasticity`.
+`simulate` lets an arm follow a reference and records it. A `SimulatedArm` accepts trajectories
+while simulated time advances. `step` integrates one step of the plant. Joints are rigid unless the
+plant has an `Elasticity`.
 
 """
 

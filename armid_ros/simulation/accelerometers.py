@@ -1,6 +1,6 @@
 # Copyright 2026 The armid_ros developers
 # SPDX-License-Identifier: Apache-2.0
-"""Accelerometers on the links of an arm: what they read."""
+"""Readings of accelerometers on the links of an arm."""
 
 from __future__ import annotations
 
@@ -17,14 +17,15 @@ import pinocchio as pin
 @dataclass(frozen=True, eq=False)
 class LinkAccelerometers:
     """
-    One accelerometer of three axes on every link, with the axes of its joint's frame.
+    Accelerometers with three axes, one on every link, aligned with the frame of its joint.
 
     Attributes
     ----------
     robot : Robot
         The arm.
     places : ndarray, shape (n, 3)
-        Where they are in the frames of the joints [m]; in the centroids of the links if not said.
+        Positions of the accelerometers in the frames of the joints [m]; by default the centroids
+        of the links.
 
     """
 
@@ -35,7 +36,7 @@ class LinkAccelerometers:
     _frames: tuple[int, ...] = field(init=False, repr=False)
 
     def __post_init__(self) -> None:
-        """Check the places, or choose them."""
+        """Check the places, or choose the default places."""
         model = self.robot.model
         places = self.places
         if places is None:
@@ -63,7 +64,7 @@ class LinkAccelerometers:
         object.__setattr__(self, '_frames', tuple(frames))
 
     def read(self, q: FloatArray, dq: FloatArray, ddq: FloatArray) -> FloatArray:
-        """Return what they read now, shape (n, 3): at rest gravity, upwards [m/s^2]."""
+        """Return the readings in one state, shape (n, 3) [m/s^2]; at rest gravity, upwards."""
         model, data = self._model, self._data
         pin.forwardKinematics(model, data, q, dq, ddq)
         up = -model.gravity.linear
@@ -74,6 +75,6 @@ class LinkAccelerometers:
         return readings
 
     def readings(self, link: Motion) -> FloatArray:
-        """Return what they read along a motion of the links, shape (n, N, 3) [m/s^2]."""
+        """Return the readings along a motion of the links, shape (n, N, 3) [m/s^2]."""
         rows = [self.read(*row) for row in zip(link.q, link.dq, link.ddq, strict=True)]
         return np.asarray(np.stack(rows, axis=1))

@@ -1,6 +1,6 @@
 # Copyright 2026 The armid_ros developers
 # SPDX-License-Identifier: Apache-2.0
-"""What makes links no bodies, so that no arm of them can be simulated."""
+"""Checks that the links of an arm are physically possible bodies, as a simulation requires."""
 
 from __future__ import annotations
 
@@ -16,17 +16,17 @@ NO_BODY = (
 
 
 class NoBodyError(ModelError):
-    """An arm cannot be simulated, as links of it are no bodies."""
+    """An arm cannot be simulated because some links are not physically possible bodies."""
 
 
 def require_masses(robot: Robot) -> None:
     """
-    Refuse a robot with links of negative mass.
+    Raise a ModelError if links of a robot have a negative mass.
 
     Raises
     ------
     ModelError
-        Naming the links.
+        If a mass is negative; the message names the links.
 
     """
     negative = _of_negative_mass(robot)
@@ -36,12 +36,12 @@ def require_masses(robot: Robot) -> None:
 
 def require_any_mass(robot: Robot) -> None:
     """
-    Refuse a robot of which no link has a mass, so that no torque is to be expected of it.
+    Raise a ModelError if no link of a robot has a mass, since it then predicts no torque.
 
     Raises
     ------
     ModelError
-        Naming the description and its links.
+        If no link has a mass; the message names the description and its links.
 
     """
     if np.all(np.abs(robot.rigid_parameters[::PER_LINK]) < NO_MASS):
@@ -53,7 +53,7 @@ def require_any_mass(robot: Robot) -> None:
 
 
 def no_body(robot: Robot) -> str:
-    """Say that the inertia matrix is not positive definite, and which links make it so."""
+    """Return the message on an inertia matrix that is not positive definite."""
     links = zip(robot.links, robot.rigid_parameters.reshape(-1, PER_LINK), strict=True)
     negative = _of_negative_mass(robot)
     odd = [

@@ -1,11 +1,11 @@
 # Copyright 2026 The armid_ros developers
 # SPDX-License-Identifier: Apache-2.0
 """
-Which friction elements stick: a linear complementarity problem with bounds, solved exactly.
+Exact solution of the linear complementarity problem of friction elements that stick or slip.
 
 Over one step, the velocities of m elements are w = w_free - G f, with G symmetric and positive
-semidefinite (the Delassus matrix times the step) and f the torques they take. Every element obeys
-its law:
+semidefinite (the Delassus matrix times the step) and f the friction torques of the elements. Every
+element obeys its law:
 
     w_i > 0 and f_i = upper_i,   or   w_i < 0 and f_i = lower_i,   or   w_i = 0 and f_i between.
 
@@ -21,20 +21,21 @@ from armid_ros.motion import FloatArray
 import numpy as np
 from scipy.linalg.lapack import dgesv
 
-#: What each element does: 1 slips forwards, -1 backwards, 0 sticks.
+#: Mode of each element: 1 slips forwards, -1 slips backwards, 0 sticks.
 Modes = tuple[int, ...]
 
-#: Share of its diagonal that is added to G where that may be singular. Elements that depend on one
-#: another (two joints and the sum of the two) make it so and leave their torques undetermined,
-#: never the velocities.
+#: Share of its diagonal that is added to G if G may be singular. Linearly dependent elements (two
+#: joints and the sum of the two) make G singular. Their torques are then undetermined, their
+#: velocities are not.
 REGULARISATION = 1e-10
 
-#: Rounding that does not count as breaking a law: share of a bound, and velocity [rad/s or m/s].
+#: Tolerances of the law of an element: share of a bound, and velocity [rad/s or m/s].
 TORQUE_TOLERANCE = 1e-12
 SPEED_TOLERANCE = 1e-13
 
-#: Rounds in which all elements that break their law change at once. Typical steps take one; some
-#: problems make this cycle, from there only the first offender changes, which always ends.
+#: Rounds in which all elements that break their law change at once. A typical step needs one
+#: round. Some problems cycle; after these rounds only the first such element changes, which always
+#: terminates.
 BLOCK_ROUNDS = 12
 ROUNDS = 500
 
@@ -47,10 +48,10 @@ class BoxLaw:
     Attributes
     ----------
     lower, upper : ndarray, shape (m,)
-        Torque while the element moves backwards, and forwards; lower < upper, infinite for what
-        never gives way.
+        Torque while the element moves backwards, and forwards; lower < upper, infinite for an
+        element that never slips.
     shift : float
-        Share of its diagonal that is added to G; 0 where it is regular.
+        Share of its diagonal that is added to G; 0 if G is regular.
 
     """
 
@@ -61,16 +62,16 @@ class BoxLaw:
     _patterns: dict[Modes, _Pattern] = field(init=False, repr=False, default_factory=dict)
 
     def __post_init__(self) -> None:
-        """Put the tolerance on the bounds."""
+        """Add the tolerance to the bounds."""
         lower = self.lower - TORQUE_TOLERANCE * np.abs(self.lower)
         upper = self.upper + TORQUE_TOLERANCE * np.abs(self.upper)
         object.__setattr__(self, '_limits', list(zip(lower.tolist(), upper.tolist(), strict=True)))
 
     def torques(self, g: FloatArray, w_free: FloatArray, modes: Modes) -> FloatArray:
         """
-        Take the torques of slipping elements from their bounds, of sticking ones from w = 0.
+        Return the torques: the bounds of slipping elements, the solution of w = 0 for stuck ones.
 
-        Patterns of modes come back step after step, so what they need is kept.
+        The same patterns of modes recur in many steps; the constants of each pattern are cached.
 
         """
         pattern = self._patterns.get(modes)
@@ -102,7 +103,7 @@ class BoxLaw:
 
 @dataclass(frozen=True, eq=False)
 class _Pattern:
-    """Constants of one pattern of modes: masks (m,), (m, m) and the bounds of what slips."""
+    """Constants of one pattern of modes: masks (m,), (m, m), and bounds of slipping elements."""
 
     bound: FloatArray
     stuck: FloatArray | None
@@ -125,14 +126,14 @@ def solve_box_complementarity(
     w_free : ndarray, shape (m,)
         Velocities at the end of the step without friction.
     modes : tuple of int, length m
-        First guess; that of the last step is nearly always right.
+        First guess, such as the modes of the last step, which are nearly always right.
 
     Returns
     -------
     torque : ndarray, shape (m,)
         f [N m], within its bounds.
     modes : tuple of int, length m
-        What each element does.
+        Mode of each element.
 
     """
     f = law.torques(g, w_free, modes)

@@ -16,16 +16,16 @@ import numpy as np
 
 class Trace(NamedTuple):
     """
-    What happened during N steps.
+    States and torques during N steps.
 
     Attributes
     ----------
     motors, links : ndarray, shape (3, N + 1, n)
         Positions, velocities and accelerations from the beginning of the first step to the end of
-        the last; one array where all joints are rigid.
+        the last; the same array if all joints are rigid.
     tau : ndarray, shape (N + 1, n)
-        The torque that the drives were asked for in each step, and in the one that comes next, as
-        far as they have it [N m].
+        Commanded torque of each step, and of the step after the last, within the limits of the
+        drives [N m].
     state : State
         The state after the last step.
 
@@ -60,15 +60,15 @@ def run(
     plant : Plant
         The arm.
     controller : Controller
-        What drives it.
+        The controller.
     state : State
-        Where it starts.
+        The initial state.
     torque : ndarray, shape (n,)
         Torque of the first step, from `command`.
     targets : Targets
-        What to do at the end of each step.
+        The targets at the end of each step.
     compiled : CompiledLoop, optional
-        The same plant and controller, for the steps that it can take.
+        The same plant and controller in compiled form, used for the steps that it supports.
 
     """
     drive, last = plant.action.drive, len(targets)

@@ -1,10 +1,11 @@
 # Copyright 2026 The armid_ros developers
 # SPDX-License-Identifier: Apache-2.0
 """
-Steps in C: what `kernel.c` is given of a plant and of the controller that drives it.
+Interface to the compiled steps of `kernel.c` for a plant and its controller.
 
-It takes the steps in which nothing changes, some fifty times as fast as `integrator.step`, which
-takes all others, and all of them where the package was installed without a compiler.
+The kernel computes the steps in which no friction element changes its mode and no joint reaches a
+stop, some fifty times as fast as `integrator.step`. `integrator.step` computes all other steps,
+and every step if the package was installed without a compiler.
 
 """
 
@@ -83,7 +84,7 @@ class _Plant(ctypes.Structure):
 
 @cache
 def kernel() -> ctypes.CDLL | None:
-    """Return the compiled kernel; None where there is none."""
+    """Return the compiled kernel; None if it was not compiled."""
     found = find_spec('armid_ros.simulation._kernel')
     if found is None or found.origin is None:
         return None
@@ -100,7 +101,7 @@ def _array(values: npt.ArrayLike, kind: npt.DTypeLike = float) -> npt.NDArray[An
 
 @dataclass(frozen=True, eq=False)
 class _Structure:
-    """A structure of the kernel, and the arrays it points to."""
+    """A C structure of the kernel, and the arrays to which it points."""
 
     values: Any
     arrays: tuple[npt.NDArray[Any], ...]
@@ -112,16 +113,16 @@ class _Structure:
 
 def rigid_body(robot: Robot, added_inertia: FloatArray, weighs: bool = True) -> _Structure:
     """
-    Return a rigid body as the kernel reads it.
+    Return a rigid-body model in the format of the kernel.
 
     Parameters
     ----------
     robot : Robot
-        Of n joints.
+        Robot of n joints.
     added_inertia : ndarray, shape (n, n)
-        What is added to its inertia matrix [kg m^2].
+        Inertia added to the inertia matrix of the robot [kg m^2].
     weighs : bool
-        Whether gravity acts on it.
+        Whether gravity acts on the robot.
 
     """
     joints = np.zeros(robot.n_joints, _JOINT)
@@ -139,14 +140,14 @@ def rigid_body(robot: Robot, added_inertia: FloatArray, weighs: bool = True) -> 
 
 class CompiledLoop:
     """
-    A plant and its controller, ready for the kernel; `of` returns None where it has no such steps.
+    A plant and its controller in the format of the kernel.
 
     Parameters
     ----------
     plant : Plant
-        Of rigid joints; without drives, hysteresis, load-dependent or coupled dry friction.
+        Plant of rigid joints without drives, hysteresis, load-dependent or coupled dry friction.
     feedback : LinearFeedback
-        What drives it.
+        The feedback law of its controller.
 
     """
 
@@ -196,7 +197,7 @@ class CompiledLoop:
 
     @classmethod
     def of(cls, plant: Plant, controller: Controller) -> CompiledLoop | None:
-        """Return the loop; None where the kernel has no such steps, or was not compiled."""
+        """Return the loop; None if the kernel does not support the plant or is not compiled."""
         action, dry = plant.action, plant.contacts
         usual = plant.springs is None and action.drive is None and action.hysteresis is None
         of_joints = dry.friction is None and -1 not in dry.axes
@@ -208,13 +209,13 @@ class CompiledLoop:
         return cls(plant, feedback) if plant.robot.n_joints <= most else None
 
     def _smooth_effects(self) -> int:
-        """Let the effects of the plant act for the kernel; return 1 if that raises something."""
+        """Compute the smooth effects of the plant for the kernel; return 1 after an exception."""
         n = len(self._law_torque)
         t, q, dq = self._law_input[0], self._law_input[1 : n + 1], self._law_input[n + 1 :]
         assert self._torque is not None
         try:
             self._law_torque[:] = self._torque(t, q, dq)
-        except BaseException as error:  # Ctrl-C too: nothing passes through C by itself
+        except BaseException as error:  # Ctrl-C too: exceptions do not pass through C
             self.failure.append(error)
             return 1
         return 0
@@ -229,11 +230,11 @@ class CompiledRun:
     loop : CompiledLoop
         The plant and its controller.
     targets : Targets
-        What to do at the end of each of N steps.
+        The targets at the end of each of N steps.
     moved : ndarray, shape (3, N + 1, n)
-        Position, velocity and acceleration at the steps, which are written.
+        Position, velocity and acceleration at the steps; written by the run.
     tau : ndarray, shape (N + 1, n)
-        Torque, which is.
+        Torque at the steps; written by the run.
 
     """
 
@@ -246,7 +247,7 @@ class CompiledRun:
         self._loop, self._last = loop, len(targets)
 
     def advance(self, state: State, row: int) -> int:
-        """Take the steps from a row on in which nothing changes; return the row after them."""
+        """Compute steps until a mode changes or a stop is reached; return the next row."""
         library = kernel()
         assert library is not None
         modes = np.array(state.modes, dtype=np.int64)

@@ -1,6 +1,6 @@
 # Copyright 2026 The armid_ros developers
 # SPDX-License-Identifier: Apache-2.0
-"""What can hold an arm at a standstill: dry friction, and the stops of its joints."""
+"""Elements that can hold a joint at rest: dry friction and joint stops."""
 
 from __future__ import annotations
 
@@ -16,18 +16,18 @@ import numpy as np
 @dataclass(frozen=True, eq=False)
 class Contacts:
     """
-    Elements that can hold: dry friction, and joint stops.
+    Elements that can hold a joint at rest: dry friction and joint stops.
 
     Attributes
     ----------
     directions : ndarray, shape (m, n)
         Velocity of each element as a combination of the joint velocities.
     law : BoxLaw
-        What torques they take.
+        Bounds of the torques of the elements.
     axes : tuple of int, length m
         The joint that an element acts on alone; -1 if it acts on several.
     friction : DryFriction
-        What they are without a load, where the load matters.
+        Dry friction without a load, if friction depends on the load.
 
     """
 
@@ -48,7 +48,7 @@ class Contacts:
         return cls(directions, law, axes, loaded)
 
     def under(self, load: FloatArray) -> Contacts:
-        """Return the contacts as they are under a torque of the rigid body, shape (n,) [N m]."""
+        """Return the contacts under a torque of the rigid body, shape (n,) [N m]."""
         if self.friction is None:
             return self
         more = self.friction.widening(load)
@@ -56,14 +56,14 @@ class Contacts:
 
 
 def split_constant(friction: DryFriction | None, n_joints: int) -> tuple[DryFriction, FloatArray]:
-    """Part the elements that cannot stick, whose levels are one constant torque, from the rest."""
+    """Separate elements that cannot stick, because both levels are equal, as a constant torque."""
     if friction is None:
         return DryFriction(np.empty((0, n_joints)), np.empty(0), np.empty(0)), np.zeros(n_joints)
     span = friction.upper - friction.lower
     pushing = np.flatnonzero(span < -NO_FRICTION)
     if len(pushing):
         worst = int(pushing[0])
-        joint = int(np.argmax(friction.directions[worst] != 0.0)) + 1  # noqa: RUF069 - of joints, never computed
+        joint = int(np.argmax(friction.directions[worst] != 0.0)) + 1  # noqa: RUF069 - directions of single joints are exact
         raise ModelError(
             f'dry friction of joint {joint} pushes: its torque forwards is less than backwards '
             f'({friction.upper[worst]:g} against {friction.lower[worst]:g} N m); friction torques '
@@ -71,8 +71,8 @@ def split_constant(friction: DryFriction | None, n_joints: int) -> tuple[DryFric
         )
     share = np.zeros(len(friction.lower)) if friction.load_share is None else friction.load_share
     constant = (span <= NO_FRICTION) & (np.abs(share) <= NO_FRICTION)
-    first = np.argsort(np.argmax(friction.directions != 0.0, axis=1), kind='stable')  # noqa: RUF069 - of joints, never computed
-    able = first[~constant[first]]  # in the order of the joints, so that most are one a joint
+    first = np.argsort(np.argmax(friction.directions != 0.0, axis=1), kind='stable')  # noqa: RUF069 - directions of single joints are exact
+    able = first[~constant[first]]  # in the order of the joints
     sticking = DryFriction(
         np.ascontiguousarray(friction.directions[able]),
         friction.lower[able],

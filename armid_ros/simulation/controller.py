@@ -1,6 +1,6 @@
 # Copyright 2026 The armid_ros developers
 # SPDX-License-Identifier: Apache-2.0
-"""What makes an arm follow a reference: computed torque, or PD with gravity compensation."""
+"""Controllers that follow a reference: computed torque, and PD with gravity compensation."""
 
 from __future__ import annotations
 
@@ -13,12 +13,12 @@ from armid_ros.robots import Robot
 import numpy as np
 import pinocchio as pin
 
-#: Natural frequency of the closed loop [rad/s]: 8 Hz, stiff for an arm, and slow enough for 1 kHz
-#: control of a joint that is half as heavy as its model.
+#: Natural frequency of the closed loop [rad/s]. 8 Hz is stiff for an arm. It is slow enough for
+#: control at 1 kHz of a joint with half the inertia of its model.
 BANDWIDTH = 50.0
 
 
-#: Position, velocity and acceleration to have; and with the torque of the feedforward; each (n,).
+#: Desired position, velocity and acceleration, without and with the feedforward torque; each (n,).
 Desired = tuple[FloatArray, FloatArray, FloatArray]
 Target = tuple[Desired, FloatArray]
 
@@ -26,14 +26,14 @@ Target = tuple[Desired, FloatArray]
 @dataclass(frozen=True, eq=False)
 class Targets:
     """
-    What a controller is to do at N successive steps.
+    Targets of a controller at N successive steps.
 
     Attributes
     ----------
     q, dq, ddq : ndarray, shape (N, n)
-        Where the motors are to be [rad or m, s].
+        Desired position, velocity and acceleration of the motors [rad or m, s].
     feedforward : ndarray, shape (N, n)
-        Torque that the controller derives from the reference alone [N m].
+        Torque that depends on the reference only [N m].
 
     """
 
@@ -43,11 +43,11 @@ class Targets:
     feedforward: FloatArray
 
     def at(self, row: int) -> Target:
-        """Return what to do at one step."""
+        """Return the targets of one step."""
         return (self.q[row], self.dq[row], self.ddq[row]), self.feedforward[row]
 
     def __getitem__(self, rows: slice) -> Targets:
-        """Return some of the steps."""
+        """Return the targets of some of the steps."""
         return Targets(self.q[rows], self.dq[rows], self.ddq[rows], self.feedforward[rows])
 
     def __len__(self) -> int:
@@ -58,22 +58,22 @@ class Targets:
 @dataclass(frozen=True, eq=False)
 class LinearFeedback:
     """
-    Inverse dynamics of a rigid body, and a spring and a damper on every joint.
+    Feedback law: inverse dynamics of a rigid body, plus a spring and a damper on every joint.
 
     tau = ID(q, s dq, w^2 e + 2 w de + s ddq_d) + kp e + kd de + feedforward, e = q_d - q.
 
     Attributes
     ----------
     robot : Robot
-        The rigid body that the inverse dynamics ID is of.
+        The rigid body of the inverse dynamics ID.
     added_inertia : ndarray, shape (n, n)
-        What is added to its inertia matrix [kg m^2].
+        Inertia added to the inertia matrix of the robot [kg m^2].
     bandwidth : float
         w, of the feedback on the acceleration [rad/s].
     follows : bool
-        Whether velocity and reference acceleration count in ID: s is 1, or 0.
+        Whether ID contains velocity and reference acceleration: s is 1 if so, otherwise 0.
     weighs : bool
-        Whether gravity does.
+        Whether ID contains gravity.
     stiffness, damping : float or ndarray, shape (n,)
         kp [N m/rad or N/m] and kd [N m s/rad or N s/m].
 
@@ -90,7 +90,7 @@ class LinearFeedback:
     _data: pin.Data = field(init=False, repr=False)
 
     def __post_init__(self) -> None:
-        """Make a body, and scratch memory."""
+        """Make the rigid-body model and its scratch memory."""
         model = pin.Model(self.robot.model)
         if not self.weighs:
             model.gravity.linear = np.zeros(3)
@@ -99,7 +99,7 @@ class LinearFeedback:
 
     @classmethod
     def of(cls, arm: ArmModel, **terms: Any) -> LinearFeedback:
-        """Return the feedback with the body of an arm and the inertia that its effects add."""
+        """Return the feedback for the rigid body of an arm and the inertia of its effects."""
         action = arm.action()
         robot = action.robot or arm.robot
         none = np.zeros((robot.n_joints, robot.n_joints))
@@ -124,18 +124,17 @@ class LinearFeedback:
 
 class Controller:
     """
-    A law from where the arm is, and where it should be, to the torque it is given.
+    A control law: torque as a function of the measured and the desired motion.
 
-    It sees the true position and velocity: sensors distort what is recorded, not what moves the
-    arm; where joints give way, those of the motors. Torque limits are the drives', applied to what
-    it asks for.
+    The law uses the true position and velocity, of the motors if joints are elastic. Sensors
+    distort the recording only. The drives apply their torque limits to the commanded torque.
 
     Attributes
     ----------
     acts_once : bool
-        Whether it keeps something from step to step, so that it may act once a step only.
+        Whether the controller has a state, so that it may act only once per step.
     feedback : LinearFeedback, or None
-        What it does, where that has this form.
+        The law as a `LinearFeedback`; None if it has another form.
 
     """
 
@@ -143,21 +142,21 @@ class Controller:
     feedback: LinearFeedback | None = None
 
     def started(self) -> Controller:
-        """Return one that has kept nothing yet: this one, where it never does."""
+        """Return a controller in its initial state; without a state, itself."""
         return self
 
     def targets(self, desired: Motion, asked: FloatArray | None = None) -> Targets:
         """
-        Return what to do to follow a reference that has one row per step.
+        Return the targets for a reference that has one row per step.
 
-        A controller that has acted for the first of them already is told what it asked for then,
-        positions of shape (n,).
+        `asked` is the position, shape (n,), that a controller commanded before for the first row,
+        if any.
 
         """
         return Targets(desired.q, desired.dq, desired.ddq, self.feedforward(desired))
 
     def feedforward(self, desired: Motion) -> FloatArray:
-        """Return torques that depend on the reference only, shape (N, n) [N m]."""
+        """Return the torques that depend on the reference only, shape (N, n) [N m]."""
         return np.zeros_like(desired.q)
 
     def torque(
@@ -173,7 +172,7 @@ class Controller:
         desired : tuple of ndarray, each of shape (n,)
             Position, velocity and acceleration of the reference.
         feedforward : ndarray, shape (n,)
-            Row of `feedforward` that belongs to now.
+            Row of `feedforward` for the present step.
 
         """
         assert self.feedback is not None, f'{type(self).__name__} has no feedback and no torque'
@@ -191,8 +190,7 @@ class ComputedTorque(Controller):
     Attributes
     ----------
     arm : ArmModel
-        What the controller believes of the arm. Its friction is compensated at the reference
-        velocity.
+        The controller's model of the arm. Its friction is compensated at the reference velocity.
     bandwidth : float
         Natural frequency omega of every joint [rad/s], critically damped.
 
@@ -203,7 +201,7 @@ class ComputedTorque(Controller):
     feedback: LinearFeedback = field(init=False, repr=False)
 
     def __post_init__(self) -> None:
-        """Collect what the effects of the nominal arm do."""
+        """Collect the actions of the effects of the nominal arm."""
         feedback = LinearFeedback.of(self.arm, bandwidth=self.bandwidth, follows=True)
         object.__setattr__(self, 'feedback', feedback)
 
@@ -219,15 +217,16 @@ class ComputedTorque(Controller):
 @dataclass(frozen=True, eq=False)
 class GravityPD(Controller):
     """
-    A spring and a damper on every joint, and the torque that holds the nominal arm.
+    A spring and a damper on every joint, plus the gravity torque of the nominal arm.
 
-    tau = kp (q_d - q) + kd (dq_d - dq) + g(q). Source: Siciliano et al. 2009, section 8.5.1.
-    Each joint on its own, in the middle of the range of motion, is critically damped at 50 rad/s.
+    tau = kp (q_d - q) + kd (dq_d - dq) + g(q).
+    Source: Siciliano et al. 2009, section 8.5.1. Each joint on its own, in the middle of the range
+    of motion, is critically damped at 50 rad/s.
 
     Attributes
     ----------
     arm : ArmModel
-        What the controller believes of the arm; only its gravity torque is used.
+        The controller's model of the arm; only its gravity torque is used.
     stiffness, damping : ndarray, shape (n,)
         kp [N m/rad or N/m] and kd [N m s/rad or N s/m].
 

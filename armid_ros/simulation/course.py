@@ -1,6 +1,6 @@
 # Copyright 2026 The armid_ros developers
 # SPDX-License-Identifier: Apache-2.0
-"""What an arm that takes trajectories is to do now: hold still, or follow the latest of them."""
+"""The current reference of a simulated arm: hold still, or follow the latest trajectory."""
 
 from __future__ import annotations
 
@@ -12,8 +12,8 @@ from armid_ros.robots import Robot
 from armid_ros.simulation.reference import Reference
 import numpy as np
 
-#: How far the first point of a trajectory that begins at once may be from where the arm is to be
-#: [rad or m], and how fast it may begin or end [rad/s or m/s].
+#: Largest distance of the first point of a trajectory that begins at once from the desired
+#: position [rad or m], and largest velocity at its beginning and end [rad/s or m/s].
 START_TOLERANCE = 0.01
 REST_TOLERANCE = 1e-3
 
@@ -25,7 +25,7 @@ class Course:
     Parameters
     ----------
     robot : Robot
-        Whose limits are kept.
+        Robot with the limits to keep.
     dt : float
         Step of the plant [s].
 
@@ -42,22 +42,22 @@ class Course:
         return self._start * self._dt + self._reference.duration
 
     def follow(self, reference: Reference, steps: int) -> None:
-        """Do what a reference says from a step on, wherever the arm is."""
+        """Follow a reference from a step on, wherever the arm is."""
         self._reference, self._start = reference, steps
 
     def begin(self, reference: Reference, steps: int) -> None:
         """
-        Follow a trajectory from a step on, in place of the one that may be under way.
+        Follow a trajectory from a step on; it replaces the present trajectory.
 
-        A first point later than time zero gives the arm that time to get there from where it is
-        to be now.
+        If the time of the first point is later than zero, the arm moves to this point within that
+        time.
 
         Raises
         ------
         TrajectoryError
-            If a joint is unknown or missing, a position or velocity limit is passed, the first
-            point is somewhere else and there is no time to get there, or the last point is not at
-            rest. The course stays what it was.
+            If a joint is unknown or missing, a position or velocity limit is exceeded, the arm has
+            no time to reach the first point, or the last point is not at rest. The course then
+            does not change.
 
         """
         curve = reference.for_robot(self._robot)
@@ -78,7 +78,7 @@ class Course:
         self.follow(curve, steps)
 
     def desired(self, first: int, count: int) -> Motion:
-        """Return what the arm is to do at some successive steps, from `first` on."""
+        """Return the desired motion at successive steps from `first` on."""
         motion = self._reference.sample(self._times(first - self._start, count))
         return replace(motion, t=self._times(first, count))
 
@@ -88,7 +88,7 @@ class Course:
     def _require_none(
         self, what: str, values: FloatArray, tolerance: float, per: str, advice: str
     ) -> None:
-        """Refuse a trajectory that has more of something than rounding, in any joint."""
+        """Raise a TrajectoryError if the value of any joint exceeds a tolerance."""
         worst = int(np.argmax(np.abs(values)))
         if abs(values[worst]) > tolerance:
             unit = self._robot.position_units[worst] + per

@@ -1,14 +1,14 @@
 # Copyright 2026 The armid_ros developers
 # SPDX-License-Identifier: Apache-2.0
 """
-One step of the plant.
+Integration of one step of the plant.
 
-Where joints give way, `spring_integrator` has it. Where they are rigid, the rigid body and the
-smooth effects are taken at the middle of the step, half a step ahead of the state, which makes the
-integration second order in the step with one evaluation of the dynamics; the torque is constant
-over a step, as a drive gives it. Damping is linearly implicit. Dry friction and joint stops are
-complementarity conditions on the velocity at the end of the step, so that what sticks has velocity
-zero, not a small one.
+`spring_integrator` integrates elastic joints. For rigid joints, the rigid body and the smooth
+effects are evaluated at the middle of the step, half a step ahead of the state. The integration is
+therefore of second order in the step with one evaluation of the dynamics. The torque is constant
+over a step, like the torque of a drive. Damping is linearly implicit. Dry friction and joint stops
+are complementarity conditions on the velocity at the end of the step. A joint that sticks
+therefore has exactly zero velocity.
 
 """
 
@@ -34,14 +34,14 @@ def step(plant: Plant, state: State, torque: FloatArray) -> State:
     plant : Plant
         The arm.
     state : State
-        Where it is.
+        Its state.
     torque : ndarray, shape (n,)
         Actuator torque [N m].
 
     Returns
     -------
     State
-        Where it is one step later.
+        The state one step later.
 
     """
     if plant.springs is not None and state.rotors is not None:
@@ -86,7 +86,7 @@ def _end_velocity(
     dq: FloatArray,
     modes: Modes,
 ) -> tuple[FloatArray, FloatArray, Modes]:
-    """Return velocity at the end and acceleration, and what friction elements and stops do."""
+    """Return end velocity, acceleration, and torques and modes of friction elements and stops."""
     dt = plant.spans[0]
     directions = contacts.directions
     right = np.empty((1 + len(directions), len(force)))
@@ -106,7 +106,7 @@ def _end_velocity(
 
 
 def _clear_stuck(dq: FloatArray, contacts: Contacts, modes: Modes) -> None:
-    """Make the velocity of what sticks exactly zero, where the solution has rounding errors."""
+    """Set the velocity of joints that stick to exactly zero, without rounding errors."""
     fixed = [
         axis for axis, mode in zip(contacts.axes, modes, strict=True) if mode == 0 and axis >= 0
     ]
@@ -137,7 +137,7 @@ def _stop(
     q_next: FloatArray,
     load: FloatArray | None,
 ) -> tuple[FloatArray, FloatArray, FloatArray, Modes]:
-    """Repeat the step with the stops that it ran into."""
+    """Repeat the step with the joint stops that were reached."""
     robot, count = plant.robot, len(state.modes)
     at_upper, at_lower = q_next > robot.upper, q_next < robot.lower
     while True:

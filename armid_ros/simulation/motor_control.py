@@ -1,6 +1,6 @@
 # Copyright 2026 The armid_ros developers
 # SPDX-License-Identifier: Apache-2.0
-"""What the drives of an arm with elastic joints do: velocity loops, alone or led by a model."""
+"""Drives of an arm with elastic joints: velocity loops, with or without model feedforward."""
 
 from __future__ import annotations
 
@@ -15,14 +15,14 @@ from armid_ros.simulation.plant import Plant
 import numpy as np
 import pinocchio as pin
 
-#: Share of a motor's velocity that one sampled action of its loop may take away.
+#: Largest share of a motor's velocity that one sample of its loop may remove.
 _QUICKEST = 0.3
 
 
 @dataclass(frozen=True, eq=False)
 class VelocityLoop:
     """
-    Proportional-integral control of the motors' velocities, sampled at every step of the plant.
+    Proportional-integral control of the motor velocities, sampled at every step of the plant.
 
     tau_k = kp e_k + ki s_k, with e_k = reference - velocity and s_k = s_k-1 + dt e_k.
 
@@ -51,19 +51,20 @@ class VelocityLoop:
 @dataclass(eq=False)
 class MotorControl(Controller):
     """
-    A velocity loop on every motor, which keeps the integral of its error from step to step.
+    A controller with a velocity loop on every motor; the integrals of the errors are its state.
 
     Attributes
     ----------
     loop : VelocityLoop
-        The loops; the integral of the velocity's error is that of the position.
+        The loops; the integral of the velocity error is the position error.
     dt : float
         Time between two actions of the loops, a step of the plant [s].
     guide : Plant, or None
-        What they believe of the arm: its torque along the reference is added to theirs, and the
-        motors are led ahead of the links by the twist of their springs. None: loops alone.
+        Model of the arm for the feedforward. Its torque along the reference is added to the torque
+        of the loops, and the twist of its springs is added to the motor positions. None: no
+        feedforward.
     integral : ndarray, shape (n,)
-        Of the error of the velocity [rad].
+        Integral of the velocity error [rad].
 
     """
 
@@ -74,17 +75,17 @@ class MotorControl(Controller):
     acts_once: ClassVar[bool] = True
 
     def __post_init__(self) -> None:
-        """Begin with relaxed loops."""
+        """Set the integrals to zero."""
         self.integral = np.zeros(len(self.loop.proportional))
 
     @classmethod
     def of(cls, plant: Plant) -> MotorControl:
         """
-        Return a control that suits an arm whose joints give way, and knows it.
+        Return loops designed for an arm with elastic joints, with that arm as the model.
 
-        The gain on the velocity is the least of what a rigid joint needs for 8 Hz, of what damps
-        the link on its spring best, sqrt(K M), and of what a sampled loop may do to a rotor. That
-        on the position damps the joint critically.
+        The velocity gain is the smallest of three values: the gain of a rigid joint for 8 Hz, the
+        gain sqrt(K M) that damps the link on its spring best, and the largest stable gain of a
+        sampled loop on a rotor. The position gain makes the joint critically damped.
 
         """
         robot, springs = plant.robot, plant.springs
@@ -106,14 +107,14 @@ class MotorControl(Controller):
         return cls(VelocityLoop(gain, gain**2 / (4.0 * inertia)), plant.dt, plant)
 
     def started(self) -> MotorControl:
-        """Return the same loops, relaxed."""
+        """Return the same loops with zero integrals."""
         return replace(self)
 
     def targets(self, desired: Motion, asked: FloatArray | None = None) -> Targets:
         """
-        Return where the loops are to bring the motors for a motion of the links.
+        Return the targets of the motors for a motion of the links.
 
-        The torque of the reference, if it has one, is added to that of the loops.
+        The torque of the reference, if any, is added to the torque of the loops.
 
         """
         tau = np.zeros_like(desired.q) if desired.tau is None else np.array(desired.tau)
@@ -130,7 +131,7 @@ class MotorControl(Controller):
     def torque(
         self, q: FloatArray, dq: FloatArray, desired: Desired, feedforward: FloatArray
     ) -> FloatArray:
-        """Act once, and return the torque, shape (n,)."""
+        """Update the integrals and return the torque, shape (n,)."""
         error = desired[1] - dq
         self.integral = self.integral + self.dt * error
         return self.loop.torque(error, self.integral) + feedforward

@@ -1,6 +1,6 @@
 # Copyright 2026 The armid_ros developers
 # SPDX-License-Identifier: Apache-2.0
-"""The plant: an arm model made ready to be integrated, and the state it is in."""
+"""The plant, an arm model prepared for integration, and its state."""
 
 from __future__ import annotations
 
@@ -23,20 +23,20 @@ import numpy.typing as npt
 import pinocchio as pin
 from scipy.linalg import eigh, LinAlgError
 
-#: How far beyond a limit is rounding, as a share of the range between the limits.
+#: Tolerance beyond a position limit, as a share of the range between the limits.
 LIMIT_TOLERANCE = 1e-6
 
 
 class Rotors(NamedTuple):
     """
-    The motion of the e motors whose transmissions give way, as seen at the joints.
+    The motion of the e motors with elastic transmissions, on the joint side of the gear.
 
     Attributes
     ----------
     twist : ndarray, shape (e,)
-        By how much they are ahead of their links [rad or m].
+        Position of the motors minus position of their links [rad or m].
     dq, ddq : ndarray, shape (e,)
-        Velocity and acceleration.
+        Velocity and acceleration of the motors.
 
     """
 
@@ -52,19 +52,19 @@ class State(NamedTuple):
     Attributes
     ----------
     steps : int
-        Time in steps of the plant.
+        Time as a number of steps of the plant.
     t : float
         Time [s], steps times the step.
     q, dq : ndarray, shape (n,)
         Position [rad or m] and velocity of the links.
     ddq : ndarray, shape (n,)
-        Mean acceleration of the step that led here; with springs, acceleration now.
+        Mean acceleration over the last step; with springs, the present acceleration.
     modes : tuple of int, length m
-        What each dry friction element did: 1 slipped forwards, -1 backwards, 0 stuck.
+        Mode of each dry friction element: 1 slipped forwards, -1 slipped backwards, 0 stuck.
     memory : ndarray, shape (h,)
-        States of the friction that has some.
+        States of the friction with hysteresis.
     rotors : Rotors, or None
-        The motors that move on their own; None where all joints are rigid.
+        The motors with a motion of their own; None if all joints are rigid.
 
     """
 
@@ -81,11 +81,11 @@ class State(NamedTuple):
 @dataclass(frozen=True, eq=False)
 class Plant:
     """
-    An arm ready to be integrated.
+    An arm model prepared for integration.
 
-    A rigid joint is an infinitely stiff spring: its motor and its link have one velocity. Where
-    elasticity is given, joints with joint_elasticity and rotor_inertia have two; without it they
-    move as one, and their springs show as a twist of the readings only.
+    The motor and the link of a rigid joint have the same velocity. If elasticity is given, motor
+    and link of joints with joint_elasticity and rotor_inertia have different velocities. Otherwise
+    they have the same velocity, and the springs only change the position readings.
 
     Attributes
     ----------
@@ -94,39 +94,40 @@ class Plant:
     dt : float
         Step [s].
     hard_stops : bool
-        Whether the joints stop at the position limits of the robot: rigid ones without bouncing;
-        links on springs meet a damped spring there, of 32 Hz with the inertia in the middle of
-        the ranges at the usual step, and get some milliradians beyond.
+        Whether the joints stop at the position limits of the robot. Rigid joints stop without
+        bouncing. The stop of a link on a spring is a damped spring, which yields by some
+        milliradians. Its frequency is 32 Hz with the inertia in the middle of the ranges and the
+        default step.
     elasticity : Elasticity, or None
-        How joints that give way are simulated; None to take them for rigid ones.
+        How elastic joints are simulated; None: all joints are rigid.
     robot : Robot
-        The rigid body as the effects make it.
+        The rigid body with the changes of the effects, such as a payload.
     contacts : Contacts
         Friction elements that can stick, m of them.
     damping : ndarray, shape (n, n)
         Viscous matrix [N m s/rad].
     model : pinocchio.Model
-        The rigid body, and on every joint what is added to its inertia: rotors, and the implicit
-        part of the damping [kg m^2].
+        The rigid body, with the inertia added to every joint: rotors, and the implicit part of the
+        damping [kg m^2].
     coupling : ndarray, shape (n, n), or None
-        What is added to that between joints [kg m^2].
+        Added inertia between different joints [kg m^2].
     constant : ndarray, shape (n,), or None
         Constant torque that the actuators have to supply [N m].
     torque : callable (t, q, dq) -> ndarray (n,), or None
-        Anything else that they have to supply; with springs, that the motors have to.
+        Any other torque that the actuators have to supply, on the motor side of springs.
     action : Action
-        What the effects do, to the arm and to its sensors.
+        Actions of the effects on the arm and on its sensors.
     springs : ElasticJoints, or None
-        What is between motors and links; None where all joints are rigid.
+        Springs between motors and links; None if all joints are rigid.
     spans : tuple of ndarray, each of shape ()
-        The step and half of it [s]; numpy multiplies by these in half the time of a float.
+        The step and half the step [s], as arrays because numpy multiplies them twice as fast as
+        floats.
     torque_range : tuple of ndarray, each of shape (n,)
-        What the drives have, backwards and forwards [N m].
+        Torque limits of the drives, backwards and forwards [N m].
     stops : list of (float, float)
         Lower and upper position limit of every joint [rad or m].
     data : pinocchio.Data
-        Scratch memory of the rigid-body algorithms: integrating is a pure function, but two
-        threads need two plants.
+        Scratch memory of the rigid-body algorithms; two threads therefore need two plants.
 
     """
 
@@ -152,7 +153,7 @@ class Plant:
     )
 
     def __post_init__(self) -> None:
-        """Collect what the effects do."""
+        """Collect the actions of the effects."""
         if not (math.isfinite(self.dt) and self.dt > 0.0):
             raise ModelError(f'the step has to be a positive time, not {self.dt} s')
         action = self.arm.action()
@@ -207,14 +208,15 @@ class Plant:
         steps: int = 0,
     ) -> State:
         """
-        Make a state, at rest unless told otherwise.
+        Make a state, by default at rest.
 
-        Springs carry the weight of their links, and motors move with them.
+        Springs are twisted by the weight of their links, and motors have the velocity of their
+        links.
 
         Raises
         ------
         TrajectoryError
-            If a joint is beyond its stop; the message names it.
+            If a joint is beyond its stop; the message names the joint.
 
         """
         n = self.robot.n_joints
@@ -236,7 +238,7 @@ class Plant:
         return State(steps, t, position, velocity, acceleration, modes, memory, rotors)
 
     def motors(self, state: State) -> tuple[FloatArray, FloatArray, FloatArray]:
-        """Return positions, velocities and accelerations of the motors at the joints, (n,)."""
+        """Return positions, velocities and accelerations of the motors, each of shape (n,)."""
         _, _, q, dq, ddq, _, _, rotors = state
         if rotors is None or self.springs is None:
             return q, dq, ddq
@@ -248,7 +250,7 @@ class Plant:
     def resist(
         self, force: FloatArray, t: float, q: FloatArray, dq: FloatArray, memory: FloatArray
     ) -> None:
-        """Subtract from forces on the motors, (n,) [N m], what smooth effects take of them."""
+        """Subtract the torques of smooth effects from torques on the motors, (n,) [N m]."""
         if self.constant is not None:
             force -= self.constant
         if self.torque is not None:
@@ -258,7 +260,7 @@ class Plant:
 
     @property
     def sensing(self) -> Action:
-        """Return what effects make of the readings of motors."""
+        """Return the action of the effects on the readings of the motors."""
         return self.action if self.springs is None else self.springs.sensing
 
     def _within_stops(self, q: FloatArray) -> FloatArray:
@@ -279,10 +281,10 @@ class Plant:
         self, at_lower: npt.NDArray[np.bool_], at_upper: npt.NDArray[np.bool_]
     ) -> Contacts:
         """
-        Return the friction elements, and after them the stops that some joints are at.
+        Return the friction elements, followed by the stops that joints touch.
 
-        A stop is an element that holds any torque one way: its law is w <= 0, f >= 0, w f = 0 at
-        the upper limit.
+        A stop is an element that holds any torque in one direction. Its law is w <= 0, f >= 0, w f
+        = 0 at the upper limit.
 
         """
         key = (at_lower.tobytes(), at_upper.tobytes())
@@ -302,13 +304,13 @@ class Plant:
 
 
 def limit_slack(robot: Robot) -> FloatArray:
-    """Return how far beyond a position limit is rounding [rad or m], shape (n,)."""
+    """Return the tolerance beyond a position limit [rad or m], shape (n,)."""
     span = robot.upper - robot.lower
     return np.asarray(LIMIT_TOLERANCE * np.where(np.isfinite(span), span, 1.0))
 
 
 def _damping_weight(robot: Robot, inertia: FloatArray, damping: FloatArray, dt: float) -> float:
-    """Return the share of the end of a step in the velocity that damping acts on."""
+    """Return the weight of the velocity at the end of a step in the damping torque."""
     # 1/2 (second order) for weak damping, 1 (no overshoot) for stiff damping; between them the
     # value that makes the fastest decay rate of the arm exact (Liniger and Willoughby 1970)
     try:

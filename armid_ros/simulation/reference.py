@@ -1,11 +1,11 @@
 # Copyright 2026 The armid_ros developers
 # SPDX-License-Identifier: Apache-2.0
 """
-What an arm is told to do: waypoints in time, and the smooth curve through them.
+The reference of an arm: waypoints in time, and the smooth curve through them.
 
-The curve is what ROS 2's joint_trajectory_controller makes of a JointTrajectory: a line through
-waypoints that have positions only, a cubic with velocities, a quintic with accelerations. Before
-its first waypoint and after its last one the arm is to hold still.
+The curve equals that of ROS 2's joint_trajectory_controller for a JointTrajectory: linear between
+waypoints with positions only, cubic with velocities, quintic with accelerations. Before the first
+and after the last waypoint the arm holds still.
 
 """
 
@@ -21,7 +21,7 @@ from armid_ros.robots import Robot
 from armid_ros.simulation.plant import limit_slack, LIMIT_TOLERANCE
 import numpy as np
 
-#: Samples looked at in one go when a reference is compared with the limits.
+#: Samples per block when a reference is compared with the limits.
 _BLOCK = 20_000
 
 
@@ -41,8 +41,8 @@ class Reference:
     dq, ddq : ndarray, shape (K, n), or None
         Velocity and acceleration; an acceleration needs a velocity.
     tau : ndarray, shape (K, n), or None
-        Torque on top of what follows the waypoints, straight from each to the next [N m]; for
-        arms whose controllers take one.
+        Feedforward torque, interpolated linearly between waypoints [N m]; for controllers that
+        accept it.
 
     """
 
@@ -55,7 +55,7 @@ class Reference:
     _coefficients: FloatArray = field(init=False, repr=False)
 
     def __post_init__(self) -> None:
-        """Freeze the waypoints, check them, and find the polynomials between them."""
+        """Freeze and check the waypoints, and compute the polynomials between them."""
         names = [
             name for name in ('t', 'q', 'dq', 'ddq', 'tau') if getattr(self, name) is not None
         ]
@@ -107,7 +107,7 @@ class Reference:
 
     def sample(self, t: FloatArray) -> Motion:
         """
-        Evaluate the curve.
+        Evaluate the curve at given times.
 
         Parameters
         ----------
@@ -117,7 +117,7 @@ class Reference:
         Returns
         -------
         Motion
-            Position, velocity and acceleration, and torque where there is one.
+            Position, velocity and acceleration, and torque if the reference has one.
 
         """
         tau = None
@@ -171,15 +171,15 @@ class Reference:
 
     def remaining(self, late: float) -> Reference:
         """
-        Return what is left of the reference when it was to begin some time ago.
+        Return the remaining reference when its start time is in the past.
 
-        Waypoints that are past are left out, and as long again, in which the arm catches up; where
-        that leaves none, the reference is returned as it is.
+        Waypoints of the first 2 * late seconds are left out, so that the arm has time to catch up.
+        If no waypoint remains, the whole reference is returned.
 
         Parameters
         ----------
         late : float
-            How long ago it was to begin [s].
+            Time since the start of the reference [s].
 
         """
         left = self.t > 2.0 * late
@@ -195,9 +195,9 @@ class Reference:
 
     def after(self, q: FloatArray, dq: FloatArray, ddq: FloatArray) -> Reference:
         """
-        Return the reference with the way to its first point, from where the arm is at time zero.
+        Return the reference with a waypoint added at time zero, where the arm is.
 
-        The first point has to be later than time zero.
+        The time of the first point has to be later than zero.
 
         """
         return Reference(
@@ -211,19 +211,19 @@ class Reference:
 
     def require_limits(self, robot: Robot, dt: float) -> None:
         """
-        Compare the curve with the position and velocity limits of a robot.
+        Check that the curve keeps the position and velocity limits of a robot.
 
         Parameters
         ----------
         robot : Robot
-            Gives the limits, in the joint order of this reference.
+            Robot with the limits, in the joint order of this reference.
         dt : float
-            Time between the points that are looked at [s].
+            Time between the checked points [s].
 
         Raises
         ------
         TrajectoryError
-            If a limit is passed; the message names the joint, the time, the value and the limit.
+            If a limit is exceeded; the message names the joint, the time, the value and the limit.
 
         """
         slack = limit_slack(robot)
@@ -250,7 +250,7 @@ class Reference:
                 )
 
     def _blocks(self, dt: float) -> Iterator[Motion]:
-        """Sample the curve every dt, and at its waypoints, in pieces."""
+        """Yield samples of the curve at every dt and at its waypoints, in blocks."""
         steps = int(np.ceil(self.duration / dt)) + 1
         yield self.sample(self.t)
         for first in range(0, steps, _BLOCK):

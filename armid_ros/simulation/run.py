@@ -1,6 +1,6 @@
 # Copyright 2026 The armid_ros developers
 # SPDX-License-Identifier: Apache-2.0
-"""A whole run: an arm follows a reference and is recorded."""
+"""Simulation of a whole run: an arm follows a reference and is recorded."""
 
 from __future__ import annotations
 
@@ -17,14 +17,14 @@ from armid_ros.simulation.sensors import readings, Sensors
 from armid_ros.simulation.simulated_arm import SimulatedArm
 import numpy as np
 
-#: A simulated joint that is faster has left all bounds [rad/s or m/s].
+#: Velocity beyond which a simulated joint is unstable [rad/s or m/s].
 _LOST = 1e6
 
 
 @dataclass(frozen=True, eq=False)
 class SimulatedRun:
     """
-    What a run recorded, and what really happened.
+    The recording of a run, and its true motion.
 
     Attributes
     ----------
@@ -36,13 +36,13 @@ class SimulatedRun:
         Position, velocity and torque as the sensors read them.
     truth : Motion
         Position, velocity, acceleration and torque of the arm at the same times. Torque and
-        acceleration are constant over a step and jump between two; these are the means of the
-        step before and the step after.
+        acceleration are constant over a step and jump between two steps; each sample is the mean
+        of the steps before and after it.
     reference : Motion
-        What the arm should have done.
+        The reference of the arm.
     sides : ElasticRun or None
-        What was recorded on both sides of the springs; None where all joints are rigid. The other
-        readings are those of the motors.
+        Recordings of both sides of the springs; None if all joints are rigid. The other readings
+        are readings of the motors.
 
     """
 
@@ -80,24 +80,25 @@ def simulate(
     arm : ArmModel or Plant
         The arm; an ArmModel is integrated at 1 kHz with hard stops and rigid joints.
     reference : Reference or Motion
-        What it should do. The arm starts on it, at its velocity.
+        The reference. The arm starts at its first point, with its velocity.
     rng : numpy.random.Generator
         Source of the sensors' noise.
     controller : Controller, optional
-        Computed torque of the true arm by default; where joints give way, velocity loops.
+        Computed torque with the true arm by default; velocity loops if joints are elastic.
     sensors : Sensors, optional
         Perfect by default.
     rate : float
-        Recorded samples per second [Hz]; a whole number of steps apart.
+        Recorded samples per second [Hz]; the sample time is a whole number of steps.
     duration : float, optional
-        Recorded time [s]; that of the reference by default. What is longer holds its last point.
+        Recorded time [s]; by default the duration of the reference. After its end, the arm holds
+        the last point.
     progress : callable, optional
-        Is given the share that is done, from 0 to 1, several times a second.
+        Called with the share done, 0 to 1, several times a second.
 
     Raises
     ------
     TrajectoryError
-        If the reference does not fit the robot or passes a limit; the message names both.
+        If the joints of the reference do not fit the robot, or a limit is exceeded.
     ModelError
         If the rate does not fit the step.
 
@@ -120,14 +121,14 @@ def record(
     Parameters
     ----------
     arm : SimulatedArm
-        With its controller, its sensors and the source of their noise.
+        The arm with its controller, its sensors and the source of their noise.
     reference, rate, duration, progress
-        As of `simulate`.
+        As for `simulate`.
 
     Raises
     ------
     TrajectoryError
-        If the reference does not fit the robot or passes a limit; the message names both.
+        If the joints of the reference do not fit the robot, or a limit is exceeded.
     ModelError
         If the rate does not fit the step.
 
@@ -165,9 +166,9 @@ def record(
 def _followed(
     arm: SimulatedArm, steps: int, progress: Callable[[float], None] | None
 ) -> tuple[FloatArray, FloatArray, FloatArray]:
-    """Let an arm go on; return motors, their acceleration over each step, links and torques."""
+    """Simulate steps; return the motion of motors and links, and the torques."""
     pieces, done = [], 0
-    with np.errstate(over='ignore', invalid='ignore'):  # looked for below
+    with np.errstate(over='ignore', invalid='ignore'):  # overflow is detected below
         for trace in arm.traces(steps):
             q, dq, ddq = trace.motors
             _require_motion(arm.plant, dq[:-1], done)
@@ -181,7 +182,7 @@ def _followed(
 
 
 def _both_sides(arm: SimulatedArm, run: SimulatedRun, moved: Motion) -> ElasticRun:
-    """Return what motors and links of a run read, and what the loops were asked for."""
+    """Return the readings of motors and links of a run, and the reference of the loops."""
     period = run.t[1] - run.t[0] if len(run.t) > 1 else arm.plant.dt
     sensors, still = arm.sensors, np.zeros_like(moved.q)
     q, dq, _ = sensors.measure(moved.q, moved.dq, still, period, arm.rng)
@@ -199,7 +200,7 @@ def _both_sides(arm: SimulatedArm, run: SimulatedRun, moved: Motion) -> ElasticR
 
 
 def _require_motion(plant: Plant, dq: FloatArray, first: int) -> None:
-    """Raise a ModelError if an arm has left all bounds in some steps from the first on."""
+    """Raise a ModelError if the motion of an arm has become unstable in the given steps."""
     lost = ~(np.abs(dq) < _LOST)
     if np.any(lost):
         step, joint = np.argwhere(lost)[0]
@@ -211,12 +212,12 @@ def _require_motion(plant: Plant, dq: FloatArray, first: int) -> None:
 
 def whole_steps(time: float, dt: float, what: str) -> int:
     """
-    Return how many steps a time takes.
+    Return a time as a number of steps.
 
     Raises
     ------
     ModelError
-        If it is not a whole number of them; the message begins with `what`.
+        If the time is not a whole number of steps; the message begins with `what`.
 
     """
     steps = round(time / dt) if np.isfinite(time) else 0

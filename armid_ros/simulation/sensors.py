@@ -1,6 +1,6 @@
 # Copyright 2026 The armid_ros developers
 # SPDX-License-Identifier: Apache-2.0
-"""What sensors, and the effects of an arm, make of its motion: noise, steps, delays, gains."""
+"""Sensor readings of a true motion: noise, quantisation, delays, and effects on the readings."""
 
 from __future__ import annotations
 
@@ -14,32 +14,32 @@ from armid_ros.simulation.plant import Plant, State
 import numpy as np
 import numpy.typing as npt
 
-#: Extra samples around those that a reading depends on, for its rates of change.
+#: Extra samples beyond those that a reading depends on, for derivatives.
 _NEIGHBOURS = 8
 
 
 @dataclass(frozen=True, eq=False)
 class Sensors:
     """
-    Encoders and torque sensors of an arm; perfect unless told otherwise.
+    Encoders and torque sensors of an arm, by default without errors.
 
     Attributes
     ----------
     torque_noise : float or ndarray, shape (n,)
-        Standard deviation of the torque [N m].
+        Standard deviation of the torque noise [N m].
     position_noise : float or ndarray, shape (n,)
-        Standard deviation of the position, before quantisation [rad or m].
+        Standard deviation of the position noise, before quantisation [rad or m].
     velocity_noise : float or ndarray, shape (n,)
-        Standard deviation of the velocity [rad/s or m/s].
+        Standard deviation of the velocity noise [rad/s or m/s].
     resolution : float or ndarray, shape (n,)
-        Step of the encoder [rad or m]; 0 for none.
+        Step of the encoder [rad or m]; 0: no quantisation.
     velocity_from_encoder : bool
-        Whether the velocity is the difference of the last two positions as measured, divided by
-        the time between them, instead of the true one; the noise comes on top.
+        Whether the velocity is the difference quotient of the last two measured positions, instead
+        of the true velocity. The velocity noise is added.
     torque_delay : int
         Steps of the plant by which the torque reading is older than the position reading.
     acceleration_noise : float
-        Standard deviation of accelerometers on the links, where an arm has them [m/s^2].
+        Standard deviation of accelerometers on the links, if any [m/s^2].
 
     """
 
@@ -55,7 +55,7 @@ class Sensors:
     _size: FloatArray = field(init=False, repr=False)
 
     def __post_init__(self) -> None:
-        """Refuse negative values, and see what there is to do."""
+        """Raise a ModelError if a value is negative; prepare the noise and the quantisation."""
         noises = ('torque_noise', 'position_noise', 'velocity_noise', 'acceleration_noise')
         for name in (*noises, 'resolution'):
             value = np.asarray(getattr(self, name), dtype=float)
@@ -83,19 +83,19 @@ class Sensors:
         previous: FloatArray | None = None,
     ) -> tuple[FloatArray, FloatArray, FloatArray]:
         """
-        Read successive samples of an arm; the delay is the caller's, who knows the past.
+        Add noise and quantisation to successive samples; the caller applies the delay.
 
         Parameters
         ----------
         q, dq, tau : ndarray, shape (N, n)
-            The truth.
+            True position, velocity and torque.
         dt : float
             Time between samples [s].
         rng : numpy.random.Generator
-            Source of the noise; N samples at once draw what N times one sample draw.
+            Source of the noise; N samples at once give the same noise as N single samples.
         previous : ndarray, shape (n,), or None
-            Measured position one sample earlier; None at the beginning, where the arm is taken
-            to have come with its true velocity.
+            Measured position one sample earlier. None at the beginning: it is extrapolated back
+            with the true velocity.
 
         Returns
         -------
@@ -126,16 +126,16 @@ def readings(
     action: Action, truth: Motion, asked: FloatArray
 ) -> tuple[FloatArray, FloatArray, FloatArray]:
     """
-    Return what sensors without noise read.
+    Return the readings of sensors without noise.
 
     Parameters
     ----------
     action : Action
-        What the effects do.
+        Action of the effects.
     truth : Motion
         True motion and torque, at every step of the plant.
     asked : ndarray, shape (N, n)
-        What the drives were asked for, which is what they report [N m].
+        Commanded torque, which the drives report [N m].
 
     Returns
     -------
@@ -155,18 +155,18 @@ def readings(
 
 class RecentPast:
     """
-    The last samples of an arm, as many as its readings depend on.
+    The latest samples of an arm, as many as its readings depend on.
 
     Parameters
     ----------
     plant : Plant
         The arm.
     state : State
-        Where it starts.
+        The initial state.
     torque : ndarray, shape (n,)
-        What its drives are asked for there [N m].
+        The commanded torque in that state [N m].
     delay : int
-        Steps by which the torque sensors are late.
+        Delay of the torque sensors, in steps.
 
     """
 
@@ -182,11 +182,11 @@ class RecentPast:
 
     def extend(self, trace: Trace) -> None:
         """
-        Take in what happened.
+        Add the samples of a trace.
 
-        Torque is constant over a step. Where joints are rigid, what is read between two steps is
-        the mean of both, as the acceleration jumps with it; where motors have rotors of their
-        own, it is what is given from now on.
+        Torque is constant over a step. With rigid joints, the reading between two steps is the
+        mean of both, because the acceleration jumps with the torque. With elastic joints, the
+        reading is the torque of the next step.
 
         """
         rows = np.empty((5, len(trace.tau) - 1, trace.tau.shape[1]))
@@ -198,11 +198,11 @@ class RecentPast:
         self._steps = trace.state.steps
 
     def _read(self, tau: FloatArray) -> FloatArray:
-        """Return torques at the ends of steps from those of the steps."""
+        """Return the torque readings at the ends of steps from the torques of the steps."""
         return (tau[1:] + tau[:-1]) / 2 if self._plant.springs is None else tau[1:]
 
     def latest(self) -> tuple[FloatArray, FloatArray, FloatArray]:
-        """Return position, velocity and torque as read now, each of shape (n,)."""
+        """Return the present readings of position, velocity and torque, each of shape (n,)."""
         count, sensing = self._rows.shape[1], self._plant.sensing
         q, dq, ddq, given, asked = self._rows
         late = max(-1 - self._delay, -count)

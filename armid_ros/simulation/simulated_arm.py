@@ -1,6 +1,6 @@
 # Copyright 2026 The armid_ros developers
 # SPDX-License-Identifier: Apache-2.0
-"""An arm that stands there, takes trajectories, and is read while time goes on."""
+"""A simulated arm that accepts trajectories and returns sensor readings as time advances."""
 
 from __future__ import annotations
 
@@ -22,25 +22,25 @@ from armid_ros.simulation.sensors import RecentPast, Sensors
 import numpy as np
 import numpy.typing as npt
 
-#: Steps of the reference that are evaluated in one go.
+#: Steps of the reference that are evaluated at once.
 _BLOCK = 1000
 
 
 @dataclass(frozen=True, eq=False)
 class LinkSample:
     """
-    What is read of an arm whose joints give way, beside its motors.
+    Readings on the link side of an arm with elastic joints.
 
     Attributes
     ----------
     q, dq : ndarray, shape (n,)
-        Encoders at the links [rad or m].
+        Readings of the encoders at the links [rad or m].
     ddq : ndarray, shape (n,)
         True acceleration of the links [rad/s^2 or m/s^2].
     acceleration : ndarray, shape (n, 3)
-        Accelerometers on the links [m/s^2].
+        Readings of the accelerometers on the links [m/s^2].
     asked_q, asked_dq : ndarray, shape (n,)
-        Where the loop wants the motors, and its velocity over the last step.
+        Motor positions commanded to the loop, and their mean velocity over the last step.
 
     """
 
@@ -55,19 +55,19 @@ class LinkSample:
 @dataclass(frozen=True, eq=False)
 class Sample:
     """
-    One reading of the sensors.
+    One sample of the sensor readings.
 
     Attributes
     ----------
     steps : int
-        Time in steps of the plant.
+        Time as a number of steps of the plant.
     t : float
         Time [s].
     q, dq, tau : ndarray, shape (n,)
-        Position [rad or m], velocity and torque [N m or N] as measured; where joints give way,
-        of the motors at the joints, and the torque is what the drives give from now on.
+        Position [rad or m], velocity and torque [N m or N] as measured. With elastic joints, these
+        are readings of the motors, and the torque is that of the next step.
     link : LinkSample, or None
-        The other side of the springs, where there are any.
+        Readings on the link side of the springs; None if all joints are rigid.
 
     """
 
@@ -83,7 +83,8 @@ class SimulatedArm:
     """
     A simulated arm with its controller, drives and sensors.
 
-    It holds its pose until it is given a trajectory, and the last point of that when it ends.
+    The arm holds its pose until it receives a trajectory, and then holds the last point of the
+    trajectory.
 
     Parameters
     ----------
@@ -92,19 +93,19 @@ class SimulatedArm:
     rng : numpy.random.Generator
         Source of the sensors' noise.
     controller : Controller, optional
-        Computed torque of the true arm by default; where joints give way, velocity loops of the
-        motors that suit the plant.
+        Computed torque with the true arm by default; with elastic joints, velocity loops designed
+        for the plant.
     sensors : Sensors, optional
-        Of motors and links alike; perfect by default.
+        Sensors of motors and links; without errors by default.
     accelerometers : LinkAccelerometers, optional
-        Of links on springs; in their centroids by default.
+        Accelerometers of links on springs; in the centroids of the links by default.
     start : array_like, shape (n,), optional
-        Where it stands [rad or m]: the middle of the range of motion by default.
+        Initial pose [rad or m]; the middle of the range of motion by default.
 
     Raises
     ------
     TrajectoryError
-        If it cannot stand there.
+        If the initial pose is beyond a stop.
 
     """
 
@@ -155,12 +156,12 @@ class SimulatedArm:
 
     def reset(self, steps: int = 0) -> None:
         """
-        Put the arm back to where it stood first, at rest and without a trajectory.
+        Return the arm to its initial pose, at rest and without a trajectory.
 
         Parameters
         ----------
         steps : int
-            What time it is then, in steps of the plant.
+            Time after the reset, in steps of the plant.
 
         """
         hold = Reference(self.joints, np.zeros(1), self._home[np.newaxis])
@@ -168,14 +169,14 @@ class SimulatedArm:
 
     def start_on(self, reference: Reference) -> Reference:
         """
-        Put the arm on the first point of a reference, at its velocity, and begin it there.
+        Put the arm on the first point of a reference, with its velocity, and begin the reference.
 
-        Returns the reference with its joints in the order of the robot.
+        The result is the reference with its joints in the order of the robot.
 
         Raises
         ------
         TrajectoryError
-            If the reference does not fit the robot or passes a limit; the message names both.
+            If the joints of the reference do not fit the robot, or a limit is exceeded.
 
         """
         curve = reference.for_robot(self.plant.robot)
@@ -185,9 +186,9 @@ class SimulatedArm:
 
     def become(self, arm: ArmModel) -> None:
         """
-        Go on as another arm from where this one is: it picks up a load, its friction rises.
+        Replace the arm model and keep the state, such as when the arm picks up a load.
 
-        The controller stays what it was, and so knows nothing of it.
+        The controller is not changed, and therefore does not know the new model.
 
         Parameters
         ----------
@@ -197,7 +198,7 @@ class SimulatedArm:
         Raises
         ------
         ModelError
-            If it is another robot, or joints give way.
+            If the robot is another one, or joints are elastic.
 
         """
         now = self._state
@@ -208,16 +209,19 @@ class SimulatedArm:
 
     def successor(self, arm: ArmModel) -> Plant:
         """
-        Return the plant that this arm would have as another one.
+        Return the plant of this arm with another arm model.
 
         Raises
         ------
         ModelError
-            If it is another robot, or no body, or joints give way.
+            If the robot is another one, its links are not physically possible, or joints are
+            elastic.
 
         """
         if self.plant.springs is not None:
-            raise ModelError('an arm with elastic joints keeps its effects; start it with others')
+            raise ModelError(
+                'the effects of an arm with elastic joints cannot change; start a new arm'
+            )
         if arm.robot.joints != self.joints:
             raise ModelError(
                 f'{arm.robot.name}: an arm with the joints {", ".join(self.joints)} cannot become '
@@ -227,12 +231,12 @@ class SimulatedArm:
 
     def set_trajectory(self, reference: Reference) -> None:
         """
-        Begin a trajectory now, in place of the one that may be under way; see `Course.begin`.
+        Begin a trajectory now; it replaces the present trajectory. See `Course.begin`.
 
         Raises
         ------
         TrajectoryError
-            If the arm cannot follow it. It goes on with what it was doing.
+            If the arm cannot follow the trajectory. The present trajectory then continues.
 
         """
         self._course.begin(reference, self._state.steps)
@@ -242,7 +246,7 @@ class SimulatedArm:
 
     def advance(self, steps: int = 1) -> Sample:
         """
-        Let time go on, and read the sensors.
+        Simulate some steps, and return the sensor readings.
 
         Parameters
         ----------
@@ -257,7 +261,7 @@ class SimulatedArm:
         return self.read(steps)
 
     def traces(self, steps: int) -> Iterator[Trace]:
-        """Let time go on, and yield all that happens, some hundred steps at once."""
+        """Simulate some steps, and yield their traces, each of some hundred steps."""
         while steps:
             row = self._row + 1
             if row >= len(self._targets):
@@ -274,7 +278,7 @@ class SimulatedArm:
             yield trace
 
     def read(self, steps: int = 1) -> Sample:
-        """Read the sensors now, some steps after they were read last."""
+        """Return the present sensor readings, some steps after the last ones."""
         state, dt = self._state, steps * self.plant.dt
         q, dq, tau = (row[np.newaxis] for row in self._past.latest())
         q, dq, tau = self.sensors.measure(q, dq, tau, dt, self.rng, self._previous)
@@ -283,7 +287,7 @@ class SimulatedArm:
         return Sample(state.steps, state.t, q[0], dq[0], tau[0], link)
 
     def _read_links(self, dt: float) -> LinkSample:
-        """Read the other side of the springs."""
+        """Return the readings on the link side of the springs."""
         state, targets, row = self._state, self._targets, self._row
         q, dq = state.q[np.newaxis], state.dq[np.newaxis]
         none = np.zeros_like(q)
@@ -295,7 +299,7 @@ class SimulatedArm:
         return LinkSample(q[0], dq[0], state.ddq, felt, targets.q[row], targets.dq[row])
 
     def _begin(self, reference: Reference, steps: int) -> None:
-        """Put the arm on a reference, with nothing before it."""
+        """Put the arm on a reference without a past."""
         first = reference.sample(np.zeros(1))
         self._state = self.plant.state(first.q[0], first.dq[0], first.ddq[0], steps)
         self._course.follow(reference, steps)
@@ -307,19 +311,19 @@ class SimulatedArm:
 
     @property
     def _row(self) -> int:
-        """Row of the targets that belongs to now."""
+        """Row of the targets for the present step."""
         return self._state.steps - self._first
 
     def _act(self) -> None:
-        """Let the controller do what the course says now."""
+        """Return the torque of the controller for the present targets."""
         self._torque = command(self.plant, self._acting, self._state, self._targets.at(0))
 
     def _look_ahead(self, asked: FloatArray | None = None, steps: int = _BLOCK) -> None:
-        """Evaluate the reference from now on, for some steps; motors were to be here now."""
+        """Evaluate the reference for the next steps, given the last commanded motor position."""
         self._first = self._state.steps
         desired = self._course.desired(self._first, steps + 1)
         self._targets = self.controller.targets(desired, asked)
 
     def _new_past(self) -> RecentPast:
-        """Return what the sensors know of an arm that begins here."""
+        """Return the sensor history of an arm that begins in its present state."""
         return RecentPast(self.plant, self._state, self._torque, self.sensors.torque_delay)

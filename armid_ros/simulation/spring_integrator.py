@@ -1,13 +1,13 @@
 # Copyright 2026 The armid_ros developers
 # SPDX-License-Identifier: Apache-2.0
 """
-One step of a plant whose joints give way.
+Integration of one step of a plant with elastic joints.
 
-The springs, dampers and inertias of the moment are a linear system. It is integrated by the Pade
-approximation (2, 2) of its exponential, which is A-stable, so that no spring is too stiff for the
-step, and of fourth order, so that its frequencies stay where they are: 0.005 % off at ten steps a
-period. What is not linear is taken at the middle of the substep. Dry friction is complementary to
-the velocity at the end, as where joints are rigid.
+The present springs, dampers and inertias form a linear system. The system is integrated with the
+Pade approximation (2, 2) of its matrix exponential. The approximation is A-stable, so that no
+spring is too stiff for the step. It is of fourth order: the error of a frequency is 0.005 % at ten
+steps a period. Nonlinear torques are evaluated at the middle of the substep. Dry friction is a
+complementarity condition on the velocity at the end of the substep, as for rigid joints.
 
 """
 
@@ -25,7 +25,7 @@ from scipy.linalg.lapack import dgesv
 def spring_substep(
     plant: Plant, springs: ElasticJoints, rotors: Rotors, state: State, torque: FloatArray
 ) -> State:
-    """Integrate one of the parts of a step, under a constant actuator torque (n,) [N m]."""
+    """Integrate one substep under a constant actuator torque (n,) [N m]."""
     dt, e = springs.dt, len(springs.joints)
     half = 0.5 * dt
     x = np.concatenate([rotors.twist, rotors.dq, state.dq])
@@ -39,7 +39,7 @@ def spring_substep(
     if springs.loose:
         pull, offset = springs.meshing(twist)
         force = force + springs.to_twists.T.dot(offset)
-    # accelerations per twist and velocity, of what acts, and per torque of the dry friction
+    # accelerations: per twist and velocity, from the torques, and per dry friction torque
     right = np.concatenate([pull.T, force[np.newaxis], springs.friction]).T
     rates = np.asarray(dgesv(inertia, right, 0, 1)[2])
     after = _propagated(springs, rates, x)
@@ -64,7 +64,7 @@ def spring_substep(
 
 
 def _propagated(springs: ElasticJoints, rates: FloatArray, x: FloatArray) -> FloatArray:
-    """Return twists and velocities at the end without dry friction, and its effect on them."""
+    """Return final twists and velocities without dry friction, and the effect of friction."""
     e, size = len(springs.joints), len(x)
     z = np.zeros((size, size))
     z[:e, e:] = springs.to_twists
@@ -87,7 +87,7 @@ def _force(
     v: FloatArray,
     twist: FloatArray,
 ) -> tuple[FloatArray, FloatArray]:
-    """Return what acts on motors and links at the middle of a substep, and the new memory."""
+    """Return the torques on motors and links at mid-substep, and the new friction states."""
     robot, action, e = plant.robot, plant.action, len(springs.joints)
     t = state.t + 0.5 * springs.dt
     motor_speed = springs.to_motors.dot(v)
@@ -105,7 +105,7 @@ def _force(
         beyond = q - np.minimum(np.maximum(q, robot.lower), robot.upper)
         if beyond.any():
             stiffness, damping = springs.stops
-            force[e:] -= stiffness * beyond + np.where(beyond != 0.0, damping, 0.0) * v[e:]  # noqa: RUF069 - what is inside is clipped to itself
+            force[e:] -= stiffness * beyond + np.where(beyond != 0.0, damping, 0.0) * v[e:]  # noqa: RUF069 - values within the range are not changed by clipping
     return force, memory
 
 
@@ -117,7 +117,7 @@ def _hold(
     modes: Modes,
     moved: FloatArray,
 ) -> None:
-    """Keep motors that were and are stuck where they are, without rounding."""
+    """Keep the positions of motors that stay stuck, without rounding errors."""
     e = len(springs.joints)
     for axis, mode in zip(plant.contacts.axes, modes, strict=True):
         if mode != 0 or axis < 0:

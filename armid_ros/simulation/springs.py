@@ -1,12 +1,12 @@
 # Copyright 2026 The armid_ros developers
 # SPDX-License-Identifier: Apache-2.0
 """
-What is between the motors and the links of a plant whose transmissions give way.
+Springs between the motors and the links of a plant with elastic transmissions.
 
-Where one does, motor and link have velocities of their own. Motors carry rotor inertia, drive
-torque and all friction of the arm's effects; links carry the rigid body and what is attached to
-it. Rotors are taken to turn fast about their own axes, so that their inertia does not depend on
-the pose (Spong 1987).
+The motor and the link of an elastic joint have different velocities. Motors carry rotor inertia,
+drive torque and all friction of the arm's effects; links carry the rigid body and everything
+attached to it. Rotors are assumed to turn fast about their own axes, so that their inertia does
+not depend on the pose (Spong 1987).
 
 """
 
@@ -22,22 +22,22 @@ from armid_ros.robots import Robot
 import numpy as np
 import numpy.typing as npt
 
-#: Natural frequency of a link against its stop, times the substep: soft enough to be integrated.
+#: Natural frequency of a link on its stop, times the substep; low enough for the integration.
 _STOP = 0.1
 
 
 @dataclass(frozen=True, eq=False)
 class Elasticity:
     """
-    How joints that give way are simulated.
+    Settings for the simulation of elastic joints.
 
     Attributes
     ----------
     substeps : int
-        Parts that a step is integrated in.
+        Number of substeps per step.
     link_damping : float or ndarray, shape (n,)
-        Viscous friction of the links, which no effect of the catalogue has: friction there is at
-        the motors [N m s/rad].
+        Viscous friction of the links [N m s/rad]. No effect of the catalogue describes it, because
+        catalogue friction acts on the motors.
 
     """
 
@@ -48,32 +48,33 @@ class Elasticity:
 @dataclass(frozen=True, eq=False)
 class ElasticJoints:
     """
-    The e joints of an arm that give way; velocities are those of e motors, then of n links.
+    The e elastic joints of an arm; velocities are those of e motors, then of n links.
 
     Attributes
     ----------
     joints : ndarray, shape (e,)
-        Which they are.
+        Indices of the elastic joints.
     transmission : Transmission
-        Their stiffness, damping and free play, each of shape (e,).
+        Stiffness, damping and free play of the elastic joints, each of shape (e,).
     substeps : int
-        Parts that a step is integrated in.
+        Number of substeps per step.
     dt : float
-        One of them [s].
+        Duration of a substep [s].
     to_motors, to_twists : ndarray, shape (n, e + n), (e, e + n)
-        Velocities of the motors at all joints, and of the twists of the springs.
+        Matrices from the velocities to those of the motors of all joints, and to the rates of the
+        twists.
     rotors, damping : ndarray, shape (e + n, e + n)
-        Inertia but for that of the rigid body [kg m^2], and viscous friction [N m s/rad].
+        Inertia without the rigid body [kg m^2], and viscous friction [N m s/rad].
     friction : ndarray, shape (m, e + n)
         Directions of the dry friction.
     stops : tuple of ndarray, each of shape (n,)
         Stiffness and damping of the stops [N m/rad], [N m s/rad].
     sensing : Action
-        What effects make of the readings of motors, which their springs do not change.
+        Action of the effects on the readings of the motors, which the springs do not change.
     pull : ndarray, shape (e + n, e + e + n)
-        What springs that mesh and friction do per twist and velocity.
+        Torques of engaged springs and of friction, per twist and velocity.
     loose : bool
-        Whether any has free play.
+        Whether any joint has free play.
 
     """
 
@@ -92,7 +93,7 @@ class ElasticJoints:
     loose: bool = field(init=False)
 
     def __post_init__(self) -> None:
-        """Collect what springs that mesh do."""
+        """Compute the matrix of the engaged springs."""
         springs = self.transmission
         object.__setattr__(self, 'loose', bool(np.any(springs.gap)))
         pull = self.pull_of(springs.stiffness, springs.damping)
@@ -108,15 +109,17 @@ class ElasticJoints:
         dt: float,
     ) -> ElasticJoints:
         """
-        Return the joints of an arm that give way.
+        Return the elastic joints of an arm.
 
-        Beside its effects it takes the directions of the dry friction, (m, n), the inertia matrix
-        of the links in the middle of their ranges, (n, n) [kg m^2], and the step of the plant [s].
+        The arguments are the arm, the settings, the directions of the dry friction, (m, n), the
+        inertia matrix of the links in the middle of their ranges, (n, n) [kg m^2], and the step of
+        the plant [s].
 
         Raises
         ------
         ModelError
-            If no joint gives way, or the motor of one that does has no inertia; names the joint.
+            If no joint is elastic, or the motor of an elastic joint has no inertia. The message
+            names the joint.
 
         """
         action = arm.action()
@@ -133,7 +136,7 @@ class ElasticJoints:
         )
         free, rate = 1.0 / np.diag(np.linalg.inv(mass)), _STOP * elasticity.substeps / dt
         rub = np.diag(np.broadcast_to(np.asarray(elasticity.link_damping, dtype=float), (n,)))
-        # what effects make of the readings of motors, which their springs do not change
+        # actions on the readings of the motors, which the springs do not change
         kept = [
             (effect, values)
             for effect, values in zip(arm.effects, arm.values, strict=True)
@@ -157,12 +160,12 @@ class ElasticJoints:
         )
 
     def pull_of(self, stiffness: FloatArray, damping: FloatArray) -> FloatArray:
-        """Return what springs and friction do per state, shape (e + n, e + e + n)."""
+        """Return torques of springs and friction per twist and velocity, (e + n, e + e + n)."""
         w = self.to_twists
         return np.hstack([-w.T * stiffness, -self.damping - (w.T * damping) @ w])
 
     def meshing(self, twist: FloatArray) -> tuple[FloatArray, FloatArray]:
-        """Return what springs that mesh do, and their torque at zero twist, negative (e,)."""
+        """Return the matrix of the engaged springs, and minus their torque at zero twist (e,)."""
         springs = self.transmission
         meshes = np.abs(twist) > springs.gap
         stiffness = np.where(meshes, springs.stiffness, 0.0)
@@ -170,28 +173,28 @@ class ElasticJoints:
         return self.pull_of(stiffness, damping), stiffness * springs.gap * np.sign(twist)
 
     def twist(self, load: FloatArray) -> FloatArray:
-        """Return by how much loads on the joints, (..., n) [N m], twist the springs, (..., e)."""
+        """Return the twists of the springs (..., e) under loads on the joints (..., n) [N m]."""
         springs, push = self.transmission, load[..., self.joints]
         return np.asarray(push / springs.stiffness + np.sign(push) * springs.gap)
 
     def at_motors(self, links: FloatArray, twist: FloatArray) -> FloatArray:
-        """Return positions of the motors from those of the links and twists, (..., n)."""
+        """Return the motor positions from link positions and twists, (..., n)."""
         return np.asarray(links + twist.dot(self.to_motors[:, : len(self.joints)].T))
 
 
 def _required(robot: Robot, action: Action) -> Transmission:
-    """Return the transmission of an arm whose motors can move on their own."""
+    """Return the transmission of an arm; raise a ModelError if no motor can move on its own."""
     springs = action.transmission
     if springs is None or not np.any(np.isfinite(springs.stiffness)):
         raise ModelError(
-            f'{robot.name}: no joint gives way; add joint_elasticity, or simulate it '
+            f'{robot.name}: no joint is elastic; add joint_elasticity, or simulate it '
             'as a rigid arm'
         )
     soft = np.isfinite(springs.stiffness)
     rotor = np.zeros(len(soft)) if action.inertia is None else np.diag(action.inertia)
     for joint in np.flatnonzero(soft & (rotor <= 0.0))[:1]:
         raise ModelError(
-            f"{robot.name}: joint '{robot.joints[joint]}' gives way, but its motor has no "
+            f"{robot.name}: joint '{robot.joints[joint]}' is elastic, but its motor has no  "
             'inertia; add rotor_inertia'
         )
     if np.any(springs.gap[~soft] > 0.0):

@@ -165,7 +165,7 @@ def test_names_joints_and_units():
         ('coupled_joint_friction@elbow_pitch', 'pairs'),
         ('gravity_magnitude@elbow_pitch', 'whole arm'),
         ('torque_crosstalk@elbow_pitch+elbow_pitch', 'no pair'),
-        ('joint_coupling@elbow_pitch+wrist_pitch+elbow_pitch+forearm_yaw', 'leads two'),
+        ('joint_coupling@elbow_pitch+wrist_pitch+elbow_pitch+forearm_yaw', 'is first in two'),
     ],
 )
 def test_errors_hold_the_answer(robot, text, message):

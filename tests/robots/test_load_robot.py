@@ -163,7 +163,7 @@ class TestDrivenJoints:
         [
             (['elbo'], "no joint is named 'elbo'; joints to drive: shoulder, elbow"),
             (['elbow', 'elbow'], "'elbow' is named twice"),
-            ([], 'needs one at least'),
+            ([], 'needs at least one'),
             (['flange'], "'flange' is fixed; joints to drive: shoulder, elbow"),
         ],
     )
@@ -345,7 +345,7 @@ def test_xacro_arguments_reach_the_file_and_what_it_includes(tmp_path: Path) -> 
     heavy = load_robot(f'{path} mass:=4.0')
     np.testing.assert_allclose(heavy.rigid_parameters[::10], 4.0)
     np.testing.assert_allclose(load_robot(path).rigid_parameters[::10], 1.5)
-    with pytest.raises(RobotError, match="'mass=4' is no argument; write name:=value"):
+    with pytest.raises(RobotError, match="'mass=4' is not an argument; write name:=value"):
         load_robot(f'{path} other:=1 mass=4')
     (tmp_path / 'arm.urdf').write_text(TWO_LINKS)
     with pytest.raises(RobotError, match='not a xacro file'):

@@ -90,7 +90,7 @@ def test_a_controller_that_keeps_going_is_told_again_and_it_is_said(bench, arm, 
     arm.faults.deaf = True
     node.stop()
     arm.run(103.2)
-    assert 'goes on moving though it was stopped' in node.condition()[0]
+    assert 'still moves although it was stopped' in node.condition()[0]
     assert 'emergency stop' in node.condition()[0]
     arm.faults.deaf = False
     arm.run(105.5)

@@ -1,3 +1,3 @@
 # Copyright 2026 The armid_ros developers
 # SPDX-License-Identifier: Apache-2.0
-"""Where the bodies of an arm are, and how far from each other and from obstacles."""
+"""Geometry of the bodies of an arm: clearance, floor, obstacles and collision-free paths."""

@@ -1,9 +1,9 @@
 # Copyright 2026 The armid_ros developers
 # SPDX-License-Identifier: Apache-2.0
 """
-Clearance between bodies: where they come near, how that changes, and a proof for a whole path.
+Clearance between bodies: distances, their derivatives, and a proof for a whole path.
 
-Far pairs are told by their bounding spheres, near ones measured by coal.
+Bounding spheres exclude distant pairs; coal computes the distances of the other pairs.
 
 """
 
@@ -23,27 +23,27 @@ import pinocchio as pin
 
 IntArray = npt.NDArray[np.intp]
 
-#: Intervals are not cut below this [s] when a path is proven clear; a motion this short moves a
-#: body by less than the slack the design keeps.
+#: Shortest interval of the proof of clearance [s]; in this time a body moves by less than the
+#: extra clearance of a design.
 _SHORTEST_INTERVAL = 1e-4
 
-#: How far a slide without limits is taken to go [m].
+#: Assumed travel of a prismatic joint without limits [m].
 _LONGEST_STROKE = 10.0
 
 
 @dataclass(frozen=True)
 class NearPairs:
     """
-    Pairs of bodies that are near each other in some of N poses, m in all.
+    The m pairs of bodies that are close to each other in some of N poses.
 
     Attributes
     ----------
     sample, pair : ndarray of int, shape (m,)
-        Which pose, which pair.
+        Index of the pose, and index of the pair.
     distance : ndarray, shape (m,)
         Signed distance [m].
     by_q : ndarray, shape (m, n)
-        Its derivative by the joint positions [m/rad].
+        Derivative of the distance by the joint positions [m/rad].
 
     """
 
@@ -56,16 +56,16 @@ class NearPairs:
 @dataclass(frozen=True)
 class Approach:
     """
-    Two bodies closer than they may be.
+    An approach of two bodies: names, time and distance.
 
     Attributes
     ----------
     first, second : str
-        Links or obstacles.
+        Names of the links or obstacles.
     time : float
-        When [s].
+        Time of the approach [s].
     distance : float
-        How close [m]; negative in collision.
+        Distance [m]; negative in collision.
 
     """
 
@@ -75,7 +75,7 @@ class Approach:
     distance: float
 
     def __str__(self) -> str:
-        """Say it in a line."""
+        """Return the approach in one line."""
         return f'{self.first} and {self.second}: {self.distance:.4f} m apart at {self.time:.3f} s'
 
 
@@ -99,9 +99,9 @@ class ClearanceModel:
     pairs : ndarray of int, shape (number of pairs, 2)
         Bodies of each pair.
     between : ndarray, shape (number of pairs, n)
-        +1 where a joint moves the second body only, -1 the first only, 0 both or neither.
+        +1 if a joint moves the second body only, -1 the first body only, 0 both or neither.
     levers : ndarray, shape (number of pairs, n)
-        Most that any point of either body moves per unit of a joint's motion [m/rad, m/m].
+        Largest motion of any point of either body per unit of a joint's motion [m/rad, m/m].
 
     """
 
@@ -116,7 +116,7 @@ class ClearanceModel:
 
     @classmethod
     def of(cls, collision: CollisionModel) -> ClearanceModel:
-        """Prepare a collision model."""
+        """Return the clearance model of a collision model."""
         robot, bodies = collision.robot, list(collision.geometry.geometryObjects)
         joints = np.array([int(body.parentJoint) - 1 for body in bodies], dtype=np.intp)
         spheres, planes = np.zeros((len(bodies), 4)), np.full((len(bodies), 4), np.nan)
@@ -145,7 +145,7 @@ class ClearanceModel:
         return cls(collision, joints, spheres, planes, np.arange(len(pairs)), pairs, between, most)
 
     def watched(self, q: FloatArray, reach: float) -> ClearanceModel:
-        """Return the model with those pairs only that come closer than ``reach`` [m] in poses."""
+        """Return the model with only the pairs that are closer than ``reach`` [m] in a pose."""
         kept = np.unique(self.near(q, reach).pair)
         return replace(
             self,
@@ -157,9 +157,9 @@ class ClearanceModel:
 
     def near(self, q: FloatArray, reach: float) -> NearPairs:
         """
-        Find all pairs of bodies closer than ``reach`` [m] in poses of shape (N, n).
+        Return all pairs of bodies closer than ``reach`` [m] in poses of shape (N, n).
 
-        Pairs further apart than that may be missing from the answer or in it.
+        The result may contain pairs that are further apart.
 
         """
         frames = LinkFrames.of(self.collision.robot, q)
@@ -187,7 +187,7 @@ class ClearanceModel:
         return result
 
     def closest(self, motion: Motion) -> Approach | None:
-        """Return where the bodies of a sampled motion come closest; None without pairs."""
+        """Return the closest approach of two bodies in a sampled motion; None without pairs."""
         if not len(self.pairs):
             return None
         reach = 0.05
@@ -207,27 +207,27 @@ class ClearanceModel:
         margin: float,
     ) -> Approach | None:
         """
-        Prove that no pair comes closer than a margin anywhere on a path, or show where.
+        Prove that no pair comes closer than a margin on a path, or return an approach that does.
 
-        On an interval the distance of a pair cannot fall below the mean of its ends less half of
-        what the joints in between can move its bodies; intervals for which that is not enough
-        are halved.
+        On an interval, the distance of a pair is at least the mean of the distances at both ends,
+        minus half the distance that the joints between the bodies can move them. An interval for
+        which this bound is below the margin is halved.
 
         Parameters
         ----------
         path : callable
-            From times, shape (N,), to the motion.
+            Function from times, shape (N,), to the motion.
         acceleration : ndarray, shape (n,)
             Bound on the joint accelerations over the whole path [rad/s^2 or m/s^2].
         times : ndarray, shape (N,)
-            Ends of the intervals to begin with [s].
+            Ends of the initial intervals [s].
         margin : float
             Clearance to prove [m].
 
         Returns
         -------
         Approach or None
-            A pose that is closer, or None: there is none.
+            A pose with a smaller distance; None: there is no such pose.
 
         """
         if not len(self.pairs):
@@ -268,7 +268,7 @@ class ClearanceModel:
         return None
 
     def _bound(self, frames: LinkFrames) -> FloatArray:
-        """Bound the distance of every pair from below, shape (N, number of pairs) [m]."""
+        """Return a lower bound on the distance of every pair, shape (N, number of pairs) [m]."""
         centre = np.empty((frames.lines.shape[2], len(self.joints), 3))
         for body, joint in enumerate(self.joints):
             place = self.spheres[body, :3]
@@ -283,7 +283,7 @@ class ClearanceModel:
     def _measure(
         self, q: FloatArray, sample: IntArray, pair: IntArray
     ) -> tuple[FloatArray, FloatArray, FloatArray]:
-        """Measure pairs in samples: distances, normals to the second, points of the first."""
+        """Return distances, normals to the second body and points of the first body of pairs."""
         model, geometry = self.collision.robot.model, self.collision.geometry
         data, placed = model.createData(), geometry.createData()
         distance = np.empty(len(sample))
@@ -304,7 +304,7 @@ class ClearanceModel:
 
 
 def _levers(robot: Robot, joint: int, length: float) -> FloatArray:
-    """Most that any point of a body can move per unit of every joint, shape (n,)."""
+    """Return the largest motion of any point of a body per unit of every joint, shape (n,)."""
     levers = np.zeros(robot.n_joints)
     stroke = np.where(robot.prismatic, np.maximum(np.abs(robot.lower), np.abs(robot.upper)), 0.0)
     stroke = np.minimum(stroke, _LONGEST_STROKE)

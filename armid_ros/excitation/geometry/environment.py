@@ -1,6 +1,6 @@
 # Copyright 2026 The armid_ros developers
 # SPDX-License-Identifier: Apache-2.0
-"""What stands around the arm: boxes, spheres, cylinders, meshes and planes."""
+"""Obstacles around the arm: boxes, spheres, cylinders, meshes and planes."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ import coal
 import numpy as np
 import pinocchio as pin
 
-#: Kinds of obstacle and the numbers that each one's size is made of.
+#: Kinds of obstacle, each with the names of the numbers in its size.
 KINDS: Mapping[str, tuple[str, ...]] = {
     'box': ('x', 'y', 'z'),
     'sphere': ('radius',),
@@ -23,19 +23,19 @@ KINDS: Mapping[str, tuple[str, ...]] = {
     'mesh': ('scale',),
     'plane': (),
 }
-#: Radius of what stands for a link without a body [m].
+#: Radius of the sphere that represents a link without a collision body [m].
 _POINT = 1e-4
 
 
 @dataclass(frozen=True)
 class Obstacle:
     """
-    A body that does not move.
+    A fixed obstacle.
 
     Attributes
     ----------
     name : str
-        What messages call it.
+        Name in messages.
     kind : str
         'box', 'sphere', 'cylinder' (along z), 'mesh' (its convex hull) or 'plane' (the half
         space below z = 0 of its own frame).
@@ -46,9 +46,9 @@ class Obstacle:
     rpy : tuple of float
         Roll, pitch and yaw, as in a URDF [rad].
     mesh : Path or None
-        File of a mesh.
+        File of the mesh; None for other kinds.
     ignore : tuple of str
-        Links that may touch it, such as the one that stands on it.
+        Links that may touch the obstacle, such as the link that stands on it.
 
     """
 
@@ -61,7 +61,7 @@ class Obstacle:
     ignore: tuple[str, ...] = field(default=())
 
     def __post_init__(self) -> None:
-        """Check names, kind and numbers."""
+        """Check the names, the kind and the numbers."""
         if not all(isinstance(name, str) for name in (self.name, self.kind, *self.ignore)):
             raise TrajectoryError(
                 f"obstacle '{self.name}': name, kind and the links to ignore are texts; quote them"
@@ -87,7 +87,7 @@ class Obstacle:
             raise TrajectoryError(f"obstacle '{self.name}': a mesh, and only a mesh, has a file")
 
     def geometry(self) -> coal.CollisionGeometry:
-        """Return the shape in its own frame."""
+        """Return the shape in the frame of the obstacle."""
         if self.kind == 'box':
             return coal.Box(*self.size)
         if self.kind == 'sphere':
@@ -108,23 +108,24 @@ class Obstacle:
 
 def with_obstacles(collision: CollisionModel, obstacles: Sequence[Obstacle]) -> CollisionModel:
     """
-    Return the collision bodies of a robot together with what stands around it.
+    Return the collision bodies of a robot together with the obstacles around it.
 
-    Every body that moves is checked against every obstacle, except for the links the obstacle
-    ignores. A link without a body is where the frame of its joint is: nobody knows its size, but
-    it must not be led through the floor.
+    Every moving body is checked against every obstacle, except the links that the obstacle
+    ignores. A small sphere at the frame of its joint represents a link without a body. The size of
+    such a link is unknown, but the link must not pass through the floor.
 
     Raises
     ------
     TrajectoryError
-        If an obstacle ignores a link that the robot does not have, or two have one name.
+        If an obstacle ignores a link that the robot does not have, or two obstacles have the same
+        name.
 
     """
     if not obstacles:
         return collision
     geometry = collision.geometry.copy()
     _add_points(geometry, collision.robot)
-    # copied, for the objects that Python sees are gone once another one is added
+    # copied, because adding an object invalidates the Python references
     bodies = [(int(body.parentJoint), int(body.parentFrame)) for body in geometry.geometryObjects]
     links = [str(collision.robot.model.frames[frame].name) for _, frame in bodies]
     names = [obstacle.name for obstacle in obstacles]
@@ -149,7 +150,7 @@ def with_obstacles(collision: CollisionModel, obstacles: Sequence[Obstacle]) -> 
 
 
 def _add_points(geometry: pin.GeometryModel, robot: Robot) -> None:
-    """Add the joint frames of links without a body."""
+    """Add a sphere at the joint frame of each link without a body."""
     model = robot.model
     seen = {int(body.parentJoint) for body in geometry.geometryObjects}
     for joint, link in enumerate(robot.links, start=1):
@@ -175,9 +176,9 @@ def parse_obstacles(entries: Any, folder: Path) -> tuple[Obstacle, ...]:
     Parameters
     ----------
     entries : list of dict
-        Of a document.
+        Entries of a document.
     folder : Path
-        Where its meshes are looked for.
+        Folder in which meshes are looked for.
 
     Raises
     ------
@@ -209,7 +210,7 @@ def parse_obstacles(entries: Any, folder: Path) -> tuple[Obstacle, ...]:
 
 
 def body_name(collision: CollisionModel, number: int) -> str:
-    """Return the link, or the obstacle, that a collision body belongs to."""
+    """Return the name of the link or obstacle of a collision body."""
     body = collision.geometry.geometryObjects[number]
     frame = int(body.parentFrame)
     return str(body.name) if frame == 0 else str(collision.robot.model.frames[frame].name)

@@ -1,10 +1,11 @@
 # Copyright 2026 The armid_ros developers
 # SPDX-License-Identifier: Apache-2.0
 """
-The floor that an arm must not hit, which no URDF names.
+The floor that an arm must not hit, which a URDF does not contain.
 
-It is given as a height, or a file beside the description says it, or it is the base plane of an
-arm that stands. Of an arm that hangs, or reaches below its base, nobody can tell: it is asked for.
+The height of the floor is given by the user or by a file beside the description. By default, the
+floor is the base plane of a standing arm. For an arm that hangs or reaches below its base, the
+height must be given.
 
 """
 
@@ -23,12 +24,12 @@ import numpy as np
 
 #: Name of the floor as an obstacle.
 FLOOR = 'floor'
-#: What --floor takes where there is none.
+#: Value of --floor for an arm without a floor.
 NO_FLOOR = 'none'
-#: An arm that stands reaches above its base plane this many times as far as below it, at zero:
-#: stretched out, the wrist of a small industrial arm hangs a third of its shoulder's height below.
+#: A standing arm at zero reaches above its base plane at least this many times as far as below it.
+#: The wrist of a stretched small industrial arm hangs a third of its shoulder's height below.
 _ABOVE_TO_BELOW = 2.0
-#: Poses in which it is looked whether a link can be clear of the floor at all.
+#: Number of poses in which a link is tested for clearance to the floor.
 _POSES = 400
 _SEED = 0
 
@@ -41,11 +42,12 @@ class Floor:
     Attributes
     ----------
     height : float or None
-        Above the origin of the base, along ``up`` [m]; None: no floor is checked.
+        Height of the floor above the origin of the base, along ``up`` [m]; None: no floor is
+        checked.
     up : ndarray, shape (3,)
         Normal of the floor in the base frame, a unit vector.
     source : str
-        Who says so: 'given', 'base plane', 'environment', or the file that does.
+        Source of the height: 'given', 'base plane', 'environment', or the name of a file.
 
     """
 
@@ -58,7 +60,7 @@ class Floor:
         object.__setattr__(self, 'up', read_only(self.up))
 
     def __str__(self) -> str:
-        """Say it in a few words."""
+        """Return the height and its source."""
         if self.height is None:
             return f'none ({self.source})'
         return f'{self.height:g} m above the base ({self.source})'
@@ -68,7 +70,7 @@ def find_floor(
     collision: CollisionModel, given: str | None = None, surroundings: Sequence[Obstacle] = ()
 ) -> Floor:
     """
-    Find out where the floor of an arm is.
+    Return the floor of an arm.
 
     Parameters
     ----------
@@ -77,13 +79,13 @@ def find_floor(
     given : str, optional
         Height above the origin of the base along the vertical [m], or 'none'.
     surroundings : sequence of Obstacle
-        What stands around the arm; where there is something, no floor is assumed.
+        Obstacles around the arm; if there are any, no floor is assumed.
 
     Raises
     ------
     TrajectoryError
-        If what is given is neither, or the arm does not stand on its base plane and nobody says
-        where its floor is.
+        If ``given`` is neither a height nor 'none', or the arm does not stand on its base plane
+        and no height is given.
 
     """
     robot = collision.robot
@@ -109,24 +111,24 @@ def floor_obstacles(
     collision: CollisionModel, floor: Floor, margin: float
 ) -> tuple[Obstacle, ...]:
     """
-    Return the floor as an obstacle, if there is one.
+    Return the floor as an obstacle; empty without a floor.
 
-    Links that are nowhere clear of it touch it by construction, such as the turret that turns on
-    the base; it ignores them.
+    The floor ignores links that have no clearance to it in any pose, such as a turret that turns
+    on the base.
 
     Parameters
     ----------
     collision : CollisionModel
         The arm and its bodies.
     floor : Floor
-        Where it is.
+        The floor.
     margin : float
         Clearance to keep [m].
 
     Raises
     ------
     TrajectoryError
-        If no pose takes any link above the floor.
+        If no link is above the floor in any pose.
 
     """
     if floor.height is None:
@@ -139,7 +141,7 @@ def floor_obstacles(
         highest[link] = np.minimum(highest.get(link, np.inf), lowest)
     if all(lowest.max() < floor.height for lowest in highest.values()):
         raise TrajectoryError(
-            f'{robot.name}: no pose takes any link above the floor, {floor}; --floor Z is its '
+            f'{robot.name}: no link is above the floor in any pose, {floor}; --floor Z is its '
             'height above the origin of the base [m]'
         )
     touching = tuple(k for k, lowest in highest.items() if lowest.max() < floor.height + margin)
@@ -164,7 +166,7 @@ def _height(text: str) -> float | None:
 
 
 def _why_not_standing(collision: CollisionModel, up: FloatArray) -> str:
-    """Say why the floor of an arm is not its base plane; empty when it is."""
+    """Return why the floor of an arm is not its base plane; empty if it is."""
     normal = np.array([0.0, 0.0, 1.0])
     if up[2] < np.cos(np.pi / 4.0):
         return 'gravity does not pull it onto its base plane'

@@ -1,6 +1,6 @@
 # Copyright 2026 The armid_ros developers
 # SPDX-License-Identifier: Apache-2.0
-"""How high the bodies of an arm are: the lowest and the highest point of a motion."""
+"""Heights of the bodies of an arm: the lowest and the highest point of a motion."""
 
 from __future__ import annotations
 
@@ -14,23 +14,23 @@ from armid_ros.robots import CollisionModel
 import coal
 import numpy as np
 
-#: A shape with a coordinate beyond this has no bounds, such as a half space [m].
+#: A shape with a larger coordinate is unbounded, such as a half space [m].
 _ENDLESS = 1e6
 
 
 @dataclass(frozen=True)
 class LowestPoint:
     """
-    Where a motion comes lowest.
+    The lowest point of a motion.
 
     Attributes
     ----------
     height : float
-        Of the point above the origin of the base, along the vertical [m].
+        Height of the point above the origin of the base, along the vertical [m].
     link : str
-        Link that it belongs to.
+        Link of the point.
     time : float
-        When [s].
+        Time of the point [s].
 
     """
 
@@ -45,7 +45,7 @@ def lowest_point(
     """
     Return the lowest point of the moving links in the samples of a motion.
 
-    A link without a collision body counts with the frame of its joint.
+    The frame of its joint represents a link without a collision body.
 
     Parameters
     ----------
@@ -56,7 +56,7 @@ def lowest_point(
     motion : Motion
         N samples.
     exempt : sequence of str
-        Links that do not count, because they stand on the floor.
+        Links that are ignored, because they stand on the floor.
 
     """
     lowest = LowestPoint(np.inf, '', 0.0)
@@ -73,7 +73,7 @@ def link_heights(
     collision: CollisionModel, up: FloatArray, q: FloatArray, *, fixed: bool = False
 ) -> Iterator[tuple[str, FloatArray, FloatArray]]:
     """
-    Yield link by link how far down and how far up it reaches in poses, q of shape (N, n).
+    Yield each link with its lowest and highest point in poses, q of shape (N, n).
 
     Yields
     ------
@@ -111,13 +111,13 @@ def link_heights(
 
 
 def vertical(gravity: FloatArray) -> FloatArray:
-    """Return the unit vector against gravity; z of the base where there is none."""
+    """Return the unit vector against gravity; z of the base without gravity."""
     size = float(np.linalg.norm(gravity))
     return np.asarray(-gravity / size) if size > 0.0 else np.array([0.0, 0.0, 1.0])
 
 
 def outline(shape: coal.CollisionGeometry) -> tuple[FloatArray, float]:
-    """Return points and a radius about their convex hull that contain a shape; none if endless."""
+    """Return points and a radius about their hull that contain a shape; None if unbounded."""
     if isinstance(shape, coal.Convex):
         return np.array(shape.points()), 0.0
     if isinstance(shape, coal.Sphere):
@@ -133,7 +133,7 @@ def outline(shape: coal.CollisionGeometry) -> tuple[FloatArray, float]:
 
 
 def _support(shape: coal.CollisionGeometry, direction: FloatArray) -> FloatArray:
-    """How far a shape reaches along unit vectors in its own frame, shape (N, 3) to (N,) [m]."""
+    """Return the extent of a shape along unit vectors in its frame, shape (N, 3) to (N,) [m]."""
     if isinstance(shape, coal.Cylinder):
         along = np.abs(direction[:, 2])
         across = np.sqrt(np.maximum(1.0 - along**2, 0.0))

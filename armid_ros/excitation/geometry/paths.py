@@ -1,9 +1,9 @@
 # Copyright 2026 The armid_ros developers
 # SPDX-License-Identifier: Apache-2.0
 """
-Paths in joint space that are clear of all bodies: straight where that is possible.
+Collision-free paths in joint space: straight lines if possible.
 
-Where it is not, two trees of straight lines grow from both ends until they meet.
+Otherwise, two trees of straight lines grow from both ends until they meet.
 Source: Kuffner and LaValle 2000, RRT-Connect.
 
 """
@@ -19,17 +19,17 @@ from armid_ros.motion import FloatArray, Motion
 from armid_ros.robots.robot import UNLIMITED_HALF_RANGE
 import numpy as np
 
-#: Longest straight line of a tree, and the interval with which the proof of one begins
-#: [rad or m].
+#: Longest straight line of a tree, and the initial interval of the proof of its clearance [rad or
+#: m].
 _STEP, _INTERVAL = 0.6, 0.1
-#: Poses that are drawn before it is said that there is no way.
+#: Number of poses drawn before a TrajectoryError is raised.
 _DRAWS = 800
-#: Corners that are tried to cut of a path that was found.
+#: Number of trials to cut corners of a path.
 _CUTS = 60
 
-#: Whether poses of shape (N, n) may be held.
+#: Function that returns whether the arm can hold poses of shape (N, n).
 Held = Callable[[FloatArray], bool]
-#: Whether the straight line between two poses, shape (n,), may be taken.
+#: Function that returns whether the straight line between two poses, shape (n,), is allowed.
 _Free = Callable[[FloatArray, FloatArray], bool]
 
 
@@ -51,11 +51,11 @@ def find_path(
     margin : float
         Clearance to keep [m].
     ends : tuple of ndarray, shape (n,)
-        Where it begins and where it ends [rad or m].
+        First and last pose of the path [rad or m].
     limits : tuple of ndarray, shape (n,)
         Least and largest positions [rad or m].
     held : callable
-        Whether the arm can hold poses.
+        Function that returns whether the arm can hold poses.
     rng : Generator
         Source of randomness.
 
@@ -67,7 +67,7 @@ def find_path(
     Raises
     ------
     TrajectoryError
-        If none was found; says what is in the straight way.
+        If no path was found; the message names the obstruction of the straight path.
 
     """
     start, goal = ends
@@ -102,7 +102,7 @@ def find_path(
 def clear_line(
     clearance: ClearanceModel | None, margin: float, start: FloatArray, goal: FloatArray
 ) -> Approach | None:
-    """Prove that a straight line between two poses, shape (n,), is clear, or show where not."""
+    """Prove that a straight line between two poses (n,) is clear, or return an approach."""
     if clearance is None:
         return None
     way = goal - start
@@ -119,14 +119,14 @@ def clear_line(
 
 @dataclass
 class _Tree:
-    """Poses that are joined by clear straight lines, from a root on."""
+    """A tree of poses that are joined by clear straight lines, from a root on."""
 
     poses: list[FloatArray]
     free: _Free
     parents: list[int] = field(default_factory=lambda: [-1])
 
     def grow(self, target: FloatArray) -> int | None:
-        """Take a step towards a pose from the nearest one; return what was reached."""
+        """Step towards a pose from the nearest pose of the tree; return the pose reached."""
         nearest = int(np.argmin([np.linalg.norm(target - q) for q in self.poses]))
         way = target - self.poses[nearest]
         reach = float(np.abs(way).max())
@@ -140,7 +140,7 @@ class _Tree:
         return len(self.poses) - 1
 
     def connect(self, target: FloatArray) -> bool:
-        """Step towards a pose until it is reached, and say whether it is."""
+        """Step towards a pose while possible; return whether the pose is reached."""
         while True:
             reached = self.grow(target)
             if reached is None:
@@ -152,7 +152,7 @@ class _Tree:
                 return True
 
     def branch(self, number: int) -> list[FloatArray]:
-        """Return the poses from one of them back to the root."""
+        """Return the poses from one pose back to the root."""
         poses = []
         while number >= 0:
             poses.append(self.poses[number])
@@ -161,7 +161,7 @@ class _Tree:
 
 
 def _shortened(path: list[FloatArray], free: _Free, rng: np.random.Generator) -> list[FloatArray]:
-    """Cut corners at random, and leave out poses that a straight line gets past."""
+    """Cut corners at random, and remove poses that a clear straight line can skip."""
     path = _skipped(path, free)
     for _ in range(_CUTS if len(path) > 2 else 0):
         i, j = np.sort(rng.integers(0, len(path) - 1, 2))
@@ -175,7 +175,7 @@ def _shortened(path: list[FloatArray], free: _Free, rng: np.random.Generator) ->
 
 
 def _skipped(path: list[FloatArray], free: _Free) -> list[FloatArray]:
-    """Go from each pose to the farthest one that a straight line leads to."""
+    """Connect each pose with the farthest pose that a clear straight line reaches."""
     short, here = [path[0]], 0
     while here < len(path) - 1:
         here = next(

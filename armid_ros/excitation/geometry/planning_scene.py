@@ -1,12 +1,12 @@
 # Copyright 2026 The armid_ros developers
 # SPDX-License-Identifier: Apache-2.0
 """
-What stands around an arm, from files: obstacles, or what MoveIt knows.
+Reading of obstacles from files: lists of obstacles, or planning scenes of MoveIt.
 
-Of MoveIt what `ros2 topic echo --once --full-length` prints of a scene is read
-(moveit_msgs/PlanningScene, PlanningSceneWorld or CollisionObject). Cones become the cylinder
-around them and meshes the box around them in the frame of their object, which takes more room,
-never less. What is attached to the arm is not read.
+A planning scene is read as printed by `ros2 topic echo --once --full-length`
+(moveit_msgs/PlanningScene, PlanningSceneWorld or CollisionObject). A cone is replaced by its
+enclosing cylinder, and a mesh by its enclosing box in the frame of its object. Objects attached to
+the arm are not read.
 
 """
 
@@ -24,16 +24,16 @@ from armid_ros.robots import Robot
 import numpy as np
 import pinocchio as pin
 
-#: Names of the frame that the world has where a description has no frame of that name.
+#: Names of the world frame if a description has no frame of that name.
 _WORLD = ('', 'world')
 #: Thinnest box around a mesh that is flat [m].
 _FLAT = 1e-4
-#: shape_msgs/SolidPrimitive: by number the kind of obstacle, a cone's being the one around it.
+#: Kind of obstacle for each number of shape_msgs/SolidPrimitive; a cone becomes a cylinder.
 _PRIMITIVES = {1: 'box', 2: 'sphere', 3: 'cylinder', 4: 'cylinder'}
 #: Keys of a planning scene, of its world, and of a collision object.
 _SCENE = {'world', 'collision_objects', 'primitives'}
 
-#: Kind, size and placement of a body, as obstacles have them.
+#: Kind, size and placement of an obstacle.
 _Shape = tuple[str, tuple[float, ...], pin.SE3]
 
 
@@ -44,11 +44,11 @@ def load_environment(path: str | Path, robot: Robot | None = None) -> tuple[Obst
     Parameters
     ----------
     path : str or Path
-        A YAML list of mappings with the attributes of `Obstacle`; what `ros2 topic echo --once
-        --full-length /monitored_planning_scene` prints, the world or a collision object of it, in
-        YAML or JSON.
+        A YAML list of mappings with the attributes of `Obstacle`; or the output of `ros2 topic
+        echo --once --full-length /monitored_planning_scene`, its world or one of its collision
+        objects, in YAML or JSON.
     robot : Robot, optional
-        Whose frames a planning scene may name; without it all is taken to be in the base frame.
+        Robot whose frames a planning scene may name; without a robot, the base frame is assumed.
 
     Raises
     ------
@@ -66,7 +66,7 @@ def load_environment(path: str | Path, robot: Robot | None = None) -> tuple[Obst
 
 
 def _scene_obstacles(document: Mapping[str, Any], robot: Robot | None) -> tuple[Obstacle, ...]:
-    """Return the collision objects of a planning scene; errors name them."""
+    """Return the obstacles of a planning scene; errors name the collision object."""
     world = document.get('world', document)
     objects = world.get('collision_objects', [world] if 'primitives' in world else [])
     if not isinstance(objects, list):
@@ -89,7 +89,7 @@ def _scene_obstacles(document: Mapping[str, Any], robot: Robot | None) -> tuple[
         except (KeyError, TypeError, IndexError, ValueError, AttributeError) as error:
             whole = '; print it with --full-length' if "'...'" in str(entry) else ''
             raise TrajectoryError(
-                f"collision object '{name or number}' lacks or has something else: "
+                f"collision object '{name or number}' has a missing or wrong entry: "
                 f'{type(error).__name__} {error}{whole}'
             ) from error
     return tuple(found)
@@ -106,7 +106,7 @@ def _shapes(entry: Mapping[str, Any], robot: Robot | None) -> Iterator[_Shape]:
             )
         size = tuple(float(value) for value in primitive['dimensions'])
         if kind == 'cylinder':
-            size = size[1::-1]  # height comes first
+            size = size[1::-1]  # the height is the first dimension
         yield kind, size, base * _pose(pose)
     for mesh, pose in zip(entry.get('meshes', ()), entry.get('mesh_poses', ()), strict=True):
         points = np.array([[p['x'], p['y'], p['z']] for p in mesh['vertices']], dtype=float)
@@ -122,7 +122,7 @@ def _shapes(entry: Mapping[str, Any], robot: Robot | None) -> Iterator[_Shape]:
 
 
 def _frame(name: str, robot: Robot | None) -> pin.SE3:
-    """Return where a frame is that does not move."""
+    """Return the placement of a fixed frame."""
     if robot is None:
         return pin.SE3.Identity()
     model = robot.model
@@ -133,7 +133,7 @@ def _frame(name: str, robot: Robot | None) -> pin.SE3:
     if name in _WORLD:
         return pin.SE3.Identity()
     moves = model.existFrame(name)
-    why = 'moves with the arm' if moves else 'is none of the description'
+    why = 'moves with the arm' if moves else 'is not in the description'
     raise TrajectoryError(
         f"a collision object is in the frame '{name}', which {why}; those that do not move are "
         f'{", ".join(frame for frame in fixed if frame != "universe") or "world"}'
@@ -146,7 +146,9 @@ def _pose(pose: Mapping[str, Any] | None) -> pin.SE3:
     place, turn = pose['position'], pose['orientation']
     quaternion = np.array([float(turn[axis]) for axis in 'xyzw'])
     if not np.linalg.norm(quaternion) > 0.0:
-        quaternion = np.array([0.0, 0.0, 0.0, 1.0])  # as MoveIt takes what was not set
+        quaternion = np.array(
+            [0.0, 0.0, 0.0, 1.0]
+        )  # as in MoveIt for an orientation that is not set
     quaternion /= np.linalg.norm(quaternion)
     position = np.array([float(place[axis]) for axis in 'xyz'])
     return pin.SE3(pin.Quaternion(quaternion).matrix(), position)

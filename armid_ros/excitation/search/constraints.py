@@ -5,8 +5,8 @@ The limits as smooth constraints on the Fourier coefficients.
 
 Each limit of each joint is one constraint, c <= 0: the soft maximum (Kreisselmeier and Steinhauser
 1979) of its excess over all samples, relative to the limit. A soft maximum is never below the
-maximum, so a trajectory that meets the constraints meets the limits in every sample; what it
-gives away is at most log(samples) / sharpness.
+maximum, so that a trajectory that meets the constraints keeps the limits in every sample. It
+exceeds the maximum by at most log(samples) / sharpness.
 
 """
 
@@ -22,22 +22,22 @@ from armid_ros.motion import FloatArray, Motion
 import numpy as np
 import numpy.typing as npt
 
-#: Distance over which the clearance counts as one unit of a constraint [m].
+#: Change of the clearance that changes a constraint by one unit [m].
 _CLEARANCE_UNIT = 0.1
 
-#: Bodies further apart than the margin by this many units are not measured: at a sharpness of
-#: 60, exp(-36) of them enters the soft maximum.
+#: Distance beyond the margin, in these units, above which bodies are ignored. At a sharpness of
+#: 60, their weight in the soft maximum is exp(-36).
 _CLEARANCE_REACH = 0.6
 
-#: Stretches of the period, each with a clearance constraint of its own: a step of the solver is
-#: bent around several near encounters at once.
+#: Number of stretches of the period, each with its own clearance constraint, so that a step of the
+#: solver avoids several close approaches at once.
 _STRETCHES = 20
 
-#: Samples per sample of the settings at which position, velocity and acceleration are looked at,
-#: and those at which torque and clearance are.
+#: Numbers of samples per sample of the settings: for position, velocity and acceleration, and for
+#: torque and clearance.
 _DENSE, _STATES = 5, 3
 
-#: Values of some constraints, and what works out their gradients.
+#: Values of some constraints, and a function that computes their gradients.
 Part = tuple[FloatArray, Callable[[], FloatArray]]
 
 
@@ -48,17 +48,17 @@ class Constraints:
     Parameters
     ----------
     problem : DesignProblem
-        Gives limits and prior model.
+        Problem with the limits and the prior model.
     clearance : ClearanceModel or None
         Bodies to keep apart.
     margin : float
         Clearance to keep [m].
     reserve : float
-        Share of every limit that is kept free for what happens between the samples.
+        Share of every limit that is kept free for peaks between the samples.
     sharpness : float
-        Of the soft maximum.
+        Sharpness of the soft maximum.
     more_times : ndarray
-        Times at which torque and clearance are looked at besides evenly spaced ones [s].
+        Additional times at which torque and clearance are evaluated [s].
 
     """
 
@@ -84,7 +84,7 @@ class Constraints:
 
     def value(self, x: FloatArray) -> Part:
         """
-        Return the constraints, and what works out their gradients.
+        Return the constraints, and a function that computes their gradients.
 
         Parameters
         ----------
@@ -94,9 +94,10 @@ class Constraints:
         Returns
         -------
         values : ndarray, shape (m,)
-            Not positive where the limit is kept.
+            Zero or negative if the limit is kept.
         gradients : callable () -> ndarray, shape (m, n, 1 + 2 H)
-            Derivatives by the coefficients; a line search does without most of them.
+            Derivatives by the coefficients; evaluated only when needed, because a line search
+            rarely needs them.
 
         """
         limits = self.problem.limits
@@ -127,7 +128,7 @@ class Constraints:
         upper: FloatArray,
         unit: FloatArray,
     ) -> Part:
-        """Constrain quantities that depend on the coefficients of their own joint only."""
+        """Return constraints on quantities that depend on the coefficients of one joint only."""
         values = basis @ x.T
         limited, totals, signed = self._between(values, lower, upper, unit)
 
@@ -162,7 +163,7 @@ class Constraints:
         return totals, gradients
 
     def _clear(self, motion: Motion) -> Part:
-        """Constrain the clearance, once in every stretch of the period."""
+        """Return one clearance constraint for every stretch of the period."""
         assert self.clearance is not None
         near = self.clearance.near(motion.q, self.margin + _CLEARANCE_REACH * _CLEARANCE_UNIT)
         stretch = self.t[near.sample] * (_STRETCHES / self.problem.settings.period)
@@ -186,7 +187,7 @@ class Constraints:
     def _between(
         self, values: FloatArray, lower: FloatArray, upper: FloatArray, unit: FloatArray
     ) -> tuple[npt.NDArray[np.intp], FloatArray, FloatArray]:
-        """Return which joints are limited, their soft maxima, and the slopes by the values."""
+        """Return the limited joints, their soft maxima, and the derivatives by the values."""
         limited = np.flatnonzero(np.isfinite(lower) | np.isfinite(upper))
         signed = np.empty((len(limited), len(values)))
         totals = np.empty(len(limited))

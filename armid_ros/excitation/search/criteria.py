@@ -1,12 +1,12 @@
 # Copyright 2026 The armid_ros developers
 # SPDX-License-Identifier: Apache-2.0
 """
-How much a motion tells about the parameters.
+Information of a motion on the parameters, and optimality criteria.
 
 With W the regressor of the base parameters, every row divided by the standard deviation of its
-joint's torque noise, the information matrix is W' W and its inverse the covariance of the
-weighted least-squares estimate. Every criterion is a cost, a number to make small, and comes with
-its gradient by the information matrix.
+joint's torque noise, the information matrix is W' W and its inverse the covariance of the weighted
+least-squares estimate. Every criterion is a cost to minimise, and has a gradient by the
+information matrix.
 
 """
 
@@ -21,7 +21,7 @@ from armid_ros.motion import FloatArray, read_only
 import numpy as np
 import numpy.typing as npt
 
-#: Criteria to design for, each with what it stands for.
+#: Optimality criteria, each with its meaning.
 CRITERIA = {
     'D': 'volume of the confidence ellipsoid, log det of the information',
     'A': 'mean variance of the parameters, each scaled to the torque it makes',
@@ -30,18 +30,18 @@ CRITERIA = {
     'T': 'torque that a rival model cannot explain',
 }
 
-#: The largest and the smallest eigenvalue have a kink where two of them cross. A search follows a
-#: p-norm instead, which is at most r^(1/p) beyond them: 1.4-fold for 60 parameters.
+#: The largest and the smallest eigenvalue are not differentiable where two eigenvalues cross. A
+#: search uses a p-norm instead, which is larger by at most r^(1/p): 1.4 for 60 parameters.
 _NORM = 12.0
 
-#: A direction of the parameters, each scaled to unit information, is not seen below this.
+#: Smallest eigenvalue of an identifiable direction, with parameters scaled to unit information.
 _BLIND = 1e-13
 
 
 @dataclass(frozen=True)
 class Information:
     """
-    What a motion tells about r parameters.
+    Information of a motion on r parameters.
 
     Attributes
     ----------
@@ -50,8 +50,8 @@ class Information:
     matrix : ndarray, shape (r, r)
         Information matrix, the inverse of the covariance of the estimate.
     scale : ndarray, shape (r,)
-        Size of each parameter that makes a torque as large as the noise, over random motions;
-        criteria A and E measure the parameters in it, so that units do not matter.
+        Size of each parameter whose torque equals the noise in random motions. Criteria A and E
+        use it as the unit of the parameter, so that physical units do not matter.
 
     """
 
@@ -72,7 +72,7 @@ class Information:
 
     @property
     def log_det(self) -> float:
-        """Natural logarithm of the determinant; -inf where some parameter is not seen."""
+        """Natural logarithm of the determinant; -inf if a parameter is not identifiable."""
         sign, value = np.linalg.slogdet(self.matrix)
         return float(value) if sign > 0 else -np.inf
 
@@ -84,7 +84,7 @@ class Information:
 
     @cached_property
     def std(self) -> FloatArray:
-        """Predicted standard deviation of each parameter, shape (r,); inf where not seen."""
+        """Predicted standard deviation of each parameter, shape (r,); inf if not identifiable."""
         diagonal = np.sqrt(np.diag(self.matrix))
         seen = diagonal > 0.0
         std = np.full(len(diagonal), np.inf)
@@ -100,10 +100,10 @@ class Information:
 @dataclass(frozen=True)
 class Criterion:
     """
-    Cost of an information matrix M, shape (r, r), to be made small.
+    Cost of an information matrix M, shape (r, r), to minimise.
 
-    Parameters that are not wanted are nuisance parameters, fitted too: what counts is the Schur
-    complement S = M_ww - M_wn M_nn^+ M_nw of their block.
+    Parameters that are not wanted are nuisance parameters, which are fitted too. The cost depends
+    on the Schur complement S = M_ww - M_wn M_nn^+ M_nw of their block.
 
     Attributes
     ----------
@@ -111,17 +111,17 @@ class Criterion:
         A function of the eigenvalues of S. 'D': -log det / r, plus ``balance`` times the log of
         the condition number of the weighted regressor. 'A': log of the mean variance in units of
         ``scale``. 'E': log of the largest variance in any direction, in the same units.
-        'condition': log of the condition number of the weighted regressor. Or 'T': -log of the
-        sum of squares, in noise units, that a rival leaves which lacks the wanted parameters.
-        Source of 'T': Atkinson and Fedorov 1975, for models linear in their parameters.
+        'condition': log of the condition number of the weighted regressor. Or 'T': -log of the sum
+        of squared residuals, in noise units, of a rival without the wanted parameters. Source of
+        'T': Atkinson and Fedorov 1975, for models linear in their parameters.
     scale : ndarray, shape (r,)
         See `Information`.
     wanted : ndarray of bool, shape (r,)
-        The parameters that count.
+        The wanted parameters.
     values : ndarray, shape (r,)
-        Parameters, for 'T'.
+        Values of the parameters, for 'T'.
     balance : float
-        Weight of the condition number in 'D'; 0 is D-optimality and nothing else.
+        Weight of the condition number in 'D'; 0: D-optimality only.
 
     """
 
@@ -132,17 +132,17 @@ class Criterion:
     balance: float = 0.0
 
     def cost(self, matrix: FloatArray) -> float:
-        """Return the cost of an information matrix, shape (r, r); inf where it is singular."""
+        """Return the cost of an information matrix, shape (r, r); inf if singular."""
         return self._evaluated(matrix, np.inf)[0]
 
     def smooth(self, matrix: FloatArray) -> tuple[float, FloatArray]:
         """
-        Return a smooth stand-in for the cost and its gradient.
+        Return a smooth approximation of the cost and its gradient.
 
         Returns
         -------
         cost : float
-            Equal to the cost for A, T, and D without balance; inf where the matrix is singular.
+            Equal to the cost for A, T, and D without balance; inf if the matrix is singular.
         gradient : ndarray, shape (r, r)
             Derivative by the entries of the matrix.
 
@@ -172,7 +172,7 @@ class Criterion:
         return cost, (vectors * slope) @ vectors.T
 
     def _of_eigenvalues(self, values: FloatArray, norm: float) -> tuple[float, FloatArray]:
-        """Return the cost of eigenvalues in ascending order, and its derivative by them."""
+        """Return the cost of ascending eigenvalues, and its derivative by the eigenvalues."""
         if self.name == 'A':
             total = np.sum(1.0 / values)
             return float(np.log(total / len(values))), -1.0 / (values**2 * total)
@@ -196,7 +196,7 @@ def _log_norm(values: FloatArray, norm: float) -> tuple[float, FloatArray]:
 
 
 def _least_squares(block: FloatArray, reach: FloatArray) -> FloatArray:
-    """Solve the normal equations, also where a motion does not tell all columns apart."""
+    """Solve the normal equations, also with linearly dependent columns."""
     size = np.sqrt(np.maximum(np.diag(block), 0.0))
     unit = np.divide(1.0, size, out=np.zeros_like(size), where=size > 0.0)
     values, vectors = np.linalg.eigh(block * np.outer(unit, unit))

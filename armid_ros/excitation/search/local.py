@@ -1,13 +1,13 @@
 # Copyright 2026 The armid_ros developers
 # SPDX-License-Identifier: Apache-2.0
 """
-The search: from the best of random trajectories to local optima inside every limit.
+The search: local optimisation of the best random trajectories within all limits.
 
 Several searches begin. After every second round the worse half of them ends, so that most of the
-work is spent on the best. The solver is SLSQP of SciPy, sequential quadratic programming;
-docs/excitation.md compares it with others. It works on samples; after each round the result is
-examined between them, and where something is wrong there the time is added to those that the next
-round looks at.
+work is spent on the best searches. The solver is SLSQP of SciPy, sequential quadratic programming;
+docs/excitation.md compares it with others. The solver works on samples. After each round the
+result is checked between the samples. The times of faults are added to the samples of the next
+round.
 
 """
 
@@ -32,38 +32,38 @@ from armid_ros.robots.robot import position_range
 import numpy as np
 import scipy.optimize
 
-#: Why a search did not end by itself.
+#: Reasons for the early end of a search.
 INTERRUPTED, OUT_OF_TIME = 'interrupted', 'time budget'
 
-#: Sharpness of the soft maximum, coarse for as long as that gains anything, then fine.
+#: Sharpness of the soft maximum: coarse while the cost improves, then fine.
 _SHARPNESS = (60.0, 300.0)
 
-#: Iterations of a round, and the gain of one below which the search has settled.
+#: Iterations of a round, and the gain of a round below which the search has converged.
 _ROUND, _SETTLED = 25, 0.005
 
 #: Rounds after which the worse half of the searches ends.
 _ROUNDS = 2
 
-#: Half width of the box a round may not leave, in units of the coefficients' scale.
+#: Half width of the box of a round, in units of the coefficients' scale.
 _BOX = 0.5
 
 #: Share of every limit that the solver keeps free, and clearance on top of the margin [m].
 _RESERVE, _SLACK = 0.002, 0.001
 
-#: Samples of a period among which bodies too near are looked for after a round, per harmonic.
+#: Samples per harmonic of the clearance check after a round.
 _CHECK = 200
 
-#: Poses in which a pair of bodies has to come nearer than the margin and this [m] for the solver
-#: to look at it; the proof of clearance looks at all.
+#: Number of random poses, and distance beyond the margin [m]. The solver ignores pairs of bodies
+#: that stay further apart in all these poses; the proof of clearance checks all pairs.
 _POSES, _WATCHED = 1000, 0.01
 
-#: Joints up to which all candidates are drawn; the time of each grows with the joints.
+#: Number of joints up to which all candidates are drawn; larger arms get fewer candidates.
 _CANDIDATE_JOINTS = 10
 
-#: Factor by which a trajectory that is not quite feasible is made smaller, and how often.
+#: Factor on the amplitudes of a nearly feasible trajectory, and the number of reductions.
 _SHRINK, _SHRINKS = 0.99, 12
 
-#: Stands in for an infinite cost, which a line search cannot work with.
+#: Replacement of an infinite cost, because a line search needs a finite cost.
 _NO_COST = 1e3
 
 
@@ -73,27 +73,27 @@ class _OutOfTime(Exception):
 
 class Search:
     """
-    A search that can be ended at any time, with the best trajectory so far.
+    A search that keeps the best trajectory so far and can be ended at any time.
 
     Parameters
     ----------
     problem : DesignProblem
-        What is wanted.
+        The design problem.
     clearance : ClearanceModel or None
         Bodies to keep apart.
     prior : ndarray, shape (r, r), or None
-        Information that is there already.
+        Information of earlier recordings.
     rng : Generator
         Source of randomness.
     watch : callable
-        Receives the share of the work that is done, and the cost of the best so far.
+        Called with the share of the work done, and the cost of the best trajectory so far.
 
     Attributes
     ----------
     trajectory : FourierTrajectory or None
-        Best so far; feasible, at and between all samples.
+        Best trajectory so far; feasible at and between all samples.
     cost : float
-        Its cost.
+        Cost of the best trajectory.
 
     """
 
@@ -117,14 +117,14 @@ class Search:
 
     def run(self) -> str:
         """
-        Search, and say why it ended early: 'time budget', 'interrupted', or '' where it did not.
+        Run the search; return 'time budget' or 'interrupted' if it ended early, otherwise ''.
 
         Raises
         ------
         TrajectoryError
-            If nothing is feasible.
+            If no trajectory is feasible.
         KeyboardInterrupt
-            If interrupted before anything was found.
+            If interrupted before a feasible trajectory was found.
 
         """
         try:
@@ -139,7 +139,7 @@ class Search:
         return ''
 
     def offer(self, trajectory: FourierTrajectory) -> float:
-        """Take a feasible trajectory into account, and return its cost."""
+        """Return the cost of a feasible trajectory, and keep the trajectory if it is the best."""
         problem, prior = self.problem, self.prior
         matrix = problem.recorded(trajectory, problem.settings.n_periods).matrix
         cost = problem.criterion.cost(matrix if prior is None else matrix + prior)
@@ -174,9 +174,9 @@ class Search:
         return [trajectory for _, trajectory in drawn[: settings.starts]]
 
     def _improve(self, starts: list[FourierTrajectory]) -> None:
-        """Go on in rounds from several trajectories; the worse half ends after every `_ROUNDS`."""
+        """Improve several trajectories in rounds; the worse half ends after every `_ROUNDS`."""
         objective, watched = Objective(self.problem, self.prior), self.clearance
-        if watched is not None:  # without the pairs of bodies that stay apart in all of many poses
+        if watched is not None:  # without pairs that stay apart in many poses
             limits = self.problem.limits
             lower, upper = position_range(limits.lower, limits.upper)
             poses = self.rng.uniform(lower, upper, (_POSES, len(lower)))
@@ -192,7 +192,7 @@ class Search:
 
 @dataclass
 class _Branch:
-    """One local search: where it stands, and the box and the times of its next round."""
+    """One local search: its trajectory, and the box and the times of its next round."""
 
     search: Search
     objective: Objective
@@ -201,7 +201,7 @@ class _Branch:
     cost: float = np.inf
 
     def __post_init__(self) -> None:
-        """Bound the coefficients, in units of what alone reaches a limit."""
+        """Bound the coefficients, in units of the value that alone reaches a limit."""
         limits, settings = self.search.problem.limits, self.search.problem.settings
         low, high = position_range(limits.lower, limits.upper)
         half = 0.5 * (high - low)[:, np.newaxis]
@@ -292,7 +292,7 @@ class _Branch:
 def _faulty_times(
     problem: DesignProblem, clearance: ClearanceModel | None, trajectory: FourierTrajectory
 ) -> FloatArray:
-    """Return the times at which torque or clearance is worst between the samples of the solver."""
+    """Return the times of the worst torque or clearance faults between the samples."""
     motion = trajectory.one_period(_CHECK * trajectory.harmonics)
     torque = np.abs(problem.arm.joint_torque(motion))
     excess = (torque / problem.limits.torque).max(axis=1) - 1.0
@@ -306,7 +306,7 @@ def _faulty_times(
 def _made_feasible(
     problem: DesignProblem, clearance: ClearanceModel | None, trajectory: FourierTrajectory
 ) -> FourierTrajectory | None:
-    """Make joints at fault, or all where it is not clear which, a little smaller."""
+    """Reduce the amplitudes of the joints at fault, or of all joints if the joint is unknown."""
     for _ in range(_SHRINKS):
         faults = trajectory_faults(
             problem.arm, problem.limits, trajectory, clearance, problem.settings.clearance

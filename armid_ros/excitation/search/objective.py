@@ -3,8 +3,9 @@
 """
 The cost of a trajectory and its gradient by the Fourier coefficients.
 
-Columns that depend on the state alone are differentiated by finite differences of the states of
-all samples at once, those that depend on the motion's past by differences of every coefficient.
+Columns that depend only on the state are differentiated by finite differences of the states of all
+samples at once. Columns that depend on the past of the motion are differentiated by differences of
+every coefficient.
 
 """
 
@@ -20,13 +21,13 @@ from armid_ros.model import regressor
 from armid_ros.motion import FloatArray, Motion
 import numpy as np
 
-#: The direction of motion is blurred below this share of a joint's velocity limit.
+#: Share of a joint's velocity limit below which the direction of motion is smoothed.
 _BLUR = 0.05
 
-#: Step of finite differences, of a state of size 1.
+#: Step of finite differences for a state of size 1.
 _STEP = 1e-7
 
-#: Joints that are moved at a time, each in all samples: their columns are in memory together.
+#: Number of joints that are varied at once; limits the memory of their columns.
 _TOGETHER = 8
 
 
@@ -37,9 +38,9 @@ class Objective:
     Parameters
     ----------
     problem : DesignProblem
-        What is wanted.
+        The design problem.
     prior : ndarray, shape (r, r), optional
-        Information that is there already.
+        Information of earlier recordings.
 
     """
 
@@ -50,12 +51,12 @@ class Objective:
         velocity = problem.limits.velocity
         self.width = _BLUR * np.where(np.isfinite(velocity), velocity, 1.0)
         past = marked(problem.arm, lambda effect: not effect.instantaneous)
-        # where each standard parameter is among the columns: those of the past are last
+        # indices of the standard parameters among the columns; columns of the past are last
         self._order = np.argsort(np.argsort(past, kind='stable'))
 
     def value(self, x: FloatArray) -> tuple[float, Callable[[], FloatArray]]:
         """
-        Return the smooth cost, and what works out its gradient.
+        Return the smooth cost, and a function that computes its gradient.
 
         Parameters
         ----------
@@ -65,9 +66,10 @@ class Objective:
         Returns
         -------
         cost : float
-            Inf where the parameters cannot be seen.
+            Smooth cost; inf if the parameters are not identifiable.
         gradient : callable () -> ndarray, shape (n, 1 + 2 H)
-            Derivative by the coefficients; a line search does without most of them.
+            Derivative by the coefficients; evaluated only when needed, because a line search
+            rarely needs it.
 
         """
         problem, settings = self.problem, self.problem.settings
@@ -94,7 +96,7 @@ class Objective:
         return cost, gradient
 
     def _state_gradient(self, motion: Motion, here: FloatArray, weights: FloatArray) -> FloatArray:
-        """Differentiate sum(weights * columns of the state) by the coefficients."""
+        """Differentiate sum(weights * columns) by the coefficients, for columns of the state."""
         count, n = motion.q.shape
         total = np.zeros((n, self.basis[0].shape[1]))
         state = np.array([motion.q, motion.dq, motion.ddq])
@@ -111,7 +113,7 @@ class Objective:
     def _past_gradient(
         self, x: FloatArray, past: Sequence[FloatArray], weights: FloatArray
     ) -> FloatArray:
-        """Differentiate sum(weights * columns of the past) by the coefficients."""
+        """Differentiate sum(weights * columns) by the coefficients, for columns of the past."""
         total = np.zeros_like(x)
         if past:
             weights = weights[:, :, -sum(block.shape[2] for block in past) :]
@@ -123,7 +125,7 @@ class Objective:
         return total
 
     def _by_state(self, motion: Motion) -> list[FloatArray]:
-        """Return the columns of what depends on the state alone: of the body and of effects."""
+        """Return the columns that depend only on the state: of the rigid body and of effects."""
         arm, target = self.problem.arm, self.problem.settings.target
         if target == 'effects':
             body = np.zeros((*motion.q.shape, len(arm.robot.rigid_parameters)))
@@ -133,7 +135,7 @@ class Objective:
         return [body, *(arm.columns_of(e, motion) for e in arm.effects if e.instantaneous)]
 
     def _by_past(self, x: FloatArray) -> list[FloatArray]:
-        """Return the columns of effects that depend on the motion's past as well."""
+        """Return the columns of effects that depend on the past of the motion."""
         problem = self.problem
         effects = [effect for effect in problem.arm.effects if not effect.instantaneous]
         path = FourierTrajectory.of(problem.limits.joints, problem.settings.period, x)

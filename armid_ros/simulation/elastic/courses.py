@@ -1,6 +1,6 @@
 # Copyright 2026 The armid_ros developers
 # SPDX-License-Identifier: Apache-2.0
-"""Trajectories that show the springs of an arm: multisines on the move, and steps of velocity."""
+"""Trajectories that identify elastic joints: multisines during moves, and steps of velocity."""
 
 from __future__ import annotations
 
@@ -13,18 +13,18 @@ from armid_ros.simulation.reference import Reference
 import numpy as np
 import numpy.typing as npt
 
-#: Band of the multisines [Hz], and samples per second in which they are written.
+#: Frequency band of the multisines [Hz], and their samples per second.
 _BAND, _RATE = (2.0, 100.0), 500.0
-#: An experiment lasts so long at least, the arm stands between two, and a step lasts [s].
+#: Shortest duration of an experiment, pause between two experiments, and duration of a step [s].
 _EXPERIMENT, _STAND, _STEP = 4.0, 1.0, 0.5
-#: How far from its middle position a joint goes at most [rad or m].
+#: Largest distance of a joint from its middle position [rad or m].
 _REACH = np.pi / 3.0
-#: Share of the velocity limits on the way to another pose under a multisine.
+#: Share of the velocity limits that a move to another pose uses during a multisine.
 _WAY = 0.25
-#: Poses that are tried before it is said that none can be reached.
+#: Number of poses tried before a TrajectoryError is raised.
 _TRIES = 1000
 
-#: Tells from a path, shape (N, n), whether it may be taken.
+#: Function that returns whether a path, shape (N, n), is allowed.
 Clear = Callable[[FloatArray], bool]
 
 
@@ -36,7 +36,7 @@ def multisine(
     rng: np.random.Generator,
 ) -> FloatArray:
     """
-    Return one period of sines of equal size and random phase at every frequency of a band.
+    Return one period of sines of equal amplitude and random phase at every frequency of a band.
 
     Parameters
     ----------
@@ -69,27 +69,27 @@ def multisine_course(
     robot: Robot, duration: float, torque: float, rng: np.random.Generator, clear: Clear
 ) -> Reference:
     """
-    Return moves from pose to pose with a multisine of torque on top of each.
+    Return moves from pose to pose, each with a multisine of torque added.
 
-    While it moves, friction keeps its sign; between two moves the arm stands.
+    Friction keeps its sign during a move. The arm rests between two moves.
 
     Parameters
     ----------
     robot : Robot
-        Gives the limits.
+        Robot with the limits.
     duration : float
-        Of the whole at most [s].
+        Largest duration of the trajectory [s].
     torque : float
         Root mean square of the multisine, as a share of the torque limits.
     rng : numpy.random.Generator
         Source of poses and phases.
     clear : callable
-        Whether a path from pose to pose may be taken.
+        Function that returns whether a path from pose to pose is allowed.
 
     Raises
     ------
     TrajectoryError
-        If the limits are not known, there is not the time for one move or no clear way.
+        If a limit is unknown, the duration is too short for one move, or no pose can be reached.
 
     """
     limit = _finite(robot, robot.torque_limit, 'torque')
@@ -124,25 +124,25 @@ def step_course(
     robot: Robot, duration: float, velocity: float, rng: np.random.Generator, clear: Clear
 ) -> Reference:
     """
-    Return steps of velocity from rest, in many poses: of each joint alone, and of all at once.
+    Return steps of velocity from rest in many poses, of single joints and of all joints.
 
     Parameters
     ----------
     robot : Robot
-        Gives the limits.
+        Robot with the limits.
     duration : float
-        Of the whole at most [s].
+        Largest duration of the trajectory [s].
     velocity : float
-        Of the steps, as a share of the velocity limits.
+        Velocity of the steps, as a share of the velocity limits.
     rng : numpy.random.Generator
         Source of the poses.
     clear : callable
-        Whether a path from pose to pose may be taken.
+        Function that returns whether a path from pose to pose is allowed.
 
     Raises
     ------
     TrajectoryError
-        If the limits are not known, there is not the time for one step or no clear way.
+        If a limit is unknown, the duration is too short for one step, or no pose can be reached.
 
     """
     limit = _finite(robot, robot.velocity_limit, 'velocity')
@@ -167,7 +167,7 @@ def step_course(
 def _next_pose(
     robot: Robot, here: FloatArray, rng: np.random.Generator, clear: Clear, beyond: FloatArray
 ) -> FloatArray:
-    """Draw a pose that can be gone to in a straight line, and by some way beyond."""
+    """Draw a pose that can be reached in a straight line, with a margin beyond the pose."""
     middle = robot.middle_pose
     lower = np.maximum(robot.lower, middle - _REACH)
     upper = np.minimum(robot.upper, middle + _REACH)

@@ -1,6 +1,6 @@
 # Copyright 2026 The armid_ros developers
 # SPDX-License-Identifier: Apache-2.0
-"""From an arm model to a simulated arm with elastic joints, drives and sensors."""
+"""Construction of a simulated arm with elastic joints, drives and sensors from an arm model."""
 
 from __future__ import annotations
 
@@ -23,10 +23,10 @@ import numpy.typing as npt
 
 def shipped_arm(robot: Robot) -> tuple[ArmModel, TwoLinkSet | None]:
     """
-    Return a robot as it is shipped: its effects, and its drives where they are known.
+    Return the arm model of a shipped robot, and its drives if they are known.
 
-    That is the bare robot, but for the two-link arm, whose springs, friction and drives are in
-    its parameter set 'after'.
+    The model has no effects, except for the two-link arm: the springs, friction and drives of that
+    arm are in its parameter set 'after'.
 
     """
     if robot.name != ROBOT:
@@ -37,10 +37,10 @@ def shipped_arm(robot: Robot) -> tuple[ArmModel, TwoLinkSet | None]:
 
 def elastic_joints(arm: ArmModel) -> tuple[tuple[str, ...], tuple[str, ...]]:
     """
-    Return the joints whose transmissions are springs: those with rotors, and those without.
+    Return the elastic joints: those with rotor inertia, and those without.
 
-    A motor without inertia has no motion of its own; its spring can only be simulated as a twist
-    that follows the load at once.
+    A motor without inertia has no motion of its own. Its spring is simulated as a twist that
+    follows the load without delay.
 
     """
     action, joints = arm.action(), arm.robot.joints
@@ -53,7 +53,7 @@ def elastic_joints(arm: ArmModel) -> tuple[tuple[str, ...], tuple[str, ...]]:
 
 
 def no_rotor(joints: Sequence[str]) -> str:
-    """Say what becomes of springs whose motors have no inertia."""
+    """Return a note on how springs are simulated whose motors have no inertia."""
     return (
         f'{", ".join(joints)}: joint_elasticity without rotor_inertia, so that no motor moves on '
         'its own. All joints are simulated as rigid ones whose encoders read the twist under '
@@ -77,14 +77,14 @@ def make_elastic_arm(
     Parameters
     ----------
     arm : ArmModel
-        With joint_elasticity and rotor_inertia.
+        Arm model with joint_elasticity and rotor_inertia.
     rng : numpy.random.Generator
         Source of the sensors' noise.
     drives : TwoLinkSet, optional
-        Velocity loops, friction of the links and places of the accelerometers of the two-link
-        arm; other arms get loops that suit them, led by their own model.
+        Velocity loops, friction of the links and places of the accelerometers of the two-link arm.
+        By default, loops are designed from the model of the arm.
     gain : float
-        Share of the gains of the loops.
+        Factor on the gains of the loops.
     dt : float
         Step of plant and loops [s].
     sensors, start
@@ -93,7 +93,7 @@ def make_elastic_arm(
     Raises
     ------
     ModelError
-        If no joint gives way, or the motor of one that does has no inertia.
+        If no joint is elastic, or the motor of an elastic joint has no inertia.
 
     """
     if drives is None:

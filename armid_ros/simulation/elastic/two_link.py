@@ -1,6 +1,6 @@
 # Copyright 2026 The armid_ros developers
 # SPDX-License-Identifier: Apache-2.0
-"""The shipped two-link arm with elastic joints, as a plant and under its drives."""
+"""The shipped two-link arm with elastic joints: its plant and its drives."""
 
 from __future__ import annotations
 
@@ -16,9 +16,9 @@ import numpy as np
 
 def two_link_arm(parameters: TwoLinkParameters, robot: Robot | None = None) -> ArmModel:
     """
-    Return the two links as an arm with effects of the catalogue.
+    Return the two-link arm as an arm model with effects of the catalogue.
 
-    The friction of the links is not among them: give it to the plant.
+    The model does not contain the friction of the links, which the plant adds.
 
     """
     robot = parameters.body(robot or load_robot(ROBOT))
@@ -35,14 +35,14 @@ def two_link_arm(parameters: TwoLinkParameters, robot: Robot | None = None) -> A
 
 
 def two_link_plant(parameters: TwoLinkParameters, *, substeps: int = 2) -> Plant:
-    """Return the two links ready to be integrated."""
+    """Return the plant of the two-link arm."""
     arm = two_link_arm(parameters)
     return Plant(arm, elasticity=Elasticity(substeps, parameters.link_damping))
 
 
 def two_link_loop(shipped: TwoLinkSet, share: float = 1.0) -> VelocityLoop:
-    """Return the velocity loop of the shipped arm, or one with a share of its gains."""
-    # gains of the drives are in V s/rad and V/rad at the motors
+    """Return the velocity loop of the shipped arm, with its gains times a factor."""
+    # units of the gains are V s/rad and V/rad at the motors
     scale = share * shipped.parameters.torque_per_volt * shipped.parameters.gear
     proportional, integral = (
         scale * np.asarray(shipped.assumptions[name])

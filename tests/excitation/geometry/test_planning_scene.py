@@ -117,7 +117,7 @@ def test_meshes_and_planes_take_at_least_their_room(tmp_path):
 def test_objects_in_frames_that_move_or_are_unknown_are_refused(tmp_path):
     path = tmp_path / 'scene.yaml'
     hand = str(ROBOT.model.frames[-1].name)
-    for frame, words in ((hand, 'moves with the arm'), ('camera', 'is none of the description')):
+    for frame, words in ((hand, 'moves with the arm'), ('camera', 'is not in the description')):
         written(path, scene(collision_object('box', 1, [1.0, 1.0, 1.0], pose(), frame)))
         with pytest.raises(TrajectoryError, match=f"scene.yaml: .*'{frame}', which {words}"):
             load_environment(path, ROBOT)
