@@ -150,6 +150,19 @@ def test_joints_that_warm_up_each_by_its_own_share_are_told_so(bench):
         np.testing.assert_allclose(told, shares, atol=5.0 * wide.max())
 
 
+def test_recordings_with_more_noise_than_the_baseline_have_a_floor_of_their_own(bench):
+    """A simulated baseline has no noise at all."""
+    floors = []
+    for noise in (0.0, 1.0):
+        before = bench.recordings(seed=1, noise=noise)
+        arm = identify(bench.arm, before, rng=np.random.default_rng(0)).arm
+        after = bench.recordings(seed=2)
+        found = diagnose(arm, after, baseline=before, rng=np.random.default_rng(0))
+        assert found.verdict == 'consistent', found.summary
+        floors.append(found.gap.floor)
+    np.testing.assert_allclose(floors[0], floors[1], rtol=0.5)
+
+
 @pytest.mark.parametrize('told', [False, True])
 def test_the_noise_of_a_wider_band_is_no_reason_to_doubt_a_baseline(bench, told):
     """The recordings are those that the model is of, behind other filters."""

@@ -18,7 +18,7 @@ from armid_ros.arm.memoized_arm import memoized_arm
 from armid_ros.arm.misfit import louder
 from armid_ros.diagnosis.data.baseline import Baseline
 from armid_ros.diagnosis.data.days import Rows
-from armid_ros.diagnosis.data.evidence import Evidence, torque_rms
+from armid_ros.diagnosis.data.evidence import Evidence, noise_floor, torque_rms
 from armid_ros.diagnosis.data.trajectory import count_recordings, Trajectory
 from armid_ros.diagnosis.prepare import Prepared, with_friction
 from armid_ros.diagnosis.search.candidates import Causes
@@ -48,8 +48,6 @@ import numpy as np
 Progress = Callable[[float, str], None]
 OWN_MISFIT = 'the misfit that the model had before'
 WRITTEN_MISFIT = 'the misfit that the model had when it was identified'
-#: Data are sampled as often as others if their sampling period is not longer by this factor.
-_AS_OFTEN = 1.2
 #: Note where nothing is known of how well a model was identified.
 _AS_EXACT = (
     'values of the model are taken as exact, for want of its identification.json: intervals do '
@@ -144,7 +142,7 @@ class Explainer:
         """
         prepared, settings, known = self.prepared, self.settings, written.information
         misfit = written.of(self.arm.robot, torque_rms(prepared.data))
-        noise = _noise_within(misfit, prepared, 0.0)
+        noise = _noise_within(misfit, prepared, misfit)
         evidence = Evidence(prepared.data, tuple(np.maximum(s, misfit) for s in noise), noise)
         rows = Rows(prepared.data, evidence.sigma, 0, (misfit,) * count_recordings(prepared.data))
         grid = settings_of_misfit(known is not None)
@@ -162,8 +160,8 @@ class Explainer:
         prepared = self.prepared
         now, then = torque_rms(prepared.data), torque_rms(baseline.data)
         misfit = baseline.misfit * louder(now, then)
-        usual = float(np.median([part.period_recorded for part in baseline.data]))
-        noise = _noise_within(misfit, prepared, usual)
+        rough = [noise_floor(part, self.arm).rough for part in baseline.data]
+        noise = _noise_within(misfit, prepared, np.sqrt(np.mean(np.square(rough), axis=0)))
         sigma = tuple(np.maximum(one, misfit) for one in noise)
         evidence = Evidence(prepared.data, sigma, noise, baseline.varies)
         self.tell(0.2, 'what has changed')
@@ -250,23 +248,17 @@ def _speed(data: Sequence[Trajectory]) -> FloatArray:
 
 
 def _noise_within(
-    misfit: FloatArray, prepared: Prepared, period_recorded: float
+    misfit: FloatArray, prepared: Prepared, contained: FloatArray
 ) -> tuple[FloatArray, ...]:
     """
-    Return the noise of each trajectory where the misfit contains noise, (n,).
+    Return the noise of each trajectory where the misfit contains some noise already, (n,).
 
-    What periods differ by is more where something happens in one of them, which is a gap: noise
-    beyond the misfit differs from row to row. Data that were sampled as often have none beyond it.
+    What periods differ by is more where something happens in one of them, which is a gap. So the
+    noise is at most what its differences from row to row have beyond that of the misfit.
 
     """
+    more = [np.maximum(floor.rough**2 - contained**2, 0.0) for floor in prepared.floors]
     return tuple(
-        np.minimum(
-            sigma,
-            misfit
-            if part.period_recorded < _AS_OFTEN * period_recorded
-            else np.maximum(misfit, floor.rough),
-        )
-        for sigma, floor, part in zip(
-            prepared.as_described, prepared.floors, prepared.data, strict=True
-        )
+        np.minimum(sigma, np.sqrt(misfit**2 + excess))
+        for sigma, excess in zip(prepared.as_described, more, strict=True)
     )
