@@ -58,7 +58,7 @@ Item = TypeVar('Item')
 
 @dataclass(eq=False)
 class _Stretch:
-    """Rows that were not searched so far; those before an interruption have no end."""
+    """Rows not searched yet; those before an interruption have no end."""
 
     begin: float
     narrow: Learned
@@ -68,7 +68,7 @@ class _Stretch:
 
 class ChangeWatch:
     """
-    Lets an estimator learn, and detects changes of what it learns.
+    Updates an estimator and detects changes of its parameters.
 
     Parameters
     ----------
@@ -79,7 +79,7 @@ class ChangeWatch:
     candidates : sequence of ChangeCandidate
         What may change.
     settings : ChangeSettings
-        The threshold of a change.
+        Settings of change detection.
     work : Background
         Does what takes long.
 
@@ -112,7 +112,7 @@ class ChangeWatch:
         self.reset()
 
     def reset(self) -> None:
-        """Forget the noise level and all changes; no background work may be pending."""
+        """Clear noise level and changes; no background job may be pending."""
         self.changes: list[Change] = []
         self._wider.reset()
         self._search.reset()
@@ -312,6 +312,6 @@ class ChangeWatch:
 
 
 def _parts(items: Sequence[Item], size: int) -> Iterator[Sequence[Item]]:
-    """Yield so many items after the other."""
+    """Yield items in groups of a size."""
     for first in range(0, len(items), size):
         yield items[first : first + size]
