@@ -258,7 +258,7 @@ class ArmModel:
         return None if law is None else law_derivatives(law, self.link_motion(motion))
 
     def joint_torque(self, motion: Motion) -> FloatArray:
-        """Return what sensors of no error would read along a motion, shape (N, n) [N m or N]."""
+        """Return the torque of ideal sensors along a motion, shape (N, n) [N m or N]."""
         link = self.link_motion(motion)
         load = self.load(link)
         return load + self.along(motion).action().effort(motion, link, load)
@@ -369,7 +369,7 @@ class ArmModel:
         return columns
 
     def torque_before(self, effect: Effect, motion: Motion) -> FloatArray:
-        """Return the torque that an effect of the sensors is given to read, shape (N, n) [N m]."""
+        """Return the input torque of a sensor effect, shape (N, n) [N m]."""
         tau = self.joint_torque(motion)
         for own, values in self._readings:
             if own == effect:
@@ -378,7 +378,7 @@ class ArmModel:
         return tau
 
     def neighbours(self, period: float) -> int:
-        """Return how many samples to either side what is read depends on, a period [s] apart."""
+        """Return the number of neighbouring samples that a reading depends on."""
         action = self._acting
         if action.displacement is None and action.reading_memory == 0.0:  # noqa: RUF069 - of laws, never computed
             return 0
@@ -392,7 +392,7 @@ class ArmModel:
     def _as_read(
         self, motion: Motion, columns: FloatArray, after: Effect | None = None
     ) -> FloatArray:
-        """Pass columns through the torque sensors: all of them, or those after an effect."""
+        """Apply the sensor effects to columns: all, or those after an effect."""
         readings = self._readings
         if isinstance(after, TorqueReading):
             known = [own for own, _ in readings]
@@ -409,7 +409,7 @@ class ArmModel:
         return columns
 
     def with_load_friction(self, motion: Motion, columns: FloatArray) -> FloatArray:
-        """Add to changes of the load, (N, n, P), what friction in proportion to it adds."""
+        """Add load-dependent friction to changes of the load, (N, n, P)."""
         friction = self._acting.dry_friction
         if friction is None or friction.load_share is None:
             return columns
@@ -419,7 +419,7 @@ class ArmModel:
         return np.asarray(columns + along @ (gain[:, :, np.newaxis] * (along.T @ columns)))
 
     def felt(self, motion: Motion) -> Motion:
-        """Return what the rigid body feels of a motion of the links: all, or its weight alone."""
+        """Return the link motion for the rigid body; without motion if quasi-static."""
         return motion.at_rest() if self.quasi_static else motion
 
     def base_parameters(

@@ -61,7 +61,7 @@ class Regressors:
 
 @dataclass(frozen=True, repr=False)
 class _Memoized(ArmModel):
-    """An arm that computes what a motion takes once; arms made of it have its regressors."""
+    """An arm with cached torques and regressors of motions."""
 
     regressors: Regressors = field(default_factory=Regressors, compare=False)
 
@@ -130,14 +130,14 @@ class _Memoized(ArmModel):
 
 
 def memoized_arm(arm: ArmModel) -> ArmModel:
-    """Return the arm, made to compute the torques of each motion once."""
+    """Return the arm with caches of torques and regressors."""
     if isinstance(arm, _Memoized):
         return arm
     return _Memoized(arm.robot, arm.effects, arm.values, arm.quasi_static)
 
 
 def plain_arm(arm: ArmModel) -> ArmModel:
-    """Return the arm without what it has computed."""
+    """Return the arm without caches."""
     return ArmModel(arm.robot, arm.effects, arm.values, arm.quasi_static)
 
 

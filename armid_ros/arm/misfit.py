@@ -30,7 +30,7 @@ _DATA = ('held-out', 'training')
 
 class RowFilters(NamedTuple):
     """
-    What recordings were filtered with: sampling rate and cut-off [Hz], and decimation.
+    Filters of the rows: sampling rate and cut-off [Hz], and decimation.
 
     They are those of `armid_ros.identification.rows.signals.Conditioning`.
 
@@ -44,7 +44,7 @@ class RowFilters(NamedTuple):
 @dataclass(frozen=True)
 class Misfit:
     """
-    What a model leaves.
+    Residual of a model at its identification.
 
     Attributes
     ----------
@@ -75,7 +75,7 @@ class Misfit:
     filters: RowFilters | None = None
 
     def document(self) -> dict[str, Any]:
-        """Return the block that model.yaml holds."""
+        """Return the block ``misfit`` of model.yaml."""
         block = {
             'unit': 'N m',
             'data': self.data,
@@ -118,7 +118,7 @@ class Misfit:
 
 
 def louder(now: FloatArray, before: FloatArray) -> FloatArray:
-    """Return by how much more torque there is now than there was before, at least 1, (n,)."""
+    """Return the ratio of the rms torque now to that before, at least 1, (n,)."""
     return np.asarray(np.maximum(now / np.maximum(before, 1e-12), 1.0))
 
 
@@ -145,7 +145,7 @@ def load_misfit(path: str | Path) -> Misfit | None:
 
 
 def misfit_of_block(block: Any) -> Misfit:
-    """Return what the block ``misfit`` of a model.yaml says."""
+    """Parse the block ``misfit`` of a model.yaml."""
     try:
         rms, torque = _torques(block['rms']), block.get('torque_rms')
         loud = None if torque is None else _torques(torque)

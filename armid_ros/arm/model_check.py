@@ -29,7 +29,7 @@ _NEEDED_OF_EFFECT = 'name', 'joints', 'parameters'
 
 def checked_model(text: str) -> dict[str, Any]:
     """
-    Return the document of a model.yaml, the keys, numbers and units of which are what they may be.
+    Return a validated document of a model.yaml: keys, numbers and units.
 
     Parameters
     ----------
@@ -61,7 +61,7 @@ def checked_model(text: str) -> dict[str, Any]:
 
 
 def wrong_unit(row: Mapping[str, Any], units: Collection[str]) -> str:
-    """Say that the unit of a parameter is none of some; empty if it is, or if none is given."""
+    """Return the error on a wrong unit of a parameter; empty if it is right."""
     if not units or row.get('unit', next(iter(units))) in units:
         return ''
     expected = ' or '.join(f"'{unit}'" for unit in units)
@@ -88,7 +88,7 @@ def _rows(
 
 
 def _fault(row: Any, units: tuple[str, ...]) -> tuple[str, str]:
-    """Return the key at which a parameter is wrong, and what is wrong; empty if nothing is."""
+    """Return key and error of a wrong parameter; empty if none."""
     if not isinstance(row, dict):
         keys = ', '.join(_KEYS_OF_PARAMETER)
         return '', f'a parameter has {keys}; here is {str(row)[:40]!r}'

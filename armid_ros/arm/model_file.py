@@ -53,7 +53,7 @@ def model_text(
     arm: ArmModel, robot: str, estimate: Estimate | None = None, misfit: Misfit | None = None
 ) -> str:
     """
-    Return what model.yaml holds.
+    Return the content of model.yaml.
 
     Parameters
     ----------

@@ -51,7 +51,7 @@ _UNEXPECTED = (
 @contextmanager
 def reading(path: str | Path, error: type[ArmidError]) -> Iterator[None]:
     """
-    Turn what a parser raises for the content of a file into one error that names the file.
+    Convert errors of a parser into one error that names the file.
 
     Parameters
     ----------
@@ -77,7 +77,7 @@ def reading(path: str | Path, error: type[ArmidError]) -> Iterator[None]:
 
 
 def finite(value: Any, what: str) -> float:
-    """Return a number of a document; ValueError when it is none, or beyond all quantities."""
+    """Return a finite number of a document; ValueError if it is none."""
     try:
         number = float(value)
     except (TypeError, ValueError, OverflowError):
@@ -90,7 +90,7 @@ def finite(value: Any, what: str) -> float:
 
 
 def parsed_yaml(text: str, error: type[ArmidError]) -> Any:
-    """Return what a text in YAML says, as `load_yaml`; what is none is an error of the package."""
+    """Parse YAML as `load_yaml`; raise an error of the package if it is invalid."""
     try:
         return load_yaml(text)
     except (yaml.YAMLError, ValueError) as fault:
@@ -99,7 +99,7 @@ def parsed_yaml(text: str, error: type[ArmidError]) -> Any:
 
 def load_yaml(text: str) -> Any:
     """
-    Return what a text in YAML says, as plain types.
+    Parse YAML to plain types.
 
     Raises
     ------
@@ -142,7 +142,7 @@ def yaml_line(text: str, place: Sequence[str | int]) -> int:
 
 def load_json(text: str) -> Any:
     """
-    Return what a text in JSON says, as plain types.
+    Parse JSON to plain types.
 
     Raises
     ------
@@ -192,7 +192,7 @@ def _line(event: yaml.Event) -> int:
 
 
 def _said(problem: BaseException) -> str:
-    """Say what a parser met, in one line."""
+    """Format the error of a parser in one line."""
     if isinstance(problem, RecursionError):
         return 'nested too deep'
     if isinstance(problem, MemoryError):

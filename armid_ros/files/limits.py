@@ -14,7 +14,7 @@ _CONTROL_GROUP = Path('/sys/fs/cgroup/memory.max')
 
 
 def default_memory_limit() -> int:
-    """Return what one input may take [bytes]: a quarter of the memory of machine or process."""
+    """Return the memory limit of one input: a quarter of the memory [bytes]."""
     bounds = [os.sysconf('SC_PAGE_SIZE') * os.sysconf('SC_PHYS_PAGES')]
     limit = resource.getrlimit(resource.RLIMIT_AS)[0]
     if limit != resource.RLIM_INFINITY:

@@ -200,7 +200,7 @@ _HINT = 'name another folder, or write over it with --force'
 
 
 def _same(robot: str, other: str) -> bool:
-    """Tell whether two names mean one robot: shipped names, or paths of one file."""
+    """Whether two names mean one robot: shipped names, or paths of one file."""
     if '-' in (robot, other):  # that of the bag, whichever it is
         return True
     return robot == other or Path(robot).absolute() == Path(other).absolute()

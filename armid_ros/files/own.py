@@ -86,7 +86,7 @@ _MARKS = {
 
 
 def settled(path: Path) -> Path:
-    """Return where a file of a result in the making will be; another path as it is."""
+    """Return the final path of a staged file; other paths unchanged."""
     return Path(*(part for part in path.parts if part != STAGING))
 
 
@@ -133,7 +133,7 @@ def refuse_foreign(folder: Path, schema: str, also: Collection[str] = ()) -> Non
 
 def refuse_replacing(folder: Path, names: Collection[str]) -> None:
     """
-    Refuse to replace files that this package did not write; others are left where they are.
+    Raise an error instead of replacing files that this package did not write.
 
     Parameters
     ----------
@@ -155,7 +155,7 @@ def refuse_replacing(folder: Path, names: Collection[str]) -> None:
 
 
 def _foreign(folder: Path, names: Sequence[str]) -> Iterator[str]:
-    """Yield files that are no results; those without room for a mark go by the others."""
+    """Yield files that are no results of this package."""
     known = [name for name in names if _mark_of(name)]
     return (name for name in known or names if not is_own(folder / name))
 
@@ -165,7 +165,7 @@ def _mark_of(name: str) -> re.Pattern[bytes] | None:
 
 
 def is_plan(path: Path) -> bool:
-    """Tell whether a folder is a bag with a trajectory to run, and nothing that was measured."""
+    """Whether a folder is a bag with a trajectory and no measurements."""
     try:
         text = read_text(path / 'metadata.yaml', OutputError)
     except OutputError:
@@ -175,7 +175,7 @@ def is_plan(path: Path) -> bool:
 
 
 def is_own(path: Path) -> bool:
-    """Tell whether a document, a page or a trajectory is a result of this package."""
+    """Whether a document, page or trajectory is a result of this package."""
     if path.is_dir():
         return is_plan(path)
     mark = _mark_of(path.name)

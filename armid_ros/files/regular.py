@@ -30,7 +30,7 @@ _KINDS = (
 
 
 def is_file(path: str | Path) -> bool:
-    """Tell whether there is a regular file; a name that no file can have is none."""
+    """Whether a path is a regular file."""
     try:
         return stat.S_ISREG(os.stat(path).st_mode)
     except (OSError, ValueError):
@@ -99,5 +99,5 @@ def read_text(path: str | Path, error: type[ArmidError], limit: int = TEXT_LIMIT
 
 
 def problem_text(problem: OSError | ValueError) -> str:
-    """Return why the system refused, without the path that the message has already."""
+    """Return the reason of a system error, without the path."""
     return (problem.strerror if isinstance(problem, OSError) else None) or str(problem)

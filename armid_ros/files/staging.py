@@ -32,7 +32,7 @@ _AT_FDCWD, _RENAME_EXCHANGE = -100, 2
 @dataclass(frozen=True)
 class Staged:
     """
-    A result in the making.
+    A staged result.
 
     Attributes
     ----------
@@ -61,7 +61,7 @@ class Staged:
 
     def keep(self) -> None:
         """
-        Make what was written the result, with one rename of the folder.
+        Commit the staged result with one rename of the folder.
 
         Other files of the folder are linked into the new one, which then takes the place of the
         old one. Where a folder cannot be exchanged (the current one, a mount point, a file system
@@ -116,7 +116,7 @@ class Staged:
         return True
 
     def _earlier(self) -> list[Path]:
-        """Return files of an earlier result that this one has not; folders may be recordings."""
+        """Return the files of an earlier result that the new one lacks."""
         spared = {path.resolve() for path in self.spared}
         return [
             path
@@ -133,7 +133,7 @@ def staged(
     out: Path, replaced: Collection[str] = (), spared: Collection[Path] = ()
 ) -> Iterator[Staged]:
     """
-    Hold a place for a result in the making; what was not kept when the context ends is gone.
+    Create a staging folder; it is deleted at the end unless it was kept.
 
     Parameters
     ----------

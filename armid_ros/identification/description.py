@@ -12,7 +12,7 @@ import numpy as np
 
 def kinematics_digest(robot: Robot) -> str:
     """
-    Return what is the same for two descriptions exactly if their joints are, in hexadecimal.
+    Return a digest of the joints of a description, in hexadecimal.
 
     Names, kinds, axes and places of the joints and names of the links count, to a micrometre.
     Masses and gravity do not: they are what is corrected from one day to the next.

@@ -43,7 +43,7 @@ def _content(path: Path) -> dict[str, Any]:
 
 
 def with_contents(document: Mapping[str, Any]) -> dict[str, Any]:
-    """Return identification.json with the contents of its recordings, of those that are there."""
+    """Add the digests of existing recordings to identification.json."""
     there = [(name, Path(name)) for name in _names(document)]
     rows = [{'bag': name, **_content(path)} for name, path in there if path.exists()]
     return {**document, 'recordings': rows}
@@ -51,7 +51,7 @@ def with_contents(document: Mapping[str, Any]) -> dict[str, Any]:
 
 def identified_from(path: str | Path) -> tuple[Path, ...]:
     """
-    Return the recordings that a model was identified from, held-out ones included, that are there.
+    Return the existing recordings of an identification, held-out ones included.
 
     Parameters
     ----------
@@ -70,7 +70,7 @@ def identified_from(path: str | Path) -> tuple[Path, ...]:
 
 def require_as_identified(path: str | Path) -> None:
     """
-    Refuse recordings that have been written over since a model was identified from them.
+    Raise an error if recordings changed since the identification.
 
     Parameters
     ----------
@@ -93,7 +93,7 @@ def require_as_identified(path: str | Path) -> None:
 
 
 def _found(model: Path) -> dict[Path, dict[str, Any] | None]:
-    """Return the recordings of a model that are there, and what they held, where that is known."""
+    """Return the existing recordings of a model, with their digests if known."""
     beside = model.with_name('identification.json')
     if not is_file(beside):
         return {}
@@ -114,6 +114,6 @@ def _found(model: Path) -> dict[Path, dict[str, Any] | None]:
 
 
 def _names(document: Mapping[str, Any]) -> list[str]:
-    """Return the recordings that a document names, those that were held out last."""
+    """Return the recordings that a document names, held-out ones last."""
     validation = (row['bag'] for row in document.get('validation', []))
     return [str(name) for name in (*document['training']['bags'], *validation) if name]

@@ -83,7 +83,7 @@ class IdentificationSettings:
     prefers_bodies: bool = False
 
     def __post_init__(self) -> None:
-        """Refuse an unknown method, and constraints of bodies on instrumental variables."""
+        """Check the method, and its combination with physical constraints."""
         if self.method not in ESTIMATORS:
             raise IdentificationError(
                 f"no method '{self.method}'; use one of {', '.join(ESTIMATORS)}"
@@ -95,12 +95,12 @@ class IdentificationSettings:
 
     @property
     def least_squares(self) -> Method:
-        """Return the least squares that the method is, or starts from."""
+        """Return the least-squares method that the method is, or starts from."""
         return 'wls' if self.method == 'iv' else self.method
 
     @property
     def holds_description(self) -> bool:
-        """Whether the description stays where it is surer; a fit among bodies weighs it itself."""
+        """Whether parameters stay at the description if it is more certain."""
         return self.physical is None and self.method != 'iv'
 
 
@@ -163,7 +163,7 @@ class Identification:
     passes: int = 1
 
     def __repr__(self) -> str:
-        """Return what was found in a few lines."""
+        """Return a summary of a few lines."""
         error = Score.of(self.training).relative_error_percent
         return (
             f'Identification of {self.arm.robot.name}: {error:.2f} % relative error, condition '
@@ -172,7 +172,7 @@ class Identification:
 
     @property
     def unidentified(self) -> tuple[Unidentified, ...]:
-        """Return what the data do not tell, and why."""
+        """Return the unidentified parameters with reasons."""
         return unidentified(self.theory, self.base, self.estimate)
 
     def predict(self, recordings: Sequence[Recording]) -> tuple[Fit, ...]:
@@ -276,7 +276,7 @@ def identify(
 
 
 class _Bodies(NamedTuple):
-    """A fit of links that are bodies, and the share by which its torque error is larger."""
+    """A fit with physically consistent links, and the increase of its torque error."""
 
     settings: IdentificationSettings
     theory: BaseParameters
@@ -292,7 +292,7 @@ def _bodies(
     settings: IdentificationSettings,
     rng: np.random.Generator,
 ) -> _Bodies | None:
-    """Fit links that are bodies; None where they are not asked for and there are none."""
+    """Fit physically consistent links; None if not requested and impossible."""
     if settings.method == 'iv':
         return None
     known = settings.physical or PhysicalSettings()
@@ -314,7 +314,7 @@ def _fitted(
     settings: IdentificationSettings,
     rng: np.random.Generator,
 ) -> tuple[BaseParameters, FittedValues]:
-    """Fit what data determine better than the description, and return what any motion shows."""
+    """Fit the parameters that data determine better than the description."""
     base, problem, recordings, used = data
     method = settings.least_squares
 
@@ -343,7 +343,7 @@ def _require_samples(
     columns: Sequence[Regression],
     used: Conditioning,
 ) -> None:
-    """Refuse data with fewer than two torques for a parameter."""
+    """Raise an error for fewer than two torques per parameter."""
     samples = sum(len(part.motion) for part in columns)
     left = {part.source for part in columns}
     for recording in recordings:
@@ -360,7 +360,7 @@ def _require_samples(
 
 
 def _remarks(fit: FittedValues, theory: BaseParameters) -> tuple[str, ...]:
-    """Say what the data group, what they were weighted down for, and whether the fit settled."""
+    """Return notes on grouped parameters, outliers and convergence."""
     remarks = []
     if fit.base.rank < theory.rank:
         remarks.append(

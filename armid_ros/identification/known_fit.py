@@ -16,7 +16,7 @@ from armid_ros.identification.assess.grade_limits import by_error
 @dataclass(frozen=True)
 class KnownFit:
     """
-    What a model leaves of the torque, and what it is said to be good for.
+    Torque error and grade of a model, as its file states them.
 
     Attributes
     ----------
@@ -48,14 +48,14 @@ class KnownFit:
         return self.grade == 'unusable'
 
     def torque(self, joint: str) -> float:
-        """Return the root mean square torque of a joint, zero where it is not known [N m]."""
+        """Return the rms torque of a joint, zero if unknown [N m]."""
         error = self.errors.get(joint, 0.0)
         return 100.0 * self.rms[joint] / error if error > 0.0 else 0.0
 
 
 def known_fit(document: Mapping[str, Any]) -> KnownFit | None:
     """
-    Return what a document of identification.json or model.yaml says of the fit, if it does.
+    Read the fit from identification.json or model.yaml; None if absent.
 
     Raises
     ------
@@ -83,7 +83,7 @@ def known_fit(document: Mapping[str, Any]) -> KnownFit | None:
 
 
 def _worst(errors: Mapping[str, float], overall: float, data: str) -> str:
-    """Say in words how far off the joint is that is predicted worst."""
+    """Return a sentence on the joint with the largest error."""
     if not errors:
         return f'Torque error on {data}: {overall:.3g} %.'
     joint = max(errors, key=lambda one: errors[one])
@@ -92,7 +92,7 @@ def _worst(errors: Mapping[str, float], overall: float, data: str) -> str:
 
 
 def _by_joint(score: Mapping[str, Any], key: str) -> dict[str, float]:
-    """Return what a score says of each joint; empty where it says nothing."""
+    """Return the values of a score by joint; empty if absent."""
     values = {}
     for joint, value in (score.get(key) or {}).items():
         values[str(joint)] = finite(value, f'{key} of {joint}')

@@ -63,7 +63,7 @@ class DriveGains:
     half_width: FloatArray
 
     def document(self) -> list[dict[str, object]]:
-        """Return the gains for identification.json; null where the payload does not tell."""
+        """Return the gains for identification.json; null if not identified."""
         rows: list[dict[str, object]] = []
         for joint, gain, std, width in zip(
             self.joints, self.values, self.std, self.half_width, strict=True
@@ -76,7 +76,7 @@ class DriveGains:
         return rows
 
     def sentences(self) -> tuple[str, ...]:
-        """Say what they are, in lines."""
+        """Return the gains as sentences."""
         sure = np.isfinite(self.std)
         lines = [
             f'drive gain of {joint}: {gain:.4g} ({gain - width:.4g} to {gain + width:.4g}, 95 %)'
@@ -234,7 +234,7 @@ def drive_gains(
 def _gain(
     columns: FloatArray, known: FloatArray, tau: FloatArray, blocks: FloatArray
 ) -> tuple[float, float, float]:
-    """Return coefficient of the known torque, its deviation, and half of the 95 % interval."""
+    """Return the coefficient of the known torque, its std, and the 95 % half-width."""
     scale = np.linalg.norm(columns, axis=0)
     columns = columns[:, scale > 0.0] / scale[scale > 0.0]
     # The coefficient of a column is that of what the other columns leave of it (Frisch, Waugh).

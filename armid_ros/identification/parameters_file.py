@@ -37,7 +37,7 @@ _SCHEMAS = (_IDENTIFICATION, MODEL)
 @dataclass(frozen=True)
 class ParameterFile:
     """
-    What a file says of an arm.
+    Parameters of an arm as a file states them.
 
     Attributes
     ----------
@@ -88,14 +88,14 @@ class ParameterFile:
         return np.array([std for _, std in self.values.values()])
 
     def covariance_of(self, names: Sequence[ParameterName]) -> FloatArray:
-        """Return the covariance of some values; diagonal if the file has but deviations."""
+        """Return the covariance of some values; diagonal if only std is stored."""
         chosen = self._positions(names)
         if self.covariance is None:
             return np.asarray(np.diag(self.std[chosen] ** 2))
         return np.asarray(self.covariance[np.ix_(chosen, chosen)])
 
     def scatter_of(self, names: Sequence[ParameterName]) -> FloatArray:
-        """Return what some values change by without each recording, shape (K, p)."""
+        """Return the jackknife changes of some values, shape (K, p)."""
         if not len(self.scatter):
             return np.zeros((0, len(names)))
         return np.asarray(self.scatter[:, self._positions(names)])
@@ -106,7 +106,7 @@ class ParameterFile:
 
     def information(self, parameters: Sequence[ParameterName]) -> FloatArray | None:
         """
-        Return what the values tell of standard parameters: the inverse of a covariance.
+        Return the information matrix of the standard parameters.
 
         It is zero in directions that no value tells.
 
@@ -130,7 +130,7 @@ class ParameterFile:
 
     def regrouped_as(self, other: ParameterFile) -> ParameterFile:
         """
-        Return the values with those of another grouping that follow from them.
+        Return the values in another grouping of the base parameters.
 
         A motion that shows less groups more: its parameters are combinations of those of a richer
         one.
@@ -164,7 +164,7 @@ class ParameterFile:
 
 def read_parameters(path: str | Path) -> ParameterFile:
     """
-    Read what was identified.
+    Read identified parameters.
 
     Parameters
     ----------
@@ -204,7 +204,7 @@ def read_parameters(path: str | Path) -> ParameterFile:
 
 
 def _beside(path: Path, model: Mapping[str, Any]) -> ParameterFile | None:
-    """Return what the identification.json beside a model.yaml says, if it is of this model."""
+    """Read the identification.json beside a model.yaml if it belongs to it."""
     # It has what the model was made from: groups of parameters, with their covariance. It is of
     # the model if the values of the model make those of every group.
     file = path.with_name('identification.json')
@@ -235,7 +235,7 @@ def _beside(path: Path, model: Mapping[str, Any]) -> ParameterFile | None:
 
 def read_misfit(path: str | Path, arm: ArmModel) -> Misfit | None:
     """
-    Read what a model left when it was identified; None if its file does not say.
+    Read the residual of a model at its identification; None if unknown.
 
     Parameters
     ----------
@@ -259,7 +259,7 @@ def read_misfit(path: str | Path, arm: ArmModel) -> Misfit | None:
 
 
 def _with_robot(found: ParameterFile, path: Path, model: str = '') -> ParameterFile:
-    """Look up the robot that a file without its kinematics names, where it is still there."""
+    """Look up the robot that a file without kinematics names, if it exists."""
     # A text of a model.yaml has to have all parameters of it.
     beside = path.parent / found.robot
     source = str(beside) if is_file(beside) else found.robot
@@ -274,7 +274,7 @@ def _with_robot(found: ParameterFile, path: Path, model: str = '') -> ParameterF
 
 def parameters_of(source: str, document: dict[str, Any]) -> ParameterFile:
     """
-    Return what a document of identification.json or model.yaml says.
+    Return the parameters of a document of identification.json or model.yaml.
 
     Raises
     ------
@@ -341,7 +341,7 @@ def _matrix(rows: Sequence[Mapping[str, float]], keys: Sequence[str]) -> FloatAr
 
 
 def _covariance(rows: list[list[float]] | None, size: int) -> FloatArray | None:
-    """Return the matrix of a lower triangle."""
+    """Return the symmetric matrix of a lower triangle."""
     if rows is None:
         return None
     if [len(row) for row in rows] != list(range(1, size + 1)):

@@ -83,7 +83,7 @@ class BaseParameters:
         self, standard: tuple[ParameterName, ...], columns: npt.NDArray[np.intp]
     ) -> BaseParameters:
         """
-        Return the same as parameters of a longer list, of which the others stay as they are.
+        Embed the parameters in a longer list; the others are fixed.
 
         Parameters
         ----------
@@ -257,7 +257,7 @@ def symbol(parameter: ParameterName) -> str:
 
 
 def _expression(row: FloatArray, leader: int, standard: tuple[ParameterName, ...]) -> str:
-    """Write a grouping as a person would: equal factors once, in front of their sum."""
+    """Format a grouping with equal factors in front of their sum."""
     text = standard[leader].name
     factors: dict[float, list[tuple[float, str]]] = {}
     for column in np.flatnonzero(row):

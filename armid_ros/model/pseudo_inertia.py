@@ -133,7 +133,7 @@ class Consistency:
 
 def require_consistent(links: tuple[str, ...], parameters: npt.ArrayLike) -> None:
     """
-    Refuse parameters that no bodies have.
+    Raise an error for parameters that no body has.
 
     Parameters
     ----------

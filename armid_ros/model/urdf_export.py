@@ -121,7 +121,7 @@ def _without_inertials(urdf: str, links: Sequence[str]) -> str:
 
 
 def _share(body: FloatArray, others: FloatArray) -> float:
-    """Return how much of the other links' inertia stays, 1 for all, so that a body is left."""
+    """Return the largest share of the other links' inertia that keeps a body."""
     if not np.any(others):
         return 1.0
     if not Consistency.of('', others).eigenvalues[0] > -1e-12:
@@ -220,7 +220,7 @@ def _set_meshes(document: XmlText, element: Element, urdf: Path | None) -> None:
 
 
 def _check(robot: Robot, urdf: str) -> None:
-    """Read the result again, for what it says is what others will believe."""
+    """Read the result again as a check."""
     found, wanted = _parameters(robot, urdf), robot.rigid_parameters.reshape(-1, PER_LINK)
     worst = np.max(np.abs(found - wanted), axis=1)
     scale = float(np.max(np.abs(wanted)))

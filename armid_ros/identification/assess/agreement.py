@@ -67,12 +67,12 @@ class Agreement:
 
     @property
     def expected(self) -> float:
-        """Return how many should be within two standard deviations, on average."""
+        """Return the expected number of parameters within two standard deviations."""
         return float(self.parameters * (2.0 * scipy.stats.norm.cdf(WIDTH) - 1.0))
 
     @property
     def holds(self) -> bool:
-        """Whether the errors are as large as the covariance says."""
+        """Whether the errors agree with the covariance."""
         return self.lower <= self.distance <= self.upper
 
     def sentence(self) -> str:
@@ -85,7 +85,7 @@ class Agreement:
         )
 
     def document(self) -> dict[str, Any]:
-        """Return the numbers for programs to read."""
+        """Return the numbers as a document."""
         return {
             'within_two_deviations': self.within,
             'expected_within_two_deviations': self.expected,

@@ -133,7 +133,7 @@ def compare(before: ParameterFile, after: ParameterFile) -> Comparison:
 
 
 def _require_two_of_one_robot(before: ParameterFile, after: ParameterFile) -> None:
-    """Refuse robots whose joints differ, wherever their files are, and one result given twice."""
+    """Raise an error if the joints differ, or if one result is given twice."""
     if before.kinematics and after.kinematics and before.kinematics != after.kinematics:
         apart = set(before.joints).symmetric_difference(after.joints)
         how = (
@@ -154,7 +154,7 @@ def _require_two_of_one_robot(before: ParameterFile, after: ParameterFile) -> No
 
 
 def _nothing_shared(before: ParameterFile, after: ParameterFile) -> str:
-    """Say why two files cannot be compared."""
+    """Return the error that explains why two files cannot be compared."""
     for one in (before, after):
         if not one.values and one.without_std:
             return (
@@ -168,7 +168,7 @@ def _nothing_shared(before: ParameterFile, after: ParameterFile) -> str:
 
 
 def _only_in(one: ParameterFile, other: ParameterFile) -> Iterator[NotCompared]:
-    """Yield what one has of its own, where the other has no value of it."""
+    """Yield the parameters that only one of the two results has."""
     for name in one.values:
         if name in other.values or name in other.without_std:
             continue
@@ -182,7 +182,7 @@ def _only_in(one: ParameterFile, other: ParameterFile) -> Iterator[NotCompared]:
 
 @dataclass(frozen=True)
 class _Side:
-    """The parameters that two identifications share, in one of them."""
+    """Values and covariance of the shared parameters in one identification."""
 
     values: FloatArray  # (p,)
     #: Standard deviations: those of noise, and in each joint as many times as much as its values
@@ -214,7 +214,7 @@ class _Side:
 
 
 def _single_chances(before: _Side, after: _Side) -> FloatArray:
-    """Return how likely each difference is by chance, with freedoms of a sum (Welch)."""
+    """Return the p-value of each difference, with degrees of freedom by Welch."""
     size, std = np.abs(after.values - before.values), np.hypot(before.std, after.std)
     same = size <= _ROUNDING * np.abs(before.values)
     safe = np.where(std > 0.0, std, 1.0)
@@ -230,7 +230,7 @@ def _whole(
     names: Sequence[ParameterName],
     group: Sequence[int],
 ) -> tuple[FloatArray, FloatArray, float]:
-    """Return differences at some positions, their covariance, and their p-value together."""
+    """Return the differences of some parameters, their covariance and joint p-value."""
     own = [names[k] for k in group]
     difference = (sides[1].values - sides[0].values)[list(group)]
     covariance = files[0].covariance_of(own) + files[1].covariance_of(own)
@@ -249,7 +249,7 @@ def _whole(
 
 
 def _squares(rows: FloatArray, covariance: FloatArray) -> tuple[float, int]:
-    """Return the sum of the squares of rows (K, p) over a covariance, and its rank."""
+    """Return the Mahalanobis distance of rows (K, p), and the rank of the covariance."""
     std = np.sqrt(np.diag(covariance))
     with np.errstate(over='ignore'):
         squares, rank = quadratic_form(rows / std, covariance / np.outer(std, std), _ROUNDING)
@@ -259,7 +259,7 @@ def _squares(rows: FloatArray, covariance: FloatArray) -> tuple[float, int]:
 def _find_load(
     terms: Sequence[Mapping[str, float]], difference: FloatArray, covariance: FloatArray
 ) -> LoadChange | None:
-    """Return the load on the outermost link that explains changes of base parameters."""
+    """Return the load that explains the changes of base parameters, on the outermost link."""
     # that is where arms hold things; none if its mass does not differ from zero
     std = np.sqrt(np.diag(covariance))
     if not len(std) or not np.all(std > 0.0):
@@ -305,7 +305,7 @@ def residual_changes(
     before: KnownFit | None, after: KnownFit | None
 ) -> tuple[ResidualChange, ...]:
     """
-    Hold against each other what two models leave of each joint.
+    Compare the residuals of two models for each joint.
 
     Empty where it is not known alike: the misfit of model.yaml and the residual of
     identification.json are of other rows. What a model gets wrong of an arm is slow, so a

@@ -25,7 +25,7 @@ _CLEAR, _FEWEST, _MOST = 5.0, 4, 0.8
 @dataclass(frozen=True)
 class ParameterChange:
     """
-    One parameter in both: values, standard deviations, and whether they differ beyond chance.
+    One shared parameter: both values, standard deviations, and significance of the change.
 
     Attributes
     ----------
@@ -44,7 +44,7 @@ class ParameterChange:
 
     @property
     def difference(self) -> float:
-        """Return what it grew by."""
+        """Return the difference, second minus first."""
         return self.after - self.before
 
     @property
@@ -54,7 +54,7 @@ class ParameterChange:
 
     @property
     def deviations(self) -> float:
-        """Difference in its standard deviations; of exact values none, or infinitely many."""
+        """Return the z-score of the difference; 0 or inf for exact values."""
         if self.std > 0.0:
             return self.difference / self.std
         return float(np.copysign(np.inf if self.changed else 0.0, self.difference))
@@ -63,7 +63,7 @@ class ParameterChange:
 @dataclass(frozen=True)
 class GroupChange:
     """
-    Two or more parameters as a whole, and the probability that chance makes them differ as much.
+    A group of parameters with the p-value of their joint change.
 
     Attributes
     ----------
@@ -109,7 +109,7 @@ class LoadChange:
     rivals: tuple[int, ...] = ()
 
     def document(self) -> dict[str, Any]:
-        """Return the load for programs to read."""
+        """Return the load as a document."""
         center = None if self.center is None else self.center.tolist()
         return {**asdict(self), 'center': center, 'rivals': list(self.rivals)}
 
@@ -117,7 +117,7 @@ class LoadChange:
 @dataclass(frozen=True)
 class ResidualChange:
     """
-    What two models leave of one joint.
+    The residuals of two models in one joint.
 
     Attributes
     ----------
@@ -146,14 +146,14 @@ class ResidualChange:
     changed: bool = False
 
     def document(self) -> dict[str, Any]:
-        """Return it for programs to read."""
+        """Return the document for JSON."""
         return asdict(self) | {'ratio': self.ratio if isfinite(self.ratio) else None}
 
 
 @dataclass(frozen=True)
 class NotCompared:
     """
-    A parameter that is not compared, and why.
+    A parameter that is not compared, and the reason.
 
     Attributes
     ----------
@@ -169,7 +169,7 @@ class NotCompared:
     why: Literal['deviation', 'motion', 'effect', 'grouping']
 
     def document(self) -> dict[str, str]:
-        """Return it for programs to read."""
+        """Return the document for JSON."""
         return {'name': self.parameter.name, 'joint': self.parameter.joint, 'why': self.why}
 
 
@@ -207,44 +207,44 @@ class Comparison:
 
     @property
     def anything(self) -> bool:
-        """Whether something changed: a parameter, several as a whole, or what is left."""
+        """Whether any parameter, group or residual changed significantly."""
         return bool(self.changed or self.changed_residuals) or any(g.changed for g in self.groups)
 
     @property
     def unusable(self) -> tuple[ParameterFile, ...]:
-        """Return which of the two does not describe its recordings."""
+        """Return which of the two results is graded unusable."""
         both = self.before, self.after
         return tuple(one for one in both if one.fit is not None and one.fit.unusable)
 
     @property
     def factors(self) -> dict[str, float]:
-        """Return by what one factor the torques of each joint changed; see ``unit_factors``."""
+        """Return the common factor of the torques of each joint; see ``unit_factors``."""
         return unit_factors(self.changes)
 
     @property
     def not_compared(self) -> tuple[NotCompared, ...]:
-        """Return every parameter that either has and that was not compared."""
+        """Return every parameter of either result that was not compared."""
         return (*self.left_out, *self.only_before, *self.only_after)
 
     @property
     def changed_residuals(self) -> tuple[ResidualChange, ...]:
-        """Return the joints of which a model leaves much more than the other one."""
+        """Return the joints whose residual differs significantly between the models."""
         return tuple(one for one in self.residuals if one.changed)
 
     @property
     def changed_together(self) -> tuple[GroupChange, ...]:
-        """Return the groups that changed though none of their parameters did beyond doubt."""
+        """Return the groups that changed although no single parameter changed significantly."""
         sure = {change.parameter for change in self.changed}
         return tuple(g for g in self.groups if g.changed and not sure.intersection(g.parameters))
 
     @property
     def changed(self) -> tuple[ParameterChange, ...]:
-        """Return what changed, the surest first."""
+        """Return the changed parameters, most significant first."""
         found = [change for change in self.changes if change.changed]
         return tuple(sorted(found, key=lambda change: -abs(change.deviations)))
 
     def document(self) -> dict[str, Any]:
-        """Return the comparison for programs to read (schema armid/comparison/1)."""
+        """Return the comparison as a document (schema armid/comparison/1)."""
         parameters = []
         for change in self.changes:
             row = asdict(change)
@@ -277,7 +277,7 @@ class Comparison:
 
 def unit_factors(changes: Sequence[ParameterChange]) -> dict[str, float]:
     """
-    Return by what one factor the values of each joint changed, where that is all that did.
+    Return the common factor of the changes of each joint, if nothing else changed.
 
     No load and no wear makes masses and friction of all joints several times what they were:
     torques of one of the two are in another unit, or are currents. Empty where none are.

@@ -48,7 +48,7 @@ SIGNIFICANCE = 0.05
 @dataclass(frozen=True)
 class NoiseCheck:
     """
-    What encoder noise does to an identification.
+    The effect of encoder noise on an identification.
 
     Attributes
     ----------
@@ -82,7 +82,7 @@ class NoiseCheck:
 
     @property
     def consistent(self) -> bool:
-        """Whether the test finds nothing."""
+        """Whether the test is not significant."""
         return self.p_value >= SIGNIFICANCE
 
     @property
@@ -92,12 +92,12 @@ class NoiseCheck:
 
     @property
     def harmless(self) -> bool:
-        """Whether no parameter is biased by a share of its deviation that matters."""
+        """Whether the bias of every parameter is negligible beside its standard deviation."""
         return bool(np.max(np.abs(self.relative_bias), initial=0.0) < BIAS_LIMIT)
 
     def findings(self) -> tuple[tuple[str, bool], tuple[str, bool]]:
         """
-        Say in words what was found, each with whether it is as it should be.
+        Return sentences on the findings, each with whether it is satisfactory.
 
         Where the test fires and the noise makes no bias that matters, something else sets the
         two fits apart: what the model lacks, whose share of each is not the same.

@@ -50,7 +50,7 @@ def check_data(
     before: Sequence[Recording] = (),
 ) -> tuple[list[str], list[str]]:
     """
-    Look for faults of the data.
+    Check the data for faults.
 
     Parameters
     ----------
@@ -108,7 +108,7 @@ def _mistaken(
     motions: Sequence[Motion],
     before: Sequence[Motion],
 ) -> list[str]:
-    """Say what every recording shows to be wrong with it: names, signs or units of joints."""
+    """Return the mistakes of each recording: names, signs or units of joints."""
     # a baseline gives the factor of all torques by itself
     since = bool(before) and bool(np.any(factors_since(arm, motions, before) > 0.0))
     found = [find_mistake(arm.body, recording, used) for recording in recordings]
@@ -125,7 +125,7 @@ def mistaken_recordings(
     used: Conditioning,
 ) -> list[str]:
     """
-    Say of which recordings names, signs or units are wrong, each by itself, with the remedy.
+    Return the mistakes in names, signs or units of each recording, with remedies.
 
     Where they are wrong in every one `check_data` says so.
 
@@ -148,7 +148,7 @@ def mistaken_recordings(
 
 
 def _described_friction(arm: ArmModel) -> list[str]:
-    """Say that a description states friction that the model does not have."""
+    """Return a note if the description states friction that the model lacks."""
     robot = arm.robot
     there = {(effect.name, joint) for effect in arm.effects for joint in effect.joints}
     stated = [
@@ -171,7 +171,7 @@ def _described_friction(arm: ArmModel) -> list[str]:
 
 
 def _extremes(robot: Robot, recording: Recording) -> Iterator[str]:
-    """Say where torques stay at their highest value, or are beyond what a drive can give."""
+    """Return notes on torques that saturate or exceed the limits of the drives."""
     if recording.tau is None:
         return
     source = recording.source or 'recording'

@@ -35,7 +35,7 @@ from scipy import stats
 @dataclass(frozen=True)
 class Grade:
     """
-    What an identification is good for.
+    Grade of an identification, with reasons.
 
     Attributes
     ----------
@@ -60,7 +60,7 @@ class Grade:
     worst_joint: str
 
     def document(self) -> dict[str, object]:
-        """Return the grade for programs to read."""
+        """Return the grade as a document."""
         return {
             'grade': self.word,
             'error_percent': self.error_percent,
@@ -133,7 +133,7 @@ def _worst_first(reasons: Sequence[Fault]) -> list[Fault]:
 def _mistakes(
     result: Identification, description: ArmModel, recordings: Sequence[Recording]
 ) -> list[Fault]:
-    """Return what recordings show to be wrong: names, signs, units, zeros, delays, gravity."""
+    """Return mistakes in the recordings: names, signs, units, zeros, delays, gravity."""
     robot, used = description.body, result.used
     alike: dict[tuple[object, ...], list[tuple[str, Mistake]]] = {}
     settings = SignalSettings(used.cutoff_hz, used.decimation)
@@ -157,7 +157,7 @@ def _mistakes(
 def _errors(
     result: Identification, worst: Mapping[str | None, _Worst], held_out: Sequence[Fit]
 ) -> Iterator[Fault]:
-    """Judge the joint that is predicted worst, and name those that are not predicted."""
+    """Grade the joint with the largest error, and name the joints without prediction."""
     use = {
         'good': '',
         'poor': ', too much to compute torques with',
@@ -185,7 +185,7 @@ def _errors(
 
 
 class _Worst(NamedTuple):
-    """The joint that is predicted worst: its error, that without noise [%], and that in words."""
+    """The joint with the largest error: error, error without noise [%], and a sentence."""
 
     joint: int
     measured: float
@@ -194,7 +194,7 @@ class _Worst(NamedTuple):
 
 
 def _worst(errors: FloatArray, fits: Sequence[Fit], result: Identification) -> _Worst:
-    """Choose the joint that is predicted worst, or is off most where noise is all of that."""
+    """Choose the joint with the largest error beyond noise, or else the largest error."""
     joints, beyond = result.arm.robot.joints, beyond_noise(errors, fits, result.used)
     moves = moving(fit.motion for fit in fits)
     worst = int(np.lexsort((np.where(moves, errors, -1.0), beyond))[-1])
@@ -207,7 +207,7 @@ def _worst(errors: FloatArray, fits: Sequence[Fit], result: Identification) -> _
 
 
 def _halves(result: Identification, word: Word, error: str) -> Fault:
-    """Judge by what one half of the data says of the other, where nothing was held out."""
+    """Grade by the error with which each half of the data predicts the other."""
     training = Score.of(result.training).joint_relative_error_percent
     every = result.halves.joints
     text = f'cross-check between the halves of the data: {error}'
@@ -226,7 +226,7 @@ def _halves(result: Identification, word: Word, error: str) -> Fault:
 
 
 def _resting(result: Identification, validation: Mapping[str, Sequence[Fit]]) -> Iterator[Fault]:
-    """Yield which joints nothing is known of, or are not checked, because they do not move."""
+    """Yield sentences on joints that do not move: not identified, or not checked."""
     fitted = moving(fit.motion for fit in result.training)
     held_out = [fit.motion for part in validation.values() for fit in part]
     checked = moving(held_out) if held_out else fitted
@@ -245,7 +245,7 @@ def _resting(result: Identification, validation: Mapping[str, Sequence[Fit]]) ->
 
 def beyond_noise(errors: FloatArray, fits: Sequence[Fit], used: Conditioning) -> FloatArray:
     """
-    Return what is left of errors of joints without the noise of their torques.
+    Return the errors of joints without the share of torque noise.
 
     Noise counts twice: a row has it, and so has the prediction of a row, where that is as sure as
     a measurement of it (leverage of one, Hoaglin and Welsch 1978). A model that is no further off

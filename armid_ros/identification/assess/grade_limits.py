@@ -13,7 +13,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import Literal
 
-#: What an identification is good for.
+#: Grade of an identification, with reasons.
 Word = Literal['good', 'poor', 'unusable']
 #: Independent values of a residual in one recording. Of ten simulated arms that have lived and to
 #: which nothing happened, with other motions each day, the logarithm of the ratio of two residuals
@@ -25,7 +25,7 @@ FREEDOM = 8
 @dataclass(frozen=True)
 class GradeLimits:
     """
-    What decides between good, poor and unusable, and when a hypothesis is believed.
+    Limits of the grades, and of the likelihood ratio of a hypothesis.
 
     Attributes
     ----------

@@ -50,7 +50,7 @@ QUANTITIES: tuple[Quantity, ...] = ('position and torque', 'position', 'torque')
 @dataclass(frozen=True, eq=False)
 class Hypothesis:
     """
-    One thing that may be wrong with a recording.
+    A possible mistake in a recording.
 
     Attributes
     ----------
@@ -69,7 +69,7 @@ class Hypothesis:
     nearby : callable
         Returns finer steps of the same kind.
     of_data : bool
-        Whether it is of the data for sure, and of nothing that may happen to an arm.
+        Whether only the data, and no change of the arm, can explain it.
 
     """
 
@@ -84,12 +84,12 @@ class Hypothesis:
 
     @property
     def of_masses(self) -> bool:
-        """Whether masses that are all off by a factor do the same, up to where it is material."""
+        """Whether a common factor of all masses explains the same."""
         return self.kind in ('gravity', 'scale')
 
     @property
     def disputable(self) -> bool:
-        """Whether other masses would explain as much, so that a person has to say which it is."""
+        """Whether other masses explain the data as well."""
         return self.kind == 'scale' and not self.of_data
 
 
@@ -105,7 +105,7 @@ WITHOUT_BODY = Hypothesis(
 
 def hypotheses(robot: Robot, motions: Sequence[Motion]) -> Iterator[Hypothesis]:
     """
-    Yield what may be wrong with recorded motions of an arm, but for delays.
+    Yield the possible mistakes in recorded motions of an arm, except delays.
 
     Of an arm that moves by a few degrees some position is beyond a turn, if it is in degrees.
 
@@ -130,7 +130,7 @@ def hypotheses(robot: Robot, motions: Sequence[Motion]) -> Iterator[Hypothesis]:
 
 
 def _of_all_torques(robot: Robot, motions: Sequence[Motion]) -> Iterator[Hypothesis]:
-    """Yield the gravity, and the factor of all torques, that fit best, if masses do not."""
+    """Yield the best-fitting gravity and common torque factor, if masses do not explain them."""
     motion = thinned(motions, _ROWS)
     if motion is None:
         return
@@ -147,7 +147,7 @@ def _of_all_torques(robot: Robot, motions: Sequence[Motion]) -> Iterator[Hypothe
 
 
 def in_unit(robot: Robot, joint: int, unit: str) -> Hypothesis:
-    """Return that a joint's torque is in a unit; no load makes it a thousand times as large."""
+    """Return the hypothesis that the torque of a joint is in another unit."""
     wrong, right = effort_unit(robot, joint, unit), robot.torque_units[joint]
     return Hypothesis(
         'unit',
@@ -160,7 +160,7 @@ def in_unit(robot: Robot, joint: int, unit: str) -> Hypothesis:
 
 
 def delayed(seconds: float, half_width: float) -> Hypothesis:
-    """Return that torque comes later than its position, or earlier, with its 95 % interval [s]."""
+    """Return the hypothesis of a torque delay, with its 95 % interval [s]."""
     side = 'later' if seconds > 0.0 else 'earlier'
     return Hypothesis(
         'delay',
@@ -172,7 +172,7 @@ def delayed(seconds: float, half_width: float) -> Hypothesis:
 
 def shifted(motion: Motion, seconds: float) -> Motion:
     """
-    Return the motion of the time that a late torque belongs to.
+    Shift the motion by the delay of the torque.
 
     The torque stays as it is, for its noise would be less between samples.
 
@@ -188,7 +188,7 @@ def shifted(motion: Motion, seconds: float) -> Motion:
 
 def other_gravity(robot: Robot, vector: FloatArray) -> Hypothesis | None:
     """
-    Return that gravity is not as described.
+    Return the hypothesis of another gravity vector.
 
     Parameters
     ----------
@@ -228,7 +228,7 @@ def other_gravity(robot: Robot, vector: FloatArray) -> Hypothesis | None:
 
 def known_gravity(vector: FloatArray, told: FloatArray) -> tuple[FloatArray, str]:
     """
-    Write a gravity vector that was found as a person would.
+    Format a gravity vector, by its name if it is a known one.
 
     Parameters
     ----------
@@ -258,7 +258,7 @@ def known_gravity(vector: FloatArray, told: FloatArray) -> tuple[FloatArray, str
 
 
 def _other_scale(robot: Robot, factor: float, motions: Sequence[Motion]) -> Hypothesis:
-    """Return that efforts are a factor from N m: a unit where it is every joint's, or currents."""
+    """Return the hypothesis that efforts are a factor from N m: another unit, or currents."""
     torques = [motion.tau for motion in motions if motion.tau is not None]
     factors, correlation = torque_factors(robot, motions, torques)
     known = (correlation > _CLEAR) & (factors > 0.0)
@@ -317,7 +317,7 @@ def _zero_off(robot: Robot, joint: int, degrees: float) -> Hypothesis:
 
 
 def _in_degrees(robot: Robot, joint: int | None = None) -> Hypothesis:
-    """Return that positions are in degrees: those of all joints that turn, or of one."""
+    """Return the hypothesis that positions of one joint, or of all, are in degrees."""
     text = 'the positions seem to be in degrees: convert them to rad'
     if joint is not None:
         text = f'the position of {robot.joints[joint]} seems to be in degrees: convert it to rad'
@@ -326,12 +326,12 @@ def _in_degrees(robot: Robot, joint: int | None = None) -> Hypothesis:
 
 
 def _beyond_masses(factor: float) -> bool:
-    """Whether masses are not off by a factor, all of them."""
+    """Whether a common factor of all masses does not explain the data."""
     return not 1.0 / LIMITS.torque_factor < factor < LIMITS.torque_factor
 
 
 def _times(quantity: Quantity, joint: int | slice, factor: float) -> Callable[[Motion], Motion]:
-    """Return what multiplies a quantity of one joint, or of some."""
+    """Return the factors of a quantity for one or several joints."""
 
     def scaled(values: FloatArray) -> FloatArray:
         scale = np.ones(values.shape[1])

@@ -45,7 +45,7 @@ def units_beyond_drives(
     robot: Robot, recordings: Sequence[Recording], motions: Sequence[Motion]
 ) -> Iterator[str]:
     """
-    Say whose torque is in another unit, as the limits of drives show.
+    Return notes on torques in another unit, by the limits of the drives.
 
     Where most joints are beyond their limits, or the described body needs as much, it is
     the limits of the description that are wrong.
@@ -82,7 +82,7 @@ def unit_faults(
     arm: ArmModel, motions: Sequence[Motion], before: Sequence[Motion] = ()
 ) -> list[str]:
     """
-    Say what unit torques are in, as a model with its friction or a baseline shows.
+    Return notes on the unit of torques, by a model with friction or by a baseline.
 
     Parameters
     ----------
@@ -128,7 +128,7 @@ def factors_since(
     arm: ArmModel, motions: Sequence[Motion], before: Sequence[Motion] = ()
 ) -> FloatArray:
     """
-    Return the factors of torques on the model's, over those of a baseline if there is one.
+    Return the ratio of measured to modelled torque, relative to that of a baseline if given.
 
     A model is off by less than the torque of a baseline itself, times the factor, or it gives
     none: a motion that does not determine a model shows its errors there. Rows at rest count:
@@ -160,7 +160,7 @@ def factors_since(
 
 
 def _factors(arm: ArmModel, motions: Sequence[Motion]) -> tuple[FloatArray, FloatArray]:
-    """Return the slope of torques on those of the model, and their correlation, each (n,)."""
+    """Return slope and correlation of measured on modelled torques, each (n,)."""
     moves, expected, measured = _torques(arm, motions)
     if not arm.effects:
         torques = [motion.tau for motion in motions if motion.tau is not None]
@@ -178,7 +178,7 @@ def _factors(arm: ArmModel, motions: Sequence[Motion]) -> tuple[FloatArray, Floa
 def _torques(
     arm: ArmModel, motions: Sequence[Motion]
 ) -> tuple[npt.NDArray[np.bool_], FloatArray, FloatArray]:
-    """Return where joints move, the torque of the model and the measured one, each (N, n)."""
+    """Return where joints move, modelled torque and measured torque, each (N, n)."""
     speed = np.abs(np.concatenate([motion.dq for motion in motions]))
     expected = np.concatenate([arm.torque(motion) for motion in motions])
     measured = np.concatenate([motion.tau for motion in motions if motion.tau is not None])

@@ -53,7 +53,7 @@ _STEPS, _SETTLED = 10, 1e-4
 
 
 class Delay(NamedTuple):
-    """By how much a torque is late, negative for earlier, and half of the 95 % interval [s]."""
+    """Delay of a torque, negative if early, and half-width of its 95 % interval [s]."""
 
     seconds: float
     half_width: float
@@ -61,7 +61,7 @@ class Delay(NamedTuple):
 
 def late_torque(robot: Robot, recording: Recording, used: Conditioning) -> Delay | None:
     """
-    Return a delay with its 95 % interval; None where that holds zero.
+    Return the delay with its 95 % interval; None if that includes zero.
 
     Parameters
     ----------
@@ -93,7 +93,7 @@ def late_torque(robot: Robot, recording: Recording, used: Conditioning) -> Delay
 
 
 def _rows(robot: Robot, motion: Motion, used: Conditioning) -> tuple[FloatArray, FloatArray]:
-    """Return columns of each joint's own, (n, M, k), and shared ones, (n, M, 10 n + 3)."""
+    """Return the columns of each joint, (n, M, k), and the shared ones, (n, M, 10 n + 3)."""
     # own are offset, viscous friction, drive inertia, and dry friction that gives way over no
     # length and over several, constant and in proportion to the load, filtered as the torque is,
     # for it steps within a sample; shared are what bodies near the description add, what a delay
@@ -117,7 +117,7 @@ def _rows(robot: Robot, motion: Motion, used: Conditioning) -> tuple[FloatArray,
 
 
 def _step(parts: Sequence[tuple[FloatArray, FloatArray]]) -> Delay | None:
-    """Fit a delay beside friction, drives and a near body."""
+    """Fit the delay with friction, drive inertia and body as nuisance parameters."""
     # the deviation allows for residuals that are alike for long, or in all of a joint (Liang and
     # Zeger 1986): sums of their products with the rate over parts of the recording, or over
     # joints, whichever vary more

@@ -52,7 +52,7 @@ _FEWEST = 40
 @dataclass(frozen=True)
 class Mistake:
     """
-    What a recording shows to be wrong with it.
+    A mistake that a recording shows.
 
     Attributes
     ----------
@@ -72,21 +72,21 @@ class Mistake:
 
     @property
     def joint(self) -> int:
-        """Return the joint with most of the torque explained."""
+        """Return the joint whose torque is explained best."""
         return int(np.argmax(self.before.joints.clip(max=1.0) - self.after.joints))
 
     @property
     def of_data(self) -> bool:
-        """Whether it is of the data for sure, and of nothing that may happen to an arm."""
+        """Whether only the data, and no change of the arm, can explain it."""
         return all(one.of_data for one in self.hypotheses)
 
     @property
     def text(self) -> str:
-        """Return what seems to be wrong and what to do, without a full stop."""
+        """Return the mistake and the remedy, without a full stop."""
         return ', or '.join(one.text for one in self.hypotheses)
 
     def sentence(self, robot: Robot) -> str:
-        """Say what seems to be wrong, what to do and what shows it, without a full stop."""
+        """Return the mistake, the remedy and the evidence, without a full stop."""
         before, after = (
             100.0 * min(float(error.joints[self.joint]), 9.99)
             for error in (self.before, self.after)
@@ -99,7 +99,7 @@ class Mistake:
 
 
 class _Row(NamedTuple):
-    """A hypothesis, its errors, and its likelihood ratios over what its values have to reach."""
+    """A hypothesis with its errors and its likelihood ratios over their limits."""
 
     hypothesis: Hypothesis
     described: PredictionError
@@ -110,7 +110,7 @@ class _Row(NamedTuple):
 
 def find_mistake(robot: Robot, recording: Recording, used: Conditioning) -> Mistake | None:
     """
-    Try what may be wrong with a recording.
+    Find the most likely mistake in a recording.
 
     Parameters
     ----------
@@ -142,7 +142,7 @@ def find_mistake(robot: Robot, recording: Recording, used: Conditioning) -> Mist
         return None
 
     def rows(some: Sequence[Hypothesis]) -> list[_Row]:
-        """Judge hypotheses; a body is fitted where the described one leaves it open."""
+        """Evaluate hypotheses; fit the body where the described one is not decisive."""
         found = []
         for one in some:
             after = _error(robot, slow, one, near=False)
@@ -182,7 +182,7 @@ def find_mistake(robot: Robot, recording: Recording, used: Conditioning) -> Mist
 
 
 def _predicts(robot: Robot, row: _Row) -> bool:
-    """Whether the corrected data are predicted at all."""
+    """Whether the model predicts the corrected data."""
     after = row.described if row.as_described >= 1.0 else row.fitted
     return bool(100.0 * after.whole(robot) < LIMITS.unusable)
 
@@ -190,7 +190,7 @@ def _predicts(robot: Robot, row: _Row) -> bool:
 def _error(
     robot: Robot, slow: Sequence[Motion], one: Hypothesis, *, near: bool
 ) -> PredictionError | None:
-    """Return how well a hypothesis predicts motions; None where too few samples remain."""
+    """Return the prediction error of a hypothesis; None if too few samples remain."""
     motion = thinned([one.motion(motion) for motion in slow], _ROWS)
     if motion is None or len(motion) < _FEWEST:
         return None
@@ -198,7 +198,7 @@ def _error(
 
 
 def _first(rows: Sequence[_Row], ratio: str, before: PredictionError) -> Mistake:
-    """Return the hypothesis with the largest ratio, and those of other kinds that are as good."""
+    """Return the hypothesis with the largest ratio, and its equals of other kinds."""
     value = attrgetter(ratio)
     first, *others = sorted(rows, key=value, reverse=True)
     likely = {first.hypothesis.kind: first.hypothesis}
@@ -212,7 +212,7 @@ def _first(rows: Sequence[_Row], ratio: str, before: PredictionError) -> Mistake
 
 
 def slow_motions(recordings: Sequence[Recording], used: Conditioning) -> list[Motion]:
-    """Return the stretches of recordings, with what is in the band of the motion alone."""
+    """Return the stretches of recordings, low-passed to the band of the motion."""
     result = []
     for motion in (part for one in recordings for part in segments(one, used)):
         kept = np.array(decimated_samples(len(motion), used), dtype=np.intp)

@@ -50,7 +50,7 @@ class PredictionError:
     off: float = 0.0
 
     def whole(self, robot: Robot) -> float:
-        """Return the error of all slides or of all other joints together, whichever is more."""
+        """Return the larger of the errors of all prismatic and of all revolute joints."""
         left = self.joints * self.torque
         return max(
             float(np.linalg.norm(left[own]) / np.linalg.norm(self.torque[own]))
@@ -69,7 +69,7 @@ class PredictionError:
         return self.of_data(better) * float(np.exp((self.off - better.off) / (2.0 * FREEDOM)))
 
     def of_data(self, better: PredictionError) -> float:
-        """Return that ratio without the prior of the bodies."""
+        """Return the likelihood ratio without the prior of the bodies."""
         before, after = (np.clip(x.joints, LIMITS.floor, 1.0) for x in (self, better))
         return float(np.prod(before / after))
 
@@ -79,7 +79,7 @@ class PredictionError:
 
 
 def thinned(stretches: Sequence[Motion], rows: int) -> Motion | None:
-    """Put stretches with torques one after the other, and keep about so many of the samples."""
+    """Concatenate stretches with torques, and thin them to about a number of samples."""
     parts = [motion for motion in stretches if motion.tau is not None and len(motion) > 2]
     if not parts:
         return None
@@ -91,7 +91,7 @@ def thinned(stretches: Sequence[Motion], rows: int) -> Motion | None:
 
 def prediction_error(robot: Robot, motion: Motion, *, near: bool) -> PredictionError:
     """
-    Fit friction, offset and drive inertia of every joint, and return what is left of the torque.
+    Fit friction, offset and drive inertia of every joint; return the prediction error.
 
     Friction and the inertia of a drive are not below zero: they explain no torque of the opposite
     sign.
@@ -138,7 +138,7 @@ def prediction_error(robot: Robot, motion: Motion, *, near: bool) -> PredictionE
 
 def common_values(motion: Motion, fixed: FloatArray, columns: FloatArray) -> FloatArray:
     """
-    Fit values that all joints share, such as gravity, beside friction and drive of each joint.
+    Fit values that all joints share, such as gravity, with friction and drives as nuisance.
 
     Joints are weighted by their residuals, down to the floor.
 
@@ -174,7 +174,7 @@ def common_values(motion: Motion, fixed: FloatArray, columns: FloatArray) -> Flo
 
 def beside(own: FloatArray, shared: FloatArray) -> FloatArray:
     """
-    Return what columns of each joint's own leave of others (Frisch and Waugh 1933).
+    Project the own columns of each joint out of others (Frisch and Waugh 1933).
 
     Parameters
     ----------
@@ -194,13 +194,13 @@ def beside(own: FloatArray, shared: FloatArray) -> FloatArray:
 
 
 def root_mean_square(columns: FloatArray) -> FloatArray:
-    """Return the root mean square of every column; one where there is none."""
+    """Return the root mean square of every column; one if it is zero."""
     size = np.sqrt(np.mean(columns**2, axis=0))
     return np.where(size > 0.0, size, 1.0)
 
 
 def _own_columns(motion: Motion) -> FloatArray:
-    """Return columns of each joint's own, of mean square one, shape (N, n, 4)."""
+    """Return the own columns of each joint, of mean square one, shape (N, n, 4)."""
     dq, ddq = motion.dq, motion.ddq
     columns = np.stack([np.ones_like(dq), dq, np.sign(dq), ddq], axis=-1)
     return columns / root_mean_square(columns)

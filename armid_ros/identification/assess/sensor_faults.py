@@ -99,7 +99,7 @@ def sensor_faults(
     arm: ArmModel, recordings: Sequence[Recording], rows: Sequence[Stretch], used: Conditioning
 ) -> Iterator[Fault]:
     """
-    Yield faults of clocks and sensors, and joints that were elsewhere.
+    Yield faults of clocks and sensors, and undriven joints at another position.
 
     Parameters
     ----------
@@ -137,7 +137,7 @@ def sensor_faults(
 
 
 def _jumps(robot: Robot, recording: Recording) -> Iterator[Fault]:
-    """Yield the positions that step faster than a joint can move, and do not come back at once."""
+    """Yield positions that jump faster than the joint can move, and do not jump back."""
     if len(recording) < 2:
         return
     time = np.maximum(np.diff(recording.t), recording.period)[:, np.newaxis]
@@ -160,7 +160,7 @@ def _jumps(robot: Robot, recording: Recording) -> Iterator[Fault]:
 
 
 def encoder_faults(recording: Recording, units: Sequence[str] | None = None) -> Iterator[Fault]:
-    """Yield the positions, or velocities, that stay the same while their joint moves."""
+    """Yield position and velocity channels that are constant while the joint moves."""
     if recording.dq is None:
         return
     t, units = recording.t, units or ('rad',) * recording.n_joints
@@ -196,7 +196,7 @@ def encoder_faults(recording: Recording, units: Sequence[str] | None = None) -> 
 def torque_faults(
     arm: ArmModel, recording: Recording, motions: Sequence[Motion]
 ) -> Iterator[Fault]:
-    """Yield the torques that stay the same, though the joint moves and takes another one."""
+    """Yield torque channels that are constant while the joint needs another torque."""
     assert recording.tau is not None
     if np.all(np.ptp(recording.tau, axis=0) < NOTHING):
         yield Fault(SILENT, 'unusable', recording.source)
@@ -228,14 +228,14 @@ def torque_faults(
 
 
 def _when(t: FloatArray, start: int, stop: int, always: str) -> tuple[str, str]:
-    """Return when a reading stays the same, in words, and what to do."""
+    """Describe when a channel is constant, and the remedy."""
     if stop - start == len(t):
         return 'throughout', always
     return f'from {t[start]:.3f} s to {t[stop - 1]:.3f} s', 'leave that time out'
 
 
 def _longest_same(reading: FloatArray, step: float = 0.0) -> tuple[int, int]:
-    """Return where the longest run without a larger step starts and stops."""
+    """Return start and stop of the longest run of equal samples."""
     edges = np.flatnonzero(np.abs(np.diff(reading)) > step) + 1
     bounds = np.concatenate([[0], edges, [len(reading)]])
     longest = int(np.argmax(np.diff(bounds)))
@@ -243,7 +243,7 @@ def _longest_same(reading: FloatArray, step: float = 0.0) -> tuple[int, int]:
 
 
 def _distance(t: FloatArray, dq: FloatArray) -> float:
-    """Return how far a recorded velocity goes beyond its mean, [rad or m]."""
+    """Return the distance that a recorded velocity covers beyond its mean [rad or m]."""
     if len(t) < 3:
         return 0.0
     way = cumulative_trapezoid(dq, t, initial=0.0)
@@ -297,7 +297,7 @@ def velocity_ratio(recording: Recording) -> tuple[FloatArray, FloatArray]:
 
 def velocity_faults(recording: Recording) -> Iterator[Fault]:
     """
-    Yield what is wrong with velocities beside positions: the time base, a unit or a sign.
+    Yield faults of velocities against positions: time base, unit or sign.
 
     Identification takes velocities from the positions, so that a unit or a sign spoils nothing.
     Of a wrong time two joints at least have to agree, and no other that moves may disagree.
@@ -329,7 +329,7 @@ def held_elsewhere(
     robot: Robot, recordings: Sequence[Recording], motions: Sequence[Motion]
 ) -> Iterator[Fault]:
     """
-    Yield the joints that are not driven and were elsewhere, as far as it matters.
+    Yield undriven joints that were at another position, if that matters.
 
     Where such a joint moves, or stands elsewhere and carries driven joints, the arm is another one
     than the model; how much that matters is what its position makes of the described torque along
@@ -369,7 +369,7 @@ def held_elsewhere(
 
 
 def _elsewhere(joint: HeldJoint, lowest: float, highest: float, moves: bool, makes: str) -> str:
-    """Say where a joint was, what that makes of the torque and what to do."""
+    """Describe where a joint was, its effect on the torque, and the remedy."""
     name, unit = joint.name, joint.unit
     model = f'the model has it at {joint.position:.3g} {unit}'
     if not moves:

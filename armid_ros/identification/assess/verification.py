@@ -52,7 +52,7 @@ Progress = Callable[[float, str], None]
 @dataclass(frozen=True)
 class ForwardScore:
     """
-    How far a simulated arm was from the recorded one under the same torques.
+    Position error of a simulated arm under the recorded torques.
 
     Attributes
     ----------
@@ -84,14 +84,14 @@ class ForwardScore:
 
     @property
     def worst(self) -> str:
-        """Return the largest position error and its joint, as it is read."""
+        """Format the largest position error and its joint."""
         joint = int(np.argmax(self.position_error))
         return (
             f'{1e3 * self.position_error[joint]:.3g} m{self.units[joint]} ({self.joints[joint]})'
         )
 
     def document(self) -> dict[str, dict[str, float]]:
-        """Return the errors of every joint for programs to read."""
+        """Return the errors of every joint as a document."""
         named = {
             'position_rms': self.position_error,
             'torque_rms': self.torque_error,
@@ -105,7 +105,7 @@ class ForwardScore:
 
 @dataclass(frozen=True, eq=False)
 class _RecordedTorque(Controller):
-    """The recorded torque, and a feedback of the inertia of an arm that holds it to its motion."""
+    """Recorded torque with inertia-scaled feedback to the recorded motion."""
 
     motion: Motion
     feedback: LinearFeedback
@@ -200,7 +200,7 @@ class ForwardValidation:
     after: ForwardScore
 
     def sentence(self) -> str:
-        """Say how far the simulations are off."""
+        """Return a sentence on the position errors of the simulations."""
         before = '' if self.before is None else f'{self.before.worst} before, '
         comment = self.comment()
         return (
@@ -211,7 +211,7 @@ class ForwardValidation:
 
     @property
     def worse(self) -> tuple[str, ...]:
-        """Joints that are farther off after than before, by more than simulations vary."""
+        """Joints whose error grew by more than simulations vary."""
         if self.before is None:
             return ()
         before, after = self.before.position_error, self.after.position_error
@@ -221,11 +221,11 @@ class ForwardValidation:
         return tuple(name for name, more in zip(self.after.joints, grown, strict=True) if more)
 
     def comment(self) -> str:
-        """Say where it is worse than before; '' where it is not."""
+        """Return a sentence on joints that became worse; '' if none did."""
         return f'it is worse than before in {", ".join(self.worse)}' if self.worse else ''
 
     def document(self) -> dict[str, Any]:
-        """Return the errors for programs to read."""
+        """Return the errors as a document."""
         return {
             'bag': self.after.source,
             'seconds': float(np.ptp(self.after.motion.t)),
@@ -237,7 +237,7 @@ class ForwardValidation:
 @dataclass(frozen=True)
 class Verification:
     """
-    What an identification was put to.
+    Tests of an identification.
 
     Attributes
     ----------
@@ -255,7 +255,7 @@ class Verification:
     left_out: tuple[str, ...]
 
     def sentences(self) -> tuple[str, ...]:
-        """Say in words what was found; ``left_out`` says what was not done."""
+        """Return sentences on the results; ``left_out`` lists the tests that were not made."""
         found = () if self.noise is None else self.noise.findings()
         return (*(text for text, _ in found), *(pair.sentence() for pair in self.forward))
 

@@ -29,7 +29,7 @@ LEAST_LEFT = 0.1
 
 
 def sandwich(bread: FloatArray, middle: FloatArray) -> FloatArray:
-    """Return bread middle bread', semi-definite whatever rounding does, shape (p, p)."""
+    """Return the sandwich bread middle bread', positive semi-definite, shape (p, p)."""
     covariance = bread @ middle @ bread.T
     std = np.sqrt(np.maximum(np.abs(np.diag(covariance)), 1e-300))
     sizes, axes = np.linalg.eigh(covariance / np.outer(std, std))
@@ -40,7 +40,7 @@ def sandwich(bread: FloatArray, middle: FloatArray) -> FloatArray:
 
 def score_products(scores: Sequence[FloatArray], lags: int) -> FloatArray:
     """
-    Return the covariance of the sum of scores of which neighbours are alike.
+    Return the covariance of a sum of autocorrelated scores.
 
     Source: Newey and West 1987.
 
@@ -66,7 +66,7 @@ def score_products(scores: Sequence[FloatArray], lags: int) -> FloatArray:
 
 
 def widened(covariance: FloatArray, bread: FloatArray, middle: FloatArray) -> FloatArray:
-    """Return a covariance, (p, p), with deviations no less than those of another middle."""
+    """Widen a covariance, (p, p), to the standard deviations of another middle."""
     ratio = np.diag(bread @ middle @ bread) / np.diag(covariance)
     factor = np.sqrt(np.maximum(ratio, 1.0))
     return np.asarray(covariance * np.outer(factor, factor))
@@ -178,7 +178,7 @@ def _smoothed(spectrum: FloatArray, reach: int) -> FloatArray:
 
 def scatter(problem: Sequence[Regression], weights: FloatArray, values: FloatArray) -> FloatArray:
     """
-    Return the changes of values without each recording, of which squares sum up to a variance.
+    Return jackknife changes of the values, whose squares sum up to a variance.
 
     A change counts by what the other recordings determine of the value: for white noise the
     squares then sum up to the variance of least squares, also where one recording determines most
@@ -224,6 +224,6 @@ def scatter(problem: Sequence[Regression], weights: FloatArray, values: FloatArr
 
 
 def _solution(products: FloatArray) -> tuple[FloatArray, FloatArray]:
-    """Return means and deviations, (p,), of normal equations (p, p + 1), zero if not seen."""
+    """Return means and standard deviations, (p,), of normal equations (p, p + 1)."""
     basis = informative_basis(products[:, :-1])
     return basis @ (basis.T @ products[:, -1]), np.sqrt(np.sum(basis**2, axis=1))

@@ -34,7 +34,7 @@ def excited(
     theory: BaseParameters, problem: Sequence[Regression]
 ) -> tuple[BaseParameters, tuple[Regression, ...]]:
     """
-    Group further what a motion does not tell apart, such as the links of a joint at rest.
+    Group parameters that a motion does not separate, such as links of a joint at rest.
 
     Parameters
     ----------
@@ -59,7 +59,7 @@ def identifiable_base(
     theory: BaseParameters, normal: NormalEquations
 ) -> tuple[BaseParameters, list[int]]:
     """
-    Group further what the rows of normal equations do not tell apart.
+    Group parameters that normal equations do not separate.
 
     Parameters
     ----------
@@ -85,7 +85,7 @@ def identifiable_base(
 
 
 def bounds(arm: ArmModel, base: BaseParameters) -> tuple[FloatArray, FloatArray]:
-    """Return the bounds of base parameters; one that stands for a group has none."""
+    """Return the bounds of base parameters; a group of parameters has none."""
     free = np.full(len(arm.robot.rigid_parameters), np.inf)
     effects = [effect.bounds() for effect in arm.effects]
     lower = np.concatenate([-free, *(limits[0] for limits in effects)])[base.independent]
@@ -98,7 +98,7 @@ def determined(
     arm: ArmModel, base: BaseParameters, problem: Sequence[Regression], method: Method
 ) -> tuple[BaseParameters, tuple[Regression, ...], Solution]:
     """
-    Hold at the description what is less sure than it, the least sure first.
+    Hold parameters at the description if it is more certain than the data.
 
     The others get surer by what is held, so that one is held at a time.
 
@@ -154,7 +154,7 @@ def determined(
 
 def base_spread(arm: ArmModel, base: BaseParameters) -> FloatArray:
     """
-    Return what base parameters of a description may be off by, shape (r,).
+    Return the prior standard deviation of described base parameters, shape (r,).
 
     Infinite where an effect takes part that does not know the size of its values, and where no
     link has a mass.
@@ -169,5 +169,5 @@ def base_spread(arm: ArmModel, base: BaseParameters) -> FloatArray:
 
 
 def near_deviation(robot: Robot) -> FloatArray:
-    """Return standard deviations of rigid parameters of a description, uniform, shape (10 n,)."""
+    """Return the prior standard deviation of rigid parameters, shape (10 n,)."""
     return np.asarray(described_spread(robot).ravel() / np.sqrt(3.0))

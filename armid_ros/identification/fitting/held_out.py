@@ -67,7 +67,7 @@ def halves_error(
     spread: FloatArray | None = None,
 ) -> HalvesError:
     """
-    Fit the first half and predict the second, and the other way round.
+    Cross-validate with two halves: fit one and predict the other.
 
     Parameters
     ----------
@@ -123,7 +123,7 @@ def cutoff_of_torques(
     used: Conditioning,
 ) -> Conditioning:
     """
-    Lower the cut-off of positions as far as it makes torques more predictable.
+    Lower the cut-off of positions while that improves held-out torque prediction.
 
     The highest cut-off is taken whose loss on data that were left out is within a tenth of the
     least, or one standard deviation (Breiman et al., Classification and Regression Trees, 1984):
@@ -173,7 +173,7 @@ def cutoff_of_torques(
 def _shared(
     problem: Sequence[Sequence[Regression]], shorter: Sequence[Sequence[Regression]]
 ) -> list[Regression]:
-    """Return the rows of each recording that a lower cut-off has as well."""
+    """Return the rows of each recording that a lower cut-off shares."""
     # It cuts more off the ends, where arms start and stop: other rows have other losses.
     result = []
     for parts, others in zip(problem, shorter, strict=True):
@@ -187,14 +187,14 @@ def _shared(
 
 
 def _as_good(losses: FloatArray, best: FloatArray) -> bool:
-    """Tell whether stretches are predicted as well as the best way does, to one deviation."""
+    """Whether stretches are predicted as well as by the best, within one standard error."""
     worse = losses - best
     deviation = np.std(worse, ddof=1) / np.sqrt(len(worse))
     return bool(np.mean(worse) <= max(float(deviation), _NEAR))
 
 
 def _losses(problem: Sequence[Regression]) -> FloatArray:
-    """Return the log of the rms that others leave of each stretch, mean of joints, shape (S,)."""
+    """Return the mean log rms error of each stretch, predicted from the others, (S,)."""
     # every second stretch is predicted from the others, and those from it; every joint counts by
     # the ratio of its errors: a light one whose torque is mostly noise gains by a low cut-off, and
     # must not hide that a heavy one loses
@@ -228,14 +228,14 @@ def _fit(
 
 
 def _step(problem: Sequence[Regression], most: int) -> int:
-    """Return how many rows apart those are of which there are about so many."""
+    """Return the stride that leaves about a number of rows."""
     return max(1, sum(len(part.tau) for part in problem) // most)
 
 
 def _some_rows(
     problem: Sequence[Regression], most: int
 ) -> tuple[FloatArray, FloatArray, FloatArray, npt.NDArray[np.bool_]]:
-    """Return about so many rows: columns (N, n, r), torque, target and which are informative."""
+    """Thin to about a number of rows: columns (N, n, r), torque, target, informative."""
     step = _step(problem, most)
     columns, tau, target = (
         np.concatenate([getattr(part, name) for part in problem])[::step]

@@ -29,7 +29,7 @@ Reason = Literal[
 @dataclass(frozen=True)
 class Unidentified:
     """
-    A parameter that the data do not tell.
+    A parameter that the data do not identify.
 
     Attributes
     ----------
@@ -45,7 +45,7 @@ class Unidentified:
 
 
 def excludes_zero(values: npt.ArrayLike, std: npt.ArrayLike) -> npt.NDArray[np.bool_]:
-    """Return where the 95 % interval of an estimate leaves out zero."""
+    """Return whether the 95 % interval of each estimate excludes zero."""
     return np.asarray(np.abs(values) > HALF_WIDTH * np.asarray(std, dtype=float))
 
 
@@ -53,7 +53,7 @@ def unidentified(
     theory: BaseParameters, base: BaseParameters, estimate: Estimate
 ) -> tuple[Unidentified, ...]:
     """
-    List what some data do not tell.
+    List the parameters that data do not identify.
 
     Parameters
     ----------

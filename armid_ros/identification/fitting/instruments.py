@@ -50,7 +50,7 @@ _SETTLED = 0.02
 @dataclass(frozen=True)
 class Instrumented:
     """
-    Values by instruments.
+    Estimate by instrumental variables.
 
     Attributes
     ----------
@@ -75,7 +75,7 @@ def fit_by_instruments(
     fit: FittedValues, recordings: Sequence[Recording], used: Conditioning
 ) -> FittedValues:
     """
-    Fit by instruments of the smoothed motion, beginning from weighted least squares.
+    Fit by instrumental variables from the smoothed motion, from a weighted start.
 
     Parameters
     ----------

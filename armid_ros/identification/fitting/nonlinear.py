@@ -64,7 +64,7 @@ Torques = tuple[FloatArray, ...]
 @dataclass(frozen=True)
 class FittedValues:
     """
-    A fit, and the torque that the arm has with it.
+    Fitted values with the arm and the torque they give.
 
     Attributes
     ----------
@@ -98,7 +98,7 @@ class FittedValues:
 
     @property
     def fits(self) -> tuple[Fit, ...]:
-        """Return how the model predicts the data that it was fitted to."""
+        """Return the predictions of the training data."""
         return tuple(
             Fit(part.source, part.motion, part.informative, torque)
             for part, torque in zip(self.problem, self.predicted, strict=True)
@@ -116,7 +116,7 @@ def fit_values(
     solution: Solution | None = None,
 ) -> FittedValues:
     """
-    Fit base parameters, again and again where the torque is not linear in them.
+    Fit base parameters, by Gauss-Newton if the torque is not linear in them.
 
     Parameters
     ----------
@@ -162,7 +162,7 @@ def fit_values(
 
 def curved(before: ArmModel, after: ArmModel, motions: Sequence[Motion]) -> bool:
     """
-    Tell whether the torque is not linear in the parameters between two arms of one structure.
+    Whether the torque is nonlinear in the parameters between two arms.
 
     Parameters
     ----------
@@ -186,7 +186,7 @@ def curved(before: ArmModel, after: ArmModel, motions: Sequence[Motion]) -> bool
 
 def moved(arm: ArmModel, base: BaseParameters, values: FloatArray, free: FloatArray) -> ArmModel:
     """
-    Return an arm with other base parameters.
+    Return the arm with other base parameters.
 
     Of what no motion tells apart, effects stay where they are and rigid parameters move as little
     as may be: what is grouped with rigid parameters alone is so wherever the effects are.
@@ -213,7 +213,7 @@ def moved(arm: ArmModel, base: BaseParameters, values: FloatArray, free: FloatAr
 
 
 def _carried(rigid: FloatArray, free: FloatArray) -> FloatArray:
-    """Return rigid parameters with a mass where a first moment has none, shape (10 n,)."""
+    """Give a mass to links with a first moment but no mass, shape (10 n,)."""
     links = rigid.reshape(-1, len(LINK_PARAMETERS))
     lacking = (np.abs(links[:, 0]) < NO_MASS) & np.any(np.abs(links[:, 1:4]) >= NO_MASS, axis=1)
     if not np.any(lacking):
@@ -252,7 +252,7 @@ def torques(arm: ArmModel, recordings: Sequence[Recording], used: Conditioning) 
 def through(
     problem: Sequence[Regression], predicted: Torques, values: FloatArray
 ) -> tuple[Regression, ...]:
-    """Return linear models that have the predicted torque at the values."""
+    """Shift linear models so that they predict the torque at the given values."""
     return tuple(
         replace(part, constant=torque - part.columns @ values)
         for part, torque in zip(problem, predicted, strict=True)
@@ -262,7 +262,7 @@ def through(
 def agree(
     problem: Sequence[Regression], weights: FloatArray, promised: Torques, predicted: Torques
 ) -> bool:
-    """Tell whether the torque of an arm is what a linear model promised, as far as it matters."""
+    """Whether the torque of an arm agrees with its linear model."""
     off = _size(weights, [p - q for p, q in zip(promised, predicted, strict=True)])
     whole = _size(weights, [part.tau for part in problem])
     left = [part.tau - torque for part, torque in zip(problem, promised, strict=True)]
@@ -278,7 +278,7 @@ def _iterate(
     method: Method,
     free: FloatArray,
 ) -> FittedValues:
-    """Take Gauss-Newton steps, damped where they lead astray, until linear model and arm agree."""
+    """Take damped Gauss-Newton steps until the linear model and the arm agree."""
     limits = bounds(arm, base)
     now = _State(arm, base.values(arm.theta), problem)
     passes, settled = 0, True
@@ -317,7 +317,7 @@ def _iterate(
 
 
 class _State:
-    """Where an iteration is: an arm, its values, its linear model, and what that leaves."""
+    """State of an iteration: arm, values, linear model and residual."""
 
     def __init__(self, arm: ArmModel, values: FloatArray, problem: Sequence[Regression]) -> None:
         self.arm, self.values, self.problem = arm, values, tuple(problem)
@@ -330,7 +330,7 @@ class _State:
         self._weights = self._used / np.maximum(rms, _EXACT * max(rms.max(), 1e-100))
 
     def gain(self, predicted: Torques) -> float:
-        """Return the squared residuals that torques explain; zero where there is no residual."""
+        """Return the share of squared residuals that torques explain."""
         if np.linalg.norm(self._used * self._left) <= _FINE * np.linalg.norm(
             self._used * self._tau
         ):
@@ -347,7 +347,7 @@ class _State:
         return np.clip(self.values + step / np.where(size > 0.0, size, np.inf), *limits)
 
     def cost(self, predicted: Torques | None = None) -> float:
-        """Return the sum of squares that remains of the present residual of each joint."""
+        """Return the sum of squared residuals after a step, per joint."""
         if predicted is None:
             return float(np.sum((self._weights * self._left) ** 2))
         left = self._weights * (self._tau - np.concatenate(predicted))

@@ -32,7 +32,7 @@ UNINFORMATIVE = 1e-10
 @dataclass(frozen=True, eq=False)
 class NormalEquations:
     """
-    Products of the columns and the target of all joints.
+    Normal equations of all joints.
 
     Attributes
     ----------
@@ -82,11 +82,11 @@ class NormalEquations:
         return cls(products, counts)
 
     def __add__(self, other: NormalEquations) -> NormalEquations:
-        """Return the normal equations of the rows of both."""
+        """Add the normal equations of two sets of rows."""
         return NormalEquations(self.products + other.products, self.counts + other.counts)
 
     def restrict(self, columns: Sequence[int] | npt.NDArray[np.intp]) -> NormalEquations:
-        """Return the normal equations of the same rows in some of their columns."""
+        """Return the normal equations restricted to some columns."""
         kept = np.append(np.asarray(columns, dtype=np.intp), self.rank)
         return NormalEquations(self.products[:, kept[:, np.newaxis], kept], self.counts)
 
@@ -125,7 +125,7 @@ class NormalEquations:
 
     @classmethod
     def unpacked(cls, numbers: FloatArray) -> NormalEquations:
-        """Return the normal equations that were packed."""
+        """Unpack normal equations."""
         joints = int(numbers[0])
         triangles = numbers[1 + joints :].reshape(joints, -1)
         size = int(np.sqrt(2 * triangles.shape[1]))
@@ -158,7 +158,7 @@ class WeightedFit:
 
     @property
     def condition_number(self) -> float:
-        """Of the weighted columns."""
+        """Condition number of the weighted columns."""
         return float(np.linalg.cond(self.factor))
 
     @property
@@ -223,7 +223,7 @@ def within(
     values: FloatArray, factor: FloatArray, bounds: tuple[FloatArray, FloatArray]
 ) -> FloatArray:
     """
-    Return the best fit within bounds: the one whose predictions differ least from the free.
+    Return the bounded fit whose predictions are nearest to the free fit.
 
     Parameters
     ----------
@@ -245,7 +245,7 @@ def within(
 
 
 def positive(scale: FloatArray) -> FloatArray:
-    """Keep a joint that is fitted exactly from taking all the weight."""
+    """Bound scales from below, so that an exactly fitted joint has finite weight."""
     floor = max(1e-9 * float(np.max(scale)), 1e-100)
     return np.maximum(scale, floor)
 
@@ -281,7 +281,7 @@ def informative_basis(products: FloatArray) -> FloatArray:
 
 def informative_solution(products: FloatArray, aim: FloatArray) -> FloatArray:
     """
-    Solve normal equations; directions that are not identifiable get no change.
+    Solve normal equations; unidentifiable directions stay zero.
 
     Parameters
     ----------

@@ -35,7 +35,7 @@ def with_uncertain_inertia(
     used: Conditioning,
 ) -> tuple[FittedValues, tuple[str, ...]]:
     """
-    Add to the covariance of the weight what the inertia of the description may be wrong by.
+    Add the uncertainty of the described inertia to the covariance.
 
     Parameters
     ----------

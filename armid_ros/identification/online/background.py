@@ -24,7 +24,7 @@ Pieces = Generator[None, None, Result]
 
 
 def at_once(work: Pieces[Result]) -> Result:
-    """Do all pieces, and return the result."""
+    """Run a job to its end; return the result."""
     while True:
         try:
             next(work)
@@ -34,23 +34,23 @@ def at_once(work: Pieces[Result]) -> Result:
 
 
 class Background:
-    """Jobs that wait for their next piece: urgent ones first, otherwise in order."""
+    """Queue of jobs that run in pieces: urgent ones first, otherwise in order."""
 
     def __init__(self) -> None:
         self._urgent: deque[Job] = deque()
         self._patient: deque[Job] = deque()
 
     def begin(self, job: Job, *, urgent: bool = False) -> None:
-        """Take on a job."""
+        """Add a job."""
         (self._urgent if urgent else self._patient).append(job)
 
     @property
     def busy(self) -> bool:
-        """Whether anything is left to do."""
+        """Whether any job is pending."""
         return bool(self._urgent or self._patient)
 
     def advance(self, pieces: int = 1) -> None:
-        """Do some pieces, if there are so many."""
+        """Run up to a number of pieces."""
         for _ in range(pieces):
             waiting = self._urgent or self._patient
             if not waiting:
@@ -63,12 +63,12 @@ class Background:
             waiting.appendleft(job)
 
     def finish(self) -> None:
-        """Do all that is left."""
+        """Finish all jobs."""
         while self.busy:
             self.advance()
 
     def clear(self) -> None:
-        """Give up all that is left."""
+        """Drop all jobs."""
         for job in (*self._urgent, *self._patient):
             job.close()
         self._urgent.clear()

@@ -24,7 +24,7 @@ _INDEPENDENT = 1e-6
 @dataclass(frozen=True, eq=False)
 class ChangeCandidate:
     """
-    One thing that may change.
+    A candidate change.
 
     Attributes
     ----------
@@ -62,14 +62,14 @@ class ChangeCandidate:
         return f'{text} at {self.joint}' if self.joint else text
 
     def includes(self, other: ChangeCandidate) -> bool:
-        """Whether all that the other one is about is among this one's."""
+        """Whether this candidate includes the other one."""
         return set(other.parameters) <= set(self.parameters)
 
 
 @dataclass(frozen=True, eq=False)
 class Change:
     """
-    Something that has changed.
+    A detected change.
 
     Attributes
     ----------
@@ -92,14 +92,14 @@ class Change:
 
     @property
     def reopened(self) -> FloatArray:
-        """Independent directions of all that may have changed, shape (P, k)."""
+        """Independent directions of the changed parameters, shape (P, k)."""
         columns = np.hstack([c.reopened for c in (self.candidate, *self.rivals)])
         columns = columns / np.linalg.norm(columns, axis=0)
         left, size, _ = np.linalg.svd(columns, full_matrices=False)
         return np.asarray(left[:, size > _INDEPENDENT * size[0]])
 
     def __str__(self) -> str:
-        """Say what changed, by how much, and what else it may have been."""
+        """Return a sentence: what changed, by how much, and rivals."""
         sizes = ', '.join(
             f'{p.name} by {value:+.3g} {p.unit} ({lower:.3g} to {upper:.3g})'
             if 0.0 < upper - lower < np.inf
@@ -114,7 +114,7 @@ class Change:
 
 def change_candidates(arm: ArmModel, base: BaseParameters) -> tuple[ChangeCandidate, ...]:
     """
-    List what may change: every effect on every joint, friction of a joint, what the arm holds.
+    List candidates: every effect on every joint, joint friction, carried load.
 
     Parameters
     ----------
@@ -151,7 +151,7 @@ def _candidate(
     added_to: Sequence[int],
     names: Sequence[ParameterName] = (),
 ) -> ChangeCandidate:
-    """Return a change of standard parameters, or of what is named and adds to them."""
+    """Return a candidate of standard parameters, or of an effect that adds to them."""
     columns = base.grouping[:, added_to]
     independent = _independent(columns)
     kept = [k for k in independent if not names or k < _REPORTED]
@@ -167,7 +167,7 @@ def _candidate(
 
 
 def _independent(columns: FloatArray) -> list[int]:
-    """Return the columns that those before them do not span."""
+    """Return a maximal set of linearly independent columns, in order."""
     lengths = np.linalg.norm(columns, axis=0)
     unit = columns / np.where(lengths > 0.0, lengths, 1.0)
     ranks = [np.linalg.matrix_rank(unit[:, :k], _INDEPENDENT) for k in range(len(lengths) + 1)]

@@ -40,7 +40,7 @@ _HIDDEN = 1e-6
 @dataclass(frozen=True, eq=False)
 class Block:
     """
-    A short stretch of rows of unit noise, summed up.
+    Normal equations of a short stretch of whitened rows.
 
     Attributes
     ----------
@@ -80,7 +80,7 @@ class Block:
 @dataclass(frozen=True, eq=False)
 class ScoreStatistics:
     """
-    The statistics of Q possible changes in a window.
+    Test statistics of Q candidate changes in a window.
 
     Attributes
     ----------
@@ -98,7 +98,7 @@ class ScoreStatistics:
     strength: FloatArray
 
     def ratios(self, sets: npt.NDArray[np.intp]) -> FloatArray:
-        """Return twice the log of the likelihood ratio of G sets of p changes, (G, p): (G,)."""
+        """Return twice the log likelihood ratio of G sets of p changes, (G, p): (G,)."""
         information = self.information[sets[:, :, np.newaxis], sets[:, np.newaxis, :]]
         return quadratic_form(self.score[sets], information, _NOTHING)[0]
 
@@ -126,7 +126,7 @@ def weighing(
     residual_scale: float = 1.0,
 ) -> Pieces[ScoreStatistics]:
     """
-    Weigh possible changes by a window of rows, piece by piece.
+    Compute the statistics of candidates in a window, in pieces.
 
     Parameters
     ----------

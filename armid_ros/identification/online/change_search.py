@@ -50,7 +50,7 @@ _CORRECTION = 0.3
 @dataclass(frozen=True)
 class ChangeSettings:
     """
-    The threshold of a change.
+    Settings of change detection.
 
     Attributes
     ----------
@@ -62,7 +62,7 @@ class ChangeSettings:
     false_alarm_time: float = 100.0 * 3600.0
 
     def __post_init__(self) -> None:
-        """Refuse times that are none."""
+        """Check the times."""
         if not self.false_alarm_time > 0.0:
             raise IdentificationError(
                 f'time between false alarms {self.false_alarm_time} s: has to be above 0'
@@ -72,7 +72,7 @@ class ChangeSettings:
 @dataclass(frozen=True, eq=False)
 class FoundChange:
     """
-    A change that is clear.
+    A significant change.
 
     Attributes
     ----------
@@ -97,18 +97,18 @@ class FoundChange:
 
     @property
     def before(self) -> int:
-        """Return the last block that is not of the change."""
+        """Return the last block before the change."""
         return max(self.first - 1, 0)
 
     @property
     def after(self) -> int:
-        """Return the first block that is wholly of the arm as it is now."""
+        """Return the first block after the change."""
         return min(self.first + 1, len(self.blocks) - 1)
 
 
 class ChangeSearch:
     """
-    Remembers blocks of rows, and what their statistics usually are.
+    Search for changes in blocks of rows, with calibrated statistics.
 
     Parameters
     ----------
@@ -151,24 +151,24 @@ class ChangeSearch:
         self.reset()
 
     def believe(self, chance: float) -> None:
-        """Test with another chance of a positive test without a change; 0: none is positive."""
+        """Set the false alarm probability; 0 disables detection."""
         self._chance = chance / (len(self._sizes) * len(_LENGTHS))
 
     def reset(self) -> None:
-        """Forget what noise usually does, and all blocks."""
+        """Clear the calibration and all blocks."""
         places = {c.joint for c in self._candidates}
         self._usual = {m: NullCalibration(self._sizes.tolist(), m, len(places)) for m in _LENGTHS}
         self._fresh = -np.inf, 0.0
         self.interrupt()
 
     def interrupt(self) -> None:
-        """Begin a new stretch of blocks, which does not continue the one before."""
+        """Begin a new stretch after an interruption."""
         self._blocks: deque[Block] = deque(maxlen=_KEPT)
         self._waiting: deque[dict[int, tuple[FloatArray, FloatArray]]] = deque()
 
     def take(self, block: Block, residual_scale: float) -> Pieces[FoundChange | None]:
         """
-        Take in a block of rows, and return the change that is clear by now.
+        Add a block of rows; return a significant change or None.
 
         Parameters
         ----------
@@ -204,7 +204,7 @@ class ChangeSearch:
     def size(
         self, found: FoundChange, residual_scale: float
     ) -> Pieces[tuple[FloatArray, FloatArray]]:
-        """Return by how much a candidate has changed, and the covariance of that."""
+        """Return the size of a change and its covariance."""
         before, after = found.blocks[found.before], found.blocks[found.after :]
         window = yield from weighing(after, before, self.directions, residual_scale)
         yield
@@ -214,7 +214,7 @@ class ChangeSearch:
         return values, covariance * usual
 
     def _window(self, first: int, residual_scale: float) -> Pieces[ScoreStatistics]:
-        """Weigh the blocks from one on against what was known before it."""
+        """Compute the statistics of all blocks from one on."""
         blocks = list(self._blocks)[first:]
         return weighing(blocks, blocks[0], self.directions, residual_scale)
 
@@ -225,7 +225,7 @@ class ChangeSearch:
         return ratios
 
     def _judge(self, residual_scale: float) -> Pieces[FoundChange | None]:
-        """Find when the change was and what it is, if that is clear or time is up."""
+        """Locate and classify the change once it is clear or overdue."""
         rows = []
         for k in range(len(self._blocks) - 1):
             window = yield from self._window(k, residual_scale)

@@ -58,7 +58,7 @@ Item = TypeVar('Item')
 
 @dataclass(eq=False)
 class _Stretch:
-    """Rows that were not searched so far; those before an interruption have no end."""
+    """Rows not searched yet; those before an interruption have no end."""
 
     begin: float
     narrow: Learned
@@ -68,7 +68,7 @@ class _Stretch:
 
 class ChangeWatch:
     """
-    Lets an estimator learn, and detects changes of what it learns.
+    Updates an estimator and detects changes of its parameters.
 
     Parameters
     ----------
@@ -79,7 +79,7 @@ class ChangeWatch:
     candidates : sequence of ChangeCandidate
         What may change.
     settings : ChangeSettings
-        The threshold of a change.
+        Settings of change detection.
     work : Background
         Does what takes long.
 
@@ -112,7 +112,7 @@ class ChangeWatch:
         self.reset()
 
     def reset(self) -> None:
-        """Forget the noise level and all changes; no background work may be pending."""
+        """Clear noise level and changes; no background job may be pending."""
         self.changes: list[Change] = []
         self._wider.reset()
         self._search.reset()
@@ -142,13 +142,13 @@ class ChangeWatch:
         self._wider.forgetting = forgetting
 
     def interrupt(self) -> None:
-        """Begin a new stretch of rows, which does not continue the one before."""
+        """Begin a new stretch of rows after an interruption."""
         if self._late is None:
             self._open = self._open or _Stretch(0.0, self._estimator.learned())
             self._hand_over(None)
 
     def update(self, row: Row) -> None:
-        """Let the estimator take in one row; see ``RecursiveLeastSquares.update``."""
+        """Update the estimator with one row; see ``RecursiveLeastSquares.update``."""
         if self._open is not None and row.t - self._open.begin >= BLOCK:
             self._hand_over(row.t)
         if self._late is not None:  # a change was named, and what came since is learned again
@@ -160,12 +160,12 @@ class ChangeWatch:
         self._estimator.update(*row.sample)
 
     def _among_all(self, directions: FloatArray) -> FloatArray:
-        """Return directions in the parameters of the estimator in those of the wider one."""
+        """Map directions in the parameters to the wider parameter vector."""
         more = len(self._wider.parameters) - self._own
         return np.vstack([directions, np.zeros((more, directions.shape[1]))])
 
     def _hand_over(self, end: float | None) -> None:
-        """Let the open stretch be searched."""
+        """Queue the open stretch for the search."""
         assert self._open is not None
         self._open.end = end
         self._unseen.append(self._open)
@@ -175,7 +175,7 @@ class ChangeWatch:
             self._work.begin(self._see(), urgent=True)
 
     def _see(self) -> Job:
-        """Search what was not searched so far."""
+        """Search the queued stretches."""
         try:
             while self._unseen:
                 stretch = self._unseen.popleft()
@@ -202,7 +202,7 @@ class ChangeWatch:
         return _ONE_BY_ONE if self._estimator.forgetting < 1.0 else _TOGETHER
 
     def _widened(self, rows: Sequence[Row]) -> Pieces[list[WeightedSample]]:
-        """Return successive samples with the columns of all that is learned."""
+        """Return successive samples with the columns of all parameters."""
         samples: list[WeightedSample] = []
         for part in _parts(rows, _WIDENED):
             own = np.stack([row.sample.rows for row in part])
@@ -216,7 +216,7 @@ class ChangeWatch:
     def _summed(
         self, stretch: _Stretch, end: float, samples: Sequence[WeightedSample], before: Learned
     ) -> Pieces[Block]:
-        """Sum up the rows of a block, and project them on the changes that are looked for."""
+        """Sum up the rows of a block, projected on the candidate changes."""
         residual_scale, residuals, squares = self._residual_scale.value, [], 0.0
         size = len(self._wider.parameters)
         information, right = np.zeros((size, size)), np.zeros(size)
@@ -256,7 +256,7 @@ class ChangeWatch:
         return float(np.exp(np.mean(np.log(self._residual_scale.value))))
 
     def _name(self, found: FoundChange) -> Job:
-        """Report a change in a block, and learn anew what it concerns."""
+        """Report a change in a block, and reopen its parameters."""
         values, covariance = yield from self._search.size(found, self._residual_scale_of_all)
         yield
         size = Estimate(found.best.parameters, values, covariance)
@@ -268,7 +268,7 @@ class ChangeWatch:
         )
 
     def _learn_again(self, found: FoundChange, reopened: FloatArray) -> Job:
-        """Return to what was known when a block began, and learn what may have changed anew."""
+        """Restore the estimator at the beginning of a block, and reopen changed directions."""
         last = found.blocks[found.before]
         since = [sample for block in found.blocks[found.after :] for sample in block.samples]
         stretches = (*self._unseen, *([self._open] if self._open else ()))
@@ -297,7 +297,7 @@ class ChangeWatch:
         yield from self._learn(again, own)
 
     def _louder(self, blocks: Sequence[Block], free: int) -> Pieces[float]:
-        """Return how much larger squares of residuals are than usual, 1 at least."""
+        """Return the ratio of squared residuals to the usual ones, at least 1."""
         # A change shakes the arm, and its motion is none that the parameters were learned from.
         squares = count = 0.0
         for block in blocks:
@@ -312,6 +312,6 @@ class ChangeWatch:
 
 
 def _parts(items: Sequence[Item], size: int) -> Iterator[Sequence[Item]]:
-    """Yield so many items after the other."""
+    """Yield items in groups of a size."""
     for first in range(0, len(items), size):
         yield items[first : first + size]

@@ -18,7 +18,7 @@ _BEHIND = 1.0
 
 class StreamChecks:
     """
-    Whether anything can be learned from a stream, by how far its good samples have ranged.
+    Checks whether a stream is identifiable, by the ranges of its good samples.
 
     Parameters
     ----------
@@ -34,13 +34,13 @@ class StreamChecks:
         self.reset()
 
     def reset(self) -> None:
-        """Forget when the arm began to move."""
+        """Clear the time of the first motion."""
         self._moved: float | None = None
         self._moving = 0.0
         self._judged: tuple[bytes, str] | None = None
 
     def take(self, t: float) -> None:
-        """Take in the stamp of a sample that is not damaged."""
+        """Add the timestamp of an undamaged sample."""
         if self._moved is None:
             lowest, highest = self._positions
             self._moved = t if np.any(highest - lowest > REST_RANGE) else None
@@ -53,13 +53,13 @@ class StreamChecks:
 
     @property
     def silent(self) -> bool:
-        """Whether no torque has ever changed, so that nothing can be learned from it."""
+        """Whether all torques have been constant so far."""
         n = self._robot.n_joints
         return bool((self._gate.highest[-n:] <= self._gate.lowest[-n:]).all())
 
     @property
     def error(self) -> str:
-        """Return what to mend before anything can be identified; empty when all is well."""
+        """Return the fault that prevents identification; empty without fault."""
         if self.silent and abs(self._moving) > SHORTEST:
             return SILENT
         # the range is judged for each row, and seldom grows
@@ -72,7 +72,7 @@ class StreamChecks:
 
 class MissingSamples:
     """
-    Count the samples that should have come between others, by their stamps.
+    Counts missing samples by the timestamps.
 
     Where a sample is late and those after it are early, nothing is missing.
 
@@ -93,7 +93,7 @@ class MissingSamples:
         self._doubtful = 0
 
     def take(self, t: float, period: float | None) -> None:
-        """Take in a stamp [s], with the sampling period if it is known."""
+        """Add a timestamp [s], with the sampling period if known."""
         last = self._last
         if last is not None and last - _BEHIND < t <= last:
             self._came_late()
@@ -112,7 +112,7 @@ class MissingSamples:
             self._doubtful = 0
 
     def _came_late(self) -> None:
-        """Take back one of those that were counted last."""
+        """Remove one of the samples counted last."""
         if self._doubtful:
             self._doubtful -= 1
             self.count -= 1

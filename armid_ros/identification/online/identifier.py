@@ -48,7 +48,7 @@ _SPARE = 4.0
 @dataclass(frozen=True)
 class OnlineSample:
     """
-    One sample that the estimator saw.
+    A row that the estimator used, with its prediction.
 
     Attributes
     ----------
@@ -167,7 +167,7 @@ class OnlineIdentifier:
         self._noise: RowNoise | None = None
 
     def reset(self) -> None:
-        """Forget everything that was learned, and set the counters to zero."""
+        """Clear the estimate and all counters."""
         self._work.clear()
         self._learner.reset()
         self._filter.reset()
@@ -218,13 +218,13 @@ class OnlineIdentifier:
         return self.latest[-1] if self.latest else None
 
     def __getstate__(self) -> dict[str, Any]:
-        """Finish what is under way, for a job can be in one place only."""
+        """Finish pending jobs, as generators cannot be copied."""
         self._learner.settle()
         self._work.finish()
         return self.__dict__
 
     def _take(self, sample: StreamSample) -> OnlineSample | None:
-        """Learn from a good sample, which may begin a stretch; return what it brought."""
+        """Filter a good sample, which may begin a stretch; return new rows."""
         if sample.begins:
             self._filter.restart('position_step')
         self._checks.take(sample.t)
@@ -252,16 +252,16 @@ class OnlineIdentifier:
         return self._learn(motion, step, used & usable, begins)
 
     def estimate(self) -> Estimate:
-        """Return values and covariance of the base parameters, errors that last included."""
+        """Return base parameters and covariance, with autocorrelated errors included."""
         return self._learner.estimate
 
     def model(self) -> ArmModel:
-        """Return the arm with the estimate, otherwise as near as possible to what it was."""
+        """Return the arm with the estimate; unidentified directions stay unchanged."""
         return self.arm.with_theta(self.base.lift(self._learner.values, self.arm.theta))
 
     def check(self, settings: OnlineSettings) -> None:
         """
-        Refuse settings that this identifier cannot go on with; see `use`.
+        Raise an error for settings that need a restart; see `use`.
 
         Raises
         ------
@@ -284,7 +284,7 @@ class OnlineIdentifier:
 
     def use(self, settings: OnlineSettings) -> None:
         """
-        Go on with other settings; nothing that was learned is lost.
+        Change settings and keep the estimate.
 
         Parameters
         ----------
@@ -304,7 +304,7 @@ class OnlineIdentifier:
 
     @property
     def changes(self) -> tuple[Change, ...]:
-        """Return what has changed about the arm since the last reset, oldest first."""
+        """Return the detected changes since the last reset, oldest first."""
         return tuple(self._learner.changes)
 
     @property
@@ -314,12 +314,12 @@ class OnlineIdentifier:
 
     @property
     def samples(self) -> int:
-        """Return the samples that the estimate rests on."""
+        """Return the number of samples in the estimate."""
         return self._learner.samples
 
     @property
     def missing(self) -> int:
-        """Joint states that never came, by the stamps of those that did."""
+        """Number of missing joint states, by the timestamps."""
         return self._missing.count
 
     @property
@@ -329,12 +329,12 @@ class OnlineIdentifier:
 
     @property
     def error(self) -> str:
-        """Why nothing can be learned, such as torques that are absent; empty when all is well."""
+        """Fault that prevents identification, such as absent torques; empty without fault."""
         return self._checks.error
 
     @property
     def spikes(self) -> Mapping[tuple[str, str], int]:
-        """Joint states left out as a signal jumped and came back, by joint and signal."""
+        """Joint states left out for spikes, by joint and signal."""
         joints = self.arm.robot.joints
         signals = ('position', *(['velocity'] * self.settings.measured_velocity), 'effort')
         names = [(joint, signal) for signal in signals for joint in joints]
@@ -375,7 +375,7 @@ class OnlineIdentifier:
 
     @property
     def _without_consequence(self) -> FloatArray:
-        """Return what one sample may be off by before a row shows it, positions not so judged."""
+        """Return the error of one sample that a row does not show; 0 for positions."""
         n = self.arm.robot.n_joints
         floor = np.zeros((3 if self.settings.measured_velocity else 2) * n)
         if self._filter.pole is not None:
@@ -383,7 +383,7 @@ class OnlineIdentifier:
         return floor
 
     def _row_noise(self) -> RowNoise:
-        """Return the noise of the rows since the filters were started."""
+        """Return the noise model of rows since the start of the filters."""
         if self._noise is None:
             period, pole = self._filter.period, self._filter.pole
             assert period is not None and pole is not None

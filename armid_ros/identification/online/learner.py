@@ -91,7 +91,7 @@ class OnlineSettings:
 
 class Learner:
     """
-    Learns the base parameters of an arm, how certain they are, and when they have changed.
+    Estimates base parameters with their covariance, and detects changes.
 
     Parameters
     ----------
@@ -131,7 +131,7 @@ class Learner:
         self.reset()
 
     def reset(self) -> None:
-        """Forget everything; nothing may be left to be done in the background."""
+        """Clear everything; no background job may be pending."""
         self._waiting: tuple[Row, FloatArray] | None = None
         self._reopened = 0
         # of residuals: weighted squares, their weights, and the standard deviation
@@ -142,28 +142,28 @@ class Learner:
             self._watch.reset()
 
     def use(self, settings: OnlineSettings) -> None:
-        """Go on with another forgetting, and another belief in changes."""
+        """Change the forgetting factor and the change detection."""
         self.settle()
         self._estimator.forgetting = self._scores.forgetting = settings.forgetting
         if self._watch is not None:
             self._watch.use(settings.changes, settings.forgetting)
 
     def interrupt(self) -> None:
-        """Begin a new stretch of rows, which does not continue the one before."""
+        """Begin a new stretch of rows after an interruption."""
         self.settle()
         self._scores.interrupt()
         if self._watch is not None:
             self._watch.interrupt()
 
     def predict(self, row: Row) -> FloatArray:
-        """Take in a row, and return what the estimate before it misses the torque by."""
+        """Add a row; return the innovation, its prediction error by the estimate before."""
         self.settle()
         innovation = row.sample.tau - row.sample.rows @ self._estimator.values
         self._waiting = row, innovation
         return innovation
 
     def settle(self) -> bool:
-        """Learn from the row that waits; return whether there was one."""
+        """Update the estimate with the pending row; return whether there was one."""
         if self._waiting is None:
             return False
         (row, innovation), self._waiting = self._waiting, None
@@ -186,12 +186,12 @@ class Learner:
 
     @property
     def watches(self) -> bool:
-        """Whether changes are looked for."""
+        """Whether changes are detected."""
         return self._watch is not None
 
     @property
     def residual_deviation(self) -> FloatArray:
-        """Return what the estimate leaves of torques, as noise of single samples, (n,) [N m]."""
+        """Return the standard deviation of the residual per sample, (n,) [N m]."""
         self.settle()
         return self._deviation
 
@@ -203,7 +203,7 @@ class Learner:
 
     @property
     def estimate(self) -> Estimate:
-        """Values and covariance, errors that last included."""
+        """Values and covariance, with autocorrelated errors included."""
         self.settle()
         estimate = self._estimator.estimate
         covariance = self._scores.covariance(self._estimator.learned().root)
@@ -211,7 +211,7 @@ class Learner:
 
     @property
     def changes(self) -> Sequence[Change]:
-        """Return what has changed, oldest first; it is found in the background."""
+        """Return the detected changes, oldest first; detection runs in the background."""
         return () if self._watch is None else self._watch.changes
 
     @property
@@ -222,6 +222,6 @@ class Learner:
 
     @property
     def samples(self) -> int:
-        """Return the samples that the estimate rests on."""
+        """Return the number of samples in the estimate."""
         self.settle()
         return self._estimator.samples

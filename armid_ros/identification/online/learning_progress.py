@@ -42,7 +42,7 @@ _OTHER_ADVICE = 'move it both ways at several speeds'
 @dataclass(frozen=True)
 class Unlearned:
     """
-    What is not learned about a joint.
+    Quantities of a joint that the motion does not identify.
 
     Attributes
     ----------
@@ -60,7 +60,7 @@ class Unlearned:
     uncertainty: float
 
     def __str__(self) -> str:
-        """Return what is unknown and how to move, in plain words."""
+        """Describe what is unknown, and the motion that identifies it."""
         words = list(dict.fromkeys(_word(p) for p in self.parameters))
         advice = list(dict.fromkeys(_ADVICE.get(word, _OTHER_ADVICE) for word in words))
         return f'{self.joint or "the arm"} ({", ".join(words)}): {" and ".join(advice)}'
@@ -68,7 +68,7 @@ class Unlearned:
 
 class LearningProgress:
     """
-    Looks at estimates now and then, and finds what the motion between them did not teach.
+    Compares estimates over time to find what the motion does not identify.
 
     Parameters
     ----------
@@ -90,12 +90,12 @@ class LearningProgress:
         self._past: deque[tuple[float, FloatArray]] = deque()
 
     def reset(self) -> None:
-        """Forget all estimates."""
+        """Clear all estimates."""
         self._past.clear()
 
     def look(self, t: float, estimate: Estimate) -> tuple[Unlearned, ...]:
         """
-        Return what is unknown and was not learned for ten seconds, joint by joint.
+        Return the unidentified quantities without progress for ten seconds, per joint.
 
         Parameters
         ----------
@@ -131,7 +131,7 @@ class LearningProgress:
 
 
 def too_little_motion(unlearned: Sequence[Unlearned]) -> str:
-    """Say in a line what the motion does not teach; empty when nothing is missing."""
+    """Return a line on what the motion does not identify; empty if nothing."""
     if not unlearned:
         return ''
     rest = len(unlearned) - _NAMED

@@ -27,7 +27,7 @@ import numpy as np
 
 class Row(NamedTuple):
     """
-    What is learned from one sample, and what further columns of it are made from.
+    A filtered row, and the state from which its friction columns are computed.
 
     Attributes
     ----------
@@ -56,7 +56,7 @@ class Row(NamedTuple):
 
 class NuisanceRows:
     """
-    Makes and filters the columns of friction that an arm model does not have.
+    Computes and filters the columns of friction that the model lacks.
 
     Parameters
     ----------

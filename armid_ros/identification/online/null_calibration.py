@@ -51,7 +51,7 @@ _FEWEST_BLOCKS = 16
 
 class History:
     """
-    Rows of numbers, of which the last ones are remembered.
+    Ring buffer of rows of numbers.
 
     Parameters
     ----------
@@ -68,11 +68,11 @@ class History:
         self._end = 0
 
     def __len__(self) -> int:
-        """Return how many rows there are."""
+        """Return the number of rows."""
         return min(self._end, self._most)
 
     def append(self, row: FloatArray) -> None:
-        """Take in a row."""
+        """Append a row."""
         if self._end == len(self._rows):
             kept = self.values
             size = min(2 * len(self._rows), 2 * self._most)
@@ -84,13 +84,13 @@ class History:
 
     @property
     def values(self) -> FloatArray:
-        """Return the rows, oldest first; they stay as they are when others come."""
+        """Return a copy of the rows, oldest first."""
         return self._rows[self._end - len(self) : self._end]
 
 
 class NullCalibration:
     """
-    How large statistics usually are, compared with those of white noise.
+    Calibration of test statistics against those of white noise.
 
     By their mean, in which what one in twenty exceeds counts as that and no more, over the later
     three quarters of what was seen and ten minutes at most: so what came while little was known,
@@ -135,7 +135,7 @@ class NullCalibration:
 
     def learning(self, ratios: FloatArray, strength: FloatArray) -> Job:
         """
-        Take in a window in which nothing changed, piece by piece.
+        Learn from a window without a change, in pieces.
 
         Parameters
         ----------
@@ -197,7 +197,7 @@ class NullCalibration:
 
     @staticmethod
     def _tail_of(seen: FloatArray, rare: FloatArray) -> Pieces[float]:
-        """Return what one in a hundred of all statistics exceeds, over what it does in noise."""
+        """Return the ratio of the 99 % quantile of statistics to that of white noise."""
         count = int(np.sum(seen > 0.0))
         most = count - int((1.0 - _RARE) * (count - 1))  # so many of the largest hold the quantile
         largest = np.empty(0)
@@ -212,7 +212,7 @@ class NullCalibration:
 
     def excess(self, ratios: FloatArray, strength: FloatArray, chance: float) -> FloatArray:
         """
-        Return statistics over what they exceed with so small a chance; 0: too early to say.
+        Return statistics over their critical values; 0 before calibration.
 
         What the model lacks has biased the parameters, and a motion that is stronger than those
         they were learned from makes the more of it.
@@ -238,7 +238,7 @@ class NullCalibration:
 
 
 def _in_pieces(values: FloatArray) -> Iterator[slice]:
-    """Yield columns whose numbers are looked at in one piece of work."""
+    """Yield the columns that one piece of work evaluates."""
     width = max(1, _AT_A_TIME // max(1, len(values)))
     for first in range(0, values.shape[1], width):
         yield slice(first, first + width)
@@ -246,7 +246,7 @@ def _in_pieces(values: FloatArray) -> Iterator[slice]:
 
 class ResidualScale:
     """
-    Standard deviation of residuals that last, per joint, relative to noise as assumed.
+    Standard deviation of autocorrelated residuals per joint, over the assumed noise.
 
     Sums of residuals over a block: what is quick cancels in them. By their median, which neither
     the first blocks nor a change that is not yet noticed moves.
@@ -269,7 +269,7 @@ class ResidualScale:
         return np.ones(1) if self._value is None else self._value
 
     def learn(self, residual: FloatArray, weights: FloatArray) -> None:
-        """Take in the residuals of a block, in units of the assumed noise, shape (k, m)."""
+        """Learn from the residuals of a block over the assumed noise, shape (k, m)."""
         used = np.sum(weights > 0.0, axis=0)
         if not used.any():
             return  # an arm at rest must not forget what it is like in motion

@@ -35,7 +35,7 @@ SMALLEST_FORGETTING = 0.9
 @dataclass(frozen=True, eq=False)
 class Learned:
     """
-    What an estimator knew at some time, to return to.
+    Saved state of an estimator.
 
     Attributes
     ----------
@@ -59,7 +59,7 @@ class Learned:
 
 class WeightedSample(NamedTuple):
     """
-    What an estimator takes in at a time.
+    Rows, torques and weights of one sample.
 
     Attributes
     ----------
@@ -138,7 +138,7 @@ class RecursiveLeastSquares:
         self.reset()
 
     def with_more(self, parameters: tuple[ParameterName, ...]) -> RecursiveLeastSquares:
-        """Return an estimator in its beginning, of more parameters that nothing is known of."""
+        """Return a reset estimator with further parameters without prior."""
         wider = copy(self)
         wider.parameters = self.parameters + parameters
         wider._start = np.concatenate([self._start, np.zeros(len(parameters))])
@@ -146,7 +146,7 @@ class RecursiveLeastSquares:
         return wider
 
     def reset(self) -> None:
-        """Return to the beginning."""
+        """Reset to the initial state."""
         self.samples = 0
         self._root = np.asfortranarray(np.eye(len(self._start)) / square_root.PRIOR_STD)
         self._right = np.asfortranarray(self._start[:, np.newaxis] / square_root.PRIOR_STD)
@@ -162,7 +162,7 @@ class RecursiveLeastSquares:
         weights: npt.ArrayLike | None = None,
     ) -> FloatArray:
         """
-        Take in one sample.
+        Add one sample.
 
         Parameters
         ----------
@@ -194,7 +194,7 @@ class RecursiveLeastSquares:
 
     def update_together(self, samples: Sequence[WeightedSample]) -> None:
         """
-        Take in several samples, in much less time than one after the other.
+        Add several samples at once, which is faster than one by one.
 
         Without forgetting, what is learned is the same. With it, they are taken one by one, as
         what is given up depends on the order.
@@ -218,7 +218,7 @@ class RecursiveLeastSquares:
         counts: FloatArray,
         scale: FloatArray,
     ) -> None:
-        """Take in rows of one or several samples."""
+        """Add rows of one or several samples."""
         rows = rows * scale[:, np.newaxis]
         if self._forgetting < 1.0:
             self._root = square_root.replaced(self._root, rows, self._forgetting)
@@ -237,24 +237,24 @@ class RecursiveLeastSquares:
         self._freedom += float(counts.sum())
 
     def scale(self, weights: FloatArray) -> FloatArray:
-        """Return what gives rows of these weights noise of variance 1, shape (m,) [1/(N m)]."""
+        """Return the factors that whiten rows of given weights, shape (m,) [1/(N m)]."""
         return np.asarray(np.sqrt(weights) / self._noise)
 
     def learned(self) -> Learned:
-        """Return what is known now."""
+        """Return the present state."""
         return Learned(
             read_only(self._root), self._values, self._squares, self._freedom, self.samples
         )
 
     def restore(self, learned: Learned) -> None:
-        """Return to what was known."""
+        """Restore a saved state."""
         self._take(np.array(learned.root, order='F'), learned.values)
         self._squares, self._freedom = learned.squares, learned.freedom
         self.samples = learned.samples
 
     def reopen(self, directions: FloatArray) -> None:
         """
-        Forget the values along some directions, and nothing else.
+        Remove the information along some directions.
 
         Parameters
         ----------
@@ -334,7 +334,7 @@ class RecursiveLeastSquares:
 
 
 def check_forgetting(factor: float) -> None:
-    """Refuse a forgetting factor that is none."""
+    """Check the forgetting factor."""
     if not SMALLEST_FORGETTING <= factor <= 1.0:
         raise IdentificationError(
             f'forgetting factor {factor}: has to be from {SMALLEST_FORGETTING} to 1'

@@ -57,7 +57,7 @@ class _Bands:
 
 class RobustCovariance:
     """
-    Sums up windows of rows, and computes the covariance of an estimate from their residuals.
+    Sandwich covariance of an estimate from windows of rows.
 
     Parameters
     ----------
@@ -84,13 +84,13 @@ class RobustCovariance:
         self.interrupt()
 
     def interrupt(self) -> None:
-        """Begin a new stretch of rows, which does not continue the one before."""
+        """Begin a new stretch of rows after an interruption."""
         self._rows: FloatArray | None = None
         self._count = 0
 
     def add(self, rows: FloatArray, tau: FloatArray, values: FloatArray) -> None:
         """
-        Take in one sample.
+        Add one sample.
 
         Parameters
         ----------
@@ -111,7 +111,7 @@ class RobustCovariance:
 
     def reopen(self, directions: FloatArray, values: FloatArray) -> None:
         """
-        Let the parameters have been others before, by something that is not known.
+        Allow for an unknown change of the parameters before now.
 
         The last window, in which they may have changed, is left out. From the torques of all rows
         before is subtracted what the change adds to them if it is the one for which they fit best.
@@ -129,7 +129,7 @@ class RobustCovariance:
         self._work.begin(self._reopened(directions, values))
 
     def _sum_up(self, columns: FloatArray, values: FloatArray) -> Job:
-        """Take in a window of rows and torques, shape (m, k, P + 1)."""
+        """Add a window of rows and torques, shape (m, k, P + 1)."""
         window = yield from _transformed(columns)
         if not window.counts.any():
             return
@@ -156,7 +156,7 @@ class RobustCovariance:
         self._latest = window
 
     def _reopened(self, directions: FloatArray, values: FloatArray) -> Job:
-        """Give the parameters before any values along some directions."""
+        """Marginalise earlier parameters along some directions."""
         self._latest = None
         if self._settled is None:
             return

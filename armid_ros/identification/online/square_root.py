@@ -55,7 +55,7 @@ def absorbed(
 
 def replaced(root: FloatArray, rows: FloatArray, forgetting: float) -> FloatArray:
     """
-    Return R with new information in it, old information given up where it arrives.
+    Return R with new information, discounting old information in the same directions.
 
     In the directions b of U = rows R^-1 = A diag(s) B^T the old information, 1, becomes
     1 - f + s^2 with f = min(s^2, level). It never falls, so the new triangle is the old one

@@ -77,7 +77,7 @@ class PhysicalSettings:
     mass_range: float | None = None
 
     def __post_init__(self) -> None:
-        """Refuse what cannot be."""
+        """Check the values."""
         if self.total_mass is not None and not 0.0 < self.total_mass < np.inf:
             raise IdentificationError(f'total mass {self.total_mass} kg: it has to be positive')
         if self.mass_range is not None and not 1.0 < self.mass_range < np.inf:
@@ -102,7 +102,7 @@ def fit_to_bodies(
     rng: np.random.Generator,
 ) -> tuple[FittedValues, PhysicalCertificate]:
     """
-    Fit bodies where a free fit has been.
+    Fit physically consistent links after a free fit.
 
     Parameters
     ----------
@@ -155,7 +155,7 @@ def fit_to_bodies(
 def _bodies(
     arm: ArmModel, fit: FittedValues, settings: PhysicalSettings
 ) -> tuple[FittedValues, PhysicalCertificate]:
-    """Fit the standard parameters of an arm to a linear problem, all links being bodies."""
+    """Fit physically consistent standard parameters to a linear problem."""
     base, problem, weights = fit.base, fit.problem, fit.solution.weights
     program, notes = physical_program(arm, base, settings)
     prior, lower, upper, boxes = program.prior, program.lower, program.upper, program.boxes
@@ -214,7 +214,7 @@ def _bodies(
 
 
 def _heavy(robot: Robot, rigid: FloatArray) -> tuple[str, ...]:
-    """Say which links are far heavier than described, shape (n, 10)."""
+    """Return the mask of links far heavier than described, shape (n, 10)."""
     described = robot.rigid_parameters[::PER_LINK]
     named = [
         f'{link} {found:.3g} kg, described {mass:.3g} kg'
@@ -232,7 +232,7 @@ def _heavy(robot: Robot, rigid: FloatArray) -> tuple[str, ...]:
 def physical_program(
     arm: ArmModel, base: BaseParameters, settings: PhysicalSettings
 ) -> tuple[PhysicalProgram, tuple[str, ...]]:
-    """Return what physics allows for the parameters of an arm, and what was assumed for it."""
+    """Return the constraints on the parameters of an arm, and the assumptions made."""
     prior, notes = bodily_prior(arm)
     ends = [effect.bounds() for effect in arm.effects]
     lower, upper = (np.concatenate([np.empty(0), *(b[k] for b in ends)]) for k in (0, 1))
@@ -250,7 +250,7 @@ def physical_program(
 
 def bodily_prior(arm: ArmModel) -> tuple[FloatArray, tuple[str, ...]]:
     """
-    Return the standard parameters of an arm with bodies where the description has none.
+    Return standard parameters with bodies for links without inertia.
 
     A link of no mass becomes a ball of the mean mass of the others; one that is a point, or whose
     moments no body has, is given the least second moments that a body has there.

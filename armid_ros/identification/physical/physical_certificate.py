@@ -24,7 +24,7 @@ DEAR = 1.03
 @dataclass(frozen=True)
 class PhysicalCertificate:
     """
-    What shows that an identified arm is made of bodies, and what it cost.
+    Certificate of physical consistency, with the increase of the error.
 
     Attributes
     ----------
@@ -75,13 +75,13 @@ class PhysicalCertificate:
 
     @property
     def active(self) -> tuple[str, ...]:
-        """Links that are at the limit of what a body can be."""
+        """Links at the limit of physical consistency."""
         near = self.shares < ACTIVE_SHARE
         return tuple(link.link for link, at in zip(self.links, near, strict=True) if at)
 
     @property
     def activity(self) -> tuple[str, ...]:
-        """Say which constraints hold the fit, and when they do it harm; empty if none does."""
+        """Return a sentence on the active constraints; empty if none is active."""
         said = []
         if self.held_out_ratio > DEAR:
             said.append(
@@ -106,7 +106,7 @@ class PhysicalCertificate:
         return tuple(said)
 
     def sentences(self) -> tuple[str, ...]:
-        """Say in words what was found."""
+        """Return the findings as sentences."""
         least = min(self.links, key=lambda link: float(link.eigenvalues[0]))
         verdict = 'every link is a body' if self.consistent else 'not every link is a body'
         return (
@@ -120,7 +120,7 @@ class PhysicalCertificate:
         )
 
     def document(self) -> dict[str, Any]:
-        """Return the certificate for programs to read."""
+        """Return the certificate as a document."""
         return {
             'consistent': self.consistent,
             'links': [
@@ -148,7 +148,7 @@ class PhysicalCertificate:
 
 def walls_reached(parameters: FloatArray, box: Box) -> tuple[str, ...]:
     """
-    Say which limits of its box a link is at.
+    Return the active limits of the box of a link.
 
     Parameters
     ----------

@@ -44,7 +44,7 @@ _PERIOD_INTERVALS = 20
 
 
 def check_gap(samples: int) -> None:
-    """Refuse a largest gap that is none."""
+    """Check the largest gap."""
     if samples < 1:
         raise IdentificationError(f'largest gap of {samples} samples: has to be at least 1')
 
@@ -73,7 +73,7 @@ class TripleLag:
 
     @property
     def delay(self) -> float:
-        """Time by which slow signals are late [s]."""
+        """Delay of slow signals [s]."""
         return 3.0 / self.pole
 
     def reset(self) -> None:
@@ -109,7 +109,7 @@ class TripleLag:
         return stages
 
     def _set_step(self, dt: float) -> None:
-        """Learn what the stages become of themselves, of the signal before and of its move."""
+        """Compute the state transition of the stages for a step."""
         # A ramp u is followed by stage i at u - i * slope / pole; the rest decays.
         x, step = self.pole * dt, self._step
         self._dt = dt
@@ -210,7 +210,7 @@ class CausalFilter:
         self._begin()
 
     def restart(self, reason: str) -> None:
-        """Begin a new stretch, as what comes does not continue what was before."""
+        """Begin a new stretch after an interruption."""
         self.restarts[reason] += 1
         self._begin()
 
@@ -232,7 +232,7 @@ class CausalFilter:
         self, t: float, q: npt.ArrayLike, dq: npt.ArrayLike | None, tau: npt.ArrayLike
     ) -> FloatArray | None:
         """
-        Stack what is filtered of one joint state, shape (2 n,) or (3 n,).
+        Stack the signals of one joint state, shape (2 n,) or (3 n,).
 
         Parameters
         ----------
@@ -265,7 +265,7 @@ class CausalFilter:
         return signal
 
     def advance(self, t: float, signal: FloatArray) -> CausalMotion | None:
-        """Filter what `signal` has stacked; None while the filter settles."""
+        """Filter a stacked signal; None while the filter settles."""
         dt = 0.0 if self._last is None else t - self._last
         longest = self.max_gap * self.period if self.period else np.inf
         if self._last is not None and not 0.0 < dt <= longest:
@@ -291,7 +291,7 @@ class CausalFilter:
         return CausalMotion(t, value[:n], dq[:n], ddq[:n], value[-n:])
 
     def _missing(self, t: float, dt: float, signal: FloatArray) -> list[FloatArray]:
-        """Return what stands for the samples missing before one."""
+        """Interpolate the samples missing before one."""
         # A straight line would have no acceleration, so the rows would lack that of the whole gap.
         # They are on the cubic through the sample behind the gap and three before it, which are as
         # far apart as the gap is long, for then it has hardly more noise than they.
@@ -309,7 +309,7 @@ class CausalFilter:
         return list(np.vander(inside, len(place)) @ factors)
 
     def _learn_period(self, dt: float) -> None:
-        """Take in an interval, and make the filter when there are enough of them."""
+        """Add an interval; create the filter once there are enough."""
         if dt > 0.0:
             self._intervals.append(dt)
         if len(self._intervals) < _PERIOD_INTERVALS:

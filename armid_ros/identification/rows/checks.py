@@ -64,7 +64,7 @@ def check_motion(
     robot: Robot, recordings: Sequence[Recording], used: Conditioning | None = None
 ) -> tuple[str, ...]:
     """
-    Refuse recordings without usable motion.
+    Raise an error for recordings without usable motion.
 
     Parameters
     ----------
@@ -101,19 +101,19 @@ def check_motion(
 
 
 def check_held_out(robot: Robot, held_out: Sequence[Recording]) -> None:
-    """Refuse recordings in which no joint moves: they check no model, whatever it predicts."""
+    """Raise an error for recordings without motion, which cannot validate a model."""
     for recording in held_out:
         resting(robot, recording.source, np.ptp(recording.q, axis=0))
 
 
 def too_short_to_tell(recordings: Sequence[Recording]) -> tuple[str, ...]:
-    """Say that recordings are short, all together."""
+    """Return a note if the recordings are short in total."""
     duration = sum(recording.duration for recording in recordings)
     return (f'{duration:.2g} s is short; record 20 s or more',) if duration < _SHORT else ()
 
 
 def check_stamps(recordings: Sequence[Recording], used: Conditioning) -> None:
-    """Refuse uneven time stamps where little is left of data: late ones look like gaps."""
+    """Raise an error for uneven timestamps if little data remains."""
     for recording in recordings:
         uneven = uneven_stamps(recording, used.cutoff_hz, used.kept_hz)
         if uneven:
@@ -121,13 +121,13 @@ def check_stamps(recordings: Sequence[Recording], used: Conditioning) -> None:
 
 
 def moving(motions: Iterable[Motion]) -> npt.NDArray[np.bool_]:
-    """Tell which joints move in any of some motions, shape (n,)."""
+    """Return which joints move in any of some motions, shape (n,)."""
     ranges = np.max([np.ptp(motion.q, axis=0) for motion in motions], axis=0)
     return np.asarray(ranges >= REST_RANGE)
 
 
 def resting(robot: Robot, source: str, ranges: FloatArray) -> tuple[str, ...]:
-    """Say which joints are at rest, given how far each moved, (n,); refuse it of all of them."""
+    """Return a note on resting joints by their ranges, (n,); raise if all rest."""
     names = [name for name, size in zip(robot.joints, ranges, strict=True) if size < REST_RANGE]
     if len(names) == robot.n_joints:
         raise IdentificationError(
@@ -143,7 +143,7 @@ def check_torque(
     arm: ArmModel, recordings: Sequence[Recording], problem: Sequence[Regression]
 ) -> tuple[str, ...]:
     """
-    Refuse torques that are absent, of the wrong sign, in another unit than N m, or a mere command.
+    Raise an error for absent torques, wrong signs or units, or mere commands.
 
     Sign and unit show against the rigid body of the description, if all the joints that follow it
     agree; the sign of the others shows in their friction.
@@ -192,7 +192,7 @@ def check_torque(
 
 
 def wrong_sign(joints: Sequence[str]) -> str:
-    """Say what is wrong with the torque of joints that friction seems to drive."""
+    """Return the error on joints with negative friction power."""
     return (
         f'the torque of {", ".join(joints)} has the opposite sign of friction: negate it, as '
         'effort has to be positive along the URDF joint axis; or somebody moved the arm'
