@@ -395,7 +395,7 @@ def test_a_bag_of_one_message_is_too_short(swinging, stamps, write_bag, messages
 def test_joints_asked_for_must_differ(swinging, tmp_path):
     write_recording(tmp_path / 'bag', swinging)
     for joints in ([], ['elbow', 'elbow']):
-        with pytest.raises(RecordingError, match='joints wanted'):
+        with pytest.raises(RecordingError, match='at least one joint'):
             read_recording(tmp_path / 'bag', joints=joints)
 
 
