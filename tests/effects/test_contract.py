@@ -164,7 +164,7 @@ def test_names_joints_and_units():
         ('viscous_friction@elbo', 'its joints are shoulder_pitch'),
         ('coupled_joint_friction@elbow_pitch', 'pairs'),
         ('gravity_magnitude@elbow_pitch', 'whole arm'),
-        ('torque_crosstalk@elbow_pitch+elbow_pitch', 'no pair'),
+        ('torque_crosstalk@elbow_pitch+elbow_pitch', 'same joint'),
         ('joint_coupling@elbow_pitch+wrist_pitch+elbow_pitch+forearm_yaw', 'is first in two'),
     ],
 )

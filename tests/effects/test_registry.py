@@ -164,7 +164,7 @@ def test_a_class_without_its_methods_is_refused():
     )
     with pytest.raises(ar.ArmidError, match=r'bare .* has no columns'):
         ar.register(kind)
-    with pytest.raises(ar.ArmidError, match='no class'):
+    with pytest.raises(ar.ArmidError, match='not an effect class'):
         ar.register(Hose(('joint1',)))
 
 
