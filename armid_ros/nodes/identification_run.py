@@ -67,6 +67,9 @@ class IdentificationRunNode(ArmidNode):
         NodeParameter('robot', 'humanoid_arm', 'A shipped robot, or the path of a URDF or xacro.'),
         NodeParameter('gravity', 'earth', 'earth, moon, or x,y,z in the base frame [m/s^2].'),
         NodeParameter(
+            'joints', [''], 'Driven joints; if empty, all joints except those of grippers.'
+        ),
+        NodeParameter(
             'effects',
             [''],
             'Effects added to the rigid body; without names, the default of armid.',
