@@ -28,7 +28,7 @@ DISTURBANCES = {
     'stamp': 'joint states whose stamp alone is off are left out',
     'erratic': 'joint states that follow neither those before nor each other are left out',
     'no_velocity': 'joint states without velocity are left out: measured_velocity requires it',
-    'jump_back': 'joint states jump back in time: what is made of them begins anew',
+    'jump_back': 'joint states jump back in time: their processing begins anew',
     'position_step': 'positions step, as when a clock is set or an encoder is zeroed: the filters '
     'begin anew',
     'missing': 'joint states are missing between those that came: the history of the publisher is '
