@@ -40,6 +40,7 @@ from armid_ros.diagnosis import (
     next_run,
 )
 from armid_ros.diagnosis.next_run.steps import MODEL
+from armid_ros.diagnosis.verdict.finding import Overlay
 from armid_ros.effects.tied import Partner
 from armid_ros.errors import IdentificationError
 from armid_ros.excitation import save_excitation
@@ -115,7 +116,7 @@ class DiagnosisResult(ShownModel):
 
     @property
     def residual(self) -> Residual | None:
-        """Return the learned map of the unexplained residual; None if not asked for."""
+        """Return the learned map of the unexplained residual; None if none was learned."""
         return self.extras.residual
 
     @property
@@ -147,19 +148,16 @@ class DiagnosisResult(ShownModel):
             If the data were refused, so that there is no residual.
 
         """
-        if self.core.gap is None:
-            raise IdentificationError(f'no residual to draw: {self.core.summary}')
-        shown = self.core.gap.overlays[0]
-        t = shown.trajectory.motion.t[shown.trajectory.rows]
+        shown = self._overlays()[0]
         curves = {
-            'without the named effects': (t, shown.measured - shown.before),
-            'with them': (t, shown.measured - shown.after),
+            'without the named effects': (shown.trajectory.t, shown.measured - shown.before),
+            'with them': (shown.trajectory.t, shown.measured - shown.after),
         }
         return draw_joints(self.arm.robot.joints, curves, 'residual torque [N m or N]')
 
     def residual_table(self) -> pandas.DataFrame:
         """
-        Return what the model with the named effects leaves of the torque as a pandas table.
+        Return the residual torque with the named effects as a pandas table.
 
         Columns are recording, t [s], and every joint [N m or N].
 
@@ -169,19 +167,14 @@ class DiagnosisResult(ShownModel):
             If the data were refused, so that there is no residual.
 
         """
+        parts = [(o.source, o.trajectory.t, o.measured - o.after) for o in self._overlays()]
+        return residual_frame(self.description.robot.joints, parts)
+
+    def _overlays(self) -> tuple[Overlay, ...]:
+        """Return measured and predicted torques; IdentificationError if data were refused."""
         if self.core.gap is None:
             raise IdentificationError(f'no residual: {self.core.summary}')
-        return residual_frame(
-            self.description.robot.joints,
-            [
-                (
-                    one.source,
-                    one.trajectory.motion.t[one.trajectory.rows],
-                    one.measured - one.after,
-                )
-                for one in self.core.gap.overlays
-            ],
-        )
+        return self.core.gap.overlays
 
     def to_dataframe(self) -> pandas.DataFrame:
         """Return the named effects as a pandas table, one row per parameter."""
