@@ -26,13 +26,13 @@ _EVERYWHERE = re.compile(
     r'errors|motion|files|estimate|cli|api\.(arguments|table)|recording\.(curves|twice)'
     r'|report\.(notation|families|judgement|compare_report)'
 )
-#: A row, the distance of two lanes, the width of a name, and that of the text beside it [px].
+#: A row, the distance of two lanes, the width of a name, and that of the text [px].
 _ROW, _LANE, _NAME, _TEXT = 18, 22, 240, 560
 _BEGINNING = """# Architecture
 
 Each diagram follows one command, from top to bottom. A lane is a room: a folder of the package.
 The dot of a function is in the lane of its room, and a line leads to it from its caller. The text
-beside it is the first line of its docstring. Each function is shown once, helpers are left out.
+to the right is the first line of its docstring. Each function is shown once, without helpers.
 """
 
 

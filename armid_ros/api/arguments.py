@@ -118,7 +118,7 @@ def arm_of(arm: RobotLike, effects: str = USUAL) -> ArmModel:
 
 
 def drivable(arm: RobotLike) -> ArmModel:
-    """Return an arm model to move; TrajectoryError if some of its joints belong to no arm."""
+    """Return an arm model; TrajectoryError if a name or path has joints of no arm."""
     model = arm_of(arm)
     others = joints_beside_arms(model.robot) if isinstance(arm, str | Path) else ()
     if others:
@@ -164,7 +164,7 @@ def some_recordings_of(
 
 
 def with_sources_apart(*groups: list[Recording]) -> tuple[list[Recording], ...]:
-    """Make the source names of recordings unique by numbering equal ones."""
+    """Add numbers to equal source names of recordings, except existing paths."""
     taken: dict[str, int] = {}
 
     def named(recording: Recording) -> Recording:

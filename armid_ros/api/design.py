@@ -185,7 +185,7 @@ def _searched(
     rival: ArmModel | None,
     progress: Callable[[DesignProgress], None] | None,
 ) -> ExcitationResult:
-    """Find a start pose with a collision-free approach, then search for the trajectory."""
+    """Check that a start pose is free, then search for the trajectory."""
     planner = planner_of(model, asked, scene)
     if start is None:
         planner.free_start()  # where there is none, that is said before the search

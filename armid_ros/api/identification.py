@@ -158,7 +158,7 @@ class IdentificationResult(ShownModel):
 
     @property
     def grade(self) -> str:
-        """Grade in one word: good, fair, poor or unusable."""
+        """Grade in one word: good, poor or unusable."""
         return self.graded.word
 
     @cached_property

@@ -1,6 +1,6 @@
 # Copyright 2026 The armid_ros developers
 # SPDX-License-Identifier: Apache-2.0
-"""What is known of a model from when it was identified: its misfit, and its recordings."""
+"""Misfit and recordings of a model from its identification."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ import numpy as np
 
 
 def misfit_of(arm: RobotLike | IdentificationResult, model: ArmModel) -> Misfit | None:
-    """Return what a model left when it was identified, where that is known."""
+    """Return the misfit of a model at its identification, if it is known."""
     if isinstance(arm, IdentificationResult):
         return arm.misfit
     return read_misfit(arm, model) if _is_written(arm) else None
@@ -28,7 +28,7 @@ def misfit_of(arm: RobotLike | IdentificationResult, model: ArmModel) -> Misfit 
 def recordings_since(
     arm: RobotLike | IdentificationResult, model: ArmModel, asked: Sequence[Recording]
 ) -> list[Recording]:
-    """Return what a model was identified from; nothing if some of it is looked at."""
+    """Return the recordings of the identification as baseline; none if one is diagnosed."""
     if isinstance(arm, IdentificationResult):
         found = [*arm.recordings, *arm.held_out]
     elif _is_written(arm):

@@ -378,7 +378,7 @@ class ArmModel:
         return tau
 
     def neighbours(self, period: float) -> int:
-        """Return the number of neighbouring samples that a reading depends on."""
+        """Return how many samples to either side a reading depends on, a period [s] apart."""
         action = self._acting
         if action.displacement is None and action.reading_memory == 0.0:  # noqa: RUF069 - of laws, never computed
             return 0
@@ -419,7 +419,7 @@ class ArmModel:
         return np.asarray(columns + along @ (gain[:, :, np.newaxis] * (along.T @ columns)))
 
     def felt(self, motion: Motion) -> Motion:
-        """Return the link motion for the rigid body; without motion if quasi-static."""
+        """Return a link motion as the rigid body feels it: at rest if quasi-static."""
         return motion.at_rest() if self.quasi_static else motion
 
     def base_parameters(

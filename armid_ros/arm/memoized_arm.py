@@ -61,7 +61,7 @@ class Regressors:
 
 @dataclass(frozen=True, repr=False)
 class _Memoized(ArmModel):
-    """An arm with cached torques and regressors of motions."""
+    """An arm with caches of torques and regressors; arms made of it share the regressors."""
 
     regressors: Regressors = field(default_factory=Regressors, compare=False)
 

@@ -61,7 +61,7 @@ def checked_model(text: str) -> dict[str, Any]:
 
 
 def wrong_unit(row: Mapping[str, Any], units: Collection[str]) -> str:
-    """Return the error on a wrong unit of a parameter; empty if it is right."""
+    """Return the error on a wrong unit of a parameter; empty if right or not given."""
     if not units or row.get('unit', next(iter(units))) in units:
         return ''
     expected = ' or '.join(f"'{unit}'" for unit in units)
@@ -88,7 +88,7 @@ def _rows(
 
 
 def _fault(row: Any, units: tuple[str, ...]) -> tuple[str, str]:
-    """Return key and error of a wrong parameter; empty if none."""
+    """Return the key and error of a wrong parameter; the error is empty if it is right."""
     if not isinstance(row, dict):
         keys = ', '.join(_KEYS_OF_PARAMETER)
         return '', f'a parameter has {keys}; here is {str(row)[:40]!r}'

@@ -12,7 +12,7 @@ from armid_ros.motion import FloatArray
 
 
 def with_named(arm: ArmModel, effect: Effect, values: FloatArray) -> ArmModel:
-    """Add an effect to an arm; its values add to existing ones."""
+    """Return the arm with an effect added; its values add to existing ones."""
     there = place_in(arm, effect)
     if there is None:
         words = effect.named_as(values, arm)
@@ -28,7 +28,7 @@ def with_named(arm: ArmModel, effect: Effect, values: FloatArray) -> ArmModel:
 
 
 def place_in(arm: ArmModel, effect: Effect) -> tuple[int, list[int]] | None:
-    """Return the positions of the parameters of an effect; None if absent."""
+    """Return the index of an effect and rows of its parameters; None if any is missing."""
     wanted = [(p.name, p.joint) for p in effect.parameters(arm.robot)]
     for position, own in enumerate(arm.effects):
         if isinstance(effect, type(own)) and not own.shapes and not own.points:
@@ -40,7 +40,7 @@ def place_in(arm: ArmModel, effect: Effect) -> tuple[int, list[int]] | None:
 
 def in_words(arm: ArmModel) -> ArmModel:
     """
-    Express the effects of an arm by those of the catalogue.
+    Return the arm with its effects expressed by those of the catalogue.
 
     What only a search looks for, such as a gravity vector, is said as others are: a tilted base
     and the magnitude of gravity.

@@ -312,7 +312,7 @@ def variances(series: ParameterHistory, spread: Spread) -> tuple[FloatArray, flo
 def _lasting(
     group: Sequence[ParameterHistory], found: dict[tuple[str, str], Spread]
 ) -> tuple[float, float]:
-    """Return the inflation of steps and trends over the spread of neighbours."""
+    """Return the factors, in deviations, of steps and trends over neighbours; 1 or more."""
     steps, trends = [], []
     for one in group:
         if len(one.values) < FEWEST:

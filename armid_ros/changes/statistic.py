@@ -100,7 +100,7 @@ def two_means(x: FloatArray, weights: FloatArray) -> tuple[FloatArray, FloatArra
 
 
 def beyond_chance(chances: Sequence[float] | FloatArray, allowed: float) -> list[bool]:
-    """Return the significant changes at a family-wise error rate (Holm 1979)."""
+    """Return which changes are significant at a family-wise error rate (Holm 1979)."""
     beyond = [False] * len(chances)
     for tried, index in enumerate(np.argsort(chances)):
         if chances[index] > allowed / (len(chances) - tried):

@@ -149,7 +149,7 @@ def _blaming(texts: Sequence[str], robot: Robot) -> Iterator[None]:
 
 
 def _of_some_size(text: str, robot: Robot) -> tuple[Effect, FloatArray]:
-    """Parse --effect; refuse one without a value."""
+    """Parse --effect; raise a ModelError if its quantities are all zero."""
     from armid_ros.effects import parse_effect
 
     effect, values = parse_effect(text, robot)

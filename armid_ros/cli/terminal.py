@@ -96,7 +96,7 @@ class ProgressLines:
 
     @contextmanager
     def watched(self) -> Iterator[None]:
-        """Check every second in a thread."""
+        """Call `look` every second in a thread while the work runs."""
         done = threading.Event()
 
         def watch() -> None:

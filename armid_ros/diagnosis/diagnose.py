@@ -158,7 +158,7 @@ def diagnose(
 
 
 def _hardly_explained(result: Diagnosis, settings: DiagnosisSettings) -> bool:
-    """Return whether named causes explain less than half of the gap, or leave it open."""
+    """Return whether a gap stays open, or no named cause explains more than half of it."""
     largest = max((one.share for one in result.findings), default=0.0)
     return result.verdict in OPEN or largest <= settings.thresholds.open_share
 
@@ -214,7 +214,7 @@ def _each_alone(
     used: Conditioning,
     explainer: Explainer,
 ) -> Diagnosis:
-    """Return the result; BAD DATA if it stays open and single recordings turn out faulty."""
+    """Return the result; bad data if it is open or in doubt and some recordings are faulty."""
     arm = explainer.arm
     open_or_doubted = result.verdict in OPEN or bool(result.doubt)
     if not open_or_doubted or explainer.settings.partner is not None:

@@ -77,7 +77,7 @@ def reading(path: str | Path, error: type[ArmidError]) -> Iterator[None]:
 
 
 def finite(value: Any, what: str) -> float:
-    """Return a finite number of a document; ValueError if it is none."""
+    """Return a number of a document; ValueError unless finite and within LARGEST."""
     try:
         number = float(value)
     except (TypeError, ValueError, OverflowError):

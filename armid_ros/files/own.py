@@ -155,7 +155,7 @@ def refuse_replacing(folder: Path, names: Collection[str]) -> None:
 
 
 def _foreign(folder: Path, names: Sequence[str]) -> Iterator[str]:
-    """Yield files that are no results of this package."""
+    """Yield foreign files; those without room for a mark only if no name has room."""
     known = [name for name in names if _mark_of(name)]
     return (name for name in known or names if not is_own(folder / name))
 

@@ -43,7 +43,7 @@ def _content(path: Path) -> dict[str, Any]:
 
 
 def with_contents(document: Mapping[str, Any]) -> dict[str, Any]:
-    """Add the digests of existing recordings to identification.json."""
+    """Return identification.json with sizes and digests of existing recordings."""
     there = [(name, Path(name)) for name in _names(document)]
     rows = [{'bag': name, **_content(path)} for name, path in there if path.exists()]
     return {**document, 'recordings': rows}

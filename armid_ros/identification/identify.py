@@ -276,7 +276,7 @@ def identify(
 
 
 class _Bodies(NamedTuple):
-    """A fit with physically consistent links, and the increase of its torque error."""
+    """A fit with physically consistent links, and the relative increase of its error."""
 
     settings: IdentificationSettings
     theory: BaseParameters
@@ -314,7 +314,7 @@ def _fitted(
     settings: IdentificationSettings,
     rng: np.random.Generator,
 ) -> tuple[BaseParameters, FittedValues]:
-    """Fit the parameters that data determine better than the description."""
+    """Fit what data determine better than the description; return theory and fit."""
     base, problem, recordings, used = data
     method = settings.least_squares
 

@@ -130,7 +130,7 @@ class ParameterFile:
 
     def regrouped_as(self, other: ParameterFile) -> ParameterFile:
         """
-        Return the values in another grouping of the base parameters.
+        Return the values, plus those of another grouping that follow from them.
 
         A motion that shows less groups more: its parameters are combinations of those of a richer
         one.

@@ -83,7 +83,7 @@ class BaseParameters:
         self, standard: tuple[ParameterName, ...], columns: npt.NDArray[np.intp]
     ) -> BaseParameters:
         """
-        Embed the parameters in a longer list; the others are fixed.
+        Return the parameters embedded in a longer list; they do not depend on the others.
 
         Parameters
         ----------

@@ -121,7 +121,7 @@ def _without_inertials(urdf: str, links: Sequence[str]) -> str:
 
 
 def _share(body: FloatArray, others: FloatArray) -> float:
-    """Return the largest share of the other links' inertia that keeps a body."""
+    """Return the share of the other links' inertia to keep, 1 for all, so a body is left."""
     if not np.any(others):
         return 1.0
     if not Consistency.of('', others).eigenvalues[0] > -1e-12:

@@ -31,7 +31,7 @@ from scipy.ndimage import median_filter
 RESTART_NS = 10**9
 # Window of the median that checks a stamp [messages]; fewer than half of them may be wrong.
 _AROUND = 5
-# So many messages in a row with earlier stamps mean that the clock was set back.
+# Number of successive messages with earlier stamps that show a clock that was set back.
 _FEWEST_AGAIN = 10
 # Limit of positions, velocities and torques; uninitialised memory can exceed it.
 LARGEST = 1e15

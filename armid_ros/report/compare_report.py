@@ -108,7 +108,7 @@ def change_rows(comparison: Comparison) -> list[tuple[str, ...]]:
 
 
 def tell(comparison: Comparison) -> tuple[str, ...]:
-    """Return sentences on what changed, most significant first, after a summary."""
+    """Return sentences on what changed, the headline first, the details last."""
     if comparison.factors:
         units = tell_units(comparison.before.source, comparison.after.source, comparison.factors)
         return (*(_unusable(one) for one in comparison.unusable), units)
@@ -123,7 +123,7 @@ def tell(comparison: Comparison) -> tuple[str, ...]:
 
 
 def tell_units(before: str, after: str, factors: Mapping[str, float]) -> str:
-    """Return a sentence if the torques of both identifications differ in unit."""
+    """Return the sentences for identifications whose torques differ in unit."""
     named = ', '.join(f'{joint} {factor:.3g}' for joint, factor in factors.items())
     return (
         f'Inertia and friction of {after} are those of {before} times one factor a joint '
@@ -156,7 +156,7 @@ def _sum(comparison: Comparison) -> str:
 
 
 def _details(comparison: Comparison) -> Sequence[str]:
-    """Return the changes, all together and one by one, or the smallest detectable ones."""
+    """Return sentences on changed groups, or one on the smallest detectable change."""
     if not comparison.anything:
         return [_least_visible(comparison.changes)]
     changed = comparison.changed
@@ -234,7 +234,7 @@ def _together(group: GroupChange) -> str:
 
 
 def _least_visible(changes: Sequence[ParameterChange]) -> str:
-    """Return the smallest detectable change of the quantities that wear changes."""
+    """Return a sentence on the smallest detectable change of what wear changes."""
     worn = [c for c in changes if not c.parameter.rigid] or list(changes)
     known = [c for c in worn if excludes_zero(c.before, c.before_std)]
     if not known:

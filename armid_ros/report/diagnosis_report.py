@@ -208,7 +208,7 @@ def diagnosis_report(
 def _at_fault(
     diagnosis: Diagnosis, read: Mapping[str, Sequence[Recording]], names: Mapping[str, str]
 ) -> list[str]:
-    """Return the recordings that a BAD DATA verdict names; all if it names none."""
+    """Return the recordings that a BAD DATA verdict names, or all; [] for other verdicts."""
     if diagnosis.verdict != 'bad_data':
         return []
     sources = [one.source for several in read.values() for one in several if one.source]

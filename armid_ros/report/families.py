@@ -162,7 +162,7 @@ def parameter_folds(
 
 
 def estimate_text(value: float, std: float) -> tuple[str, str]:
-    """Return a value and the half-width of its 95 % interval; a dash if that includes zero."""
+    """Format a value, or 'includes 0', and the half-width of its 95 % interval."""
     number, reach = measured(value, HALF_WIDTH * std)
     return (number if not std or abs(value) > HALF_WIDTH * std else 'includes 0'), reach
 

@@ -135,7 +135,7 @@ def headline(remarks: Sequence[Remark], found: LinkCheck | None) -> tuple[str, .
 
 
 def _wrong_mass(found: LinkCheck, k: int) -> str:
-    """Return the error of the mass of a link; empty where it is not determined."""
+    """Return the error of a link's mass as a phrase; '' if it is not significant."""
     change, reach = found.measured_mass[k] - found.mass[k], HALF_WIDTH * found.mass_std[k]
     if not abs(change) > reach:
         return ''

@@ -98,7 +98,7 @@ def judge(
 
 
 def _notes(result: Identification) -> list[str]:
-    """Return the notes; of a physical certificate only active bounds."""
+    """Return the notes; of a physical certificate only active constraints and its notes."""
     given = result.physical
     if given is None:
         return list(result.notes)

@@ -45,7 +45,7 @@ def digits(value: float, count: int = 2) -> str:
 
 
 def plain(value: float, count: int = 3) -> str:
-    """Format a number without trailing zeros or exponent: '5', not '5.00'; 3000, not 3e+03."""
+    """Format a number without trailing zeros; exponent only below 1e-4 or from 1e7."""
     whole = 10.0**count - 0.5 <= abs(value) < 1e7
     return f'{value:.0f}' if whole else f'{value:.{count}g}'
 
@@ -94,7 +94,7 @@ def percent(share: float) -> str:
 
 
 def probability(p: float) -> str:
-    """Format a p value with one significant digit."""
+    """Format a p value: one digit below 0.1, else two decimals; or '< 0.0001'."""
     if p < 1e-4:
         return '< 0.0001'
     return f'{p:.1g}' if p < 0.1 else f'{p:.2f}'

@@ -133,7 +133,7 @@ class Direction:
 
 
 def torque_scale(result: Identification) -> FloatArray:
-    """Return the torque of a unit of each parameter over the residual, shape (r,)."""
+    """Return the rms torque of a unit of each parameter in residual deviations, shape (r,)."""
     columns = _some_columns(result, result.training)
     noise = np.where(result.joint_std > 0.0, result.joint_std, 1.0)
     return np.asarray(np.sqrt(np.mean((columns / noise[:, np.newaxis]) ** 2, axis=(0, 1))))
@@ -141,7 +141,7 @@ def torque_scale(result: Identification) -> FloatArray:
 
 def torque_reach(result: Identification, fits: Sequence[Fit]) -> FloatArray:
     """
-    Return the standard deviation of the predicted torque by the parameters, shape (n,).
+    Return the 95 % half-width of the torque due to uncertain parameters, shape (n,).
 
     Half widths of 95 % intervals, root mean square over a motion [N m].
 

@@ -33,7 +33,7 @@ SENSORS = Sensors(
 #: A run with the hidden change: seconds of a period, and harmonics.
 _PERIOD, _HARMONICS = 8.0, 5
 _RUNS = ('after_1', 'after_2', 'unused')
-#: Values of the hidden effect that are pretty.
+#: Number of values of the hidden effect that are printed.
 _SHOWN = 4
 
 
@@ -124,7 +124,7 @@ class HiddenChange:
         return f'Hidden was: {self.sentence(diagnosis.arm)}. The diagnosis {rank}.'
 
     def document(self, diagnosis: Diagnosis) -> dict[str, Any]:
-        """Return the hidden and the found effect for JSON."""
+        """Return the hidden effect, the verdict and whether it was found, for JSON."""
         gap, joints = diagnosis.gap, diagnosis.arm.robot.joints
         return {
             'hidden': {

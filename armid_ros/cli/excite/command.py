@@ -311,7 +311,7 @@ def _arms(
 
 @contextmanager
 def _kept_design(staged: Staged) -> Iterator[None]:
-    """Save the coefficients of a design without approach, unless the file exists."""
+    """Save a design without approach if its folder has no other files; then raise."""
     try:
         yield
     except TrajectoryError as error:

@@ -265,7 +265,7 @@ def _difference(
 def _between_rows(
     trajectory: Trajectory, samples: npt.NDArray[np.intp], joint: int
 ) -> npt.NDArray[np.bool_]:
-    """Return whether the row nearest to each sample is informative for a joint, (K,)."""
+    """Return whether the row at or after each sample is informative for a joint, (K,)."""
     nearest = np.clip(np.searchsorted(trajectory.rows, samples), 0, len(trajectory.rows) - 1)
     return np.asarray(trajectory.informative[nearest, joint])
 

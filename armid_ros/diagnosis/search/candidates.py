@@ -95,7 +95,7 @@ class Causes:
             yield from (one for one in members if (one.name, one.joints) not in self.fitted)
 
     def _divided(self, effect: Effect, singles: Sequence[Effect]) -> Iterator[Cause]:
-        """Yield the single causes of an effect on several joints."""
+        """Yield the causes that an effect consists of; its columns are computed at once."""
         robot, start = self.nuisance.arm.robot, 0
         places: list[tuple[Effect, tuple[int, ...], list[int]]] = []
         for one in singles:
@@ -137,7 +137,7 @@ class Causes:
     def made(
         self, effect: Effect, kept: tuple[int, ...], columns: Sequence[FloatArray]
     ) -> Cause | None:
-        """Make a cause from an effect and its columns (M, n, p); None if all columns are zero."""
+        """Make a cause from columns (M, n, p); None if all are zero on the day in question."""
         rows, robot = self.nuisance.rows, self.nuisance.arm.robot
         torque = _torque_of(columns, rows)
         seen = torque.any(axis=0)
@@ -261,7 +261,7 @@ def _unexplained(nuisance: Nuisance, under: Marginal) -> Unexplained:
 def candidate_effects(
     robot: Robot, kinds: Sequence[Kind]
 ) -> Iterator[tuple[Effect, list[Effect]]]:
-    """Yield effects on several joints, with the effects on single joints that they combine."""
+    """Yield effects to compute at once, each with the candidates that it combines."""
     for kind in with_exact_vector(kinds):
         try:
             places = kind.places(robot)
@@ -279,7 +279,7 @@ def candidate_effects(
 def shaped(
     effect: Effect, members: list[Effect], arm: ArmModel, unexplained: Unexplained
 ) -> Iterator[tuple[Effect, list[Effect]]]:
-    """Yield an effect and its single-joint parts for each starting value of its shape."""
+    """Yield an effect and its members in each starting shape; once if it has no shape."""
     if not effect.shapes:
         yield effect, members
         return

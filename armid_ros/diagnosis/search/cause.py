@@ -58,7 +58,7 @@ class Cause:
         return self.effect.name, self.effect.joints, self.kept
 
     def aimed_at(self, residual: Sequence[FloatArray]) -> Cause:
-        """Return the cause with its products recomputed for another residual, (n, M) each."""
+        """Return the cause with `aim` recomputed for another residual, (n, M) per recording."""
         joints = list(self.joints)
         pairs = zip(self.columns, residual, strict=True)
         aim = tuple(np.einsum('tmp,tm->p', x, y[joints]) for x, y in pairs)

@@ -273,7 +273,7 @@ class CauseComparison:
 
 
 def settings_of_baseline(nuisance: Nuisance) -> tuple[Setting, ...]:
-    """Return the discrepancy amplitudes that maximise the evidence of the baseline."""
+    """Return the one setting that maximises the evidence of the baseline, as a tuple."""
     before = np.flatnonzero(~nuisance.rows.today).tolist()
     lasting = 1.0
     for _ in range(2):
@@ -287,7 +287,7 @@ def settings_of_baseline(nuisance: Nuisance) -> tuple[Setting, ...]:
 
 
 def settings_alone() -> tuple[Setting, ...]:
-    """Return the discrepancy amplitudes to compare without a baseline."""
+    """Return the settings to compare without a baseline, with a fixed and a free body."""
     return tuple(
         Setting(free, share, share, factor, LASTING, odds + more)
         for free in (False, True)
@@ -297,7 +297,7 @@ def settings_alone() -> tuple[Setting, ...]:
 
 
 def settings_of_misfit(free: bool) -> tuple[Setting, ...]:
-    """Return the discrepancy amplitudes to compare where only the size of the misfit is known."""
+    """Return the settings to compare where only the size of the misfit is known."""
     return tuple(
         Setting(free, share, share, noise, LASTING) for share, noise in product(_OWN, (0.5, 1.1))
     )

@@ -145,7 +145,7 @@ class CauseInformation:
         return replace(self, matrix=matrix, vector=self.vector[kept], today=self.today[of_it])
 
     def apart(self, spread: float) -> list[FloatArray]:
-        """Return the Cholesky-like root of the covariance between recordings."""
+        """Return a root of the covariance of differences between recordings; empty if none."""
         if not spread:
             return []
         p, groups = self.size, len(self.today)

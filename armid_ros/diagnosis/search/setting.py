@@ -43,7 +43,7 @@ class Setting:
 
     @property
     def precision(self) -> float:
-        """Precision of a row, 1 / variance."""
+        """Precision of a row, 1 / variance, divided by `lasting` as rows are correlated."""
         return 1.0 / (self.lasting * self.noise**2)
 
 

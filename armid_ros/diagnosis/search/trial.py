@@ -123,7 +123,7 @@ class Ranked:
 
     def ahead(self, other: Ranked, levels: Thresholds) -> float:
         """
-        Return the log odds against another cause.
+        Return the log odds over another cause; positive if this one is likelier.
 
         A lead of a share of what is explained is none, as laws are inexact, unless one leaves so
         little that the other is no fit then. Then what freedom costs and what is commoner

@@ -124,7 +124,7 @@ def left_out(explanation: Explanation) -> Attribution:
 
 
 def _left(problem: JointFit, linear: Nuisance, names: Sequence[int]) -> FloatArray:
-    """Return the residual squares of each block, predicted from the other folds."""
+    """Return the squares that some names leave of each block, predicted from other folds."""
     fewer = replace(linear, accepted=tuple(linear.accepted[k] for k in names))
     rows = linear.rows
     said = np.zeros(len(fewer.cross[0]), dtype=bool)

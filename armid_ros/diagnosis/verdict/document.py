@@ -158,7 +158,7 @@ def _filters(diagnosis: Diagnosis) -> dict[str, float] | None:
 
 
 def _candidates(diagnosis: Diagnosis) -> list[dict[str, Any]]:
-    """Return the best candidates of the first comparison, best first."""
+    """Return the first candidates of the survey: named causes, then the likeliest others."""
     explanation = diagnosis.explanation
     if explanation is None or explanation.survey is None:
         return []
@@ -229,7 +229,7 @@ def _sizes(trial: Trial, robot: Robot) -> Iterator[tuple[int, float]]:
 
 def _said_size(trial: Trial, arm: ArmModel) -> tuple[ParameterName, float]:
     """
-    Return a parameter of the effect that a cause is named as, with its detectable size.
+    Return a parameter of the effect as named, with its smallest detectable size.
 
     It is inf where no size that the effect can have is detectable.
 

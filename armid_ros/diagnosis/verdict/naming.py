@@ -96,7 +96,7 @@ def findings(
 
 
 def _rows(parts: Sequence[_NamedEffect]) -> list[tuple[ParameterName, float, float]]:
-    """Return the parameters of all effects of one name, with values and standard deviations."""
+    """Return each parameter of one name once, with its summed value and standard deviation."""
     rows: dict[ParameterName, tuple[float, float]] = {}
     for part in parts:
         for parameter, value, std in zip(part.parameters, part.values, part.std, strict=True):

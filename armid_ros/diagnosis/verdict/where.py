@@ -122,7 +122,7 @@ def where_it_is(
 def where_left(
     explanation: Explanation, arm: ArmModel, shown: Evidence, settings: DiagnosisSettings
 ) -> tuple[Where, ...]:
-    """Locate the residual beyond the limits of the patched model."""
+    """Locate the residual of an arm beyond the limits of the patched model."""
     patched, left = (shown.residuals(one) for one in (explanation.fitted.arm, arm))
     losses, limits = shown.chi2_per_row(left), shown.limits(patched, settings)
     beyond = np.where(losses > limits, losses - 1.0, 0.0)

@@ -131,7 +131,7 @@ def larger(ratio: float) -> str:
 
 
 def sentence(finding: Finding, of: str = 'the gap') -> str:
-    """Return a sentence: what the cause is and how much of the gap it explains."""
+    """Return a sentence: what the cause is and how much it explains, by default of the gap."""
     return f'{_subject(finding)} explains {percent(finding.share)} of {of}.'
 
 
@@ -147,7 +147,7 @@ def share_in_words(finding: Finding) -> str:
 
 
 def percent(share: float) -> str:
-    """Format a share as a percentage with its leading digit: '96 %', '0.4 %'."""
+    """Format a share as a percentage, with a decimal below 2 %: '96 %', '0.4 %'."""
     size = abs(100.0 * share)
     return f'{100.0 * share:z.0f} %' if size >= 2.0 or size < 0.05 else f'{100.0 * share:.1f} %'
 

@@ -154,7 +154,7 @@ def _require_two_of_one_robot(before: ParameterFile, after: ParameterFile) -> No
 
 
 def _nothing_shared(before: ParameterFile, after: ParameterFile) -> str:
-    """Return the error that explains why two files cannot be compared."""
+    """Return the error message on two files that cannot be compared."""
     for one in (before, after):
         if not one.values and one.without_std:
             return (
@@ -168,7 +168,7 @@ def _nothing_shared(before: ParameterFile, after: ParameterFile) -> str:
 
 
 def _only_in(one: ParameterFile, other: ParameterFile) -> Iterator[NotCompared]:
-    """Yield the parameters that only one of the two results has."""
+    """Yield the parameters of one result that the other has no value of."""
     for name in one.values:
         if name in other.values or name in other.without_std:
             continue
@@ -182,7 +182,7 @@ def _only_in(one: ParameterFile, other: ParameterFile) -> Iterator[NotCompared]:
 
 @dataclass(frozen=True)
 class _Side:
-    """Values and covariance of the shared parameters in one identification."""
+    """Values, standard deviations and scatter of the shared parameters in one result."""
 
     values: FloatArray  # (p,)
     #: Standard deviations: those of noise, and in each joint as many times as much as its values
@@ -230,7 +230,7 @@ def _whole(
     names: Sequence[ParameterName],
     group: Sequence[int],
 ) -> tuple[FloatArray, FloatArray, float]:
-    """Return the differences of some parameters, their covariance and joint p-value."""
+    """Return the differences of some parameters, their covariance and overall p-value."""
     own = [names[k] for k in group]
     difference = (sides[1].values - sides[0].values)[list(group)]
     covariance = files[0].covariance_of(own) + files[1].covariance_of(own)
@@ -249,7 +249,7 @@ def _whole(
 
 
 def _squares(rows: FloatArray, covariance: FloatArray) -> tuple[float, int]:
-    """Return the Mahalanobis distance of rows (K, p), and the rank of the covariance."""
+    """Return the summed squared Mahalanobis distances of rows (K, p), and the rank."""
     std = np.sqrt(np.diag(covariance))
     with np.errstate(over='ignore'):
         squares, rank = quadratic_form(rows / std, covariance / np.outer(std, std), _ROUNDING)
@@ -259,7 +259,7 @@ def _squares(rows: FloatArray, covariance: FloatArray) -> tuple[float, int]:
 def _find_load(
     terms: Sequence[Mapping[str, float]], difference: FloatArray, covariance: FloatArray
 ) -> LoadChange | None:
-    """Return the load that explains the changes of base parameters, on the outermost link."""
+    """Return the load on the outermost link where one explains the changes, or None."""
     # that is where arms hold things; none if its mass does not differ from zero
     std = np.sqrt(np.diag(covariance))
     if not len(std) or not np.all(std > 0.0):

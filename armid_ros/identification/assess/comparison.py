@@ -54,7 +54,7 @@ class ParameterChange:
 
     @property
     def deviations(self) -> float:
-        """Return the z-score of the difference; 0 or inf for exact values."""
+        """Return the z-score of the difference; 0 or ±inf for exact values."""
         if self.std > 0.0:
             return self.difference / self.std
         return float(np.copysign(np.inf if self.changed else 0.0, self.difference))
@@ -63,7 +63,7 @@ class ParameterChange:
 @dataclass(frozen=True)
 class GroupChange:
     """
-    A group of parameters with the p-value of their joint change.
+    A group of parameters with the p-value of its change as a whole.
 
     Attributes
     ----------
@@ -218,7 +218,7 @@ class Comparison:
 
     @property
     def factors(self) -> dict[str, float]:
-        """Return the common factor of the torques of each joint; see ``unit_factors``."""
+        """Return the factor by which each joint's values changed; see ``unit_factors``."""
         return unit_factors(self.changes)
 
     @property
@@ -233,7 +233,7 @@ class Comparison:
 
     @property
     def changed_together(self) -> tuple[GroupChange, ...]:
-        """Return the groups that changed although no single parameter changed significantly."""
+        """Return the groups that changed although none of their own parameters did."""
         sure = {change.parameter for change in self.changed}
         return tuple(g for g in self.groups if g.changed and not sure.intersection(g.parameters))
 
@@ -277,7 +277,7 @@ class Comparison:
 
 def unit_factors(changes: Sequence[ParameterChange]) -> dict[str, float]:
     """
-    Return the common factor of the changes of each joint, if nothing else changed.
+    Return the factor, after over before, of each joint, if one fits nearly all values.
 
     No load and no wear makes masses and friction of all joints several times what they were:
     torques of one of the two are in another unit, or are currents. Empty where none are.

@@ -108,7 +108,7 @@ def _mistaken(
     motions: Sequence[Motion],
     before: Sequence[Motion],
 ) -> list[str]:
-    """Return the mistakes of each recording: names, signs or units of joints."""
+    """Return the mistake that all recordings share, or else joints in a wrong unit."""
     # a baseline gives the factor of all torques by itself
     since = bool(before) and bool(np.any(factors_since(arm, motions, before) > 0.0))
     found = [find_mistake(arm.body, recording, used) for recording in recordings]
@@ -148,7 +148,7 @@ def mistaken_recordings(
 
 
 def _described_friction(arm: ArmModel) -> list[str]:
-    """Return a note if the description states friction that the model lacks."""
+    """Return a list with a note if the description states friction the model lacks."""
     robot = arm.robot
     there = {(effect.name, joint) for effect in arm.effects for joint in effect.joints}
     stated = [
@@ -171,7 +171,7 @@ def _described_friction(arm: ArmModel) -> list[str]:
 
 
 def _extremes(robot: Robot, recording: Recording) -> Iterator[str]:
-    """Return notes on torques that saturate or exceed the limits of the drives."""
+    """Yield notes on torques that saturate or exceed the limits of the drives."""
     if recording.tau is None:
         return
     source = recording.source or 'recording'

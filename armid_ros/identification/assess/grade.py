@@ -157,7 +157,7 @@ def _mistakes(
 def _errors(
     result: Identification, worst: Mapping[str | None, _Worst], held_out: Sequence[Fit]
 ) -> Iterator[Fault]:
-    """Grade the joint with the largest error, and name the joints without prediction."""
+    """Yield the grade of the worst joint, and name joints that are hardly predicted."""
     use = {
         'good': '',
         'poor': ', too much to compute torques with',
@@ -185,7 +185,7 @@ def _errors(
 
 
 class _Worst(NamedTuple):
-    """The joint with the largest error: error, error without noise [%], and a sentence."""
+    """The worst joint: its index, error, error without noise [%], and these in words."""
 
     joint: int
     measured: float
@@ -226,7 +226,7 @@ def _halves(result: Identification, word: Word, error: str) -> Fault:
 
 
 def _resting(result: Identification, validation: Mapping[str, Sequence[Fit]]) -> Iterator[Fault]:
-    """Yield sentences on joints that do not move: not identified, or not checked."""
+    """Yield faults of joints that do not move: not identified, or not checked."""
     fitted = moving(fit.motion for fit in result.training)
     held_out = [fit.motion for part in validation.values() for fit in part]
     checked = moving(held_out) if held_out else fitted

@@ -228,7 +228,7 @@ def other_gravity(robot: Robot, vector: FloatArray) -> Hypothesis | None:
 
 def known_gravity(vector: FloatArray, told: FloatArray) -> tuple[FloatArray, str]:
     """
-    Format a gravity vector, by its name if it is a known one.
+    Return a gravity vector, or a known one near it, and its --gravity option.
 
     Parameters
     ----------
@@ -326,12 +326,12 @@ def _in_degrees(robot: Robot, joint: int | None = None) -> Hypothesis:
 
 
 def _beyond_masses(factor: float) -> bool:
-    """Whether a common factor of all masses does not explain the data."""
+    """Whether a factor is too far from one to be an error of all masses."""
     return not 1.0 / LIMITS.torque_factor < factor < LIMITS.torque_factor
 
 
 def _times(quantity: Quantity, joint: int | slice, factor: float) -> Callable[[Motion], Motion]:
-    """Return the factors of a quantity for one or several joints."""
+    """Return a function that multiplies a quantity of one or several joints."""
 
     def scaled(values: FloatArray) -> FloatArray:
         scale = np.ones(values.shape[1])

@@ -45,7 +45,7 @@ def units_beyond_drives(
     robot: Robot, recordings: Sequence[Recording], motions: Sequence[Motion]
 ) -> Iterator[str]:
     """
-    Return notes on torques in another unit, by the limits of the drives.
+    Yield notes on torques in another unit, by the limits of the drives.
 
     Where most joints are beyond their limits, or the described body needs as much, it is
     the limits of the description that are wrong.

@@ -142,7 +142,7 @@ def find_mistake(robot: Robot, recording: Recording, used: Conditioning) -> Mist
         return None
 
     def rows(some: Sequence[Hypothesis]) -> list[_Row]:
-        """Evaluate hypotheses; fit the body where the described one is not decisive."""
+        """Evaluate hypotheses; fit the body, too, where its error may decide."""
         found = []
         for one in some:
             after = _error(robot, slow, one, near=False)

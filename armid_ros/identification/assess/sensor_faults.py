@@ -137,7 +137,7 @@ def sensor_faults(
 
 
 def _jumps(robot: Robot, recording: Recording) -> Iterator[Fault]:
-    """Yield positions that jump faster than the joint can move, and do not jump back."""
+    """Yield the first position jump that no joint can make and that does not revert."""
     if len(recording) < 2:
         return
     time = np.maximum(np.diff(recording.t), recording.period)[:, np.newaxis]
@@ -235,7 +235,7 @@ def _when(t: FloatArray, start: int, stop: int, always: str) -> tuple[str, str]:
 
 
 def _longest_same(reading: FloatArray, step: float = 0.0) -> tuple[int, int]:
-    """Return start and stop of the longest run of equal samples."""
+    """Return start and stop of the longest run without a step larger than ``step``."""
     edges = np.flatnonzero(np.abs(np.diff(reading)) > step) + 1
     bounds = np.concatenate([[0], edges, [len(reading)]])
     longest = int(np.argmax(np.diff(bounds)))

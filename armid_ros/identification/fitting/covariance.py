@@ -66,7 +66,7 @@ def score_products(scores: Sequence[FloatArray], lags: int) -> FloatArray:
 
 
 def widened(covariance: FloatArray, bread: FloatArray, middle: FloatArray) -> FloatArray:
-    """Widen a covariance, (p, p), to the standard deviations of another middle."""
+    """Widen a covariance, (p, p), to at least the deviations of another middle."""
     ratio = np.diag(bread @ middle @ bread) / np.diag(covariance)
     factor = np.sqrt(np.maximum(ratio, 1.0))
     return np.asarray(covariance * np.outer(factor, factor))
@@ -224,6 +224,6 @@ def scatter(problem: Sequence[Regression], weights: FloatArray, values: FloatArr
 
 
 def _solution(products: FloatArray) -> tuple[FloatArray, FloatArray]:
-    """Return means and standard deviations, (p,), of normal equations (p, p + 1)."""
+    """Return means and deviations, (p,), of normal equations (p, p + 1); zero if unseen."""
     basis = informative_basis(products[:, :-1])
     return basis @ (basis.T @ products[:, -1]), np.sqrt(np.sum(basis**2, axis=1))

@@ -154,7 +154,7 @@ def determined(
 
 def base_spread(arm: ArmModel, base: BaseParameters) -> FloatArray:
     """
-    Return the prior standard deviation of described base parameters, shape (r,).
+    Return the largest expected errors of described base parameters, shape (r,).
 
     Infinite where an effect takes part that does not know the size of its values, and where no
     link has a mass.

@@ -123,7 +123,7 @@ def solve(
 def _robust(
     problem: Sequence[Regression], used: npt.NDArray[np.bool_], fit: WeightedFit
 ) -> tuple[WeightedFit, FloatArray]:
-    """Weight outliers down; return the fit and the row weights, (N, n)."""
+    """Weight outliers down; return the fit and the unscaled row factors, (N, n)."""
     relative: FloatArray = used.astype(float)
     for _ in range(ROUNDS):
         before = (fit.scale, relative)

@@ -330,7 +330,7 @@ class _State:
         self._weights = self._used / np.maximum(rms, _EXACT * max(rms.max(), 1e-100))
 
     def gain(self, predicted: Torques) -> float:
-        """Return the share of squared residuals that torques explain."""
+        """Return the decrease of the cost by torques; zero if there is no residual."""
         if np.linalg.norm(self._used * self._left) <= _FINE * np.linalg.norm(
             self._used * self._tau
         ):
@@ -347,7 +347,7 @@ class _State:
         return np.clip(self.values + step / np.where(size > 0.0, size, np.inf), *limits)
 
     def cost(self, predicted: Torques | None = None) -> float:
-        """Return the sum of squared residuals after a step, per joint."""
+        """Return the total squared residual, in units of the present rms of each joint."""
         if predicted is None:
             return float(np.sum((self._weights * self._left) ** 2))
         left = self._weights * (self._tau - np.concatenate(predicted))

@@ -92,7 +92,7 @@ class Change:
 
     @property
     def reopened(self) -> FloatArray:
-        """Independent directions of the changed parameters, shape (P, k)."""
+        """Independent directions of all that may have changed, rivals included, (P, k)."""
         columns = np.hstack([c.reopened for c in (self.candidate, *self.rivals)])
         columns = columns / np.linalg.norm(columns, axis=0)
         left, size, _ = np.linalg.svd(columns, full_matrices=False)
@@ -167,7 +167,7 @@ def _candidate(
 
 
 def _independent(columns: FloatArray) -> list[int]:
-    """Return a maximal set of linearly independent columns, in order."""
+    """Return the indices of a maximal set of independent columns, in order."""
     lengths = np.linalg.norm(columns, axis=0)
     unit = columns / np.where(lengths > 0.0, lengths, 1.0)
     ranks = [np.linalg.matrix_rank(unit[:, :k], _INDEPENDENT) for k in range(len(lengths) + 1)]

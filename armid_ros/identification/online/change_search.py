@@ -62,7 +62,7 @@ class ChangeSettings:
     false_alarm_time: float = 100.0 * 3600.0
 
     def __post_init__(self) -> None:
-        """Check the times."""
+        """Raise an error unless the time between false alarms is positive."""
         if not self.false_alarm_time > 0.0:
             raise IdentificationError(
                 f'time between false alarms {self.false_alarm_time} s: has to be above 0'
@@ -97,12 +97,12 @@ class FoundChange:
 
     @property
     def before(self) -> int:
-        """Return the last block before the change."""
+        """Return the index of the last block before the change."""
         return max(self.first - 1, 0)
 
     @property
     def after(self) -> int:
-        """Return the first block after the change."""
+        """Return the index of the first block wholly after the change."""
         return min(self.first + 1, len(self.blocks) - 1)
 
 

@@ -268,7 +268,7 @@ class ChangeWatch:
         )
 
     def _learn_again(self, found: FoundChange, reopened: FloatArray) -> Job:
-        """Restore the estimator at the beginning of a block, and reopen changed directions."""
+        """Restore an earlier state, reopen changed directions, and learn later samples again."""
         last = found.blocks[found.before]
         since = [sample for block in found.blocks[found.after :] for sample in block.samples]
         stretches = (*self._unseen, *([self._open] if self._open else ()))

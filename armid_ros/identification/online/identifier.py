@@ -48,7 +48,7 @@ _SPARE = 4.0
 @dataclass(frozen=True)
 class OnlineSample:
     """
-    A row that the estimator used, with its prediction.
+    Measured and predicted torques of one row, and which of them the estimator used.
 
     Attributes
     ----------
@@ -224,7 +224,7 @@ class OnlineIdentifier:
         return self.__dict__
 
     def _take(self, sample: StreamSample) -> OnlineSample | None:
-        """Filter a good sample, which may begin a stretch; return new rows."""
+        """Filter a good sample, which may begin a stretch; return the new row or None."""
         if sample.begins:
             self._filter.restart('position_step')
         self._checks.take(sample.t)
@@ -375,7 +375,7 @@ class OnlineIdentifier:
 
     @property
     def _without_consequence(self) -> FloatArray:
-        """Return the error of one sample that a row does not show; 0 for positions."""
+        """Return the largest error of one sample that no row shows; 0 for all but torques."""
         n = self.arm.robot.n_joints
         floor = np.zeros((3 if self.settings.measured_velocity else 2) * n)
         if self._filter.pole is not None:

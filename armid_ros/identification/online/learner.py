@@ -191,7 +191,7 @@ class Learner:
 
     @property
     def residual_deviation(self) -> FloatArray:
-        """Return the standard deviation of the residual per sample, (n,) [N m]."""
+        """Return the residual standard deviation, as noise of single samples, (n,) [N m]."""
         self.settle()
         return self._deviation
 

@@ -51,7 +51,7 @@ _FEWEST_BLOCKS = 16
 
 class History:
     """
-    Ring buffer of rows of numbers.
+    Buffer of the last rows of numbers.
 
     Parameters
     ----------
@@ -84,7 +84,7 @@ class History:
 
     @property
     def values(self) -> FloatArray:
-        """Return a copy of the rows, oldest first."""
+        """Return a view of the rows, oldest first; later appends do not change it."""
         return self._rows[self._end - len(self) : self._end]
 
 
@@ -197,7 +197,7 @@ class NullCalibration:
 
     @staticmethod
     def _tail_of(seen: FloatArray, rare: FloatArray) -> Pieces[float]:
-        """Return the ratio of the 99 % quantile of statistics to that of white noise."""
+        """Return the 99 % quantile of the statistics, each divided by its expected one."""
         count = int(np.sum(seen > 0.0))
         most = count - int((1.0 - _RARE) * (count - 1))  # so many of the largest hold the quantile
         largest = np.empty(0)
@@ -238,7 +238,7 @@ class NullCalibration:
 
 
 def _in_pieces(values: FloatArray) -> Iterator[slice]:
-    """Yield the columns that one piece of work evaluates."""
+    """Yield slices of the columns, one for each piece of work."""
     width = max(1, _AT_A_TIME // max(1, len(values)))
     for first in range(0, values.shape[1], width):
         yield slice(first, first + width)

@@ -138,7 +138,7 @@ class RecursiveLeastSquares:
         self.reset()
 
     def with_more(self, parameters: tuple[ParameterName, ...]) -> RecursiveLeastSquares:
-        """Return a reset estimator with further parameters without prior."""
+        """Return a reset estimator with more parameters, which begin at 0 with a weak prior."""
         wider = copy(self)
         wider.parameters = self.parameters + parameters
         wider._start = np.concatenate([self._start, np.zeros(len(parameters))])
@@ -334,7 +334,7 @@ class RecursiveLeastSquares:
 
 
 def check_forgetting(factor: float) -> None:
-    """Check the forgetting factor."""
+    """Raise an error for a forgetting factor out of range."""
     if not SMALLEST_FORGETTING <= factor <= 1.0:
         raise IdentificationError(
             f'forgetting factor {factor}: has to be from {SMALLEST_FORGETTING} to 1'

@@ -214,7 +214,7 @@ def _bodies(
 
 
 def _heavy(robot: Robot, rigid: FloatArray) -> tuple[str, ...]:
-    """Return the mask of links far heavier than described, shape (n, 10)."""
+    """Return at most one note, on links far heavier than described; `rigid` is (n, 10)."""
     described = robot.rigid_parameters[::PER_LINK]
     named = [
         f'{link} {found:.3g} kg, described {mass:.3g} kg'

@@ -81,7 +81,7 @@ class PhysicalCertificate:
 
     @property
     def activity(self) -> tuple[str, ...]:
-        """Return a sentence on the active constraints; empty if none is active."""
+        """Return notes on active constraints and the harm they do; empty if none applies."""
         said = []
         if self.held_out_ratio > DEAR:
             said.append(

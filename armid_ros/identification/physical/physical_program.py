@@ -170,7 +170,7 @@ class PhysicalProgram:
         empty = sparse.csr_matrix((1, _LOG_DETERMINANT * self.n_links))
 
         def linear(cone: Any, normal: FloatArray, offset: FloatArray) -> None:
-            """Constrain normal @ theta + offset to a cone of a number of rows."""
+            """Constrain normal @ theta + offset to a cone of as many rows."""
             if len(normal):
                 side = sparse.vstack([empty] * len(normal))
                 blocks.append(sparse.hstack([-sparse.csr_matrix(normal @ change), side]))
@@ -223,7 +223,7 @@ class PhysicalProgram:
 
 def box_conditions(box: Box) -> FloatArray:
     """
-    Return the quantities that are positive for a link inside a box.
+    Return rows whose products with the parameters are positive inside a box.
 
     The centre of mass is between the corners, and so is all mass: the integral of
     (x - lower) (upper - x) dm is not negative along any axis.

@@ -44,7 +44,7 @@ _PERIOD_INTERVALS = 20
 
 
 def check_gap(samples: int) -> None:
-    """Check the largest gap."""
+    """Raise an error for a largest gap below 1 sample."""
     if samples < 1:
         raise IdentificationError(f'largest gap of {samples} samples: has to be at least 1')
 

@@ -131,7 +131,7 @@ def _repeatability(
 
 def repeatability(fits: Sequence[Fit]) -> tuple[float, FloatArray, FloatArray] | None:
     """
-    Return the period of a motion, and what does not repeat of torque and residual.
+    Return the period of a motion, what does not repeat after it, and the residual.
 
     Two periods are compared in the longest stretch of a recording; None where nothing repeats. The
     difference is of the residual, in which each period has its own positions: what depends on the
