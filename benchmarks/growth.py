@@ -11,6 +11,8 @@ picture. Each point is a process of its own. The arms are chains with friction o
 from __future__ import annotations
 
 import argparse
+from collections.abc import Callable
+from functools import partial
 import json
 from pathlib import Path
 import resource
@@ -20,25 +22,25 @@ import tempfile
 import time
 
 import armid_ros as ar
-from armid_ros.effects import make_effect
-from armid_ros.motion import Motion
 from armid_ros.recording import write_recording
 import numpy as np
+
+from benchmarks.offline_speed import motion, RATE
+from benchmarks.reference_loop import processor
 
 OUT = Path(__file__).parent / 'results' / 'growth.json'
 FRICTION = ('viscous_friction:viscous_coefficient=0.5', 'coulomb_friction:coulomb_torque=0.3')
 OFFSET = 'torque_offset:torque_offset=1'
-RATE = 200.0
-#: Job, what grows, and its values; elsewhere 7 joints, one bag of 60 s, two effects.
+#: Job, what grows, and its values; elsewhere 7 joints, one bag of 12 s, two effects.
 POINTS = {
     ('read', 'samples'): (10**4, 10**5, 10**6, 3 * 10**6),
-    ('identify', 'samples'): (10**4, 10**5, 10**6, 3 * 10**6),
+    ('identify', 'samples'): (10**4, 10**5, 10**6),
     ('diagnose', 'samples'): (10**4, 3 * 10**4, 10**5, 3 * 10**5),
     ('identify', 'joints'): (1, 3, 7, 15, 30),
     ('diagnose', 'joints'): (1, 3, 7, 12),
     ('simulate', 'joints'): (1, 3, 7, 15, 30),
     ('online', 'joints'): (1, 3, 7, 15, 30),
-    ('identify', 'bags'): (1, 10, 100, 1000),
+    ('identify', 'bags'): (1, 10, 100, 300),
     ('identify', 'effects'): (1, 2, 4, 8),
 }
 DEFAULTS = {'samples': 12_000, 'joints': 7, 'bags': 1, 'effects': 2}
@@ -69,50 +71,39 @@ def chain(joints: int) -> str:
 
 
 def recording(arm: ar.ArmModel, samples: int, seed: int) -> ar.Recording:
-    """Return exact torque with noise along three sines per joint."""
-    rng = np.random.default_rng(seed)
-    t = np.arange(samples) / RATE
-    q, dq, ddq = np.zeros((3, samples, arm.robot.n_joints))
-    for hz, size in ((0.1, 0.5), (0.25, 0.3), (0.6, 0.1)):
-        w = 2.0 * np.pi * hz
-        angle = w * t[:, None] + rng.uniform(0.0, 2.0 * np.pi, arm.robot.n_joints)
-        q += size * np.sin(angle)
-        dq += size * w * np.cos(angle)
-        ddq -= size * w * w * np.sin(angle)
-    motion = Motion(arm.robot.joints, t, q, dq, ddq)
-    tau = arm.torque(motion) + 0.05 * rng.normal(size=q.shape)
-    return ar.Recording(joints=arm.robot.joints, t=t, q=q, dq=dq, tau=tau, source=f'bag{seed}')
+    """Return a noisy recording along three sines per joint."""
+    made = motion(arm, samples / (60.0 * RATE), np.random.default_rng(seed))
+    q, dq, tau = made.q, made.dq, made.tau
+    return ar.Recording(joints=made.joints, t=made.t, q=q, dq=dq, tau=tau, source=f'bag{seed}')
 
 
-def measure(job: str, sizes: dict[str, int], folder: Path) -> tuple[float, float]:
-    """Return processor time [s] and memory [MB] of a job, without making its data."""
+def prepared(job: str, sizes: dict[str, int], folder: Path) -> Callable[[], object]:
+    """Make the data of a job, and return the job."""
     truth = ar.ArmModel.of(chain(sizes['joints']), effects=list(FRICTION))
-    arm = ar.ArmModel(truth.robot)
-    for name in EFFECTS[: sizes['effects']]:
-        arm = arm.with_effect(make_effect(name, arm.robot))
+    arm = ar.ArmModel.of(truth.robot, effects=EFFECTS[: sizes['effects']])
     size = sizes['samples'] if sizes['bags'] == 1 else BAG
     runs = [recording(truth, size, seed) for seed in range(sizes['bags'])]
-    changed = ar.ArmModel.of(truth.robot, effects=[*FRICTION, OFFSET])
-    later, motion = recording(changed, size, 7), runs[0].motion()
-    jobs = {
-        'read': lambda: ar.read_recording(folder / 'bag', truth.robot),
-        'identify': lambda: ar.identify(arm, runs),
-        'diagnose': lambda: ar.diagnose(truth, later, baseline=runs),
-        'simulate': lambda: ar.simulate(truth, motion),
-        'online': lambda: learn(ar.OnlineIdentifier(arm, rng=np.random.default_rng(0)), runs[0]),
-    }
     if job == 'read':
         write_recording(folder / 'bag', runs[0])
+        return partial(ar.read_recording, folder / 'bag', truth.robot)
+    if job == 'diagnose':
+        changed = ar.ArmModel.of(truth.robot, effects=[*FRICTION, OFFSET])
+        return partial(ar.diagnose, truth, recording(changed, size, 7), baseline=runs)
+    if job == 'simulate':
+        return partial(ar.simulate, truth, runs[0].motion())
+    if job == 'online':
+        online = ar.OnlineIdentifier(arm, rng=np.random.default_rng(0))
+        samples = list(zip(runs[0].t, runs[0].q, runs[0].tau, strict=True))
+        return lambda: [online.update(t, q, None, tau) for t, q, tau in samples]
+    return partial(ar.identify, arm, runs)
+
+
+def measure(run: Callable[[], object]) -> tuple[float, float]:
+    """Return processor time [s] of a job, and the memory that it adds [MB]."""
     before, begun = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss, time.process_time()
-    jobs[job]()
+    run()
     used = time.process_time() - begun
     return used, (resource.getrusage(resource.RUSAGE_SELF).ru_maxrss - before) / 1024.0
-
-
-def learn(online: ar.OnlineIdentifier, run: ar.Recording) -> None:
-    """Give an online identifier a recording, sample by sample."""
-    for t, q, tau in zip(run.t, run.q, run.tau, strict=True):
-        online.update(t, q, None, tau)
 
 
 def slope(x: list[int], y: list[float]) -> float:
@@ -132,7 +123,8 @@ def main() -> None:
     if asked.point:
         job, axis, value = asked.point
         with tempfile.TemporaryDirectory() as folder:
-            print(json.dumps(measure(job, DEFAULTS | {axis: int(value)}, Path(folder))))
+            run = prepared(job, DEFAULTS | {axis: int(value)}, Path(folder))
+            print(json.dumps(measure(run)))
         return
     table = []
     for (job, axis), values in POINTS.items():
@@ -150,18 +142,7 @@ def main() -> None:
         )
         print(f'{job:9} over {axis:8} slope {table[-1]["slope"]:.2f}   {points}', flush=True)
     if not asked.quick:
-        OUT.write_text(json.dumps({'machine': machine(), 'jobs': table}, indent=1) + '\n')
-
-
-def machine() -> str:
-    """Return the processor and the commit."""
-    names = (
-        line for line in Path('/proc/cpuinfo').read_text().splitlines() if 'model name' in line
-    )
-    commit = subprocess.run(
-        ['git', 'rev-parse', '--short', 'HEAD'], capture_output=True, text=True
-    )
-    return f'{next(names, ": unknown").partition(": ")[2]}, commit {commit.stdout.strip()}'
+        OUT.write_text(json.dumps({'machine': processor(), 'jobs': table}, indent=1) + '\n')
 
 
 if __name__ == '__main__':

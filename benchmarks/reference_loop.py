@@ -20,11 +20,16 @@ def loop() -> float:
     return time.process_time() - begin
 
 
+def processor() -> str:
+    """Return the name of the processor."""
+    with open('/proc/cpuinfo', encoding='utf-8') as info:
+        names = (line.split(': ')[1] for line in info if line.startswith('model name'))
+        return next(names, '?').strip()
+
+
 if __name__ == '__main__':
     took, reference = time.time() - float(sys.argv[1]), min(loop() for _ in range(5))
-    with open('/proc/cpuinfo', encoding='utf-8') as info:
-        model = next((line.split(': ')[1] for line in info if line.startswith('model name')), '?')
     print(
-        f'the tests took {took:.0f} s on {os.cpu_count()} cores of {model.strip()}, '
+        f'the tests took {took:.0f} s on {os.cpu_count()} cores of {processor()}, '
         f'{took / reference:.0f} times a reference loop of {reference:.2f} s'
     )
