@@ -6,6 +6,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
+from importlib.util import find_spec
 from pathlib import Path
 from typing import Any, Literal, TYPE_CHECKING, TypeVar
 
@@ -39,6 +40,7 @@ from armid_ros.diagnosis import (
     EXPERIMENT_FILE,
     next_run,
 )
+from armid_ros.diagnosis.diagnose import OPEN
 from armid_ros.diagnosis.next_run.steps import MODEL
 from armid_ros.diagnosis.verdict.finding import Overlay
 from armid_ros.effects.tied import Partner
@@ -50,17 +52,9 @@ from armid_ros.identification.assess.verification import ForwardValidation, simu
 from armid_ros.identification.rows.signals import conditioning
 from armid_ros.recording import Recording, require_once
 from armid_ros.recording.curves import draw_joints
-from armid_ros.report.diagnosis_report import diagnosis_report, Extras
+from armid_ros.report.diagnosis_report import diagnosis_report, Extras, LearnedResidual
 from armid_ros.report.notation import pretty
 from armid_ros.report.sections.diagnosed import named_rows
-from armid_ros.residual import (
-    learn_residual,
-    lookup_table,
-    require_libraries,
-    Residual,
-    TABLE_FILE,
-    WORTH_A_MAP,
-)
 from armid_ros.simulation.bodies import require_any_mass
 import numpy as np
 import numpy.typing as npt
@@ -115,7 +109,7 @@ class DiagnosisResult(ShownModel):
     extras: Extras = field(default_factory=Extras)
 
     @property
-    def residual(self) -> Residual | None:
+    def residual(self) -> LearnedResidual | None:
         """Return the learned map of the unexplained residual; None if none was learned."""
         return self.extras.residual
 
@@ -189,7 +183,7 @@ class DiagnosisResult(ShownModel):
         extras = self.extras
         return {
             **diagnosis_document(self.core),
-            'residual': None if self.residual is None else self.residual.document(TABLE_FILE),
+            'residual': None if self.residual is None else self.residual.document(),
             'forward': [pair.document() for pair in extras.forward],
             'next_run': None if extras.next_run is None else extras.next_run.document(),
         }
@@ -217,7 +211,7 @@ class DiagnosisResult(ShownModel):
         save_model(model, self.arm, source, self.core.estimate, self.misfit)
         write_file(folder / 'diagnosis.json', json_text(document, indent=1))
         if self.residual is not None:
-            write_file(folder / TABLE_FILE, lookup_table(self.residual))
+            self.residual.write_table(folder)
         if self.extras.next_run is not None:
             save_excitation(self.extras.next_run.excitation, folder / EXPERIMENT_FILE)
         page = self.page(origin, model.read_text(encoding='utf-8'))
@@ -229,16 +223,23 @@ class DiagnosisResult(ShownModel):
         """Return the names of the files of the result."""
         return [
             *('diagnosis.json', 'report.html', 'model.yaml'),
-            *([] if self.extras.residual is None else [TABLE_FILE]),
+            *([] if self.residual is None else [self.residual.table_file]),
             *([] if self.extras.next_run is None else [EXPERIMENT_FILE]),
         ]
 
     def with_residual(self, seed: int) -> DiagnosisResult:
         """Learn the unexplained residual as a map of the state; note why if it is not learned."""
-        if self.verdict not in WORTH_A_MAP:
+        if self.verdict not in OPEN:
             said = self.verdict.replace('_', ' ')
             return self._with_notes(f'nothing is learned where the verdict is {said}')
-        found, why = _tried('map', lambda: learn_residual(self.core, np.random.default_rng(seed)))
+
+        def learned() -> LearnedResidual | None:
+            require_residual()
+            from armid_ros.residual import learn_residual
+
+            return learn_residual(self.core, np.random.default_rng(seed))
+
+        found, why = _tried('map', learned)
         if found is None:
             nothing = 'nothing was learned: the residual does not depend on the state of any joint'
             return self._with_notes(*(why or (nothing,)))
@@ -298,9 +299,9 @@ class DiagnosisResult(ShownModel):
         """Return the command that follows."""
         if self.verdict in ('bad_data', 'not_repeatable'):
             return 'inspect'
-        if self.verdict in WORTH_A_MAP and self.residual is None:
+        if self.verdict in OPEN and self.residual is None:
             return 'diagnose'
-        anew = self.core.doubt or self.core.harmful or self.verdict in WORTH_A_MAP
+        anew = self.core.doubt or self.core.harmful or self.verdict in OPEN
         return 'identify' if anew else 'simulate'
 
     def _baseline(self) -> list[str]:
@@ -387,7 +388,7 @@ def diagnose(
 
     """
     if residual is not None:
-        require_libraries()
+        require_residual()
     model = arm.arm if isinstance(arm, IdentificationResult) else arm_of(arm, effects)
     require_any_mass(model.robot)
     looked_at = some_recordings_of(recordings, model.robot)
@@ -427,6 +428,17 @@ def diagnose(
     )
     seed = rng if isinstance(rng, int) else 0
     return found if residual is None else found.with_residual(seed)
+
+
+def require_residual() -> None:
+    """Raise IdentificationError if the package or a library that learns residuals is missing."""
+    if find_spec('armid_ros.residual') is None:
+        raise IdentificationError(
+            'learning a residual needs armid_ros.residual, which this installation does not have'
+        )
+    from armid_ros.residual import require_libraries
+
+    require_libraries()
 
 
 def _tried(what: str, make: Callable[[], _Made]) -> tuple[_Made | None, tuple[str, ...]]:

@@ -6,8 +6,10 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
-from typing import ClassVar
+from pathlib import Path
+from typing import Any, ClassVar, Protocol
 
+from armid_ros.arm import ArmModel
 from armid_ros.diagnosis import Diagnosis, Finding, NextRun
 from armid_ros.diagnosis.next_run.steps import MODEL, next_steps
 from armid_ros.diagnosis.verdict.document import detectable
@@ -41,8 +43,6 @@ from armid_ros.report.sections.diagnosed import (
 from armid_ros.report.sections.fit import forward_section
 from armid_ros.report.sections.frame import next_steps_section, Origin, VerdictSection
 from armid_ros.report.sections.overlay import overlay_section, whole_overlays
-from armid_ros.report.sections.residual_map import residual_map_section
-from armid_ros.residual import JointResidual, Residual
 import numpy as np
 
 #: Colour of each verdict; the others are bad.
@@ -64,6 +64,37 @@ def tone_of(diagnosis: Diagnosis, worse: Sequence[str] = ()) -> str:
     return 'fair' if tone == 'good' and (any(open_ends) or worse) else tone
 
 
+class LearnedResidual(Protocol):
+    """Learned maps of an unexplained residual, as results and reports use them."""
+
+    @property
+    def arm(self) -> ArmModel:
+        """The model with the maps."""
+
+    @property
+    def gains(self) -> Mapping[str, float]:
+        """Share of the squared residual that the map of each joint predicts."""
+
+    @property
+    def table_file(self) -> str:
+        """Name of the file with the maps."""
+
+    def sentences(self) -> Sequence[str]:
+        """Return a sentence for each joint."""
+
+    def steps(self) -> Sequence[str]:
+        """Return what to do next about each joint."""
+
+    def section(self) -> Section:
+        """Return the section of a report with the maps."""
+
+    def document(self) -> dict[str, Any]:
+        """Return the entry of diagnosis.json."""
+
+    def write_table(self, folder: Path) -> None:
+        """Write the maps as a table into a folder."""
+
+
 @dataclass(frozen=True)
 class Extras:
     """
@@ -79,7 +110,7 @@ class Extras:
         Why there is no next run, where names are in doubt.
     notes : tuple of str
         Why there is not more.
-    residual : Residual or None
+    residual : LearnedResidual or None
         What is left without a name, learned.
 
     """
@@ -88,7 +119,7 @@ class Extras:
     next_run: NextRun | None = None
     no_run: str = ''
     notes: tuple[str, ...] = ()
-    residual: Residual | None = None
+    residual: LearnedResidual | None = None
 
     def steps(self, diagnosis: Diagnosis, model: str = MODEL) -> list[str]:
         """Return what to do next, for the page and the terminal, and where the model is."""
@@ -160,7 +191,9 @@ def diagnosis_report(
     recordings = [(one, role) for role, several in read.items() for one in several]
     names = short_names([one.source for one, _ in recordings])
     residual, patched = extras.residual, bool(diagnosis.findings)
-    steps = [*map(pretty, extras.steps(diagnosis)), *_of_maps(residual)]
+    steps = list(map(pretty, extras.steps(diagnosis)))
+    if residual is not None:
+        steps += residual.steps()
     sections: list[Section] = [_verdict(diagnosis, names, extras.worse, ''.join(steps[:1]))]
     curves = whole_overlays(diagnosis, [one for one, _ in recordings])
     if curves is not None and diagnosis.gap is not None:
@@ -173,7 +206,7 @@ def diagnosis_report(
         if diagnosis.where:
             sections.append(evidence_section(diagnosis.where, share_of(diagnosis)))
     if residual is not None:
-        sections.append(residual_map_section(residual))
+        sections.append(residual.section())
     sections.append(next_steps_section(steps))
     if diagnosis.minor:
         sections.append(minor_section(diagnosis.minor, everything, patched))
@@ -235,19 +268,6 @@ def _verdict(
     return VerdictSection(badge, tone, sentences, notes, bars, with_names(step, names))
 
 
-def _of_maps(residual: Residual | None) -> list[str]:
-    steps = []
-    for one in () if residual is None else residual.joints:
-        if one.law is None:
-            steps.append(f'Inspect gear, cables and stops of {one.joint} where its map is strong.')
-        else:
-            steps.append(
-                f'If {one.law.text} is plausible for {one.joint}, write it as an effect of your '
-                'own and diagnose again.'
-            )
-    return steps
-
-
 @dataclass(frozen=True)
 class Story(Section):
     """
@@ -257,7 +277,7 @@ class Story(Section):
     ----------
     diagnosis : Diagnosis
         What was found.
-    residual : Residual or None
+    residual : LearnedResidual or None
         The learned residual.
 
     """
@@ -266,7 +286,7 @@ class Story(Section):
     template: ClassVar[str] = 'story.html'
 
     diagnosis: Diagnosis
-    residual: Residual | None = None
+    residual: LearnedResidual | None = None
 
     @property
     def drawing(self) -> ArmDrawing:
@@ -274,7 +294,7 @@ class Story(Section):
         data, robot = self.diagnosis.data, self.diagnosis.arm.robot
         cause: list[Finding] = next(iter(by_cause(self.diagnosis.findings)), [])
         names = ', '.join(one.name.replace('_', ' ') for one in cause)
-        found = [place.joint for place in self.diagnosis.where] + [m.joint for m in self._maps]
+        found = [*(place.joint for place in self.diagnosis.where), *self._gains]
         named = {joint for one in cause for joint in one.joints}
         joints = [joint for joint in robot.joints if joint in named] if cause else found[:1]
         caption = f'coloured: {", ".join(joints)} ({names or "the largest gap"})'
@@ -304,8 +324,8 @@ class Story(Section):
         return answers
 
     @property
-    def _maps(self) -> tuple[JointResidual, ...]:
-        return () if self.residual is None else self.residual.joints
+    def _gains(self) -> Mapping[str, float]:
+        return {} if self.residual is None else self.residual.gains
 
     def _where(self) -> list[str]:
         places, whole = self.diagnosis.where, share_of(self.diagnosis)
@@ -334,8 +354,8 @@ class Story(Section):
         diagnosis = self.diagnosis
         patched = not diagnosis.harmful
         added = [finding.name.replace('_', ' ') for finding in diagnosis.findings if patched]
-        if self._maps:
-            added.append(f'the learned residual of {", ".join(one.joint for one in self._maps)}')
+        if self._gains:
+            added.append(f'the learned residual of {", ".join(self._gains)}')
         if not added:
             return ['The model is unchanged.']
         more = ', with rigid body and friction refitted' * (diagnosis.refitted and patched)
@@ -356,9 +376,8 @@ class Story(Section):
             f'{robot.joints[j]}: {change}, {where}.',
             f'The floor, {floor}, is {self.diagnosis.baseline}.',
             *(
-                f'{one.joint}: the map predicts {percent(one.gain)} of the residual without a '
-                'known cause.'
-                for one in self._maps
+                f'{joint}: the map predicts {percent(gain)} of the residual without a known cause.'
+                for joint, gain in self._gains.items()
             ),
         ]
 

@@ -14,13 +14,9 @@ from armid_ros.residual.learn import (
     lookup_table,
     require_libraries,
     Residual,
-    TABLE_FILE,
-    WORTH_A_MAP,
 )
 
 __all__ = [
-    'TABLE_FILE',
-    'WORTH_A_MAP',
     'JointResidual',
     'Residual',
     'learn_residual',

@@ -7,30 +7,32 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 from itertools import product
-from typing import Any
+from pathlib import Path
+from typing import Any, ClassVar
 
 from armid_ros.arm import ArmModel
 from armid_ros.diagnosis import Diagnosis
 from armid_ros.diagnosis.data.trajectory import Trajectory
+from armid_ros.diagnosis.diagnose import OPEN
 from armid_ros.effects.learned import LearnedTorque, TorqueMap
 from armid_ros.errors import IdentificationError
+from armid_ros.files import write_file
 from armid_ros.files.cells import csv_cell
 from armid_ros.motion import FloatArray
+from armid_ros.report.blocks import ContentSection
 from armid_ros.residual.gaussian_process import learn_map
 from armid_ros.residual.law import Law, share_of, suggest_law
 from armid_ros.residual.rows import BLOCKS, joint_rows, JointRows
+from armid_ros.residual.section import residual_map_section
 import numpy as np
 import numpy.typing as npt
 from threadpoolctl import threadpool_limits
 
-#: Verdicts with an unexplained residual.
-WORTH_A_MAP = ('partial', 'unknown')
 #: A joint with fewer rows has too few data for a map.
 _FEW = 100
 #: A map is informative if its standard deviation is less than this share of the prior's.
 _KNOWN = 0.5
-#: File beside model.yaml with the maps on a grid of position, velocity and load.
-TABLE_FILE = 'residual.csv'
+#: Points of the table of the maps along position, velocity and load.
 _STEPS = (41, 31, 9)
 _HEAD = 'joint,position,velocity,load,torque,std'
 
@@ -87,8 +89,12 @@ class Residual:
         The model with them.
     joints : tuple of JointResidual
         Joints whose residual is predictable; the largest residual first.
+    table_file : str
+        File beside model.yaml with the maps on a grid of position, velocity and load.
 
     """
+
+    table_file: ClassVar[str] = 'residual.csv'
 
     base: ArmModel
     arm: ArmModel
@@ -112,11 +118,34 @@ class Residual:
             )
         return tuple(lines)
 
-    def document(self, table: str) -> dict[str, Any]:
-        """Return the entry of diagnosis.json; ``table`` is the name of the file with the maps."""
+    @property
+    def gains(self) -> dict[str, float]:
+        """Share of the squared residual that the map of each joint predicts in held-out data."""
+        return {one.joint: one.gain for one in self.joints}
+
+    def steps(self) -> list[str]:
+        """Return what to do next about each joint."""
+        return [
+            f'Inspect gear, cables and stops of {one.joint} where its map is strong.'
+            if one.law is None
+            else f'If {one.law.text} is plausible for {one.joint}, write it as an effect of your '
+            'own and diagnose again.'
+            for one in self.joints
+        ]
+
+    def section(self) -> ContentSection:
+        """Return the section of a report with the maps."""
+        return residual_map_section(self)
+
+    def write_table(self, folder: Path) -> None:
+        """Write the maps as a table into a folder."""
+        write_file(folder / self.table_file, lookup_table(self))
+
+    def document(self) -> dict[str, Any]:
+        """Return the entry of diagnosis.json."""
         return {
             'method': 'gp',
-            'table': table,
+            'table': self.table_file,
             'joints': [
                 {
                     'joint': one.joint,
@@ -177,7 +206,7 @@ def learn_residual(diagnosis: Diagnosis, rng: np.random.Generator) -> Residual |
 
     """
     require_libraries()
-    if diagnosis.verdict not in WORTH_A_MAP or diagnosis.explanation is None:
+    if diagnosis.verdict not in OPEN or diagnosis.explanation is None:
         return None
     base = diagnosis.arm if diagnosis.findings else diagnosis.explanation.fitted.arm
     gap = diagnosis.gap

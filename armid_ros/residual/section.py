@@ -4,6 +4,8 @@
 
 from __future__ import annotations
 
+from typing import TYPE_CHECKING
+
 from armid_ros.report.blocks import (
     ContentSection,
     DataTable,
@@ -14,9 +16,11 @@ from armid_ros.report.blocks import (
 from armid_ros.report.charts import image_data
 from armid_ros.report.notation import digits, percent
 from armid_ros.report.page import render
-from armid_ros.residual import JointResidual, Residual, TABLE_FILE
 from markupsafe import Markup
 import numpy as np
+
+if TYPE_CHECKING:
+    from armid_ros.residual.learn import JointResidual, Residual
 
 #: Cells of a picture along position and velocity.
 _CELLS = 80, 60
@@ -60,8 +64,8 @@ def residual_map_section(residual: Residual) -> ContentSection:
             Paragraph(
                 'No effect of the catalogue explains the residual of these joints. A Gaussian '
                 'process over position, velocity and load has learned it. model.yaml has it as '
-                f'an effect, {TABLE_FILE} as a table. It is zero where there were no data. '
-                'Shares are of the squared residual in cross-validation, and in held-out '
+                f'an effect, {residual.table_file} as a table. It is zero where there were no '
+                'data. Shares are of the squared residual in cross-validation, and in held-out '
                 'recordings close to the data.'
             ),
             DataTable(heads, rows, (0, 5)),
