@@ -18,19 +18,11 @@ from armid_ros.identification import SignalSettings
 from armid_ros.identification.rows.signals import conditioning, no_stretch, segments
 from armid_ros.motion import Motion
 from armid_ros.recording import ReadSettings, Recording, Topic
-from armid_ros.recording.anything import read_anything
+from armid_ros.recording.anything import is_table, read_anything, read_tables, Show
+from armid_ros.recording.columns import ColumnSettings, numbers
 from armid_ros.recording.message_types import JOINT_STATE
 from armid_ros.recording.reader import bag_contents
 from armid_ros.recording.settings import DEFAULT
-from armid_ros.recording.tables import (
-    ColumnSettings,
-    is_table,
-    measured,
-    open_table,
-    plan,
-    TablePlan,
-)
-from armid_ros.recording.tables.settings import numbers
 from armid_ros.robots import joints_beside_arms, load_robot, Robot, shipped_robots
 from armid_ros.robots.shipped import shipped_path
 import numpy as np
@@ -310,7 +302,7 @@ def read_all_joints(
     joints: Sequence[str] | None = None,
     topic: str | None = None,
     columns: ColumnSettings | None = None,
-    show: Callable[[TablePlan], None] | None = None,
+    show: Show | None = None,
     settings: ReadSettings = DEFAULT,
 ) -> Recording:
     """
@@ -336,10 +328,7 @@ def read_all_joints(
     """
     said = columns or ColumnSettings()
     if is_table(path):
-        settled = plan(open_table(path, episode=said.episode), said, joints)
-        if show is not None:
-            show(settled)
-        return measured(settled)
+        return read_tables([path], said, joints, show=show)
     if joints is None:
         there = [one for one in topics if one.joints]
         if topic is not None:

@@ -15,7 +15,7 @@ USUAL_EFFECTS = ('viscous_friction', 'coulomb_friction', 'torque_offset')
 EFFECT_EXAMPLES = 'viscous_friction:viscous_coefficient=0.1 or payload@wrist:payload_m=0.3'
 #: `armid_ros.identification.fitting.least_squares.ESTIMATORS`.
 ESTIMATORS = ('ols', 'wls', 'irls', 'iv')
-#: Units of time of a table; `armid_ros.recording.tables.settings.TIME_UNITS`.
+#: Units of time of a table; `armid_ros.recording.columns.TIME_UNITS`.
 TIME_UNITS = ('s', 'ms', 'us', 'ns')
 #: `armid_ros.excitation.SPEED_CLASSES`.
 SPEED_CLASSES = ('slow', 'medium', 'fast')

@@ -13,7 +13,7 @@ from armid_ros.files.cells import listed
 import click
 
 if TYPE_CHECKING:
-    from armid_ros.recording.tables import ColumnSettings
+    from armid_ros.recording.columns import ColumnSettings
 
 #: Where the context keeps what they say.
 META = 'armid.columns'
@@ -48,7 +48,7 @@ def _rules(ctx: click.Context, parameter: click.Parameter, value: Any) -> Any:
 def _numbers(ctx: click.Context, parameter: click.Parameter, value: str | None) -> Any:
     """Store one number, or one for each joint."""
     if value is not None:
-        from armid_ros.recording.tables import numbers
+        from armid_ros.recording.columns import numbers
 
         return _kept(ctx, parameter, numbers(value))
     return _kept(ctx, parameter, ())
@@ -139,13 +139,13 @@ def options(command: Any) -> Any:
 
 def settings() -> ColumnSettings:
     """Return the values of the options of the running command."""
-    from armid_ros.recording.tables import ColumnSettings
+    from armid_ros.recording.columns import ColumnSettings
 
     return ColumnSettings(**click.get_current_context().meta.get(META, {}))
 
 
 def _coupling(text: str) -> tuple[str, str, float]:
-    from armid_ros.recording.tables.settings import number
+    from armid_ros.recording.columns import number
 
     pair, equals, ratio = text.rpartition('=')
     names = listed(pair)

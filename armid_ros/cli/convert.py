@@ -14,6 +14,7 @@ from armid_ros.errors import RecordingError
 import click
 
 if TYPE_CHECKING:
+    from armid_ros.recording.tables import TablePlan
     from armid_ros.robots import Robot
 
 
@@ -48,7 +49,7 @@ def convert(
 
     """
     from armid_ros.cli import options
-    from armid_ros.recording.tables import is_table
+    from armid_ros.recording.anything import is_table
 
     if out is None and not dry_run:
         raise click.UsageError('give --out, the bag to write, or --dry-run to write none')
@@ -69,17 +70,17 @@ def _table(
 ) -> None:
     from armid_ros.files.cells import listed
     from armid_ros.recording import write_recording
-    from armid_ros.recording.tables import measured, open_table, plan, side_by_side
+    from armid_ros.recording.anything import read_tables
 
-    said = columns.settings()
-    table = side_by_side([open_table(path, episode=said.episode) for path in files])
+    def show(plan: TablePlan) -> None:
+        for line in plan.lines():
+            say(line)
+
     names = None if robot is None else robot.joints
     if robot is None and joints:
         names = listed(joints)
-    settled = plan(table, said, names, None if robot is None else list(robot.prismatic))
-    for line in settled.lines():
-        say(line)
-    recording = measured(settled)
+    slides = None if robot is None else list(robot.prismatic)
+    recording = read_tables(files, columns.settings(), names, slides, show)
     rate = 1.0 / recording.period
     say(f'  {recording.report.describe()} {recording.duration:.2f} s at {rate:.4g} Hz')
     if out is None:
@@ -96,8 +97,8 @@ def _table(
 def _bag(path: Path, out: Path | None) -> None:
     from armid_ros.cli import options
     from armid_ros.recording.bag import is_ros1
+    from armid_ros.recording.columns import refuse_columns
     from armid_ros.recording.copying import copy_bag
-    from armid_ros.recording.tables import refuse_columns
 
     said = columns.settings()
     refuse_columns(path, said, copied=True)

@@ -6,6 +6,7 @@ from __future__ import annotations
 
 from collections.abc import Collection, Sequence
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 from armid_ros.api.table import ResultOrigin, Shown, Summary
 from armid_ros.arm import ArmModel, load_model
@@ -28,8 +29,7 @@ from armid_ros.files.cells import listed, parted
 from armid_ros.files.own import written_by
 from armid_ros.motion import FloatArray
 from armid_ros.recording import read_robot_description, ReadSettings, Recording
-from armid_ros.recording.anything import read_anything
-from armid_ros.recording.tables import is_table, TablePlan
+from armid_ros.recording.anything import is_table, read_anything
 from armid_ros.report.sections.frame import VerdictSection
 from armid_ros.robots import (
     driven_in_words,
@@ -41,6 +41,9 @@ from armid_ros.robots import (
 import click
 from click.core import ParameterSource
 import numpy as np
+
+if TYPE_CHECKING:
+    from armid_ros.recording.tables import TablePlan
 
 Corners = tuple[Sequence[float], Sequence[float]]
 

@@ -17,7 +17,7 @@ from armid_ros.nodes.messages.classes import message_class
 from armid_ros.nodes.parameters.table import names, NodeParameter, ParameterError
 from armid_ros.nodes.qos import LATCHED, MatchedSubscription, SAMPLES
 from armid_ros.nodes.running.process import run
-from armid_ros.recording.tables import per_joint
+from armid_ros.recording.columns import per_joint
 from armid_ros.robots import robot_from_urdf
 import numpy as np
 from rclpy.time import Time

@@ -6,25 +6,82 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import replace
+from importlib.util import find_spec
 from pathlib import Path
+from typing import TYPE_CHECKING
 
+from armid_ros.errors import RecordingError
+from armid_ros.recording.bag import is_bag_file
+from armid_ros.recording.columns import (
+    ColumnSettings,
+    in_si,
+    name_in_file,
+    refuse_columns,
+    renamed,
+)
 from armid_ros.recording.reader import read_recording
 from armid_ros.recording.recording import Recording
 from armid_ros.recording.settings import DEFAULT, ReadSettings
-from armid_ros.recording.tables import (
-    ColumnSettings,
-    in_si,
-    is_table,
-    measured,
-    name_in_file,
-    open_table,
-    plan,
-    refuse_columns,
-    renamed,
-    TablePlan,
-)
 
-Show = Callable[[TablePlan], None]
+if TYPE_CHECKING:
+    from armid_ros.recording.tables import TablePlan
+
+#: Shows the plan by which a table is read.
+Show = Callable[['TablePlan'], None]
+#: Package that reads tables, a plug-in.
+_TABLES = 'armid_ros.recording.tables'
+
+
+def is_table(path: Path) -> bool:
+    """Return whether a path is a table; without the package of tables, a file that is no bag."""
+    if find_spec(_TABLES) is None:
+        return path.is_file() and not is_bag_file(path)
+    from armid_ros.recording import tables
+
+    return tables.is_table(path)
+
+
+def read_tables(
+    paths: Sequence[Path],
+    columns: ColumnSettings,
+    joints: Sequence[str] | None = None,
+    slides: Sequence[bool] | None = None,
+    show: Show | None = None,
+) -> Recording:
+    """
+    Read the measurements of some joints from tables of the same samples.
+
+    Parameters
+    ----------
+    paths : sequence of Path
+        Files whose columns stand side by side.
+    columns : ColumnSettings
+        Which columns hold which quantity, in which unit; missing settings are guessed.
+    joints : sequence of str, optional
+        Joints to read, in this order; by default named by the columns.
+    slides : sequence of bool, optional
+        Whether each joint is prismatic.
+    show : callable, optional
+        Called with the plan before the columns are converted.
+
+    Raises
+    ------
+    RecordingError
+        If a file cannot be read, or the package that reads tables is not installed.
+
+    """
+    if find_spec(_TABLES) is None:
+        raise RecordingError(
+            f'{paths[0]}: not a bag; reading a table needs {_TABLES}, which this installation '
+            'does not have'
+        )
+    from armid_ros.recording.tables import measured, open_table, plan, side_by_side
+
+    table = side_by_side([open_table(path, episode=columns.episode) for path in paths])
+    settled = plan(table, columns, joints, slides)
+    if show is not None:
+        show(settled)
+    return measured(settled)
 
 
 def read_anything(
@@ -69,11 +126,7 @@ def read_anything(
     path = Path(path)
     columns = columns or ColumnSettings()
     if is_table(path):
-        table = open_table(path, episode=columns.episode)
-        settled = plan(table, columns, joints, slides)
-        if show is not None:
-            show(settled)
-        return measured(settled)
+        return read_tables([path], columns, joints, slides, show)
     refuse_columns(path, columns)
     called = [name_in_file(joint, columns.rename) for joint in joints]
     recording = read_recording(path, joints=called, topic=topic, settings=settings)

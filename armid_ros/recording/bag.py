@@ -221,12 +221,17 @@ def _storage_suffix(file: Path) -> str:
     return Path(file.stem).suffix if file.suffix in _COMPRESSED else file.suffix
 
 
+def is_bag_file(path: Path) -> bool:
+    """Return whether a file has the name of a file of a bag."""
+    return _storage_suffix(path) in _STORAGES or is_ros1(path)
+
+
 def _files_of(path: Path) -> BagMetadata:
     """Return the metadata of a bag; without metadata.yaml, its files alone."""
     if not os.path.lexists(path):
         raise RecordingError(f'{path}: there is no such bag')
     if not path.is_dir():
-        if _storage_suffix(path) not in _STORAGES and not is_ros1(path):
+        if not is_bag_file(path):
             raise RecordingError(
                 f'{path}: not a bag; give a rosbag2 directory, or a file .mcap, .db3 or .bag'
             )

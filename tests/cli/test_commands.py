@@ -18,7 +18,7 @@ from armid_ros.excitation import CRITERIA, load_excitation, SPEED_CLASSES, TARGE
 from armid_ros.excitation.schedule import MAX_DURATION
 from armid_ros.identification.fitting.least_squares import ESTIMATORS
 from armid_ros.recording import read_recording, read_waypoints
-from armid_ros.recording.tables.settings import TIME_UNITS
+from armid_ros.recording.columns import TIME_UNITS
 from armid_ros.robots import load_robot
 import numpy as np
 import pytest

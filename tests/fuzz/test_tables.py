@@ -8,7 +8,7 @@ import zipfile
 import zlib
 
 from armid_ros.recording.anything import read_anything
-from armid_ros.recording.tables import ColumnSettings
+from armid_ros.recording.columns import ColumnSettings
 from hypothesis import given
 from hypothesis import strategies as st
 import numpy as np

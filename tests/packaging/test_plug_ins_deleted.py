@@ -1,6 +1,6 @@
 # Copyright 2026 The armid_ros developers
 # SPDX-License-Identifier: Apache-2.0
-"""Fleet, view and each paper can be deleted with their folders; the core knows none of them."""
+"""Each plug-in can be deleted with its folder; the core imports none of them."""
 
 import os
 import re
@@ -10,16 +10,22 @@ import sys
 
 import pytest
 
-#: Folders of plug-ins; each brings the command of its name.
-PLUG_INS = ('fleet', 'papers/elastic', 'papers/exo', 'papers/lunar', 'view')
+#: Folders of plug-ins that bring the command of their name.
+WITH_COMMAND = ('fleet', 'papers/elastic', 'papers/exo', 'papers/lunar', 'view')
+#: Folders of plug-ins that serve commands of the core, and such a command.
+SERVING = {
+    'residual': ('diagnose', 'bag', '--robot', 'ur10', '--out', 'found', '--residual', 'gp'),
+    'recording/tables': ('convert', 'run.csv', '--dry-run'),
+}
+PLUG_INS = (*WITH_COMMAND, *SERVING)
 #: Folders of Python code; the others are linked.
 CODE = ('armid_ros', 'tests', 'benchmarks', 'docsite')
-#: Lists the commands, and asks for one that is not there.
+#: Lists the commands, and runs one.
 ASK = """
 import sys
 from armid_ros.cli import main
 main(['--help'], standalone_mode=False)
-main([sys.argv[1]])
+main(sys.argv[1:])
 """
 #: Imports every module of the core.
 IMPORT = """
@@ -76,7 +82,7 @@ def python(folder, *arguments):
     )
 
 
-@pytest.mark.parametrize('plug_in', PLUG_INS)
+@pytest.mark.parametrize('plug_in', WITH_COMMAND)
 def test_the_other_commands_stay(root, tmp_path, plug_in):
     command = plug_in.rpartition('/')[2]
     done = python(copied(root, tmp_path, [plug_in]), '-c', ASK, command)
@@ -85,6 +91,15 @@ def test_the_other_commands_stay(root, tmp_path, plug_in):
     listed = {line.split()[0] for line in done.stdout.splitlines() if line.startswith('  ')}
     assert {'identify', 'fleet', 'elastic', 'exo', 'lunar', 'view'} - {command} <= listed
     assert command not in listed
+
+
+@pytest.mark.parametrize('plug_in', SERVING)
+def test_a_command_names_the_package_that_it_needs(root, tmp_path, plug_in):
+    folder = copied(root, tmp_path, [plug_in])
+    (folder / 'run.csv').write_text('time,q1\n0.0,0.0\n')
+    done = python(folder, '-c', ASK, *SERVING[plug_in])
+    assert done.returncode == 2, done.stderr
+    assert f'needs armid_ros.{plug_in.replace("/", ".")}' in done.stderr
 
 
 def test_the_core_imports_and_a_few_of_its_tests_pass_without_all_of_them(root, tmp_path):

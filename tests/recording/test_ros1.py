@@ -5,9 +5,9 @@
 from armid_ros.errors import RecordingError
 from armid_ros.recording import read_recording, topics, write_recording
 from armid_ros.recording.anything import read_anything
+from armid_ros.recording.columns import ColumnSettings
 from armid_ros.recording.copying import copy_bag
 from armid_ros.recording.recording import Recording
-from armid_ros.recording.tables import ColumnSettings
 import numpy as np
 import pytest
 from rosbags.rosbag1 import Writer

@@ -13,7 +13,7 @@ from armid_ros.effects import parse_effect
 from armid_ros.errors import RobotError
 from armid_ros.files import reading
 from armid_ros.nodes.parameters.table import NodeParameter, Values
-from armid_ros.recording.tables import numbers, per_joint
+from armid_ros.recording.columns import numbers, per_joint
 from armid_ros.robots import load_robot, parse_gravity
 from armid_ros.robots.two_link import TwoLinkSet
 from armid_ros.simulation import ComputedTorque, GravityPD, Plant, Sensors, SimulatedArm

@@ -15,7 +15,7 @@ import re
 
 from armid_ros.errors import RecordingError
 from armid_ros.files.cells import listed
-from armid_ros.recording.tables.settings import renamed, Rules
+from armid_ros.recording.columns import renamed, Rules
 from armid_ros.recording.tables.table import Table, TableColumn
 from armid_ros.recording.tables.words import (
     is_quantity,

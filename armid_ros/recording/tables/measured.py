@@ -10,11 +10,11 @@ from dataclasses import replace
 
 from armid_ros.errors import RecordingError
 from armid_ros.motion import FloatArray
+from armid_ros.recording.columns import in_si, renamed, TIME_UNITS
 from armid_ros.recording.joint_state.decoder import JointSamples
 from armid_ros.recording.recording import PositionRange, Recording
 from armid_ros.recording.series import assemble, MAX_NOT_FINITE
 from armid_ros.recording.tables.plan import TablePlan
-from armid_ros.recording.tables.settings import in_si, renamed, TIME_UNITS
 import numpy as np
 
 #: Times later than this are counted from 1970 [s].

@@ -7,7 +7,8 @@ import json
 
 from armid_ros.errors import RecordingError
 from armid_ros.recording.anything import read_anything
-from armid_ros.recording.tables import ColumnSettings, open_table, side_by_side
+from armid_ros.recording.columns import ColumnSettings
+from armid_ros.recording.tables import open_table, side_by_side
 import numpy as np
 import pytest
 from scipy.io import savemat

@@ -7,7 +7,8 @@ from itertools import chain
 
 from armid_ros.errors import RecordingError
 from armid_ros.recording.anything import read_anything
-from armid_ros.recording.tables import ColumnSettings, open_table, plan
+from armid_ros.recording.columns import ColumnSettings
+from armid_ros.recording.tables import open_table, plan
 import numpy as np
 import pytest
 

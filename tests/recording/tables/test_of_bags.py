@@ -8,8 +8,8 @@ from armid_ros.errors import RecordingError
 from armid_ros.motion import Motion
 from armid_ros.recording import write_recording
 from armid_ros.recording.anything import read_anything
+from armid_ros.recording.columns import ColumnSettings, in_si
 from armid_ros.recording.recording import PositionRange
-from armid_ros.recording.tables import ColumnSettings, in_si
 import numpy as np
 import pytest
 

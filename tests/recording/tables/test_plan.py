@@ -3,17 +3,8 @@
 """Columns are matched to joints by name, else by number; what is guessed is said to be."""
 
 from armid_ros.errors import RecordingError
-from armid_ros.recording.tables import (
-    ColumnSettings,
-    measured,
-    name_in_file,
-    numbers,
-    open_table,
-    plan,
-    renamed,
-    Table,
-    TableColumn,
-)
+from armid_ros.recording.columns import ColumnSettings, name_in_file, numbers, renamed
+from armid_ros.recording.tables import measured, open_table, plan, Table, TableColumn
 import numpy as np
 import pytest
 
