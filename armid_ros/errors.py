@@ -7,13 +7,11 @@ from __future__ import annotations
 from collections.abc import Iterable
 from difflib import get_close_matches
 
-#: Least similarity of a suggested name, 0 to 1: one letter in four may differ.
-_ALIKE = 0.75
-
 
 def nearest(name: str, names: Iterable[str]) -> str:
     """Return the most similar of the names; empty if none is similar enough."""
-    return next(iter(get_close_matches(name, list(names), 1, _ALIKE)), '')
+    # one letter in four may differ
+    return next(iter(get_close_matches(name, list(names), 1, 0.75)), '')
 
 
 def meant(name: str, names: Iterable[str]) -> str:

@@ -34,11 +34,6 @@ from armid_ros.motion import FloatArray
 from armid_ros.recording import Recording
 import numpy as np
 
-#: Of more joints one search is made by default: each step of it takes seconds.
-_MANY_JOINTS = 20
-#: Of the run-in and the run-out [s], and at most this share of the duration.
-_RUN_IN, _RUN_IN_SHARE = 2.0, 0.1
-
 
 @spelled
 def design_excitation(
@@ -145,8 +140,9 @@ def design_excitation(
     if joint_limits is not None:
         model, known = _limited(model, joint_limits)
         acceleration = known if acceleration is None else acceleration
-    searches, seconds = (1, 25.0) if model.robot.n_joints > _MANY_JOINTS else (4, 120.0)
-    run_in = min(_RUN_IN, _RUN_IN_SHARE * duration)
+    # one search of an arm of many joints: each step of it takes seconds
+    searches, seconds = (1, 25.0) if model.robot.n_joints > 20 else (4, 120.0)
+    run_in = min(2.0, 0.1 * duration)  # [s]
     period = whole_period(duration, periods, run_in, WAYPOINT_RATE)
     asked = DesignSettings(
         period=period,

@@ -18,9 +18,6 @@ from armid_ros.simulation import Reference, Sensors
 from armid_ros.simulation import simulate as run
 import numpy as np
 
-#: Rate of a trajectory that a simulation follows [Hz].
-_FINE = 1000.0
-
 
 @spelled
 def simulate(
@@ -132,5 +129,5 @@ def reference_of(
             return Reference(read.joints, read.t, read.q, read.dq, read.ddq, read.tau)
         trajectory = load_excitation(path)
     if isinstance(trajectory, Excitation):
-        trajectory = trajectory.motion(_FINE)
+        trajectory = trajectory.motion(1000.0)  # [Hz]
     return Reference.of(trajectory)

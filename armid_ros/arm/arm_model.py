@@ -40,9 +40,6 @@ from armid_ros.robots import load_robot, Robot
 import numpy as np
 import numpy.typing as npt
 
-#: Samples to either side that rates of change of rates of change are taken from.
-_STENCIL = 4
-
 
 @dataclass(frozen=True, repr=False)
 class ArmModel:
@@ -382,7 +379,8 @@ class ArmModel:
         action = self._acting
         if action.displacement is None and action.reading_memory == 0.0:  # noqa: RUF069 - of laws, never computed
             return 0
-        return int(np.ceil(action.reading_memory / period)) + _STENCIL
+        # samples to either side that rates of change of rates of change are taken from
+        return int(np.ceil(action.reading_memory / period)) + 4
 
     @cached_property
     def _readings(self) -> list[tuple[TorqueReading, FloatArray]]:

@@ -14,9 +14,6 @@ from armid_ros.model import LinkFrames, regressor
 from armid_ros.motion import FloatArray, Motion
 import numpy as np
 
-#: Regressors of more than this are computed whenever they are needed [bytes].
-_MOST = 1_000_000_000
-
 _Result = TypeVar('_Result')
 
 
@@ -31,7 +28,8 @@ class Regressors:
     def __init__(self) -> None:
         self._known: dict[tuple[object, ...], tuple[Motion, FloatArray]] = {}
         self._in_rows: dict[int, FloatArray | None] = {}
-        self._room = _MOST
+        # bytes; larger regressors are computed whenever they are needed
+        self._room = 1_000_000_000
 
     def of(self, arm: ArmModel, motion: Motion) -> FloatArray | None:
         """Return the regressor of a motion, shape (N, n, 10 n); None where there is no room."""

@@ -37,8 +37,6 @@ Kind = Literal['step', 'trend']
 
 #: Days of a month.
 MONTH = 365.25 / 12.0
-#: No probability is less: that of larger scores is no number any more.
-_SMALLEST = 1e-300
 
 
 @dataclass(frozen=True)
@@ -160,4 +158,5 @@ def wear(series: ParameterHistory, spread: Spread) -> tuple[float, float]:
 
 
 def _p(score: float, freedom: float, tried: int) -> float:
-    return min(1.0, tried * max(float(tail(score**2, 1, freedom)), _SMALLEST))
+    # no probability is less: that of larger scores is no number any more
+    return min(1.0, tried * max(float(tail(score**2, 1, freedom)), 1e-300))

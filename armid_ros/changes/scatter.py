@@ -37,8 +37,6 @@ FEWEST = 4
 _WINDOW, _ODD = 5, 3.0
 #: Degrees of freedom of a variance from the median of n squares, over n.
 _EFFICIENCY = 0.37
-#: Series of white noise from which the error of a single variance is computed.
-_DRAWN = 4000
 #: Siblings with a bag on a day, of which the day's effect is taken.
 _SIBLINGS = 8
 #: Standard error of a variance by the median of n absolute deviations, over it and times sqrt(n).
@@ -277,7 +275,7 @@ def _ratio(series: ParameterHistory, spread: Spread) -> float:
 @cache
 def _freedom(bags: int) -> float:
     """Return the degrees of freedom of the variance of so many bags, from white noise."""
-    noise = np.random.default_rng(0).normal(size=(_DRAWN, bags))
+    noise = np.random.default_rng(0).normal(size=(4000, bags))  # series of white noise
     medians = np.median(np.diff(noise, axis=1) ** 2, axis=1)
     return _inverse_trigamma(_robust_scale(np.log(medians)) ** 2)
 

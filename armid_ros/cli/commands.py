@@ -43,8 +43,6 @@ COMMANDS = {
 
 #: Exit code after Ctrl-C: 128 and the number of SIGINT.
 INTERRUPTED = 130
-#: The same with SIGPIPE.
-BROKEN_PIPE = 141
 #: Where the context keeps what is said on stderr when the work was done: an error is one line.
 NOTES = 'armid.notes'
 #: Where it keeps the arguments of the command as they were typed.
@@ -121,7 +119,7 @@ class Commands(click.Group):
         except OSError as error:  # a disk that is full, a folder that went away
             if error.errno == errno.EPIPE:  # whoever reads has read enough
                 os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
-                sys.exit(BROKEN_PIPE)
+                sys.exit(141)  # 128 and the number of SIGPIPE
             where = f'{error.filename}: ' if error.filename else ''
             click.echo(visible(f'armid: {where}{error.strerror or error}'), err=True)
             sys.exit(2)

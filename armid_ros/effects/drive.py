@@ -19,13 +19,6 @@ import numpy as np
 if TYPE_CHECKING:
     from armid_ros.robots import Robot
 
-#: Largest lost share of the excess. If the commanded torque was not recorded, a share of 1 cannot
-#: be represented, because no torque beyond the level is measured.
-_MOST_LOST = 0.99
-#: Range of ripple orders in a search [1/rad, 1/m]. Gravity and springs cause lower orders; filters
-#: remove higher orders. Screws and racks have a tooth or turn every 4 to 60 mm.
-_IN_A_TURN, _ON_A_WAY = (3.0, 80.0), (100.0, 1600.0)
-
 
 @dataclass(frozen=True)
 class RotorInertia(Effect):
@@ -84,8 +77,12 @@ class TorqueRipple(Effect):
     def shape_starts(self, unexplained: Unexplained, arm: Arm) -> tuple[FloatArray, ...]:
         """Return the orders at which waves over the angle explain most of the residual."""
         robot = arm.robot
+        # Range of ripple orders in a search [1/rad, 1/m]. Gravity and springs cause lower orders;
+        # filters remove higher orders. Screws and racks have a tooth or turn every 4 to 60 mm.
         orders = [
-            wave_orders(unexplained, joint, _ON_A_WAY if robot.prismatic[joint] else _IN_A_TURN)
+            wave_orders(
+                unexplained, joint, (100.0, 1600.0) if robot.prismatic[joint] else (3.0, 80.0)
+            )
             for joint in self.indices(robot.joints)
         ]
         return (np.array(orders),)
@@ -195,7 +192,9 @@ class ActuatorSaturation(TorqueReading):
         spread[:2, columns] = values.reshape(-1, 2).T
         spread[2, columns] = self.shape_values[:, 0]
         if motion.tau is None:
-            spread[0] = np.minimum(spread[0], _MOST_LOST)
+            # Largest lost share of the excess. If the commanded torque was not recorded, a share
+            # of 1 cannot be represented, because no torque beyond the level is measured.
+            spread[0] = np.minimum(spread[0], 0.99)
         return spread[0], spread[1], spread[2]
 
 

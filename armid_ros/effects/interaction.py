@@ -36,8 +36,6 @@ _SHORTEST = 1e-12
 #: Anchors of straps to try: distances from the mean position of the attachment, over the spread of
 #: its positions, in all directions of a cube. Slacks are quantiles of the length.
 _DISTANCES, _SLACKS = (0.0, 0.7, 1.5, 3.0), (0.0, 0.2, 0.4, 0.6, 0.8)
-#: Number of straps that are compared with other causes, and number of rows used.
-_STRAPS, _ROWS = 2, 400
 
 _AXES = ('x', 'y', 'z')
 _ATTACHMENT = tuple(
@@ -179,7 +177,7 @@ class InterfaceSlack(Attached):
 
     def shape_starts(self, unexplained: Unexplained, arm: Arm) -> tuple[FloatArray, ...]:
         """Return the anchors and slacks that explain most of the residual."""
-        thin = unexplained.thinned(_ROWS)
+        thin = unexplained.thinned(400)
         target = thin.rest(thin.residual[:, :, np.newaxis])[:, 0]
         starts, frames = [], LinkFrames.of(arm.robot, thin.q)
         for joint, shape in zip(self.joints, self.shape_values, strict=True):
@@ -190,7 +188,7 @@ class InterfaceSlack(Attached):
             columns = thin.rest(straps)
             own, aim = np.sum(columns**2, axis=0), columns.T @ target
             gain = np.maximum(aim, 0.0) ** 2 / np.maximum(own, max(1e-12 * own.max(), 1e-300))
-            best = np.argsort(-gain)[:_STRAPS]
+            best = np.argsort(-gain)[:2]  # are compared with other causes
             starts.append([(*shape[:3], *anchors[k], slacks[k]) for k in best])
         return tuple(np.array(starts).transpose(2, 0, 1))
 

@@ -18,8 +18,6 @@ import numpy as np
 
 #: Assumed distance of a link's mass from its joint if the description has none [m].
 _REACH = 0.1
-#: Indices of the moments of inertia in the parameters of a link: Ixx, Iyy, Izz.
-_MOMENTS = 4, 6, 9
 
 
 @dataclass(frozen=True)
@@ -201,5 +199,6 @@ class LinkInertia(_LinkBody):
             return True
         (link,) = self.indices(arm.robot.joints)
         own = arm.robot.rigid_parameters.reshape(-1, len(LINK_PARAMETERS))[link]
-        there, left = (each[list(_MOMENTS)] for each in (own, own + values + SURELY * std))
+        # Ixx, Iyy, Izz
+        there, left = (each[[4, 6, 9]] for each in (own, own + values + SURELY * std))
         return bool(np.all(left > 0.0) or np.any(there <= 0.0))

@@ -15,10 +15,6 @@ from armid_ros.effects.unexplained import Unexplained
 from armid_ros.motion import FloatArray, Motion
 import numpy as np
 
-#: Time constants of a drift in a search, over the length of a recording; a faster drift is an
-#: offset.
-_TIMES = (0.3, 1.0, 3.0)
-
 
 @dataclass(frozen=True)
 class TorqueOffset(Effect):
@@ -102,8 +98,10 @@ class TorqueDrift(TorqueReading):
 
     def shape_starts(self, unexplained: Unexplained, arm: Arm) -> tuple[FloatArray, ...]:
         """Return distinguishable times; beyond three recording lengths, a drift is a line."""
+        # time constants of a drift in a search, over the length of a recording; a faster drift is
+        # an offset
         times = np.maximum(
-            float(np.ptp(unexplained.motion.t)) * np.array(_TIMES), self.shapes[0].lower
+            float(np.ptp(unexplained.motion.t)) * np.array((0.3, 1.0, 3.0)), self.shapes[0].lower
         )
         return (np.tile(times, (len(self.joints), 1)),)
 

@@ -15,11 +15,6 @@ from armid_ros.motion import FloatArray, Motion
 from armid_ros.robots import Robot
 import numpy as np
 
-#: Default position of bumpers: this share of the range of motion from either end.
-_BUMPER = 0.15
-#: Shares of the range of the recorded motion between which a search places bumpers.
-_EDGES = (0.02, 0.05, 0.1, 0.2, 0.3)
-
 
 @dataclass(frozen=True)
 class JointSpring(Effect):
@@ -83,7 +78,8 @@ class SoftLimit(Effect):
         joints = self.indices(robot.joints)
         lower, upper = robot.lower[joints], robot.upper[joints]
         known = np.isfinite(lower) & np.isfinite(upper)
-        margin = _BUMPER * np.where(known, upper - lower, 0.0)
+        # default position of bumpers: this share of the range of motion from either end
+        margin = 0.15 * np.where(known, upper - lower, 0.0)
         edges = np.stack([lower + margin, upper - margin], axis=1)
         return np.where(known[:, np.newaxis], edges, self.shape_values)
 
@@ -92,7 +88,8 @@ class SoftLimit(Effect):
         motion = unexplained.motion
         q = arm.link_motion(motion).q[:, self.indices(motion.joints)]
         lowest, highest = q.min(axis=0)[:, np.newaxis], q.max(axis=0)[:, np.newaxis]
-        depth = (highest - lowest) * np.array(_EDGES)
+        # shares of the range of the recorded motion between which a search places bumpers
+        depth = (highest - lowest) * np.array((0.02, 0.05, 0.1, 0.2, 0.3))
         return lowest + depth, highest - depth
 
     def columns(self, motion: Motion, arm: Arm) -> FloatArray:

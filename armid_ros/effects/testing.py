@@ -30,8 +30,6 @@ from armid_ros.robots import load_robot, Robot
 import numpy as np
 import numpy.typing as npt
 
-#: Size of a quantity without a typical size.
-_SIZE = 0.1
 #: Step of the finite differences, and tolerance of derivatives relative to the largest one.
 _STEP, _TOLERANCE = 1e-6, 2e-5
 
@@ -88,7 +86,8 @@ class EffectCase:
         motion = sines(robot)
         motion = motion.with_torque(rng.normal(scale=20.0, size=motion.q.shape))
         if size is None:
-            size = [np.sqrt(np.prod(q.typical)) if q.typical else _SIZE for q in kind.quantities]
+            # size of a quantity without a typical size
+            size = [np.sqrt(np.prod(q.typical)) if q.typical else 0.1 for q in kind.quantities]
         count = len(effect.parameters(robot))
         lower = np.resize([q.lower for q in kind.quantities], count)
         sign = np.where(lower < 0.0, rng.choice([-1.0, 1.0], count), 1.0)

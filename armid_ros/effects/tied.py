@@ -25,9 +25,6 @@ from armid_ros.robots import Robot
 import numpy as np
 from scipy.interpolate import CubicHermiteSpline
 
-#: Start values of slacks in a search [m]; straps stretch by millimetres.
-_SLACKS = (0.001, 0.002, 0.004, 0.008)
-
 
 @dataclass(frozen=True)
 class Tied(Attached):
@@ -127,7 +124,10 @@ class TiedInteraction(Tied, HumanInteraction):
 class TiedSlack(Tied, InterfaceSlack):
     """Strap to a point whose motion is known; it pulls only beyond a slack."""
 
-    shapes = (replace(InterfaceSlack.shapes[-1], default=0.003, grid=_SLACKS),)
+    # start values [m]; straps stretch by millimetres
+    shapes = (
+        replace(InterfaceSlack.shapes[-1], default=0.003, grid=(0.001, 0.002, 0.004, 0.008)),
+    )
 
 
 @dataclass(frozen=True)

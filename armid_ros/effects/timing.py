@@ -18,8 +18,6 @@ import numpy as np
 from scipy.signal import butter, lfilter, sosfiltfilt
 from scipy.sparse import csr_array
 
-#: Number of time constants after which a low-pass output no longer depends on an input.
-_FORGOTTEN = 20.0
 #: Factor between two lags whose difference is the derivative.
 _MORE = 1.0001
 
@@ -143,7 +141,8 @@ class TorqueLag(LateReading):
 
     def memory(self, values: FloatArray) -> float:
         """Return the time after which the slowest filter has settled [s]."""
-        return _FORGOTTEN * float(np.max(np.abs(values)))
+        # after 20 time constants the output no longer depends on an input
+        return 20.0 * float(np.max(np.abs(values)))
 
 
 def rate_of_change(t: FloatArray, x: FloatArray) -> FloatArray:

@@ -23,9 +23,6 @@ from armid_ros.motion import FloatArray, Motion
 import numpy as np
 from scipy.integrate import cumulative_trapezoid
 
-#: Assumed inertia about a joint of a link without inertia in the description [kg m^2].
-_LIGHTEST = 1e-9
-
 
 @dataclass(frozen=True)
 class JointElasticity(Displacing):
@@ -100,7 +97,8 @@ class Backlash(Displacing):
         inertia = np.diagonal(arm.load_derivatives(motion)[2], axis1=1, axis2=2)
         place = np.zeros(motion.q.shape)
         for joint in self.indices(motion.joints):
-            pull = load[:, joint] / np.maximum(inertia[:, joint], _LIGHTEST)
+            # kg m^2 of a link without inertia
+            pull = load[:, joint] / np.maximum(inertia[:, joint], 1e-9)
             place[:, joint] = place_in_gap(motion.t, pull, float(width[joint]))
         return _twist(self, motion, place / width)
 

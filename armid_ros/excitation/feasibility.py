@@ -21,9 +21,6 @@ import numpy as np
 #: Samples per period and harmonic.
 _DENSITY = 200
 
-#: Poses per period and harmonic at the beginning of the proof of clearance.
-_INTERVALS = 20
-
 
 class Faults(tuple[Violation | Approach, ...]):
     """Reasons not to run a trajectory: exceeded limits, and bodies too close to each other."""
@@ -63,7 +60,8 @@ def trajectory_faults(
     violations = _violations(arm, limits, motion, periodic=True)
     if clearance is None:
         return Faults(violations)
-    times = np.linspace(0.0, trajectory.period, _INTERVALS * trajectory.harmonics + 1)
+    # intervals at the beginning of the proof
+    times = np.linspace(0.0, trajectory.period, 20 * trajectory.harmonics + 1)
     _, acceleration, _ = trajectory.bounds()
     approach = clearance.first_fault(trajectory.motion, acceleration, times, margin)
     return Faults(violations if approach is None else (*violations, approach))

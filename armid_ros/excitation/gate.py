@@ -23,10 +23,6 @@ _LONGER, _TRIES = 1.25, 8
 #: over the acceleration limit: 1.875 and 2.4 for a quintic from rest to rest. A quintic that
 #: begins with a speed needs 3.94 times the speed over the acceleration limit: at most 6 are taken.
 _STEP = 3.0
-#: Interval at the beginning of the proof of clearance [s].
-_INTERVAL = 0.1
-#: Smallest expected effort of a joint, as a share of its limit, because of dry friction.
-_LEAST_EFFORT = 0.1
 
 
 @dataclass(frozen=True)
@@ -87,13 +83,15 @@ class MotionGate:
         usual = np.maximum(limits.acceleration, 1.001 * peak)
         fixed = np.isfinite(planner.given_acceleration)
         limits = replace(limits, acceleration=np.where(fixed, limits.acceleration, usual))
-        room = np.where(np.isfinite(robot.torque_limit), _LEAST_EFFORT * robot.torque_limit, 0.0)
+        # a joint may need a tenth of its limit for its dry friction
+        room = np.where(np.isfinite(robot.torque_limit), 0.1 * robot.torque_limit, 0.0)
         effort = np.maximum(np.abs(torque).max(axis=0), room)
         gate = cls(run, limits, planner.clearance, planner.margin, effort)
         violations = check_limits(limits, motion, torque) if planner.limits is not None else ()
         if violations:
             raise TrajectoryError(f'the run is not sent: {violations[0]}')
-        times = np.linspace(0.0, run.duration, int(np.ceil(run.duration / _INTERVAL)) + 1)
+        # intervals of 0.1 s at the beginning of the proof
+        times = np.linspace(0.0, run.duration, int(np.ceil(run.duration / 0.1)) + 1)
         if planner.clearance is not None:
             near = planner.clearance.first_fault(run.at, 1.5 * peak, times, planner.margin)
             if near is not None:

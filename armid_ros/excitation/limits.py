@@ -34,9 +34,6 @@ _POSITION_RESERVE, _TORQUE_RESERVE = 0.02, 0.1
 #: Relative tolerance of the comparison of positions and rates with limits.
 _ROUNDING = 1e-9
 
-#: Position limits of a revolute joint above this, about two turns, may be degrees [rad].
-_TWO_TURNS = 1.01 * 4.0 * math.pi
-
 
 @dataclass(frozen=True)
 class Limits:
@@ -290,7 +287,8 @@ def require_radians(robot: Robot) -> None:
         robot.joints, robot.lower, robot.upper, robot.prismatic, strict=True
     ):
         ends = [abs(end) for end in (lower, upper) if math.isfinite(end)]
-        if not slides and max(ends, default=0.0) > _TWO_TURNS:
+        # two turns; larger limits may be degrees
+        if not slides and max(ends, default=0.0) > 1.01 * 4.0 * math.pi:
             raise TrajectoryError(
                 f'{robot.name}: joint {joint} has position limits {lower:g} and {upper:g} rad, '
                 'beyond two turns; are these degrees? Write them in radians, or make the joint '

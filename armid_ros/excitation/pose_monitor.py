@@ -29,8 +29,6 @@ _NOISE = 0.02
 _DIFFERENCE = 0.01
 #: Transport delay: the difference of stamps may exceed that of arrivals by this time [s].
 _TRANSPORT = 0.1
-#: Velocity limit of a joint without one in the description [rad/s or m/s]: a turn per second.
-_UNSTATED_VELOCITY = 2.0 * np.pi
 #: Largest valid position of a joint without position limits [rad or m].
 _FARTHEST = 1e4
 
@@ -104,7 +102,8 @@ class PoseMonitor:
         limit = robot.velocity_limit
         self.pose = MeasuredPose.unknown(robot.joints)
         self._units = robot.position_units
-        self._velocity = np.where(np.isfinite(limit) & (limit > 0.0), limit, _UNSTATED_VELOCITY)
+        # without a limit in the description, a turn per second is assumed
+        self._velocity = np.where(np.isfinite(limit) & (limit > 0.0), limit, 2.0 * np.pi)
         self._lower = np.maximum(robot.lower - tolerance, -_FARTHEST)
         self._upper = np.minimum(robot.upper + tolerance, _FARTHEST)
         self._sources: dict[tuple[str, ...], _Source] = {}

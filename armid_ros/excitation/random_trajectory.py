@@ -15,12 +15,6 @@ from armid_ros.robots import CollisionModel
 from armid_ros.robots.robot import position_range
 import numpy as np
 
-#: Number of trajectories drawn before the search around single poses.
-_ATTEMPTS = 60
-
-#: Number of poses tried if no trajectory was found.
-_POSES = 2000
-
 #: Factors on the amplitudes of a trajectory, tried until it is feasible.
 _SHRINK, _SHRINKS = 0.75, 6
 
@@ -71,7 +65,7 @@ def random_feasible(
     clearance = (
         ClearanceModel.of(collision) if isinstance(collision, CollisionModel) else collision
     )
-    for _ in range(_ATTEMPTS):
+    for _ in range(60):
         trajectory = _draw(limits, period, harmonics, rng)
         found = _shrunk(arm, limits, trajectory, clearance, margin, _SHRINKS)
         if found is not None:
@@ -105,7 +99,7 @@ def feasible_pose(
 
     """
     lower, upper = position_range(limits.lower, limits.upper)
-    q = rng.uniform(lower, upper, (_POSES, len(lower)))
+    q = rng.uniform(lower, upper, (2000, len(lower)))
     motion = Motion.of_states(limits.joints, q, 0.0, 0.0)
     load = np.abs(arm.joint_torque(motion)) / limits.torque
     for j in np.flatnonzero(load.min(axis=0) > 1.0):

@@ -9,8 +9,6 @@ from armid_ros.excitation.supervision import Path
 from armid_ros.motion import FloatArray
 import numpy as np
 
-#: Number of samples of the path at which the torque is predicted.
-_SAMPLES = 4000
 #: Largest accepted ratio of a measured torque to the largest predicted torque. The ratio is large
 #: because a description has no friction, and friction dominates the torque of a slow arm.
 _SURPRISING = 3.0
@@ -60,7 +58,7 @@ class Rehearsal:
 
     def foreseen(self) -> FloatArray:
         """Return the largest predicted torque so far, shape (n,)."""
-        wanted = self._path.at(np.linspace(0.0, self._until, _SAMPLES))
+        wanted = self._path.at(np.linspace(0.0, self._until, 4000))
         return np.asarray(np.abs(self._arm.joint_torque(wanted)).max(axis=0))
 
     def report(self) -> tuple[str, tuple[str, ...]]:

@@ -16,8 +16,6 @@ from armid_ros.motion import FloatArray, Motion
 import numpy as np
 import numpy.typing as npt
 
-#: Largest distance between the end of the approach and the start of the excitation [rad or m].
-_GAP = 1e-9
 _TURN = 2.0 * np.pi
 #: Number of samples of the period at which range and torque are checked.
 _SAMPLES = 400
@@ -52,7 +50,8 @@ class Run:
         """Round the ways to whole numbers of samples, and check that they meet the excitation."""
         ends = self.excitation.at([0.0, self.excitation.duration]).q
         for way, own, end in ((self.approach, -1, 0), (self.back, 0, 1)):
-            if way is not None and np.abs(way.q[own] - ends[end]).max() > _GAP:
+            # [rad or m]; rounding
+            if way is not None and np.abs(way.q[own] - ends[end]).max() > 1e-9:
                 raise TrajectoryError('run: the way and the excitation do not meet')
         for name in ('approach', 'back'):
             way = getattr(self, name)

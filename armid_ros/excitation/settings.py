@@ -19,9 +19,6 @@ TARGETS = {
     'effects': 'those of the effects alone, the rigid body being known',
 }
 
-#: Samples of one period in a search: smallest number, and number per harmonic.
-_SAMPLES, _PER_HARMONIC = 64, 12
-
 
 @dataclass(frozen=True)
 class DesignSettings:
@@ -136,7 +133,7 @@ class DesignSettings:
     @property
     def samples(self) -> int:
         """Number of samples of one period in a search."""
-        return max(_SAMPLES, _PER_HARMONIC * self.harmonics)
+        return max(64, 12 * self.harmonics)
 
 
 def whole_period(duration: float, n_periods: int, run_in: float, rate: float) -> float:

@@ -17,19 +17,12 @@ from armid_ros.robots import Robot
 import numpy as np
 import numpy.typing as npt
 
-#: Largest velocity and acceleration of a quintic from 0 to 1 in unit time.
-_TOP_VELOCITY, _TOP_ACCELERATION = 1.875, 10.0 / np.sqrt(3.0)
 #: Acceleration that is slow for any joint, used with `SLOW_VELOCITY` [rad/s^2 or m/s^2].
 _SLOW_ACCELERATION = 1.0
 #: Samples of a way at which its torque is checked; factor on its duration, and number of trials.
 _SAMPLES, _SLOWER, _TRIES = 200, 1.3, 20
 #: Tolerance beyond a position limit for a measured position [rad or m].
 _BEYOND = 0.01
-#: Number of poses about zero that are tried at each of these distances if zero is not free.
-_NEARBY, _DISTANCES = 200, (0.1, 0.2, 0.4, 0.8, 1.6, 3.2)
-#: Decimals of a pose that was found, so that a person can type it.
-_DIGITS = 2
-_SEED = 0
 
 
 @dataclass(frozen=True)
@@ -193,9 +186,10 @@ class TransferPlanner:
         reason = self.fault(zero)
         if not reason:
             return zero
-        rng = np.random.default_rng(_SEED)
-        for distance in _DISTANCES:
-            about = zero + distance * rng.uniform(-1.0, 1.0, (_NEARBY, len(zero)))
+        rng = np.random.default_rng(0)
+        # 200 poses about zero at each of these distances
+        for distance in (0.1, 0.2, 0.4, 0.8, 1.6, 3.2):
+            about = zero + distance * rng.uniform(-1.0, 1.0, (200, len(zero)))
             about = np.clip(about, self.limits.lower, self.limits.upper)
             about = about[np.argsort(np.linalg.norm(about - zero, axis=1))]
             for q in about:
@@ -226,7 +220,7 @@ class TransferPlanner:
             other[j] = zero[j]
             if not self.fault(other):
                 q = other
-        rounded = np.where(q == zero, zero, np.round(q, _DIGITS))
+        rounded = np.where(q == zero, zero, np.round(q, 2))  # decimals that a person can type
         return q if self.fault(rounded) else rounded
 
     def _overload(self, q: FloatArray) -> str:
@@ -251,9 +245,10 @@ class TransferPlanner:
         assert limits is not None
         way = np.abs(np.diff(poses, axis=0))
         velocity = np.where(np.isfinite(limits.velocity), limits.velocity, SLOW_VELOCITY)
+        # largest velocity and acceleration of a quintic from 0 to 1 in unit time
         needed = np.maximum(
-            (_TOP_VELOCITY * way / velocity).max(axis=1),
-            np.sqrt(_TOP_ACCELERATION * way / limits.acceleration).max(axis=1),
+            (1.875 * way / velocity).max(axis=1),
+            np.sqrt((10.0 / np.sqrt(3.0)) * way / limits.acceleration).max(axis=1),
         )
         t = np.append(0.0, np.cumsum(needed))
         transfer = Transfer(limits.joints, t, poses)

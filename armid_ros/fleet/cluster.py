@@ -15,8 +15,6 @@ from armid_ros.version import __version__
 import dask
 from distributed import Client, LocalCluster
 
-#: Memory limit of a worker of this machine; Dask then moves results to the disk [bytes].
-WORKER_MEMORY = 1_200_000_000
 #: Timeout of the connection to a cluster [s].
 ANSWER = 30.0
 #: Period of the check whether all workers of this machine run.
@@ -86,7 +84,7 @@ def _embedded(workers: int | None) -> Iterator[Client]:
                 LocalCluster(
                     n_workers=count,
                     threads_per_worker=1,
-                    memory_limit=WORKER_MEMORY,
+                    memory_limit=1_200_000_000,  # bytes; beyond, Dask uses the disk
                     dashboard_address='127.0.0.1:0',
                     local_directory=folder,
                     silence_logs=logging.CRITICAL,

@@ -21,10 +21,6 @@ import numpy as np
 
 #: Sampling rates that differ by less than this share are treated as equal.
 _SAME_RATE = 0.02
-#: Largest number of elements of the columns of a piece; larger bags are read in pieces.
-_MOST_NUMBERS = 16_000_000
-#: Largest number of full-rate samples of a piece, times joints.
-_MOST_SAMPLES = 1_400_000
 
 
 @dataclass(frozen=True)
@@ -145,8 +141,8 @@ class Job:
     def samples(self) -> int:
         """Return the number of samples of a bag that are in memory at once."""
         joints = self.arm.robot.n_joints
-        rows = _MOST_NUMBERS // (joints * self.theory.rank)
-        return min(rows * self.filters.decimation, _MOST_SAMPLES // joints)
+        rows = 16_000_000 // (joints * self.theory.rank)  # larger columns are read in pieces
+        return min(rows * self.filters.decimation, 1_400_000 // joints)
 
 
 def require_linear(arm: ArmModel, rng: np.random.Generator) -> None:

@@ -46,8 +46,6 @@ import numpy as np
 _LISTED = 60
 #: Number of refused bags that the overview lists.
 _SHOWN = 50
-#: Size of a small curve, and of a larger one with intervals [px].
-_SMALL, _LARGE = (84, 20), (250, 74)
 
 Diagnoses = Mapping[str, Mapping[str, Any]]
 
@@ -282,7 +280,8 @@ def _drawing(
     title: str = '',
 ) -> tuple[Markup, tuple[float, float]]:
     """Draw a series as a line, or as points with links; return drawing and range of ordinate."""
-    (width, height), wide = (_LARGE, HALF_WIDTH) if links else (_SMALL, 0.0)
+    # [px]; a large curve has intervals
+    (width, height), wide = ((250, 74), HALF_WIDTH) if links else ((84, 20), 0.0)
     low, high = float(np.min(values - wide * std)), float(np.max(values + wide * std))
     least = max(6.0 * float(np.median(std)), 1e-3 * float(np.max(np.abs(values))), 1e-12)
     spare = max(0.0, 0.5 * (least - (high - low)))

@@ -37,12 +37,6 @@ from armid_ros.robots import load_robot, robot_from_urdf
 import numpy as np
 
 SCHEMA = 'armid/fleet/1'
-#: Number of bags from which the filters are chosen, of different arms if possible.
-_CHOSEN_BY = 4
-#: Largest number of bags that are tried if some cannot be read.
-_TRIED = 24
-#: Number of samples of each of these bags that are read.
-_LOOKED_AT = 100_000
 
 
 @dataclass(frozen=True)
@@ -226,14 +220,15 @@ def choose_filters(
     for bag in bags:  # one bag of each arm before a second bag of any arm
         turns[bag.arm] += 1
         order.append((turns[bag.arm], bag))
-    for _, bag in sorted(order)[:_TRIED]:
+    # four bags are enough; some cannot be read
+    for _, bag in sorted(order)[:24]:
         try:
             with fetched(bag.url) as path:
                 first = read_pieces(
                     path,
                     joints=arm.robot.joints,
                     topic=settings.topic,
-                    samples=_LOOKED_AT,
+                    samples=100_000,
                     keep=lambda piece: piece.start_ns,
                     settings=settings.reading,
                 )
@@ -242,7 +237,7 @@ def choose_filters(
                 recordings.append(piece)
         except (ArmidError, StoreError) as error:
             problem = str(error)
-        if len(recordings) == _CHOSEN_BY:
+        if len(recordings) == 4:
             break
     if not recordings:
         raise FleetError(f'no bag of {arm.robot.name} can be read: {problem}')

@@ -35,8 +35,6 @@ RETRIES = 3
 #: Largest size [bytes] and number of bags of one task. A task then takes about a second, so that
 #: the overhead of Dask is small.
 TASK_BYTES, TASK_BAGS = 16_000_000, 16
-#: Number of groups of bags in progress: a constant, and a number per thread of the cluster.
-_UNDER_WAY, _MORE = 2, 3
 #: Status of tasks if the scheduler was lost.
 _BROKEN = ('cancelled', 'lost')
 
@@ -264,7 +262,8 @@ class _Run:
 
     def work(self) -> None:
         """Keep enough arms in progress that no worker is idle, until all arms are finished."""
-        limit = _UNDER_WAY + _MORE * sum(self._client.nthreads().values())
+        # groups of bags in progress: a constant, and a number per thread
+        limit = 2 + 3 * sum(self._client.nthreads().values())
         under_way: dict[Any, _UnderWay] = {}
         ended = as_completed(raise_errors=False)
         while self._waiting or under_way:

@@ -28,8 +28,6 @@ import yaml
 
 #: A grouping is a combination of others if its remainder is at most this share of it.
 _SAME_GROUPING = 1e-6
-#: Relative; what is written has 16 digits.
-_ROUNDING = 1e-9
 _IDENTIFICATION = 'armid/identification/1'
 _SCHEMAS = (_IDENTIFICATION, MODEL)
 
@@ -353,6 +351,7 @@ def _covariance(rows: list[list[float]] | None, size: int) -> FloatArray | None:
         raise ValueError('a covariance with a number that is not finite')
     deviations = np.sqrt(np.maximum(np.diag(matrix), 0.0))
     largest = np.outer(deviations, deviations)
-    if (np.diag(matrix) < 0.0).any() or (np.abs(matrix) > largest * (1.0 + _ROUNDING)).any():
+    # the file has 16 digits
+    if (np.diag(matrix) < 0.0).any() or (np.abs(matrix) > largest * (1.0 + 1e-9)).any():
         raise ValueError('a covariance with a negative variance or a correlation beyond one')
     return matrix

@@ -14,8 +14,6 @@ import numpy as np
 GAP = 5.0
 #: Positions of successive periods differ by less than this share of their variation.
 _SAME = 0.03
-_SEARCH_HZ = 20.0
-_LONGEST = 3000
 
 
 @dataclass(frozen=True)
@@ -77,7 +75,8 @@ def find_repetition(recording: Recording) -> float | None:
     ignored. The period is the first lag with a small minimum.
 
     """
-    rate = min(_SEARCH_HZ, 1.0 / recording.period, _LONGEST / max(recording.duration, 1e-9))
+    # at most 20 Hz and 3000 samples
+    rate = min(20.0, 1.0 / recording.period, 3000 / max(recording.duration, 1e-9))
     t = np.arange(recording.t[0], recording.t[-1], 1.0 / rate)
     varying = np.ptp(recording.q, axis=0) > 1e-3
     if len(t) < 40 or not varying.any():

@@ -30,10 +30,6 @@ import numpy as np
 
 #: One thread of linear algebra: the matrices are small, and other processes need the cores.
 _ONE_THREAD = dict.fromkeys(('OMP_NUM_THREADS', 'OPENBLAS_NUM_THREADS'), '1')
-#: Increment of the nice value: the process has a lower priority than the nodes.
-_NICE = 10
-#: File descriptor of standard error, for output of libraries.
-_STDERR = 2
 
 
 @dataclass(frozen=True)
@@ -201,7 +197,7 @@ class Assistant:
                     f'from {__name__} import main; main({other.fileno()})',
                 ],
                 stdin=subprocess.DEVNULL,
-                stdout=_STDERR,
+                stdout=2,  # standard error, for output of libraries
                 pass_fds=[other.fileno()],
                 env=os.environ | _ONE_THREAD,
                 start_new_session=True,  # Ctrl-C must reach the parent only
@@ -214,7 +210,7 @@ Helper = Assistant | InProcess
 
 def main(fd: int) -> None:
     """Run jobs from a socket until its other end is closed."""
-    os.nice(_NICE)
+    os.nice(10)  # lower priority than the nodes
     helper = InProcess()
     with suppress(EOFError, OSError), Connection(fd) as pipe:
         while True:

@@ -30,8 +30,6 @@ import numpy.typing as npt
 #: 1e-15 to 1e-13, and what they leave of an independent one is rarely below 1e-5.
 RANK_TOLERANCE = 1e-9
 
-#: Mass of a link of which a description gives none, for its first moments to stand on [kg].
-_LEAST_MASS = 1e-6
 
 #: Angles of a description are rounded. Gravity that is across an axis by less than this share of
 #: it is along the axis: it would show first moments by that share of what others show.
@@ -121,7 +119,8 @@ class BaseParameters:
         """
         prior = np.array(prior, dtype=float)
         masses = [_symbol_of(parameter) == 'm' for parameter in self.standard]
-        prior[masses & (np.abs(prior) < NO_MASS)] = _LEAST_MASS
+        # mass of a link of which a description gives none, for its first moments to stand on [kg]
+        prior[masses & (np.abs(prior) < NO_MASS)] = 1e-6
         correction = np.linalg.pinv(self.grouping) @ (np.asarray(beta) - self.values(prior))
         return np.asarray(prior + correction)
 

@@ -23,8 +23,6 @@ import pinocchio as pin
 #: origin of the joint frame.
 LINK_PARAMETERS = ('m', 'mx', 'my', 'mz', 'Ixx', 'Ixy', 'Iyy', 'Ixz', 'Iyz', 'Izz')
 LINK_UNITS = ('kg', 'kg m', 'kg m', 'kg m') + ('kg m^2',) * 6
-#: Random states that suffice for an arm of any length: each has a row for every joint.
-_MOST_STATES = 560
 
 
 def rigid_parameter_names(robot: Robot) -> tuple[ParameterName, ...]:
@@ -198,7 +196,8 @@ def random_motion(robot: Robot, rng: np.random.Generator, n_samples: int | None 
     """
     n = robot.n_joints
     if n_samples is None:
-        n_samples = min(40 * n, _MOST_STATES)
+        # enough for an arm of any length: each state has a row for every joint
+        n_samples = min(40 * n, 560)
     return Motion(
         joints=robot.joints,
         t=np.arange(n_samples, dtype=float),

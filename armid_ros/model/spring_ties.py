@@ -25,8 +25,6 @@ import numpy as np
 
 #: Step of the central differences of spring columns [rad or m].
 _STEP = 1e-5
-#: A way so short that it has no direction [m].
-_SHORTEST = 1e-12
 
 #: Segments of the leg pair that are tied: in the order of the source, F1 to F4.
 SEGMENTS = ('swing_shank', 'swing_thigh', 'stance_thigh', 'stance_shank')
@@ -106,7 +104,8 @@ class TieGeometry(NamedTuple):
 
     def pulled(self, slack: float | FloatArray) -> FloatArray:
         """Return the columns of springs that give by a slack [m] before they pull, (N, n, S)."""
-        length = np.maximum(np.linalg.norm(self.way, axis=2), _SHORTEST)
+        # shorter ways [m] have no direction
+        length = np.maximum(np.linalg.norm(self.way, axis=2), 1e-12)
         share = np.maximum(1.0 - slack / length, 0.0)
         return np.asarray(self.columns * share[:, np.newaxis])
 

@@ -23,7 +23,6 @@ _Buffer = bytes | memoryview
 CORRUPT = (zstandard.ZstdError, RuntimeError, MemoryError, OverflowError, ValueError)
 #: First bytes of a zstd frame; no CDR message begins with them.
 ZSTD = b'\x28\xb5\x2f\xfd'
-_STEP = 1 << 20
 _PARTIAL_STEP = 1024
 
 
@@ -122,7 +121,7 @@ def unpacked(stream: BinaryIO) -> Iterator[bytes]:
         with zstandard.ZstdDecompressor().stream_reader(
             stream, read_across_frames=True
         ) as content:
-            while piece := content.read(_STEP):
+            while piece := content.read(1 << 20):
                 yield piece
     except CORRUPT as error:
         raise RecordingError(f'the compressed file is damaged: {error}') from error

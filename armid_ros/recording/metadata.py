@@ -16,9 +16,6 @@ from armid_ros.recording.source import Topic
 import yaml
 
 FILE_NAME = 'metadata.yaml'
-VERSION = 9
-# rosbag2 writes this number as the start time of a bag without messages.
-_NO_TIME = 2**63 - 1
 
 
 @dataclass(frozen=True)
@@ -59,11 +56,12 @@ def bag_information(
 
     """
     count = sum(topic.count for topic in topics)
-    start = {'nanoseconds_since_epoch': start_ns if count else _NO_TIME}
+    # as rosbag2 writes it for a bag without messages
+    start = {'nanoseconds_since_epoch': start_ns if count else 2**63 - 1}
     duration = {'nanoseconds': end_ns - start_ns if count else 0}
     files = [] if file_name is None else [file_name]
     return {
-        'version': VERSION,
+        'version': 9,
         'storage_identifier': 'mcap',
         'duration': duration,
         'starting_time': start,

@@ -22,9 +22,6 @@ from armid_ros.recording.settings import DEFAULT, ReadSettings
 from armid_ros.recording.source import Topic
 import numpy as np
 
-#: Number of messages that are read to find the joints of a topic.
-_PEEK_MESSAGES = 1000
-
 
 def read_recording(
     path: str | Path,
@@ -250,7 +247,7 @@ def named_joints(bag: Bag, topic: Topic) -> tuple[str, ...]:
     for block in joint_state_blocks(bag, topic):
         for _ in decoder.decode(block):
             pass
-        if decoder.messages >= _PEEK_MESSAGES:
+        if decoder.messages >= 1000:
             break
     return decoder.names_seen
 

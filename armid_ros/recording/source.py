@@ -22,8 +22,6 @@ from rosbags.interfaces import Qos
 IntArray = npt.NDArray[np.int64]
 #: Encoding of listed topics whose messages the source cannot return.
 UNREADABLE = 'unreadable'
-#: Largest number of problems that are listed one by one.
-_SAID = 8
 
 
 @dataclass(frozen=True)
@@ -120,7 +118,7 @@ class Damage:
 
     def __str__(self) -> str:
         """Return the problems as a text; empty without problems."""
-        said = list(self._problems)[:_SAID]
+        said = list(self._problems)[:8]
         more = len(self._problems) - len(said)
         return '; '.join([*said, *([f'and {more} more'] if more else [])])
 

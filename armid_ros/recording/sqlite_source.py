@@ -26,7 +26,6 @@ import numpy as np
 
 _BLOCK_MESSAGES = 4096
 _BLOCK_BYTES = 8 << 20
-_LONGEST = 2**31 - 1
 _JOURNALS = ('-wal', '-journal')
 # Condition for a valid row: an integer time and binary data.
 _WHOLE = "typeof(timestamp) = 'integer' AND timestamp >= 0 AND typeof(data) = 'blob'"
@@ -113,7 +112,7 @@ class SqliteSource(Source):
         """Check that the file is one of rosbag2, and return the columns of its tables."""
         database = self._database
         database.text_factory = lambda text: text.decode('utf-8', 'replace')
-        database.setlimit(sqlite3.SQLITE_LIMIT_LENGTH, min(self._settings.memory_limit, _LONGEST))
+        database.setlimit(sqlite3.SQLITE_LIMIT_LENGTH, min(self._settings.memory_limit, 2**31 - 1))
         with suppress(sqlite3.Error):  # old versions of SQLite lack this pragma
             database.execute('PRAGMA trusted_schema = OFF')
         # Only tables are read: a view could run an endless computation.

@@ -20,12 +20,6 @@ from armid_ros.residual.rows import JointRows
 import numpy as np
 import numpy.typing as npt
 
-#: Largest number of inducing points of a joint, and least number of rows for each.
-_POINTS, _ROWS = 200, 2
-#: Number of inducing points to which length scales and noise are fitted.
-_FOR_SCALES = 100
-#: Knees of the velocity scale to try, as shares of the largest velocity.
-_KNEES = (0.02, 1.0)
 #: Bounds of the length scales, as shares of the span of an input; an input at the upper bound is
 #: irrelevant.
 _LENGTHS = (0.02, 10.0)
@@ -67,9 +61,11 @@ def learn_map(rows: JointRows, rng: np.random.Generator) -> tuple[TorqueMap, Flo
 
     everywhere = np.ones(len(rows), dtype=bool)
     best: tuple[float, _Scales, _Cells] | None = None
-    for share in _KNEES:
+    # shares of the largest velocity
+    for share in (0.02, 1.0):
         knee = max(share * float(np.abs(rows.inputs[:, 1]).max()), 1e-9)
-        count = max(1, min(_POINTS, len(rows) // _ROWS))
+        # inducing points, with at least two rows for each
+        count = max(1, min(200, len(rows) // 2))
         means = MiniBatchKMeans(
             count, n_init=1, random_state=int(rng.integers(2**31)), batch_size=1024
         )
@@ -122,7 +118,8 @@ def _fitted(cells: _Cells, knee: float) -> tuple[float, _Scales]:
     regressor = GaussianProcessRegressor(smooth + kernels.WhiteKernel(0.1, _NOISES))
     points = counted(cells.points, knee)
     span = _span(points)
-    some = slice(None, None, max(1, len(points) // _FOR_SCALES))  # cells are in no order
+    # a hundred points are enough for the scales; cells are in no order
+    some = slice(None, None, max(1, len(points) // 100))
     with warnings.catch_warnings():
         warnings.simplefilter('ignore')  # a length scale at its bound: an input is irrelevant
         regressor.fit((points / span)[some], cells.torque[some] / size)

@@ -22,8 +22,6 @@ import numpy as np
 
 #: Largest number of terms of a law.
 _TERMS = 3
-#: Positions at which a one-sided force may begin, as shares of the range of a joint.
-_PLACES = (0.2, 0.35, 0.5, 0.65, 0.8)
 #: A law has to predict at least this share of the squared residual.
 _LEAST_SHARE = 0.5
 
@@ -104,7 +102,8 @@ def _library(
             for name, function in (('sin', np.sin), ('cos', np.cos)):
                 terms.append((f'{name}({angle})', force, function(k * q)))
                 terms.append((f'{name}({angle}) sign(dq)', force, function(k * q) * sign))
-    for place in low + np.array(_PLACES) * (high - low):
+    # shares of the range at which a one-sided force may begin
+    for place in low + np.array((0.2, 0.35, 0.5, 0.65, 0.8)) * (high - low):
         terms.append((f'max(q - {place:.3g}, 0)', f'{force}/{x}', np.maximum(q - place, 0.0)))
         terms.append((f'max({place:.3g} - q, 0)', f'{force}/{x}', np.maximum(place - q, 0.0)))
     return terms

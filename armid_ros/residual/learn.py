@@ -32,8 +32,6 @@ from threadpoolctl import threadpool_limits
 _FEW = 100
 #: A map is informative if its standard deviation is less than this share of the prior's.
 _KNOWN = 0.5
-#: Points of the table of the maps along position, velocity and load.
-_STEPS = (41, 31, 9)
 _HEAD = 'joint,position,velocity,load,torque,std'
 
 
@@ -284,7 +282,8 @@ def lookup_table(residual: Residual) -> str:
     """
     lines = [_HEAD]
     for one in residual.joints:
-        axes = [one.axis(number, count) for number, count in enumerate(_STEPS)]
+        # points along position, velocity and load
+        axes = [one.axis(number, count) for number, count in enumerate((41, 31, 9))]
         loaded = one.learned.takes_load
         if not loaded:
             axes[2] = np.zeros(1)

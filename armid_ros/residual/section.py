@@ -22,8 +22,6 @@ import numpy as np
 if TYPE_CHECKING:
     from armid_ros.residual.learn import JointResidual, Residual
 
-#: Cells of a picture along position and velocity.
-_CELLS = 80, 60
 _POSITIVE, _NEGATIVE, _UNSURE = (0.0, 0.447, 0.698), (0.835, 0.369, 0.0), (0.5, 0.5, 0.5)
 
 
@@ -81,7 +79,8 @@ def residual_map_section(residual: Residual) -> ContentSection:
 
 def _pictures(one: JointResidual, unit: str, length: str) -> list[tuple[str, str, Markup, str]]:
     """Return pictures of torque and deviation at the middle load, the largest velocity on top."""
-    q, dq = (one.axis(number, count) for number, count in enumerate(_CELLS))
+    # cells along position and velocity
+    q, dq = (one.axis(number, count) for number, count in enumerate((80, 60)))
     load = np.full((len(dq), len(q)), one.ranges[2].mean())
     inputs = np.stack([*np.meshgrid(q, dq[::-1]), load], axis=-1)
     torque, std = one.learned.torque(inputs), one.learned.std(inputs)

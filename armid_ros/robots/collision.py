@@ -17,8 +17,6 @@ from armid_ros.robots.robot import Robot
 import numpy as np
 import pinocchio as pin
 
-RANGE_SAMPLES = 73  # every 5 deg of a full turn
-
 
 @dataclass(frozen=True, eq=False)
 class CollisionModel:
@@ -139,7 +137,8 @@ def _leave_out_separate(robot: Robot, geometry: pin.GeometryModel) -> None:
         closest = np.full(len(numbers), np.inf)
         span = 1.0 if robot.prismatic[joint - 1] else np.pi
         first, last = np.clip((robot.lower[joint - 1], robot.upper[joint - 1]), -span, span)
-        for position in np.linspace(first, last, RANGE_SAMPLES):
+        # every 5 deg of a full turn
+        for position in np.linspace(first, last, 73):
             pose = robot.zero_pose
             pose[joint - 1] = position
             pin.updateGeometryPlacements(robot.model, data, geometry, placed, pose)

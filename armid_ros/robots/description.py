@@ -22,7 +22,6 @@ KNOWN = (*MOVABLE, 'fixed', 'floating', 'planar')
 ROUNDING = 1e-6  # relative; descriptions print six digits
 NEGLIGIBLE = 1e-12  # kg m^2
 MAX_CHAIN = 500  # joints one behind the other; Pinocchio's reader descends by recursion
-SHORTEST_AXIS = 1e-100  # an axis shorter than this cannot be normalised
 
 Vector = tuple[float, float, float]
 
@@ -348,7 +347,8 @@ def _axis(element: ElementTree.Element, where: str) -> Vector:
     axis = element.find('axis')
     x, y, z = (1.0, 0.0, 0.0) if axis is None else _vector(axis, 'xyz', where)
     length = math.hypot(x, y, z)
-    if length < SHORTEST_AXIS:
+    # cannot be normalised
+    if length < 1e-100:
         if element.get('type') in MOVABLE:
             raise RobotError(f'the axis of {where} has no direction')
         return (1.0, 0.0, 0.0)

@@ -27,7 +27,6 @@ import pinocchio as pin
 
 #: Prefix of a package folder among the arguments of a description.
 PACKAGE = 'package:'
-NO_INERTIA = 1e-12  # kg m^2 or kg; the smallest motor rotor is five orders above
 
 
 def load_robot(
@@ -289,9 +288,10 @@ def _inertia_notes(robot: Robot) -> tuple[str, ...]:
         q = generator.uniform(-math.pi, math.pi, robot.n_joints)
         mass_matrix = pin.crba(robot.model, data, q)
         moved = np.maximum(moved, np.abs(np.diag(mass_matrix)))
+    # kg m^2 or kg; the smallest motor rotor is five orders above
     return tuple(
         f"link '{link}', moved by joint '{joint}', has no <inertial>, nor has any link beyond it: "
         'its inertia can be identified, but simulating the arm needs a rough one'
         for joint, link, inertia in zip(robot.joints, robot.links, moved, strict=True)
-        if inertia < NO_INERTIA
+        if inertia < 1e-12
     )

@@ -26,7 +26,6 @@ import coal
 import numpy as np
 import numpy.typing as npt
 
-SLABS = 12
 GROWTH = 1.1  # largest accepted ratio of the volume of a hull to the volume that it replaces
 FLAT = 1e-5  # thickness over length of points that span no volume
 NO_VOLUME = (RuntimeError, ValueError)  # errors that qhull raises for degenerate points
@@ -101,7 +100,7 @@ def _slabs(
     along = vertices @ axis
     hulls: list[coal.ConvexBase] = []
     thin = np.empty((0, 3))
-    for low, high in pairwise(np.linspace(along.min(), along.max(), SLABS + 1)):
+    for low, high in pairwise(np.linspace(along.min(), along.max(), 13)):  # twelve slabs
         points = np.vstack([thin, _slab(vertices, ends, along, low, high)])
         try:
             hulls.append(_hull(points))

@@ -24,7 +24,6 @@ from armid_ros.motion import FloatArray
 import numpy as np
 import pinocchio as pin
 
-_EARTH = (0.0, 0.0, -9.81)
 #: Pattern of the text before the root element of an MJCF, and of the name of that element.
 _ROOT = re.compile(r'(?:\s|<\?(?>.*?\?>)|<!--(?>.*?-->))*+<mujoco[\s/>]', re.DOTALL)
 
@@ -283,7 +282,7 @@ class _Writer:
     def _not_read(self) -> None:
         """Add notes on elements that act in MuJoCo and do not exist in a URDF."""
         model, kinds = self.model, self.mujoco.mjtEq
-        if not np.allclose(model.opt.gravity, _EARTH, atol=0.01):
+        if not np.allclose(model.opt.gravity, (0.0, 0.0, -9.81), atol=0.01):
             gravity = ','.join(f'{value:g}' for value in model.opt.gravity)
             self.notes.append(f'gravity {gravity} of the file is not read: --gravity={gravity}')
         closed = sum(int(kind != kinds.mjEQ_JOINT) for kind in model.eq_type)

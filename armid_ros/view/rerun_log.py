@@ -37,17 +37,9 @@ from scipy.spatial.transform import Rotation
 TIMELINE = 'time'
 #: Address of the viewer; the start function of rerun would bind it to all interfaces.
 _HOST, _PORT = '127.0.0.1', 9876
-#: Timeout of the start of a viewer, and time between attempts to connect [s].
-_PATIENCE, _TRY_EVERY = 20.0, 0.1
-#: Colours of measured torque, predicted torque, residual, links and marked links.
-_MEASURED, _PREDICTED, _RESIDUAL = (140, 145, 150), (213, 94, 0), (0, 114, 178)
 _LINK, _MARKED = (175, 182, 190), (230, 60, 40)
 #: Times above this count from 1970, times below from the start of the recording [s].
 _SINCE_1970 = 1e8
-#: Radius of the bars that stand for an arm without shapes [m].
-_BAR = 0.02
-#: Poses per second that are drawn.
-_POSE_RATE = 30.0
 
 
 def rerun() -> ModuleType:
@@ -114,7 +106,7 @@ def open_stream(name: str, out: Path | None = None) -> Any:
 def _started_viewer() -> str:
     """Start a viewer on the local interface unless one is running; return its URL."""
     command = [sys.executable, '-P', '-m', 'rerun_cli', '--expect-data-soon']
-    deadline, viewer = time.monotonic() + _PATIENCE, None
+    deadline, viewer = time.monotonic() + 20.0, None
     while True:
         try:
             socket.create_connection((_HOST, _PORT), timeout=1.0).close()
@@ -127,7 +119,7 @@ def _started_viewer() -> str:
             viewer = subprocess.Popen(
                 [*command, '--bind', _HOST, '--port', str(_PORT)], start_new_session=True
             )
-        time.sleep(_TRY_EVERY)
+        time.sleep(0.1)
 
 
 def log_recording(
@@ -174,9 +166,9 @@ def log_recording(
                 column = rr.Scalars.columns(scalars=values[known, j])
                 stream.send_columns(entity.format(_part(joint)), [_times(at[known])], column)
         for entity, name, colour in (
-            ('torque/{}/measured', 'measured', _MEASURED),
-            ('torque/{}/predicted', 'predicted', _PREDICTED),
-            ('residual/{}', f'residual {joint}', _RESIDUAL),
+            ('torque/{}/measured', 'measured', (140, 145, 150)),
+            ('torque/{}/predicted', 'predicted', (213, 94, 0)),
+            ('residual/{}', f'residual {joint}', (0, 114, 178)),
         ):
             style = rr.SeriesLines(colors=colour, names=name)
             stream.log(entity.format(_part(joint)), style, static=True)
@@ -188,7 +180,7 @@ def log_recording(
 def poses(recording: Recording) -> tuple[FloatArray, FloatArray]:
     """Interpolate about thirty poses per second; return times, (K,) [s], and poses, (K, n)."""
     t = recording.t
-    count = max(2, int((t[-1] - t[0]) * _POSE_RATE) + 1)
+    count = max(2, int((t[-1] - t[0]) * 30.0) + 1)  # poses per second
     at = np.linspace(t[0], t[-1], min(count, len(t)))
     columns = []
     for column in recording.q.T:
@@ -232,7 +224,7 @@ def _log_bodies(stream: Any, robot: Robot, marked: Sequence[str]) -> list[str]:
         drawn += 1
     for joint, end in [] if drawn else sticks(robot.model):
         where, colour = place(joint)
-        bar = rr.LineStrips3D([[np.zeros(3), end]], radii=_BAR, colors=colour)
+        bar = rr.LineStrips3D([[np.zeros(3), end]], radii=0.02, colors=colour)
         stream.log(f'{where}/bar', bar, static=True)
     return [*all_in_one(absent), *notes]
 

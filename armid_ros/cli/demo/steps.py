@@ -30,11 +30,7 @@ ROBOT = 'humanoid_arm'
 SENSORS = Sensors(
     torque_noise=np.array([0.02, 0.02, 0.01, 0.01, 0.004, 0.004]), resolution=2.0 * np.pi / 2**18
 )
-#: A run with the hidden change: seconds of a period, and harmonics.
-_PERIOD, _HARMONICS = 8.0, 5
 _RUNS = ('after_1', 'after_2', 'unused')
-#: Number of values of the hidden effect that are printed.
-_SHOWN = 4
 
 
 def _facts() -> dict[str, Any]:
@@ -110,7 +106,7 @@ class HiddenChange:
             if value
         ]
         where = ', '.join(self.effect.joints) or 'the whole arm'
-        return f'{self.effect.name.replace("_", " ")} in {where} ({", ".join(shown[:_SHOWN])})'
+        return f'{self.effect.name.replace("_", " ")} in {where} ({", ".join(shown[:4])})'
 
     def found_by(self, diagnosis: Diagnosis) -> bool:
         """Return whether the first name is that of the effect, and its joint."""
@@ -178,7 +174,8 @@ def diagnose_hidden(
     changed = truth.with_effect(hidden.effect, hidden.values)
 
     def recorded(name: str) -> Recording:
-        drawn = random_feasible(known, limits, _PERIOD, _HARMONICS, rng, collision=bodies)
+        # a period of 8 s with 5 harmonics
+        drawn = random_feasible(known, limits, 8.0, 5, rng, collision=bodies)
         plant = SimulatedArm(changed, rng=rng, sensors=SENSORS)
         with progress(f'recording {name}') as tick:
             run_lockstep(

@@ -27,9 +27,6 @@ IntArray = npt.NDArray[np.intp]
 #: extra clearance of a design.
 _SHORTEST_INTERVAL = 1e-4
 
-#: Assumed travel of a prismatic joint without limits [m].
-_LONGEST_STROKE = 10.0
-
 
 @dataclass(frozen=True)
 class NearPairs:
@@ -307,7 +304,7 @@ def _levers(robot: Robot, joint: int, length: float) -> FloatArray:
     """Return the largest motion of any point of a body per unit of every joint, shape (n,)."""
     levers = np.zeros(robot.n_joints)
     stroke = np.where(robot.prismatic, np.maximum(np.abs(robot.lower), np.abs(robot.upper)), 0.0)
-    stroke = np.minimum(stroke, _LONGEST_STROKE)
+    stroke = np.minimum(stroke, 10.0)  # m; without limits
     while joint >= 0:
         levers[joint] = 1.0 if robot.prismatic[joint] else length
         length += float(np.linalg.norm(robot.geometry[joint].origin)) + float(stroke[joint])

@@ -23,8 +23,6 @@ KINDS: Mapping[str, tuple[str, ...]] = {
     'mesh': ('scale',),
     'plane': (),
 }
-#: Radius of the sphere that represents a link without a collision body [m].
-_POINT = 1e-4
 
 
 @dataclass(frozen=True)
@@ -156,7 +154,7 @@ def _add_points(geometry: pin.GeometryModel, robot: Robot) -> None:
     for joint, link in enumerate(robot.links, start=1):
         if joint not in seen:
             frame = model.getFrameId(link, pin.FrameType.BODY)
-            point = coal.Sphere(_POINT)
+            point = coal.Sphere(1e-4)  # radius [m]
             geometry.addGeometryObject(
                 pin.GeometryObject(f'{link}_frame', joint, frame, pin.SE3.Identity(), point)
             )

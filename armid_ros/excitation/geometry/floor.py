@@ -29,9 +29,6 @@ NO_FLOOR = 'none'
 #: A standing arm at zero reaches above its base plane at least this many times as far as below it.
 #: The wrist of a stretched small industrial arm hangs a third of its shoulder's height below.
 _ABOVE_TO_BELOW = 2.0
-#: Number of poses in which a link is tested for clearance to the floor.
-_POSES = 400
-_SEED = 0
 
 
 @dataclass(frozen=True)
@@ -134,8 +131,8 @@ def floor_obstacles(
     if floor.height is None:
         return ()
     robot = collision.robot
-    size = (_POSES, robot.n_joints)
-    q = np.random.default_rng(_SEED).uniform(*robot.position_range(), size)
+    size = (400, robot.n_joints)
+    q = np.random.default_rng(0).uniform(*robot.position_range(), size)
     highest: dict[str, FloatArray] = {}
     for link, lowest, _ in link_heights(collision, floor.up, q):
         highest[link] = np.minimum(highest.get(link, np.inf), lowest)

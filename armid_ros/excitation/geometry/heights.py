@@ -14,9 +14,6 @@ from armid_ros.robots import CollisionModel
 import coal
 import numpy as np
 
-#: A shape with a larger coordinate is unbounded, such as a half space [m].
-_ENDLESS = 1e6
-
 
 @dataclass(frozen=True)
 class LowestPoint:
@@ -127,7 +124,8 @@ def outline(shape: coal.CollisionGeometry) -> tuple[FloatArray, float]:
         return np.array([end, -end]), float(shape.radius)
     shape.computeLocalAABB()
     ends = np.array([shape.aabb_local.min_, shape.aabb_local.max_])
-    if not np.all(np.abs(ends) < _ENDLESS):
+    # [m]; an unbounded shape, such as a half space
+    if not np.all(np.abs(ends) < 1e6):
         return np.empty((0, 3)), 0.0
     return np.array(list(product(*ends.T))), 0.0
 

@@ -24,8 +24,6 @@ import numpy as np
 _STEP, _INTERVAL = 0.6, 0.1
 #: Number of poses drawn before a TrajectoryError is raised.
 _DRAWS = 800
-#: Number of trials to cut corners of a path.
-_CUTS = 60
 
 #: Function that returns whether the arm can hold poses of shape (N, n).
 Held = Callable[[FloatArray], bool]
@@ -163,7 +161,8 @@ class _Tree:
 def _shortened(path: list[FloatArray], free: _Free, rng: np.random.Generator) -> list[FloatArray]:
     """Cut corners at random, and remove poses that a clear straight line can skip."""
     path = _skipped(path, free)
-    for _ in range(_CUTS if len(path) > 2 else 0):
+    # trials to cut a corner
+    for _ in range(60 if len(path) > 2 else 0):
         i, j = np.sort(rng.integers(0, len(path) - 1, 2))
         if i == j:
             continue

@@ -26,10 +26,6 @@ import pinocchio as pin
 
 #: Names of the world frame if a description has no frame of that name.
 _WORLD = ('', 'world')
-#: Thinnest box around a mesh that is flat [m].
-_FLAT = 1e-4
-#: Kind of obstacle for each number of shape_msgs/SolidPrimitive; a cone becomes a cylinder.
-_PRIMITIVES = {1: 'box', 2: 'sphere', 3: 'cylinder', 4: 'cylinder'}
 #: Keys of a planning scene, of its world, and of a collision object.
 _SCENE = {'world', 'collision_objects', 'primitives'}
 
@@ -99,7 +95,10 @@ def _shapes(entry: Mapping[str, Any], robot: Robot | None) -> Iterator[_Shape]:
     """Yield the bodies of a collision object."""
     base = _frame(str(entry['header']['frame_id']), robot) * _pose(entry.get('pose'))
     for primitive, pose in zip(entry['primitives'], entry['primitive_poses'], strict=True):
-        kind = _PRIMITIVES.get(int(primitive['type']), '')
+        # numbers of shape_msgs/SolidPrimitive; a cone becomes a cylinder
+        kind = {1: 'box', 2: 'sphere', 3: 'cylinder', 4: 'cylinder'}.get(
+            int(primitive['type']), ''
+        )
         if not kind:
             raise TrajectoryError(
                 f'primitive {primitive["type"]} cannot be an obstacle; put a box around it'
@@ -111,7 +110,8 @@ def _shapes(entry: Mapping[str, Any], robot: Robot | None) -> Iterator[_Shape]:
     for mesh, pose in zip(entry.get('meshes', ()), entry.get('mesh_poses', ()), strict=True):
         points = np.array([[p['x'], p['y'], p['z']] for p in mesh['vertices']], dtype=float)
         low, high = points.min(axis=0), points.max(axis=0)
-        box = tuple(float(x) for x in np.maximum(high - low, _FLAT))
+        # a flat mesh gets a box of this thickness [m]
+        box = tuple(float(x) for x in np.maximum(high - low, 1e-4))
         yield 'box', box, base * _pose(pose) * pin.SE3(np.eye(3), (low + high) / 2.0)
     for plane, pose in zip(entry.get('planes', ()), entry.get('plane_poses', ()), strict=True):
         *normal, d = (float(value) for value in plane['coef'])  # a x + b y + c z + d = 0

@@ -33,9 +33,6 @@ _CLEARANCE_REACH = 0.6
 #: solver avoids several close approaches at once.
 _STRETCHES = 20
 
-#: Numbers of samples per sample of the settings: for position, velocity and acceleration, and for
-#: torque and clearance.
-_DENSE, _STATES = 5, 3
 
 #: Values of some constraints, and a function that computes their gradients.
 Part = tuple[FloatArray, Callable[[], FloatArray]]
@@ -76,8 +73,9 @@ class Constraints:
         self.reserve, self.sharpness = reserve, sharpness
         period, harmonics = problem.settings.period, problem.settings.harmonics
         samples = problem.settings.samples
-        dense: FloatArray = np.linspace(0.0, period, _DENSE * samples, endpoint=False)
-        states: FloatArray = np.linspace(0.0, period, _STATES * samples, endpoint=False)
+        # samples for position, velocity and acceleration, and for torque and clearance
+        dense: FloatArray = np.linspace(0.0, period, 5 * samples, endpoint=False)
+        states: FloatArray = np.linspace(0.0, period, 3 * samples, endpoint=False)
         self.dense = fourier_basis(dense, period, harmonics)
         self.t = np.unique(np.concatenate([states, more_times]))
         self.basis = fourier_basis(self.t, period, harmonics)

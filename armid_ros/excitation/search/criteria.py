@@ -30,9 +30,6 @@ CRITERIA = {
     'T': 'torque that a rival model cannot explain',
 }
 
-#: The largest and the smallest eigenvalue are not differentiable where two eigenvalues cross. A
-#: search uses a p-norm instead, which is larger by at most r^(1/p): 1.4 for 60 parameters.
-_NORM = 12.0
 
 #: Smallest eigenvalue of an identifiable direction, with parameters scaled to unit information.
 _BLIND = 1e-13
@@ -147,7 +144,10 @@ class Criterion:
             Derivative by the entries of the matrix.
 
         """
-        return self._evaluated(matrix, _NORM)
+        # The largest and the smallest eigenvalue are not differentiable where two eigenvalues
+        # cross. A search uses a p-norm instead, which is larger by at most r^(1/p): 1.4 for 60
+        # parameters.
+        return self._evaluated(matrix, 12.0)
 
     def _evaluated(self, matrix: FloatArray, norm: float) -> tuple[float, FloatArray]:
         wanted, nuisance = np.flatnonzero(self.wanted), np.flatnonzero(~self.wanted)

@@ -50,22 +50,6 @@ _BOX = 0.5
 #: Share of every limit that the solver keeps free, and clearance on top of the margin [m].
 _RESERVE, _SLACK = 0.002, 0.001
 
-#: Samples per harmonic of the clearance check after a round.
-_CHECK = 200
-
-#: Number of random poses, and distance beyond the margin [m]. The solver ignores pairs of bodies
-#: that stay further apart in all these poses; the proof of clearance checks all pairs.
-_POSES, _WATCHED = 1000, 0.01
-
-#: Number of joints up to which all candidates are drawn; larger arms get fewer candidates.
-_CANDIDATE_JOINTS = 10
-
-#: Factor on the amplitudes of a nearly feasible trajectory, and the number of reductions.
-_SHRINK, _SHRINKS = 0.99, 12
-
-#: Replacement of an infinite cost, because a line search needs a finite cost.
-_NO_COST = 1e3
-
 
 class _OutOfTime(Exception):
     """The time budget is used up."""
@@ -110,7 +94,8 @@ class Search:
         self.cost = np.inf
         self._watch, self._begun, self._steps = watch, time.process_time(), 0
         settings = problem.settings
-        share = min(1.0, _CANDIDATE_JOINTS / problem.arm.robot.n_joints)
+        # arms of more than ten joints get fewer candidates
+        share = min(1.0, 10 / problem.arm.robot.n_joints)
         self._candidates = max(math.ceil(share * settings.candidates), settings.starts)
         others = 2 * _ROUNDS * _ROUND * (settings.starts - 1)
         self._work = self._candidates + settings.iterations + others
@@ -179,8 +164,10 @@ class Search:
         if watched is not None:  # without pairs that stay apart in many poses
             limits = self.problem.limits
             lower, upper = position_range(limits.lower, limits.upper)
-            poses = self.rng.uniform(lower, upper, (_POSES, len(lower)))
-            watched = watched.watched(poses, self.problem.settings.clearance + _WATCHED)
+            # The solver ignores pairs of bodies that stay 1 cm beyond the margin in 1000 random
+            # poses; the proof of clearance checks all pairs.
+            poses = self.rng.uniform(lower, upper, (1000, len(lower)))
+            watched = watched.watched(poses, self.problem.settings.clearance + 0.01)
         branches = [_Branch(self, objective, watched, start) for start in starts]
         while branches:
             for branch in branches:
@@ -260,7 +247,7 @@ class _Branch:
 
         def finite_cost(z: FloatArray) -> float:
             value = cost(z.tobytes())[0]
-            return value if np.isfinite(value) else _NO_COST
+            return value if np.isfinite(value) else 1e3  # a line search needs a finite cost
 
         def counted(z: FloatArray) -> None:
             nonlocal count
@@ -293,7 +280,7 @@ def _faulty_times(
     problem: DesignProblem, clearance: ClearanceModel | None, trajectory: FourierTrajectory
 ) -> FloatArray:
     """Return the times of the worst torque or clearance faults between the samples."""
-    motion = trajectory.one_period(_CHECK * trajectory.harmonics)
+    motion = trajectory.one_period(200 * trajectory.harmonics)
     torque = np.abs(problem.arm.joint_torque(motion))
     excess = (torque / problem.limits.torque).max(axis=1) - 1.0
     if clearance is not None:
@@ -307,7 +294,7 @@ def _made_feasible(
     problem: DesignProblem, clearance: ClearanceModel | None, trajectory: FourierTrajectory
 ) -> FourierTrajectory | None:
     """Reduce the amplitudes of the joints at fault, or of all joints if the joint is unknown."""
-    for _ in range(_SHRINKS):
+    for _ in range(12):  # reductions of the amplitudes
         faults = trajectory_faults(
             problem.arm, problem.limits, trajectory, clearance, problem.settings.clearance
         )
@@ -315,6 +302,6 @@ def _made_feasible(
             return trajectory
         own = {v.joint for v in faults if isinstance(v, Violation) and v.limit != 'torque'}
         everywhere = len(own) < len(faults)
-        factor = [_SHRINK if everywhere or j in own else 1.0 for j in trajectory.joints]
+        factor = [0.99 if everywhere or j in own else 1.0 for j in trajectory.joints]
         trajectory = trajectory.scaled(np.array(factor))
     return None

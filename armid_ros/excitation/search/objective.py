@@ -27,9 +27,6 @@ _BLUR = 0.05
 #: Step of finite differences for a state of size 1.
 _STEP = 1e-7
 
-#: Number of joints that are varied at once; limits the memory of their columns.
-_TOGETHER = 8
-
 
 class Objective:
     """
@@ -101,7 +98,8 @@ class Objective:
         total = np.zeros((n, self.basis[0].shape[1]))
         state = np.array([motion.q, motion.dq, motion.ddq])
         for argument, basis in enumerate(self.basis):
-            for joints in np.array_split(np.arange(n), -(-n // _TOGETHER)):
+            # eight joints at once; limits the memory of their columns
+            for joints in np.array_split(np.arange(n), -(-n // 8)):
                 moved = np.tile(state, (1, len(joints), 1)).reshape(3, len(joints), count, n)
                 moved[argument, np.arange(len(joints)), :, joints] += _STEP
                 q, dq, ddq = moved.reshape(3, -1, n)

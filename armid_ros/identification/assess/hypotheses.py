@@ -29,14 +29,10 @@ import numpy as np
 
 #: Angles that the zero of a joint may be off by [degrees]: an encoder's, an axis', a drawing's.
 TURNS = (-135.0, -90.0, -45.0, 45.0, 90.0, 135.0, 180.0)
-#: Finer steps of these [degrees].
-_FINER = (-15.0, 15.0)
 #: Gravity of Jupiter [m/s^2]: no arm stands where there is more.
 _STRONGEST = 24.8
 #: A gravity vector is written as a known one from which it differs by less than this share.
 _KNOWN = 0.3
-#: Samples that gravity and the factor of all torques are estimated from.
-_ROWS = 600
 #: Correlation from which the factor of a joint is known: it leaves 15 % of the torque at most.
 _CLEAR = 0.989
 
@@ -131,7 +127,7 @@ def hypotheses(robot: Robot, motions: Sequence[Motion]) -> Iterator[Hypothesis]:
 
 def _of_all_torques(robot: Robot, motions: Sequence[Motion]) -> Iterator[Hypothesis]:
     """Yield the best-fitting gravity and common torque factor, if masses do not explain them."""
-    motion = thinned(motions, _ROWS)
+    motion = thinned(motions, 600)
     if motion is None:
         return
     described = inverse_dynamics(robot, motion)
@@ -312,7 +308,7 @@ def _zero_off(robot: Robot, joint: int, degrees: float) -> Hypothesis:
         f'{remedy}',
         lambda motion: replace(motion, q=motion.q + shift),
         (joint,),
-        nearby=lambda: [_zero_off(robot, joint, degrees + step) for step in _FINER],
+        nearby=lambda: [_zero_off(robot, joint, degrees + step) for step in (-15.0, 15.0)],
     )
 
 

@@ -48,8 +48,6 @@ _LENGTHS = (0.0003, 0.001, 0.003, 0.01)
 _LONGEST = 0.3
 #: Parts of a recording of which each tells a delay by itself: ten are nine degrees of freedom.
 _BLOCKS = 10
-#: Steps of Gauss and Newton, and the one that ends them [s].
-_STEPS, _SETTLED = 10, 1e-4
 
 
 class Delay(NamedTuple):
@@ -75,7 +73,7 @@ def late_torque(robot: Robot, recording: Recording, used: Conditioning) -> Delay
     """
     stretches = list(segments(recording, used))
     seconds, half = 0.0, np.inf
-    for _ in range(_STEPS):
+    for _ in range(10):  # Gauss-Newton steps
         moved = [shifted(motion, seconds) for motion in stretches]
         rows = [
             _rows(robot, motion, used)
@@ -87,7 +85,7 @@ def late_torque(robot: Robot, recording: Recording, used: Conditioning) -> Delay
             return None
         before, half = seconds, found.half_width
         seconds = float(np.clip(seconds + found.seconds, -_LONGEST, _LONGEST))
-        if abs(seconds - before) < _SETTLED:
+        if abs(seconds - before) < 1e-4:  # [s]
             break
     return Delay(seconds, half) if abs(seconds) > half else None
 

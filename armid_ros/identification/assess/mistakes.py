@@ -43,8 +43,6 @@ from armid_ros.recording import Recording
 from armid_ros.robots import Robot
 import numpy as np
 
-#: Samples of a recording that are looked at: twenty for every value of a link.
-_ROWS = 200
 #: Samples below which nothing can be asked.
 _FEWEST = 40
 
@@ -191,7 +189,8 @@ def _error(
     robot: Robot, slow: Sequence[Motion], one: Hypothesis, *, near: bool
 ) -> PredictionError | None:
     """Return the prediction error of a hypothesis; None if too few samples remain."""
-    motion = thinned([one.motion(motion) for motion in slow], _ROWS)
+    # twenty for every value of a link
+    motion = thinned([one.motion(motion) for motion in slow], 200)
     if motion is None or len(motion) < _FEWEST:
         return None
     return prediction_error(one.body(robot), motion, near=near)

@@ -25,8 +25,6 @@ import numpy as np
 _OWN = 4
 #: A joint below this share of its top speed may be held by its friction.
 _SLOW = 0.05
-#: Fits of what joints share: the first tells how much each leaves.
-_PASSES = 4
 
 
 @dataclass(frozen=True)
@@ -164,7 +162,8 @@ def common_values(motion: Motion, fixed: FloatArray, columns: FloatArray) -> Flo
     own = _own_columns(motion) * weight
     both = beside(own.transpose(1, 0, 2), both.transpose(1, 0, 2))
     values, size = np.empty(0), np.ones(len(both))
-    for _ in range(_PASSES):
+    # the first pass tells how much each fit leaves
+    for _ in range(4):
         stacked = (both / size[:, np.newaxis, np.newaxis]).reshape(-1, both.shape[2])
         values = np.asarray(np.linalg.lstsq(stacked[:, :-1], stacked[:, -1], rcond=None)[0])
         left = both[:, :, -1] - both[:, :, :-1] @ values

@@ -43,8 +43,6 @@ _WORSE = 0.05
 #: Natural frequency of the feedback [rad/s]: 8 Hz, as of arms. A softer one would leave a light
 #: joint to its friction, whose sign at a reversal no model has to the millisecond.
 _BANDWIDTH = 50.0
-#: Far enough for no joint to be at a limit [rad or m].
-_FAR = 1e4
 
 Progress = Callable[[float, str], None]
 
@@ -163,7 +161,8 @@ def forward_validation(
     feedback = LinearFeedback.of(nominal or arm, bandwidth=_BANDWIDTH, weighs=False)
     controller = _RecordedTorque(reference, feedback)
     along = arm.along(reference)
-    far, free = np.full(motion.n_joints, _FAR), np.full(motion.n_joints, np.inf)
+    # no joint gets to a limit this far away [rad or m]
+    far, free = np.full(motion.n_joints, 1e4), np.full(motion.n_joints, np.inf)
     robot = replace(along.robot, lower=-far, upper=far, velocity_limit=free, torque_limit=free)
     plant = Plant(replace(along, robot=robot), hard_stops=False)
     run = simulate(plant, reference, rng=np.random.default_rng(0), controller=controller)

@@ -38,8 +38,6 @@ import scipy.linalg
 
 #: A fit better than this share of the torque is taken as that good: there is always some noise.
 FINEST_FIT = 1e-4
-#: Linearisations of a fit among bodies, each with the search for the weight of the prior.
-_MOST_PASSES = 8
 #: A mass beyond so many times the described one is said.
 HEAVY = 3.0
 #: Blocks of the training data that are left out in turn to choose the weight of the prior.
@@ -132,7 +130,7 @@ def fit_to_bodies(
     fit, certificate = _bodies(arm, free, settings)
     if free.passes == 1:
         return fit, certificate
-    for passes in range(1, _MOST_PASSES):
+    for passes in range(1, 8):
         promised = tuple(part.torque(fit.values) for part in fit.problem)
         predicted = torques(fit.arm, recordings, used)
         fit = replace(fit, predicted=predicted, passes=free.passes + passes)

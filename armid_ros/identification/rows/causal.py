@@ -39,8 +39,6 @@ _SETTLED = 20.0
 _GAP = 1.5
 #: No arm has positions or torques beyond this [SI units]; their squares would drown all others.
 LARGEST = 1e6
-#: Intervals whose median is taken as the sampling period.
-_PERIOD_INTERVALS = 20
 
 
 def check_gap(samples: int) -> None:
@@ -312,7 +310,7 @@ class CausalFilter:
         """Add an interval; create the filter once there are enough."""
         if dt > 0.0:
             self._intervals.append(dt)
-        if len(self._intervals) < _PERIOD_INTERVALS:
+        if len(self._intervals) < 20:  # too few for a median
             return
         self.period = period = float(np.median(self._intervals))
         fastest = _FASTEST_POLE / period * _CUTOFF_OF_POLE / (2.0 * np.pi)

@@ -29,13 +29,11 @@ from armid_ros.recording.recording import GAP_PERIODS
 import numpy as np
 import numpy.typing as npt
 
-#: Periods of the cut-off after which a filter of order 4 has forgotten where it began: exp(-38).
-_FORGET_PERIODS = 16.0
-
 
 def _cuts(piece: Recording, used: Conditioning) -> tuple[int, int]:
     """Return the stamps that the next piece begins with, and where its own rows begin [ns]."""
-    periods = (EDGE_PERIODS + _FORGET_PERIODS) * used.rate_hz / used.cutoff_hz
+    # after 16 periods a filter of order 4 has forgotten where it began: exp(-38)
+    periods = (EDGE_PERIODS + 16.0) * used.rate_hz / used.cutoff_hz
     margin = int(np.ceil(periods)) + len(used.taps())
     longest = GAP_PERIODS * max(1.0 / used.rate_hz, piece.period)
     gaps = np.flatnonzero(np.diff(piece.t) > longest)

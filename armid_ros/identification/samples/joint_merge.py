@@ -13,12 +13,8 @@ from armid_ros.motion import FloatArray
 import numpy as np
 import numpy.typing as npt
 
-#: Samples of one sender that wait for those of the others.
-_WAITING = 1000
 #: Periods of a sender that its signals are interpolated across.
 _LONGEST = 10.0
-#: Weight of a new interval in the period of a sender.
-_NEW = 0.05
 
 Moment = tuple[float, FloatArray]
 
@@ -28,7 +24,7 @@ class _Part:
     """What one sender has sent: joints, and samples of shape (s, k) that are still needed."""
 
     joints: tuple[int, ...]
-    samples: deque[Moment] = field(default_factory=lambda: deque(maxlen=_WAITING))
+    samples: deque[Moment] = field(default_factory=lambda: deque(maxlen=1000))
     period: float = np.inf
 
     def take(self, t: float, values: FloatArray) -> None:
@@ -39,7 +35,7 @@ class _Part:
             if step < 0.0:
                 self.samples.clear()
             elif np.isfinite(self.period):
-                self.period += _NEW * (min(step, _LONGEST * self.period) - self.period)
+                self.period += 0.05 * (min(step, _LONGEST * self.period) - self.period)
             else:
                 self.period = step
         self.samples.append((t, values))

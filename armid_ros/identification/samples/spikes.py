@@ -55,8 +55,6 @@ FIRST = 20
 _NEARER = 0.5
 #: Periods without a sample after which one waits for the next, which may contradict its stamp.
 _LEAP = 1.5
-#: What is divided by is at least this.
-_TINY = 1e-300
 
 
 class SpikeGate:
@@ -368,7 +366,7 @@ class SpikeGate:
 
     def _off_by(self, missed: Missed, floor: FloatArray | float) -> FloatArray:
         """Return how far off its prediction a sample is, over the limit, shape (m,)."""
-        limit = np.maximum(self._limits(missed, floor), _TINY)
+        limit = np.maximum(self._limits(missed, floor), 1e-300)
         return np.asarray(np.abs(missed.error) / limit)
 
     def _surely_in_line(self, missed: Missed, floor: FloatArray | float) -> bool:

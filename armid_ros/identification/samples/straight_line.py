@@ -16,9 +16,6 @@ from scipy import special
 
 #: Correlation of successive errors of a straight line in white noise.
 _NOISE_CORRELATION = -2.0 / 3.0
-#: How hard an arm may accelerate over what 95 % of the time it does at most, times the standard
-#: deviations that those are of a normal variable.
-_HARDER = 2.0 * 1.96
 #: Usual errors beyond which one says nothing of the correlation.
 _CLIPPED = 3.0
 #: Less is no jump by a full turn [rad].
@@ -104,7 +101,9 @@ class Usual:
     @cached_property
     def _shares(self) -> tuple[FloatArray, FloatArray]:
         """Return standard deviations of what is noise, most of what is not, over `size`, (m,)."""
-        return np.sqrt(self.noisy), np.sqrt(1.0 - self.noisy) * _HARDER
+        # how hard an arm may accelerate over what 95 % of the time it does at most, times the
+        # standard deviations that those are of a normal variable
+        return np.sqrt(self.noisy), np.sqrt(1.0 - self.noisy) * (2.0 * 1.96)
 
     def limits(self, quantile: float, noise: Factor, bend: Factor) -> FloatArray:
         """

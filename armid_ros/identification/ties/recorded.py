@@ -36,8 +36,6 @@ import numpy as np
 _ORDER = 6
 #: The filter's pass band is so much wider than the motion's that it leaves the motion as it is.
 _MARGIN = 2.0
-#: Length of the pieces that spectra are averaged over [s].
-_SPECTRUM = 4.0
 #: The motion ends where its spectrum is less than this many times the noise.
 _ABOVE = 3.0
 
@@ -215,7 +213,8 @@ def band_of_motion(
 
 def _crossing(recording: Recording, rate: float) -> float:
     """Return where the motion of the fastest angle sinks into its noise [Hz]."""
-    frequency, power = mean_spectrum([recording.q], rate, 'linear', _SPECTRUM)
+    # spectra of pieces of 4 s are averaged
+    frequency, power = mean_spectrum([recording.q], rate, 'linear', 4.0)
     above = power > _ABOVE * 2.0 * _white(recording.q) ** 2 / rate
     above[-1] = False
     return max(float(frequency[2:][np.argmin(column)]) for column in above[2:].T)

@@ -27,8 +27,6 @@ from armid_ros.motion import FloatArray, read_only
 import numpy as np
 from scipy.optimize import minimize
 
-#: Steps of the quasi-Newton method.
-_ITERATIONS = 300
 #: Gradients below this share of a standard deviation end the iteration.
 _CONVERGED = 1e-3
 #: Share of the residuals' mean square that is noise of torques where none was measured.
@@ -162,7 +160,7 @@ def _most_likely(
         np.zeros(len(theta)),
         jac=True,
         method='BFGS',
-        options={'gtol': _CONVERGED, 'maxiter': _ITERATIONS},
+        options={'gtol': _CONVERGED, 'maxiter': 300},
     )
     if not np.max(np.abs(found.jac)) < 10.0 * _CONVERGED:
         raise IdentificationError(

@@ -29,20 +29,10 @@ from armid_ros.simulation import Sensors, simulate
 import numpy as np
 import scipy.optimize
 
-#: Masses of the description relative to the arm.
-_BELIEVED = 0.8
 #: Sampling rate of the recording [Hz].
 _RATE = 100.0
-#: Period of the trajectory [s], two of which are run: slow, as in the paper.
-_PERIOD = 60.0
 #: Number of held-out trajectories for the errors, and their period [s].
 HELD_OUT, _TEST = 5, 60.0
-#: Encoder of 18 bits.
-_RESOLUTION = 2 * np.pi / 2**18
-#: Number of random poses in the search for the largest torques.
-_POSES = 5000
-#: Number of the best poses of each joint that start a local search.
-_STARTS = 3
 
 
 @dataclass(frozen=True, eq=False)
@@ -169,8 +159,9 @@ def reproduce(
     nominal = load_robot('humanoid_arm', gravity='moon')
     progress(0.0, 'designing the trajectory')
     collision = collision_model(nominal)
+    # slow, as in the paper
     settings = DesignSettings(
-        period=_PERIOD,
+        period=60.0,
         speed='slow',
         starts=2,
         candidates=20,
@@ -202,11 +193,11 @@ def attainable(robot: Robot, rng: np.random.Generator) -> FloatArray:
     def torque(q: FloatArray) -> FloatArray:
         return inverse_dynamics(robot, Motion.of_states(robot.joints, q, 0.0, 0.0))
 
-    poses = rng.uniform(-np.pi, np.pi, (_POSES, n))
+    poses = rng.uniform(-np.pi, np.pi, (5000, n))
     sizes = np.abs(torque(poses))
     best = np.zeros(n)
     for joint in range(n):
-        for pose in poses[np.argsort(sizes[:, joint])[-_STARTS:]]:
+        for pose in poses[np.argsort(sizes[:, joint])[-3:]]:
             found = scipy.optimize.minimize(
                 lambda q, joint=joint: -abs(float(torque(q)[0, joint])), pose
             )
@@ -222,7 +213,8 @@ def _repeat(
     recording, moved = _recorded(truth, table, run, rng)
     assert recording.tau is not None
     believed = load_robot('humanoid_arm', gravity=table.gravity)
-    believed = believed.with_inertias(_BELIEVED * believed.rigid_parameters)
+    # masses of the description relative to the arm
+    believed = believed.with_inertias(0.8 * believed.rigid_parameters)
     torques = [truth.torque(motion) for motion in tests]
     methods = []
     for slow in (True, False):
@@ -254,8 +246,13 @@ def _recorded(
     truth: ArmModel, table: PaperTable, run: Excitation, rng: np.random.Generator
 ) -> tuple[Recording, Motion]:
     """Simulate the arm; return the recording with the noise of the table, and the motion."""
+    # encoder of 18 bits
     made = simulate(
-        truth, run.motion(1000.0), rng=rng, sensors=Sensors(resolution=_RESOLUTION), rate=_RATE
+        truth,
+        run.motion(1000.0),
+        rng=rng,
+        sensors=Sensors(resolution=2 * np.pi / 2**18),
+        rate=_RATE,
     )
     if table.uniform:
         noise = 2.0 * table.noise * rng.uniform(-1.0, 1.0, made.tau.shape)

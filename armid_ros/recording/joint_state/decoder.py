@@ -16,8 +16,6 @@ import numpy.typing as npt
 
 # With more layouts in one block, messages are decoded one by one.
 _LAYOUTS_A_BLOCK = 32
-#: Largest memory reserved at once for a quantity; counts in damaged files are unreliable [bytes].
-_MOST_ROOM = 1 << 30
 
 
 @dataclass(frozen=True)
@@ -198,7 +196,9 @@ class _Room:
 
     def take(self, name: str, count: int, joints: int) -> FloatArray:
         """Return an array of shape (count, joints), adjacent to the previous one if possible."""
-        expected = min(self._expected, _MOST_ROOM // (8 * joints))
+        # largest memory reserved at once for a quantity; counts in damaged files are unreliable
+        # [bytes]
+        expected = min(self._expected, (1 << 30) // (8 * joints))
         free = self._free.get((name, joints))
         if free is None:
             free = np.empty((expected, joints))

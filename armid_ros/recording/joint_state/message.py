@@ -11,8 +11,6 @@ from armid_ros.motion import FloatArray
 from armid_ros.recording.joint_state.layout import JointStateLayout
 import numpy as np
 
-#: Number of cached layouts, one per sender on a topic.
-_REMEMBERED = 8
 _NOTHING = np.empty(0)
 
 
@@ -59,7 +57,7 @@ class JointStateMessages:
             if fields.fit(data):
                 return fields.read(data)
         fields = _Fields(JointStateLayout.of(data))
-        self._known = [fields, *self._known[: _REMEMBERED - 1]]
+        self._known = [fields, *self._known[:7]]  # one layout per sender on a topic
         return fields.read(data)
 
 

@@ -43,9 +43,6 @@ MESSAGE = np.dtype(
 MESSAGE_HEADER = MESSAGE.itemsize - RECORD_HEADER
 _CHUNK_HEADER = struct.Struct('<QQQII')
 _FOOTER = struct.Struct('<QQI')
-_INDEX_ENTRY = 16
-# Opcodes from here to _PRIVATE are not defined; higher ones are for private use.
-_UNKNOWN, _PRIVATE = 0x10, 0x80
 _DEFINITIONS = (Opcode.SCHEMA, Opcode.CHANNEL, Opcode.STATISTICS)
 
 
@@ -177,7 +174,8 @@ def _walk(found: FileMap) -> tuple[list[tuple[int, int, int]], int | None, int |
     while position + RECORD_HEADER <= size:
         opcode, length = struct.unpack_from('<BQ', data, position)
         begin, end = position + RECORD_HEADER, position + RECORD_HEADER + length
-        if not opcode or _UNKNOWN <= opcode < _PRIVATE:
+        # opcodes that are not defined; higher ones are for private use
+        if not opcode or 0x10 <= opcode < 0x80:
             break
         if end > size:
             if opcode == Opcode.CHUNK:
@@ -250,7 +248,7 @@ def _add_index(found: FileMap, begin: int, end: int) -> None:
         return
     channel, count = struct.unpack_from('<HI', found.data, begin)
     if end - begin == 6 + count:
-        found.chunks[-1].indexes[channel] = (begin + 6, count // _INDEX_ENTRY)
+        found.chunks[-1].indexes[channel] = (begin + 6, count // 16)  # bytes of an entry
 
 
 def _add_loose(found: FileMap, begin: int, end: int) -> None:

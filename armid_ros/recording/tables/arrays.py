@@ -19,8 +19,6 @@ import numpy.typing as npt
 
 #: First bytes of an HDF5 file; in MATLAB files they follow 512 other bytes.
 HDF5 = b'\x89HDF'
-#: Upper bound of the compression ratio of deflate.
-_MOST_PACKED = 1100
 
 Arrays = dict[str, npt.NDArray[np.generic]]
 
@@ -84,7 +82,8 @@ def read_hdf5(path: Path) -> Table:
 
 def _require_packed(what: str, size: int, stored: int) -> None:
     """Raise a RecordingError if the stated size of an array is impossible or over the limit."""
-    if size > _MOST_PACKED * stored:
+    # upper bound of the compression ratio of deflate
+    if size > 1100 * stored:
         raise RecordingError(f'{what} states {size} bytes, but the file has {stored}')
     DEFAULT.require(size, what)
 

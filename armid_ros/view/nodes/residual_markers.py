@@ -25,14 +25,10 @@ from sensor_msgs.msg import JointState
 from std_msgs.msg import ColorRGBA
 from visualization_msgs.msg import Marker, MarkerArray
 
-#: Markers that are not drawn anew vanish after this [s].
-_LIFETIME = 2
 #: Averaging time of the mean squares of residuals and torques [s].
 _WINDOW = 2.0
 #: Sizes as shares of the reach of the arm: arrow at the full scale, its shaft, letters.
 _ARROW, _SHAFT, _LETTER = 0.25, 0.015, 0.05
-#: Letters in a line of the diagnosis.
-_LINE = 60
 
 
 class ResidualMarkersNode(ListeningNode):
@@ -95,13 +91,13 @@ class ResidualMarkersNode(ListeningNode):
         stamp = self.get_clock().now().to_msg()
         markers = [*self._of_joints(self.robot)]
         if self._told:
-            lines = '\n'.join(textwrap.wrap(self._told, _LINE))
+            lines = '\n'.join(textwrap.wrap(self._told, 60))
             above = np.array([0.0, 0.0, 1.3 * self._reach])
             markers.append(self._text('diagnosis', lines, above, 1.4))
         for number, marker in enumerate(markers):
             marker.header.frame_id, marker.header.stamp = self._frame, stamp
             marker.id = number
-            marker.lifetime = Duration(sec=_LIFETIME)
+            marker.lifetime = Duration(sec=2)  # s; markers that are not drawn anew vanish
         self._markers.publish(MarkerArray(markers=markers))
 
     def _of_joints(self, robot: Robot) -> Sequence[Marker]:

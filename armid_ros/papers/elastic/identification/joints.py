@@ -33,8 +33,6 @@ from scipy.signal import butter, sosfiltfilt
 
 #: Shortest stretch without a pause that is used [s].
 _SHORTEST = 2.0
-#: Number of poses over which the inertia of a joint is averaged.
-_POSES = 200
 #: Least R^2 of the twist for an estimate of stiffness.
 _EXPLAINED = 0.9
 
@@ -113,7 +111,7 @@ def fit_springs(
     loads = [inverse_dynamics(robot, link) for _, link in stretches]
     q = np.concatenate([link.q for _, link in stretches])
     data = robot.model.createData()
-    chosen = q[np.linspace(0, len(q) - 1, _POSES).astype(int)]
+    chosen = q[np.linspace(0, len(q) - 1, 200).astype(int)]
     diagonals = [np.diag(pin.crba(robot.model, data, pose)).copy() for pose in chosen]
     inertia = np.asarray(np.mean(diagonals, axis=0))
     found = []

@@ -26,7 +26,6 @@ from scipy.optimize import least_squares
 ComplexArray = npt.NDArray[np.complex128]
 #: Frequency range of the comparison of responses [Hz], and number of logarithmic points.
 BAND = (1.0, 60.0)
-_POINTS = 120
 
 
 def ideal_response(
@@ -91,7 +90,7 @@ def fit_joints(
         If a response has no antiresonance and resonance in the band.
 
     """
-    frequency = np.geomspace(*BAND, _POINTS)
+    frequency = np.geomspace(*BAND, 120)
     s = np.asarray(2j * np.pi * frequency, dtype=np.complex128)
     values = []
     for joint, system in zip(joints, systems, strict=True):

@@ -23,9 +23,6 @@ from armid_ros.simulation.motor_control import VelocityLoop
 import numpy as np
 import numpy.typing as npt
 
-#: Quantiles of the poses that represent all poses.
-_SHARES = np.linspace(0.02, 0.98, 25)
-
 
 @dataclass(frozen=True, eq=False)
 class MeasuredJoint:
@@ -156,7 +153,10 @@ def identify_two_inertia(
         begin = untuned if start is None else replace(start, coulomb=untuned.coulomb)
         tuning = tune(steps, begin, loop)
     tell(1.0, 'done')
-    angles = np.quantile(np.concatenate([run.link.q[:, 1] for run in runs]), _SHARES)
+    # poses that represent all poses
+    angles = np.quantile(
+        np.concatenate([run.link.q[:, 1] for run in runs]), np.linspace(0.02, 0.98, 25)
+    )
     return TwoInertiaIdentification(
         joints, rigid, measured, systems, untuned, gain, len(runs), angles, tuning
     )

@@ -35,15 +35,12 @@ from scipy.optimize import least_squares
 
 #: Places of dl and dm of both joints in the parameter vector, and of the Coulomb torques after it.
 _LINK, _MOTOR = (7, 8), (9, 10)
-_COULOMB = (SIZE, SIZE + 1)
 #: Prior standard deviations of the friction ratio and of the Coulomb torques (logarithms).
 _SPLIT, _BELIEVED = np.log(2.0), 0.1
 #: Standard deviations of the initial vibration: twist of the springs [rad] and velocity of the
 #: links [rad/s], some tenths of a second after a step of 1 rad/s.
 _RINGING = np.array([1e-5, 1e-5, 1e-3, 1e-3])
 _ROUNDS = 3
-#: Residuals are correlated over at most this fraction (1 / n) of an experiment.
-_LASTING = 10
 
 
 @dataclass(frozen=True, eq=False)
@@ -86,7 +83,7 @@ def _prior() -> FloatArray:
     rows = np.zeros((4, SIZE + 2))
     for row, (link, motor) in enumerate(zip(_LINK, _MOTOR, strict=True)):
         rows[row, link], rows[row, motor] = 1.0 / _SPLIT, -1.0 / _SPLIT
-    rows[[2, 3], list(_COULOMB)] = 1.0 / _BELIEVED
+    rows[[2, 3], [SIZE, SIZE + 1]] = 1.0 / _BELIEVED
     return rows
 
 
@@ -153,7 +150,7 @@ def tune(
     # residuals are correlated: sum the scores over the channels of a sample, without the prior
     white_noise, data = _covariance(rows), len(left) - len(prior)
     scores = (rows * left[:, np.newaxis])[:data].reshape(*measured.shape, -1).sum(axis=2)
-    lags = max(1, count // _LASTING)
+    lags = max(1, count // 10)  # residuals are correlated over at most a tenth of an experiment
     middle = prior.T @ prior + score_products(list(scores.transpose(1, 0, 2)), lags)
     relative = widened(white_noise, white_noise, middle)[:SIZE, :SIZE]
     return Tuning(

@@ -18,13 +18,6 @@ STEP_POSES = ((0.0, 0.0), (0.0, np.pi / 2), (0.0, np.pi / 4), (0.0, 3 * np.pi / 
 STEPS = ((1.0, 0.0), (0.0, 1.0), (1.0, -1.0), (1.0, 1.0))
 #: Step of experiments [s], and the band of their multisine [Hz].
 _DT, _BAND = 1e-3, (2.0, 100.0)
-#: Time of an experiment with a step [s].
-_STEP = 0.5
-#: Amplitude of the slow velocity [rad/s], and its lowest and highest frequency [Hz]; each
-#: experiment has its own.
-_SPEED, _SLOW = 0.8, (0.3, 1.0)
-#: Largest initial position of the links [rad].
-_REACH = np.pi / 3.0
 
 
 def resonance_experiments(
@@ -58,12 +51,13 @@ def resonance_experiments(
     t = _DT * np.arange(steps)[:, np.newaxis]
     experiments = []
     for _ in range(count):
-        rate = 2.0 * np.pi * rng.uniform(*_SLOW, len(size))
+        # 0.3 to 1 Hz and 0.8 rad/s; each experiment has its own frequency
+        rate = 2.0 * np.pi * rng.uniform(0.3, 1.0, len(size))
         phase = 2.0 * np.pi * rng.random(len(size))
         ramp = np.minimum(t / 0.2, 1.0)
-        velocity = ramp * _SPEED * np.cos(rate * t + phase)
+        velocity = ramp * 0.8 * np.cos(rate * t + phase)
         torque = ramp * multisine(steps, _DT, _BAND, size, rng)
-        pose = _REACH * rng.uniform(-1.0, 1.0, len(size))
+        pose = np.pi / 3.0 * rng.uniform(-1.0, 1.0, len(size))
         experiments.append(Experiment(pose, velocity, torque))
     return experiments
 
@@ -80,7 +74,7 @@ def step_experiments(
         Initial position [rad] and reference velocity [rad/s] of each experiment.
 
     """
-    steps = round(_STEP / _DT)
+    steps = round(0.5 / _DT)  # an experiment of 0.5 s
     return [
         Experiment(np.asarray(q, dtype=float), np.tile(np.asarray(v, dtype=float), (steps, 1)))
         for q, v in zip(poses, velocities, strict=True)

@@ -19,7 +19,6 @@ import numpy.typing as npt
 
 #: Frequency ranges of the plots and of the comparison of responses [Hz].
 _SHOWN, _COMPARED = (2.0, 100.0), (5.0, 60.0)
-_POINTS = 300
 _ROLES: tuple[Role, Role] = ('residual', 'predicted')
 _SIZE = 'size [dB re rad/(N m s)]'
 
@@ -56,7 +55,7 @@ def _joint(
     measured, joint, parameters = result.measured[k], result.joints[k], result.parameters
     seen = (measured.frequency >= _SHOWN[0]) & (measured.frequency <= _SHOWN[1])
     own = measured.frequency[seen]
-    frequency = np.unique(np.concatenate([np.geomspace(*_SHOWN, _POINTS), own]))
+    frequency = np.unique(np.concatenate([np.geomspace(*_SHOWN, 300), own]))
     decoupled = ideal_response(parameters, k, frequency)[:, 0, 0]
     subspaces = result.systems[k].response(frequency)[:, 0, 0]
     coupled = coupled_response(parameters, result.angles, frequency)[:, k]

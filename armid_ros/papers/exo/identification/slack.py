@@ -18,10 +18,6 @@ from armid_ros.identification.ties.problem import InteractionProblem
 from armid_ros.identification.ties.stiffness import identify_interaction, Interaction
 import numpy as np
 
-#: Slacks to try [m]; a strap with more slack is not worn.
-_TRIED = (0.0, 0.001, 0.002, 0.004, 0.006)
-#: Successive step sizes on either side of the best slack [m].
-_REFINED = (5e-4, 2e-4)
 #: Decrease of the misfit, in standard deviations of its noise, above which slack is significant.
 _LEAST_GAIN = 25.0
 
@@ -70,9 +66,11 @@ def find_slack(problem: Callable[[float], InteractionProblem]) -> Slack:
             fits[slack] = identify_interaction(problem(slack))
         return fits[slack].misfit
 
-    best = min(_TRIED, key=misfit)
+    # [m]; a strap with more slack is not worn
+    best = min((0.0, 0.001, 0.002, 0.004, 0.006), key=misfit)
     bend = np.inf
-    for step in _REFINED:
+    # steps on either side of the best slack [m]
+    for step in (5e-4, 2e-4):
         centre = max(best, step)
         lower, middle, upper = (misfit(centre + k * step) for k in (-1, 0, 1))
         bend = (lower - 2.0 * middle + upper) / step**2

@@ -29,8 +29,6 @@ from diagnostic_msgs.msg import DiagnosticStatus
 import numpy as np
 from sensor_msgs.msg import JointState
 
-#: Queue length of subscriptions during an estimate: several seconds at 1 kHz.
-_DEPTH = 10_000
 _TOPICS = ('exo/joint_states', 'human/joint_states')
 #: Fields that are used of the messages of each machine.
 _FIELDS = (('position', 'effort'), ('position',))
@@ -94,9 +92,10 @@ class InteractionIdentifierNode(ArmidNode):
         self.freshness = tuple(Freshness(topic) for topic in _TOPICS)
         self._stopped = False
         self._epoch: int | None = None
+        # several seconds at 1 kHz
         self.topics = tuple(
             MatchedSubscription(
-                self, JointState, topic, lambda message, k=k: self._take(k, message), depth=_DEPTH
+                self, JointState, topic, lambda message, k=k: self._take(k, message), depth=10_000
             )
             for k, topic in enumerate(_TOPICS)
         )

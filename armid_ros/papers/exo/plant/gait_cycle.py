@@ -37,8 +37,6 @@ import pinocchio as pin
 
 #: Integration steps per cycle, and number of cycles before the returned one.
 _STEPS, _SETTLING = 2400, 2
-#: A foot bears weight if its force exceeds this share of the machine's weight.
-_BEARS = 0.01
 _PLANE = np.array([0, 2])
 
 
@@ -86,7 +84,8 @@ class GaitCycle:
     def support(self, *, other: bool = False) -> npt.NDArray[np.int_]:
         """Return the number of feet that bear weight, shape (N,)."""
         robot = self.pair.other if other else self.pair.robot
-        return np.asarray(np.sum(self.feet(other=other)[:, :, 1] > _BEARS * weight(robot), axis=1))
+        # a foot that bears less does not count
+        return np.asarray(np.sum(self.feet(other=other)[:, :, 1] > 0.01 * weight(robot), axis=1))
 
 
 @dataclass(frozen=True)

@@ -17,10 +17,6 @@ from scipy.interpolate import CubicHermiteSpline, CubicSpline
 
 #: Number of samples per block of the simulation.
 _BLOCK = 50
-#: Runge-Kutta steps in a block: 5 ms at 1 kHz, half the time between two torque samples.
-_INTEGRATED = 10
-#: If a driven joint deviates more than this from the gait, the pair has fallen [rad].
-_FALLEN = np.radians(60.0)
 
 
 @dataclass(frozen=True, eq=False)
@@ -121,7 +117,7 @@ class SimulatedPair:
     @property
     def fallen(self) -> bool:
         """Whether a driven joint deviates so far from the gait that the pair has fallen."""
-        return bool(self.deviation > _FALLEN)
+        return bool(self.deviation > np.radians(60.0))  # of a driven joint from the gait
 
     def advance(self) -> PairSample:
         """Simulate one sample, and return the sensor readings."""
@@ -155,7 +151,8 @@ class SimulatedPair:
 
     def _driven(self, own: Motion) -> Motion:
         """Integrate the driven joints with their torques over the block."""
-        coarse = np.linspace(own.t[0], own.t[-1], 2 * _INTEGRATED + 1)
+        # Runge-Kutta steps in a block: 5 ms at 1 kHz, half the time between two torque samples
+        coarse = np.linspace(own.t[0], own.t[-1], 2 * 10 + 1)
         prescribed, other = stepping(self.pair, self._gait, coarse)
         if self._state is not None:
             q, dq = np.array(prescribed.q), np.array(prescribed.dq)

@@ -22,7 +22,6 @@ from armid_ros.report.provenance import Provenance
 from armid_ros.report.sections.frame import Origin, VerdictSection
 import numpy as np
 
-_POSES = 6
 #: Intervals wider than this share of the value are called poor.
 _NARROW = 0.1
 
@@ -57,7 +56,7 @@ def exo_report(
         Files, versions, settings, seed.
 
     """
-    samples = np.linspace(0, len(abscissa) - 1, _POSES).astype(int).tolist()
+    samples = np.linspace(0, len(abscissa) - 1, 6).astype(int).tolist()
     captions = [f'{abscissa[k]:.2f}' for k in samples]
     sections: list[Section] = [
         verdict(found, walked),

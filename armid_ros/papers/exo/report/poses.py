@@ -18,8 +18,6 @@ import numpy as np
 
 _MARGIN = 0.06
 _SCALE = 260.0
-#: Magnification of the extension of springs, which would be invisible otherwise.
-_MAGNIFIED = 4.0
 
 
 @dataclass(frozen=True)
@@ -72,9 +70,10 @@ def draw_poses(
         )
         for group in lines
     ]
+    # magnified four times, to be visible
     ties = [
         tuple(
-            np.round(strip.place(flat(SIDE, np.stack([start, start + _MAGNIFIED * way])), pose), 1)
+            np.round(strip.place(flat(SIDE, np.stack([start, start + 4.0 * way])), pose), 1)
             .ravel()
             .tolist()
         )

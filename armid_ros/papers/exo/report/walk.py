@@ -21,15 +21,9 @@ from armid_ros.robots import Robot
 from markupsafe import Markup
 import numpy as np
 
-_FRAMES = 72
 #: Size of the drawing [px], scale [px/m], and positions of hips and ground [px].
 _WIDTH, _HEIGHT, _SCALE, _HIPS, _GROUND = 640, 420, 260.0, 300.0, 385.0
-#: Magnification of the extension of springs, and scale of forces [px/N].
-_MAGNIFIED, _FORCE = 4.0, 0.16
-_TRUNK = 0.55
 _ABSCISSA = 'gait cycle of the right leg'
-#: Largest error of a joint in the source [deg].
-SOURCE = {'hip': 1.5, 'knee': 2.5}
 
 
 @dataclass(frozen=True)
@@ -58,7 +52,8 @@ class Driven:
     @property
     def source(self) -> float:
         """Largest error of the joint position in the source [deg]."""
-        return SOURCE[self.joint.split('_')[-1]]
+        # largest error of the source [deg]
+        return {'hip': 1.5, 'knee': 2.5}[self.joint.split('_')[-1]]
 
 
 @dataclass(frozen=True)
@@ -136,14 +131,14 @@ class Walk(Section):
     def data(self) -> Markup:
         """Return the data of the animation script: a list of frames, each with lines."""
         cycle = self.cycle
-        rows = np.linspace(0, len(cycle.phase) - 1, _FRAMES + 1).astype(int)[:-1]
+        rows = np.linspace(0, len(cycle.phase) - 1, 73).astype(int)[:-1]
         wearer = cycle.motions.other.select(rows)
         ahead = wearer.q[:, floating(cycle.pair.other)[0]]
         machines = [cycle.motions.own.select(rows)]
         machines += [d.right.motion.select(rows // 2) for d in self.driven]
         geometry = cycle.pair.geometry(machines[0], wearer)
         start = geometry.other_position[..., [0, 2]]
-        end = start + _MAGNIFIED * geometry.way[..., [0, 2]]
+        end = start + 4.0 * geometry.way[..., [0, 2]]  # magnified four times, to be visible
         return script_json(
             {
                 'phase': np.round(cycle.phase[rows], 3).tolist(),
@@ -173,7 +168,7 @@ class Walk(Section):
             foot = np.where(up.sum(axis=2) > 0.0, middle, place[:, :, 0])
             total = force.sum(axis=2)
             drawn = _placed(foot, ahead)
-            tip = drawn + _FORCE * total * np.array([1.0, -1.0])
+            tip = drawn + 0.16 * total * np.array([1.0, -1.0])
             arrows.append(np.stack([drawn, tip], axis=2))
         return _whole(np.concatenate(arrows, axis=1))
 
@@ -262,7 +257,7 @@ def _bodies(robot: Robot, motion: Motion, ahead: FloatArray) -> list[Any]:
     """Return lines of trunk, right and left leg in every frame, in px."""
     leg = leg_length(robot)
     lean = robot.joints[floating(robot)[2]]
-    joints, points = [lean, lean], [[0.0, 0.0, _TRUNK], [0.0, 0.0, 0.0]]
+    joints, points = [lean, lean], [[0.0, 0.0, 0.55], [0.0, 0.0, 0.0]]
     for side in SIDES:
         names = [robot.joints[k] for k in columns(robot, side)]
         joints += [*names, names[-1]]
