@@ -253,7 +253,9 @@ class DiagnosisResult(ShownModel):
             result = self.with_residual(seed)
         result = result._with_simulations(progress)
         progress(1.0, 'next run')
-        return result._with_next_run(seed)
+        run, why = _tried('next run', lambda: next_run(self.core, np.random.default_rng(seed)))
+        extras = replace(result.extras, next_run=run, no_run='; '.join(why))
+        return replace(result, extras=extras)
 
     def _with_simulations(self, progress: Progress) -> DiagnosisResult:
         """Simulate the held-out recordings, with the model as it was and as it is patched."""
@@ -272,11 +274,6 @@ class DiagnosisResult(ShownModel):
         extras = replace(self.extras, forward=forward)
         return replace(self, extras=extras)._with_notes(*left_out, *why)
 
-    def _with_next_run(self, seed: int) -> DiagnosisResult:
-        """Plan a motion that separates names in doubt."""
-        run, why = _tried('next run', lambda: next_run(self.core, np.random.default_rng(seed)))
-        return replace(self, extras=replace(self.extras, next_run=run, no_run='; '.join(why)))
-
     def _with_notes(self, *notes: str) -> DiagnosisResult:
         return replace(self, extras=replace(self.extras, notes=(*self.extras.notes, *notes)))
 
@@ -285,12 +282,15 @@ class DiagnosisResult(ShownModel):
         rows: list[Sequence[str]] = [*named_rows(self.core.findings, certain=True)]
         if not every and len(rows) > _ROWS + 1:
             rows[_ROWS:] = [(f'... and {len(rows) - _ROWS} more: --all, or report.html',)]
+        lines = self.extras.sentences(self.core)
+        if self.baseline:
+            lines.insert(0, f'baseline: {", ".join(one.source for one in self.baseline)}')
         return Summary(
             pretty(self.core.summary),
             self.core.verdict.replace('_', ' '),
             ('effect', 'parameter', 'joint', 'value, 95 %') if rows else (),
             rows,
-            [*self._baseline(), *self.extras.sentences(self.core)],
+            lines,
             list(map(pretty, self.extras.steps(self.core, model))),
             self._then(),
         )
@@ -303,10 +303,6 @@ class DiagnosisResult(ShownModel):
             return 'diagnose'
         anew = self.core.doubt or self.core.harmful or self.verdict in OPEN
         return 'identify' if anew else 'simulate'
-
-    def _baseline(self) -> list[str]:
-        sources = ', '.join(recording.source for recording in self.baseline)
-        return [f'baseline: {sources}'] if sources else []
 
 
 @spelled

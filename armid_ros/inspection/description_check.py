@@ -20,11 +20,11 @@ from armid_ros.arm import ArmModel
 from armid_ros.effects.load import described_spread
 from armid_ros.identification import Identification, Score
 from armid_ros.inspection.inspect import notes_on, Remark, worst_first
-from armid_ros.model import LINK_PARAMETERS
 from armid_ros.motion import FloatArray
 from armid_ros.robots import NO_MASS, Robot
 from armid_ros.robots.description import MOVABLE, parse_xml
 from armid_ros.robots.geometry import all_in_one, collision_geometry
+from armid_ros.robots.robot import PARAMETERS_PER_BODY
 import numpy as np
 
 #: Least and largest plausible density of a link within its shape [kg/m^3]: foam and steel.
@@ -204,7 +204,7 @@ def check_links(found: Identification, described: ArmModel, grade: str, fault: s
         Grade of the identification, and the fault of the recording if there is one.
 
     """
-    robot, size = described.robot, len(LINK_PARAMETERS)
+    robot, size = described.robot, PARAMETERS_PER_BODY
     rigid = size * robot.n_joints
     difference = found.estimate.values - found.base.values(described.theta)
     factor = np.linalg.cholesky(found.estimate.covariance)
@@ -273,7 +273,7 @@ def _errors(found: Identification, described: ArmModel) -> tuple[float, float]:
 
 def _selected(rows: FloatArray, spread: FloatArray, total: float) -> list[int]:
     """Return the wrong links by forward selection, without a link that became redundant."""
-    every = range(len(spread) // len(LINK_PARAMETERS))
+    every = range(len(spread) // PARAMETERS_PER_BODY)
     wrong: list[int] = []
     rest = total
     while len(wrong) < min(_MOST, len(every)) and rest > _REMAINS * len(rows):
@@ -293,7 +293,7 @@ def _fit(
     rows: FloatArray, spread: FloatArray, links: Sequence[int]
 ) -> tuple[FloatArray, FloatArray, float]:
     """Return change, covariance and remaining chi-squared of links that may be wrong."""
-    size = len(LINK_PARAMETERS)
+    size = PARAMETERS_PER_BODY
     own = [size * k + i for k in links for i in range(size)]
     columns, target = rows[:, own] * spread[own], rows[:, -1]
     inverse = np.linalg.inv(columns.T @ columns + np.eye(len(own)))

@@ -106,8 +106,12 @@ def tiled(
     around = [(begin, int(offsets[0])), (int(ends[-1]), end)]
     between = zip(ends[gaps].tolist(), offsets[gaps + 1].tolist(), strict=True)
     for start, stop in (*around, *between):
-        if start > stop or (start < stop and not _are_definitions(data, start, stop)):
+        if start > stop:
             return None
+        if start < stop:  # only schemas and channels may lie between messages
+            messages, _, position = walk(data, start, stop)
+            if position != stop or len(messages):
+                return None
     return rows
 
 
@@ -151,9 +155,3 @@ def walk(
             break
         position = stop
     return np.array(offsets, np.int64), definitions, position
-
-
-def _are_definitions(data: bytes | mmap.mmap, begin: int, end: int) -> bool:
-    """Return whether schemas and channels fill a range."""
-    offsets, _, position = walk(data, begin, end)
-    return position == end and not len(offsets)
