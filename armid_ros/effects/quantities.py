@@ -32,10 +32,6 @@ _MIXED_UNITS = {
     '': ('1/m', 'm'),
 }
 
-#: Largest ratio of a quantity to its typical size in arms of 1 to 10 kg, if the arm is not
-#: heavier.
-_BEYOND_TYPICAL = 10.0
-_TYPICAL_MASS = 10.0
 #: Ratio of half width to value above which a confidence interval is uninformative.
 _SCALE_KNOWN = 3.0
 #: Number of standard deviations of a significant difference.
@@ -86,8 +82,9 @@ class Quantity:
             size = min(size, drive if drive > 0.0 else np.inf)
         if self.typical is None:
             return size
-        heavier = max(float(robot.rigid_parameters[::10].sum()) / _TYPICAL_MASS, 1.0)
-        return min(size, _BEYOND_TYPICAL * heavier * self.typical[1])
+        # ten times a typical size, which is that of arms of up to 10 kg, or of a heavier arm more
+        heavier = max(float(robot.rigid_parameters[::10].sum()) / 10.0, 1.0)
+        return min(size, 10.0 * heavier * self.typical[1])
 
 
 @dataclass(frozen=True)

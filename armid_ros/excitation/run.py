@@ -19,8 +19,6 @@ import numpy.typing as npt
 _TURN = 2.0 * np.pi
 #: Number of samples of the period at which range and torque are checked.
 _SAMPLES = 400
-#: Relative tolerance for equal torques, as a share of the largest torque.
-_SAME = 1e-6
 
 
 @dataclass(frozen=True)
@@ -175,6 +173,7 @@ def unwound(
         return excitation
     moved = replace(trajectory, q0=trajectory.q0 + _TURN * turns)
     before, after = (arm.joint_torque(path.one_period(_SAMPLES)) for path in (trajectory, moved))
-    if np.abs(after - before).max() > _SAME * np.abs(before).max():
+    # equal up to rounding
+    if np.abs(after - before).max() > 1e-6 * np.abs(before).max():
         return excitation
     return replace(excitation, trajectory=moved)

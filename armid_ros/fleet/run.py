@@ -28,8 +28,6 @@ from armid_ros.motion import FloatArray
 from distributed import as_completed, Client, Future, KilledWorker
 import numpy as np
 
-#: Number of times that an arm is repeated if its workers ended because of other tasks.
-_HIT = 3
 #: Number of times that Dask repeats a task if its store failed.
 RETRIES = 3
 #: Largest size [bytes] and number of bags of one task. A task then takes about a second, so that
@@ -352,7 +350,7 @@ class _Run:
             arm.arm,
             tuple(groups),
             (*arm.refused, *failed),
-            arm.hit + (hit and arm.hit < _HIT),
+            arm.hit + (hit and arm.hit < 3),  # at most three times
         )
         if left.groups and left != arm:
             self._waiting.appendleft(left)

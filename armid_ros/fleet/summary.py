@@ -20,9 +20,6 @@ from armid_ros.identification.rows.streaming import streamed
 from armid_ros.recording import Recording
 import numpy as np
 
-#: Memory for rows of the bags of an arm until the fit [bytes]; other rows are read again.
-KEPT_BYTES = 48_000_000
-
 
 @dataclass(frozen=True, eq=False)
 class BagSummary:
@@ -99,7 +96,8 @@ def prepare(bag: BagFile, job: Job, bags_of_arm: int = 1) -> BagSummary | Refuse
     path = bag.url
     try:
         with fetched(bag.url) as path:
-            return _prepared(bag, path, job, KEPT_BYTES // max(1, bags_of_arm))
+            # bytes of rows in memory until the fit; others are read again
+            return _prepared(bag, path, job, 48_000_000 // max(1, bags_of_arm))
     except ArmidError as error:
         # the message names the URL of the bag, not the path of its copy
         return Refused(bag, str(error).replace(path, bag.url))

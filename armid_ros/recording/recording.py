@@ -26,8 +26,6 @@ _LABELS = {
     'dq': 'velocity [rad/s or m/s]',
     'tau': 'torque [N m or N]',
 }
-#: Fewest samples that two recordings must have in common.
-_LEAST = 4
 
 #: A stretch without samples is a gap when it is longer than this many sampling periods.
 GAP_PERIODS = 5.0
@@ -417,7 +415,7 @@ def recorded_together(
     steps = np.diff(other.t)
     after = np.clip(np.searchsorted(other.t, t), 1, len(steps))
     inside &= steps[after - 1] <= GAP_PERIODS * other.period
-    if np.count_nonzero(inside) < _LEAST:
+    if np.count_nonzero(inside) < 4:
         raise RecordingError(
             f'{recording.source}: {recording.topic} and {other.topic} have no time in common; '
             'record them together'

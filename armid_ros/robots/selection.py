@@ -16,8 +16,6 @@ MAX_DRIVEN = 150
 GRIPPER_WORDS = ('finger', 'gripper', 'jaw')
 #: Number of joints that a note names.
 _NAMED = 8
-#: A branch of fewer joints, such as a head or a trunk, is not an arm.
-SHORTEST_ARM = 3
 
 
 @dataclass(frozen=True)
@@ -98,7 +96,8 @@ def _arms(description: Description, joints: Sequence[str]) -> list[list[str]]:
         beyond = {j: {k for k in kept if j in carriers[k]} for j in kept}
         tips = {j for j in kept if not beyond[j]}
         limbs = {tip: [j for j in kept if (beyond[j] | {j}) & tips == {tip}] for tip in tips}
-        short = {j for limb in limbs.values() if len(limb) < SHORTEST_ARM for j in limb}
+        # a shorter branch, such as a head or a trunk, is not an arm
+        short = {j for limb in limbs.values() if len(limb) < 3 for j in limb}
         if not short:
             arms = [sorted(limb, key=lambda j: len(carriers[j])) for limb in limbs.values()]
             return sorted(arms, key=lambda arm: joints.index(arm[0]))

@@ -38,8 +38,6 @@ TIMELINE = 'time'
 #: Address of the viewer; the start function of rerun would bind it to all interfaces.
 _HOST, _PORT = '127.0.0.1', 9876
 _LINK, _MARKED = (175, 182, 190), (230, 60, 40)
-#: Times above this count from 1970, times below from the start of the recording [s].
-_SINCE_1970 = 1e8
 
 
 def rerun() -> ModuleType:
@@ -282,5 +280,6 @@ def _part(name: str) -> str:
 
 def _times(t: FloatArray) -> Any:
     """Return the time column: dates if times count from 1970, else durations."""
-    kind = 'timestamp' if t[0] > _SINCE_1970 else 'duration'
+    # times above this count from 1970, times below from the start of the recording
+    kind = 'timestamp' if t[0] > 1e8 else 'duration'
     return rerun().TimeColumn(TIMELINE, **{kind: t})

@@ -23,10 +23,6 @@ import pinocchio as pin
 
 IntArray = npt.NDArray[np.intp]
 
-#: Shortest interval of the proof of clearance [s]; in this time a body moves by less than the
-#: extra clearance of a design.
-_SHORTEST_INTERVAL = 1e-4
-
 
 @dataclass(frozen=True)
 class NearPairs:
@@ -255,7 +251,9 @@ class ClearanceModel:
                 )
             ends = distance[slot]
             bound = 0.5 * (ends[: len(left)] + ends[len(left) :] - travel)
-            open_ = (bound < margin) & (duration > _SHORTEST_INTERVAL)
+            # shortest interval of the proof of clearance [s]; in this time a body moves by less
+            # than the extra clearance of a design
+            open_ = (bound < margin) & (duration > 1e-4)
             middle = 0.5 * (left + right)[open_]
             left, right, pair = (
                 np.concatenate([left[open_], middle]),

@@ -47,9 +47,6 @@ _ROUNDS = 2
 #: Half width of the box of a round, in units of the coefficients' scale.
 _BOX = 0.5
 
-#: Share of every limit that the solver keeps free, and clearance on top of the margin [m].
-_RESERVE, _SLACK = 0.002, 0.001
-
 
 class _OutOfTime(Exception):
     """The time budget is used up."""
@@ -209,11 +206,12 @@ class _Branch:
             return
         problem, clearance = self.search.problem, self.search.clearance
         settings = problem.settings
+        # the solver keeps 0.2 % of every limit free, and 1 mm on top of the margin
         constraints = Constraints(
             problem,
             self.watched,
-            margin=settings.clearance + _SLACK,
-            reserve=_RESERVE,
+            margin=settings.clearance + 0.001,
+            reserve=0.002,
             sharpness=self.sharpness,
             more_times=self.times,
         )

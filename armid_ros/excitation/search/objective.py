@@ -21,9 +21,6 @@ from armid_ros.model import regressor
 from armid_ros.motion import FloatArray, Motion
 import numpy as np
 
-#: Share of a joint's velocity limit below which the direction of motion is smoothed.
-_BLUR = 0.05
-
 #: Step of finite differences for a state of size 1.
 _STEP = 1e-7
 
@@ -46,7 +43,8 @@ class Objective:
         self.t: FloatArray = np.linspace(0.0, settings.period, settings.samples, endpoint=False)
         self.basis = fourier_basis(self.t, settings.period, settings.harmonics)
         velocity = problem.limits.velocity
-        self.width = _BLUR * np.where(np.isfinite(velocity), velocity, 1.0)
+        # the direction of motion is smoothed below 5 % of the velocity limit
+        self.width = 0.05 * np.where(np.isfinite(velocity), velocity, 1.0)
         past = marked(problem.arm, lambda effect: not effect.instantaneous)
         # indices of the standard parameters among the columns; columns of the past are last
         self._order = np.argsort(np.argsort(past, kind='stable'))

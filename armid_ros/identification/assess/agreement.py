@@ -14,8 +14,6 @@ import scipy.stats
 
 #: Standard deviations to either side of what is known.
 WIDTH = 2.0
-#: Share of all experiments in which a right estimate is within the range.
-_COVERED = 0.95
 #: Independent values that a covariance is as if estimated from: it follows the spectrum of the
 #: residual in the band of the motion, of which a run of 20 s shows little. In 23 simulations of
 #: the demo the distance of 56 parameters had mean 56 and deviation 17, which this makes; a
@@ -59,7 +57,7 @@ class Agreement:
         """
         scaled = (estimate.values - truth) / estimate.std
         correlation = estimate.covariance / np.outer(estimate.std, estimate.std)
-        count, tail = len(scaled), 0.5 * (1.0 - _COVERED)
+        count, tail = len(scaled), 0.5 * (1.0 - 0.95)  # 95 % range
         lower, upper = count * scipy.stats.f.ppf((tail, 1.0 - tail), count, freedom)
         distance = float(scaled @ np.linalg.solve(correlation, scaled))
         within = int(np.sum(np.abs(scaled) < WIDTH))

@@ -29,8 +29,6 @@ import numpy as np
 
 #: Angles that the zero of a joint may be off by [degrees]: an encoder's, an axis', a drawing's.
 TURNS = (-135.0, -90.0, -45.0, 45.0, 90.0, 135.0, 180.0)
-#: Gravity of Jupiter [m/s^2]: no arm stands where there is more.
-_STRONGEST = 24.8
 #: A gravity vector is written as a known one from which it differs by less than this share.
 _KNOWN = 0.3
 #: Correlation from which the factor of a joint is known: it leaves 15 % of the torque at most.
@@ -205,7 +203,8 @@ def other_gravity(robot: Robot, vector: FloatArray) -> Hypothesis | None:
     far = LIMITS.gravity_change * max(size, 1.0) < np.linalg.norm(vector - told)
     turned = np.linalg.norm(vector / max(length, 1e-9) - told / max(size, 1e-9))
     weighs = length / size if size > 0.0 else np.inf
-    if not (far and length < _STRONGEST):
+    # gravity of Jupiter [m/s^2]: no arm stands where there is more
+    if not (far and length < 24.8):
         return None
     if turned <= LIMITS.gravity_change and not _beyond_masses(weighs):
         return None

@@ -62,9 +62,6 @@ _RATIOS = {
     _DEGREE: 'are in rad/s while positions are in degrees',
     -1.0: 'have the opposite sign of what the positions do',
 }
-#: Places of its range at which a joint that moves is compared: weight and inertia may be the same
-#: at both ends, as those of a link that swings as far to either side.
-_PLACES = 7
 
 
 @dataclass(frozen=True)
@@ -354,7 +351,9 @@ def held_elsewhere(
         if not (moves or joint.carries):
             continue  # a part of the body that carries it, in whatever position
         # the largest change of the described torque between places, as a share
-        places = [*np.linspace(lowest, highest, _PLACES if moves else 1), joint.position]
+        # places of its range at which a joint that moves is compared: weight and inertia may be
+        # the same at both ends, as those of a link that swings as far to either side
+        places = [*np.linspace(lowest, highest, 7 if moves else 1), joint.position]
         robots = [described_at(robot, {joint.name: place}) for place in places]
         described = [np.concatenate([inverse_dynamics(r, m) for m in motions]) for r in robots]
         changes = [np.linalg.norm(a - b, axis=0) for a, b in combinations(described, 2)]

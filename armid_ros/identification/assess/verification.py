@@ -34,9 +34,6 @@ import numpy as np
 #: Motion that is simulated, shared by the held-out recordings, which takes a tenth of that; and at
 #: most this much of one recording [s].
 _SIMULATED, _LONGEST = 60.0, 30.0
-#: Samples that tell the bias of encoder noise well enough, all simulations together; and fewest
-#: and most simulations.
-_ENOUGH, _REPEATS = 300_000, (2, 6)
 #: A joint is worse where its error grows by this share, and by this share of the largest error of
 #: joints of its kind; reversals of friction vary by less from one model to the next.
 _WORSE = 0.05
@@ -287,13 +284,14 @@ def verify(
     """
     left_out = []
     noise = None
-    repeats = _ENOUGH // max(1, sum(len(recording) for recording in recordings))
+    # enough samples to tell the bias of encoder noise, all simulations together
+    repeats = 300_000 // max(1, sum(len(recording) for recording in recordings))
     try:
         noise = check_noise(
             result,
             recordings,
             rng=rng,
-            repeats=int(np.clip(repeats, *_REPEATS)),
+            repeats=int(np.clip(repeats, 2, 6)),
             progress=lambda share: progress(share, 'testing for encoder noise'),
         )
     except (ArmidError, np.linalg.LinAlgError) as error:

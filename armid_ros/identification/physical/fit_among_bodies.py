@@ -46,12 +46,6 @@ BLOCKS = 5
 WEIGHTS = tuple(float(w) for w in 10.0 ** np.arange(-7.0, 0.5))
 #: The heaviest weight is taken whose held-out error is within this share of the least one.
 TOLERANCE = 1e-3
-#: A mass within this share of its range, in logarithms, is at its bound.
-_AT_MASS = 1e-3
-#: Smallest radius of gyration of a prior [m], for descriptions that give points for links.
-SMALLEST_RADIUS = 0.005
-#: Radius of gyration of a prior for a link of which the description says nothing [m].
-UNKNOWN_RADIUS = 0.05
 
 
 @dataclass(frozen=True)
@@ -184,7 +178,8 @@ def _bodies(
     values = base.values(theta)
     described = prior[: rigid.size].reshape(-1, PER_LINK)
     off = np.abs(np.log(rigid[:, 0] / described[:, 0]))
-    off = off > (1.0 - _AT_MASS) * np.log(settings.mass_range or np.inf)
+    # at the bound, up to rounding
+    off = off > (1.0 - 1e-3) * np.log(settings.mass_range or np.inf)
     certificate = PhysicalCertificate(
         links=links,
         shares=np.array(
@@ -270,7 +265,8 @@ def bodily_prior(arm: ArmModel) -> tuple[FloatArray, tuple[str, ...]]:
         matrix = pseudo_inertia(theta[part])
         mass = matrix[3, 3]
         if mass <= 1e-6 * typical:
-            ball = np.diag([UNKNOWN_RADIUS**2] * 3 + [1.0]) * typical
+            # radius of gyration [m] of a link of which the description says nothing
+            ball = np.diag([0.05**2] * 3 + [1.0]) * typical
             theta[part] = link_parameters(ball)
             notes.append(
                 f"link '{link}': the description has no mass; a ball of {typical:.3g} kg is the "
@@ -280,7 +276,8 @@ def bodily_prior(arm: ArmModel) -> tuple[FloatArray, tuple[str, ...]]:
         center = matrix[:3, 3] / mass
         second = matrix[:3, :3] - mass * np.outer(center, center)
         values, axes = np.linalg.eigh(second)
-        floor = mass * SMALLEST_RADIUS**2
+        # smallest radius of gyration [m], for descriptions that give points for links
+        floor = mass * 0.005**2
         if values[0] < 1e-3 * floor or values[0] < 1e-4 * values[2]:
             least = max(floor, 1e-2 * values[2])
             second = (axes * np.maximum(values, least)) @ axes.T

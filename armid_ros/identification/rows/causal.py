@@ -33,8 +33,6 @@ MOTION_FILTER_RATIO = 4.0
 #: Rows of the regressor are taken at this many times the cut-off frequency of F: fast enough for
 #: the steps of sign(dq) in them, and the aliases of what G lets through fold onto nothing.
 ROW_RATE_RATIO = 40.0
-#: Time constants until the start of G at rest is forgotten, to 1e-6.
-_SETTLED = 20.0
 #: Periods between two samples beyond which some are missing.
 _GAP = 1.5
 #: No arm has positions or torques beyond this [SI units]; their squares would drown all others.
@@ -279,7 +277,8 @@ class CausalFilter:
         for value in (*missing, signal):
             stages = self._lag.update(dt / (len(missing) + 1), value)
         self._recent.append((t, signal))
-        if t - self._start < _SETTLED / self._lag.pole:
+        # time constants until the start of G at rest is forgotten, to 1e-6
+        if t - self._start < 20.0 / self._lag.pole:
             return None
         n = self._n_joints
         outputs = np.dot(self._outputs, stages)

@@ -13,10 +13,6 @@ _SAME = 0.02
 #: A crawl that agrees goes hardly once as far in a lag. Of 108 recordings of 17 arms 30 % more or
 #: less changes none.
 _FARTHER = 3.0
-#: The shortest period that is looked for [s].
-_SHORTEST = 1.5
-#: Positions are compared over this share of a period.
-_STRETCH = 0.8
 #: In a stretch that tells, positions vary by this share of what they vary by in all.
 _MOVING = 0.3
 
@@ -44,7 +40,7 @@ def find_period(motion: Motion) -> tuple[int, slice] | None:
     speed = change.max(axis=1)
     moving = speed > 0.05 * speed.max()
     allowed = _SAME + change  # the lag is only known to a sample yet
-    shortest = int(_SHORTEST * rate / stride)
+    shortest = int(1.5 * rate / stride)  # the shortest period is 1.5 s
     best: tuple[int, int, int] | None = None
     for lag in range(shortest, int(0.7 * len(q))):
         same = np.all(np.abs(q[lag:] - q[:-lag]) < allowed[:-lag], axis=1)
@@ -84,7 +80,7 @@ def least_change(q: FloatArray, lag: int) -> float:
         Samples.
 
     """
-    width = min(int(_STRETCH * lag), len(q) - lag)
+    width = min(int(0.8 * lag), len(q) - lag)  # positions are compared over this share of a period
     change = np.mean((q[lag:] - q[:-lag]) ** 2, axis=1) / 2.0
     first, second = (_window_means(values[: len(change)], width) for values in (q, q**2))
     spread = np.mean(second - first**2, axis=1)

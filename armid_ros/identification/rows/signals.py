@@ -45,15 +45,11 @@ EDGE_PERIODS = 4.0
 #: Periods of the cut-off that a stretch has to have beside what the decimation takes of it: those
 #: at both ends, and two that stay.
 _CUTOFF_PERIODS = 2.0 * EDGE_PERIODS + 2.0
-#: Samples per period of the cut-off that describe a smooth function of the filtered positions.
-SMOOTH_SAMPLES = 5.0
 #: No drive tells its torque to more than this share of it, which is 13 bits; what a simulation
 #: without noise leaves of a motion that is differentiated is less.
 TORQUE_RESOLUTION = 1e-4
 #: Half length of the decimation filter in output samples; its edges are cut off.
 _HALF_TAPS = 4
-#: Share of their rate up to which rows keep what is there, where the decimation filter ends.
-_KEPT = 0.4
 #: Second derivatives of torques, fourth of positions, are taken below this many bands of the
 #: motion: between two and five, elasticity is found all the same; at ten there is but noise.
 _CURVATURE_BANDS = 2.0
@@ -117,7 +113,8 @@ class Conditioning:
     @property
     def kept_hz(self) -> float:
         """Frequency up to which rows keep what is there [Hz]."""
-        return _KEPT * self.rate_hz / self.decimation
+        # the decimation filter ends at this share of the rate of the rows
+        return 0.4 * self.rate_hz / self.decimation
 
     def taps(self) -> FloatArray:
         """Return the symmetric decimation filter; a single 1 where nothing is decimated."""
@@ -140,7 +137,9 @@ class Conditioning:
         period of the cut-off are enough for the decimation filter to see what it passes.
 
         """
-        widest = self.rate_hz / (SMOOTH_SAMPLES * self.cutoff_hz)
+        # five samples per period of the cut-off describe a smooth function of the filtered
+        # positions
+        widest = self.rate_hz / (5.0 * self.cutoff_hz)
         divisors = [d for d in range(1, self.decimation + 1) if self.decimation % d == 0]
         return max(d for d in divisors if d <= max(1.0, widest))
 

@@ -14,9 +14,6 @@ from mcap.opcode import Opcode
 import numpy as np
 import numpy.typing as npt
 
-# Chunks are gathered into blocks of about this size. Small blocks are slow in array code, and
-# large blocks exceed the processor cache.
-_BLOCK_BYTES = 1 << 20
 BLOCK_MESSAGES = 4096
 
 
@@ -41,7 +38,8 @@ class Gathered:
         else:
             self._offsets.append(offsets)
         self._count += len(offsets)
-        if self._size > _BLOCK_BYTES or (not own and self._count > BLOCK_MESSAGES):
+        # small blocks are slow in array code, and large blocks exceed the processor cache
+        if self._size > (1 << 20) or (not own and self._count > BLOCK_MESSAGES):
             yield from self.flush()
 
     def flush(self) -> Iterator[MessageBlock]:

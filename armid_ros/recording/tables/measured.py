@@ -17,11 +17,6 @@ from armid_ros.recording.series import assemble, MAX_NOT_FINITE
 from armid_ros.recording.tables.plan import TablePlan
 import numpy as np
 
-#: Times later than this are counted from 1970 [s].
-_EPOCH = 1e8
-#: No stamp is later: nanoseconds beyond the year 2255 do not fit into 64 bits [s].
-_LATEST = 9e9
-
 
 def measured(plan: TablePlan) -> Recording:
     """
@@ -86,7 +81,8 @@ def _times(plan: TablePlan) -> tuple[FloatArray, int]:
         assert plan.rate_hz is not None
         return np.arange(len(plan.table)) / plan.rate_hz, 10**9
     scale = TIME_UNITS[plan.time_unit]
-    values = np.where(np.abs(plan.time.values * scale) < _LATEST, plan.time.values, np.nan)
+    # no stamp is later: nanoseconds beyond the year 2255 do not fit into 64 bits
+    values = np.where(np.abs(plan.time.values * scale) < 9e9, plan.time.values, np.nan)
     stamped = np.flatnonzero(np.isfinite(values) & (values != 0.0))  # noqa: RUF069 - as it is written
     if len(stamped) and np.count_nonzero(values[: stamped[0]] == 0.0) > 1:  # noqa: RUF069 - as it is written
         values[: stamped[0]] = np.nan  # simulated time is zero before the first /clock
@@ -94,7 +90,7 @@ def _times(plan: TablePlan) -> tuple[FloatArray, int]:
     if not len(there):
         raise RecordingError(f'{plan.table.source}: column {plan.time.name} has no time in it')
     origin = float(there[0])
-    epoch = origin * scale > _EPOCH
+    epoch = origin * scale > 1e8  # later times are counted from 1970
     # Differences first: counted from 1970, nanoseconds do not fit into a float.
     return (values - origin) * scale, int(origin * scale * 1e9) if epoch else 10**9
 

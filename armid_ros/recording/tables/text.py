@@ -23,8 +23,6 @@ _EMPTY = ('', 'nan', 'na', 'n/a', 'null', 'none', '-')
 _LIST = re.compile(r'[\[(]([^\[\]()]*)[\])]\s*\)?$')
 _COMMAS = re.compile(r'[,;\s]+')
 _DECIMAL_COMMA = re.compile(r'[-+]?\d+,\d+([eE][-+]?\d+)?')
-#: Share of numbers below which a column counts as one of words.
-_NUMERIC = 0.5
 
 
 def read_text(path: Path) -> Table:
@@ -188,7 +186,8 @@ def _numbers(
                 values[k, j] = _number(cell, separator)
             except ValueError:
                 said.setdefault(j, {})[k] = cell
-    numeric = np.isfinite(values).mean(axis=0) >= _NUMERIC
+    # a column with fewer numbers is one of words
+    numeric = np.isfinite(values).mean(axis=0) >= 0.5
     words: dict[str, Sequence[str]] = {}
     for j, of in said.items():
         if numeric[j]:

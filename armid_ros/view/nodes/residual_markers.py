@@ -25,8 +25,6 @@ from sensor_msgs.msg import JointState
 from std_msgs.msg import ColorRGBA
 from visualization_msgs.msg import Marker, MarkerArray
 
-#: Averaging time of the mean squares of residuals and torques [s].
-_WINDOW = 2.0
 #: Sizes as shares of the reach of the arm: arrow at the full scale, its shaft, letters.
 _ARROW, _SHAFT, _LETTER = 0.25, 0.015, 0.05
 
@@ -171,7 +169,8 @@ class ResidualMarkersNode(ListeningNode):
     def _averaged(self, what: str, t: float, before: FloatArray, values: FloatArray) -> FloatArray:
         """Update a mean square with a sample; the first sample starts the average."""
         step, self._seen[what] = t - self._seen[what], t
-        share = 1.0 if not before.any() else float(np.clip(step / _WINDOW, 0.0, 1.0))
+        # averages over 2 s
+        share = 1.0 if not before.any() else float(np.clip(step / 2.0, 0.0, 1.0))
         return np.asarray(before + share * (values**2 - before))
 
 
