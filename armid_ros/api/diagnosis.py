@@ -63,8 +63,6 @@ if TYPE_CHECKING:
     import pandas
 
 _Made = TypeVar('_Made')
-#: Rows that a command prints without --all.
-_ROWS = 6
 
 
 @dataclass(frozen=True, repr=False, eq=False)
@@ -280,8 +278,9 @@ class DiagnosisResult(ShownModel):
     def summary(self, model: str = MODEL, every: bool = True) -> Summary:
         """Return the verdict, values that are not zero, notes, and steps with a model's path."""
         rows: list[Sequence[str]] = [*named_rows(self.core.findings, certain=True)]
-        if not every and len(rows) > _ROWS + 1:
-            rows[_ROWS:] = [(f'... and {len(rows) - _ROWS} more: --all, or report.html',)]
+        most = 6  # rows without --all
+        if not every and len(rows) > most + 1:
+            rows[most:] = [(f'... and {len(rows) - most} more: --all, or report.html',)]
         lines = self.extras.sentences(self.core)
         if self.baseline:
             lines.insert(0, f'baseline: {", ".join(one.source for one in self.baseline)}')

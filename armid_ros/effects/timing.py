@@ -18,9 +18,6 @@ import numpy as np
 from scipy.signal import butter, lfilter, sosfiltfilt
 from scipy.sparse import csr_array
 
-#: Factor between two lags whose difference is the derivative.
-_MORE = 1.0001
-
 
 @dataclass(frozen=True)
 class LateReading(TorqueReading):
@@ -133,10 +130,11 @@ class TorqueLag(LateReading):
     def sensitivity(self, values: FloatArray, motion: Motion, tau: FloatArray) -> FloatArray:
         """Return dreading/dT [N m/s], which is -dtau/dt for a zero lag, (N, n, P)."""
         rates = -rate_of_change(motion.t, tau)
+        more = 1.0001  # factor between two lags whose difference is the derivative
         for lag, rows in zip(values, self._owned(motion), strict=True):
             if lag > 0.0:
-                ends = [low_pass(motion.t, tau[:, rows], lag * s) for s in (_MORE, 1 / _MORE)]
-                rates[:, rows] = (ends[0] - ends[1]) / (lag * (_MORE - 1 / _MORE))
+                ends = [low_pass(motion.t, tau[:, rows], lag * s) for s in (more, 1 / more)]
+                rates[:, rows] = (ends[0] - ends[1]) / (lag * (more - 1 / more))
         return _by_owner(self, motion, rates)
 
     def memory(self, values: FloatArray) -> float:

@@ -16,10 +16,6 @@ from armid_ros.motion import FloatArray, Motion
 import numpy as np
 import numpy.typing as npt
 
-_TURN = 2.0 * np.pi
-#: Number of samples of the period at which range and torque are checked.
-_SAMPLES = 400
-
 
 @dataclass(frozen=True)
 class Run:
@@ -162,17 +158,19 @@ def unwound(
 
     """
     trajectory = excitation.trajectory
-    q = trajectory.one_period(_SAMPLES).q
+    samples = 400
+    q = trajectory.one_period(samples).q
     low, high = q.min(axis=0), q.max(axis=0)
-    wanted = np.round((start - 0.5 * (low + high)) / _TURN)
-    least = np.ceil((limits.lower - low) / _TURN)
-    most = np.floor((limits.upper - high) / _TURN)
+    turn = 2.0 * np.pi
+    wanted = np.round((start - 0.5 * (low + high)) / turn)
+    least = np.ceil((limits.lower - low) / turn)
+    most = np.floor((limits.upper - high) / turn)
     turns = np.clip(wanted, np.minimum(least, 0.0), np.maximum(most, 0.0))
     turns = np.where(limits.prismatic, 0.0, turns)
     if not turns.any():
         return excitation
-    moved = replace(trajectory, q0=trajectory.q0 + _TURN * turns)
-    before, after = (arm.joint_torque(path.one_period(_SAMPLES)) for path in (trajectory, moved))
+    moved = replace(trajectory, q0=trajectory.q0 + turn * turns)
+    before, after = (arm.joint_torque(path.one_period(samples)) for path in (trajectory, moved))
     # equal up to rounding
     if np.abs(after - before).max() > 1e-6 * np.abs(before).max():
         return excitation

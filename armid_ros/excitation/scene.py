@@ -20,9 +20,6 @@ from armid_ros.excitation.limits import (
 from armid_ros.robots import collision_model, CollisionModel, Robot
 import numpy as np
 
-#: Number of names that are listed; the other names are counted.
-_NAMED = 4
-
 
 @dataclass(frozen=True)
 class CollisionScene:
@@ -143,6 +140,7 @@ class CollisionScene:
 
 
 def _listed(names: Sequence[str]) -> str:
-    more = len(names) - _NAMED
-    text = ', '.join(names[:_NAMED])
+    most = 4
+    more = len(names) - most
+    text = ', '.join(names[:most])
     return f'{text} and {more} more' if more > 0 else text

@@ -20,9 +20,6 @@ import click
 if TYPE_CHECKING:
     from armid_ros.fleet.store import Store
 
-#: Refused bags, changes and diagnoses that are shown; all are among the results.
-_SHOWN = 8
-
 
 def _out(command: Callable[..., None]) -> Callable[..., None]:
     """Add the options --out, the folder of results, and --force, to overwrite other files."""
@@ -92,10 +89,11 @@ def _results(out: str, doing: str) -> Iterator[tuple[Store, Callable[..., None]]
 
 def _print_shown(lines: Sequence[str], rest: str) -> None:
     """Print the first lines, and where the rest is."""
-    for line in lines[:_SHOWN]:
+    most = 8  # all are among the results
+    for line in lines[:most]:
         say(line)
-    if len(lines) > _SHOWN:
-        say(f'... and {len(lines) - _SHOWN} more, in {rest}')
+    if len(lines) > most:
+        say(f'... and {len(lines) - most} more, in {rest}')
 
 
 def _print_json(name: str, **document: Any) -> None:

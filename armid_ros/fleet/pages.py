@@ -42,11 +42,6 @@ from armid_ros.report.sections.frame import VerdictSection
 from markupsafe import escape, Markup
 import numpy as np
 
-#: Largest length of the list of arms in the first sentence [characters].
-_LISTED = 60
-#: Number of refused bags that the overview lists.
-_SHOWN = 50
-
 Diagnoses = Mapping[str, Mapping[str, Any]]
 
 
@@ -73,10 +68,11 @@ def _overview(found: Watch, diagnoses: Diagnoses) -> str:
         _table('Arms', heads, rows, (3, 4, 5), hint),
     ]
     refused = [row for arm in found.arms for row in arm.refused]
+    most = 50
     if refused:
-        more = len(refused) > _SHOWN
-        hint = f'{_SHOWN} of {len(refused)}; all are in refused/.' if more else ''
-        sections.append(_refused(refused[:_SHOWN], hint))
+        more = len(refused) > most
+        hint = f'{most} of {len(refused)}; all are in refused/.' if more else ''
+        sections.append(_refused(refused[:most], hint))
     days = [day for arm in found.arms for one in arm.series[:1] for day in one.days[[0, -1]]]
     span = f'{day_text(min(days))} to {day_text(max(days))}' if days else ''
     bags = sum(len(arm.bags) for arm in found.arms)
@@ -157,9 +153,10 @@ def _verdict(found: Watch, diagnoses: Diagnoses) -> VerdictSection:
             f'suddenly, {counts["wearing"]} gradually.',
             f'At most {100.0 * found.alpha:g} % of the named arms are false alarms, on average.',
         ]
+    longest = 60  # characters
     if blamed:
         names = ', '.join(blamed)
-        some = names if len(names) < _LISTED else counted(len(blamed), 'arm')
+        some = names if len(names) < longest else counted(len(blamed), 'arm')
         sentences.insert(0, f'The diagnosis found a fault in {some}.')
     beware = []
     if counts['too few bags']:
@@ -170,7 +167,7 @@ def _verdict(found: Watch, diagnoses: Diagnoses) -> VerdictSection:
     grade = 'changes' if ill else 'diagnosed' if blamed else 'quiet'
     tone = 'fair' if ill or blamed else 'good'
     named = ', '.join(arm.arm for arm in found.arms if arm.named)
-    step = f'open the page of {named}.' if ill and len(named) < _LISTED else ''
+    step = f'open the page of {named}.' if ill and len(named) < longest else ''
     return VerdictSection(grade, tone, sentences, beware, step=step)
 
 

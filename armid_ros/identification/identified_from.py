@@ -18,9 +18,6 @@ from typing import Any
 from armid_ros.errors import ModelError
 from armid_ros.files import is_file, load_json, read_text, reading
 
-#: Beginning and end of each file that the digest is of [bytes]: a bag begins with its time stamps
-#: and ends with its index, so that no two are alike there, and all of a large one takes long.
-_END = 1 << 20
 #: Written anew by tools that do not touch the data.
 _NOT_DATA = 'metadata.yaml'
 
@@ -29,6 +26,7 @@ def _content(path: Path) -> dict[str, Any]:
     """Return size of a file or folder [bytes], and SHA-256 of the ends of its files."""
     inside = sorted(path.rglob('*')) if path.is_dir() else [path]
     digest, total = hashlib.sha256(), 0
+    end = 1 << 20  # bytes: time stamps at the beginning, the index at the end
     for file in inside:
         if not file.is_file() or file.name == _NOT_DATA:
             continue
@@ -36,9 +34,9 @@ def _content(path: Path) -> dict[str, Any]:
         total += size
         digest.update(f'{size};'.encode())
         with file.open('rb') as stream:
-            digest.update(stream.read(_END))
-            stream.seek(max(_END, size - _END))
-            digest.update(stream.read(_END))
+            digest.update(stream.read(end))
+            stream.seek(max(end, size - end))
+            digest.update(stream.read(end))
     return {'size': total, 'digest': digest.hexdigest()}
 
 

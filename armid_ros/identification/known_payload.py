@@ -33,8 +33,6 @@ import numpy as np
 import pinocchio as pin
 from scipy.stats import t as student
 
-#: Blocks of a recording whose residuals count as independent of each other.
-_BLOCKS = 20
 #: Share of the payload's torque that the columns of a joint do not explain, at the least.
 _APART = 1e-8
 #: A gain whose standard deviation is larger is not determined.
@@ -212,9 +210,10 @@ def drive_gains(
     columns = np.concatenate([part.columns for part in rows])
     tau = np.concatenate([part.tau for part in rows])
     informative = np.concatenate([part.informative for part in rows])
+    most = 20  # blocks that count as independent
     blocks = np.concatenate(
         [
-            number * _BLOCKS + np.arange(len(part.tau)) * _BLOCKS // len(part.tau)
+            number * most + np.arange(len(part.tau)) * most // len(part.tau)
             for number, part in enumerate(rows)
         ]
     )

@@ -15,8 +15,6 @@ from scipy.signal import savgol_filter
 
 #: A joint slower than this share of its own top speed is at rest.
 _REST = 0.02
-#: Samples on either side over which a speed is fitted.
-_HALF = 5
 #: A joint whose range is smaller than this is at rest [rad or m].
 STILL = 1e-3
 
@@ -80,13 +78,14 @@ def joint_facts(recording: Recording) -> tuple[JointFacts, ...]:
 
 def _derivative(recording: Recording) -> FloatArray:
     """Return velocities from positions, by parabolas through neighbours in even steps."""
-    if len(recording) <= 2 * _HALF + 1:
+    half = 5  # samples on either side
+    if len(recording) <= 2 * half + 1:
         return np.gradient(recording.q, recording.t, axis=0)
     even = np.linspace(recording.t[0], recording.t[-1], len(recording))
     columns = []
     for column in recording.q.T:
         q = np.interp(even, recording.t, column)
-        speed = savgol_filter(q, 2 * _HALF + 1, 2, deriv=1, delta=float(even[1] - even[0]))
+        speed = savgol_filter(q, 2 * half + 1, 2, deriv=1, delta=float(even[1] - even[0]))
         columns.append(np.interp(recording.t, even, speed))
     return np.column_stack(columns)
 

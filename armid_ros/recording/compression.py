@@ -23,7 +23,6 @@ _Buffer = bytes | memoryview
 CORRUPT = (zstandard.ZstdError, RuntimeError, MemoryError, OverflowError, ValueError)
 #: First bytes of a zstd frame; no CDR message begins with them.
 ZSTD = b'\x28\xb5\x2f\xfd'
-_PARTIAL_STEP = 1024
 
 
 def stated_size(stored: _Buffer, compression: str) -> int | None:
@@ -100,9 +99,10 @@ def _decompress_into(content: bytearray, data: _Buffer, compression: str, size: 
         decompressor = zstandard.ZstdDecompressor().decompressobj()
     else:
         decompressor = lz4.frame.LZ4FrameDecompressor()
-    for at in range(0, len(data), _PARTIAL_STEP):
+    step = 1024  # bytes
+    for at in range(0, len(data), step):
         # Each block that a compressor writes can be decompressed on its own.
-        content += decompressor.decompress(bytes(data[at : at + _PARTIAL_STEP]))
+        content += decompressor.decompress(bytes(data[at : at + step]))
         if len(content) >= size:
             break
 

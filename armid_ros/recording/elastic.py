@@ -27,8 +27,6 @@ if TYPE_CHECKING:
 #: references of the control loops.
 MOTOR, LINK, REFERENCE = '/joint_states', '/link/joint_states', '/reference/joint_states'
 IMU = 'sensor_msgs/msg/Imu'
-#: Pause between two experiments [ns].
-_PAUSE_NS = 10**9
 #: Count of numbers in an Imu message: orientation, angular velocity and linear acceleration, each
 #: with a covariance.
 _NUMBERS = 37
@@ -48,9 +46,10 @@ def write_runs(
 
     """
     joints = robot.joints
+    pause = 10**9  # [ns]
     with whole_bag(path) as writer:
-        writer.write_description(robot.urdf, _PAUSE_NS)
-        start = _PAUSE_NS
+        writer.write_description(robot.urdf, pause)
+        start = pause
         for run in runs:
             motor, link = run.motor, run.link
             stamps = start + np.rint((motor.t - motor.t[0]) * 1e9).astype(np.int64)
@@ -62,7 +61,7 @@ def write_runs(
             felt = sensors.readings(link) if run.felt is None else run.felt
             for name, values in zip(robot.links, felt, strict=True):
                 _write_accelerations(writer, imu_topic(name), name, stamps, values)
-            start = int(stamps[-1]) + _PAUSE_NS
+            start = int(stamps[-1]) + pause
 
 
 def _write_accelerations(

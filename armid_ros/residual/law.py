@@ -20,8 +20,6 @@ from armid_ros.motion import FloatArray
 from armid_ros.residual.rows import BLOCKS, JointRows
 import numpy as np
 
-#: Largest number of terms of a law.
-_TERMS = 3
 #: A law has to predict at least this share of the squared residual.
 _LEAST_SHARE = 0.5
 
@@ -124,10 +122,11 @@ def suggest_law(rows: JointRows, prismatic: bool) -> Law | None:
     ends = float(rows.inputs[:, 0].min()), float(rows.inputs[:, 0].max())
     columns = _library(rows.inputs, *ends, prismatic)
     x = np.column_stack([values for _, _, values in columns])
+    most = 3  # terms of a law
     # squared residuals of each held-out block, by the number of terms of the law
-    losses = np.zeros((_TERMS, BLOCKS))
+    losses = np.zeros((most, BLOCKS))
     for block, others in enumerate(rows.folds()):
-        for more in range(_TERMS):
+        for more in range(most):
             factors = _fit(x[others], rows.left[others], more + 1)
             losses[more, block] = np.sum((rows.left[~others] - x[~others] @ factors) ** 2)
     best = int(np.argmin(losses.sum(axis=1)))

@@ -14,8 +14,6 @@ from armid_ros.robots.robot import Robot
 #: Pinocchio keeps tensors of the joints cubed, 1 GB for 250; a humanoid with both hands has 70.
 MAX_DRIVEN = 150
 GRIPPER_WORDS = ('finger', 'gripper', 'jaw')
-#: Number of joints that a note names.
-_NAMED = 8
 
 
 @dataclass(frozen=True)
@@ -115,8 +113,9 @@ def driven_in_words(robot: Robot) -> tuple[str, ...]:
     arms = several_arms(description, [description.by_name[name] for name in robot.joints])
     if not locked:
         return arms
-    more = f' and {len(locked) - _NAMED} more' if len(locked) > _NAMED else ''
-    named = ', '.join(locked[:_NAMED])
+    most = 8  # are named
+    more = f' and {len(locked) - most} more' if len(locked) > most else ''
+    named = ', '.join(locked[:most])
     return (f'not driven, and locked: {named}{more}; --joints A,B,... chooses others', *arms)
 
 

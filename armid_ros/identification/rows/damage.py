@@ -17,9 +17,6 @@ from armid_ros.recording import Recording
 import numpy as np
 import numpy.typing as npt
 
-#: Samples that are named at most.
-_NAMED = 3
-
 
 def without_damage(
     recordings: Sequence[Recording], settings: SignalSettings
@@ -81,7 +78,8 @@ def _damage(recording: Recording, used: Conditioning) -> tuple[str, npt.NDArray[
     what = '1 sample jumps and comes back; it was'
     if len(damaged) > 1:
         what = f'{len(damaged)} samples jump and come back; they were'
-    named = ', '.join((*worst[:_NAMED], *(['...'] if len(damaged) > _NAMED else [])))
+    most = 3  # are named
+    named = ', '.join((*worst[:most], *(['...'] if len(damaged) > most else [])))
     return f'{recording.source}: {what} interpolated across: {named}', bad
 
 

@@ -58,8 +58,6 @@ _CURVATURE_BANDS = 2.0
 _RATE_OF_BAND = 20.0
 #: Samples that a stretch has to have to have a spectrum.
 _LEAST_SAMPLES = 4
-#: Output samples that one matrix product makes; larger ones multiply more zeros of the band.
-_BLOCK = 16
 
 
 @dataclass(frozen=True)
@@ -313,11 +311,12 @@ def decimate(values: FloatArray, used: Conditioning, stride: int = 1) -> FloatAr
     # a link moves no joint after its own: half are zero
     active = np.flatnonzero(flat.any(axis=0))
     flat = np.ascontiguousarray(flat[:, active])
-    band = np.zeros((_BLOCK, (_BLOCK - 1) * factor + len(taps)))
-    for row in range(_BLOCK):
+    size = 16  # output samples of one matrix product; larger ones multiply more zeros of the band
+    band = np.zeros((size, (size - 1) * factor + len(taps)))
+    for row in range(size):
         band[row, row * factor : row * factor + len(taps)] = taps
-    for start in range(0, count, _BLOCK):
-        rows = min(_BLOCK, count - start)
+    for start in range(0, count, size):
+        rows = min(size, count - start)
         width = (rows - 1) * factor + len(taps)
         window = flat[start * factor : start * factor + width]
         result[start : start + rows, active] = band[:rows, :width] @ window

@@ -18,8 +18,6 @@ from armid_ros.recording.writer import BagWriter, DEFAULT_CHUNK_SIZE, whole_bag
 import numpy as np
 import numpy.typing as npt
 
-_BATCH = 4096
-
 
 class Measured(Protocol):
     """Joint measurements: a Recording, or a Motion with or without torque."""
@@ -194,8 +192,9 @@ def _encoded(
     template['names'] = layout.names_pattern[0]
     for name, count in zip(QUANTITIES, counts, strict=True):
         template['n_' + name] = count
-    for at in range(0, len(stamps), _BATCH):
-        batch = slice(at, at + _BATCH)
+    size = 4096
+    for at in range(0, len(stamps), size):
+        batch = slice(at, at + size)
         rows = np.repeat(template, len(stamps[batch]))
         rows['sec'], rows['nanosec'] = np.divmod(stamps[batch], 10**9)
         for name, values in zip(QUANTITIES, fields, strict=True):

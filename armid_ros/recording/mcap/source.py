@@ -36,8 +36,6 @@ import numpy as np
 import numpy.typing as npt
 
 _Rows = npt.NDArray[np.void]
-#: Memory overhead of a message object [bytes].
-_OVERHEAD = 400
 
 
 class McapSource(Source):
@@ -88,10 +86,11 @@ class McapSource(Source):
         pending: list[tuple[int, int, RawMessage]] = []
         number = size = 0
         in_order = sorted(self._found.chunks, key=lambda chunk: chunk.start_time)
+        overhead = 400  # bytes of a message object
         for start_time, content, offsets in self._pieces(in_order, sorted(names), by_time=True):
             while pending and pending[0][0] < start_time:
                 raw = heapq.heappop(pending)[2]
-                size -= len(raw.cdr) + _OVERHEAD
+                size -= len(raw.cdr) + overhead
                 yield raw
             block, channels = message_block(content, offsets), heads(content, offsets)['channel']
             times = zip(
@@ -104,7 +103,7 @@ class McapSource(Source):
                 raw = RawMessage(names[channel], log_time, publish_time, block.message(at))
                 heapq.heappush(pending, (log_time, number, raw))
                 number += 1
-                size += len(raw.cdr) + _OVERHEAD
+                size += len(raw.cdr) + overhead
             # Chunks that overlap in time are kept in memory until their messages are sorted.
             self._settings.require(size, 'the messages to sort by time')
         while pending:
