@@ -11,7 +11,7 @@ from typing import Any, TYPE_CHECKING
 from armid_ros.api.identification import IdentificationResult
 from armid_ros.api.table import data_frame, DEFAULT_ORIGIN, ResultOrigin, Shown, Summary
 from armid_ros.identification.assess.compare import compare as run
-from armid_ros.identification.assess.comparison import Comparison
+from armid_ros.identification.assess.comparison import Comparison, SCHEMA
 from armid_ros.identification.parameters_file import ParameterFile, parameters_of, read_parameters
 
 if TYPE_CHECKING:
@@ -36,6 +36,8 @@ class ComparisonResult(Shown):
     (True, 0.4)
 
     """
+
+    schema = SCHEMA
 
     core: Comparison
 

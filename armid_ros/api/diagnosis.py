@@ -42,6 +42,7 @@ from armid_ros.diagnosis import (
 )
 from armid_ros.diagnosis.diagnose import OPEN
 from armid_ros.diagnosis.next_run.steps import MODEL
+from armid_ros.diagnosis.verdict.document import SCHEMA
 from armid_ros.diagnosis.verdict.finding import Overlay
 from armid_ros.effects.tied import Partner
 from armid_ros.errors import IdentificationError
@@ -96,6 +97,8 @@ class DiagnosisResult(ShownModel):
     ('elbow',)
 
     """
+
+    schema = SCHEMA
 
     core: Diagnosis
     description: ArmModel

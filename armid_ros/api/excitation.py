@@ -39,7 +39,6 @@ if TYPE_CHECKING:
 
 #: Waypoints per second of a JointTrajectory; controllers interpolate between them.
 WAYPOINT_RATE = 50.0
-SCHEMA = 'armid/excitation/1'
 #: Name of the bag.
 BAG = 'trajectory'
 
@@ -72,6 +71,8 @@ class ExcitationResult(Shown):
     ['excitation.csv', 'excitation.json', 'excitation.yaml', 'report.html', 'trajectory']
 
     """
+
+    schema = 'armid/excitation/1'
 
     core: Design
     arm: ArmModel
@@ -141,7 +142,7 @@ class ExcitationResult(Shown):
         used = core.limits_used(self.arm)
         nearest, low, floor = self.fitness.nearest, self.fitness.lowest, self.scene.floor
         return {
-            'schema': SCHEMA,
+            'schema': self.schema,
             'robot': origin.of(self.arm.robot).robot,
             'verdict': self.fitness.word,
             'summary': str(self.fitness),

@@ -56,6 +56,7 @@ from armid_ros.identification.fitting.identifiability import excludes_zero
 from armid_ros.identification.fitting.least_squares import Estimator
 from armid_ros.identification.identified_from import with_contents
 from armid_ros.identification.known_payload import corrected, drive_gains, DriveGains, payloads_of
+from armid_ros.identification.output import SCHEMA
 from armid_ros.identification.parameters_file import parameters_of
 from armid_ros.identification.rows.checks import check_held_out
 from armid_ros.recording import Recording, require_once
@@ -99,6 +100,8 @@ class IdentificationResult(ShownModel):
     ['identification.json', 'identified.mjcf.xml', 'identified.urdf', 'model.yaml', 'report.html']
 
     """
+
+    schema = SCHEMA
 
     core: Identification
     description: ArmModel

@@ -33,6 +33,7 @@ from armid_ros.inspection import (
     Remark,
 )
 from armid_ros.inspection import inspect as look
+from armid_ros.inspection.inspect import SCHEMA
 from armid_ros.recording import Recording, Topic
 from armid_ros.robots import Robot
 import numpy as np
@@ -41,7 +42,6 @@ if TYPE_CHECKING:
     import pandas
 
 #: Of a check of a description.
-CHECK = 'armid/check/1'
 
 
 @dataclass(frozen=True, repr=False, eq=False)
@@ -65,6 +65,7 @@ class InspectionResult(Shown):
 
     core: Inspection
 
+    schema = SCHEMA
     files = ('inspection.json', 'inspection.html')
 
     @property
@@ -204,6 +205,7 @@ class CheckResult(Shown):
     remarks: tuple[Remark, ...]
     links: LinkCheck | None
 
+    schema = 'armid/check/1'
     files = ('check.json', 'report.html')
 
     @property
@@ -228,7 +230,7 @@ class CheckResult(Shown):
         remarks = [asdict(one) for one in self.remarks]
         finding, robot = self.finding, self.robot.name
         return {
-            'schema': CHECK,
+            'schema': self.schema,
             'robot': robot,
             'finding': finding,
             'remarks': remarks,

@@ -9,7 +9,7 @@ from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 import textwrap
-from typing import Any, TYPE_CHECKING
+from typing import Any, ClassVar, TYPE_CHECKING
 
 from armid_ros.api.arguments import source_of
 from armid_ros.arm import ArmModel
@@ -140,7 +140,17 @@ def residual_frame(joints: Sequence[str], parts: Iterable[ResidualPart]) -> pand
 
 
 class Shown(ABC):
-    """A result that prints as its summary and is written as the commands write it."""
+    """
+    A result that prints as its summary and is written as the commands write it.
+
+    Attributes
+    ----------
+    schema : str
+        Schema of its document.
+
+    """
+
+    schema: ClassVar[str]
 
     @property
     @abstractmethod
@@ -178,8 +188,8 @@ class Shown(ABC):
     def save(self, folder: str | Path) -> Path:
         """Write the files of the command of the same name; OutputError if others are there."""
         with staged(Path(folder)) as result:
-            schema = str(self.fill(result.folder)['schema'])
-            with result_folder(Path(folder), schema):
+            self.fill(result.folder)
+            with result_folder(Path(folder), self.schema):
                 result.keep()
         return result.out
 

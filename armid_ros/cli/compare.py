@@ -24,12 +24,12 @@ def compare(before: Path, after: Path, out: Path, strict: bool, as_json: bool) -
 
     """
     from armid_ros.api.comparison import compare as run
+    from armid_ros.api.comparison import ComparisonResult
     from armid_ros.api.table import ResultOrigin
     from armid_ros.cli import options
     from armid_ros.cli.origin import provenance
-    from armid_ros.identification.assess.comparison import SCHEMA
 
-    staged = options.stage(out, SCHEMA)
+    staged = options.stage(out, ComparisonResult.schema)
     result = run(before, after)
     sources = [Path(one.source) for one in (result.core.before, result.core.after)]
     options.deliver(result, staged, ResultOrigin(provenance=provenance(sources)), as_json)

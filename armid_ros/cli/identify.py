@@ -95,6 +95,7 @@ def identify(
     **asked: Any,
 ) -> None:
     """Fit a model with uncertainties to recordings."""
+    from armid_ros.api.identification import IdentificationResult
     from armid_ros.api.identification import identify as run
     from armid_ros.api.table import ResultOrigin
     from armid_ros.arm import ArmModel
@@ -102,9 +103,8 @@ def identify(
     from armid_ros.cli.origin import provenance
     from armid_ros.errors import IdentificationError
     from armid_ros.identification import PhysicalSettings
-    from armid_ros.identification.output import SCHEMA
 
-    staged = options.stage(out, SCHEMA, robot_source)
+    staged = options.stage(out, IdentificationResult.schema, robot_source)
     robot = options.open_robot(robot_source, gravity, joints, bags, tell=False)
     arm = options.with_effects(ArmModel(robot, quasi_static=quasi_static), effects)
     if not physical and (total_mass is not None or mass_range is not None or boxes):

@@ -49,13 +49,15 @@ def inspect(
     """
     from armid_ros.api.arguments import read_all_joints, topics_of
     from armid_ros.api.inspection import inspect as run
+    from armid_ros.api.inspection import InspectionResult
     from armid_ros.api.table import ResultOrigin
     from armid_ros.cli import options
     from armid_ros.cli.origin import provenance
     from armid_ros.files.cells import listed
-    from armid_ros.inspection.inspect import SCHEMA
 
-    staged = None if out is None else options.stage(out, SCHEMA, robot_source or '')
+    staged = (
+        None if out is None else options.stage(out, InspectionResult.schema, robot_source or '')
+    )
     robot = None
     if robot_source is not None:
         robot = options.open_robot(robot_source, gravity, joints, [bag], tell=False)
@@ -124,8 +126,8 @@ def check(
     one: mass and centre of each link as described and as measured.
 
     """
-    from armid_ros.api.inspection import CHECK
     from armid_ros.api.inspection import check as run
+    from armid_ros.api.inspection import CheckResult
     from armid_ros.api.table import ResultOrigin
     from armid_ros.cli import options
     from armid_ros.cli.origin import provenance
@@ -133,7 +135,7 @@ def check(
     context = click.get_current_context()
     robot_source, bags = _parted(context, robot_source, arguments)
     context.params |= {'robot_source': robot_source, 'bags': bags}
-    staged = None if out is None else options.stage(out, CHECK, robot_source)
+    staged = None if out is None else options.stage(out, CheckResult.schema, robot_source)
     robot = options.open_robot(robot_source, gravity, joints, bags, tell=False)
     with progress('checking'):
         found = run(robot, options.read(bags, robot, topic), rng=seed)

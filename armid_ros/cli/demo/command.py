@@ -45,7 +45,7 @@ OUTPUTS = ('bag', 'excitation.yaml', 'model.yaml', 'identification.json', 'repor
 @parameters.as_json
 def demo(gravity: str, rate: float, hide: str, out: Path, seed: int, as_json: bool) -> None:
     """Excite, move, identify online and offline; then find a hidden change of the arm."""
-    from armid_ros.api.identification import identify
+    from armid_ros.api.identification import IdentificationResult, identify
     from armid_ros.arm import ArmModel, save_model
     from armid_ros.cli import options
     from armid_ros.cli.demo import steps
@@ -54,7 +54,6 @@ def demo(gravity: str, rate: float, hide: str, out: Path, seed: int, as_json: bo
     from armid_ros.identification import write_document
     from armid_ros.identification.assess.agreement import Agreement
     from armid_ros.identification.online.identifier import OnlineIdentifier
-    from armid_ros.identification.output import SCHEMA
     from armid_ros.nodes.lockstep import replay_lockstep, run_lockstep
     from armid_ros.recording import read_recording
     from armid_ros.robots import collision_model, load_robot
@@ -66,7 +65,7 @@ def demo(gravity: str, rate: float, hide: str, out: Path, seed: int, as_json: bo
     truth = steps.true_arm(robot)
     nominal = ArmModel(robot, truth.effects)
     hidden = steps.hidden_change(robot, np.random.default_rng([seed, 1]), hide)
-    staged = options.stage(out, SCHEMA, steps.ROBOT, [*OUTPUTS, '*.png'])
+    staged = options.stage(out, IdentificationResult.schema, steps.ROBOT, [*OUTPUTS, '*.png'])
     new, bag = staged.folder, staged.folder / 'bag'
     settings = DesignSettings(period=10.0, harmonics=5, starts=2, candidates=20, iterations=40)
     with progress('designing the excitation') as tick:

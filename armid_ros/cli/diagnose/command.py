@@ -140,17 +140,16 @@ def diagnose(
     if baseline and no_baseline:
         raise click.UsageError('give --baseline or --no-baseline, not both')
     from armid_ros.api.diagnosis import diagnose as run
-    from armid_ros.api.diagnosis import require_residual
+    from armid_ros.api.diagnosis import DiagnosisResult, require_residual
     from armid_ros.api.table import ResultOrigin
     from armid_ros.arm import ArmModel
     from armid_ros.cli import options
     from armid_ros.cli.origin import provenance
-    from armid_ros.diagnosis.verdict.document import SCHEMA
     from armid_ros.identification.parameters_file import read_misfit
 
     if residual is not None:
         require_residual()
-    staged = options.stage(out, SCHEMA, robot_source)
+    staged = options.stage(out, DiagnosisResult.schema, robot_source)
     robot = options.open_robot(robot_source, gravity, joints, bags)
     arm = ArmModel(robot) if model is None else _model_of(model, robot)
     arm = options.with_effects(arm, effects)

@@ -219,7 +219,7 @@ def excite(
 ) -> None:
     """Design a trajectory that shows the parameters, inside all limits and free of collisions."""
     from armid_ros.api.design import design_excitation
-    from armid_ros.api.excitation import SCHEMA
+    from armid_ros.api.excitation import ExcitationResult
     from armid_ros.api.table import ResultOrigin
     from armid_ros.cli import options
     from armid_ros.cli.excite.springs import (
@@ -244,7 +244,7 @@ def excite(
     if acceleration is not None:
         limits = options.per_joint(acceleration, robot, '--acceleration')
     require_free(out)
-    staged = options.stage(out, SCHEMA, robot_source)
+    staged = options.stage(out, ExcitationResult.schema, robot_source)
     beside = [path for path in (model, environment, joint_limits) if path is not None]
     read = [Path(robot_source.split(' ')[0]), *after, *beside]
     with progress('designing') as tick:

@@ -7,7 +7,7 @@ from __future__ import annotations
 import os
 from pathlib import Path
 
-from armid_ros.api.excitation import BAG, SCHEMA
+from armid_ros.api.excitation import BAG, ExcitationResult
 from armid_ros.cli import options
 from armid_ros.cli.terminal import say
 from armid_ros.errors import RecordingError
@@ -56,7 +56,7 @@ def write_course(
     """Write the trajectory as a bag."""
     robot = space.collision.robot
     require_free(out)
-    staged = options.stage(out, SCHEMA, robot.name)
+    staged = options.stage(out, ExcitationResult.schema, robot.name)
     bodies, margin = ClearanceModel.of(space.bodies), space.clearance
 
     def clear(q: FloatArray) -> bool:
