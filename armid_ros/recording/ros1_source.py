@@ -13,7 +13,14 @@ from pathlib import Path
 from armid_ros.errors import RecordingError
 from armid_ros.recording.message_types import message_type, MessageType
 from armid_ros.recording.settings import DEFAULT, ReadSettings
-from armid_ros.recording.source import MessageBlock, RawMessage, Source, Topic, UNREADABLE
+from armid_ros.recording.source import (
+    BLOCK_MESSAGES,
+    MessageBlock,
+    RawMessage,
+    Source,
+    Topic,
+    UNREADABLE,
+)
 import numpy as np
 from rosbags.convert.converter import is_same_wireformat, migrate_bytes
 from rosbags.interfaces import Connection
@@ -21,8 +28,6 @@ from rosbags.rosbag1 import Reader, ReaderError
 from rosbags.serde import SerdeError
 from rosbags.typesys import get_types_from_msg, get_typestore, Stores
 from rosbags.typesys.base import TypesysError
-
-_BLOCK_MESSAGES = 4096
 
 
 class Ros1Source(Source):
@@ -60,7 +65,7 @@ class Ros1Source(Source):
     def blocks(self, topic: str) -> Iterator[MessageBlock]:
         wanted = [one for one in self._reader.connections if one.topic == topic]
         stream = self._read(wanted)
-        while messages := list(islice(stream, _BLOCK_MESSAGES)):
+        while messages := list(islice(stream, BLOCK_MESSAGES)):
             times = np.array([message.log_time_ns for message in messages], np.int64)
             yield MessageBlock.joined([message.cdr for message in messages], times, times)
 

@@ -22,6 +22,8 @@ from rosbags.interfaces import Qos
 IntArray = npt.NDArray[np.int64]
 #: Encoding of listed topics whose messages the source cannot return.
 UNREADABLE = 'unreadable'
+#: Messages of a block.
+BLOCK_MESSAGES = 4096
 
 
 @dataclass(frozen=True)

@@ -21,11 +21,9 @@ from armid_ros.files import is_file
 from armid_ros.recording.message_types import MessageType
 from armid_ros.recording.qos import parse_qos
 from armid_ros.recording.settings import DEFAULT, ReadSettings
-from armid_ros.recording.source import MessageBlock, RawMessage, Source, Topic
+from armid_ros.recording.source import BLOCK_MESSAGES, MessageBlock, RawMessage, Source, Topic
 import numpy as np
 
-_BLOCK_MESSAGES = 4096
-_BLOCK_BYTES = 8 << 20
 _JOURNALS = ('-wal', '-journal')
 # Condition for a valid row: an integer time and binary data.
 _WHOLE = "typeof(timestamp) = 'integer' AND timestamp >= 0 AND typeof(data) = 'blob'"
@@ -166,7 +164,7 @@ class SqliteSource(Source):
             for row in self._database.execute(query, parameters):
                 rows.append(row)
                 size += len(row[-1])
-                if len(rows) == _BLOCK_MESSAGES or size > _BLOCK_BYTES:
+                if len(rows) == BLOCK_MESSAGES or size > 8 << 20:
                     yield rows
                     rows, size = [], 0
         except _ERRORS as error:

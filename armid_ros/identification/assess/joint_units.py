@@ -15,6 +15,7 @@ from collections.abc import Iterator, Sequence
 
 from armid_ros.arm import ArmModel
 from armid_ros.identification.assess.hypotheses import in_unit
+from armid_ros.identification.assess.prediction_error import SLOW
 from armid_ros.identification.rows.checks import (
     FOLLOWS,
     NEAR,
@@ -37,8 +38,6 @@ _GAINS = 4.0
 _BEYOND_DRIVE = 10.0
 #: A factor since a baseline is that of a unit of force within this factor: masses cancel.
 _NEAR_SINCE = 1.05
-#: A joint below this share of its top speed may be held by its friction, with any torque.
-_SLOW = 0.05
 
 
 def units_beyond_drives(
@@ -182,4 +181,4 @@ def _torques(
     speed = np.abs(np.concatenate([motion.dq for motion in motions]))
     expected = np.concatenate([arm.torque(motion) for motion in motions])
     measured = np.concatenate([motion.tau for motion in motions if motion.tau is not None])
-    return speed >= _SLOW * speed.max(axis=0), expected, measured
+    return speed >= SLOW * speed.max(axis=0), expected, measured

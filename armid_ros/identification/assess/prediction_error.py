@@ -23,8 +23,8 @@ import numpy as np
 
 #: Columns of each joint's own: offset, viscous and Coulomb friction, drive inertia.
 _OWN = 4
-#: A joint below this share of its top speed may be held by its friction.
-_SLOW = 0.05
+#: A joint below this share of its top speed may be held by its friction, with any torque.
+SLOW = 0.05
 
 
 @dataclass(frozen=True)
@@ -210,6 +210,6 @@ def _weight(motion: Motion) -> FloatArray:
     # They are zero where a joint rests or turns round. Dry friction is any torque there: a bristle
     # that gives way before it slips looks like a torque that comes late.
     speed = np.abs(motion.dq)
-    moves = speed > _SLOW * speed.max(axis=0)
+    moves = speed > SLOW * speed.max(axis=0)
     moves[:, ~moves.any(axis=0)] = True
     return np.asarray(moves / np.sqrt(moves.mean(axis=0)))

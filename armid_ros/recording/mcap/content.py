@@ -9,12 +9,10 @@ import mmap
 import struct
 
 from armid_ros.recording.mcap.records import MESSAGE, MESSAGE_HEADER, RECORD_HEADER
-from armid_ros.recording.source import IntArray, MessageBlock, records_at
+from armid_ros.recording.source import BLOCK_MESSAGES, IntArray, MessageBlock, records_at
 from mcap.opcode import Opcode
 import numpy as np
 import numpy.typing as npt
-
-BLOCK_MESSAGES = 4096
 
 
 class Gathered:

@@ -18,19 +18,19 @@ from pathlib import Path
 from armid_ros.errors import RecordingError
 from armid_ros.files import open_regular
 from armid_ros.recording.mcap.chunks import Content, contents
-from armid_ros.recording.mcap.content import (
-    BLOCK_MESSAGES,
-    Gathered,
-    heads,
-    message_block,
-    tiled,
-    walk,
-)
+from armid_ros.recording.mcap.content import Gathered, heads, message_block, tiled, walk
 from armid_ros.recording.mcap.records import add_definition, Chunk, FileMap, map_file
 from armid_ros.recording.message_types import MessageType
 from armid_ros.recording.qos import parse_qos
 from armid_ros.recording.settings import DEFAULT, ReadSettings
-from armid_ros.recording.source import IntArray, MessageBlock, RawMessage, Source, Topic
+from armid_ros.recording.source import (
+    BLOCK_MESSAGES,
+    IntArray,
+    MessageBlock,
+    RawMessage,
+    Source,
+    Topic,
+)
 from mcap.records import Channel
 import numpy as np
 import numpy.typing as npt

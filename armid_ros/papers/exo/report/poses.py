@@ -16,9 +16,6 @@ from armid_ros.report.page import Section
 from armid_ros.robots import Robot
 import numpy as np
 
-_MARGIN = 0.06
-_SCALE = 260.0
-
 
 @dataclass(frozen=True)
 class Poses(Section):
@@ -60,7 +57,7 @@ def draw_poses(
         for robot, motion in ((pair.robot, motions.own), (pair.other, motions.other))
     ]
     everything = np.concatenate([line for group in lines for line in group], axis=1)
-    strip = Strip.around(everything.reshape(-1, 2), len(rows), _MARGIN, _SCALE)
+    strip = Strip.around(everything.reshape(-1, 2), len(rows), margin=0.06, scale=260.0)
     geometry = pair.geometry(motions.own.select(rows), motions.other.select(rows))
     drawn = [
         tuple(
