@@ -47,13 +47,6 @@ def test_a_difference_beyond_all_numbers_of_deviations_is_a_change():
         assert change.parameter.joint == 'joint_1'
 
 
-def test_what_only_one_has_is_listed():
-    comparison = compare(parameters([1.0], [0.1]), parameters([1.0, 2.0], [0.1, 0.1]))
-    assert [one.parameter.joint for one in comparison.only_after] == ['joint_2']
-    assert comparison.only_before == ()
-    assert comparison.document()['not_compared'] == 1
-
-
 def correlated(rng, size):
     """Return a covariance whose parameters are hard to tell apart."""
     factors = rng.normal(size=(size, size)) * np.logspace(0, -2, size)
@@ -179,18 +172,6 @@ def test_a_change_beyond_what_recordings_differ_by_is_found():
         first = compare(exact, changed).changed[0]
         assert first.parameter.name == 'p7'
         assert 0.02 < first.std < 0.08
-
-
-def test_a_change_of_two_links_is_no_load():
-    rng = np.random.default_rng(0)
-    terms = {name: {name.name: 1.0} for name in LINKS}
-    covariance = 1e-6 * np.eye(len(LINKS))
-    truth, other = np.zeros(len(LINKS)), np.ones(len(LINKS))
-    comparison = compare(
-        drawn(rng, LINKS, truth, covariance, terms), drawn(rng, LINKS, other, covariance, terms)
-    )
-    assert comparison.changed
-    assert comparison.load is None
 
 
 def test_why_a_parameter_is_not_compared_is_told_apart():

@@ -52,16 +52,6 @@ def test_a_velocity_that_goes_on_shows_a_dead_encoder(arm, joint, since):
 
 
 @pytest.mark.parametrize('joint', JOINTS)
-def test_a_joint_that_waits_for_the_others_is_not_dead(arm, joint):
-    moves, waits = record(arm, 1), record(arm, 1, held=joint)
-    q, dq, tau = (
-        np.concatenate([getattr(moves, name)[:1000], getattr(waits, name)[1000:]])
-        for name in ('q', 'dq', 'tau')
-    )
-    assert said(arm.robot, replace(moves, q=q, dq=dq, tau=tau)) == []
-
-
-@pytest.mark.parametrize('joint', JOINTS)
 def test_a_velocity_that_stays_while_its_position_moves_is_dead(arm, joint):
     recording = record(arm, 1)
     (text,) = said(arm.robot, replace(recording, dq=recording.dq * (np.arange(6) != joint)))
@@ -84,10 +74,27 @@ def test_a_constant_speed_is_dead_where_it_is_not_the_way_gone(arm, stated, dead
     assert sum('velocit' in text for text in remarks) == dead
 
 
-def test_a_driver_that_measures_no_velocities_is_not_dead(arm):
-    recording = record(arm, 1)
-    assert said(arm.robot, replace(recording, dq=0.0 * recording.dq)) == []
-    assert said(arm.robot, replace(recording, dq=None)) == []
+def waiting(moves, waits):
+    """Return a recording in which a joint waits for the others from 10 s on."""
+    parts = {
+        name: np.concatenate([getattr(moves, name)[:1000], getattr(waits, name)[1000:]])
+        for name in ('q', 'dq', 'tau')
+    }
+    return replace(moves, **parts)
+
+
+@pytest.mark.parametrize(
+    'change',
+    [
+        waiting,
+        lambda moves, waits: replace(moves, dq=0.0 * moves.dq),
+        lambda moves, waits: replace(moves, dq=None),
+        lambda moves, waits: replace(moves, q=5e-3 * np.round(moves.q / 5e-3)),
+    ],
+    ids=['waits', 'velocities of zero', 'no velocities', 'coarse'],
+)
+def test_what_is_no_dead_encoder(arm, change):
+    assert said(arm.robot, change(record(arm, 1), record(arm, 1, held=3))) == []
 
 
 @pytest.mark.parametrize(('joint', 'seed'), [(0, 1), (3, 2), (5, 3)])
@@ -102,12 +109,6 @@ def test_a_joint_that_is_held_is_not_dead(arm, joint, seed):
     dq = recording.dq.copy()
     dq[:, joint] = 1e-3 + noise
     assert said(arm.robot, replace(recording, dq=dq)) == []
-
-
-def test_a_coarse_encoder_of_slow_motion_is_not_dead(arm):
-    recording = record(arm, 1)
-    step = 5e-3
-    assert said(arm.robot, replace(recording, q=step * np.round(recording.q / step))) == []
 
 
 @pytest.fixture(scope='module')

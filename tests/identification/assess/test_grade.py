@@ -8,7 +8,6 @@ import re
 from armid_ros.arm import ArmModel
 from armid_ros.effects import make_effect
 from armid_ros.identification import grade, identify, Score
-from armid_ros.identification.assess.grade import torque_noise
 from armid_ros.identification.assess.grade_limits import LIMITS
 from armid_ros.recording import read_recording, ReadReport
 from armid_ros.robots import load_robot
@@ -120,21 +119,6 @@ def test_noise_as_large_as_the_torque_of_a_joint_condemns_no_model(structure, ru
     assert found.word == 'good'
 
 
-@pytest.mark.slow
-def test_a_joint_at_rest_with_any_torque_within_its_friction_condemns_no_model(structure, arm):
-    """Friction holds it with whatever torque it was left with."""
-    motion = multisine(arm.robot.joints, 20.0, RATE, seed=1, base_hz=0.12)
-    moves = np.array([1, 1, 1, 1, 1, 0])
-    held = replace(motion, q=motion.q * moves, dq=motion.dq * moves, ddq=motion.ddq * moves)
-    left = 0.04 * np.sign(np.sin(0.5 * motion.t))
-    record = with_torque_of(
-        recorded(arm, held, torque_noise=0.005, position_noise=1e-5), 5, lambda tau: tau + left
-    )
-    found, _ = graded(structure, [record])
-    assert not [reason for reason in found.reasons if f'% in {arm.robot.joints[5]}' in reason]
-    assert found.word == 'poor'
-
-
 def resting(recording, joints):
     """Return a recording of the same motion in which some joints stand still."""
     q = recording.q.copy()
@@ -164,17 +148,6 @@ def test_a_joint_that_rests_in_what_is_held_out_is_named(structure, run, sound):
     assert found.word == 'good'
 
 
-def test_noise_is_told_from_torque_that_no_model_describes(run, sound):
-    """What a joint is off by slowly is no noise, however large it is."""
-    _, result = sound
-    white = 0.2 * np.random.default_rng(0).normal(size=run.tau.shape)
-    slow = np.sin(3.0 * run.t)[:, np.newaxis] * np.ones(6)
-    expected = 0.2 * np.linalg.norm(result.used.taps())
-    for tau in (run.tau + white, run.tau + white + slow):
-        noise = torque_noise(result.predict([replace(run, tau=tau)]), result.used)
-        np.testing.assert_allclose(noise, expected, rtol=0.15)
-
-
 def test_without_held_out_data_halves_of_the_recording_judge_each_other(structure, run):
     found, result = graded(structure, [run])
     assert found.word == 'good'
@@ -188,13 +161,6 @@ def test_two_seconds_of_data_are_too_little(arm, structure):
     assert found.word != 'good'
     assert 'record longer' in found.reasons[0]
     assert result.halves.joints.max() > LIMITS.poor
-
-
-@pytest.mark.slow
-@pytest.mark.parametrize('seed', range(2))
-def test_recordings_drawn_at_random_are_good(arm, structure, seed):
-    found, _ = graded(structure, [record(arm, 10 + seed, duration=15.0 + 20.0 * seed)])
-    assert found.word == 'good'
 
 
 @pytest.mark.parametrize('held_out', [False, True])
@@ -218,46 +184,23 @@ def test_a_velocity_of_the_opposite_sign_is_said_and_condemns_nothing(structure,
     assert said.startswith('In other') and joint in said
 
 
-def test_torques_that_come_late_are_not_good(structure, run):
-    """A free fit takes them for friction and inertia, and is not far off."""
-    late = replace(run, t=run.t[:-10], q=run.q[10:], tau=run.tau[:-10])
-    found, _ = graded(structure, [late])
-    assert found.word == 'poor'
-    said = re.search(r'(\d+) ms later', found.reasons[0]).group(1)
-    assert int(said) == pytest.approx(100, abs=3)
-
-
-@pytest.mark.long
-@pytest.mark.slow
-@pytest.mark.parametrize('since', [0, 1000])
-def test_a_dead_channel_of_torque_is_unusable(structure, run, other, since):
-    """The fit explains a torque that is not there by links that weigh nothing."""
-    tau = run.tau.copy()
-    tau[since:, 3] = 0.0
-    dead = replace(run, tau=tau)
-    found, _ = graded(structure, [dead])
-    assert found.word == 'unusable'
-    joint = structure.robot.joints[3]
-    assert joint in found.reasons[0]
-    assert ('10.000 s' if since else 'throughout') in found.reasons[0]
-    found, _ = graded(structure, [other], [dead])
-    assert found.word == 'unusable'
+def late(run):
+    return replace(run, t=run.t[:-10], q=run.q[10:], tau=run.tau[:-10])
 
 
 @pytest.mark.parametrize(
-    ('factor', 'word', 'said'),
+    ('change', 'word', 'said'),
     [
-        (0.05, 'poor', '0.05 times'),  # it may be wrong masses
-        (1.0 / 9.80665, 'unusable', 'kgf m'),
+        (late, 'poor', r'\b(99|10[01]) ms later'),
+        (lambda run: replace(run, tau=0.05 * run.tau), 'poor', r'0\.05 times'),  # or wrong masses
+        (lambda run: replace(run, tau=run.tau / 9.80665), 'unusable', 'kgf m'),
     ],
+    ids=['late', 'currents', 'unit'],
 )
-def test_currents_for_torques_are_asked_about_and_a_unit_is_unusable(
-    structure, run, factor, word, said
-):
-    """A free fit is as good in any unit."""
-    found, _ = graded(structure, [replace(run, tau=factor * run.tau)])
+def test_a_mistake_that_a_free_fit_hides_is_not_good(structure, run, change, word, said):
+    found, _ = graded(structure, [change(run)])
     assert found.word == word
-    assert said in found.reasons[0]
+    assert re.search(said, found.reasons[0])
 
 
 def test_gravity_of_the_earth_on_a_recording_from_the_moon_is_unusable(arm, structure):
@@ -265,6 +208,15 @@ def test_gravity_of_the_earth_on_a_recording_from_the_moon_is_unusable(arm, stru
     found, _ = graded(structure, [record(moon, 1)])
     assert found.word == 'unusable'
     assert '--gravity moon' in found.reasons[0]
+
+
+@pytest.mark.filterwarnings('error')
+def test_a_channel_of_torque_that_is_numerically_zero_is_unusable(structure, run):
+    """The fit explains a torque that is not there by links that weigh nothing."""
+    dead = replace(run, tau=np.where(np.arange(6) == 2, 1e-309 * run.tau, run.tau))
+    found, _ = graded(structure, [dead])
+    assert found.word == 'unusable'
+    assert any(f'torque of {run.joints[2]}' in reason for reason in found.reasons)
 
 
 def test_a_clock_that_was_set_back_is_said(structure, run):

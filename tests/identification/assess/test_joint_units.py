@@ -9,14 +9,11 @@ from armid_ros.effects import make_effect
 from armid_ros.identification import grade, identify
 from armid_ros.identification.assess.data_faults import check_data
 from armid_ros.identification.assess.joint_units import (
-    factors_since,
     unit_faults,
     units_beyond_drives,
 )
 from armid_ros.identification.rows.regression import Stretch
 from armid_ros.identification.rows.signals import conditioning, segments, SignalSettings
-from armid_ros.model import regressor
-from armid_ros.motion import Motion
 from armid_ros.robots import load_robot
 import numpy as np
 import pytest
@@ -77,48 +74,6 @@ def test_currents_are_in_no_one_unit(arm, run):
     assert unit_faults(arm, filtered(run), filtered(run)) == []
     (said,) = unit_faults(arm, filtered(replace(run, tau=1e3 * run.tau)), filtered(run))
     assert 'N mm' in said
-
-
-def moved(motion, joints, pose):
-    """Return a motion of some joints, with the others at rest."""
-    still = ~np.isin(np.arange(motion.n_joints), joints)
-    q, dq, ddq = (x.copy() for x in (motion.q, motion.dq, motion.ddq))
-    q[:, still], dq[:, still], ddq[:, still] = pose[still], 0.0, 0.0
-    return replace(motion, q=q, dq=dq, ddq=ddq)
-
-
-def test_a_model_that_a_baseline_does_not_determine_tells_no_factor(arm):
-    """
-    Moved one after the other, joints do not show what each makes of the torque of another.
-
-    The model is right in its first joint where that moves, and off by many times its torque
-    where the second does; a torque that follows it all the same is one five-hundredth of it.
-
-    """
-    robot, pose = arm.robot, np.full(6, 0.3)
-    steps = Motion(
-        robot.joints, np.arange(2.0), np.tile(pose, (2, 1)), np.zeros((2, 6)), np.eye(6)[:2]
-    )
-    body = regressor(robot, steps)[:, :, 14:20]
-    coupling = np.linalg.lstsq(
-        np.array([body[0, 0], body[1, 1], body[1, 0]]), np.array([0.0, 0.0, 5.0]), rcond=None
-    )[0]
-    links = robot.rigid_parameters.copy()
-    links[14:20] += coupling
-    model = replace(arm, robot=robot.with_inertias(links))
-    motion = multisine(robot.joints, 10.0, 100.0, seed=3)
-    alone = [recorded(arm, moved(motion, joints, pose)) for joints in ([0], [1, 2, 3, 4, 5])]
-    now = filtered(times(recorded(model, motion), 1.0 / 500.0, (0,)))
-    before = [part for one in alone for part in filtered(one)]
-    assert unit_faults(model, now, before) == []
-    assert factors_since(model, now, before)[0] == 0.0 < factors_since(model, now)[0]
-    assert factors_since(arm, before, before)[0] == pytest.approx(1.0)
-
-
-def test_limits_that_the_body_itself_needs_more_than_are_wrong(arm, run):
-    needy = replace(arm.robot, torque_limit=np.where(np.arange(6) == 1, 1e-3, 1e3))
-    assert beyond_drives(needy, run) == []
-    assert beyond_drives(replace(arm.robot, torque_limit=np.full(6, 1e-3)), run) == []
 
 
 @pytest.mark.parametrize(('factor', 'unit'), [(1e3, 'N mm'), (1e2, 'N cm'), (1e-3, 'kN m')])

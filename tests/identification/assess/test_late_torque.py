@@ -9,18 +9,12 @@ from armid_ros.effects.slipping import Hysteresis
 from armid_ros.identification.assess.late_torque import late_torque
 from armid_ros.identification.assess.mistakes import find_mistake
 from armid_ros.identification.rows.signals import conditioning, SignalSettings
-from armid_ros.robots import load_robot
 import numpy as np
 import pytest
 
 from ..conftest import multisine, recorded
 
 RATE = 100.0
-
-
-@pytest.fixture(scope='module')
-def robot():
-    return load_robot('humanoid_arm')
 
 
 def giving_way(robot, length, seed, share=1.0):

@@ -59,7 +59,6 @@ def test_what_is_not_done_is_said(result, recordings):
     [
         ([2e-3, 20e-3], [1e-3, 30e-3], ('elbow',)),
         ([2e-3, 20e-3], [1e-3, 20.1e-3], ()),
-        ([2e-3, 20e-3], [2e-3, 20e-3], ()),
         ([1e-6, 20e-3], [2e-6, 10e-3], ()),
     ],
 )

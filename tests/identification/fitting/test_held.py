@@ -4,8 +4,6 @@
 
 from dataclasses import replace
 
-from armid_ros.arm import ArmModel
-from armid_ros.effects import make_effect
 from armid_ros.identification import grade, identify
 from armid_ros.identification.fitting.excited import base_spread
 from armid_ros.identification.fitting.identifiability import NOT_SHOWN
@@ -95,9 +93,3 @@ def test_friction_and_links_without_mass_have_no_spread(structure):
     assert np.all(np.isfinite(spread[:-18])) and np.all(spread > 0.0)
     weightless = replace(structure, robot=structure.robot.with_inertias(np.zeros(60)))
     assert np.all(np.isinf(base_spread(weightless, base)))
-    payload = ArmModel(structure.robot).with_effect(
-        make_effect('payload', structure.robot), np.zeros(10)
-    )
-    assert np.all(
-        np.isfinite(base_spread(payload, payload.base_parameters(np.random.default_rng(0))))
-    )

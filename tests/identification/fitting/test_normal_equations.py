@@ -8,10 +8,8 @@ from armid_ros.identification.fitting.normal_equations import (
     factored,
     informative_basis,
     NormalEquations,
-    scaled_fit,
     weighted_fit,
 )
-from armid_ros.identification.online.recursive import RecursiveLeastSquares
 from armid_ros.identification.rows.regression import regressions
 from armid_ros.identification.rows.signals import Conditioning
 from hypothesis import given
@@ -53,18 +51,6 @@ def test_the_fit_of_a_sum_is_that_of_all_rows(problem):
     rows = np.concatenate([part.columns for part in problem]) * whole.weights[:, :, np.newaxis]
     condition = np.linalg.cond(rows.reshape(-1, rows.shape[2]))
     assert fit.condition_number == pytest.approx(condition, rel=1e-6)
-
-
-def test_recursion_and_batch_agree(problem, theory):
-    whole = solve(problem)
-    noise = 1.0 / np.max(whole.weights, axis=0)
-    recursive = RecursiveLeastSquares(theory.parameters, noise)
-    for part in problem:
-        for rows, tau, told in zip(part.columns, part.tau, part.informative, strict=True):
-            recursive.update(rows, tau, told.astype(float))
-    batch = scaled_fit(added(problem), noise)
-    # the recursion begins with a ridge, which is all that is between them
-    np.testing.assert_allclose(recursive.values, batch.values, rtol=1e-6, atol=1e-9)
 
 
 def test_squares_of_torques_and_residuals_are_those_of_the_rows(problem):

@@ -147,15 +147,6 @@ def test_nothing_comes_out_until_the_start_is_forgotten():
     assert 0.05 < stamps[0] - t[500] < 0.2
 
 
-def test_period_is_learned_and_bounds_the_filter():
-    for period in (1e-3, 8e-3):
-        causal = CausalFilter(2, CUTOFF)
-        t = np.arange(0.0, 2.0, period)
-        run(causal, t, *stream(t))
-        assert causal.period == pytest.approx(period)
-        assert causal.pole * period < 1.0 + 1e-9
-
-
 @pytest.mark.parametrize(
     ('reason', 'spoil'),
     [
@@ -198,19 +189,6 @@ def test_a_gap_or_a_jump_restarts_and_leaves_no_trace(jump, reason):
     np.testing.assert_array_equal(a[1], b[1])
     assert dict(jumped.restarts) == {reason: 1}
     assert jumped.generation == generation + 1
-
-
-def test_a_short_gap_is_bridged():
-    t = np.arange(0.0, 2.0, 1e-3)
-    kept = np.ones(len(t), dtype=bool)
-    kept[500::100] = kept[501::100] = kept[502::100] = False
-    q, tau = stream(t)
-    causal, whole = CausalFilter(2, CUTOFF), CausalFilter(2, CUTOFF)
-    stamps, values = table(run(causal, t[kept], q[kept], tau[kept]))
-    all_stamps, all_values = table(run(whole, t, q, tau))
-    assert not causal.restarts
-    expected = all_values[np.searchsorted(all_stamps, stamps)][:, :2]
-    np.testing.assert_allclose(values[:, :2], expected, atol=5e-5)
 
 
 def test_measured_velocity_is_differentiated_when_wanted():

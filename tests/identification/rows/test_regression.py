@@ -27,17 +27,17 @@ URDF = """
 
 
 @pytest.fixture(scope='module')
-def robot():
+def swing():
     return load_robot(URDF)
 
 
 @pytest.fixture(scope='module')
-def long_motion(robot):
+def long_motion(swing):
     """45 s at 1 kHz: three parts."""
     t = np.arange(45_000) * 1e-3
     w = 2.0 * np.pi * 0.7
     q = np.sin(w * t)[:, None]
-    return Motion(robot.joints, t, q, w * np.cos(w * t)[:, None], -(w**2) * q)
+    return Motion(swing.joints, t, q, w * np.cos(w * t)[:, None], -(w**2) * q)
 
 
 @pytest.mark.parametrize(
@@ -49,10 +49,10 @@ def long_motion(robot):
     ],
     ids=['history', 'late', 'elastic'],
 )
-def test_columns_made_in_parts_are_those_made_at_once(robot, long_motion, values):
-    arm = ArmModel(robot)
+def test_columns_made_in_parts_are_those_made_at_once(swing, long_motion, values):
+    arm = ArmModel(swing)
     for name, value in values.items():
-        arm = arm.with_effect(make_effect(name, robot), [value])
+        arm = arm.with_effect(make_effect(name, swing), [value])
     used = Conditioning(1000.0, 50.0, 20)
     chosen = np.array([9 + len(values), 3, 9, 10])
     parts = filtered_columns(arm, chosen, long_motion, used)
