@@ -44,7 +44,7 @@ def ladder(arm):
         if mass:
             payload = pin.Inertia(mass, np.array([0.0, 0.0, -0.05]), np.zeros((3, 3)))
             robot = with_payload(robot, link, payload)
-        motion = multisine(robot.joints, 30.0, 100.0, number, amplitude=0.7)
+        motion = multisine(robot.joints, 30.0, 200.0, number, amplitude=0.7)
         recording = recorded(
             replace(arm, robot=robot), motion, number, torque_noise=0.05, source=BAGS[number].stem
         )

@@ -151,12 +151,6 @@ def test_a_joint_that_moves_without_being_driven_is_doubted(clean):
     assert said.startswith('doubt: ') and '-0.5' in said
 
 
-def test_a_fit_that_explains_little_is_doubted(clean, robot):
-    pushed = 3.0 * clean.tau.std(axis=0) * np.sin(7.0 * clean.t)[:, np.newaxis]
-    other = replace(clean, tau=clean.tau + pushed)
-    assert any(remark.startswith(('doubt', 'bad')) for remark in remarks(other, robot))
-
-
 @pytest.mark.slow
 def test_what_identify_calls_unusable_is_not_taken(clean, robot):
     """The grade of identify is asked, whatever it is for: here a torque that is no arm's."""

@@ -65,14 +65,6 @@ def test_simulated_bias_is_the_error_of_a_fit_without_torque_noise(arm, structur
     assert 0.75 < np.median(check.bias[large] / error[large]) < 1.35
 
 
-def test_instruments_take_most_of_the_bias_away(arm, structure, motion):
-    result, check = checked(arm, structure, motion, 0.0, 3e-4)
-    truth = result.base.values(arm.theta)
-    weights = 1.0 / result.estimate.std
-    plain = np.linalg.norm(weights * (result.estimate.values - truth))
-    assert np.linalg.norm(weights * (check.instrumental.values - truth)) < 0.5 * plain
-
-
 @pytest.mark.parametrize('lost', [slice(800, 1400), [500, 900, 1500]])
 def test_samples_that_are_missing_are_no_noise_of_encoders(arm, structure, motion, lost):
     """What the arm does meanwhile is a jump from one sample to the next."""

@@ -64,13 +64,6 @@ def test_squares_of_torques_and_residuals_are_those_of_the_rows(problem):
     np.testing.assert_array_equal(normal.counts, told.sum(axis=0))
 
 
-def test_some_columns_are_the_normal_equations_of_some_columns(problem):
-    kept = np.arange(5, 30)
-    small = NormalEquations.of(problem).restrict(kept)
-    direct = NormalEquations.of([part.restrict(kept) for part in problem])
-    np.testing.assert_allclose(small.products, direct.products, rtol=1e-9, atol=1e-9)
-
-
 def test_what_is_packed_comes_back(problem):
     normal = NormalEquations.of(problem)
     arrived = NormalEquations.unpacked(normal.packed())

@@ -138,7 +138,7 @@ def test_an_arm_at_rest_teaches_nothing_it_could_unlearn(arm, motion, tau):
 def test_an_arm_may_have_a_single_joint():
     """A pendulum of 2 kg at 0.3 m: its moment is found from its weight."""
     robot = load_robot(PENDULUM)
-    motion = multisine(robot.joints, 20.0, 500.0, seed=0)
+    motion = multisine(robot.joints, SECONDS, 200.0, seed=0)
     online = OnlineIdentifier(ArmModel(robot), rng=np.random.default_rng(0))
     feed(online, motion.t, motion.q, ArmModel(robot).torque(motion))
     estimate = online.estimate()

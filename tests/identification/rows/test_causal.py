@@ -85,18 +85,6 @@ def test_what_is_missing_has_the_acceleration_of_what_is_around_it(lost):
     assert np.all(off / (np.array([0.8, 0.3]) * np.array([6.0, 11.0]) ** 2) < 0.03 * lost**2)
 
 
-def test_step_response_is_exact_for_any_step_size():
-    """After a ramp of 1 ms up to 1: the closed form, in one step of 80 ms as in eighty."""
-    coarse, fine = TripleLag(CUTOFF), TripleLag(CUTOFF)
-    for lag in (coarse, fine):
-        lag.update(0.0, np.zeros(1))
-        lag.update(1e-3, np.ones(1))
-    once = coarse.update(0.08, np.ones(1))
-    for _ in range(80):
-        stages = fine.update(1e-3, np.ones(1))
-    np.testing.assert_allclose(once, stages, rtol=1e-12)
-
-
 def test_outputs_are_the_filtered_motion_and_its_derivatives():
     causal = CausalFilter(2, CUTOFF)
     t = np.arange(0.0, 3.0, 1e-3)

@@ -48,7 +48,8 @@ def test_damage_of_a_clean_stream_is_left_out() -> None:
     assert t[1000] not in good and gate.rejected == {'spike': 1}
 
 
-def test_the_identifier_uses_every_state_of_a_simulation_without_noise() -> None:
+@pytest.mark.parametrize('spike', [0.0, 50.0])
+def test_the_identifier_uses_every_state_of_a_simulation_but_damage(spike: float) -> None:
     robot = load_robot('humanoid_arm', gravity='moon')
     arm = ArmModel(robot).with_effect(make_effect('torque_offset', robot))
     rng = np.random.default_rng(0)
@@ -60,5 +61,7 @@ def test_the_identifier_uses_every_state_of_a_simulation_without_noise() -> None
         if k == 200:
             plant.set_trajectory(Reference.of(run.motion(100.0)))
         sample = plant.advance(2)
-        identifier.update(plant.state.t, sample.q, sample.dq, sample.tau)
-    assert not identifier.rejected and not identifier.restarts and not identifier.missing
+        tau = sample.tau + spike * (k == 500)
+        identifier.update(plant.state.t, sample.q, sample.dq, tau)
+    assert identifier.rejected == ({'spike': 1} if spike else {})
+    assert not identifier.restarts and not identifier.missing
