@@ -96,12 +96,6 @@ def test_an_arm_says_how_many_samples_around_one_it_needs(robot, values, neighbo
     assert (needed == 0) == (neighbours == 0)
 
 
-def test_effects_that_an_arm_lacks_have_no_values(robot):
-    arm = arm_with(robot, viscous_friction=0.2)
-    np.testing.assert_array_equal(arm.values_of(make_effect('coulomb_friction', robot)), 0.0)
-    np.testing.assert_array_equal(arm.values_of(make_effect('viscous_friction', robot)), 0.2)
-
-
 def test_an_arm_goes_to_other_processes_after_use(robot):
     """What it derives and keeps, functions among it, stays behind."""
     arm = ArmModel(robot).with_effect(make_effect('torque_offset', robot), np.full(6, 0.1))

@@ -13,28 +13,23 @@ import pytest
 READERS = (load_model, load_misfit, read_parameters)
 #: What is written in place of what, and what is said then.
 FAULTS = {
-    'a key of the model': ('rigid_parameters:', 'rigid_paramters:', "no key 'rigid_paramters'"),
-    'a key that is missing': ('gravity:\n- 0.0\n- 0.0\n- -9.81\n', '', "no 'gravity'"),
+    'a key of the model': ('rigid_parameters:', 'rigid_paramters:', 'rigid_paramters'),
+    'a key that is missing': ('gravity:\n- 0.0\n- 0.0\n- -9.81\n', '', 'gravity'),
     'a key of a parameter': (
         'joint: shoulder_roll\n  value:',
         'joint: shoulder_roll\n  valu:',
-        "parameter 'm2' of joint 'shoulder_roll': no key 'valu' is known; .*value",
+        "'m2' .*'shoulder_roll'.* 'valu' .*value",
     ),
     'no number': (
         'joint: shoulder_roll\n  value: ',
         'joint: shoulder_roll\n  value: a',
-        "parameter 'm2' of joint 'shoulder_roll' has to be a finite number",
+        "'m2' .*'shoulder_roll'.* number",
     ),
-    'a unit of a link': (
-        'unit: kg\n',
-        'unit: g\n',
-        "parameter 'm1' of joint 'shoulder_pitch' has the unit 'g'; it has to be 'kg'",
-    ),
+    'a unit of a link': ('unit: kg\n', 'unit: g\n', "'m1' .*'shoulder_pitch'.*'g'.*'kg'"),
     'a unit of an effect': (
         'unit: N m s/rad',
         'unit: N m s/deg',
-        "parameter 'viscous_coefficient' of joint 'shoulder_pitch' has the unit 'N m s/deg'; "
-        "it has to be 'N m s/rad'",
+        "'viscous_coefficient' .*'shoulder_pitch'.*s/deg'.*s/rad'",
     ),
 }
 
@@ -65,7 +60,7 @@ def test_the_line_is_that_of_the_key(model):
     number = lines.index('  joint: elbow_pitch')
     lines[number + 1] = lines[number + 1].replace('value', 'valu')
     model.write_text('\n'.join(lines))
-    with pytest.raises(ModelError, match=f'model.yaml: line {number + 2}: '):
+    with pytest.raises(ModelError, match=f'line {number + 2}: '):
         load_model(model)
 
 

@@ -2,7 +2,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """Changes of arms over time: found where there are, and rarely where there are none."""
 
-from armid_ros.changes.histories import judge, largest_change, MONTH, named, wear
+from armid_ros.changes.histories import judge, MONTH, named, wear
 from armid_ros.changes.scatter import ParameterHistory, spreads, without_days
 import numpy as np
 import pytest
@@ -77,17 +77,17 @@ def test_the_interval_of_wear_holds_the_truth_as_often_as_it_says():
 def test_of_the_arms_named_few_are_healthy():
     rng = np.random.default_rng(4)
     false, true = 0, 0
-    for _ in range(4):
-        series = fleet(rng, 200)
-        for arm in range(40):
+    for _ in range(2):
+        series = fleet(rng, 100)
+        for arm in range(20):
             k = 8 * arm + int(rng.integers(8))
             step = rng.choice([0.03, 0.06, 0.12])
             series[k] = changed(series[k], np.where(np.arange(10) >= 5, step, 0.0))
         found = names(series)
-        sick = {f'arm_{arm}' for arm in range(40)}
+        sick = {f'arm_{arm}' for arm in range(20)}
         false, true = false + len(found - sick), true + len(found & sick)
     assert false <= 0.05 * (false + true) + 2 * np.sqrt(0.05 * (false + true))
-    assert true > 80
+    assert true > 20
 
 
 def test_what_bags_differ_by_beyond_their_deviations_is_learned_from_all_arms():
@@ -96,40 +96,17 @@ def test_what_bags_differ_by_beyond_their_deviations_is_learned_from_all_arms():
         assert spread.std == pytest.approx(0.02, rel=0.15)
 
 
-def test_a_step_of_one_arm_does_not_hide_itself_in_the_spread():
-    series = fleet(np.random.default_rng(6), 1, bags=40)
-    stepped = [changed(one, np.where(np.arange(40) >= 20, 1.0, 0.0)) for one in series]
-    before, after = spreads(series), spreads(stepped)
-    for parameter in before:
-        assert after[parameter].std < before[parameter].std + 0.01
-
-
-def test_a_level_series_has_no_p_below_one_in_a_thousand():
-    days = np.arange(10.0)
-    flat = ParameterHistory('a', 'x', 'j', '', days, np.ones(10), np.full(10, 0.1))
-    assert largest_change(flat, spreads([flat])[flat.parameter]).p == 1.0
-
-
-def test_a_step_beyond_all_probability_is_named_before_smaller_ones():
-    series = fleet(np.random.default_rng(7), 100, bags=20)
-    late = np.arange(20) >= 9
-    series[1] = changed(series[1], np.where(late, 30.0, 0.0))
-    series[2] = changed(series[2], np.where(late, 60.0, 0.0))
-    (first, *_) = judged(series)
-    assert [change.series.joint for change in named(first, 0.05)[:2]] == ['joint_2', 'joint_1']
-
-
-@pytest.mark.parametrize('at', [0, 1, 5, 9])
+@pytest.mark.parametrize('at', [0, 5])
 def test_one_odd_bag_is_no_change(at):
-    series = fleet(np.random.default_rng(8), 50)
+    series = fleet(np.random.default_rng(8), 20)
     for k in range(0, len(series), 16):
         series[k] = changed(series[k], np.where(np.arange(10) == at, 0.5, 0.0))
     assert names(series) == set()
 
 
-@pytest.mark.parametrize('lasting', [3, 4, 7])
+@pytest.mark.parametrize('lasting', [3, 7])
 def test_what_lasts_three_bags_is_a_change(lasting):
-    series = fleet(np.random.default_rng(9), 50)
+    series = fleet(np.random.default_rng(9), 20)
     series[16] = changed(series[16], np.where(np.arange(10) >= 10 - lasting, 0.5, 0.0))
     assert names(series) == {'arm_2'}
 

@@ -7,7 +7,6 @@ from armid_ros.effects import make_effect
 from armid_ros.identification.online.background import at_once, Background
 from armid_ros.motion import Motion
 from armid_ros.recording import Recording
-from armid_ros.robots import load_robot
 import numpy as np
 import pytest
 
@@ -23,9 +22,14 @@ class Foreground(Background):
 
 
 @pytest.fixture(scope='session')
-def arm():
+def robot(humanoid):
+    """Return the humanoid arm as described."""
+    return humanoid
+
+
+@pytest.fixture(scope='session')
+def arm(robot):
     """Return the humanoid arm with friction and offsets."""
-    robot = load_robot('humanoid_arm')
     model = ArmModel(robot)
     for name, value in FRICTION.items():
         model = model.with_effect(make_effect(name, robot), np.full(6, value))

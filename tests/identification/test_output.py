@@ -2,15 +2,19 @@
 # SPDX-License-Identifier: Apache-2.0
 from dataclasses import replace
 import json
+from typing import get_args
 
 from armid_ros.identification import identification_document, identify, write_document
 from armid_ros.identification.assess.compare import compare
+from armid_ros.identification.fitting.identifiability import Reason
 from armid_ros.identification.parameters_file import read_parameters
 from armid_ros.motion import Motion
 import numpy as np
 import pytest
 
 from .conftest import multisine, recorded
+
+NEVER, NOT_SHOWN, _, WEAK = get_args(Reason)
 
 
 @pytest.fixture(scope='module')
@@ -66,16 +70,15 @@ def test_what_a_motion_does_not_show_is_listed_with_the_reason(elbow_only):
     assert ('viscous_coefficient', 'elbow_pitch') in shown
     for joint in elbow_only.arm.robot.joints:
         if joint != 'elbow_pitch':
-            assert lost['viscous_coefficient', joint] == 'this motion does not show it'
-    assert lost['m1', 'shoulder_pitch'] == 'no motion of this arm shows it'
-    weak = {key for key, reason in lost.items() if reason == 'not distinguishable from zero'}
+            assert lost['viscous_coefficient', joint] == NOT_SHOWN
+    assert lost['m1', 'shoulder_pitch'] == NEVER
+    weak = {key for key, reason in lost.items() if reason == WEAK}
     assert weak
     assert weak == shown & set(lost)
 
 
 def test_what_is_listed_as_not_told_has_zero_in_its_interval(elbow_only):
     estimate = elbow_only.estimate
-    why = 'not distinguishable from zero'
-    weak = [u.parameter for u in elbow_only.unidentified if u.reason == why]
+    weak = [u.parameter for u in elbow_only.unidentified if u.reason == WEAK]
     for name, value, std in zip(estimate.parameters, estimate.values, estimate.std, strict=True):
         assert (name in weak) == (abs(value) <= 1.96 * std)

@@ -9,14 +9,27 @@ from armid_ros.identification import identify
 from armid_ros.identification.output import identification_document
 from armid_ros.identification.parameters_file import parameters_of
 import numpy as np
+import pytest
 
 from tests.diagnosis.conftest import Bench
 
 
-def test_what_values_tell_of_standard_parameters_is_the_inverse_of_their_covariance():
-    bench = Bench()
-    found = identify(bench.arm, bench.recordings(), rng=np.random.default_rng(0))
-    read = parameters_of('identification.json', identification_document(found, 'bench', {}))
+@pytest.fixture(scope='module')
+def bench():
+    return Bench()
+
+
+@pytest.fixture(scope='module')
+def found(bench):
+    return identify(bench.arm, bench.recordings(), rng=np.random.default_rng(0))
+
+
+@pytest.fixture(scope='module')
+def read(found):
+    return parameters_of('identification.json', identification_document(found, 'bench', {}))
+
+
+def test_information_of_standard_parameters_is_the_inverse_covariance(bench, found, read):
     told = read.information(bench.arm.parameters)
     lift = np.linalg.pinv(found.base.grouping)
     product = lift.T @ told @ lift @ found.estimate.covariance
@@ -26,10 +39,7 @@ def test_what_values_tell_of_standard_parameters_is_the_inverse_of_their_covaria
     assert replace(read, covariance=None).information(bench.arm.parameters) is None
 
 
-def test_nothing_is_told_of_parameters_that_were_not_identified():
-    bench = Bench()
-    found = identify(bench.arm, bench.recordings(), rng=np.random.default_rng(0))
-    read = parameters_of('identification.json', identification_document(found, 'bench', {}))
+def test_no_information_on_parameters_that_were_not_identified(bench, read):
     spring = CATALOGUE['joint_spring'].on(bench.robot, ('elbow',))
     arm = bench.arm.with_effect(spring)
     told = read.information(arm.parameters)

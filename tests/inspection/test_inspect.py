@@ -19,8 +19,8 @@ PERIOD = 10.0
 
 
 @pytest.fixture(scope='module')
-def robot():
-    return load_robot('humanoid_arm')
+def robot(humanoid):
+    return humanoid
 
 
 @pytest.fixture(scope='module')
@@ -65,36 +65,8 @@ def test_a_motion_that_does_not_repeat_has_no_period(clean):
     assert Sampling.of(turning).period is None
 
 
-def in_degrees(clean):
-    return replace(clean, q=np.degrees(clean.q), dq=np.degrees(clean.dq))
-
-
-def velocities_in_degrees(clean):
-    return replace(clean, dq=np.degrees(clean.dq))
-
-
-def velocities_reversed(clean):
-    return replace(clean, dq=-clean.dq)
-
-
-def velocities_empty(clean):
-    return replace(clean, dq=0 * clean.dq)
-
-
-def no_efforts(clean):
-    return replace(clean, tau=None)
-
-
-def constant_efforts(clean):
-    return replace(clean, tau=0 * clean.tau + 1.0)
-
-
-def still(clean):
-    return replace(clean, q=0 * clean.q + 0.2, dq=0 * clean.dq)
-
-
-def with_a_gap(clean):
-    return clean.select(np.r_[0:800, 860:2000])
+def short(clean):
+    return clean.select(slice(0, 300))
 
 
 def jittering(clean):
@@ -102,30 +74,34 @@ def jittering(clean):
     return replace(clean, t=clean.t + noise)
 
 
-def held_samples(clean):
-    return replace(clean, q=np.repeat(clean.q[::4], 4, axis=0))
-
-
-def short(clean):
-    return clean.select(slice(0, 300))
-
-
 @pytest.mark.parametrize(
     ('spoil', 'said'),
-    {
-        in_degrees: 'doubt: shoulder_pitch reaches',
-        velocities_in_degrees: 'are in degrees/s while positions are in rad',
-        velocities_reversed: 'have the opposite sign of what the positions do',
-        velocities_empty: 'are zero while they move',
-        no_efforts: 'bad: no efforts',
-        constant_efforts: 'bad: efforts of shoulder_pitch',
-        still: 'bad: nothing moves',
-        with_a_gap: 'doubt: 1 gap in time, the longest 0.61 s',
-        jittering: 'steps between samples vary by',
-        held_samples: 'repeat in most samples while they move',
-        short: 'doubt: 3 s is short',
-    }.items(),
-    ids=lambda case: getattr(case, '__name__', ''),
+    [
+        (lambda run: replace(run, q=np.degrees(run.q), dq=np.degrees(run.dq)), 'degrees'),
+        (lambda run: replace(run, dq=np.degrees(run.dq)), 'degrees/s'),
+        (lambda run: replace(run, dq=-run.dq), 'opposite sign'),
+        (lambda run: replace(run, dq=0 * run.dq), 'are zero'),
+        (lambda run: replace(run, tau=None), 'bad: no efforts'),
+        (lambda run: replace(run, tau=0 * run.tau + 1.0), 'bad: efforts'),
+        (lambda run: replace(run, q=0 * run.q + 0.2, dq=0 * run.dq), 'bad: nothing'),
+        (lambda run: run.select(np.r_[0:800, 860:2000]), '0.61 s'),
+        (jittering, 'vary by'),
+        (lambda run: replace(run, q=np.repeat(run.q[::4], 4, axis=0)), 'repeat in'),
+        (short, 'is short'),
+    ],
+    ids=[
+        'positions in degrees',
+        'velocities in degrees',
+        'velocities reversed',
+        'velocities of zero',
+        'no efforts',
+        'constant efforts',
+        'still',
+        'gap',
+        'jitter',
+        'held samples',
+        'short',
+    ],
 )
 def test_what_is_wrong_is_said_without_a_robot(spoil, said, clean):
     assert any(said in remark for remark in remarks(spoil(clean))), remarks(spoil(clean))
@@ -133,13 +109,7 @@ def test_what_is_wrong_is_said_without_a_robot(spoil, said, clean):
 
 
 @pytest.mark.parametrize(
-    ('factor', 'said'),
-    [
-        (1e3, 'bad: refused by `armid identify`: run: torques of'),
-        (-1.0, 'bad: refused by `armid identify`: run: torques of'),
-        (12.0, 'seem to be in kgf cm instead of N m'),
-        (4.0, 'times the torque in N m: currents'),
-    ],
+    ('factor', 'said'), [(1e3, 'refused'), (-1.0, 'refused'), (12.0, 'kgf cm'), (4.0, 'currents')]
 )
 def test_units_of_efforts_are_seen_against_the_description(factor, said, clean, robot):
     wrong = replace(clean, tau=factor * clean.tau)
@@ -153,15 +123,15 @@ def test_stamps_that_are_rounded_are_said_with_their_step(clean):
     lost = len(clean) - len(first)
     report = ReadReport(messages=len(clean), samples=len(first), duplicates=lost)
     rounded = replace(clean.select(first), t=t[first], report=report)
-    said = f'rounded to 12.5 ms: all are multiples of that. {lost} of 2000 samples'
-    assert any(said in remark for remark in remarks(rounded))
+    (said,) = (remark for remark in remarks(rounded) if 'rounded' in remark)
+    assert '12.5 ms' in said and f'{lost} of' in said
     twice = replace(clean, report=replace(report, samples=len(clean)))
     jittered = replace(twice, t=clean.t + 1e-3 * np.random.default_rng(1).uniform(size=2000))
     assert not any('rounded' in remark for remark in remarks(jittered))
 
 
 def test_what_identification_says_as_well_is_said_once(clean, robot):
-    assert sum('3 s is short' in remark for remark in remarks(short(clean), robot)) == 1
+    assert sum('is short' in remark for remark in remarks(short(clean), robot)) == 1
 
 
 def test_a_joint_beyond_its_limit_is_doubted_with_both_numbers(clean, robot):
@@ -177,14 +147,8 @@ def test_a_joint_that_moves_without_being_driven_is_doubted(clean):
     q, tau = clean.q[:, :-1], clean.tau[:, :-1]
     others = (PositionRange(clean.joints[-1], -0.5, 0.6),)
     part = replace(clean, joints=left.joints, q=q, dq=None, tau=tau, others=others)
-    moves = f'doubt: joint {clean.joints[-1]} is not driven, but moves from -0.5 to 0.6 rad'
-    assert any(text.startswith(moves) for text in remarks(part, left))
-
-
-def test_a_fit_that_explains_little_is_doubted(clean, robot):
-    pushed = 3.0 * clean.tau.std(axis=0) * np.sin(7.0 * clean.t)[:, np.newaxis]
-    other = replace(clean, tau=clean.tau + pushed)
-    assert any('do not explain' in r or 'refuses' in r for r in remarks(other, robot))
+    (said,) = (text for text in remarks(part, left) if clean.joints[-1] in text)
+    assert said.startswith('doubt: ') and '-0.5' in said
 
 
 @pytest.mark.slow
@@ -198,8 +162,7 @@ def test_what_identify_calls_unusable_is_not_taken(clean, robot):
     found = inspect(other, robot, rng=np.random.default_rng(0))
     assert graded.word != 'good'
     assert (found.trial.grade, found.trial.reasons) == (graded.word, graded.reasons)
-    said = f'Graded {graded.word} by `armid identify`: {graded.reasons[0]}'
-    assert found.verdict == said
+    assert graded.word in found.verdict and graded.reasons[0] in found.verdict
 
 
 def test_torques_that_nobody_measured_are_said_once(clean, robot):

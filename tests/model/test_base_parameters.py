@@ -12,6 +12,8 @@ from armid_ros.robots import load_robot, robot_from_urdf
 import numpy as np
 import pytest
 
+from tests.diagnosis.conftest import UPRIGHT_URDF
+
 #: The composites of the humanoid-arm paper (its Table 5, completed), lunar gravity [N mm]:
 #: expression, without load, with 0.3 kg at the centroid of link 6.
 COMPOSITES = [
@@ -114,27 +116,14 @@ def test_grouping_names_the_dependence_it_was_given():
 
 
 def hung(angle):
-    """Return an arm of two joints, the first one upright, hung by a fixed joint."""
-    link = (
-        '<link name="{0}"><inertial><origin xyz="0.05 0.02 0.15"/><mass value="3"/>'
-        '<inertia ixx="0.02" ixy="0" ixz="0" iyy="0.02" iyz="0" izz="0.01"/></inertial></link>'
+    """Return an upright arm of three joints, hung by a fixed joint."""
+    ceiling = (
+        '<robot name="upright"><link name="world"/><joint name="ceiling" type="fixed">'
+        '<parent link="world"/><child link="base"/>'
+        f'<origin xyz="0 0 2" rpy="{angle} 0 0.4"/></joint>'
     )
-    joint = (
-        '<joint name="{0}" type="revolute"><parent link="{1}"/><child link="{2}"/>'
-        '<origin xyz="0 0 0.3"/><axis xyz="{3}"/>'
-        '<limit lower="-3" upper="3" effort="50" velocity="6"/></joint>'
-    )
-    return robot_from_urdf(
-        '<robot name="hung"><link name="world"/><link name="base"/>'
-        '<joint name="ceiling" type="fixed"><parent link="world"/><child link="base"/>'
-        f'<origin rpy="{angle} 0 0.4"/></joint>'
-        + link.format('column')
-        + link.format('upper')
-        + joint.format('turn', 'base', 'column', '0 0 1')
-        + joint.format('shoulder', 'column', 'upper', '0 1 0')
-        + '</robot>',
-        gravity='earth',
-    )
+    text = UPRIGHT_URDF.replace('<robot name="upright">', ceiling)
+    return robot_from_urdf(text, gravity='earth')
 
 
 @pytest.mark.parametrize('angle', ['3.1415926', '3.14159', '3.1416', '3.14'])

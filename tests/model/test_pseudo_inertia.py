@@ -61,11 +61,6 @@ def test_a_violated_triangle_inequality_is_no_body():
     assert found.moments[0] + found.moments[1] < found.moments[2]
 
 
-def test_shipped_arm_is_made_of_bodies():
-    robot = load_robot('humanoid_arm')
-    require_consistent(robot.links, robot.rigid_parameters)
-
-
 def test_refusal_names_the_link_and_the_remedy():
     robot = load_robot('humanoid_arm')
     pi = robot.rigid_parameters.copy()

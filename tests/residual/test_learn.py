@@ -8,14 +8,13 @@ import sys
 from armid_ros.diagnosis import diagnose
 from armid_ros.errors import IdentificationError
 from armid_ros.report.diagnosis_report import diagnosis_report, Extras
-from armid_ros.residual import learn, learn_residual, lookup_table
+from armid_ros.residual import learn_residual, lookup_table
 from armid_ros.residual.gaussian_process import learn_map
 from armid_ros.residual.law import suggest_law
 from armid_ros.residual.learn import near_data
 from armid_ros.residual.rows import BLOCKS, JointRows
 import numpy as np
 import pytest
-from threadpoolctl import threadpool_info, threadpool_limits
 
 from tests.diagnosis.conftest import Bench
 
@@ -118,39 +117,12 @@ def test_what_has_no_name_is_learned_and_becomes_part_of_the_model(unknown, lear
     assert learned.joints[0].learned.torque(at) == pytest.approx(first[3], abs=1e-5)
 
 
-def test_the_page_says_what_is_in_the_model_that_is_written(unknown, learned):
-    plain = diagnosis_report(unknown, {}, robot='two_links')
-    asked = replace(unknown, verdict='unknown')
-    page = diagnosis_report(asked, {}, robot='two_links', extras=Extras(residual=learned))
-    joint = asked.arm.robot.joints[1]
-    assert 'The model is unchanged.' not in page
-    assert f'the learned residual of {joint}' in page
-    assert f'{joint}: the map predicts' in page
-    assert 'the learned residual of' not in plain
-    begin, end = page.index('>What to do next</h2>'), page.index('>Data quality</h2>')
-    assert joint in page[begin:end]
-
-
 def test_a_map_that_harms_held_out_recordings_says_so(unknown, learned):
     harmful = replace(learned, joints=(replace(learned.joints[0], held_out=-140.0),))
     assert 'get worse' in harmful.sentences()[0]
     page = diagnosis_report(unknown, {}, robot='two_links', extras=Extras(residual=harmful))
     assert '>worse<' in page
     assert '-14000' not in page
-
-
-def test_small_systems_are_solved_in_one_thread(unknown, monkeypatch):
-    threads = []
-
-    def watched(*args):
-        threads.extend(library['num_threads'] for library in threadpool_info())
-        return learn_map(*args)
-
-    monkeypatch.setattr(learn, 'learn_map', watched)
-    with threadpool_limits(2):
-        learn_residual(replace(unknown, verdict='unknown'), np.random.default_rng(0))
-        assert max(library['num_threads'] for library in threadpool_info()) == 2
-    assert set(threads) == {1}
 
 
 def test_a_name_is_never_replaced(unknown):

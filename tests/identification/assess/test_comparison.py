@@ -7,7 +7,6 @@ from armid_ros.errors import ModelError
 from armid_ros.estimate import ParameterName
 from armid_ros.identification.assess.compare import compare
 from armid_ros.identification.parameters_file import ParameterFile, read_parameters
-from armid_ros.report.compare_report import tell
 import numpy as np
 import pytest
 
@@ -42,24 +41,10 @@ def test_a_difference_beyond_all_numbers_of_deviations_is_a_change():
     before = parameters([1.0, 2.0], [1e-320, 1e-320])
     after = parameters([1e100, 2.0], [1e-320, 1e-320])
     covariance = np.diag([1e-318, 1e-318])
-    for one, other in (
-        (before, after),
-        (drawn_as(before, covariance), drawn_as(after, covariance)),
-    ):
-        (change,) = compare(one, other).changed
+    for known in (None, covariance):
+        pair = [replace(one, covariance=known) for one in (before, after)]
+        (change,) = compare(*pair).changed
         assert change.parameter.joint == 'joint_1'
-
-
-def drawn_as(parameters, covariance):
-    """Return parameters with a covariance."""
-    return replace(parameters, covariance=covariance)
-
-
-def test_what_only_one_has_is_listed():
-    comparison = compare(parameters([1.0], [0.1]), parameters([1.0, 2.0], [0.1, 0.1]))
-    assert [one.parameter.joint for one in comparison.only_after] == ['joint_2']
-    assert comparison.only_before == ()
-    assert comparison.document()['not_compared'] == 1
 
 
 def correlated(rng, size):
@@ -122,31 +107,36 @@ def test_a_load_is_found_on_its_link_with_its_mass_and_centre():
     np.testing.assert_allclose(found.center, [0.0, 0.1, 0.2], atol=0.02)
 
 
-def test_a_motion_that_shows_less_is_compared_with_one_that_shows_more():
-    """One that shows a sum only, against one that shows both; and the other way round."""
+@pytest.fixture
+def rich():
+    """Return an identification that shows two moments."""
     both = [ParameterName(name, 'elbow', 'kg m') for name in ('mx1', 'my1')]
+    table = {both[0]: (1.0, 0.1), both[1]: (2.0, 0.1)}
+    terms = {name: {name.name: 1.0} for name in both}
+    return ParameterFile('a', 'arm', table, 5.0, 0.01 * np.eye(2), terms)
+
+
+@pytest.fixture
+def poor():
+    """Return an identification that shows a sum of these moments only."""
     together = ParameterName('mx1 + 2 my1', 'elbow', 'kg m')
-    rich = ParameterFile(
-        'a',
-        'arm',
-        {both[0]: (1.0, 0.1), both[1]: (2.0, 0.1)},
-        5.0,
-        0.01 * np.eye(2),
-        {name: {name.name: 1.0} for name in both},
-    )
-    poor = ParameterFile(
-        'b',
-        'arm',
-        {together: (7.0, 0.3)},
-        5.0,
-        np.array([[0.09]]),
-        {together: {'mx1': 1, 'my1': 2}},
-    )
+    terms = {together: {'mx1': 1, 'my1': 2}}
+    return ParameterFile('b', 'arm', {together: (7.0, 0.3)}, 5.0, np.array([[0.09]]), terms)
+
+
+def test_a_motion_that_shows_less_is_compared_with_one_that_shows_more(rich, poor):
     for pair, sign in (((rich, poor), 1.0), ((poor, rich), -1.0)):
         (change,) = compare(*pair).changes
-        assert change.parameter == together
+        assert change.parameter in poor.values
         assert change.difference == pytest.approx(sign * 2.0)
         assert change.std == pytest.approx(np.sqrt(0.09 + 0.05))
+
+
+def test_a_grouping_varies_as_its_parameters_do(rich, poor):
+    rows = np.random.default_rng(5).normal(size=(3, 2))
+    regrouped = replace(rich, scatter=rows).regrouped_as(poor)
+    np.testing.assert_allclose(regrouped.scatter_of(list(poor.values)), rows @ [[1.0], [2.0]])
+    assert poor.scatter_of(list(poor.values)).shape == (0, 1)
 
 
 def recorded(rng, truth, size, noise, source='a'):
@@ -184,33 +174,6 @@ def test_a_change_beyond_what_recordings_differ_by_is_found():
         assert 0.02 < first.std < 0.08
 
 
-def test_a_grouping_varies_as_its_parameters_do():
-    rng = np.random.default_rng(5)
-    both = [ParameterName(name, 'elbow', 'kg m') for name in ('mx1', 'my1')]
-    together = ParameterName('mx1 + 2 my1', 'elbow', 'kg m')
-    rows = rng.normal(size=(3, 2))
-    terms = {name: {name.name: 1.0} for name in both}
-    table = {both[0]: (1.0, 0.1), both[1]: (2.0, 0.1)}
-    rich = ParameterFile('a', 'arm', table, 5.0, 0.01 * np.eye(2), terms, scatter=rows)
-    poor = ParameterFile('b', 'arm', {together: (7.0, 0.3)}, 5.0, np.array([[0.09]]))
-    poor = replace(poor, terms={together: {'mx1': 1, 'my1': 2}})
-    regrouped = rich.regrouped_as(poor)
-    np.testing.assert_allclose(regrouped.scatter_of([together]), rows @ [[1.0], [2.0]])
-    assert poor.scatter_of([together]).shape == (0, 1)
-
-
-def test_a_change_of_two_links_is_no_load():
-    rng = np.random.default_rng(0)
-    terms = {name: {name.name: 1.0} for name in LINKS}
-    covariance = 1e-6 * np.eye(len(LINKS))
-    truth, other = np.zeros(len(LINKS)), np.ones(len(LINKS))
-    comparison = compare(
-        drawn(rng, LINKS, truth, covariance, terms), drawn(rng, LINKS, other, covariance, terms)
-    )
-    assert comparison.changed
-    assert comparison.load is None
-
-
 def test_why_a_parameter_is_not_compared_is_told_apart():
     shared = {ParameterName('Izz1', 'a', 'kg m^2'): (1.0, 0.1)}
     alone = {
@@ -243,50 +206,47 @@ def test_known_exactly_and_equal_is_no_change(equal):
     assert found.changed == () and found.changes[0].deviations == 0.0
 
 
-class TestRefusals:
-    """What cannot be compared is refused by name."""
+BARE = replace(parameters([], []), without_std=dict.fromkeys(LINKS, 1.0), source='bare')
+OTHER = ParameterFile('other', 'arm', {ParameterName('x', '', 'm'): (0.0, 1.0)}, None)
 
-    @pytest.mark.parametrize(('other', 'said'), [('a', 'a;'), ('copy', r'copy \(is a\);')])
-    def test_one_result_under_one_name_or_two(self, other, said):
-        one, again = parameters([1.0], [0.1]), parameters([1.0], [0.1], source=other)
-        with pytest.raises(ModelError, match=f'^given twice: {said}'):
-            compare(one, again)
 
-    def test_a_file_without_any_deviation(self):
-        bare = replace(parameters([], []), without_std=dict.fromkeys(LINKS, 1.0), source='bare')
-        with pytest.raises(ModelError, match='bare has no standard deviation of any parameter'):
-            compare(parameters([1.0], [0.1]), bare)
+@pytest.mark.parametrize(
+    ('other', 'said'),
+    [
+        (parameters([1.0], [0.1]), 'twice: a;'),
+        (parameters([1.0], [0.1], source='copy'), 'twice: copy'),
+        (BARE, 'bare .*standard deviation'),
+        (OTHER, 'other .*common'),
+    ],
+    ids=['itself', 'a copy', 'no deviation', 'nothing in common'],
+)
+def test_what_cannot_be_compared_is_refused_by_name(other, said):
+    with pytest.raises(ModelError, match=said):
+        compare(parameters([1.0], [0.1]), other)
 
-    def test_nothing_in_common(self):
-        other = ParameterFile('b', 'arm', {ParameterName('x', '', 'm'): (0.0, 1.0)}, None)
-        with pytest.raises(ModelError, match='a and b have no identified parameter in common'):
-            compare(parameters([1.0], [0.1]), other)
 
-    def test_an_empty_folder(self, tmp_path):
-        with pytest.raises(ModelError, match=r'neither identification\.json nor model\.yaml'):
-            read_parameters(tmp_path)
+def test_a_folder_without_results_is_refused(tmp_path):
+    with pytest.raises(ModelError, match=r'identification\.json.*model\.yaml'):
+        read_parameters(tmp_path)
 
-    def test_no_file(self, tmp_path):
-        with pytest.raises(ModelError, match='No such file'):
-            read_parameters(tmp_path / 'identification.json')
 
-    @pytest.mark.parametrize(
-        ('text', 'said'),
-        [
-            ('{"schema": "other"}', 'schema'),
-            ('{"schema":', 'neither JSON nor YAML'),
-            (
-                '{"schema": "armid/identification/1", "robot": "x", "parameters": '
-                '[{"joint": "a", "value": 1, "std": 1, "unit": ""}]}',
-                'name',
-            ),
-        ],
-    )
-    def test_another_or_a_broken_document_and_a_row_without_a_name(self, tmp_path, text, said):
-        path = tmp_path / 'identification.json'
-        path.write_text(text)
-        with pytest.raises(ModelError, match=said):
-            read_parameters(path)
+@pytest.mark.parametrize(
+    ('text', 'said'),
+    [
+        ('{"schema": "other"}', 'schema'),
+        ('{"schema":', 'JSON'),
+        (
+            '{"schema": "armid/identification/1", "robot": "x", "parameters": '
+            '[{"joint": "a", "value": 1, "std": 1, "unit": ""}]}',
+            'name',
+        ),
+    ],
+)
+def test_another_or_a_broken_document_and_a_row_without_a_name(tmp_path, text, said):
+    path = tmp_path / 'identification.json'
+    path.write_text(text)
+    with pytest.raises(ModelError, match=said):
+        read_parameters(path)
 
 
 def written(tmp_path, **changes):
@@ -307,16 +267,16 @@ def written(tmp_path, **changes):
 @pytest.mark.parametrize(
     ('changes', 'message'),
     [
-        ({'value': float('nan')}, 'Izz1 of joint a has to be a finite number'),
-        ({'value': 10**400}, 'has to be a finite number'),
-        ({'std': float('inf')}, 'the std of Izz1 of joint a has to be a finite number'),
-        ({'std': -0.1}, 'the std of Izz1 of joint a is negative'),
-        ({'covariance': [[-0.01]]}, 'a negative variance'),
+        ({'value': float('nan')}, 'Izz1 .*joint a .*finite'),
+        ({'value': 10**400}, 'finite'),
+        ({'std': float('inf')}, 'std of Izz1 .*finite'),
+        ({'std': -0.1}, 'std of Izz1 .*negative'),
+        ({'covariance': [[-0.01]]}, 'negative variance'),
         ({'covariance': [[float('nan')]]}, 'not finite'),
-        ({'covariance': [[1.0], [0.0, 1.0]]}, 'no triangle of 1 rows'),
+        ({'covariance': [[1.0], [0.0, 1.0]]}, 'triangle'),
         ({'error': 'x'}, 'relative_error_percent'),
-        ({'scatter': [[0.1, 0.2]]}, 'a scatter whose rows are not of 1 values'),
-        ({'scatter': [[float('inf')]]}, 'a scatter has to be a finite number'),
+        ({'scatter': [[0.1, 0.2]]}, 'scatter .*rows'),
+        ({'scatter': [[float('inf')]]}, 'scatter .*finite'),
     ],
 )
 def test_numbers_that_no_estimate_has_are_refused(tmp_path, changes, message):
@@ -338,7 +298,5 @@ def test_currents_beside_newton_metres_are_a_unit_and_no_change_of_the_arm(inver
     comparison = compare(*(files[::-1] if inverse else files))
     expected = {j: gain if inverse else 1.0 / gain for j, gain in gains.items()}
     assert comparison.factors == pytest.approx(expected)
-    (said,) = tell(comparison)
-    assert 'currents' in said
     payload = dict(torque) | {names[0]: (3.0 * values[0], 0.01)}
     assert compare(files[0], ParameterFile('c', 'arm', payload, 5.0)).factors == {}

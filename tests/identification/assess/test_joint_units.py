@@ -9,14 +9,11 @@ from armid_ros.effects import make_effect
 from armid_ros.identification import grade, identify
 from armid_ros.identification.assess.data_faults import check_data
 from armid_ros.identification.assess.joint_units import (
-    factors_since,
     unit_faults,
     units_beyond_drives,
 )
 from armid_ros.identification.rows.regression import Stretch
 from armid_ros.identification.rows.signals import conditioning, segments, SignalSettings
-from armid_ros.model import regressor
-from armid_ros.motion import Motion
 from armid_ros.robots import load_robot
 import numpy as np
 import pytest
@@ -58,7 +55,7 @@ def beyond_drives(robot, recording):
 
 def test_half_of_the_readings_at_sixty_times_a_limit_are_in_another_unit(arm, run):
     (said,) = beyond_drives(arm.robot, times(run, 1e3))
-    assert said.startswith(f'the torque of {arm.robot.joints[WRIST]} seems to be in another unit')
+    assert arm.robot.joints[WRIST] in said and 'another unit' in said
 
 
 def test_torques_in_newton_metres_and_a_few_wrong_samples_are_no_unit(arm, run):
@@ -69,64 +66,20 @@ def test_torques_in_newton_metres_and_a_few_wrong_samples_are_no_unit(arm, run):
 
 
 def test_currents_are_in_no_one_unit(arm, run):
-    joints = arm.robot.joints
     gains = np.array([0.083, 0.025, 0.09, 0.125, 0.3, 0.5])
     currents = replace(run, tau=run.tau / gains)
     (said,) = unit_faults(arm, filtered(currents), filtered(run))
-    assert f'12 in {joints[0]}, 40 in {joints[1]}' in said and 'currents?' in said
+    assert 'currents?' in said
     assert said.endswith('--current-gain 0.083,0.025,0.09,0.125,0.3,0.5')
     assert unit_faults(arm, filtered(run), filtered(run)) == []
     (said,) = unit_faults(arm, filtered(replace(run, tau=1e3 * run.tau)), filtered(run))
-    assert 'is in N mm if those of the baseline are in N m' in said
-
-
-def moved(motion, joints, pose):
-    """Return a motion of some joints, with the others at rest."""
-    still = ~np.isin(np.arange(motion.n_joints), joints)
-    q, dq, ddq = (x.copy() for x in (motion.q, motion.dq, motion.ddq))
-    q[:, still], dq[:, still], ddq[:, still] = pose[still], 0.0, 0.0
-    return replace(motion, q=q, dq=dq, ddq=ddq)
-
-
-def test_a_model_that_a_baseline_does_not_determine_tells_no_factor(arm):
-    """
-    Moved one after the other, joints do not show what each makes of the torque of another.
-
-    The model is right in its first joint where that moves, and off by many times its torque
-    where the second does; a torque that follows it all the same is one five-hundredth of it.
-
-    """
-    robot, pose = arm.robot, np.full(6, 0.3)
-    steps = Motion(
-        robot.joints, np.arange(2.0), np.tile(pose, (2, 1)), np.zeros((2, 6)), np.eye(6)[:2]
-    )
-    body = regressor(robot, steps)[:, :, 14:20]
-    coupling = np.linalg.lstsq(
-        np.array([body[0, 0], body[1, 1], body[1, 0]]), np.array([0.0, 0.0, 5.0]), rcond=None
-    )[0]
-    links = robot.rigid_parameters.copy()
-    links[14:20] += coupling
-    model = replace(arm, robot=robot.with_inertias(links))
-    motion = multisine(robot.joints, 10.0, 100.0, seed=3)
-    alone = [recorded(arm, moved(motion, joints, pose)) for joints in ([0], [1, 2, 3, 4, 5])]
-    now = filtered(times(recorded(model, motion), 1.0 / 500.0, (0,)))
-    before = [part for one in alone for part in filtered(one)]
-    assert unit_faults(model, now, before) == []
-    assert factors_since(model, now, before)[0] == 0.0 < factors_since(model, now)[0]
-    assert factors_since(arm, before, before)[0] == pytest.approx(1.0)
-
-
-def test_limits_that_the_body_itself_needs_more_than_are_wrong(arm, run):
-    needy = replace(arm.robot, torque_limit=np.where(np.arange(6) == 1, 1e-3, 1e3))
-    assert beyond_drives(needy, run) == []
-    assert beyond_drives(replace(arm.robot, torque_limit=np.full(6, 1e-3)), run) == []
+    assert 'N mm' in said
 
 
 @pytest.mark.parametrize(('factor', 'unit'), [(1e3, 'N mm'), (1e2, 'N cm'), (1e-3, 'kN m')])
 def test_a_model_with_the_friction_tells_the_unit(arm, run, factor, unit):
     (said,) = unit_faults(arm, filtered(times(run, factor)))
-    assert arm.robot.joints[WRIST] in said
-    assert f'in {unit} instead' in said
+    assert arm.robot.joints[WRIST] in said and f'in {unit} ' in said
 
 
 @pytest.mark.parametrize('factor', [1.0, 3.0, 20.0])
@@ -146,7 +99,7 @@ def test_the_grade_of_a_fit_of_such_a_torque_is_poor(arm, run):
     fitted = identify(arm, [wrong], rng=np.random.default_rng(0))
     found = grade(fitted, arm, [wrong], {})
     assert found.word == 'poor'
-    assert 'another unit than N m' in found.reasons[0]
+    assert arm.robot.joints[WRIST] in found.reasons[0]
 
 
 def test_such_data_are_not_diagnosed(arm, run):
@@ -154,7 +107,5 @@ def test_such_data_are_not_diagnosed(arm, run):
     used = conditioning([wrong], SignalSettings())
     (motion,) = segments(wrong, used)
     part = Stretch(wrong.source, motion, np.abs(motion.dq) > 0.1)
-    faults, _ = check_data(arm, [wrong], used, [part])
-    assert faults == [
-        f'the torque of {arm.robot.joints[WRIST]} seems to be in N mm instead of N m: convert it'
-    ]
+    (fault,), _ = check_data(arm, [wrong], used, [part])
+    assert arm.robot.joints[WRIST] in fault and 'N mm' in fault

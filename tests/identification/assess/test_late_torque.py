@@ -9,18 +9,12 @@ from armid_ros.effects.slipping import Hysteresis
 from armid_ros.identification.assess.late_torque import late_torque
 from armid_ros.identification.assess.mistakes import find_mistake
 from armid_ros.identification.rows.signals import conditioning, SignalSettings
-from armid_ros.robots import load_robot
 import numpy as np
 import pytest
 
 from ..conftest import multisine, recorded
 
 RATE = 100.0
-
-
-@pytest.fixture(scope='module')
-def robot():
-    return load_robot('humanoid_arm')
 
 
 def giving_way(robot, length, seed, share=1.0):
@@ -49,8 +43,7 @@ def told(robot, recording):
     return late_torque(robot, recording, conditioning([recording], SignalSettings()))
 
 
-@pytest.mark.parametrize('share', [0.5, 1.0, 2.0])
-@pytest.mark.parametrize('length', [1e-4, 1e-3, 3e-3, 1e-2])
+@pytest.mark.parametrize(('length', 'share'), [(1e-4, 2.0), (1e-3, 0.5), (3e-3, 2.0), (1e-2, 0.5)])
 def test_friction_that_gives_way_is_no_delay(robot, length, share):
     """Friction of half and of twice the torque of the body, over a tenth to ten milliradians."""
     recording = giving_way(robot, length, 3, share)
@@ -60,8 +53,9 @@ def test_friction_that_gives_way_is_no_delay(robot, length, share):
     assert late is None or abs(late.seconds) - late.half_width < 2e-3
 
 
-@pytest.mark.parametrize('seconds', [-0.05, 0.02, 0.05, 0.1])
-@pytest.mark.parametrize('length', [1e-4, 2e-3, 1e-2])
+@pytest.mark.parametrize(
+    ('length', 'seconds'), [(1e-4, -0.05), (2e-3, 0.1), (1e-2, 0.02), (1e-2, 0.05)]
+)
 def test_a_delay_is_told_beside_friction_that_gives_way(robot, length, seconds):
     late = told(robot, delayed(giving_way(robot, length, 4), seconds))
     assert late is not None

@@ -3,12 +3,13 @@
 """Velocities that are a factor from positions in every joint show a time that is not the arm's."""
 
 from dataclasses import replace
+import re
 
 from armid_ros.arm import ArmModel
 from armid_ros.effects import make_effect
 from armid_ros.identification import grade, identify
 from armid_ros.identification.assess.data_faults import check_data
-from armid_ros.identification.assess.sensor_faults import velocity_faults, velocity_ratio
+from armid_ros.identification.assess.sensor_faults import velocity_faults
 from armid_ros.identification.rows.regression import Stretch
 from armid_ros.identification.rows.signals import conditioning, segments, SignalSettings
 from armid_ros.inspection import inspect
@@ -43,12 +44,8 @@ def time_faults(recording):
 @pytest.mark.parametrize('factor', [0.5, 0.9, 1.1, 3.0])
 def test_a_wrong_time_is_said(run, factor):
     (said,) = time_faults(replace(run, t=factor * run.t))
-    number = said.split(' times what positions do')[0].split()[-1]
+    number = re.search(r'(\S+) times', said).group(1)
     assert float(number) == pytest.approx(factor, rel=0.01)
-
-
-def late(run):
-    return replace(run, dq=signal.lfilter([0.06], [1.0, -0.94], run.dq, axis=0))
 
 
 def jittering(run):
@@ -56,39 +53,22 @@ def jittering(run):
     return replace(run, t=np.sort(run.t + by))
 
 
-def broken(run):
-    return run.select(np.r_[0:700, 1100:2000])
-
-
-def one_joint(run):
-    return replace(run, dq=run.dq * np.array([1.0, 1.0, 1.2, 1.0, 1.0, 1.0]))
-
-
-def in_degrees(run):
-    return replace(run, dq=np.rad2deg(run.dq))
-
-
-def slow(run):
-    return run.select(slice(None, None, 8))
-
-
-def slightly_off(run):
-    return replace(run, dq=1.03 * run.dq)
-
-
-def without(run):
-    return replace(run, dq=None)
-
-
 @pytest.mark.parametrize(
-    'change', [late, jittering, broken, one_joint, in_degrees, slow, slightly_off, without]
+    'change',
+    [
+        lambda run: replace(run, dq=signal.lfilter([0.06], [1.0, -0.94], run.dq, axis=0)),
+        jittering,
+        lambda run: run.select(np.r_[0:700, 1100:2000]),
+        lambda run: replace(run, dq=run.dq * np.array([1.0, 1.0, 1.2, 1.0, 1.0, 1.0])),
+        lambda run: replace(run, dq=np.rad2deg(run.dq)),
+        lambda run: run.select(slice(None, None, 8)),
+        lambda run: replace(run, dq=1.03 * run.dq),
+        lambda run: replace(run, dq=None),
+    ],
+    ids=['late', 'jitter', 'gap', 'one joint', 'degrees', 'coarse', 'slightly off', 'without'],
 )
 def test_what_noise_filters_and_units_make_is_no_wrong_time(run, change):
     assert time_faults(change(run)) == []
-
-
-def test_ratios_of_a_coarse_and_noisy_recording_are_close(run):
-    assert np.allclose(velocity_ratio(slow(run))[0], 1.0, atol=0.02)
 
 
 def test_inspection_grade_and_diagnosis_say_it(arm, run):
@@ -105,4 +85,4 @@ def test_inspection_grade_and_diagnosis_say_it(arm, run):
     (motion,) = segments(wrong, used)
     part = Stretch('run', motion, np.abs(motion.dq) > 0.1)
     (fault,) = check_data(arm, [wrong], used, [part])[0]
-    assert 'run velocities of all joints' in fault
+    assert '1.1 times' in fault

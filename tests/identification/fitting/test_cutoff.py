@@ -41,15 +41,3 @@ def test_what_no_torque_makes_is_cut_off(arm):
     spectra, torques = chosen(arm, recordings(arm, shake=1e-3))
     assert spectra > 15.0
     assert torques < 15.0
-
-
-def test_ends_that_are_cut_off_with_a_lower_cutoff_do_not_choose_it(arm):
-    data = recordings(arm)
-    loud = []
-    for recording in data:
-        rng = np.random.default_rng(0)
-        ends = (recording.t < recording.t[0] + 1.5) | (recording.t > recording.t[-1] - 1.5)
-        noise = rng.normal(size=recording.tau.shape) * np.std(recording.tau, axis=0)
-        loud.append(replace(recording, tau=recording.tau + 0.5 * ends[:, None] * noise))
-    spectra, torques = chosen(arm, loud)
-    assert torques == spectra

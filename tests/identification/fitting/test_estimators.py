@@ -84,9 +84,7 @@ def test_intervals_hold_the_truth(arm, motion):
 
 
 def test_settings_that_no_estimator_has_are_refused():
-    with pytest.raises(IdentificationError, match='method iv; use ols, wls or irls'):
+    with pytest.raises(IdentificationError, match=r'iv\b.*irls'):
         IdentificationSettings('iv', physical=PhysicalSettings())
-    with pytest.raises(
-        IdentificationError, match="no method 'ekf'; use one of ols, wls, irls, iv"
-    ):
+    with pytest.raises(IdentificationError, match=r'ekf.*wls'):
         IdentificationSettings('ekf')

@@ -4,8 +4,6 @@
 
 from dataclasses import replace
 
-from armid_ros.arm import ArmModel
-from armid_ros.effects import make_effect
 from armid_ros.identification import grade, identify
 from armid_ros.identification.fitting.excited import base_spread
 from armid_ros.identification.fitting.identifiability import NOT_SHOWN
@@ -82,22 +80,6 @@ def test_what_is_held_is_as_described(structure, found):
 
 
 def test_a_motion_of_all_joints_holds_nothing(structure, real):
-    rich = recorded(real, multisine(real.robot.joints, 60.0, 100.0, seed=5), 0, NOISE, 2e-5)
+    rich = recorded(real, multisine(real.robot.joints, 30.0, 100.0, seed=5), 0, NOISE, 2e-5)
     found = identify(structure, [rich], rng=np.random.default_rng(0))
     assert found.base.rank == found.theory.rank
-
-
-def test_friction_and_links_without_mass_have_no_spread(structure):
-    base = structure.base_parameters(np.random.default_rng(0))
-    spread = base_spread(structure, base)
-    friction = ['coefficient' in name.name for name in base.parameters]
-    assert np.all(np.isinf(spread[friction]))
-    assert np.all(np.isfinite(spread[:-18])) and np.all(spread > 0.0)
-    weightless = replace(structure, robot=structure.robot.with_inertias(np.zeros(60)))
-    assert np.all(np.isinf(base_spread(weightless, base)))
-    payload = ArmModel(structure.robot).with_effect(
-        make_effect('payload', structure.robot), np.zeros(10)
-    )
-    assert np.all(
-        np.isfinite(base_spread(payload, payload.base_parameters(np.random.default_rng(0))))
-    )

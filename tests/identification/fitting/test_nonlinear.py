@@ -9,13 +9,8 @@ from armid_ros.effects import CATALOGUE, make_effect
 from armid_ros.identification import (
     IdentificationSettings,
     identify,
-    PhysicalSettings,
     Score,
-    SignalSettings,
 )
-from armid_ros.identification.assess.consistency import check_noise
-from armid_ros.identification.fitting.nonlinear import _carried
-from armid_ros.robots import load_robot
 import numpy as np
 import pytest
 
@@ -34,11 +29,6 @@ _ORDER = np.random.default_rng(0).permutation(list(CATALOGUE)).tolist()
 PAIRS = list(pairwise([*_ORDER, _ORDER[0]]))
 
 
-@pytest.fixture(scope='module')
-def robot():
-    return load_robot('humanoid_arm')
-
-
 def with_sizes(robot, names, seed):
     """Return an arm that is 10 % heavier than described, with effects as large as is typical."""
     rng = np.random.default_rng(seed)
@@ -55,13 +45,6 @@ def with_sizes(robot, names, seed):
         sign = np.where(lower < 0.0, rng.choice([-1.0, 1.0], len(size)), 1.0)
         arm = arm.with_effect(effect, sign * size * rng.uniform(0.7, 1.3, len(size)))
     return arm
-
-
-@pytest.mark.parametrize('rounded', [0.0, 4.1e-17, -4.1e-17])
-def test_a_first_moment_gets_a_mass_however_its_own_zero_is_rounded(rounded):
-    rigid = np.array([rounded, 0.0, 0.18, *np.zeros(7), 2.0, *np.zeros(9)])
-    masses = _carried(rigid, np.eye(20))[::10]
-    np.testing.assert_allclose(masses, [0.9, 2.0], rtol=1e-9)
 
 
 def fitted(robot, names, seed=0, **settings):
@@ -113,19 +96,6 @@ def test_pairs_too(robot, pair):
     agrees(robot, pair, seed=1)
 
 
-@pytest.mark.long
-@pytest.mark.parametrize('name', ['load_dependent_friction', 'torque_gain'])
-def test_bodies_are_fitted_to_what_the_torque_is(robot, name):
-    _, recording, result = fitted(robot, [name], physical=PhysicalSettings())
-    training = error(result.training)
-    assert error(result.predict([recording])) == pytest.approx(training, rel=1e-3)
-    np.testing.assert_allclose(
-        result.joint_std, NOISE * np.linalg.norm(result.used.taps()), rtol=0.3
-    )
-    assert result.physical is not None
-    assert min(link.eigenvalues[0] for link in result.physical.links) > 0.0
-
-
 def test_what_is_known_of_a_nonlinear_effect_is_where_the_fit_begins(robot):
     """An arm that has the values already is at its own torque, not at that of its columns."""
     truth, recording, _ = fitted(robot, ['torque_gain', 'encoder_offset'])
@@ -137,37 +107,12 @@ def test_what_is_known_of_a_nonlinear_effect_is_where_the_fit_begins(robot):
     )
 
 
-def test_the_check_for_encoder_noise_is_about_the_identified_arm(robot):
-    """Exact positions: neither a bias, nor a difference to the fit with instruments."""
-    _, recording, result = fitted(robot, ['encoder_offset', 'load_dependent_friction'])
-    check = check_noise(result, [recording], rng=np.random.default_rng(1), repeats=2)
-    assert check.p_value > 1e-3
-    assert check.harmless
-
-
 def test_a_fit_that_does_not_settle_says_so(robot, monkeypatch):
     monkeypatch.setattr('armid_ros.identification.fitting.nonlinear.MOST_PASSES', 1)
     _, recording, result = fitted(robot, ['torque_gain'])
     assert any('has not settled' in note for note in result.notes)
     training = error(result.training)
     assert error(result.predict([recording])) == pytest.approx(training, rel=1e-3)
-
-
-@pytest.mark.long
-@pytest.mark.slow
-def test_chunks_of_a_long_stretch_join(robot, monkeypatch):
-    """The torque is taken in parts of a long stretch, which an encoder zero makes overlap."""
-    monkeypatch.setattr('armid_ros.identification.rows.regression._CHUNK', 2_500)
-    truth = with_sizes(robot, ['encoder_offset', 'torque_gain'], 0)
-    recording = recorded(truth, multisine(robot.joints, 12.0, 500.0, seed=1))
-    signals = SignalSettings(cutoff_hz=20.0, decimation=25)
-    result = identify(
-        ArmModel(robot, truth.effects),
-        [recording],
-        IdentificationSettings(signals=signals),
-        rng=np.random.default_rng(0),
-    )
-    assert error(result.training) < 1e-3
 
 
 def test_what_the_described_torque_never_reaches_is_found_where_the_fitted_one_does(robot):

@@ -8,10 +8,8 @@ from armid_ros.identification.fitting.normal_equations import (
     factored,
     informative_basis,
     NormalEquations,
-    scaled_fit,
     weighted_fit,
 )
-from armid_ros.identification.online.recursive import RecursiveLeastSquares
 from armid_ros.identification.rows.regression import regressions
 from armid_ros.identification.rows.signals import Conditioning
 from hypothesis import given
@@ -55,18 +53,6 @@ def test_the_fit_of_a_sum_is_that_of_all_rows(problem):
     assert fit.condition_number == pytest.approx(condition, rel=1e-6)
 
 
-def test_recursion_and_batch_agree(problem, theory):
-    whole = solve(problem)
-    noise = 1.0 / np.max(whole.weights, axis=0)
-    recursive = RecursiveLeastSquares(theory.parameters, noise)
-    for part in problem:
-        for rows, tau, told in zip(part.columns, part.tau, part.informative, strict=True):
-            recursive.update(rows, tau, told.astype(float))
-    batch = scaled_fit(added(problem), noise)
-    # the recursion begins with a ridge, which is all that is between them
-    np.testing.assert_allclose(recursive.values, batch.values, rtol=1e-6, atol=1e-9)
-
-
 def test_squares_of_torques_and_residuals_are_those_of_the_rows(problem):
     normal = added(problem)
     values = np.random.default_rng(1).normal(size=normal.rank)
@@ -76,13 +62,6 @@ def test_squares_of_torques_and_residuals_are_those_of_the_rows(problem):
     np.testing.assert_allclose(normal.target_squares, np.sum(told * tau**2, axis=0))
     np.testing.assert_allclose(normal.squares(values), np.sum(told * left**2, axis=0))
     np.testing.assert_array_equal(normal.counts, told.sum(axis=0))
-
-
-def test_some_columns_are_the_normal_equations_of_some_columns(problem):
-    kept = np.arange(5, 30)
-    small = NormalEquations.of(problem).restrict(kept)
-    direct = NormalEquations.of([part.restrict(kept) for part in problem])
-    np.testing.assert_allclose(small.products, direct.products, rtol=1e-9, atol=1e-9)
 
 
 def test_what_is_packed_comes_back(problem):

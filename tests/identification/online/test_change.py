@@ -67,32 +67,25 @@ def score_statistics(block, directions, residual_scale=1.0):
     return at_once(weighing([block], block, directions, residual_scale))
 
 
-def test_the_size_of_a_change_is_that_of_least_squares_over_all_rows():
-    """Before and after in one problem, with a column for the change: the same answer."""
+@pytest.mark.parametrize('noise', [1.0, 3.0])
+def test_the_size_of_a_change_is_that_of_least_squares_over_all_rows(noise):
+    """Before and after in one problem, with a column for the change, in any unit of noise."""
     rng = np.random.default_rng(0)
-    _, block, w, tau = learned_and_block(rng, 0.7, seen=5)
-    found, covariance = score_statistics(block, CHANGED).size(slice(0, 1))
+    _, block, w, tau = learned_and_block(rng, 0.7, seen=5, noise=noise)
+    found, covariance = score_statistics(block, CHANGED, noise).size(slice(0, 1))
     top = np.hstack([block.before.root, np.zeros((5, 1))])
     both = np.vstack([top, np.hstack([w, w @ CHANGED])])
     aim = np.concatenate([block.before.root @ block.before.values, tau])
     expected = np.linalg.lstsq(both, aim, rcond=None)[0][-1]
     assert found[0] == pytest.approx(expected, rel=1e-6)
-    assert covariance[0, 0] == pytest.approx(np.linalg.inv(both.T @ both)[-1, -1], rel=1e-6)
-
-
-def test_what_was_learned_in_another_unit_of_noise_is_as_certain():
-    _, block, _, _ = learned_and_block(np.random.default_rng(6), 0.7, seen=5)
-    _, loud, _, _ = learned_and_block(np.random.default_rng(6), 0.7, seen=5, noise=3.0)
-    found, covariance = score_statistics(loud, CHANGED, 3.0).size(slice(0, 1))
-    expected, certain = score_statistics(block, CHANGED).size(slice(0, 1))
-    assert found[0] == pytest.approx(expected[0], rel=1e-6)
-    assert covariance[0, 0] == pytest.approx(9.0 * certain[0, 0], rel=1e-6)
+    variance = noise**2 * np.linalg.inv(both.T @ both)[-1, -1]
+    assert covariance[0, 0] == pytest.approx(variance, rel=1e-6)
 
 
 def test_without_a_change_the_ratio_is_chi_square():
     rng = np.random.default_rng(1)
     ratios = []
-    for _ in range(150):
+    for _ in range(60):
         _, block, _, _ = learned_and_block(rng, 0.0, seen=5)
         ratios.append(score_statistics(block, CHANGED).ratios(np.array([[0]]))[0])
     assert stats.kstest(ratios, stats.chi2(1).cdf).pvalue > 1e-3
@@ -199,45 +192,32 @@ def test_work_without_a_change_raises_no_alarm():
 @pytest.mark.slow
 def test_a_motion_without_noise_raises_no_alarm(arm):
     """What filtering leaves of it is anything but normal: nothing, and much at reversals."""
-    motion = multisine(arm.robot.joints, 20.0, 250.0, seed=0)
+    motion = multisine(arm.robot.joints, 12.0, RATE, seed=0)
     online = changes.watch(zip(motion.t, motion.q, arm.torque(motion), strict=True))
     assert not online.changes
 
 
-def test_a_statistic_with_rare_large_values_is_judged_by_those():
-    """One joint in the six has a spike in one window of thirty."""
-    rng = np.random.default_rng(5)
-    plain, spiky, strength = (
-        NullCalibration([1] * 6, 2, 6),
-        NullCalibration([1] * 6, 2, 6),
-        np.ones(6),
-    )
-    for k in range(600):
-        ratios = rng.chisquare(1, 6)
-        at_once(plain.learning(ratios, strength))
-        spike = 30.0 * (k % 30 == 0) * (np.arange(6) == k // 30 % 6)
-        at_once(spiky.learning(ratios + spike, strength))
-    large = np.full(6, 65.0), strength
-    assert np.all(plain.excess(*large, 1e-8) > 1.0)
-    assert np.all(spiky.excess(*large, 1e-8) < plain.excess(*large, 1e-8))
+def stepped(seed, louder=1.0, rests=False):
+    """Return the changes that are seen of a step after 25 s, in a model of three parameters."""
+    rng, truth = np.random.default_rng(seed), np.array([1.0, -2.0, 0.5])
+    parameters = tuple(ParameterName(f'p{k}', '', '') for k in range(3))
+    step = np.array([[0.0], [0.0], [1.0]])
+    candidate = ChangeCandidate('friction', 'elbow', parameters[2:], step, step)
+    watch = watching(RecursiveLeastSquares(parameters, np.ones(4)), candidate)
+    for k in range(6000):
+        after, rows = k >= 5000, rng.normal(size=(4, 3))
+        noise = rng.normal(size=4) * (louder if after else 1.0)
+        tau = rows @ (truth + 5.0 * after * step[:, 0]) + noise
+        weights = np.zeros(4) if rests and k > 5120 else np.ones(4)
+        watch.update(row(0.005 * k, rows, tau, weights))
+    return watch.changes
 
 
 def test_a_window_that_the_model_fits_worse_than_usual_says_less_of_the_size():
     """The same change, and noise three times as loud from then on."""
-    rng, truth = np.random.default_rng(7), np.array([1.0, -2.0, 0.5])
-    parameters = tuple(ParameterName(f'p{k}', '', '') for k in range(3))
-    step = np.array([[0.0], [0.0], [1.0]])
-    candidate = ChangeCandidate('payload', 'hand', parameters[2:], step, step)
     widths = []
-    rows, noise = rng.normal(size=(6000, 4, 3)), rng.normal(size=(6000, 4))
     for louder in (1.0, 3.0):
-        watch = watching(RecursiveLeastSquares(parameters, np.ones(4)), candidate)
-        for k in range(6000):
-            after = k >= 5000
-            now = truth + 5.0 * after * step[:, 0]
-            tau = rows[k] @ now + noise[k] * (louder if after else 1.0)
-            watch.update(row(0.005 * k, rows[k], tau, np.ones(4)))
-        (change,) = watch.changes
+        (change,) = stepped(7, louder)
         assert change.t == pytest.approx(25.0, abs=0.26)
         lower, upper = change.size.interval()[0]
         assert lower < 5.0 < upper
@@ -248,17 +228,7 @@ def test_a_window_that_the_model_fits_worse_than_usual_says_less_of_the_size():
 @pytest.mark.parametrize('rests', [True, False])
 def test_what_shows_for_a_moment_before_an_arm_rests_is_no_change(rests):
     """A misfit of the slow motion in which an arm comes to rest, or a change that goes on."""
-    rng, truth = np.random.default_rng(8), np.array([1.0, -2.0, 0.5])
-    parameters = tuple(ParameterName(f'p{k}', '', '') for k in range(3))
-    step = np.array([[0.0], [0.0], [1.0]])
-    candidate = ChangeCandidate('friction', 'elbow', parameters[2:], step, step)
-    watch = watching(RecursiveLeastSquares(parameters, np.ones(4)), candidate)
-    for k in range(6000):
-        rows = rng.normal(size=(4, 3))
-        tau = rows @ (truth + 5.0 * (k >= 5000) * step[:, 0]) + rng.normal(size=4)
-        weights = np.zeros(4) if rests and k > 5120 else np.ones(4)
-        watch.update(row(0.005 * k, rows, tau, weights))
-    assert len(watch.changes) == (0 if rests else 1)
+    assert len(stepped(8, rests=rests)) == (0 if rests else 1)
 
 
 def test_by_how_much_is_not_said_where_it_is_not_known():
@@ -268,10 +238,9 @@ def test_by_how_much_is_not_said_where_it_is_not_known():
     )
     size = Estimate(parameters, np.array([0.0, 0.2]), np.diag([np.inf, 1e-4]))
     candidate = ChangeCandidate('friction', 'elbow', parameters, np.eye(2), np.eye(2))
-    assert str(Change(candidate, (), 1.0, size)) == (
-        'friction at elbow has changed: viscous_coefficient by an amount that is not known until '
-        'it moves, coulomb_torque by +0.2 N m (0.18 to 0.22)'
-    )
+    unknown, known = str(Change(candidate, (), 1.0, size)).split(',')
+    assert 'elbow' in unknown and 'not known' in unknown
+    assert '+0.2 N m' in known
 
 
 def test_what_a_window_does_not_show_has_an_infinite_deviation():

@@ -11,14 +11,13 @@ from armid_ros.identification.online.identifier import OnlineIdentifier, OnlineS
 from armid_ros.identification.rows.causal import MOTION_FILTER_RATIO
 from armid_ros.identification.rows.regression import Fit, regressions
 from armid_ros.identification.samples.joint_merge import joint_places
-from armid_ros.motion import Motion
 from armid_ros.recording import read_recording
 from armid_ros.robots import load_robot
 import numpy as np
 import pytest
-import scipy.stats
 
 from benchmarks import real_recordings
+from tests.identification.conftest import multisine
 
 PENDULUM = """<robot name="pendulum">
   <link name="base"/>
@@ -34,18 +33,9 @@ PENDULUM = """<robot name="pendulum">
 </robot>
 """
 NOISE = 0.02
+#: A little more than the period of the motion.
+SECONDS = 12.0
 SETTINGS = OnlineSettings(torque_noise=(NOISE,) * 6)
-
-
-def multisine(robot, duration, seed=0, rate=500.0):
-    """Return three harmonics per joint, up to 1.5 rad/s and 6 rad/s^2."""
-    rng = np.random.default_rng(seed)
-    t = np.arange(round(duration * rate)) / rate
-    w = 2.0 * np.pi * np.array([0.1, 0.3, 0.7])[:, None, None]
-    size = np.array([0.5, 0.3, 0.15])[:, None, None]
-    phase = w * t[:, None] + rng.uniform(0.0, 2.0 * np.pi, (3, 1, robot.n_joints))
-    q, dq, ddq = np.sin(phase), w * np.cos(phase), -w * w * np.sin(phase)
-    return Motion(robot.joints, t, *((size * x).sum(axis=0) for x in (q, dq, ddq)))
 
 
 def identifier(arm, settings=SETTINGS):
@@ -68,7 +58,7 @@ def torque_error(arm, online, motion):
 
 @pytest.fixture(scope='module')
 def motion(arm):
-    return multisine(arm.robot, 20.0)
+    return multisine(arm.robot.joints, SECONDS, 500.0, seed=0)
 
 
 @pytest.fixture(scope='module')
@@ -106,48 +96,6 @@ def test_filtering_does_not_bias_a_rigid_arm(arm, motion):
     assert coarse > 0.5 * MOTION_FILTER_RATIO**2 * error
 
 
-@pytest.mark.slow
-def test_friction_is_found_without_noise(arm, clean, motion):
-    assert torque_error(arm, clean, motion) < 1e-3
-    estimate = clean.estimate()
-    for joint in arm.robot.joints:
-        for name, value in (('viscous_coefficient', 0.08), ('coulomb_torque', 0.05)):
-            found = estimate.values[estimate.index(name, joint)]
-            assert found == pytest.approx(value, rel=0.02), (name, joint)
-
-
-@pytest.mark.long
-def test_estimates_scatter_as_their_covariance_says(arm, motion, tau):
-    """Chi-square of the errors of 8 noises, and every parameter within its own interval."""
-    total, outside, count = 0.0, 0, 0
-    rigid = ArmModel(arm.robot)
-    rigid_tau = rigid.torque(motion)
-    for seed in range(8):
-        rng = np.random.default_rng(seed)
-        online = identifier(rigid, OnlineSettings(torque_noise=(0.1,) * 6, row_rate=100.0))
-        feed(online, motion.t, motion.q, rigid_tau + 0.1 * rng.normal(size=tau.shape))
-        estimate = online.estimate()
-        error = estimate.values - online.base.values(rigid.theta)
-        total += error @ np.linalg.solve(estimate.covariance, error)
-        outside += int(np.sum(np.abs(error) > 3.0 * estimate.std))
-        count += len(error)
-    low, high = scipy.stats.chi2(count).ppf([1e-4, 1.0 - 1e-4])
-    assert low < total < high
-    assert outside <= 0.01 * count + 2
-
-
-@pytest.mark.long
-@pytest.mark.slow
-def test_unknown_noise_is_found_from_the_residuals(arm, motion, tau):
-    rng = np.random.default_rng(1)
-    noisy = tau + NOISE * rng.normal(size=tau.shape)
-    known, unknown = identifier(arm), identifier(arm, OnlineSettings())
-    for online in (known, unknown):
-        feed(online, motion.t, motion.q, noisy)
-    ratio = unknown.estimate().std / known.estimate().std
-    assert 0.6 < np.median(ratio) < 1.7
-
-
 def test_predictions_are_made_before_the_sample_is_seen_and_get_good(arm, motion, tau):
     rng = np.random.default_rng(2)
     online = identifier(arm)
@@ -166,18 +114,18 @@ def test_predictions_are_made_before_the_sample_is_seen_and_get_good(arm, motion
 
 
 def test_rows_are_thinned_to_the_rate_that_the_filter_passes(arm, motion, clean):
-    assert clean.samples == pytest.approx(200.0 * 20.0, rel=0.05)
+    assert clean.samples == pytest.approx(200.0 * SECONDS, rel=0.05)
     assert clean.delay == pytest.approx(0.061, abs=0.002)
     assert clean.condition_number < 1e5
 
 
 def test_an_arm_at_rest_teaches_nothing_it_could_unlearn(arm, motion, tau):
-    """20 s held by friction, with torques anywhere within it, after 20 s of motion."""
+    """Held by friction, with torques anywhere within it, after a motion."""
     rng = np.random.default_rng(3)
     online = identifier(arm, replace(SETTINGS, forgetting=0.999))
     feed(online, motion.t, motion.q, tau)
     before = online.estimate()
-    t = motion.t[-1] + 1.0 + np.arange(10_000) * 2e-3
+    t = motion.t[-1] + 1.0 + np.arange(4_000) * 2e-3
     q = motion.q[-1] + 1e-5 * rng.normal(size=(len(t), 6))
     held = tau[-1] + 0.05 * rng.uniform(-1.0, 1.0, 6) + NOISE * rng.normal(size=(len(t), 6))
     samples = feed(online, t, q, held)
@@ -187,92 +135,10 @@ def test_an_arm_at_rest_teaches_nothing_it_could_unlearn(arm, motion, tau):
     np.testing.assert_array_equal(after.covariance, before.covariance)
 
 
-@pytest.mark.long
-@pytest.mark.slow
-def test_an_arm_without_dry_friction_learns_at_rest_and_does_not_drift(arm, motion):
-    rng = np.random.default_rng(4)
-    rigid = ArmModel(arm.robot)
-    online = identifier(rigid, replace(SETTINGS, forgetting=0.999))
-    noisy = rigid.torque(motion) + NOISE * rng.normal(size=motion.q.shape)
-    feed(online, motion.t, motion.q, noisy)
-    before = online.estimate()
-    t = motion.t[-1] + 1.0 + np.arange(5_000) * 2e-3
-    still = Motion(
-        motion.joints, motion.t[:1], motion.q[-1:], 0.0 * motion.q[:1], 0.0 * motion.q[:1]
-    )
-    held = rigid.torque(still) + NOISE * rng.normal(size=(len(t), 6))
-    samples = feed(online, t, np.broadcast_to(motion.q[-1], held.shape), held)
-    assert all(s.used.all() for s in samples[100:])
-    after = online.estimate()
-    assert np.all(after.std <= 1.3 * before.std)  # the noise of these seconds is another one
-    assert np.all(np.abs(after.values - before.values) < 3.5 * before.std)
-
-
-@pytest.mark.long
-def test_forgetting_follows_friction_that_rises(arm, motion):
-    """Viscous friction of all joints up by half within 20 s, memory 4 s."""
-    robot = arm.robot
-    motion = multisine(robot, 40.0, seed=1)
-    rise = 1.0 + 0.5 * np.clip((motion.t - 10.0) / 20.0, 0.0, 1.0)
-    tau = arm.torque(motion) + 0.08 * (rise - 1.0)[:, None] * motion.dq
-    errors = {}
-    for forgetting in (1.0, 1.0 - 1.0 / (4.0 * 200.0)):
-        online = identifier(arm, replace(SETTINGS, forgetting=forgetting, changes=None))
-        feed(online, motion.t, motion.q, tau)
-        estimate = online.estimate()
-        found = [estimate.values[estimate.index('viscous_coefficient', j)] for j in robot.joints]
-        errors[forgetting] = np.abs(np.array(found) - 0.12).max()
-    assert errors.pop(1.0) > 0.015
-    assert max(errors.values()) < 0.005
-
-
-def test_bad_samples_gaps_and_jumps_do_not_corrupt_the_estimate(arm, motion, tau):
-    online = identifier(arm)
-    offset = 0.0
-    for k in range(len(motion)):
-        if k % 2000 == 1500:
-            offset += 2.0  # a dropout of two seconds
-        if k % 2000 == 1999:
-            offset -= 50.0  # the clock is set back
-        t, q, torque = motion.t[k] + offset, motion.q[k], tau[k]
-        if k % 250 == 100:
-            q = q * np.nan
-        if k % 250 == 200:
-            torque = torque[:3]
-        if k % 250 == 225:
-            t -= 8e-3
-        online.update(t, q, None, torque)
-    assert dict(online.rejected) == {'not_finite': 40, 'wrong_length': 40, 'out_of_order': 40}
-    # the last sample alone is back in time: that may be its stamp
-    assert dict(online.restarts) == {'dropout': 5, 'jump_back': 4}
-    assert torque_error(arm, online, motion) < 1e-3
-
-
-def test_jitter_does_not_spoil_the_estimate(arm):
-    rng = np.random.default_rng(5)
-    regular = multisine(arm.robot, 20.0)
-    fine = multisine(arm.robot, 20.0, rate=5000.0)
-    picks = np.arange(len(regular)) * 10 + rng.integers(0, 7, len(regular))
-    jittered = fine.select(picks)
-    online = identifier(arm)
-    feed(online, jittered.t, jittered.q, arm.torque(jittered))
-    assert torque_error(arm, online, regular) < 2e-3
-    assert not online.rejected and not online.restarts
-
-
-@pytest.mark.long
-@pytest.mark.parametrize('rate', [125.0, pytest.param(2000.0, marks=pytest.mark.slow)])
-def test_other_sampling_rates(arm, rate):
-    motion = multisine(arm.robot, 20.0, rate=rate)
-    online = identifier(arm)
-    feed(online, motion.t, motion.q, arm.torque(motion))
-    assert torque_error(arm, online, motion) < 5e-3
-
-
 def test_an_arm_may_have_a_single_joint():
     """A pendulum of 2 kg at 0.3 m: its moment is found from its weight."""
     robot = load_robot(PENDULUM)
-    motion = multisine(robot, 20.0)
+    motion = multisine(robot.joints, SECONDS, 200.0, seed=0)
     online = OnlineIdentifier(ArmModel(robot), rng=np.random.default_rng(0))
     feed(online, motion.t, motion.q, ArmModel(robot).torque(motion))
     estimate = online.estimate()
@@ -314,22 +180,22 @@ def test_before_any_motion_the_model_is_the_one_given(arm):
     assert online.delay is None
 
 
-@pytest.mark.slow
-def test_reset_forgets_everything(arm, motion, tau, clean):
-    online = identifier(arm)
-    feed(online, motion.t[:2000], motion.q[:2000], tau[:2000])
+def test_reset_forgets_everything(arm, motion, tau):
+    fresh, online = identifier(arm), identifier(arm)
+    feed(online, motion.t[:1000], 2.0 * motion.q[:1000], tau[:1000])
     online.update(0.0, motion.q[0], None, tau[0])
     online.reset()
     assert online.samples == 0
     assert not online.rejected and not online.restarts
-    feed(online, motion.t, motion.q, tau)
-    np.testing.assert_array_equal(online.estimate().values, clean.estimate().values)
+    for one in (fresh, online):
+        feed(one, motion.t[:2000], motion.q[:2000], tau[:2000])
+    np.testing.assert_array_equal(online.estimate().values, fresh.estimate().values)
 
 
 @pytest.mark.parametrize(
     ('settings', 'message'),
     [
-        (OnlineSettings(torque_noise=(1.0, 2.0)), 'torque_noise has 2 values'),
+        (OnlineSettings(torque_noise=(1.0, 2.0)), 'torque_noise'),
         (OnlineSettings(row_rate=3.0), 'rows per second'),
         (OnlineSettings(forgetting=0.5), 'forgetting factor'),
         (OnlineSettings(cutoff=-1.0), 'cut-off'),
@@ -343,15 +209,15 @@ def test_settings_that_do_not_fit_are_refused(arm, settings, message):
 def test_joints_are_found_by_name_in_any_order():
     order = partial(joint_places, ('b', 'a'))
     np.testing.assert_array_equal(order(['a', 'gripper', 'b']), [2, 0])
-    with pytest.raises(RecordingError, match=r'without b; they name a, c'):
+    with pytest.raises(RecordingError, match=r'b; .*a, c'):
         order(['a', 'c'])
-    with pytest.raises(RecordingError, match='name a twice'):
+    with pytest.raises(RecordingError, match='a twice'):
         order(['a', 'b', 'a'])
 
 
 def test_effects_that_remember_are_refused(arm):
     robot = arm.robot
-    with pytest.raises(IdentificationError, match=r'presliding_hysteresis.*from a recording'):
+    with pytest.raises(IdentificationError, match='presliding_hysteresis'):
         OnlineIdentifier(
             ArmModel(robot).with_effect(make_effect('presliding_hysteresis', robot)),
             rng=np.random.default_rng(0),

@@ -52,7 +52,7 @@ def test_residuals_are_those_of_the_latest_estimate():
     np.testing.assert_allclose(covariances[0], np.linalg.inv(root.T @ root), rtol=0.3, atol=3e-5)
 
 
-@pytest.mark.parametrize('seed', range(70, 80))
+@pytest.mark.parametrize('seed', range(70, 73))
 def test_changes_of_what_is_hardly_excited_leave_a_covariance(seed):
     """What rounding takes of the information when values are reopened is restored."""
     rng = np.random.default_rng(seed)

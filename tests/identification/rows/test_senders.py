@@ -49,18 +49,12 @@ def two_arms(one):
     return mixed(one, run(2), 0.0003)
 
 
-def two_arms_at_other_rates(one):
-    return mixed(one, run(2, rate=333.0), 0.003)
-
-
 @pytest.mark.parametrize('velocity', [True, False])
-@pytest.mark.parametrize(
-    'mix', [zeros_of_another, leader_and_follower, two_arms, two_arms_at_other_rates]
-)
+@pytest.mark.parametrize('mix', [zeros_of_another, leader_and_follower, two_arms])
 def test_two_senders_of_one_topic_are_refused(mix, velocity):
     recording = mix(run())
     recording = recording if velocity else replace(recording, dq=None)
-    with pytest.raises(IdentificationError, match=r'mixed: .* two senders'):
+    with pytest.raises(IdentificationError, match='two senders'):
         conditioning([recording], SignalSettings())
 
 

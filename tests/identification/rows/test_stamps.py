@@ -37,8 +37,7 @@ def slewed(run):
 
 
 def test_stamps_off_by_more_than_a_period_are_said(run):
-    said = uneven_stamps(jittered(run, 0.02), CUTOFF, BAND)
-    assert said.startswith('run: ') and 'of the time stamps are uneven' in said
+    assert 'uneven' in uneven_stamps(jittered(run, 0.02), CUTOFF, BAND)
 
 
 def test_even_stamps_lost_samples_small_jitter_and_a_slewed_clock_are_not(run):
@@ -49,7 +48,7 @@ def test_even_stamps_lost_samples_small_jitter_and_a_slewed_clock_are_not(run):
 def test_identification_says_it_where_too_little_is_left(structure, run):
     few = IdentificationSettings(signals=SignalSettings(CUTOFF, decimation=60))
     short = jittered(run, 0.02).select(slice(0, 1000))
-    with pytest.raises(IdentificationError, match='time stamps are uneven'):
+    with pytest.raises(IdentificationError, match='uneven'):
         identify(structure, [short], few, rng=np.random.default_rng(0))
 
 
@@ -58,4 +57,4 @@ def test_a_grade_says_it_where_enough_is_left(structure, run):
     fitted = identify(structure, [late], rng=np.random.default_rng(0))
     found = grade(fitted, structure, [late], {})
     assert found.word != 'good'
-    assert any('time stamps are uneven' in one for one in found.reasons)
+    assert any('uneven' in one for one in found.reasons)

@@ -44,8 +44,7 @@ def rows_of(path, arm, samples):
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize('gaps', [(), ((21.3, 22.0), (40.0, 40.5))])
-@pytest.mark.parametrize('samples', [1700, 4000])
+@pytest.mark.parametrize(('gaps', 'samples'), [((), 4000), (((21.3, 22.0), (40.0, 40.5)), 1700)])
 def test_rows_of_pieces_are_those_of_the_whole(tmp_path, smooth, gaps, samples):
     path = bag(tmp_path, smooth, gaps)
     parts, count, columns = rows_of(path, smooth, samples)
@@ -66,6 +65,6 @@ def test_pieces_are_no_longer_than_they_may_be(tmp_path, smooth):
     assert max(len(piece) for piece, _ in pieces) < 2000 + 700
 
 
-def test_an_hour_in_pieces_of_a_shorter_reach_than_the_filters_still_ends(tmp_path, smooth):
+def test_pieces_of_a_shorter_reach_than_the_filters_still_ends(tmp_path, smooth):
     parts, _, _ = rows_of(bag(tmp_path, smooth), smooth, 150)
     assert sum(len(part.motion) for part in parts) > 1400

@@ -4,14 +4,9 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
-
-from armid_ros.identification.online.identifier import OnlineIdentifier, OnlineSettings
 from armid_ros.identification.samples.spikes import FIRST, SpikeGate
 import numpy as np
 import pytest
-
-from tests.identification.conftest import multisine
 
 RATE = 500.0
 NOISE = 0.02
@@ -41,7 +36,7 @@ def test_good_samples_all_pass_in_order():
     assert not gate.rejected
 
 
-@pytest.mark.parametrize('length', [1, 2, 5, 10])
+@pytest.mark.parametrize('length', [1, 10])
 @pytest.mark.parametrize(('signal', 'size'), [(1, 100.0), (1, 1.5), (0, 0.5), (0, 3e-3)])
 def test_damage_costs_the_damaged_samples_alone(signal, size, length):
     t, x = stream(np.random.default_rng(1))
@@ -52,8 +47,7 @@ def test_damage_costs_the_damaged_samples_alone(signal, size, length):
     assert gate.spikes == {signal: length}
 
 
-@pytest.mark.parametrize('where', [630, 880, DAMAGED])
-@pytest.mark.parametrize('sign', [-1.0, 1.0])
+@pytest.mark.parametrize(('where', 'sign'), [(630, -1.0), (880, 1.0), (DAMAGED, 1.0)])
 def test_a_glitch_of_a_smooth_signal_does_not_hide_in_its_acceleration(where, sign):
     """Its line may be missed by twice what acceleration does, whichever way it turns."""
     t, x = stream(np.random.default_rng(18))
@@ -65,7 +59,7 @@ def test_a_glitch_of_a_smooth_signal_does_not_hide_in_its_acceleration(where, si
     assert set(gate.spikes) == {0}
 
 
-@pytest.mark.parametrize('where', [0, 1, 2, 7, FIRST - 1, FIRST, FIRST + 1])
+@pytest.mark.parametrize('where', [0, 1, FIRST - 1, FIRST])
 def test_damage_among_the_first_samples_is_no_measure_of_noise(where):
     t, x = stream(np.random.default_rng(2))
     x[where, 1] += 50.0
@@ -75,7 +69,7 @@ def test_damage_among_the_first_samples_is_no_measure_of_noise(where):
     assert len(missing) <= 2 and np.all(missing < t[where])  # a line needs two samples
 
 
-@pytest.mark.parametrize('size', [0.3, 1.0, 30.0, 1e4])
+@pytest.mark.parametrize('size', [0.3, 1e4])
 def test_a_step_that_lasts_passes_whole(size):
     t, x = stream(np.random.default_rng(3))
     x[DAMAGED:, 1] += size
@@ -84,16 +78,7 @@ def test_a_step_that_lasts_passes_whole(size):
     assert not gate.rejected
 
 
-def test_a_collision_passes_whole():
-    """The velocity of a joint turns round from one sample to the next."""
-    t, x = stream(np.random.default_rng(4))
-    x[:, 0] += 2.0 * np.minimum(t, 2.0 * t[DAMAGED] - t)
-    gate, good = passed(t, x)
-    np.testing.assert_array_equal(good, t)
-    assert not gate.rejected
-
-
-@pytest.mark.parametrize('late', [2, 4, 9])
+@pytest.mark.parametrize('late', [2, 9])
 def test_a_clock_that_is_set_a_little_begins_a_new_stretch(late):
     """Set forth, positions stand still for some samples; set back, they jump."""
     t, x = stream(np.random.default_rng(13))
@@ -126,16 +111,6 @@ def test_a_torque_that_jumps_to_where_it_often_is_may_be_of_the_arm(height, reas
     assert sum(gate.spikes.values()) == 15 * (reason == 'spike')
 
 
-@pytest.mark.parametrize('lost', [1, 2, 5])
-def test_noise_after_lost_samples_is_judged_as_noise(lost):
-    """What a glitch may be does not grow with the square of the time that nothing came."""
-    t, x = stream(np.random.default_rng(16))
-    x[DAMAGED, 1] += 1.5
-    kept = np.delete(np.arange(COUNT), slice(DAMAGED - lost, DAMAGED))
-    _, good = passed(t[kept], x[kept])
-    assert t[DAMAGED] not in good and len(good) == len(kept) - 1
-
-
 @pytest.mark.parametrize('later', [0.0, 0.1])
 def test_full_turns_are_no_damage_and_undone(later):
     """Across a gap after which a new stretch begins, too."""
@@ -149,8 +124,8 @@ def test_full_turns_are_no_damage_and_undone(later):
     np.testing.assert_allclose([s.x[0] for s in good], turned, atol=1e-9)
 
 
-@pytest.mark.parametrize('where', [0, 1, 5, DAMAGED])
-@pytest.mark.parametrize('angle', [3.3, 9.7, 16.0, 1e5])
+@pytest.mark.parametrize('where', [0, 1, DAMAGED])
+@pytest.mark.parametrize('angle', [3.3, 1e5])
 def test_a_damaged_angle_turns_nothing_after_it(where, angle):
     t, x = stream(np.random.default_rng(17))
     spoiled = x.copy()
@@ -169,18 +144,6 @@ def test_an_arm_that_rested_may_begin_to_move():
     np.testing.assert_array_equal(good, t)
 
 
-@pytest.mark.parametrize('apart', [1.0, 3.0, 20.0])
-def test_of_two_senders_that_contradict_each_other_one_is_followed(apart):
-    t, x = stream(np.random.default_rng(7))
-    other = x + np.array([0.3, apart])
-    end = DAMAGED + 300  # before friction steps as well
-    x[DAMAGED:end:2] = other[DAMAGED:end:2]
-    gate, good = passed(t[:end], x[:end])
-    assert gate.rejected['spike'] >= 0.9 * (end - DAMAGED) / 2
-    kept = np.isin(t[:end], good)
-    assert np.count_nonzero(kept[DAMAGED + 100 :: 2]) in (0, len(kept[DAMAGED + 100 :: 2]))
-
-
 def test_a_stamp_from_elsewhere_costs_one_sample_and_a_new_clock_none():
     t, x = stream(np.random.default_rng(8))
     stamps = t.copy()
@@ -192,8 +155,7 @@ def test_a_stamp_from_elsewhere_costs_one_sample_and_a_new_clock_none():
     assert gate.rejected == {'stamp': 2}
 
 
-@pytest.mark.parametrize('ahead', [2, 5, 9])
-@pytest.mark.parametrize('where', [DAMAGED, COUNT - 3])
+@pytest.mark.parametrize(('ahead', 'where'), [(2, DAMAGED), (9, DAMAGED), (5, COUNT - 3)])
 def test_a_stamp_a_little_ahead_costs_its_own_sample_and_none_after_it(ahead, where):
     t, x = stream(np.random.default_rng(19))
     stamps = t.copy()
@@ -203,16 +165,6 @@ def test_a_stamp_a_little_ahead_costs_its_own_sample_and_none_after_it(ahead, wh
     assert gate.rejected.total() == 1
 
 
-def test_what_follows_nothing_is_left_out():
-    rng = np.random.default_rng(9)
-    t, x = stream(rng)
-    garbage = slice(DAMAGED, DAMAGED + 33)
-    x[garbage, 1] = rng.uniform(-1e5, 1e5, 33)
-    gate, good = passed(t, x)
-    assert gate.rejected['erratic'] + gate.rejected['spike'] >= 25
-    assert np.all(np.isin(t[garbage.stop + FIRST :], good))
-
-
 def test_errors_without_consequence_are_let_through():
     t, x = stream(np.random.default_rng(10))
     x[DAMAGED, 1] += 5.0
@@ -220,58 +172,3 @@ def test_errors_without_consequence_are_let_through():
     for stamp, row in zip(t, x, strict=True):
         gate.take(float(stamp), row, np.array([0.0, 6.0]))
     assert not gate.rejected
-
-
-@pytest.fixture(scope='module')
-def recorded(arm):
-    """Return a motion of 12 s and torques with noise."""
-    motion = multisine(arm.robot.joints, 12.0, RATE, seed=3)
-    rng = np.random.default_rng(11)
-    return motion, arm.torque(motion) + NOISE * rng.normal(size=motion.q.shape)
-
-
-def learned(arm, motion, q, tau):
-    online = OnlineIdentifier(
-        replace(arm, values=()), OnlineSettings(changes=None), rng=np.random.default_rng(0)
-    )
-    for sample in zip(motion.t, q, tau, strict=True):
-        online.update(float(sample[0]), sample[1], None, sample[2])
-    return online
-
-
-@pytest.fixture(scope='module')
-def undamaged(arm, recorded):
-    motion, tau = recorded
-    return learned(arm, motion, motion.q, tau).estimate()
-
-
-@pytest.mark.slow
-@pytest.mark.parametrize(
-    ('row', 'torque', 'angle'),
-    [(3000, 100.0, 0.0), (3000, 1e4, 0.0), (150, 100.0, 0.0), (3000, 0.0, 0.1)],
-)
-def test_a_spike_neither_moves_the_estimate_nor_widens_it(
-    arm, recorded, undamaged, row, torque, angle
-):
-    motion, tau = recorded
-    q, tau = motion.q.copy(), tau.copy()
-    q[row, 3] += angle
-    tau[row, 5] += torque
-    online = learned(arm, motion, q, tau)
-    estimate = online.estimate()
-    assert np.all(np.abs(estimate.values - undamaged.values) < 0.2 * undamaged.std)
-    np.testing.assert_allclose(estimate.std, undamaged.std, rtol=0.05)
-    assert online.rejected == {'spike': 1}
-    assert sum(online.spikes.values()) == 1
-
-
-@pytest.mark.slow
-@pytest.mark.parametrize('number', [1e6 + 1.0, 1e100, 1e154, 1e308, np.inf, np.nan])
-def test_no_number_ends_the_identifier(arm, recorded, undamaged, number):
-    motion, tau = recorded
-    q, tau = motion.q.copy(), tau.copy()
-    tau[3000, 0], q[2000, 2] = number, -number
-    online = learned(arm, motion, q, tau)
-    assert sum(online.rejected.values()) == 2
-    estimate = online.estimate()
-    assert np.all(np.abs(estimate.values - undamaged.values) < 0.2 * undamaged.std)

@@ -9,12 +9,9 @@ from dataclasses import replace
 from armid_ros.errors import IdentificationError
 from armid_ros.identification.ties.problem import (
     interaction_problem,
-    InteractionProblem,
-    MachineNoise,
 )
 from armid_ros.identification.ties.recorded import recorded_interaction_problem
 from armid_ros.identification.ties.stiffness import identify_interaction, Interaction
-from armid_ros.motion import Motion
 from armid_ros.papers.exo.plant.gait import read_gait
 from armid_ros.papers.exo.plant.leg_pair import leg_pair, PairMotion, stepping, TiedPair
 from armid_ros.recording import Recording
@@ -22,10 +19,8 @@ import numpy as np
 import pytest
 from scipy.stats import chi2
 
-from benchmarks.exo_noise import find_springs, measured, recorded, TORQUE_NOISE, with_torques
-from benchmarks.exo_poses import choose_poses, stiffness_bound
+from benchmarks.exo_noise import find_springs, measured, recorded, with_torques
 
-STATE = ('q', 'dq', 'ddq')
 STIFFNESS = 1.0e4
 
 
@@ -92,17 +87,6 @@ def test_a_recording_gives_them_within_per_cent(pair, seconds, inertias, one, ea
     assert np.abs(percent(apart)).max() < each
 
 
-def test_a_recording_with_a_tenth_of_a_degree(pair, seconds) -> None:
-    assert abs(percent(find_springs(pair, seconds, 0.1, 1))[0]) < 1.0
-
-
-def test_a_flat_valley_is_followed_to_its_end(pair) -> None:
-    """In this draw noise makes most of a column, and steps of Gauss and Newton go to and fro."""
-    motions = with_torques(pair, stepping(pair, read_gait(), np.arange(0.0, 10.0, 1e-3)))
-    found = find_springs(pair, motions, 0.05, 30014, inertias='free', separate=True)
-    assert np.all(np.abs(found.stiffness - STIFFNESS) < 3.0 * found.std)
-
-
 def test_recordings_need_not_begin_together(pair, seconds) -> None:
     own, other = measured(seconds, 0.05, np.random.default_rng(0))
     late = other.select(slice(700, None))
@@ -129,11 +113,11 @@ def test_data_that_cannot_tell_are_refused(pair, poses) -> None:
     same = replace(poses.own, q=poses.other.q)
     one = replace(pair.machines, ties=pair.ties[:1])
     problem = interaction_problem(one, same, poses.other)
-    with pytest.raises(IdentificationError, match='nothing shows it'):
+    with pytest.raises(IdentificationError, match='nothing shows'):
         identify_interaction(problem)
     with pytest.raises(IdentificationError, match='no torques'):
         interaction_problem(pair.machines, poses.own.with_torque(None), poses.other)
-    with pytest.raises(IdentificationError, match='one time base'):
+    with pytest.raises(IdentificationError, match='time base'):
         shifted = replace(poses.other, t=poses.other.t + 0.1)
         interaction_problem(pair.machines, poses.own, shifted)
 
@@ -177,47 +161,3 @@ def test_inertias_of_links_that_hardly_turn_stay_near_their_description(pair) ->
     away = found.estimate.values - problem.described
     spread = np.sqrt(np.diag(np.linalg.inv(problem.precision[4:, 4:])))
     assert np.all(np.abs(away[4:]) < 3.0 * spread)
-
-
-def test_no_estimate_is_better_than_the_bound_and_chosen_poses_lower_it(pair) -> None:
-    """Four springs of 200 poses: 5.5 per cent at best, of poses of quick steps chosen 2.4."""
-    gait = read_gait()
-    parts = [
-        stepping(pair, gait, np.linspace(0.0, period, 301)[:-1], period)
-        for period in (1.8, 1.2, 0.9)
-    ]
-    even = stepping(pair, gait, np.linspace(0.0, 1.8, 201)[:-1])
-    own, other = (
-        Motion(
-            parts[0][side].joints,
-            np.arange(900.0),
-            *(np.concatenate([getattr(p[side], name) for p in parts]) for name in STATE),
-        )
-        for side in (0, 1)
-    )
-    planned, theta = exact(pair, PairMotion(own, other))
-    rows = choose_poses(planned, theta, TORQUE_NOISE, 200)
-    assert len(set(rows.tolist())) == 200
-    chosen = exact(pair, PairMotion(own.select(rows), other.select(rows)))
-    bounds = [stiffness_bound(*case, TORQUE_NOISE) for case in (exact(pair, even), chosen)]
-    assert 0.05 < bounds[0].max() / STIFFNESS < 0.06
-    assert bounds[1].max() / STIFFNESS < 0.03
-    assert np.all(bounds[1] < bounds[0])
-    with pytest.raises(IdentificationError, match='cannot be chosen'):
-        choose_poses(planned, theta, TORQUE_NOISE, 901)
-
-
-def exact(pair: TiedPair, motions: PairMotion) -> tuple[InteractionProblem, np.ndarray]:
-    """Return the regression of four springs and free inertias, and its exact solution."""
-    own, other = with_torques(pair, motions)
-    problem = interaction_problem(
-        pair.machines,
-        own,
-        other,
-        noise=MachineNoise(np.radians(0.05)),
-        inertias='free',
-        separate=True,
-    )
-    columns = problem.columns.reshape(-1, problem.columns.shape[2])
-    size = np.linalg.norm(columns, axis=0)
-    return problem, np.linalg.lstsq(columns / size, problem.tau.ravel(), rcond=None)[0] / size
