@@ -7,7 +7,6 @@ import re
 from armid_ros.errors import RecordingError
 from armid_ros.recording import (
     BagWriter,
-    joint_state_cdr,
     LATCHED,
     read_recording,
     read_robot_description,
@@ -80,32 +79,6 @@ def test_the_share_of_a_chunk_cut_off_is_the_share_of_its_messages(make_swing, t
     read, of = map(int, re.search(r'(\d+) of (\d+) bytes', got.report.damage).groups())
     inside = counted[largest] - counted[largest - 1]
     assert (len(got) - counted[largest - 1]) / inside == pytest.approx(read / of, abs=0.01)
-
-
-def test_uncompressed_messages_of_a_chunk_cut_off_are_read_to_the_last(make_swing, tmp_path):
-    recording = make_swing(300)
-    write_recording(tmp_path / 'bag', recording, compression='none')
-    content = (tmp_path / 'bag' / 'bag_0.mcap').read_bytes()
-    cut = tmp_path / 'cut.mcap'
-    first = [recording.q[:1], recording.dq[:1], recording.tau[:1]]
-    (message,) = joint_state_cdr(JOINTS, [recording.start_ns], *first)
-    third = content.find(message) - 31 + 3 * (31 + len(message))
-    for cut_at, messages in ((third - 1, 2), (third, 3), (third + 1, 3)):
-        cut.write_bytes(content[:cut_at])
-        assert len(read_recording(cut, joints=JOINTS)) == messages
-
-
-def test_a_file_cut_before_its_first_message_is_refused_with_its_name(whole, tmp_path):
-    _, path = whole
-    content = path.read_bytes()
-    cut = tmp_path / 'cut.mcap'
-    for size in range(0, 400, 7):
-        cut.write_bytes(content[:size])
-        with pytest.raises(RecordingError, match=str(cut)):
-            read_recording(cut, joints=JOINTS)
-        with pytest.raises(RecordingError, match=str(cut)):
-            recover(cut, tmp_path / 'out')
-    assert not (tmp_path / 'out').exists()
 
 
 def test_a_recovered_bag_is_whole_for_every_reader(whole, tmp_path, assert_same):
