@@ -74,13 +74,8 @@ def test_mcap_ros2_reads_what_is_written_by_its_own_schema(swinging, tmp_path, s
         reader = make_reader(stream, validate_crcs=True, decoder_factories=[DecoderFactory()])
         assert reader.get_header().profile == 'ros2'
         rows = list(reader.iter_decoded_messages())
-        summary = reader.get_summary()
     assert [message.log_time for _, _, message, _ in rows] == stamps.tolist()
     np.testing.assert_array_equal([list(row[3].velocity) for row in rows], swinging.dq)
-    assert summary.statistics.message_count == len(swinging)
-    assert summary.statistics.message_start_time == stamps[0]
-    assert summary.statistics.message_end_time == stamps[-1]
-    assert len(summary.chunk_indexes) == summary.statistics.chunk_count
 
 
 @pytest.mark.parametrize('version', [8, 9])

@@ -4,14 +4,12 @@
 
 from __future__ import annotations
 
-import sys
-
 from armid_ros.nodes.parameters.table import declare
 import pytest
 from rclpy.node import Node
 import yaml
 
-from tests.ros.launching import declared, launched, modules
+from tests.ros.launching import declared, launched
 from tests.ros.test_files import TABLES
 
 #: Arguments that a launch file needs, and some that are given: text, node, and two values of the
@@ -33,13 +31,6 @@ FILES = {
         },
     ),
 }
-
-
-@pytest.fixture(autouse=True)
-def launch(monkeypatch):
-    """Let launch files import the double of launch."""
-    for name, module in modules().items():
-        monkeypatch.setitem(sys.modules, name, module)
 
 
 def read_back(bench, node, folder):
