@@ -298,7 +298,7 @@ def test_a_full_disk_is_reported_and_what_fits_again_is_written(
     soft, hard = resource.getrlimit(resource.RLIMIT_FSIZE)
     resource.setrlimit(resource.RLIMIT_FSIZE, (10_000, hard))
     try:
-        with pytest.raises(RecordingError, match=r'bag_0.mcap: .*too large'):
+        with pytest.raises(RecordingError, match=r'bag_0.mcap: '):
             writer.flush()
     finally:
         resource.setrlimit(resource.RLIMIT_FSIZE, (soft, hard))
