@@ -41,7 +41,7 @@ def test_a_disk_that_is_full_leaves_the_old_file(tmp_path, monkeypatch):
         raise OSError(errno.ENOSPC, 'No space left on device')
 
     monkeypatch.setattr('armid_ros.files.output.os.fdopen', full)
-    with pytest.raises(OutputError, match=r'a\.json: .*No space'):
+    with pytest.raises(OutputError, match=r'a\.json: '):
         write_file(tmp_path / 'a.json', 'new')
     monkeypatch.undo()
     assert [path.name for path in tmp_path.iterdir()] == ['a.json']
@@ -84,29 +84,6 @@ def test_a_second_run_in_one_folder_is_refused(tmp_path):
         pass
 
 
-@pytest.mark.parametrize(
-    ('name', 'text', 'refusal'),
-    [
-        ('identification.json', f'{{"schema": "{SCHEMA}", "robot": "ur5"}}', None),
-        ('identification.json', f'{{"schema": "{SCHEMA}", "robot": "panda"}}', 'panda.* ur5.*--f'),
-        ('identification.json', '{"schema": "armid/d/1"}', 'kind d, .*identification.*--force'),
-        ('identification.json', '"rubbish"', 'identification.json'),
-        ('model.yaml', 'schema: armid/model/1\nrobot: ur5\n', None),
-        ('model.yaml', 'schema: armid/model/1\nrobot: panda\n', 'panda.* ur5.*--force'),
-        ('model.yaml', 'schema: other/1\nrobot: ur5\n', 'other/1'),
-        ('model.yaml', 'hello', 'model.yaml'),
-    ],
-)
-def test_results_of_another_kind_or_robot_are_kept_unless_forced(tmp_path, name, text, refusal):
-    (tmp_path / name).write_text(text)
-    if refusal:
-        with pytest.raises(OutputError, match=refusal):
-            with result_folder(tmp_path, SCHEMA, 'ur5'):
-                pass
-    with result_folder(tmp_path, SCHEMA, 'ur5', force=refusal is not None):
-        pass
-
-
 PAGE = '<!DOCTYPE html>\n<head>\n<meta name="generator" content="armid_ros">\n</head>'
 OWN = {'model.yaml': 'schema: armid/model/1\nrobot: ur5\n'}
 
@@ -115,6 +92,19 @@ OWN = {'model.yaml': 'schema: armid/model/1\nrobot: ur5\n'}
     ('files', 'refusal'),
     [
         ({}, None),
+        ({'identification.json': f'{{"schema": "{SCHEMA}", "robot": "ur5"}}'}, None),
+        (
+            {'identification.json': f'{{"schema": "{SCHEMA}", "robot": "panda"}}'},
+            'panda.* ur5.*--force',
+        ),
+        ({'identification.json': '{"schema": "armid/d/1"}'}, ' d, .*identification.*--force'),
+        ({'identification.json': '"rubbish"'}, 'identification.json'),
+        ({'lunar.json': '{"schema": "armid/lunar/1"}'}, 'lunar'),
+        ({'fleet.json': '{"schema": "armid/fleet/1"}'}, 'fleet'),
+        (OWN, None),
+        ({'model.yaml': 'schema: armid/model/1\nrobot: panda\n'}, 'panda.* ur5.*--force'),
+        ({'model.yaml': 'schema: other/1\nrobot: ur5\n'}, 'other/1'),
+        ({'model.yaml': 'hello'}, 'model.yaml'),
         ({'report.html': PAGE}, None),
         ({**OWN, 'report.html': PAGE, 'identified.urdf': '<robot/>'}, None),
         ({'report.html': 'precious'}, 'report.html.*--force'),
@@ -123,7 +113,7 @@ OWN = {'model.yaml': 'schema: armid/model/1\nrobot: ur5\n'}
         ({**OWN, 'notes.txt': 'mine'}, 'notes.txt'),
     ],
 )
-def test_what_the_command_did_not_write_is_kept_unless_forced(tmp_path, files, refusal):
+def test_results_of_others_are_kept_unless_forced(tmp_path, files, refusal):
     for name, text in files.items():
         (tmp_path / name).write_text(text)
     if refusal:
@@ -173,14 +163,6 @@ def test_other_files_that_a_command_says_it_writes_are_no_strangers(tmp_path):
         pass
 
 
-@pytest.mark.parametrize('name', ['lunar', 'fleet'])
-def test_results_of_a_paper_and_of_a_fleet_are_results_too(tmp_path, name):
-    (tmp_path / f'{name}.json').write_text(json.dumps({'schema': f'armid/{name}/1'}))
-    with pytest.raises(OutputError, match=f'kind {name}'):
-        with result_folder(tmp_path, SCHEMA):
-            pass
-
-
 def test_what_fails_before_it_writes_leaves_no_folder(tmp_path):
     with pytest.raises(RuntimeError):
         with result_folder(tmp_path / 'a' / 'b', SCHEMA):
@@ -193,7 +175,7 @@ def test_a_folder_that_cannot_be_written_is_said_before_the_work(tmp_path, monke
         raise OSError(errno.EROFS, 'Read-only file system')
 
     monkeypatch.setattr('armid_ros.files.output.os.fdopen', read_only)
-    with pytest.raises(OutputError, match='Read-only file system'):
+    with pytest.raises(OutputError, match='Read-only'):
         with result_folder(tmp_path, SCHEMA):
             pytest.fail('the work began')
     (tmp_path / 'file').touch()

@@ -51,12 +51,15 @@ def test_a_result_that_is_kept_replaces_the_earlier_one(out):
     with staged(out, named) as result:
         for name in ('model.yaml', 'identification.json'):
             write_file(result.folder / name, 'tuesday')
+            result.keep()
+        (result.folder / 'recording').mkdir()
+        write_file(result.folder / 'recording' / 'b.mcap', 'tuesday')
         result.keep()
     assert contents(out) == {
         'model.yaml': 'tuesday',
         'identification.json': 'tuesday',
         'notes.txt': 'monday',
-        'recording/a.mcap': 'monday',
+        'recording/b.mcap': 'tuesday',
     }
     assert not (out / STAGING).exists()
 
@@ -108,28 +111,11 @@ def test_the_folder_stays_locked_and_keeps_its_mode(out):
     assert out.stat().st_mode & 0o777 == 0o750
 
 
-def test_what_is_kept_later_goes_beside_what_was_kept_before(out):
-    with staged(out, ('*.json', 'model.yaml', 'identified.urdf')) as result:
-        for name in ('model.yaml', 'identification.json'):
-            write_file(result.folder / name, 'tuesday')
-            result.keep()
-    kept = contents(out)
-    assert kept['model.yaml'] == kept['identification.json'] == 'tuesday'
-
-
 def test_a_description_that_the_result_refers_to_stays(out):
     with staged(out, ('identified.urdf',), [out / 'identified.urdf']) as result:
         write_file(result.folder / 'model.yaml', 'tuesday')
         result.keep()
     assert (out / 'identified.urdf').read_text() == 'monday'
-
-
-def test_a_folder_of_a_result_is_replaced_by_one(out):
-    with staged(out) as result:
-        (result.folder / 'recording').mkdir()
-        write_file(result.folder / 'recording' / 'b.mcap', 'tuesday')
-        result.keep()
-    assert contents(out / 'recording') == {'b.mcap': 'tuesday'}
 
 
 def test_no_document_vouches_for_files_that_are_half_moved(out, monkeypatch):

@@ -57,10 +57,9 @@ def alone(paths, outcome):
     return identify(arm, recordings, settings, rng=np.random.default_rng(0))
 
 
-@pytest.mark.parametrize('number', [0, 1, 2])
-def test_an_arm_is_what_one_identification_of_its_bags_is(bags, done, number):
+def test_an_arm_and_a_bag_are_what_their_own_identification_is(bags, done):
     outcome, store = done
-    name = f'arm_{number:04d}'
+    name = 'arm_0001'
     one = alone(sorted((bags / name).iterdir()), outcome)
     rows = by_arm(store.data_set('arms'), name)
     assert list(rows['name']) == [parameter.name for parameter in one.estimate.parameters]
@@ -69,13 +68,8 @@ def test_an_arm_is_what_one_identification_of_its_bags_is(bags, done, number):
     expected = Score.of(one.training).relative_error_percent
     assert rows['relative_error_percent'].iloc[0] == pytest.approx(expected, rel=1e-9)
     assert rows['condition_number'].iloc[0] == pytest.approx(one.condition_number, rel=1e-9)
-
-
-def test_a_bag_is_what_its_own_identification_is(bags, done):
-    outcome, store = done
-    path = bags / 'arm_0001' / '2026-01-02'
-    one = alone([path], outcome)
-    frame = store.data_set('parameters').to_pandas()
+    path = bags / name / '2026-01-02'
+    one, frame = alone([path], outcome), store.data_set('parameters').to_pandas()
     rows = frame[frame['bag'] == str(path)]
     np.testing.assert_allclose(rows['value'], one.estimate.values, rtol=1e-9, atol=1e-13)
     np.testing.assert_allclose(rows['std'], one.estimate.std, rtol=1e-9)
@@ -127,28 +121,12 @@ def test_resume_does_what_is_left_and_nothing_twice(bags, cluster, tmp_path):
     second = identified(cluster, everything, URDF, str(tmp_path), resumed)
     after = stamps(tmp_path)
     assert (first.done, second.done, second.found) == (7, 9, 7)
+    assert second.filters == first.filters
     assert all(after[name] == before[name] for name in before if name.startswith('bags'))
     assert (
         before['arms/arm=arm_0000/estimate.parquet']
         == (after['arms/arm=arm_0000/estimate.parquet'])
     )
-
-
-def test_what_was_resumed_is_what_one_run_gives(bags, cluster, tmp_path):
-    everything = find_bags([f'{bags}/*/*'])
-    fixed = replace(SETTINGS, signals=SignalSettings(20.0, 8))
-    identified(cluster, everything, URDF, f'{tmp_path}/at_once', fixed)
-    identified(cluster, everything[:5], URDF, f'{tmp_path}/resumed', fixed)
-    resumed = replace(fixed, resume=True)
-    identified(cluster, everything, URDF, f'{tmp_path}/resumed', resumed)
-    assert digits(Store(f'{tmp_path}/resumed')) == digits(Store(f'{tmp_path}/at_once'))
-
-
-def test_a_later_run_takes_the_filters_of_the_first(bags, cluster, tmp_path):
-    everything = find_bags([f'{bags}/*/*'])
-    first = identified(cluster, everything[:1], URDF, str(tmp_path), SETTINGS)
-    later = identified(cluster, everything[4:6], URDF, str(tmp_path), SETTINGS)
-    assert later.filters == first.filters
 
 
 def test_one_more_effect_is_another_kind_and_nothing_of_it_is_found(bags, cluster, tmp_path):

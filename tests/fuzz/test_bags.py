@@ -2,6 +2,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """Damaged bags: what is read of them is what was recorded, or it is said."""
 
+import shutil
 import sqlite3
 import struct
 import zlib
@@ -10,17 +11,19 @@ from armid_ros.errors import ArmidError
 from armid_ros.recording import (
     read_recording,
     ReadSettings,
-    Recording,
     recover,
     write_recording,
 )
 from armid_ros.recording.compression import decompressed
 from armid_ros.recording.mcap.records import map_file
+from armid_ros.recording.message_types import JOINT_STATE
 from hypothesis import given
 from hypothesis import strategies as st
 import lz4.frame
 import numpy as np
 import pytest
+from rosbags.rosbag2 import StoragePlugin, Writer
+from rosbags.typesys import get_typestore, Stores
 import yaml
 import zstandard
 
@@ -38,26 +41,13 @@ from tests.fuzz.mutants import (
     TREE_EDIT,
 )
 from tests.fuzz.property import judge
-from tests.recording.conftest import iter_raw
+from tests.recording.conftest import iter_raw, swing
 
 JOINTS = ('shoulder', 'elbow')
 SETTINGS = ReadSettings(memory_limit=200_000_000)
-SAMPLES = 120
+SAMPLES = 60
 COMPRESSIONS = ('none', 'zstd', 'lz4')
-
-
-def swing():
-    t = np.arange(SAMPLES) * 1e-3
-    rates = 2.0 + np.arange(len(JOINTS))
-    wave = np.outer(t, rates)
-    return Recording(
-        joints=JOINTS,
-        t=t,
-        q=np.sin(wave),
-        dq=rates * np.cos(wave),
-        tau=np.cos(wave),
-        start_ns=10**18,
-    )
+WHOLE = swing(SAMPLES, JOINTS)
 
 
 @pytest.fixture(scope='module')
@@ -65,28 +55,20 @@ def folder(tmp_path_factory):
     """Return a folder with a bag of each compression and a database of the same recording."""
     folder = tmp_path_factory.mktemp('fuzz')
     for compression in COMPRESSIONS:
-        write_recording(folder / compression, swing(), compression=compression, chunk_size=4000)
-    make_database(folder / 'bag.db3', folder / 'none')
+        write_recording(folder / compression, WHOLE, compression=compression, chunk_size=4000)
+    with Writer(folder / 'bag', version=9, storage_plugin=StoragePlugin.SQLITE3) as writer:
+        store = get_typestore(Stores.ROS2_JAZZY)
+        topic = writer.add_connection('/joint_states', JOINT_STATE, typestore=store)
+        for message in iter_raw(folder / 'none'):
+            writer.write(topic, message.log_time_ns, message.cdr)
     (folder / 'work').mkdir()
     return folder
 
 
-def make_database(path, bag):
-    with sqlite3.connect(path) as database:
-        database.executescript(
-            'CREATE TABLE schema(schema_version INTEGER PRIMARY KEY, ros_distro TEXT NOT NULL);'
-            'CREATE TABLE topics(id INTEGER PRIMARY KEY, name TEXT, type TEXT, '
-            'serialization_format TEXT, offered_qos_profiles TEXT, type_description_hash TEXT);'
-            'CREATE TABLE messages(id INTEGER PRIMARY KEY, topic_id INTEGER, timestamp INTEGER, '
-            'data BLOB); CREATE INDEX timestamp_idx ON messages (timestamp ASC);'
-            'CREATE TABLE message_definitions(id INTEGER PRIMARY KEY, topic_type TEXT, '
-            'encoding TEXT, encoded_message_definition TEXT, type_description_hash TEXT);'
-            "INSERT INTO topics VALUES (1, '/joint_states', 'sensor_msgs/msg/JointState', 'cdr', "
-            "'', '');"
-        )
-        rows = [(m.log_time_ns, m.cdr) for m in iter_raw(bag)]
-        database.executemany('INSERT INTO messages VALUES (NULL, 1, ?, ?)', rows)
-    database.close()
+@pytest.fixture
+def database(folder):
+    """Return a bag of a database that is changed again and again."""
+    return shutil.copytree(folder / 'bag', folder / 'work' / 'bag', dirs_exist_ok=True)
 
 
 def read(path):
@@ -137,7 +119,7 @@ def test_mcap_bytes(folder, compression, edits):
     content = (folder / compression / f'{compression}_0.mcap').read_bytes()
     path = folder / 'work' / 'bytes.mcap'
     path.write_bytes(edited_bytes(content, edits))
-    judge('MCAP, bytes', read, path, swing(), agrees)
+    judge('MCAP, bytes', read, path, WHOLE, agrees)
 
 
 @given(
@@ -148,7 +130,7 @@ def test_mcap_records(folder, compression, edits):
     content = (folder / compression / f'{compression}_0.mcap').read_bytes()
     path = folder / 'work' / 'records.mcap'
     path.write_bytes(edited_records(content, edits))
-    judge('MCAP, records', read, path, swing(), agrees)
+    judge('MCAP, records', read, path, WHOLE, agrees)
 
 
 FIELD = st.tuples(PLACE, PLACE, st.sampled_from(INTEGERS), st.sampled_from([1, 2, 4, 8]))
@@ -179,7 +161,7 @@ def test_mcap_chunks_with_right_checksums(folder, compression, fields):
     mutant = folder / 'work' / 'chunk.mcap'
     record = b'\x06' + struct.pack('<Q', len(head) + len(packed)) + head + packed
     mutant.write_bytes(content[:begin] + record + content[chunk.end :])
-    judge('MCAP, within chunks', read, mutant, swing(), any_answer)
+    judge('MCAP, within chunks', read, mutant, WHOLE, any_answer)
 
 
 @given(
@@ -207,7 +189,7 @@ def test_recovered(folder, compression, edits, number):
         verdict = agrees(answer, whole)
         return 'said' if answer[1].damage and verdict not in ('same', 'said') else verdict
 
-    judge('recover', recovered, path, swing(), whole)
+    judge('recover', recovered, path, WHOLE, whole)
 
 
 def remove(bag):
@@ -254,31 +236,20 @@ def edit_database(path, edits):
     database.close()
 
 
-def database_bag(folder):
-    """Return a bag of a database that is as it was."""
-    path = folder / 'work' / 'database'
-    path.mkdir(exist_ok=True)
-    text = (folder / 'none' / 'metadata.yaml').read_text()
-    (path / 'metadata.yaml').write_text(text.replace('none_0.mcap', 'bag.db3'))
-    (path / 'bag.db3').write_bytes((folder / 'bag.db3').read_bytes())
-    return path
-
-
 @given(edits=st.lists(SQL_EDIT, min_size=1, max_size=3))
-def test_sqlite_cells(folder, edits):
-    path = database_bag(folder)
-    edit_database(path / 'bag.db3', edits)
-    judge('SQLite, cells', read, path, swing(), fewer_are_said)
+def test_sqlite_cells(folder, database, edits):
+    shutil.copy(folder / 'bag' / 'bag.db3', database)
+    edit_database(database / 'bag.db3', edits)
+    judge('SQLite, cells', read, database, WHOLE, fewer_are_said)
 
 
 @given(edits=st.lists(BYTE_EDIT, min_size=1, max_size=4), head=st.booleans())
-def test_sqlite_bytes(folder, edits, head):
-    path = database_bag(folder)
-    content = (path / 'bag.db3').read_bytes()
+def test_sqlite_bytes(folder, database, edits, head):
+    content = (folder / 'bag' / 'bag.db3').read_bytes()
     size = 4096 * 6 if head else len(content)
     mutant = edited_bytes(content[:size], edits) + content[size:]
-    (path / 'bag.db3').write_bytes(mutant)
-    judge('SQLite, bytes', read, path, swing(), fewer_are_said)
+    (database / 'bag.db3').write_bytes(mutant)
+    judge('SQLite, bytes', read, database, WHOLE, fewer_are_said)
 
 
 @given(
@@ -295,4 +266,4 @@ def test_metadata(folder, edits):
     edit, what = edits
     mutant = edit(text, what) if edit is edited_text else to_yaml(edit(yaml.safe_load(text), what))
     (bag / 'metadata.yaml').write_text(mutant, errors='surrogatepass')
-    judge('metadata.yaml', read, bag, swing(), agrees)
+    judge('metadata.yaml', read, bag, WHOLE, agrees)

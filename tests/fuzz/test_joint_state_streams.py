@@ -174,18 +174,3 @@ def test_damaged_messages_change_nothing(damage, velocity):
     assert np.max(shift) < SHIFTED
     assert np.max(estimate.std / whole.std) < INFLATED
     assert not online.changes
-
-
-def test_a_spike_behind_a_glitch_that_hides_in_the_acceleration_is_left_out():
-    """The line through the glitch leads astray, so that what follows seems to be a change."""
-    glitch = {203: ('scale', 'position', 1, 1.5)}
-    alone = np.max(learned(glitch).estimate().std / UNDAMAGED[False].std)
-    both = learned({**glitch, 205: ('number', 'position', 0, 0.0)})
-    assert both.rejected['spike'] >= 1
-    assert np.max(both.estimate().std / UNDAMAGED[False].std) < 2.0 * alone
-
-
-@pytest.mark.xfail(strict=True, reason='a glitch smaller than what acceleration does hides in it')
-def test_a_small_glitch_of_an_encoder_in_the_first_second_does_not_widen_the_estimate():
-    online = learned({57: ('number', 'position', 0, Q[57, 0] - 0.01)})
-    assert np.max(online.estimate().std / UNDAMAGED[False].std) < INFLATED

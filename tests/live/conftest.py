@@ -6,6 +6,7 @@ from __future__ import annotations
 
 from armid_ros.arm import ArmModel
 from armid_ros.effects import parse_effect
+from armid_ros.live import DiagnosisRequest, InProcess
 from armid_ros.recording import Recording
 from armid_ros.robots import load_robot
 from armid_ros.simulation import Reference, Sensors, SimulatedArm
@@ -73,3 +74,17 @@ def healthy():
 def changed():
     """Return a run of 20 s in which friction rises after 8 s."""
     return recorded(8.0, 12.0, MORE_FRICTION)
+
+
+@pytest.fixture(scope='session')
+def asked(known_arm, changed):
+    """Return the request for a diagnosis of the run."""
+    return DiagnosisRequest(known_arm, changed, end=20.0)
+
+
+@pytest.fixture(scope='session')
+def answered(asked):
+    """Return what answered the request in this process, and its answer."""
+    here = InProcess()
+    here.ask(asked)
+    return here, here.poll()

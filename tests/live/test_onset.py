@@ -4,13 +4,7 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
-
 from armid_ros.live.onset import onset
-
-
-def test_the_time_of_a_change_is_found_within_a_second(known_arm, changed):
-    assert abs(onset(known_arm, changed) - 8.0) < 1.0
 
 
 def test_nothing_is_found_where_nothing_changes(known_arm, healthy):
@@ -20,11 +14,5 @@ def test_nothing_is_found_where_nothing_changes(known_arm, healthy):
 def test_what_came_before_a_change_is_left_out_and_the_change_itself(known_arm, changed):
     """However long ago it was: a window is seldom cut where blocks begin."""
     for end in (8.6, 9.3, 12.2, 17.9):
-        so_far = until(changed, end)
-        assert onset(known_arm, so_far) >= 8.0
-
-
-def until(recording, t):
-    kept = recording.t < t
-    parts = {name: getattr(recording, name)[kept] for name in ('t', 'q', 'dq', 'tau')}
-    return replace(recording, **parts)
+        assert onset(known_arm, changed.select(changed.t < end)) >= 8.0
+    assert onset(known_arm, changed) < 9.0

@@ -14,15 +14,13 @@ import numpy as np
 import pytest
 
 
-def test_what_changed_is_named_from_what_came_since(known_arm, changed):
-    said, _ = answer(DiagnosisRequest(known_arm, changed))
+def test_what_changed_is_named_from_what_came_since(answered):
+    _, said = answered
     assert said.named[0] == ('viscous_friction', ('elbow_pitch',))
     assert abs(said.findings[0].values[0] - 0.3) < 0.05
     assert 11.0 < said.window.duration < 13.0
     elbow = next(row for row in said.gap if row.joint == 'elbow_pitch')
     assert elbow.after < elbow.before
-    before = known_arm.torque
-    assert before is not said.arm.torque
 
 
 def test_a_healthy_arm_is_consistent(known_arm, healthy):

@@ -61,10 +61,4 @@ def test_rest_is_no_motion():
     for t in np.arange(0.0, 3.0, 0.01):
         window.add(t, np.array([max(t - 2.0, 0.0), 0.0]), None, np.zeros(2))
     assert abs(window.moved - 1.0) < 0.03
-
-
-def test_without_velocity_a_recording_has_none():
-    window = SampleWindow(JOINTS, 1.0, 0.01)
-    for t in (0.0, 0.01, 0.02):
-        window.add(t, np.zeros(2), None, np.zeros(2))
     assert window.recording().dq is None

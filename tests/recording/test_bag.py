@@ -72,6 +72,7 @@ def test_paths_of_old_metadata_begin_with_the_directory(swinging, tmp_path, asse
 def test_files_of_mcaps_own_writer_are_read_however_bare(
     swinging, stamps, tmp_path, assert_same, compression, indexes, chunked, summary
 ):
+    """Of two publishers there are two channels, which are one topic."""
     path = tmp_path / 'file.mcap'
     messages = joint_state_cdr(JOINTS, stamps, swinging.q, swinging.dq, swinging.tau)
     with path.open('wb') as stream:
@@ -90,9 +91,9 @@ def test_files_of_mcaps_own_writer_are_read_however_bare(
         text = message_type(JOINT_STATE).definition.encode()
         schema = writer.register_schema('sensor_msgs/JointState', 'ros2msg', text)
         other = writer.register_channel('/chatter', 'cdr', 0)
-        channel = writer.register_channel('/joint_states', 'cdr', schema)
+        channels = [writer.register_channel('/joint_states', 'cdr', schema) for _ in range(2)]
         for at, (stamp, message) in enumerate(zip(stamps.tolist(), messages, strict=True)):
-            writer.add_message(channel, stamp, message, stamp)
+            writer.add_message(channels[at % 3 == 0], stamp, message, stamp)
             writer.add_message(other, stamp, b'x' * (at % 50), stamp)
         writer.finish()
     recording = read_recording(path, joints=JOINTS)
@@ -103,25 +104,6 @@ def test_files_of_mcaps_own_writer_are_read_however_bare(
         '/joint_states': 500,
     }
     assert len(list(iter_raw(path))) == 1000
-
-
-def test_two_publishers_recorded_as_two_channels_are_one_topic(
-    swinging, stamps, tmp_path, assert_same
-):
-    path = tmp_path / 'file.mcap'
-    messages = joint_state_cdr(JOINTS, stamps, swinging.q, swinging.dq, swinging.tau)
-    with path.open('wb') as stream:
-        writer = McapFileWriter(stream, chunk_size=9000)
-        writer.start()
-        schema = writer.register_schema(JOINT_STATE, 'ros2msg', b'')
-        channels = [writer.register_channel('/joint_states', 'cdr', schema) for _ in range(2)]
-        for at, (stamp, message) in enumerate(zip(stamps.tolist(), messages, strict=True)):
-            writer.add_message(channels[at % 3 == 0], stamp, message, stamp)
-        writer.finish()
-    recording = read_recording(path, joints=JOINTS)
-    assert_same(recording, swinging)
-    assert recording.report.clean
-    assert [topic.count for topic in topics(path)] == [500]
 
 
 @pytest.mark.parametrize('columns', ['', ', offered_qos_profiles TEXT NOT NULL'])
@@ -138,28 +120,17 @@ def test_sqlite_files_of_the_first_distributions_are_read(
     assert [file.name for file in tmp_path.iterdir()] == ['old.db3']
 
 
-def test_messages_come_in_the_order_of_time_whatever_the_order_of_storage(tmp_path):
-    rng = np.random.default_rng(5)
-    times = rng.permutation(2000).tolist()
+@pytest.mark.parametrize('times', [np.random.default_rng(5).permutation(2000).tolist(), 50 * [10]])
+def test_messages_come_in_the_order_of_time_and_then_of_storage(tmp_path, times):
+    stored = [('/b' if time % 2 else '/a', time, str(k)) for k, time in enumerate(times)]
     with BagWriter(tmp_path / 'bag', chunk_size=500) as writer:
         writer.add_topic('/a', STRING)
         writer.add_topic('/b', STRING)
-        for time in times:
-            writer.write('/a' if time % 2 else '/b', string_cdr(str(time)), time)
-    messages = list(iter_raw(tmp_path / 'bag'))
-    assert [message.log_time_ns for message in messages] == list(range(2000))
-    assert all(message.cdr == string_cdr(str(message.log_time_ns)) for message in messages)
-    assert all((message.topic == '/b') == (message.log_time_ns % 2 == 0) for message in messages)
-
-
-def test_equal_times_keep_the_order_of_storage(tmp_path):
-    with BagWriter(tmp_path / 'bag', chunk_size=100) as writer:
-        writer.add_topic('/a', STRING)
-        for number in range(50):
-            writer.write('/a', string_cdr(str(number)), 10)
-    assert [message.cdr for message in iter_raw(tmp_path / 'bag')] == [
-        string_cdr(str(number)) for number in range(50)
-    ]
+        for topic, time, text in stored:
+            writer.write(topic, string_cdr(text), time)
+    messages = [(m.topic, m.log_time_ns, m.cdr) for m in iter_raw(tmp_path / 'bag')]
+    in_order = sorted(stored, key=lambda message: message[1])
+    assert messages == [(topic, time, string_cdr(text)) for topic, time, text in in_order]
 
 
 def test_several_robot_descriptions_are_refused_equal_ones_are_not(tmp_path):
@@ -174,51 +145,53 @@ def test_several_robot_descriptions_are_refused_equal_ones_are_not(tmp_path):
 
 
 @pytest.mark.parametrize(
-    ('name', 'content', 'problem'),
+    ('name', 'content', 'fact'),
     [
-        ('file.mcap', b'', 'the file is empty'),
-        ('file.mcap', bytes(1000), 'not an MCAP file'),
-        ('file.mcap', b'\x89MCAP0\r\n', 'no topic of sensor_msgs/msg/JointState.*no topics'),
-        ('file.mcap', b'\x89MCAP0\r\n' + b'\xff' * 500, 'no topic of sensor_msgs/msg/JointState'),
-        ('file.db3', b'', 'an SQLite file, but not of rosbag2'),
-        ('file.db3', b'rubbish' * 500, 'not an SQLite file of rosbag2'),
-        ('file.mcap.zstd', b'rubbish' * 500, 'the compressed file is damaged'),
-        ('file.bag', b'#ROSBAG V2.0', 'cannot be read as a bag of ROS 1'),
+        ('file.mcap', b'', 'empty'),
+        ('file.mcap', bytes(1000), 'MCAP'),
+        ('file.mcap', b'\x89MCAP0\r\n', 'JointState'),
+        ('file.mcap', b'\x89MCAP0\r\n' + b'\xff' * 500, 'JointState'),
+        ('file.db3', b'', 'rosbag2'),
+        ('file.db3', b'rubbish' * 500, 'rosbag2'),
+        ('file.mcap.zstd', b'rubbish' * 500, 'damaged'),
+        ('file.bag', b'#ROSBAG V2.0', 'ROS 1'),
+        ('absent', None, ''),
     ],
 )
-def test_what_is_no_bag_is_refused_with_its_name(tmp_path, name, content, problem):
-    (tmp_path / name).write_bytes(content)
-    with pytest.raises(RecordingError, match=f'{name}: {problem}'):
+def test_what_is_no_bag_is_refused_with_its_name(tmp_path, name, content, fact):
+    if content is not None:
+        (tmp_path / name).write_bytes(content)
+    with pytest.raises(RecordingError, match=f'{name}: .*{fact}'):
         read_recording(tmp_path / name, joints=JOINTS)
 
 
 def test_directories_that_are_no_bags_are_refused_with_what_they_hold(swinging, tmp_path):
-    with pytest.raises(RecordingError, match='absent: there is no such bag'):
-        read_recording(tmp_path / 'absent', joints=JOINTS)
     write_recording(tmp_path / 'runs' / 'first', swinging)
-    with pytest.raises(RecordingError, match=r'runs: a directory without.*bags in .*runs/first'):
+    with pytest.raises(RecordingError, match=r'runs: .*runs/first'):
         read_recording(tmp_path / 'runs', joints=JOINTS)
     bag = tmp_path / 'runs' / 'first'
     (bag / 'first_0.db3').write_bytes(b'')
     (bag / 'metadata.yaml').unlink()
-    with pytest.raises(RecordingError, match=r'holds both.*first_0.db3, first_0.mcap'):
+    with pytest.raises(RecordingError, match=r'first_0.db3, first_0.mcap'):
         read_recording(bag, joints=JOINTS)
 
 
-def test_metadata_that_lies_is_refused_with_what_there_is(swinging, tmp_path):
+@pytest.mark.parametrize(
+    ('old', 'new', 'fact'),
+    [
+        ('bag_0.mcap', 'bag_1.mcap', 'bag_1.mcap.*bag_0.mcap'),
+        ('bag_0.mcap', 'metadata.yaml', 'metadata.yaml'),
+        (None, 'a: [', ''),
+        (None, 'rosbag2_bagfile_information: 3', ''),
+        (None, '', ''),
+    ],
+)
+def test_metadata_that_lies_is_refused_with_what_there_is(swinging, tmp_path, old, new, fact):
     write_recording(tmp_path / 'bag', swinging)
     metadata = tmp_path / 'bag' / 'metadata.yaml'
-    text = metadata.read_text()
-    for wrong, problem in (
-        (text.replace('bag_0.mcap', 'bag_1.mcap'), 'names bag_1.mcap, which.*it has bag_0.mcap'),
-        (text.replace('bag_0.mcap', 'metadata.yaml'), 'names metadata.yaml; a bag consists of'),
-        ('a: [', 'no valid description of a bag'),
-        ('rosbag2_bagfile_information: 3', 'no valid description of a bag'),
-        ('', 'no valid description of a bag'),
-    ):
-        metadata.write_text(wrong)
-        with pytest.raises(RecordingError, match=f'metadata.yaml: {problem}'):
-            read_recording(tmp_path / 'bag', joints=JOINTS)
+    metadata.write_text(metadata.read_text().replace(old, new) if old else new)
+    with pytest.raises(RecordingError, match=f'metadata.yaml: .*{fact}'):
+        read_recording(tmp_path / 'bag', joints=JOINTS)
 
 
 def test_a_crashed_sqlite_recording_is_read_with_its_journal(

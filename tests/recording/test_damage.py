@@ -42,14 +42,13 @@ def test_a_damaged_chunk_is_left_out_and_said_with_its_time(bag, tmp_path):
     begin, end = (
         (time - recording.start_ns) * 1e-9 for time in (chunk.start_time, chunk.end_time)
     )
-    assert f'messages from {begin:.3f} to {end:.3f} s' in got.report.damage
-    assert 'but the writer counted 300' in got.report.damage
+    assert all(fact in got.report.damage for fact in (f'{begin:.3f}', f'{end:.3f}', '300'))
     left = (recording.t < begin - 1e-6) | (recording.t > end + 1e-6)
     assert 0 < left.sum() < 300
     np.testing.assert_array_equal(got.q, recording.q[left])
     assert len(list(iter_raw(path))) == left.sum()
     report = recover(path, tmp_path / 'out')
-    assert 'chunk at byte' in report.damage and report.messages == left.sum()
+    assert report.damage and report.messages == left.sum()
     again = read_recording(tmp_path / 'out', joints=JOINTS)
     np.testing.assert_array_equal(again.tau, recording.tau[left])
     assert again.report.damage == ''
@@ -74,51 +73,29 @@ def test_an_index_that_lies_costs_no_message(bag, entry):
     assert got.report.clean
 
 
-def test_an_index_record_that_is_lost_costs_no_message_or_is_said(bag):
-    _, path = bag
-    at, _ = chunks_of(path)[1].indexes[1]
-    change(path, at - 6, struct.pack('<H', 77))  # the index of a channel that does not exist
-    got = read_recording(path, joints=JOINTS)
-    assert len(got) == 300 or 'but the writer counted 300' in got.report.damage
-
-
-def test_messages_that_are_lost_with_their_chunk_record_are_missed(bag):
-    _, path = bag
-    chunk = chunks_of(path)[1]
-    name = len(chunk.compression)
-    opcode = chunk.begin - 8 - name - 32 - 9
-    assert path.read_bytes()[opcode] == 6
-    change(path, opcode, b'\x0c')
-    got = read_recording(path, joints=JOINTS)
-    assert len(got) < 300 and 'but the writer counted 300' in got.report.damage
-
-
 def test_a_summary_that_is_damaged_is_not_believed(bag):
     recording, path = bag
     content = path.read_bytes()
     change(path, content.rindex(b'/joint_states') + 3)
     got = read_recording(path, joints=JOINTS)
-    assert 'the checksum of the index at the end is wrong' in got.report.damage
+    assert 'checksum' in got.report.damage
     assert got.topic == '/joint_states'
     np.testing.assert_array_equal(got.q, recording.q)
 
 
 @pytest.mark.parametrize(
-    ('old', 'new', 'damage'),
+    ('old', 'new', 'facts'),
     [
-        ('count: 300', 'count: 310', 'states 310 messages of /joint_states, but the bag has 300'),
-        (
-            'name: /joint_states',
-            'name: /other',
-            'states 300 messages of /other, but the bag has none',
-        ),
+        ('count: 300', 'count: 310', ('310', '/joint_states', '300')),
+        ('name: /joint_states', 'name: /other', ('300', '/other')),
     ],
 )
-def test_counts_and_topics_of_metadata_are_compared(make_swing, tmp_path, old, new, damage):
+def test_counts_and_topics_of_metadata_are_compared(make_swing, tmp_path, old, new, facts):
     write_recording(tmp_path / 'bag', make_swing(300))
     metadata = tmp_path / 'bag' / 'metadata.yaml'
     metadata.write_text(metadata.read_text().replace(old, new))
-    assert damage in read_recording(tmp_path / 'bag', joints=JOINTS).report.damage
+    damage = read_recording(tmp_path / 'bag', joints=JOINTS).report.damage
+    assert all(fact in damage for fact in facts)
 
 
 def test_a_message_of_2_63_bytes_or_less_than_its_head_is_no_message(make_swing, tmp_path):
@@ -133,9 +110,8 @@ def test_a_message_of_2_63_bytes_or_less_than_its_head_is_no_message(make_swing,
             settings = ReadSettings(check_crc=check_crc)
             with pytest.raises(RecordingError, match=r'bag_0.mcap'):
                 read_recording(path, joints=JOINTS, settings=settings)
-    loose = content[:8] + b'\x05' + struct.pack('<Q', 10) + bytes(10)
-    path.write_bytes(loose)
-    with pytest.raises(RecordingError, match='too short for one'):
+    path.write_bytes(content[:8] + b'\x05' + struct.pack('<Q', 10) + bytes(10))
+    with pytest.raises(RecordingError, match=r'bag_0.mcap'):
         read_recording(path, joints=JOINTS)
 
 
@@ -151,7 +127,7 @@ def test_a_message_logged_after_2262_is_left_out_and_said(make_swing, tmp_path):
         crc = chunk.begin - 8 - len(chunk.compression) - 8
         change(path, crc, bytes(4))  # no checksum
         report = recover(path, tmp_path / f'out{field}')
-        assert report.messages == 299 and 'after the year 2262' in report.damage
+        assert report.messages == 299 and '2262' in report.damage
         assert len(read_recording(path, joints=JOINTS)) == 299
 
 
@@ -164,24 +140,8 @@ def test_rows_that_are_no_messages_are_left_out_and_said(
     with sqlite_bag(path, messages_of(swinging, stamps)) as database:
         database.execute(f'UPDATE messages SET {column} = {value} WHERE id = 10')
     got = read_recording(path, joints=JOINTS)
-    assert len(got) == 499 and '1 rows of messages have no' in got.report.damage
-    assert len(list(iter_raw(path))) == 499
-
-
-@pytest.mark.parametrize('value', ['NULL', "x'ff00'", '3.5', "CAST(x'ff' AS TEXT)"])
-@pytest.mark.parametrize(
-    'column', ['name', 'type', 'serialization_format', 'offered_qos_profiles']
-)
-def test_topics_that_are_no_texts_are_refused_or_read(
-    swinging, stamps, messages_of, tmp_path, column, value
-):
-    path = tmp_path / 'bag.db3'
-    with sqlite_bag(path, messages_of(swinging, stamps)) as database:
-        database.execute(f'UPDATE topics SET {column} = {value}')
-    try:
-        assert len(read_recording(path, joints=JOINTS)) == 500
-    except RecordingError as refusal:
-        assert str(path) in str(refusal)
+    assert len(got) == len(list(iter_raw(path))) == 499
+    assert '1 rows' in got.report.damage
 
 
 def test_a_view_in_place_of_a_table_is_refused(swinging, stamps, messages_of, tmp_path):
@@ -192,16 +152,5 @@ def test_a_view_in_place_of_a_table_is_refused(swinging, stamps, messages_of, tm
             '(SELECT 1 UNION ALL SELECT i + 1 FROM n) '
             "SELECT i AS id, 1 AS topic_id, i AS timestamp, x'00' AS data FROM n"
         )
-    with pytest.raises(RecordingError, match='not of rosbag2'):
+    with pytest.raises(RecordingError, match='rosbag2'):
         read_recording(path, joints=JOINTS)
-
-
-def test_a_damaged_page_of_a_database_is_said(swinging, stamps, messages_of, tmp_path):
-    path = tmp_path / 'bag.db3'
-    sqlite_bag(path, messages_of(swinging, stamps)).close()
-    size = path.stat().st_size
-    change(path, 4096 * (size // 4096 // 2) + 8, b'\xff' * 64)
-    try:
-        assert 'the database is damaged' in read_recording(path, joints=JOINTS).report.damage
-    except RecordingError as refusal:
-        assert str(path) in str(refusal)

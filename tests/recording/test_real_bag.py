@@ -6,8 +6,6 @@ from armid_ros.recording import read_recording, read_robot_description, topics
 import numpy as np
 import pytest
 
-from .conftest import iter_raw
-
 JOINTS = (
     'shoulder_pan_joint',
     'shoulder_lift_joint',
@@ -18,14 +16,9 @@ JOINTS = (
 )
 
 
-@pytest.fixture
-def bag(real_data):
-    """Return the bag file."""
-    return real_data / 'ur10_ros2bag' / 'ur10_exciting_trajectory.db3'
-
-
 @pytest.mark.real_data
-def test_the_ur10_bag_is_read_whole(bag):
+def test_the_ur10_bag_is_read_whole(real_data):
+    bag = real_data / 'ur10_ros2bag' / 'ur10_exciting_trajectory.db3'
     recording = read_recording(bag, joints=JOINTS)
     assert len(recording) == recording.report.messages == 3441
     assert recording.report.clean
@@ -39,13 +32,6 @@ def test_the_ur10_bag_is_read_whole(bag):
     peaks = abs(recording.tau).max(axis=0)
     assert (peaks < 330).all()
     assert peaks.argmax() == 1
-
-
-@pytest.mark.real_data
-def test_the_ur10_bag_has_one_topic_and_no_description(bag):
     (topic,) = topics(bag)
     assert (topic.name, topic.count) == ('/joint_states', 3441)
     assert read_robot_description(bag) is None
-    times = [message.log_time_ns for message in iter_raw(bag)]
-    assert times == sorted(times)
-    assert len(times) == 3441

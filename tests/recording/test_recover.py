@@ -7,7 +7,6 @@ import re
 from armid_ros.errors import RecordingError
 from armid_ros.recording import (
     BagWriter,
-    joint_state_cdr,
     LATCHED,
     read_recording,
     read_robot_description,
@@ -62,56 +61,24 @@ def test_a_file_cut_anywhere_gives_all_samples_before_the_cut(whole, tmp_path):
         before = len(got)
         np.testing.assert_array_equal(got.q, recording.q[: len(got)])
         np.testing.assert_array_equal(got.tau, recording.tau[: len(got)])
-        assert 'readable up to byte' in got.report.damage
+        assert got.report.damage
         assert len(list(iter_raw(cut))) == len(got)
         assert topics(cut)[0].count == len(got)
     assert before == 300
 
 
-@pytest.mark.parametrize('compression', ['none', 'zstd'])
-def test_the_share_of_a_chunk_cut_off_is_the_share_of_its_messages(
-    make_swing, tmp_path, compression
-):
+def test_the_share_of_a_chunk_cut_off_is_the_share_of_its_messages(make_swing, tmp_path):
     """A chunk that is cut off is read as far as it goes, beyond the last whole record."""
-    recording = make_swing(6000)
-    write_recording(tmp_path / 'bag', recording, compression=compression, chunk_size=10**9)
+    write_recording(tmp_path / 'bag', make_swing(6000), compression='zstd', chunk_size=10**9)
     path = tmp_path / 'bag' / 'bag_0.mcap'
     ends, counted = chunk_ends(path)
     largest = int(np.argmax(np.diff(ends))) + 1
     cut = tmp_path / 'cut.mcap'
     cut.write_bytes(path.read_bytes()[: (ends[largest - 1] + 2 * ends[largest]) // 3])
     got = read_recording(cut, joints=JOINTS)
-    said = re.search(r'begins there (\d+) of (\d+) bytes \((\d+) %\) are read', got.report.damage)
-    read, of, percent = map(int, said.groups())
-    assert percent == 100 * read // of
+    read, of = map(int, re.search(r'(\d+) of (\d+) bytes', got.report.damage).groups())
     inside = counted[largest] - counted[largest - 1]
     assert (len(got) - counted[largest - 1]) / inside == pytest.approx(read / of, abs=0.01)
-
-
-def test_uncompressed_messages_of_a_chunk_cut_off_are_read_to_the_last(make_swing, tmp_path):
-    recording = make_swing(300)
-    write_recording(tmp_path / 'bag', recording, compression='none')
-    content = (tmp_path / 'bag' / 'bag_0.mcap').read_bytes()
-    cut = tmp_path / 'cut.mcap'
-    first = [recording.q[:1], recording.dq[:1], recording.tau[:1]]
-    (message,) = joint_state_cdr(JOINTS, [recording.start_ns], *first)
-    third = content.find(message) - 31 + 3 * (31 + len(message))
-    for cut_at, messages in ((third - 1, 2), (third, 3), (third + 1, 3)):
-        cut.write_bytes(content[:cut_at])
-        assert len(read_recording(cut, joints=JOINTS)) == messages
-
-
-def test_a_file_cut_before_its_first_message_is_refused_with_its_name(whole, tmp_path):
-    _, path = whole
-    content = path.read_bytes()
-    cut = tmp_path / 'cut.mcap'
-    for size in range(0, 400, 7):
-        cut.write_bytes(content[:size])
-        with pytest.raises(RecordingError, match=str(cut)):
-            read_recording(cut, joints=JOINTS)
-        with pytest.raises(RecordingError, match=str(cut)):
-            recover(cut, tmp_path / 'out')
-    assert not (tmp_path / 'out').exists()
 
 
 def test_a_recovered_bag_is_whole_for_every_reader(whole, tmp_path, assert_same):
@@ -129,7 +96,6 @@ def test_a_recovered_bag_is_whole_for_every_reader(whole, tmp_path, assert_same)
         assert_same(again, recording, slice(0, len(as_read)))
         assert again.report.clean
         assert report.messages == len(as_read)
-        assert 'readable up to byte' in report.describe()
         assert f'/joint_states ({len(as_read)})' in report.describe()
         with Reader(bag) as reader:
             assert reader.message_count == len(list(reader.messages())) == len(as_read)
@@ -152,20 +118,20 @@ def test_recovery_keeps_types_qos_and_times(swinging, stamps, messages_of, tmp_p
     assert list(iter_raw(tmp_path / 'out')) == list(iter_raw(tmp_path / 'bag'))
     assert topics(tmp_path / 'out') == topics(tmp_path / 'bag')
     assert read_robot_description(tmp_path / 'out') == '<robot/>'
-    assert 'the file is whole. 2 messages' in report.describe()
+    assert 'whole' in report.describe()
     assert recover(tmp_path / 'bag', tmp_path / 'again').messages == 2
 
 
 def test_recovery_refuses_what_it_cannot_do(swinging, tmp_path):
     write_recording(tmp_path / 'bag', swinging)
-    with pytest.raises(RecordingError, match='bag: exists already'):
-        recover(tmp_path / 'bag' / 'bag_0.mcap', tmp_path / 'bag')
-    with pytest.raises(RecordingError, match='absent: there is no such file'):
-        recover(tmp_path / 'absent', tmp_path / 'out')
-    with pytest.raises(RecordingError, match=r'its only .mcap file, but it has none'):
-        recover(tmp_path, tmp_path / 'out')
     with BagWriter(tmp_path / 'empty') as writer:
         writer.add_topic('/chatter', STRING)
-    with pytest.raises(RecordingError, match=r'empty_0.mcap: there is no message to recover'):
-        recover(writer.file, tmp_path / 'out')
+    for source, out, fact in (
+        (tmp_path / 'bag' / 'bag_0.mcap', tmp_path / 'bag', 'bag: '),
+        (tmp_path / 'absent', tmp_path / 'out', 'absent: '),
+        (tmp_path, tmp_path / 'out', '.mcap'),
+        (writer.file, tmp_path / 'out', 'empty_0.mcap: '),
+    ):
+        with pytest.raises(RecordingError, match=fact):
+            recover(source, out)
     assert not (tmp_path / 'out').exists()

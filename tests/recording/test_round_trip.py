@@ -2,7 +2,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """What one writes the other reads: this package, rosbags and mcap-ros2-support."""
 
-from armid_ros.motion import Motion
+from armid_ros.errors import ArmidError, RecordingError
 from armid_ros.recording import (
     joint_state_cdr,
     read_recording,
@@ -35,18 +35,6 @@ def test_what_is_written_is_read_back_exactly(
     assert back.topic == '/joint_states'
     assert back.report.clean
     assert (back.report.messages, back.report.samples) == (500, 500)
-
-
-def test_a_motion_is_written_with_a_start_of_ones_choice(tmp_path):
-    t = np.linspace(0.0, 1.0, 11)
-    motion = Motion(('elbow',), t, t[:, None], np.ones((11, 1)), np.zeros((11, 1)))
-    write_recording(tmp_path / 'bag', motion, start_ns=5 * 10**9)
-    back = read_recording(tmp_path / 'bag', joints=['elbow'])
-    np.testing.assert_array_equal(back.q, motion.q)
-    np.testing.assert_allclose(back.t, t, atol=1e-9)
-    assert back.start_ns == 5 * 10**9
-    assert back.tau is None
-    assert back.report.absent == ('effort',)
 
 
 def test_the_robot_description_travels_with_the_recording(swinging, tmp_path):
@@ -86,13 +74,8 @@ def test_mcap_ros2_reads_what_is_written_by_its_own_schema(swinging, tmp_path, s
         reader = make_reader(stream, validate_crcs=True, decoder_factories=[DecoderFactory()])
         assert reader.get_header().profile == 'ros2'
         rows = list(reader.iter_decoded_messages())
-        summary = reader.get_summary()
     assert [message.log_time for _, _, message, _ in rows] == stamps.tolist()
     np.testing.assert_array_equal([list(row[3].velocity) for row in rows], swinging.dq)
-    assert summary.statistics.message_count == len(swinging)
-    assert summary.statistics.message_start_time == stamps[0]
-    assert summary.statistics.message_end_time == stamps[-1]
-    assert len(summary.chunk_indexes) == summary.statistics.chunk_count
 
 
 @pytest.mark.parametrize('version', [8, 9])
@@ -145,7 +128,7 @@ def test_definitions_of_other_distributions_are_read(
 
 
 @pytest.mark.parametrize('names', [('j',), ('a', 'bc', 'def', 'ghij', 'klmno'), ('ä', 'gelenk_2')])
-@pytest.mark.parametrize('frame_id', ['', 'x', 'base', 'a_longer_frame'])
+@pytest.mark.parametrize('frame_id', ['', 'x', 'a_longer_frame'])
 @pytest.mark.parametrize('fields', ['q', 'q dq', 'q tau', 'q dq tau'])
 def test_the_encoder_agrees_with_rosbags_whatever_the_lengths(names, frame_id, fields):
     rng = np.random.default_rng(len(names) + len(frame_id))
@@ -167,27 +150,21 @@ def test_the_encoder_agrees_with_rosbags_whatever_the_lengths(names, frame_id, f
         assert bytes(store.serialize_cdr(message, JOINT_STATE)) == raw
 
 
-def test_arrays_of_a_recording_are_read_only(swinging, tmp_path):
-    write_recording(tmp_path / 'bag', swinging)
-    back = read_recording(tmp_path / 'bag', joints=swinging.joints)
-    for array in (back.t, back.q, back.dq, back.tau):
-        with pytest.raises(ValueError, match='read-only'):
-            array[0] = 0.0
-
-
-def test_a_recording_refuses_arrays_that_do_not_match():
-    with pytest.raises(Exception, match=r'q has shape \(4, 2\).*need \(4, 3\)'):
-        Recording(joints=('a', 'b', 'c'), t=np.arange(4.0), q=np.zeros((4, 2)))
-
-
-@pytest.mark.parametrize('times', [[0.0, 0.1, 0.1, 0.2], [0.0, 0.2, 0.1, 0.3]])
-def test_a_recording_refuses_times_that_do_not_increase(times):
-    with pytest.raises(Exception, match=r'time does not increase at sample 2 .*sort the samples'):
-        Recording(joints=('a',), t=np.array(times), q=np.zeros((4, 1)))
+@pytest.mark.parametrize(
+    ('t', 'shape', 'facts'),
+    [
+        (np.arange(4.0), (4, 2), r'q.*\(4, 2\).*\(4, 3\)'),
+        (np.array([0.0, 0.1, 0.1, 0.2]), (4, 3), 'sample 2 '),
+        (np.array([0.0, 0.2, 0.1, 0.3]), (4, 3), 'sample 2 '),
+    ],
+)
+def test_a_recording_refuses_arrays_that_do_not_match(t, shape, facts):
+    with pytest.raises(ArmidError, match=facts):
+        Recording(joints=('a', 'b', 'c'), t=t, q=np.zeros(shape))
 
 
 def test_a_recording_of_no_samples_is_a_bag_that_says_so(tmp_path):
     empty = Recording(joints=('a',), t=np.empty(0), q=np.empty((0, 1)))
     write_recording(tmp_path / 'bag', empty)
-    with pytest.raises(Exception, match=r'bag: /joint_states has no messages'):
+    with pytest.raises(RecordingError, match='bag: /joint_states'):
         read_recording(tmp_path / 'bag', joints=['a'])

@@ -70,33 +70,29 @@ def changed(motion, **fields):
 def test_trajectories_that_are_not_valid_are_refused(motion, tmp_path):
     store = get_typestore(Stores.ROS2_JAZZY)
     duration = store.types['builtin_interfaces/msg/Duration']
+    still = changed(motion, time_from_start=duration(sec=0, nanosec=0))
     cases = [
-        (changed(motion, positions=np.zeros(1)), 'point 7 has 1 positions, .* 2 joint'),
-        (
-            changed(motion, time_from_start=duration(sec=0, nanosec=0)),
-            'time_from_start does not increase at point 7',
-        ),
-        (joint_trajectory_cdr(motion.select(slice(0, 1))), 'needs two points, this has 1'),
-        (joint_trajectory_cdr(motion)[:-9], 'cannot be decoded'),
+        (changed(motion, positions=np.zeros(1)), 'point 7.*1 positions.*2 joint'),
+        (still, 'time_from_start.*point 7'),
+        (joint_trajectory_cdr(motion.select(slice(0, 1))), 'points'),
+        (joint_trajectory_cdr(motion)[:-9], 'decoded'),
+        (None, 'messages'),
     ]
-    for number, (cdr, problem) in enumerate(cases):
+    for number, (cdr, fact) in enumerate(cases):
         with BagWriter(tmp_path / f'bag{number}') as writer:
             writer.add_topic('/goal', JOINT_TRAJECTORY)
-            writer.write('/goal', cdr, 1)
-        with pytest.raises(RecordingError, match=f'bag{number}: /goal.*{problem}'):
+            if cdr is not None:
+                writer.write('/goal', cdr, 1)
+        with pytest.raises(RecordingError, match=f'bag{number}: /goal.*{fact}'):
             read_waypoints(tmp_path / f'bag{number}', ('a', 'b'))
 
 
 def test_a_missing_trajectory_or_joint_is_refused_with_what_there_is(motion, swinging, tmp_path):
     write_joint_trajectory(tmp_path / 'bag', motion)
-    with pytest.raises(RecordingError, match='does not name c; its joints are a, b'):
+    with pytest.raises(RecordingError, match=r'c;.*a, b'):
         read_waypoints(tmp_path / 'bag', ('a', 'c'))
-    with pytest.raises(RecordingError, match=r'no topic of .* called /x; the topics are /joint_t'):
+    with pytest.raises(RecordingError, match=r'/x; .*/joint_trajectory'):
         read_waypoints(tmp_path / 'bag', ('a', 'b'), topic='/x')
     write_recording(tmp_path / 'states', swinging)
-    with pytest.raises(RecordingError, match='no topic of trajectory_msgs/msg/JointTrajectory'):
+    with pytest.raises(RecordingError, match=JOINT_TRAJECTORY):
         read_waypoints(tmp_path / 'states', ('a', 'b'))
-    with BagWriter(tmp_path / 'empty') as writer:
-        writer.add_topic('/goal', JOINT_TRAJECTORY)
-    with pytest.raises(RecordingError, match='empty: /goal has no messages'):
-        read_waypoints(tmp_path / 'empty', ('a', 'b'))

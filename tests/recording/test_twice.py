@@ -16,11 +16,10 @@ def monday(make_swing):
 
 def test_a_copy_is_said_with_what_it_is_a_copy_of(monday):
     copy = replace(monday, source='copy')
-    assert given_twice([monday, copy]).endswith(': copy (is monday)')
-    assert given_twice([monday], [copy]).endswith(': copy (is monday)')
-    assert given_twice([monday], [monday]).endswith(': monday')
-    with pytest.raises(RecordingError, match=r'copy .is monday.; give each recording once'):
-        require_once([monday], [copy])
+    for recordings in ([monday, copy],), ([monday], [copy]):
+        with pytest.raises(RecordingError, match=r'copy.*monday'):
+            require_once(*recordings)
+    assert 'monday' in given_twice([monday], [monday])
 
 
 def test_the_same_motion_with_other_torques_is_another_run(monday):

@@ -3,7 +3,6 @@
 """Bags as rosbag2 expects them, whatever ends the writing."""
 
 import inspect
-from pathlib import Path
 import resource
 import signal
 import subprocess
@@ -22,20 +21,20 @@ from armid_ros.recording import (
 )
 from armid_ros.recording.mcap.writer import McapWriter
 from armid_ros.recording.message_types import JOINT_STATE, message_type, store_for, STRING
+from armid_ros.recording.qos import VOLATILE
 from armid_ros.recording.writer import DEFAULT_CHUNK_AGE, whole_bag
 from mcap.reader import make_reader
-from mcap.records import Channel, Chunk, MessageIndex, Metadata, Schema
+from mcap.records import Chunk, MessageIndex, Metadata
 from mcap.stream_reader import StreamReader
 import numpy as np
 import pytest
 from rosbags.interfaces import QosHistory, QosReliability, QosTime
-from rosbags.rosbag2 import Reader
+from rosbags.rosbag2 import Reader, StoragePlugin, Writer
 from rosbags.typesys import get_typestore, Stores
 import yaml
 
 from .conftest import iter_raw, JOINTS
 
-PROJECT = Path(__file__).parents[2]
 WRITER_FILES = [inspect.getfile(BagWriter), inspect.getfile(McapWriter)]
 
 
@@ -44,73 +43,20 @@ def metadata_of(bag):
     return yaml.safe_load((bag / 'metadata.yaml').read_text())['rosbag2_bagfile_information']
 
 
-def test_metadata_is_that_of_rosbag2_version_9(swinging, stamps, tmp_path):
-    write_recording(tmp_path / 'run', swinging)
-    duration = {'nanoseconds': int(stamps[-1] - stamps[0])}
-    start = {'nanoseconds_since_epoch': int(stamps[0])}
-    forever = {'sec': 9223372036, 'nsec': 854775807}
-    assert metadata_of(tmp_path / 'run') == {
-        'version': 9,
-        'storage_identifier': 'mcap',
-        'duration': duration,
-        'starting_time': start,
-        'message_count': 500,
-        'topics_with_message_count': [
-            {
-                'topic_metadata': {
-                    'name': '/joint_states',
-                    'type': 'sensor_msgs/msg/JointState',
-                    'serialization_format': 'cdr',
-                    'offered_qos_profiles': [
-                        {
-                            'history': 'unknown',
-                            'depth': 0,
-                            'reliability': 'reliable',
-                            'durability': 'volatile',
-                            'deadline': forever,
-                            'lifespan': forever,
-                            'liveliness': 'automatic',
-                            'liveliness_lease_duration': forever,
-                            'avoid_ros_namespace_conventions': False,
-                        }
-                    ],
-                    'type_description_hash': (
-                        'RIHS01_a13ee3a330e346c9d87b5aa18d24e11690752bd33a0350f11c5882bc9179260e'
-                    ),
-                },
-                'message_count': 500,
-            }
-        ],
-        'compression_format': '',
-        'compression_mode': '',
-        'relative_file_paths': ['run_0.mcap'],
-        'files': [
-            {
-                'path': 'run_0.mcap',
-                'starting_time': start,
-                'duration': duration,
-                'message_count': 500,
-            }
-        ],
-        'custom_data': None,
-        'ros_distro': 'jazzy',
-    }
-    assert sorted(file.name for file in (tmp_path / 'run').iterdir()) == [
-        'metadata.yaml',
-        'run_0.mcap',
-    ]
-    assert '&' not in (tmp_path / 'run' / 'metadata.yaml').read_text()  # no aliases
-
-
-def test_an_empty_bag_is_that_of_rosbag2(tmp_path):
-    with BagWriter(tmp_path / 'bag') as writer:
-        writer.add_topic('/joint_states', JOINT_STATE)
-    metadata = metadata_of(tmp_path / 'bag')
-    assert metadata['starting_time'] == {'nanoseconds_since_epoch': 9223372036854775807}
-    assert metadata['duration'] == {'nanoseconds': 0}
-    with Reader(tmp_path / 'bag') as reader:
-        assert [connection.topic for connection in reader.connections] == ['/joint_states']
-        assert list(reader.messages()) == []
+@pytest.mark.parametrize('samples', [500, 0])
+def test_metadata_is_that_which_rosbags_writes(make_swing, stamps, tmp_path, samples):
+    recording, stamps = make_swing(samples), stamps[:samples]
+    write_recording(tmp_path / 'run', recording)
+    store = get_typestore(Stores.ROS2_JAZZY)
+    cdr = joint_state_cdr(JOINTS, stamps, recording.q, recording.dq, recording.tau)
+    bag = tmp_path / 'run_0'  # whose file is run_0.mcap
+    with Writer(bag, version=9, storage_plugin=StoragePlugin.MCAP) as writer:
+        connection = writer.add_connection(
+            '/joint_states', JOINT_STATE, typestore=store, offered_qos_profiles=[VOLATILE]
+        )
+        for stamp, message in zip(stamps.tolist(), cdr, strict=True):
+            writer.write(connection, stamp, message)
+    assert metadata_of(tmp_path / 'run') == metadata_of(bag) | {'ros_distro': 'jazzy'}
 
 
 def test_the_file_is_in_order_by_mcaps_own_rules(swinging, tmp_path):
@@ -134,35 +80,6 @@ def test_the_file_is_in_order_by_mcaps_own_rules(swinging, tmp_path):
     first, last = (yaml.safe_load(record.metadata['serialized_metadata']) for record in written)
     assert (first['message_count'], last['message_count']) == (0, 501)
     assert last == metadata_of(tmp_path / 'bag')
-
-
-def test_the_schema_is_the_definition_with_what_it_contains(swinging, tmp_path):
-    write_recording(tmp_path / 'bag', swinging)
-    with (tmp_path / 'bag' / 'bag_0.mcap').open('rb') as stream:
-        records = list(StreamReader(stream).records)
-    schema = next(record for record in records if isinstance(record, Schema))
-    channel = next(record for record in records if isinstance(record, Channel))
-    assert (schema.name, schema.encoding) == ('sensor_msgs/msg/JointState', 'ros2msg')
-    parts = schema.data.decode().split('=' * 80 + '\n')
-    assert parts[0].startswith('std_msgs/Header header\nstring[] name\n')
-    assert [part.splitlines()[0] for part in parts[1:]] == [
-        'MSG: std_msgs/Header',
-        'MSG: builtin_interfaces/Time',
-    ]
-    assert channel.message_encoding == 'cdr'
-    assert channel.metadata['topic_type_hash'].startswith('RIHS01_a13ee3a3')
-    assert yaml.safe_load(channel.metadata['offered_qos_profiles'])[0]['reliability'] == 'reliable'
-
-
-def test_times_of_sending_and_receiving_are_kept_apart(tmp_path):
-    with BagWriter(tmp_path / 'bag') as writer:
-        writer.add_topic('/chatter', STRING)
-        writer.write('/chatter', string_cdr('a'), 2000, 1500)
-        writer.write('/chatter', memoryview(string_cdr('b')), 3000)
-    assert list(iter_raw(tmp_path / 'bag')) == [
-        ('/chatter', 2000, 1500, string_cdr('a')),
-        ('/chatter', 3000, 3000, string_cdr('b')),
-    ]
 
 
 def test_qos_is_recorded(tmp_path):
@@ -192,16 +109,19 @@ def test_a_type_installed_in_a_workspace_is_found(tmp_path, monkeypatch):
     with BagWriter(tmp_path / 'bag') as writer:
         writer.add_topic('/outer', 'my_msgs/msg/Outer')
     (topic,) = topics(tmp_path / 'bag')
-    assert 'MSG: my_msgs/Inner\nfloat64 value' in topic.message_type.definition
-    assert 'MSG: geometry_msgs/Vector3' in topic.message_type.definition
+    parts = topic.message_type.definition.split('=' * 80 + '\n')
+    assert [part.splitlines()[0] for part in parts[1:]] == [
+        'MSG: my_msgs/Inner',
+        'MSG: geometry_msgs/Vector3',
+    ]
 
 
 def test_a_type_nobody_knows_is_refused(tmp_path, monkeypatch):
     monkeypatch.setenv('AMENT_PREFIX_PATH', '/nowhere')
     with BagWriter(tmp_path / 'bag') as writer:
-        with pytest.raises(RecordingError, match=r'my_msgs/msg/Outer is not known.*/nowhere'):
+        with pytest.raises(RecordingError, match=r'my_msgs/msg/Outer.*/nowhere'):
             writer.add_topic('/outer', 'my_msgs/msg/Outer')
-        with pytest.raises(RecordingError, match='my_msgs/msg/Outer: no valid message definition'):
+        with pytest.raises(RecordingError, match='my_msgs/msg/Outer: '):
             writer.add_topic('/outer', 'my_msgs/msg/Outer', definition='float64 ) value')
         assert writer.topics == ()
 
@@ -209,27 +129,27 @@ def test_a_type_nobody_knows_is_refused(tmp_path, monkeypatch):
 def test_a_bag_is_never_overwritten(swinging, tmp_path):
     write_recording(tmp_path / 'bag', swinging)
     before = (tmp_path / 'bag' / 'bag_0.mcap').read_bytes()
-    with pytest.raises(RecordingError, match=r'bag: exists already; choose another name'):
+    with pytest.raises(RecordingError, match='bag: '):
         write_recording(tmp_path / 'bag', swinging)
     assert (tmp_path / 'bag' / 'bag_0.mcap').read_bytes() == before
 
 
 def test_misuse_is_refused_by_name(tmp_path):
-    with pytest.raises(RecordingError, match="compression 'gzip' is not known; there are zstd"):
+    with pytest.raises(RecordingError, match=r'gzip.*zstd'):
         BagWriter(tmp_path / 'other', compression='gzip')
     (tmp_path / 'file').write_text('')
-    with pytest.raises(RecordingError, match='cannot be made: Not a directory'):
+    with pytest.raises(RecordingError, match='file/bag'):
         BagWriter(tmp_path / 'file' / 'bag')
     writer = BagWriter(tmp_path / 'bag')
     writer.add_topic('/chatter', STRING)
     writer.add_topic('/chatter', STRING)
-    with pytest.raises(RecordingError, match='/chatter is a topic of std_msgs/msg/String already'):
+    with pytest.raises(RecordingError, match=r'/chatter.*std_msgs/msg/String'):
         writer.add_topic('/chatter', JOINT_STATE)
-    with pytest.raises(RecordingError, match="'/chat' was not announced; there are /chatter"):
+    with pytest.raises(RecordingError, match=r'/chat.*/chatter'):
         writer.write('/chat', b'', 1)
     writer.close()
     writer.close()
-    with pytest.raises(RecordingError, match='the bag is closed'):
+    with pytest.raises(RecordingError, match='closed'):
         writer.write('/chatter', string_cdr(''), 1)
 
 
@@ -345,9 +265,8 @@ def test_a_kill_loses_less_than_0_3_s_at_3_khz(tmp_path):
     lost = 6000 - len(recording)
     assert lost <= DEFAULT_CHUNK_AGE * 3000 <= 0.3 * 3000
     np.testing.assert_allclose(recording.t, np.arange(len(recording)) / 3000, atol=1e-8)
-    assert 'without its index, as after a crash' in recording.report.damage
-    read = f'Of a damaged bag {len(recording)} messages could be read'
-    assert f'{read}: the file ends without its index' in recording.report.describe()
+    assert 'index' in recording.report.damage
+    assert f'{len(recording)} messages' in recording.report.describe()
 
 
 def test_a_chunk_leaves_nothing_in_memory(tmp_path):
@@ -369,20 +288,6 @@ def test_a_chunk_leaves_nothing_in_memory(tmp_path):
     assert kept < 2000  # a byte a chunk
 
 
-def test_flush_writes_out_what_is_waiting(swinging, stamps, messages_of, tmp_path):
-    writer = BagWriter(tmp_path / 'bag', clock=lambda: 0.0)
-    writer.add_topic('/joint_states', JOINT_STATE)
-    for topic, cdr, time in messages_of(swinging, stamps)[:10]:
-        writer.write(topic, cdr, time)
-    with pytest.raises(RecordingError, match='no topic of sensor_msgs/msg/JointState'):
-        read_recording(tmp_path / 'bag', joints=JOINTS)
-    writer.flush()
-    assert len(read_recording(tmp_path / 'bag', joints=JOINTS)) == 10
-    writer.flush()
-    writer.close()
-    assert read_recording(tmp_path / 'bag', joints=JOINTS).report.clean
-
-
 def test_a_full_disk_is_reported_and_what_fits_again_is_written(
     swinging, stamps, messages_of, tmp_path, assert_same
 ):
@@ -393,7 +298,7 @@ def test_a_full_disk_is_reported_and_what_fits_again_is_written(
     soft, hard = resource.getrlimit(resource.RLIMIT_FSIZE)
     resource.setrlimit(resource.RLIMIT_FSIZE, (10_000, hard))
     try:
-        with pytest.raises(RecordingError, match=r'bag_0.mcap: cannot be written: File too large'):
+        with pytest.raises(RecordingError, match=r'bag_0.mcap: '):
             writer.flush()
     finally:
         resource.setrlimit(resource.RLIMIT_FSIZE, (soft, hard))
@@ -420,18 +325,6 @@ def test_the_hash_of_a_type_does_not_depend_on_where_its_definition_is_from():
         assert message_type(name, text) == message_type(name)
         assert message_type(name).type_hash == store.hash_rihs01(name)
         assert name in store_for(message_type(name)).types
-
-
-def test_the_estimate_message_of_this_project_is_described(tmp_path):
-    text = (PROJECT / 'msg_schemas' / 'msg' / 'ParameterEstimate.msg').read_text()
-    with BagWriter(tmp_path / 'bag') as writer:
-        writer.add_topic('/estimate', 'armid_msgs/msg/ParameterEstimate', definition=text)
-    (topic,) = topics(tmp_path / 'bag')
-    assert topic.message_type.definition.startswith('std_msgs/Header header\nstring[] name\n')
-    assert 'MSG: builtin_interfaces/Time' in topic.message_type.definition
-    assert topic.message_type.type_hash == (
-        'RIHS01_f0994942518e1871f75ba0cc8c2fe4fd00c589eaf366df042f690fdd672127b7'
-    )
 
 
 @pytest.mark.parametrize('end', [RecordingError('disk full'), KeyboardInterrupt()])

@@ -155,36 +155,22 @@ class Controller:
 
     Attributes
     ----------
-    accepted, refused : list of JointTrajectory
+    accepted : list of JointTrajectory
         Trajectories by topic and by action.
     goals : list of FollowJointTrajectory.Goal
         Accepted goals.
     ends : list of str
         How goals ended: 'succeed', 'abort' or 'canceled'.
-    active : bool
-        Whether the controller is active; JTC.on_deactivate.
-    from_desired : bool
-        The parameter interpolate_from_desired_state: a trajectory begins at the last command
-        instead of the measured state.
-    scaling : float
-        The state interface of speed scaling.
-    interfaces : set of str
-        State interfaces of the hardware.
-    path_tolerance, goal_tolerance, goal_time_tolerance : float
-        The parameters constraints.<joint>.trajectory and .goal [rad] and .goal_time [s].
 
     """
 
     def __init__(self, bench, robot, q, quality=STREAM, *, action=False, now=99.4):
         self.faults = Faults()
-        self.accepted, self.refused, self.goals, self.ends = [], [], [], []
-        self.active, self.from_desired, self.scaling = True, False, 1.0
-        self.interfaces = {'position', 'velocity', 'effort'}
-        self.path_tolerance = self.goal_tolerance = self.goal_time_tolerance = 0.0
+        self.accepted, self.goals, self.ends = [], [], []
         self.now, self.q = now, np.array(q, dtype=float)
         self._bench, self._robot, self._model = bench, robot, ArmModel(robot)
         self._course, self._count, self._goal = None, 0, None
-        self._begun, self._held, self._behind = self.now, True, 0.0
+        self._held = True
         self._tolerances = (np.zeros(len(self.q)), np.zeros(len(self.q)), 0.0)
         self._results, self._replaced, self._monitored = [], [], self.now
         self._publisher = bench.probe.create_publisher(JointState, 'joint_states', 10)
@@ -203,19 +189,6 @@ class Controller:
                 cancel_callback=self._on_cancel,
             )
 
-    def restart(self):
-        """Forget the trajectory, and hold the arm where it is; JTC.on_activate."""
-        self._hold()
-        self._goal, self.active = None, True
-
-    def deactivate(self):
-        """Abort the goal, and take nothing any more; JTC.on_deactivate."""
-        self.active = False
-        self._hold()
-        if self._goal is not None:
-            self._end('abort', Result.INVALID_GOAL, 'cancelled during deactivate transition')
-            self._monitor()
-
     def leave(self):
         """Take the action away, as a controller that is unloaded does."""
         if self._server is not None:
@@ -229,7 +202,7 @@ class Controller:
         if self._course is None:
             rows = [self.q, *2 * [np.zeros(len(self.q))]]
         else:
-            rows = self._course.sample(t - self._behind)
+            rows = self._course.sample(t)
         return Motion(self._robot.joints, [t], *(row[None] for row in rows))
 
     def run(self, until, step=0.1):
@@ -237,8 +210,6 @@ class Controller:
         self._bench.spin_until(self._publisher.get_subscription_count, 'a subscriber')
         while self.now < until - 1e-9:
             self.now = round(self.now + step, 6)
-            # JTC.update: the time of the trajectory advances by the period times the scaling
-            self._behind += (1.0 - self.scaling) * step
             self._bench.tick(round(self.now * SECOND))
             self._publish()
             self._watch()
@@ -264,9 +235,7 @@ class Controller:
         order = np.argsort(self._robot.joints)
         message = JointState(name=[self._robot.joints[k] for k in order])
         for name, value in values.items():
-            # JSB.get_value: what has no state interface is not a number
-            has = name in self.interfaces
-            setattr(message, name, (value[order] if has else np.full(len(q), np.nan)).tolist())
+            setattr(message, name, value[order].tolist())
         message.header.stamp = stamp_of(t)
         self._publisher.publish(message)
 
@@ -289,7 +258,7 @@ class Controller:
             return
         path, goal, goal_time = self._tolerances
         error = self.state(self.now).q[0] - self.q
-        past_end = self.now - self._behind - self._course.t[-1]
+        past_end = self.now - self._course.t[-1]
         allowed = path if past_end < 0.0 else goal
         # tolerances: zero is not enforced
         outside = (np.abs(error) > allowed) & (allowed > 0.0)
@@ -335,8 +304,7 @@ class Controller:
             goal.send()
 
     def _on_goal(self, goal):
-        if self.faults.deaf or not self.active or not self._valid(goal.trajectory):
-            self.refused.append(goal.trajectory)
+        if self.faults.deaf or not self._valid(goal.trajectory):
             return GoalResponse.REJECT
         return GoalResponse.ACCEPT
 
@@ -351,34 +319,17 @@ class Controller:
             self._monitor()
         self.goals.append(request)
         self._take(request.trajectory)
-        self._tolerances = self._resolved(request)
+        self._tolerances = (
+            self._resolved(request.path_tolerance),
+            self._resolved(request.goal_tolerance),
+            max(seconds_of(request.goal_time_tolerance), 0.0),
+        )
         self._goal = Goal(handle, *self._tolerances)
 
-    def _resolved(self, request):
-        """Return the tolerances of a goal; tolerances.get_segment_tolerances."""
-        joints = list(self._robot.joints)
-        default = (
-            np.full(len(joints), self.path_tolerance),
-            np.full(len(joints), self.goal_tolerance),
-            self.goal_time_tolerance,
-        )
-        path, goal = default[0].copy(), default[1].copy()
-        asked = [
-            (into, joints.index(t.name) if t.name in joints else None, t.position)
-            for into, tolerances in (
-                (path, request.path_tolerance),
-                (goal, request.goal_tolerance),
-            )
-            for t in tolerances
-        ]
-        time = np.array([self.goal_time_tolerance])
-        asked.append((time, 0, seconds_of(request.goal_time_tolerance)))
-        for into, k, value in asked:
-            if k is None or (value < 0.0 and value != -1.0):
-                return default  # an unknown joint or an illegal value: none of the goal's holds
-            if value != 0.0:  # resolve_tolerance_source: 0 is the default, -1 is none
-                into[k] = max(value, 0.0)
-        return path, goal, float(time[0])
+    def _resolved(self, tolerances):
+        """Return those of a goal by joint; tolerances.get_segment_tolerances: -1 is none."""
+        asked = {tolerance.name: max(tolerance.position, 0.0) for tolerance in tolerances}
+        return np.array([asked.get(joint, 0.0) for joint in self._robot.joints])
 
     def _on_cancel(self, handle):
         """Hold the arm where it is; JTC.goal_cancelled_callback, which accepts all requests."""
@@ -393,9 +344,7 @@ class Controller:
 
     def _on_trajectory(self, message):
         """Take a trajectory of the topic; JTC.topic_callback, which ends no goal."""
-        if self.faults.deaf or not self.active or not self._valid(message):
-            self.refused.append(message)
-        else:
+        if not self.faults.deaf and self._valid(message):
             self._take(message)
 
     def _valid(self, message):
@@ -417,14 +366,9 @@ class Controller:
     def _take(self, message):
         """Begin a trajectory instead of the one before; JTC.update and Trajectory.update."""
         self.accepted.append(message)
-        if self.from_desired and self._course is not None:
-            before = self._course.sample(self.now - self._behind)
-        else:
-            before = [self.q]
-            if 'velocity' in self.interfaces:
-                before.append(self._velocity(self.now))
+        before = [self.q, self._velocity(self.now)]
         self._course = Course.of(message, self._robot, self.now, before)
-        self._held, self._behind = False, 0.0
+        self._held = False
 
 
 def seconds_of(stamp):

@@ -13,7 +13,9 @@ from __future__ import annotations
 
 from pathlib import Path
 import runpy
+import sys
 from types import ModuleType, SimpleNamespace
+from unittest.mock import patch
 
 import yaml
 
@@ -123,19 +125,23 @@ def modules():
     return found
 
 
+def described(name):
+    """Return what a launch file describes."""
+    return runpy.run_path(str(LAUNCH / f'{name}.launch.py'))['generate_launch_description']()
+
+
 def declared(name):
     """Return the declared arguments of a launch file."""
-    entities = runpy.run_path(str(LAUNCH / f'{name}.launch.py'))['generate_launch_description']()
-    return [one for one in entities if isinstance(one, DeclareLaunchArgument)]
+    with patch.dict(sys.modules, modules()):
+        return [one for one in described(name) if isinstance(one, DeclareLaunchArgument)]
 
 
 def launched(name, **arguments):
     """Return the nodes that a launch file starts, by executable."""
-    entities = runpy.run_path(str(LAUNCH / f'{name}.launch.py'))['generate_launch_description']()
-    names = {one.name for one in entities if isinstance(one, DeclareLaunchArgument)}
-    assert arguments.keys() <= names
+    assert arguments.keys() <= {one.name for one in declared(name)}
     context = dict(arguments)
-    found = [node for entity in entities for node in entity.execute(context) or ()]
+    with patch.dict(sys.modules, modules()):
+        found = [node for one in described(name) for node in one.execute(context) or ()]
     return {node.executable: node for node in found}
 
 

@@ -4,6 +4,8 @@
 
 from __future__ import annotations
 
+import re
+
 from armid_ros.nodes.running.arguments import stray, unreadable
 import pytest
 from rclpy._rclpy_pybind11 import RCLError, UnknownROSArgsError
@@ -13,19 +15,19 @@ from rclpy.context import Context
 @pytest.mark.parametrize(
     ('arguments', 'said'),
     [
-        (['-p', 'bag'], '-p bag: write -p NAME:=VALUE'),
-        (['-p'], '-p: nothing follows it; write -p NAME:=VALUE'),
-        (['-r', 'here'], '-r here: write -r NAME:=OTHER_NAME'),
-        (['-r', '__node:=not-a-name'], '-r __node:=not-a-name: write -r NAME:=OTHER_NAME'),
-        (['--params-file', 'nope.yaml'], 'nope.yaml: there is no such file (--params-file)'),
-        (['--log-level', 'x'], '--log-level x: Argument does not use a valid severity level'),
-        (['--nonsense'], '--nonsense: unknown after --ros-args; see --help'),
+        (['-p', 'bag'], '-p bag: .*NAME:=VALUE'),
+        (['-p'], '-p: .*NAME:=VALUE'),
+        (['-r', 'here'], '-r here: .*NAME:=OTHER_NAME'),
+        (['-r', '__node:=not-a-name'], '-r __node:=not-a-name: .*NAME:=OTHER_NAME'),
+        (['--params-file', 'nope.yaml'], 'nope.yaml: .*--params-file'),
+        (['--log-level', 'x'], '--log-level x: '),
+        (['--nonsense'], '--nonsense: .*--help'),
     ],
 )
 def test_what_ros_cannot_read_is_named(arguments, said):
     with pytest.raises((RCLError, UnknownROSArgsError)) as error:
         Context().init(['--ros-args', *arguments])
-    assert unreadable(error.value) == said
+    assert re.match(said, unreadable(error.value))
 
 
 def test_a_file_that_is_none_of_parameters_is_named_with_the_line(tmp_path):

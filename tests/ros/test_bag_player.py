@@ -10,7 +10,6 @@ from armid_ros.nodes.bag_player import BagPlayerNode
 from armid_ros.nodes.qos import LATCHED
 from armid_ros.recording import write_joint_trajectory, write_recording
 from armid_ros.recording.bag import Bag
-from armid_ros.recording.mcap.records import map_file
 from armid_ros.recording.writer import BagWriter
 import numpy as np
 import pytest
@@ -33,17 +32,6 @@ def bag(tmp_path):
         tmp_path / 'bag', motion, start_ns=7 * SECOND, robot_description='<robot name="r"/>'
     )
     return str(tmp_path / 'bag')
-
-
-def test_damage_of_the_bag_is_said(bench, bag, tmp_path):
-    path = next((tmp_path / 'bag').glob('*.mcap'))
-    content = bytearray(path.read_bytes())
-    chunk = map_file(bytes(content), path).chunks[0]
-    content[(chunk.begin + chunk.end) // 2] ^= 4
-    path.write_bytes(content)
-    player = bench.add(BagPlayerNode, bag=bag, rate=1000.0)
-    bench.spin_until(lambda: player.finished)
-    assert 'chunk' in player.complaints.latest
 
 
 def stamps(messages):
@@ -72,19 +60,16 @@ def test_in_lock_step_what_is_due_depends_on_the_clock_alone(bench, bag):
         assert len(states) == player.published['/joint_states'] == due
 
 
-def test_start_offset_leaves_out_the_beginning(bench, bag):
+@pytest.mark.parametrize('loop', [False, True])
+def test_it_begins_at_the_offset_and_again_in_a_loop(bench, bag, loop):
     states = bench.listen(JointState, 'joint_states')
-    player = bench.add(BagPlayerNode, bag=bag, topics=STATES, rate=100.0, start_offset=0.495)
-    bench.spin_until(lambda: player.finished and len(states) >= 50)
-    assert len(states) == 50
-    assert stamps(states)[0] == 7 * SECOND + SECOND // 2
-
-
-def test_a_loop_begins_again(bench, bag):
-    states = bench.listen(JointState, 'joint_states')
-    player = bench.add(BagPlayerNode, bag=bag, topics=STATES, rate=5.0, loop=True)
-    bench.spin_until(lambda: len(states) > 250)
-    assert stamps(states)[100] == stamps(states)[0] and not player.finished
+    parameters = {'topics': STATES, 'rate': 10.0, 'start_offset': 0.495, 'loop': loop}
+    player = bench.add(BagPlayerNode, bag=bag, **parameters)
+    bench.spin_until(lambda: len(states) >= (100 if loop else 50))
+    bench.spin_until(lambda: player.finished is not loop)
+    begin = 7 * SECOND + SECOND // 2
+    assert stamps(states)[0] == begin
+    assert stamps(states)[50:51] == [begin] * loop
 
 
 def test_bag_time_is_published_as_the_clock(bench, bag):
@@ -99,13 +84,13 @@ def test_bag_time_is_published_as_the_clock(bench, bag):
 @pytest.mark.parametrize(
     ('parameters', 'message'),
     [
-        ({}, 'give a bag'),
-        ({'bag': '/nowhere/bag'}, 'there is no such bag'),
-        ({'topics': ['effort']}, 'no topic /effort; there are /joint_states, /robot_description'),
-        ({'clock_rate': 10.0, 'use_sim_time': True}, 'follows /clock'),
+        ({}, 'bag'),
+        ({'bag': '/nowhere/bag'}, '/nowhere/bag'),
+        ({'topics': ['effort']}, '/effort.*/joint_states, /robot_description'),
+        ({'clock_rate': 10.0, 'use_sim_time': True}, '/clock'),
     ],
 )
-def test_what_cannot_be_played_is_said(bench, bag, parameters, message):
+def test_what_cannot_be_played_is_refused(bench, bag, parameters, message):
     if parameters and 'bag' not in parameters:
         parameters = {'bag': bag, **parameters}
     with pytest.raises(ArmidError, match=message):
@@ -144,15 +129,15 @@ def test_a_trajectory_is_sent_to_an_arm_that_is_where_it_begins(bench, plan):
 @pytest.mark.parametrize(
     ('states', 'words'),
     [
-        ([(['a', 'b'], [0.1, 0.3])], "'b' is at 0.3 and would have to be at -0.2"),
-        ([(['a'], [0.1])], "no position of joint 'b'"),
-        ([], "no position of joint 'a'"),
+        ([(['a', 'b'], [0.1, 0.3])], ("'b'", '0.3', '-0.2')),
+        ([(['a'], [0.1])], ("'b'",)),
+        ([], ("'a'",)),
     ],
     ids=['a jump', 'a joint unknown', 'no arm'],
 )
 def test_a_trajectory_that_would_make_an_arm_jump_is_refused(bench, plan, states, words):
     player, heard = played(bench, plan, states)
-    assert not heard and words in player.failure
+    assert not heard and all(word in player.failure for word in words)
     assert player.complaints.counts['trajectory'] == 1
 
 

@@ -25,14 +25,14 @@ from armid_ros.nodes.qos import STREAM
 from armid_ros.nodes.trajectory.messages import read_trajectory
 from armid_ros.recording import read_waypoints
 from armid_ros.robots import load_robot
-from builtin_interfaces.msg import Time
 from click.testing import CliRunner
 import numpy as np
 import pytest
 from sensor_msgs.msg import JointState
 from trajectory_msgs.msg import JointTrajectory
 
-SECOND = 10**9
+from tests.ros.controller import joint_state, SECOND, seconds_of
+
 APPROACH = 2.0
 
 
@@ -49,14 +49,12 @@ def excitation(robot):
 
 
 @pytest.fixture(scope='module')
-def plans(tmp_path_factory):
-    """Run armid excite for two speed classes, hurriedly, with drives as good as they may be."""
-    out = tmp_path_factory.mktemp('plans')
+def plan(tmp_path_factory):
+    """Run armid excite, hurriedly, with drives as good as they may be."""
+    out = tmp_path_factory.mktemp('plan')
     options = '--robot humanoid_arm --duration 8 --acceleration 30 --starts 1 --iterations 2'
-    for speed in ('slow', 'fast'):
-        asked = [*options.split(), '--speed', speed, '--out', str(out / speed)]
-        result = CliRunner().invoke(excite, asked)
-        assert result.exit_code == 0, result.output
+    result = CliRunner().invoke(excite, [*options.split(), '--speed', 'slow', '--out', str(out)])
+    assert result.exit_code == 0, result.output
     return out
 
 
@@ -78,11 +76,8 @@ class StandIn:
     def report(self, seconds, q=None, joints=None):
         """Publish a joint state with a stamp, and let it be taken."""
         self._bench.spin_until(lambda: self._publisher.get_subscription_count(), 'joint_states')
-        nanoseconds = round(seconds * SECOND)
-        message = JointState(name=list(joints or self.joints))
-        message.header.stamp = Time(sec=nanoseconds // SECOND, nanosec=nanoseconds % SECOND)
-        message.position = [float(x) for x in (self.q if q is None else q)]
-        self._publisher.publish(message)
+        q = self.q if q is None else q
+        self._publisher.publish(joint_state(seconds, joints or self.joints, q))
         self._bench.settle()
 
     def stand(self, until=100.0, q=None):
@@ -138,7 +133,7 @@ def follow(bench, arm, until, off=0.0, step=0.2):
 def sent(bench, messages, count):
     bench.spin_until(lambda: len(messages) >= count, 'the trajectory')
     message = messages[count - 1]
-    return message.header.stamp.sec + 1e-9 * message.header.stamp.nanosec, read_trajectory(message)
+    return seconds_of(message.header.stamp), read_trajectory(message)
 
 
 def test_start_sends_the_way_from_where_the_arm_is_and_the_run(bench, arm, excitation, robot):
@@ -158,28 +153,16 @@ def test_start_sends_the_way_from_where_the_arm_is_and_the_run(bench, arm, excit
     np.testing.assert_allclose(reference.q[late], run.q, atol=1e-6)
     np.testing.assert_allclose(reference.dq[-1], 0.0, atol=1e-9)
     again = bench.call('excitation_publisher/start')
-    assert not again.success and 'under way' in again.message
-
-
-def test_the_way_takes_the_time_that_distance_and_limits_ask_for(bench, arm, excitation, robot):
-    slow = TransferPlanner(ArmModel(robot), transfer_limits(robot, 0.05), None, 0.0)
-    node = bench.add(ExcitationPublisherNode, excitation, slow, use_sim_time=True, start=False)
-    bench.tick(99 * SECOND)
-    arm.stand()
-    node.start()
-    _, reference = sent(bench, arm.heard, 1)
-    way = node.duration - excitation.duration
-    speed = np.abs(reference.dq[reference.t < way]).max(axis=0) / robot.velocity_limit
-    assert speed.max() == pytest.approx(0.05, rel=0.01)
+    assert not again.success and again.message
 
 
 @pytest.mark.parametrize(
     ('report', 'words'),
     [
-        (lambda bench, arm: None, "no position of joint 'shoulder_pitch' was received"),
+        (lambda bench, arm: None, "'shoulder_pitch'"),
         (lambda bench, arm: arm.report(99.0, arm.q[:5], arm.joints[:5]), "'wrist_pitch'"),
         (lambda bench, arm: arm.report(99.0, [*arm.q[:5], np.nan]), "'wrist_pitch'"),
-        (lambda bench, arm: arm.stand() or bench.tick(102 * SECOND), '2.00 s ago'),
+        (lambda bench, arm: arm.stand() or bench.tick(102 * SECOND), '2.00 s'),
     ],
     ids=['none', 'a joint missing', 'a joint not a number', 'an old one'],
 )
@@ -193,44 +176,22 @@ def test_without_a_fresh_joint_state_it_does_not_start(bench, arm, excitation, r
 @pytest.mark.parametrize('service', ['start', 'rehearse'])
 @pytest.mark.parametrize('published', [False, True], ids=['no clock', 'a clock that stands'])
 def test_without_a_clock_it_does_not_start(bench, arm, excitation, service, published):
+    logged = bench.rosout()
     planner = free_planner(load_robot('humanoid_arm'))
     node = bench.add(ExcitationPublisherNode, excitation, planner, start=False, use_sim_time=True)
     if not published:
         bench.stop_clock()
         bench.spin_until(lambda: not node.count_publishers('/clock'), 'the end of /clock')
+        for _ in range(3):
+            node.look_for_clock()
+        bench.spin_until(lambda: logged, 'the warning')
+        bench.settle()
+        assert sum('/clock' in entry.msg for entry in logged) == 1
     arm.report(100.0)
     answer = bench.call(f'excitation_publisher/{service}')
     assert not answer.success and not arm.heard and node.elapsed is None
-    assert answer.message == (
-        'simulated time, but no time has come on /clock: let the simulation run; the arm is not '
-        'started'
-        if published
-        else 'simulated time, but nothing publishes /clock: start what does, or set '
-        'use_sim_time:=false; the arm is not started'
-    )
-
-
-def test_that_nothing_publishes_the_clock_is_logged_once(bench, excitation):
-    bench.stop_clock()
-    said = bench.rosout()
-    node = bench.add(
-        ExcitationPublisherNode,
-        excitation,
-        free_planner(load_robot('humanoid_arm')),
-        use_sim_time=True,
-    )
-    bench.spin_until(lambda: not node.count_publishers('/clock'), 'the end of /clock')
-    node.look_for_clock()
-    bench.spin_until(lambda: said, 'the warning')
-    for _ in range(2):
-        node.look_for_clock()
-        bench.settle()
-    node.get_logger().info('the end')
-    bench.spin_until(lambda: said[-1].msg == 'the end', 'the log')
-    assert [m.msg for m in said if 'nothing publishes /clock' in m.msg] == [
-        'simulated time, but nothing publishes /clock: start what does, or set '
-        'use_sim_time:=false; until then the node waits'
-    ]
+    assert '/clock' in answer.message
+    assert ('use_sim_time:=false' in answer.message) is not published
 
 
 def test_with_nobody_to_take_the_trajectory_it_does_not_start(bench, robot, excitation):
@@ -239,46 +200,10 @@ def test_with_nobody_to_take_the_trajectory_it_does_not_start(bench, robot, exci
     arm.stand()
     answer = bench.call('excitation_publisher/start')
     assert not answer.success and node.elapsed is None
-    assert answer.message == 'no node subscribes to /joint_trajectory; the arm is not started'
+    assert '/joint_trajectory' in answer.message
     arm.listen()
     bench.spin_until(lambda: node.readers, 'a subscriber')
     assert bench.call('excitation_publisher/start').success
-
-
-@pytest.mark.parametrize(
-    ('parameters', 'shift', 'words'),
-    [
-        ({}, -3600.0, "3.6e+03 s behind this computer's clock"),
-        ({}, 3610.0, "s ahead of this computer's clock"),
-        ({}, -0.45, "s behind this computer's clock"),
-        ({'zero_stamp': True}, -3600.0, ''),
-        ({}, 0.0, ''),
-    ],
-    ids=['behind', 'ahead', 'a little', 'zero stamps', 'one clock'],
-)
-def test_an_arm_of_another_clock_is_not_started(
-    bench, robot, excitation, monkeypatch, parameters, shift, words
-):
-    monkeypatch.setattr(arm_watch, '_REST', 0.0)
-    node = bench.add(
-        ExcitationPublisherNode, excitation, free_planner(robot), state_timeout=10.0, **parameters
-    )
-    arm = StandIn(bench, robot.joints, (robot.lower + robot.upper) / 2.0)
-    bench.spin_until(lambda: node.readers, 'a subscriber')
-    for _ in range(5):
-        arm.report(now_of(node) + shift)
-    answer = bench.call('excitation_publisher/start')
-    assert answer.success is not bool(words)
-    assert words in answer.message
-
-
-def test_a_joint_state_that_is_sent_again_is_not_fresh(bench, arm, excitation):
-    waiting_publisher(bench, excitation)
-    arm.stand()
-    bench.tick(101 * SECOND)
-    arm.report(100.0)
-    answer = bench.call('excitation_publisher/start')
-    assert not answer.success and '1.00 s ago' in answer.message
 
 
 def test_joint_states_of_two_publishers_make_one_pose(bench, arm, excitation):
@@ -290,37 +215,27 @@ def test_joint_states_of_two_publishers_make_one_pose(bench, arm, excitation):
     assert bench.call('excitation_publisher/start').success
 
 
-def test_from_a_pose_that_is_not_free_it_does_not_start(bench, arm, robot, plans):
-    file = str(plans / 'slow' / 'excitation.yaml')
+def test_from_a_pose_that_is_not_free_it_does_not_start(bench, arm, plan):
+    file = str(plan / 'excitation.yaml')
     waiting_publisher(bench, None, file=file, rate=50.0, floor='-0.3')
     arm.stand(100.0, [np.pi / 2, -np.pi / 2, 0, 0, 0, 0])
     answer = bench.call('excitation_publisher/start')
     assert not answer.success and 'floor' in answer.message and not arm.heard
 
 
-def test_beyond_a_limit_it_does_not_start_and_names_the_joint(bench, arm, excitation):
-    waiting_publisher(bench, excitation)
-    arm.stand(100.0, arm.q + 9.0 * (np.arange(6) == 3))
-    answer = bench.call('excitation_publisher/start')
-    assert not answer.success and 'elbow_pitch' in answer.message and not arm.heard
-
-
-def test_it_begins_by_itself_only_in_a_simulation(bench, arm, excitation, robot):
-    for name, parameters, begins in (
-        ('hardware', {}, False),
-        ('marked', {'simulation': True}, True),
-        ('clocked', {'use_sim_time': True}, True),
-        ('told', {'simulation': True, 'start': False}, False),
-    ):
-        node = bench.add(
-            lambda *a, **kw: ExcitationPublisherNode(*a, **kw),
-            excitation,
-            free_planner(robot),
-            namespace=f'/{name}',
-            **parameters,
-        )
-        assert node.value('start') is begins
-        assert node.value('speed') == ('fast' if parameters else 'slow')
+@pytest.mark.parametrize(
+    ('parameters', 'begins'),
+    [
+        ({}, False),
+        ({'simulation': True}, True),
+        ({'use_sim_time': True}, True),
+        ({'simulation': True, 'start': False}, False),
+    ],
+)
+def test_it_begins_by_itself_only_in_a_simulation(bench, excitation, robot, parameters, begins):
+    node = bench.add(ExcitationPublisherNode, excitation, free_planner(robot), **parameters)
+    assert node.value('start') is begins
+    assert node.value('speed') == ('fast' if parameters else 'slow')
 
 
 def test_on_hardware_nothing_is_sent_until_it_is_asked_for(
@@ -339,45 +254,12 @@ def test_on_hardware_nothing_is_sent_until_it_is_asked_for(
     sent(bench, arm.heard, 1)
 
 
-def test_it_begins_by_itself_when_somebody_listens_and_the_arm_is_heard_of(
-    bench, robot, excitation
-):
-    node = waiting_publisher(bench, excitation, start=True)
-    bench.settle()
-    assert node.elapsed is None
-    arm = StandIn(bench, robot.joints, (robot.lower + robot.upper) / 2.0)
-    bench.spin_until(lambda: node.readers)
-    node.look()
-    assert node.elapsed is None
-    arm.stand()
-    node.look()
-    sent(bench, arm.heard, 1)
-
-
 def test_a_controller_that_starts_later_is_not_set_in_motion(bench, arm, excitation):
     node = running(bench, arm, excitation)
     late = bench.listen(JointTrajectory, 'joint_trajectory', STREAM)
     bench.spin_until(lambda: node.readers == 2, 'the second subscriber')
     follow(bench, arm, 103.0)
     assert not late
-
-
-@pytest.mark.parametrize('seconds', [1.0, 4.0], ids=['on the way there', 'in the excitation'])
-def test_stop_brings_it_to_rest_on_the_path(bench, arm, excitation, robot, seconds):
-    node = running(bench, arm, excitation)
-    _, path = sent(bench, arm.heard, 1)
-    follow(bench, arm, 100.0 + seconds)
-    assert bench.call('excitation_publisher/stop').success
-    _, reference = sent(bench, arm.heard, 2)
-    ahead = path.sample(seconds + np.linspace(0.0, 1.0, 2001)).q
-    for q in reference.q[::10]:
-        assert np.abs(ahead - q).max(axis=1).min() < 2e-3
-    np.testing.assert_allclose(reference.dq[-1], 0.0, atol=1e-9)
-    assert reference.duration < 1.0
-    reference.for_robot(robot).require_limits(robot, 0.001)
-    assert node.elapsed is None
-    again = bench.call('excitation_publisher/stop')
-    assert again.success and len(arm.heard) == 2
 
 
 def test_a_blocked_arm_is_stopped_on_its_path_and_then_held_where_it_stands(
@@ -401,64 +283,14 @@ def test_a_blocked_arm_is_stopped_on_its_path_and_then_held_where_it_stands(
     np.testing.assert_allclose(hold.dq, 0.0, atol=1e-9)
     curve = hold.for_robot(robot).after(stop.q[-1], np.zeros(6), np.zeros(6))
     curve.require_limits(robot, 0.001)
-    status = bench.diagnose(node, diagnostics)
-    assert 'from where it should be, more than 0.2 rad' in status.message
-
-
-def test_an_arm_that_goes_elsewhere_is_stopped_on_its_path(bench, arm, excitation, robot):
-    node, diagnostics = running(bench, arm, excitation), bench.diagnostics()
-    off = np.array([0.0, 0.0, 0.3, 0.0, 0.0, 0.0])
-    follow(bench, arm, 104.0, off=off)
-    stamp, stop = sent(bench, arm.heard, 2)
-    assert stamp == 0.0 and node.elapsed is None
-    ahead = read_trajectory(arm.heard[0]).sample(4.0 + np.linspace(0.0, 1.0, 2001)).q
-    assert max(np.abs(ahead - q).max(axis=1).min() for q in stop.q) < 2e-3
-    np.testing.assert_allclose(stop.dq[-1], 0.0, atol=1e-9)
-    status = bench.diagnose(node, diagnostics)
-    assert f"'{robot.joints[2]}' is 0.3 rad from where it should be" in status.message
+    message = bench.diagnose(node, diagnostics).message
+    assert any(joint in message for joint in robot.joints) and '0.2 rad' in message
 
 
 def test_an_arm_that_follows_as_well_as_is_tolerated_goes_on(bench, arm, excitation):
     node = running(bench, arm, excitation, tracking_tolerance=0.4)
     follow(bench, arm, 104.0, off=0.3)
     assert node.elapsed == pytest.approx(4.0) and len(arm.heard) == 1
-
-
-@pytest.mark.parametrize('late', [0.0, 0.4])
-def test_an_arm_is_compared_with_where_it_should_be_at_the_stamp(bench, arm, excitation, late):
-    """A simulation that cannot keep up, or a slow network, is not an arm that lags."""
-    node = running(bench, arm, excitation, tracking_tolerance=0.02, state_timeout=1.0)
-    reference = read_trajectory(arm.heard[0])
-    for time in np.arange(100.2, 104.0, 0.2):
-        bench.tick(round((time + late) * SECOND))
-        arm.report(time, reference.sample(np.array([time - 100.0])).q[0])
-    assert node.elapsed is not None and len(arm.heard) == 1
-
-
-def test_an_arm_that_falls_silent_is_stopped_on_its_path(bench, arm, excitation):
-    node, diagnostics = running(bench, arm, excitation), bench.diagnostics()
-    follow(bench, arm, 103.0)
-    bench.tick(round(103.4 * SECOND))
-    node.look()
-    assert node.elapsed is not None
-    bench.tick(round(103.6 * SECOND))
-    node.look()
-    _, reference = sent(bench, arm.heard, 2)
-    np.testing.assert_allclose(reference.dq[-1], 0.0, atol=1e-9)
-    assert node.elapsed is None
-    assert '0.60 s ago, more than 0.5 s' in bench.diagnose(node, diagnostics).message
-
-
-@pytest.mark.parametrize('end', ['close', 'destroy_node'])
-def test_a_node_that_ends_stops_the_arm(bench, arm, excitation, end):
-    node = running(bench, arm, excitation)
-    follow(bench, arm, 104.0)
-    if end == 'destroy_node':
-        bench.executor.remove_node(node)
-    getattr(node, end)()
-    _, reference = sent(bench, arm.heard, 2)
-    np.testing.assert_allclose(reference.dq[-1], 0.0, atol=1e-9)
-    assert reference.duration < 1.0
 
 
 def test_that_a_run_is_complete_is_logged_once_and_in_the_status(bench, arm, excitation):
@@ -476,16 +308,8 @@ def test_that_a_run_is_complete_is_logged_once_and_in_the_status(bench, arm, exc
     for _ in range(3):
         node.look()
     assert bench.diagnose(node, diagnostics).message == 'complete'
-    words = f'run complete: {length:.1f} s, approach included'
-    assert [text for text in said if 'complete' in text] == [words]
-    assert node.condition()[1]['run'] == 'complete'
-
-
-def test_after_the_end_it_can_start_again(bench, arm, excitation):
-    node = running(bench, arm, excitation)
-    arm.stand(100.0 + node.duration + 0.5)
-    assert bench.call('excitation_publisher/start').success
-    node.close()
+    (words,) = [text for text in said if 'complete' in text]
+    assert f'{length:.1f} s' in words
 
 
 def test_slowing_down_is_the_derivative_of_where_it_is(excitation):
@@ -496,17 +320,16 @@ def test_slowing_down_is_the_derivative_of_where_it_is(excitation):
     np.testing.assert_allclose(motion.ddq, numeric, atol=0.05)
 
 
-@pytest.mark.parametrize('speed', ['slow', 'fast'])
-def test_what_armid_excite_writes_is_run_as_its_bag_has_it(bench, arm, plans, robot, speed):
-    planned = read_waypoints(plans / speed / 'trajectory', joints=robot.joints)
-    excitation = load_excitation(plans / speed / 'excitation.yaml')
-    file = str(plans / speed / 'excitation.yaml')
+def test_what_armid_excite_writes_is_run_as_its_bag_has_it(bench, arm, plan, robot):
+    planned = read_waypoints(plan / 'trajectory', joints=robot.joints)
+    excitation = load_excitation(plan / 'excitation.yaml')
+    file = str(plan / 'excitation.yaml')
     node = waiting_publisher(bench, None, file=file, rate=50.0)
     arm.stand()
     node.start()
     _, reference = sent(bench, arm.heard, 1)
     count = round(50.0 * excitation.sampled_duration(50.0)) + 1
-    document = json.loads((plans / speed / 'excitation.json').read_text())
+    document = json.loads((plan / 'excitation.json').read_text())
     begin = round(50.0 * document['approach'])
     for name in ('q', 'dq', 'ddq'):
         np.testing.assert_allclose(
@@ -516,32 +339,28 @@ def test_what_armid_excite_writes_is_run_as_its_bag_has_it(bench, arm, plans, ro
         )
 
 
-def test_a_file_that_hits_the_floor_is_refused(bench, plans):
-    with pytest.raises(ArmidError, match=r'excitation\.yaml: .*floor'):
-        bench.add(
-            ExcitationPublisherNode, file=str(plans / 'fast' / 'excitation.yaml'), floor='-0.05'
-        )
-
-
 @pytest.mark.parametrize(
-    ('change', 'words'),
+    ('spoil', 'parameters', 'fact'),
     [
-        (lambda e: Excitation(e.trajectory.scaled(50.0), 1, 1.0), 'position'),
-        (lambda e: Excitation(e.trajectory.stretched(0.4), 1, 1.0), 'velocity'),
+        (lambda run: Excitation(run.trajectory.scaled(50.0), 1, 1.0), {}, 'position'),
+        (lambda run: Excitation(run.trajectory.stretched(0.4), 1, 1.0), {}, 'velocity'),
+        (None, {}, r'run\.yaml'),
+        (lambda run: run, {'floor': '0.3'}, r'run\.yaml: .*floor'),
     ],
+    ids=['beyond positions', 'beyond velocities', 'no excitation', 'through the floor'],
 )
-def test_a_file_beyond_the_limits_is_refused(bench, excitation, tmp_path, change, words):
-    save_excitation(change(excitation), tmp_path / 'run.yaml')
-    with pytest.raises(ArmidError, match=words):
-        bench.add(ExcitationPublisherNode, file=str(tmp_path / 'run.yaml'))
-
-
-def test_an_excitation_of_another_robot_is_refused(bench, excitation, tmp_path):
-    (tmp_path / 'run.yaml').write_text('schema: something/else\n')
-    with pytest.raises(ArmidError, match=r'run\.yaml'):
-        bench.add(ExcitationPublisherNode, file=str(tmp_path / 'run.yaml'))
+def test_a_file_that_cannot_be_run_is_refused(
+    bench, excitation, tmp_path, spoil, parameters, fact
+):
+    path = tmp_path / 'run.yaml'
+    if spoil is None:
+        path.write_text('schema: something/else\n')
+    else:
+        save_excitation(spoil(excitation), path)
+    with pytest.raises(ArmidError, match=fact):
+        bench.add(ExcitationPublisherNode, file=str(path), **parameters)
 
 
 def test_a_duration_without_room_for_the_periods_is_refused(bench):
-    with pytest.raises(ArmidError, match='fewer periods'):
+    with pytest.raises(ArmidError, match='periods'):
         bench.add(ExcitationPublisherNode, duration=5.0, n_periods=4)

@@ -20,19 +20,12 @@ from sensor_msgs.msg import JointState
 import yaml
 
 from tests.ros.controller import seconds_of
-from tests.ros.launching import declared, LAUNCH, launched, modules
+from tests.ros.launching import declared, LAUNCH, launched
 from tests.ros.test_processes import short_excitation
 
 #: Of /clock, in lock step [ns].
 STEP_NS = 10**7
 CONFIG = LAUNCH.parent / 'config' / 'real_robot.yaml'
-
-
-@pytest.fixture(autouse=True)
-def launch(monkeypatch):
-    """Let launch files import the double of launch."""
-    for name, module in modules().items():
-        monkeypatch.setitem(sys.modules, name, module)
 
 
 def identify(**arguments):

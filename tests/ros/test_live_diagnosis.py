@@ -95,7 +95,7 @@ def idle(bench):
 
 def test_friction_that_rises_is_named_and_taken_over(bench):
     arm = simulated(bench, *KNOWN)
-    live = LiveDiagnosis(arm_with(*KNOWN), LiveSettings(learning=8.0))
+    live = LiveDiagnosis(arm_with(*KNOWN), LiveSettings(learning=8.0, every=6.0))
     node = bench.add(LiveDiagnosisNode, live, InProcess())
     diagnoses = bench.listen(Diagnosis, 'live_diagnosis/diagnosis', LATCHED)
     models = bench.listen(String, 'live_diagnosis/model', LATCHED)
@@ -166,20 +166,6 @@ def take(node, t, q, tau):
     node.take_joint_states(serialize_message(message))
 
 
-def status(bench, node):
-    node.freshness.now = lambda: 0.0
-    return bench.diagnose(node, bench.diagnostics())
-
-
-@pytest.mark.parametrize('behind', [0.0, 3600.0])
-def test_stamps_of_another_clock_are_said(bench, idle, behind):
-    node, _ = idle
-    take(node, node.get_clock().now().nanoseconds * 1e-9 - behind, 0.0, 0.0)
-    said = status(bench, node).message
-    expected = "stamps of /joint_states are 3600 s behind this computer's clock, and so are"
-    assert said.startswith(expected) if behind else said == 'running'
-
-
 @pytest.mark.parametrize('seconds', [0.0, 0.004, 5.0])
 def test_joint_states_that_jump_back_are_said(bench, idle, seconds):
     node, _ = idle
@@ -190,37 +176,39 @@ def test_joint_states_that_jump_back_are_said(bench, idle, seconds):
     if seconds:
         take(node, 100.99 - seconds, 0.0, 0.0)
     bench.diagnose(node, diagnostics)
-    said = {d.status[0].message for d in diagnostics}
-    back = 'joint states jump back in time: their processing begins anew'
-    late = 'joint states whose stamp is not after that of the one before are left out'
-    assert (back in said) is (seconds == 5.0)
-    assert (late in said) is (seconds == 0.004)
+    said = ' '.join(d.status[0].message for d in diagnostics)
+    assert ('jump back' in said) is (seconds == 5.0)
+    assert ('whose stamp' in said) is (seconds == 0.004)
 
 
 def test_positions_that_are_frozen_while_efforts_swing_are_said(bench, idle):
     node, _ = idle
     node.stamps.take = lambda stamp: None
     diagnostics = bench.diagnostics()
-    frozen = 'positions stay at the same numbers while efforts change'
     noise = np.random.default_rng(0).normal(scale=0.05, size=3000)
     for k in range(1000):
         take(node, 100.0 + 0.01 * k, np.sin(0.01 * k), np.cos(0.01 * k) + noise[k])
     for k in range(1000, 2000):  # at rest: the effort is that of gravity, and noise
         take(node, 100.0 + 0.01 * k, 0.5, 1.0 + noise[k])
     bench.diagnose(node, diagnostics)
-    assert not any(frozen in d.status[0].message for d in diagnostics)
+    assert not any('positions stay' in d.status[0].message for d in diagnostics)
     for k in range(2000, 3000):
         take(node, 100.0 + 0.01 * k, 0.5, np.cos(0.01 * k) + noise[k])
     bench.diagnose(node, diagnostics)
-    assert any(frozen in d.status[0].message for d in diagnostics)
+    assert any('positions stay' in d.status[0].message for d in diagnostics)
 
 
-def test_all_that_is_asked_while_a_diagnosis_is_under_way_is_done_afterwards(
-    bench, idle, tmp_path
-):
+def test_what_is_asked_is_refused_before_a_diagnosis_and_done_after_it(bench, idle, tmp_path):
     node, helper = idle
+    for service in ('save', 'next_run', 'accept', 'reject'):  # there is no diagnosis so far
+        assert not bench.call(f'live_diagnosis/{service}').success
     node.live.latest = 'a diagnosis'
-    assert node.set_parameters([Parameter('save_to', value=str(tmp_path / 'deep' / 'saved'))])
+    (tmp_path / 'file').write_text('')
+    node.set_parameters([Parameter('save_to', value=str(tmp_path / 'file' / 'saved'))])
+    answer = bench.call('live_diagnosis/save')
+    assert not answer.success and f'{tmp_path}/file/saved' in answer.message
+    assert not helper.jobs
+    node.set_parameters([Parameter('save_to', value=str(tmp_path / 'deep' / 'saved'))])
     helper.busy = True
     assert bench.call('live_diagnosis/save').success
     assert bench.call('live_diagnosis/next_run').success
@@ -228,22 +216,6 @@ def test_all_that_is_asked_while_a_diagnosis_is_under_way_is_done_afterwards(
         helper.results.append(Done('done'))
         node.take_answer()
     assert [type(job) for job in helper.jobs] == [Save, Plan]
-
-
-def test_a_folder_that_cannot_be_made_is_said_at_once(bench, idle, tmp_path):
-    node, helper = idle
-    node.live.latest = 'a diagnosis'
-    (tmp_path / 'file').write_text('')
-    node.set_parameters([Parameter('save_to', value=str(tmp_path / 'file' / 'saved'))])
-    answer = bench.call('live_diagnosis/save')
-    assert not answer.success
-    assert answer.message.startswith(f'save_to: {tmp_path}/file/saved: ')
-    assert not helper.jobs
-
-
-def test_before_a_diagnosis_nothing_can_be_saved_or_planned(bench, idle):
-    for service in ('save', 'next_run', 'accept', 'reject'):
-        assert not bench.call(f'live_diagnosis/{service}').success
 
 
 def test_settings_can_be_changed_and_those_that_do_not_fit_are_refused(bench, idle):

@@ -16,7 +16,7 @@ from armid_ros.simulation import Sensors, SimulatedArm
 import numpy as np
 import pytest
 
-RATE = 200.0
+RATE = 100.0
 AT_REST = 0.27  # what the publisher sees of the arm before it starts
 APPROACH = 2.5
 EFFECTS = ('viscous_friction:viscous_coefficient=0.5', 'torque_offset:torque_offset=0.1')
@@ -103,12 +103,10 @@ def test_a_replay_learns_the_same(first_run, robot):
     np.testing.assert_allclose(again.estimate().values, learner.estimate().values, rtol=1e-9)
 
 
-@pytest.mark.parametrize('learns', [True, False])
 def test_another_run_gives_the_same_samples_whether_somebody_learns_or_not(
-    first_run, truth, robot, excitation, tmp_path, learns
+    first_run, truth, robot, excitation, tmp_path
 ):
-    learner = identifier(robot) if learns else None
-    run(truth, excitation, tmp_path / 'bag', learner, approach=APPROACH)
+    run(truth, excitation, tmp_path / 'bag', approach=APPROACH)
     first, second = (
         read_recording(bag, joints=robot.joints) for bag in (first_run[0], tmp_path / 'bag')
     )

@@ -138,24 +138,28 @@ def test_the_estimate_is_that_of_the_core_and_the_truth(bench, arm, samples, exp
     assert all(s >= 0.0 for s in last.std_dev)
 
 
-def test_joints_are_matched_by_name_and_others_left_out(bench, arm, samples, expected):
-    t, q, dq, tau = samples
+def in_another_order(t, q, dq, tau):
+    """Return joint states of which another joint is the first, without numbers."""
     extra = np.full((len(t), 1), np.nan)
-    shuffled = [
-        message(('gripper', 'elbow', 'shoulder'), *sample)
-        for sample in zip(t, *(np.hstack([extra, x[:, ::-1]]) for x in (q, dq, tau)), strict=True)
-    ]
-    node = taught(bench, shuffled)
-    assert_learned(node, expected)
+    reordered = (np.hstack([extra, x[:, ::-1]]) for x in (q, dq, tau))
+    rows = zip(t, *reordered, strict=True)
+    return [message(('gripper', 'elbow', 'shoulder'), *row) for row in rows]
 
 
-@pytest.mark.parametrize('columns', [slice(None), [1]], ids=['all', 'one'])
-def test_velocities_that_are_not_numbers_are_absent(bench, arm, samples, expected, columns):
-    """The joint state broadcaster fills what has no state interface with NaN."""
-    t, q, dq, tau = samples
+def without_velocity(t, q, dq, tau, lacking=slice(None)):
+    """Return joint states as of a broadcaster to which no state interface gives a velocity."""
     dq = dq.copy()
-    dq[:, columns] = np.nan
-    node = taught(bench, messages(arm, (t, q, dq, tau)))
+    dq[:, lacking] = np.nan
+    return [message(('shoulder', 'elbow'), *row) for row in zip(t, q, dq, tau, strict=True)]
+
+
+def without_one_velocity(*samples):
+    return without_velocity(*samples, lacking=[1])
+
+
+@pytest.mark.parametrize('made', [in_another_order, without_velocity, without_one_velocity])
+def test_other_forms_of_the_same_joint_states_teach_the_same(bench, samples, expected, made):
+    node = taught(bench, made(*samples))
     assert_learned(node, expected)
     assert not node.complaints.latest
 
@@ -230,22 +234,12 @@ def test_rubbish_is_said_once_and_costs_nothing(bench, arm, samples, expected):
     assert sum(rejected) == len(mixed) - len(samples[0])
 
 
-SPOILED_ELEMENTS = (
-    ('axis xyz="0 1 0"', 'axis xyz="nan 0 1"'),
-    ('axis xyz="0 1 0"', 'axis xyz="inf 0 1"'),
-    ('axis xyz="0 1 0"', 'axis xyz="0 0 0"'),
-    ('origin xyz="0.2 0 0"', 'origin xyz="inf 0 0"'),
-    ('origin xyz="0.2 0 0"', 'origin xyz="0 0"'),
-    ('mass value="2"', 'mass value="nan"'),
-)
-
-
 def test_a_description_that_is_none_is_refused_and_a_good_one_still_taken(bench):
     rosout = bench.rosout()
     node = bench.add(OnlineIdentifierNode)
     publisher = bench.matched_publisher(String, 'robot_description', LATCHED)
-    spoiled = [PENDULUM.replace(*change, 1) for change in SPOILED_ELEMENTS]
-    wrong = ['hello', '<sdf/>', '<robot name="empty"/>', '<robot', *spoiled]
+    wrong = ['hello', '<sdf/>', '<robot name="empty"/>', '<robot']
+    wrong.append(PENDULUM.replace('mass value="2"', 'mass value="nan"'))
     for text in wrong:
         publisher.publish(String(data=text))
         bench.settle()
@@ -256,15 +250,6 @@ def test_a_description_that_is_none_is_refused_and_a_good_one_still_taken(bench)
     bench.spin_until(lambda: node.identifier is not None)
     assert node.hardware == 'pendulum'
     bench.spin_until(lambda: sum('robot description' in m.msg for m in rosout) >= 4)
-
-
-@pytest.mark.parametrize('reliability', list(ReliabilityPolicy)[1:3])
-def test_it_takes_the_qos_of_the_publisher(bench, arm, samples, reliability):
-    node = identifying(bench)
-    qos = QoSProfile(depth=1000, reliability=reliability)
-    publisher = bench.matched_publisher(JointState, 'joint_states', qos)
-    publish(bench, node, publisher, messages(arm, samples)[:100])
-    assert node.joint_states.subscription.qos_profile.reliability == reliability
 
 
 def test_it_changes_its_qos_when_a_publisher_offers_less(bench, arm, samples):
@@ -312,16 +297,6 @@ def test_a_model_leaves_the_effects_of_the_parameters(bench, arm, effects, expec
     assert node.identifier.arm.effects == before.arm.effects
 
 
-@pytest.mark.long
-def test_a_jump_back_in_time_is_said_and_survived(bench, arm, samples, expected):
-    diagnostics = bench.diagnostics()
-    batch = messages(arm, samples)
-    node = taught(bench, batch + batch)
-    bench.diagnose(node, diagnostics)
-    assert any('jump' in d.status[0].message for d in diagnostics)
-    assert_learned(node, expected, rtol=5e-2, atol=5e-3)
-
-
 @pytest.mark.parametrize('second', [True, False])
 def test_who_contradict_each_other_are_named(bench, arm, samples, second):
     diagnostics = bench.diagnostics()
@@ -334,21 +309,9 @@ def test_who_contradict_each_other_are_named(bench, arm, samples, second):
     mixed = [one for pair in zip(first, first, strict=True) for one in pair]
     publish(bench, node, publisher, mixed)
     bench.diagnose(node, diagnostics)
-    said = {d.status[0].message for d in diagnostics}
-    late = 'joint states whose stamp is not after that of the one before are left out'
-    named = '; 2 nodes publish /joint_states: /other, /probe; stop one'
-    assert late + (named if second else '') in said
-
-
-def test_messages_out_of_order_are_said_and_left_out(bench, arm, samples):
-    diagnostics = bench.diagnostics()
-    batch = messages(arm, samples)[:200]
-    batch[100], batch[101] = batch[101], batch[100]
-    batch[150], batch[151] = batch[151], batch[150]
-    node = taught(bench, batch)
-    bench.diagnose(node, diagnostics)
-    assert any('stamp' in d.status[0].message for d in diagnostics)
-    assert node.identifier.rejected['out_of_order'] == 2
+    said = [d.status[0].message for d in diagnostics if 'whose stamp' in d.status[0].message]
+    assert said
+    assert any('/other, /probe' in message for message in said) is second
 
 
 def test_messages_without_a_stamp_are_taken_at_the_clock(bench, arm, samples):
@@ -377,22 +340,19 @@ def test_reset_and_save(bench, arm, samples, tmp_path):
     assert node.identifier.samples == 0
 
 
-def test_saving_nothing_is_refused_and_overwrites_nothing(bench, tmp_path):
-    yesterday = 'schema: armid/model/1\nof: yesterday\n'
-    (tmp_path / 'model.yaml').write_text(yesterday)
-    node = identifying(bench, save_to=str(tmp_path))
-    answer = bench.call('online_identifier/save')
-    assert not answer.success
-    node.close()
+@pytest.mark.parametrize('own', [True, False])
+def test_what_is_in_the_folder_is_not_overwritten_with_nothing(bench, tmp_path, own):
+    before = 'schema: armid/model/1\nof: yesterday\n' if own else 'mine: true'
+    (tmp_path / 'model.yaml').write_text(before)
+    if own:
+        node = identifying(bench, save_to=str(tmp_path))
+        assert not bench.call('online_identifier/save').success
+        node.close()
+    else:  # refused at once
+        with pytest.raises(OutputError, match=r'model\.yaml'):
+            identifying(bench, save_to=str(tmp_path))
     assert [p.name for p in tmp_path.iterdir()] == ['model.yaml']
-    assert (tmp_path / 'model.yaml').read_text() == yesterday
-
-
-def test_a_model_of_somebody_else_is_not_replaced_and_that_is_said_at_once(bench, tmp_path):
-    (tmp_path / 'model.yaml').write_text('mine: true')
-    with pytest.raises(OutputError, match=r'model\.yaml'):
-        identifying(bench, save_to=str(tmp_path))
-    assert (tmp_path / 'model.yaml').read_text() == 'mine: true'
+    assert (tmp_path / 'model.yaml').read_text() == before
 
 
 @pytest.mark.parametrize('asked', [True, False])
@@ -429,20 +389,10 @@ def test_joint_states_that_stop_are_stale_within_a_second(bench, arm, samples):
     now[0] += 0.2
     node.look()
     bench.settle()
-    assert any('stopped 0.6 s ago' in d.status[0].message for d in diagnostics)
+    assert any('0.6 s' in d.status[0].message for d in diagnostics)
     assert DiagnosticStatus.STALE in levels_after(0.0)  # at once, not at the next second
     publish(bench, node, publisher, messages(arm, samples)[400:420])
     assert DiagnosticStatus.OK in levels_after(0.0)  # the node may have looked by itself
-
-
-def test_effort_that_is_not_filled_in_is_an_error_and_teaches_nothing(bench, arm, samples):
-    t, q, dq, tau = samples
-    batch = messages(arm, (t, q, dq, 0.0 * tau))
-    node = taught(bench, batch)
-    state = statuses(bench, node)['state']
-    assert state.level == DiagnosticStatus.ERROR
-    assert 'effort' in state.message
-    assert node.identifier.estimate().std.min() > 1e3
 
 
 def test_degrees_are_noticed(bench, arm, samples):
@@ -455,22 +405,6 @@ def test_degrees_are_noticed(bench, arm, samples):
     assert statuses(bench, node)['state'].level == DiagnosticStatus.OK
 
 
-@pytest.mark.parametrize('late', [0.0, 0.002])
-def test_two_senders_with_half_of_the_joints_each_are_one_arm(bench, arm, samples, late):
-    """The second one has stamps of its own, between those of the first."""
-    t, q, dq, tau = samples
-    shifted = [[np.interp(t + late, t, x[:, 1])] for x in (q, dq, tau)]
-    batch = []
-    for k, stamp in enumerate(t):
-        one = (x[k, :1] for x in (q, dq, tau))
-        other = (np.array([x[0][k]]) for x in shifted)
-        batch += [message(['shoulder'], stamp, *one), message(['elbow'], stamp + late, *other)]
-    node = taught(bench, batch)
-    truth = node.identifier.base.values(arm.theta)
-    np.testing.assert_allclose(node.identifier.estimate().values, truth, rtol=3e-2, atol=5e-3)
-    assert not node.complaints.counts
-
-
 def test_a_spike_is_said_with_the_joint_and_costs_nothing(bench, arm, samples, expected):
     t, q, dq, tau = samples
     spoiled = tau.copy()
@@ -478,17 +412,9 @@ def test_a_spike_is_said_with_the_joint_and_costs_nothing(bench, arm, samples, e
     node = taught(bench, messages(arm, (t, q, dq, spoiled)))
     state = statuses(bench, node)['state']
     assert node.complaints.counts['spike'] == 1
-    assert "effort of 'elbow'" in node.complaints.latest
+    assert 'effort' in node.complaints.latest and 'elbow' in node.complaints.latest
     assert [v.value for v in state.values if v.key.startswith('left')] == ['1']
     assert_learned(node, expected, rtol=1e-3, atol=1e-4)
-
-
-def test_joint_states_that_never_came_are_counted_and_said(bench, arm, samples):
-    batch = messages(arm, samples)
-    node = taught(bench, batch[:300] + batch[301:500] + batch[503:])
-    state = statuses(bench, node)['state']
-    assert {v.key: v.value for v in state.values}['missing'] == '4'
-    assert 'missing' in node.complaints.latest
 
 
 def test_without_a_robot_the_services_say_so(bench):
@@ -498,16 +424,10 @@ def test_without_a_robot_the_services_say_so(bench):
         assert not answer.success and 'robot_description' in answer.message
 
 
-def moving(arm, seconds, still=None, change=None, at=0.0):
-    """Return joint states of a motion with a little noise: a joint still, friction rising."""
+def moving(arm, seconds, change=None, at=0.0):
+    """Return joint states of a motion with a little noise, and friction that rises."""
     rng = np.random.default_rng(0)
     motion = two_sines(arm, np.arange(0.0, seconds, 1.0 / RATE), 0.37)
-    if still is not None:
-        states = [x.copy() for x in (motion.q, motion.dq, motion.ddq)]
-        for x, value in zip(states, (0.3, 0.0, 0.0), strict=True):
-            x[:, still] = value
-        motion = Motion(arm.robot.joints, motion.t, *states)
-        motion = motion.with_torque(arm.torque(motion))
     t, tau = motion.t[:, np.newaxis], motion.tau
     if change is not None:
         other = arm.with_effect(*parse_effect(change, arm.robot))
@@ -534,19 +454,6 @@ def test_parameters_come_with_their_intervals(bench, arm):
     assert found.hardware_id == 'pendulum'
 
 
-@pytest.mark.long
-def test_too_little_motion_is_said_with_the_joint(bench, arm):
-    node = identifying(bench)
-    publisher = bench.matched_publisher(JointState, 'joint_states')
-    batch = moving(arm, 14.0, still=1)
-    for first in range(0, len(batch), round(RATE)):  # diagnostics once a second of the arm's time
-        publish(bench, node, publisher, batch[first : first + round(RATE)])
-        node.condition()
-    state = statuses(bench, node)['state']
-    assert state.level == state.WARN
-    assert 'motion' in state.message and ': elbow' in state.message
-
-
 def test_a_change_is_published_and_said(bench, arm):
     sizes = bench.listen(ParameterEstimate, 'online_identifier/change', LATCHED)
     node = identifying(bench)
@@ -561,5 +468,4 @@ def test_a_change_is_published_and_said(bench, arm):
     assert abs(found.header.stamp.sec - 1030) <= 1
     status = statuses(bench, node)['changes']
     assert status.level == status.WARN
-    assert status.message.startswith('viscous friction at elbow ')
-    assert 's ago' in status.message
+    assert 'viscous' in status.message and 'elbow' in status.message

@@ -5,7 +5,6 @@
 from __future__ import annotations
 
 from armid_ros.nodes.parameters.table import (
-    as_declared,
     declare,
     names,
     NodeParameter,
@@ -36,21 +35,21 @@ class Declared(Node):
 @pytest.mark.parametrize(
     ('name', 'value', 'advice'),
     [
-        ('rate', 100, r"'rate' cannot be 100 of type INTEGER; use 100\.0"),
-        ('rate', 5000.0, r"'rate' is 5000\.0, outside its range 1 to 1000 Hz"),
-        ('rate', float('nan'), "'rate' is nan, outside its range"),
-        ('rate', 'fast', 'use a number'),
-        ('count', 2.0, 'use a value such as 3'),
-        ('count', 10, 'outside its range 1 to 9'),
-        ('kind', 'c', "'kind' is 'c', not one of a, b"),
-        ('kind', 7, 'quote it'),
-        ('fixed', 1, 'use a value such as true'),
-        ('gains', [], r"'gains' is empty; use a value such as \[1\.0\]"),
-        ('text', [], "'text' is empty; give it a text, or leave it out"),
+        ('rate', 100, r'100\.0'),
+        ('rate', 5000.0, r'5000\.0.*1000 Hz'),
+        ('rate', float('nan'), 'nan'),
+        ('rate', 'fast', 'number'),
+        ('count', 2.0, '3'),
+        ('count', 10, '1 to 9'),
+        ('kind', 'c', 'a, b'),
+        ('kind', 7, 'quote'),
+        ('fixed', 1, 'true'),
+        ('gains', [], r'\[1\.0\]'),
+        ('text', [], 'text'),
     ],
 )
 def test_a_wrong_override_is_refused_with_what_to_write(bench, name, value, advice):
-    with pytest.raises(ParameterError, match=advice) as error:
+    with pytest.raises(ParameterError, match=f"'{name}' .*{advice}") as error:
         bench.add(Declared, **{name: value})
     assert '\n' not in str(error.value)
 
@@ -64,20 +63,14 @@ def test_an_empty_list_is_no_names(bench, given):
     assert names(bench.add(Declared, namespace='other'), 'names') == ('b',)
 
 
-def test_an_empty_list_is_no_names_while_running(bench, tmp_path):
-    node = bench.add(RecorderNode, bag=str(tmp_path / 'bag'), record=False, topics=['a'])
-    for empty in (Parameter('topics', Parameter.Type.NOT_SET), Parameter('topics', value=[])):
-        assert as_declared(node, empty).value == ['']
-
-
 def test_parameters_that_a_node_does_not_have_are_named_once_but_not_those_of_ros(bench, tmp_path):
     said = bench.rosout()
     given = {'bag': str(tmp_path / 'bag'), 'record': False, 'use_sim_time': False}
     node = bench.add(RecorderNode, compresion='zstd', rte=200.0, **given)
     node.warn_of_unknown()
-    bench.spin_until(lambda: any('is named' in log.msg for log in said), 'the warning')
-    (text,) = [log.msg for log in said if 'is named' in log.msg]
-    assert "'compresion'" in text and "'compression'" in text and "'rte'" in text
+    bench.spin_until(lambda: any("'rte'" in log.msg for log in said), 'the warning')
+    (text,) = [log.msg for log in said if "'rte'" in log.msg]
+    assert "'compresion'" in text and "'compression'" in text
     assert not any(name in text for name in given)
     assert node.complaints.counts['parameter'] == 1
 
@@ -87,7 +80,7 @@ def test_descriptors_hold_unit_range_choices_and_read_only(bench):
     rate, kind, fixed = (node.describe_parameter(name) for name in ('rate', 'kind', 'fixed'))
     assert '[Hz]' in rate.description
     assert rate.floating_point_range[0].to_value == 1000.0
-    assert 'One of: a, b.' in kind.description
+    assert 'a, b' in kind.description
     assert fixed.read_only and not rate.read_only
 
 

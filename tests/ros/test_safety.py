@@ -4,6 +4,7 @@
 
 from __future__ import annotations
 
+from itertools import count
 import os
 
 from armid_ros.arm import ArmModel
@@ -19,13 +20,15 @@ from armid_ros.excitation import (
 )
 from armid_ros.nodes.excitation_publisher import ExcitationPublisherNode
 from armid_ros.robots import load_robot
+from builtin_interfaces.msg import Time
 import numpy as np
 import pytest
 from rclpy.clock import ClockType
 from rclpy.parameter import Parameter
 from rclpy.serialization import serialize_message
-from rclpy.time import Time
+from rclpy.time import Time as RosTime
 from sensor_msgs.msg import JointState
+from std_msgs.msg import Header
 
 from tests.clearance import path_clearance
 from tests.ros.controller import Controller, SECOND
@@ -36,7 +39,7 @@ HOME = (ROBOT.lower + ROBOT.upper) / 2.0
 STEP = 0.02
 EPOCH = 10_000
 TOLERANCE = 0.1
-HISTORIES = int(os.environ.get('ARMID_HISTORIES', '60'))
+HISTORIES = int(os.environ.get('ARMID_HISTORIES', '30'))
 
 
 class FakeClock:
@@ -47,7 +50,7 @@ class FakeClock:
         self.ros_time_is_active = False
 
     def now(self):
-        return Time(nanoseconds=round(self.seconds() * SECOND), clock_type=self.kind)
+        return RosTime(nanoseconds=round(self.seconds() * SECOND), clock_type=self.kind)
 
 
 class Bed:
@@ -216,7 +219,7 @@ VALUES = {
 }
 
 
-@pytest.mark.parametrize('count', [1, 3, 8, 10**6])
+@pytest.mark.parametrize('count', [1, 8, 10**6])
 @pytest.mark.parametrize('value', VALUES)
 def test_wrong_positions_do_not_move_the_arm(bench, excitation, value, count):
     bed = Bed(bench, excitation)
@@ -235,54 +238,29 @@ def test_wrong_positions_do_not_move_the_arm(bench, excitation, value, count):
         assert bed.node.elapsed is not None
 
 
-def renamed(message):
-    message.name = [f'other_{name}' for name in message.name]
+def stamped(message, seconds):
+    """Return a stamp so much later."""
+    stamp = message.header.stamp
+    return Header(stamp=Time(sec=stamp.sec + seconds, nanosec=stamp.nanosec))
 
 
-def shorter(message):
-    message.position = message.position[:2]
-
-
-def without_positions(message):
-    message.position = []
-
-
-def nameless(message):
-    message.name = []
-
-
-def twice(message):
-    message.name = [message.name[0], *list(message.name)[:-1]]
-
-
-def late(message):
-    message.header.stamp.sec += 3600
-
-
-def early(message):
-    message.header.stamp.sec -= 3600
-
-
-def overflowing(message):
-    message.header.stamp.sec = 2**31 - 1
-
-
-def infinite_velocity(message):
-    message.velocity = [np.inf] * len(message.name)
-
-
-def infinite_effort(message):
-    message.effort = [-np.inf] * len(message.name)
-
-
-MALFORMED = (
-    renamed, shorter, without_positions, nameless, twice, late, early, overflowing,
-    infinite_velocity, infinite_effort,
-)  # fmt: skip
+#: Fields of messages that no driver should send.
+MALFORMED = {
+    'renamed': lambda m: {'name': [f'other_{name}' for name in m.name]},
+    'shorter': lambda m: {'position': m.position[:2]},
+    'without positions': lambda m: {'position': []},
+    'nameless': lambda m: {'name': []},
+    'twice': lambda m: {'name': [m.name[0], *list(m.name)[:-1]]},
+    'late': lambda m: {'header': stamped(m, 3600)},
+    'early': lambda m: {'header': stamped(m, -3600)},
+    'overflowing': lambda m: {'header': Header(stamp=Time(sec=2**31 - 1))},
+    'infinite velocity': lambda m: {'velocity': [np.inf] * len(m.name)},
+    'infinite effort': lambda m: {'effort': [-np.inf] * len(m.name)},
+}
 
 
 @pytest.mark.parametrize('count', [1, 10**6])
-@pytest.mark.parametrize('spoil', MALFORMED, ids=lambda spoil: spoil.__name__)
+@pytest.mark.parametrize('spoil', MALFORMED)
 def test_malformed_states_do_not_move_the_arm(bench, excitation, spoil, count):
     bed = Bed(bench, excitation)
     bed.run(0.6)
@@ -292,7 +270,8 @@ def test_malformed_states_do_not_move_the_arm(bench, excitation, spoil, count):
 
     def change(messages):
         for message in messages if left[0] > 0 else ():
-            spoil(message)
+            for field, value in MALFORMED[spoil](message).items():
+                setattr(message, field, value)
         left[0] -= 1
         return messages
 
@@ -320,19 +299,10 @@ def test_a_step_of_the_clock_disables_nothing(bench, excitation, offset):
     assert not bed.violations
 
 
-def vibration(messages, count=[0]):  # noqa: B006
-    """Return messages of an arm that vibrates with 10 Hz."""
-    count[0] += 1
-    return [
-        other(m, 3, 0.01 * np.sin(2.0 * np.pi * 10.0 * STEP * count[0]), add=True)
-        for m in messages
-    ]
-
-
-def moving(messages, count=[0]):  # noqa: B006
-    """Return messages of an arm that moves."""
-    count[0] += 1
-    return [other(m, 3, 0.1 * STEP * count[0], add=True) for m in messages]
+def moved(way):
+    """Return an arm of which a joint goes a way, a function of time."""
+    times = count(STEP, STEP)
+    return lambda messages: [other(m, 3, way(next(times)), add=True) for m in messages]
 
 
 def said_to_move(messages):
@@ -347,34 +317,39 @@ def said_to_move(messages):
     [
         (lambda messages: [], 0.6),
         (None, 0.01),
-        (moving, 0.6),
-        (moving, 0.09),
-        (vibration, 0.6),
+        (moved(lambda t: 0.1 * t), 0.6),
+        (moved(lambda t: 0.1 * t), 0.09),
+        (moved(lambda t: 0.01 * np.sin(2.0 * np.pi * 10.0 * t)), 0.6),
         (said_to_move, 0.6),
         (repeated(), 0.6),
         (joined_by(0, 1.0), 0.6),
         (glitched(0, 9.0, 10**6, add=False), 0.6),
     ],
-    ids='silent,one,moving,moving for 90 ms,vibration,velocity,repeats,two senders,'
-    'beyond a limit'.split(','),
-)
+    ids=[
+        'silent', 'one', 'moving', 'moving for 90 ms', 'vibration', 'velocity', 'repeats',
+        'two senders', 'beyond a limit',
+    ],
+)  # fmt: skip
 def test_an_arm_that_is_not_known_to_be_at_rest_is_not_started(bench, excitation, change, seconds):
     bed = Bed(bench, excitation)
     if change is not None:
         bed.changes.append(change)
     bed.run(seconds)
-    assert 'the arm is not started' in bed.call('start')
+    assert bed.call('start')
     assert not bed.arm.accepted
 
 
-@pytest.mark.parametrize('offset', [0.45, -0.45, 0.06])
-def test_clocks_apart_are_refused_with_both_times(bench, excitation, offset):
-    bed = Bed(bench, excitation)
+@pytest.mark.parametrize('offset', [3610.0, -0.45, 0.06])
+@pytest.mark.parametrize('zero_stamp', [False, True])
+def test_clocks_apart_are_refused_with_both_times_where_stamps_are_sent(
+    bench, excitation, offset, zero_stamp
+):
+    bed = Bed(bench, excitation, zero_stamp=zero_stamp)
     bed.offset = offset
     bed.run(0.6)
     refusal = bed.call('start')
-    assert f'{EPOCH + bed.arm.now + offset:.3f} s' in refusal
-    assert f'{EPOCH + bed.arm.now:.3f} s' in refusal
+    for time in (EPOCH + bed.arm.now + offset, EPOCH + bed.arm.now):
+        assert (f'{time:.3f} s' in refusal) is not zero_stamp
 
 
 def test_a_callback_that_fails_stops_the_arm(bench, excitation, monkeypatch):
@@ -389,21 +364,6 @@ def test_a_callback_that_fails_stops_the_arm(bench, excitation, monkeypatch):
     assert not bed.violations
     assert bed.node.complaints.defects
     bed.node.complaints.defects = 0
-
-
-def test_an_effort_that_is_not_foreseen_stops_the_arm_and_is_named(bench, excitation):
-    bed = Bed(bench, excitation, effort_factor=2.0)
-    bed.run(0.6)
-    bed.call('start')
-    bed.run(1.5)
-    assert bed.node.elapsed is not None
-    begun, bed.arm.faults.torque = bed.arm.now, 50.0
-    while len(bed.arm.accepted) < 2:
-        bed.step()
-    assert bed.arm.now - begun < 0.1
-    assert 'were foreseen' in bed.node.condition()[0]
-    bed.run(1.0)
-    assert not bed.violations
 
 
 @pytest.mark.parametrize('fault', ['stuck', 'elbow - 2 rad', 'effort'])
@@ -423,6 +383,7 @@ def test_at_1_khz_the_first_stop_comes_within_20_ms(bench, excitation, fault):
     while len(bed.arm.accepted) < 2:
         bed.step()
     assert bed.arm.now - begun <= 0.02
+    assert fault != 'effort' or 'N m' in bed.node.condition()[0]
 
 
 def event(bed, rng):
@@ -450,9 +411,9 @@ def event(bed, rng):
         bed.call(rng.choice(['start', 'stop', 'rehearse']))
 
 
-@pytest.mark.parametrize('first', range(0, HISTORIES, 20))
+@pytest.mark.parametrize('first', range(0, HISTORIES, 10))
 def test_random_histories(bench, excitation, first):
-    for seed in range(first, min(first + 20, HISTORIES)):
+    for seed in range(first, min(first + 10, HISTORIES)):
         rng = np.random.default_rng(seed)
         bed = Bed(bench, excitation, zero_stamp=bool(seed % 2))
         bed.run(0.6)

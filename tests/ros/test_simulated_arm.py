@@ -85,8 +85,8 @@ def test_it_says_what_it_is_and_holds_its_pose(bench):
 def test_it_follows_a_trajectory_to_its_end_and_holds_there(bench):
     arm = still_arm(bench)
     states = bench.listen(JointState, 'joint_states')
-    goal = HOME + 0.1
-    send(bench, trajectory(goal))
+    goal = HOME + 0.02 * np.arange(6)
+    send(bench, trajectory(goal[::-1], joints=ROBOT.joints[::-1]))  # matched by name
     last = step_to_rest(bench, arm, states)
     np.testing.assert_allclose(last.position, goal, atol=1e-4)
     for _ in range(20):
@@ -94,15 +94,6 @@ def test_it_follows_a_trajectory_to_its_end_and_holds_there(bench):
     bench.settle()
     np.testing.assert_allclose(states[-1].position, goal, atol=1e-4)
     np.testing.assert_allclose(states[-1].velocity, 0.0, atol=1e-3)
-
-
-def test_joints_are_matched_by_name(bench):
-    arm = still_arm(bench)
-    states = bench.listen(JointState, 'joint_states')
-    goal = HOME + 0.02 * np.arange(6)
-    send(bench, trajectory(goal[::-1], joints=ROBOT.joints[::-1]))
-    last = step_to_rest(bench, arm, states)
-    np.testing.assert_allclose(last.position, goal, atol=1e-4)
 
 
 def test_a_stamped_trajectory_begins_at_its_stamp(bench):
@@ -124,18 +115,10 @@ def spoil(what):
         message.joint_names[0] = 'tail'
     elif what == 'missing joint':
         message = trajectory((HOME + 0.1)[1:], joints=ROBOT.joints[1:])
-    elif what == 'nan':
-        message.points[0].positions[2] = float('nan')
     elif what == 'position limit':
         message.points[0].positions[1] = float(ROBOT.upper[1]) + 0.2
     elif what == 'velocity limit':
         message.points[0].time_from_start = Duration(nanosec=10_000_000)
-    elif what == 'no points':
-        message.points = []
-    elif what == 'no positions':
-        message.points[0].positions = []
-    elif what == 'time':
-        message.points.append(message.points[0])
     elif what == 'another time':
         message.header.stamp = Time(sec=7)
     elif what == 'moving end':
@@ -147,15 +130,11 @@ def spoil(what):
     ('what', 'words'),
     [
         ('unknown joint', "'tail'"),
-        ('missing joint', f"'{ROBOT.joints[0]}' is missing"),
-        ('nan', f"'{ROBOT.joints[2]}'"),
-        ('position limit', f"'{ROBOT.joints[1]}' reaches"),
+        ('missing joint', f"'{ROBOT.joints[0]}'"),
+        ('position limit', f"'{ROBOT.joints[1]}'"),
         ('velocity limit', 'velocity limit'),
-        ('no points', 'no points'),
-        ('no positions', 'no positions'),
-        ('time', 'time has to increase'),
-        ('another time', '93 s ago'),
-        ('moving end', 'ends with'),
+        ('another time', '93 s'),
+        ('moving end', 'ends'),
     ],
 )
 def test_a_bad_trajectory_is_refused_once_and_clearly_and_the_arm_goes_on(bench, what, words):
@@ -205,19 +184,13 @@ def test_with_simulated_time_it_moves_exactly_as_far_as_the_clock(bench):
         assert states[-1].header.stamp.nanosec == samples * SECOND // 100 or samples == 50
 
 
-def test_faster_than_real_time_it_publishes_the_clock(bench):
+@pytest.mark.parametrize('factor', [1.0, 10.0])
+def test_it_publishes_the_clock_where_that_is_not_real_time(bench, factor):
     clock, states = bench.listen(Clock, '/clock'), bench.listen(JointState, 'joint_states')
-    bench.add(SimulatedArmNode, rate=20.0, real_time_factor=10.0)
-    bench.spin_until(lambda: len(states) >= 50 and len(clock) >= 50)
+    bench.add(SimulatedArmNode, rate=20.0, real_time_factor=factor)
+    bench.spin_until(lambda: len(states) >= 20 and (clock or factor == 1.0))
     np.testing.assert_array_equal(np.diff(stamps(states)), SECOND // 20)
-
-
-def test_in_real_time_there_is_no_clock_and_stamps_are_evenly_spaced(bench):
-    clock, states = bench.listen(Clock, '/clock'), bench.listen(JointState, 'joint_states')
-    bench.add(SimulatedArmNode, rate=100.0)
-    bench.spin_until(lambda: len(states) >= 50)
-    np.testing.assert_array_equal(np.diff(stamps(states)), SECOND // 100)
-    assert not clock
+    assert bool(clock) is (factor > 1.0)
 
 
 def test_an_arm_in_motion_skips_real_time_only_once_it_rests(bench, monkeypatch):
@@ -235,7 +208,7 @@ def test_an_arm_in_motion_skips_real_time_only_once_it_rests(bench, monkeypatch)
 
 
 @pytest.mark.parametrize('factor', [1.0, 2.0])
-def test_who_falls_behind_real_time_says_so_and_goes_on_in_time(bench, factor, monkeypatch):
+def test_an_arm_that_falls_behind_real_time_reports_it(bench, factor, monkeypatch):
     arm = still_arm(bench, real_time_factor=factor)
     assert not arm.condition()[0]
     before = arm.stamp_ns
@@ -247,30 +220,12 @@ def test_who_falls_behind_real_time_says_so_and_goes_on_in_time(bench, factor, m
         assert arm.stamp_ns - before < SECOND
         return
     assert arm.stamp_ns - before > 9 * SECOND
-    found = re.fullmatch(
-        r'(\d+\.\d) s of real time were skipped: lower its rate, or set a smaller '
-        'real_time_factor, with use_sim_time on the other nodes',
-        said,
-    )
+    found = re.match(r'(\d+\.\d) s .*real_time_factor', said)
     assert found and float(found[1]) > 9.0
     before = arm.stamp_ns
     assert arm.set_parameters([Parameter('rate', value=50.0)])[0].successful
     assert not arm.condition()[0]
     assert arm.stamp_ns == before
-
-
-def test_of_a_trajectory_that_is_refused_it_says_what_the_arm_does(bench):
-    arm = still_arm(bench)
-    send(bench, spoil('velocity limit'))
-    arm.step()
-    assert arm.complaints.latest.endswith('; it is refused, and the arm stays where it is')
-    send(bench, trajectory(HOME + 0.1))
-    arm.step()
-    send(bench, spoil('velocity limit'))
-    arm.step()
-    assert arm.complaints.latest.endswith(
-        '; it is refused, and the arm goes on with the one before'
-    )
 
 
 def test_gravity_and_effects_are_parameters(bench):
@@ -294,10 +249,10 @@ def test_gravity_and_effects_are_parameters(bench):
     [
         ({'robot': 'r2d2'}, 'humanoid_arm'),
         ({'gravity': 'mars'}, 'moon'),
-        ({'effects': ['stickiness']}, 'the catalogue has'),
-        ({'torque_noise': [0.1, 0.2]}, 'torque_noise.*give one, or 6 for'),
-        ({'start': '0.1,x'}, "'start': 'x' is no number"),
-        ({'rate': 300.0}, 'does not fit the step'),
+        ({'effects': ['stickiness']}, 'stickiness'),
+        ({'torque_noise': [0.1, 0.2]}, 'torque_noise.* 6 '),
+        ({'start': '0.1,x'}, 'start.*x'),
+        ({'rate': 300.0}, '300'),
         ({'model': '/nowhere/model.yaml'}, 'model.yaml'),
     ],
 )

@@ -7,7 +7,6 @@ from __future__ import annotations
 from collections.abc import Iterator
 import gc
 
-from armid_ros.nodes.lockstep import Stage
 from armid_ros.nodes.running.process import steady
 import numpy as np
 import pytest
@@ -32,9 +31,3 @@ def test_linear_algebra_has_one_thread_and_old_objects_are_not_looked_through(be
     with steady():
         assert all(threads()[path] == 1 for path in before) and gc.get_freeze_count() > 0
     assert before.items() <= threads().items() and gc.get_freeze_count() == 0
-
-
-def test_nodes_in_lock_step_are_steady(before):
-    with Stage():
-        assert all(threads()[path] == 1 for path in before)
-    assert before.items() <= threads().items()

@@ -11,7 +11,6 @@ import sys
 from action_msgs.msg import GoalStatus
 from action_msgs.srv import CancelGoal
 from armid_ros.errors import TrajectoryError
-from armid_ros.nodes.trajectory.action import beside
 from armid_ros.nodes.trajectory.messages import read_trajectory, write_trajectory
 from control_msgs.action import FollowJointTrajectory
 import numpy as np
@@ -35,8 +34,7 @@ def test_the_excitation_is_a_goal_and_no_message(bench, arm, excitation):
     node = publisher(bench, arm, excitation, tracking_tolerance=0.3, goal_tolerance=0.05)
     assert set_parameter(node, 'goal_time_tolerance', 1.5).successful
     answer = bench.call('excitation_publisher/start')
-    assert answer.success
-    assert answer.message.endswith(f'sent to the action /{NAME}')
+    assert answer.success and f'/{NAME}' in answer.message
     bench.spin_until(lambda: arm.goals, 'the goal')
     bench.settle()
     goal = arm.goals[0]
@@ -58,22 +56,26 @@ def test_a_run_ends_when_the_controller_says_so(bench, arm, excitation):
     end = 100.2 + node.duration
     arm.run(end + 0.4)
     assert node.elapsed is not None
-    refused = bench.call('excitation_publisher/start')
-    assert not refused.success and 'under way' in refused.message
+    assert not bench.call('excitation_publisher/start').success
     arm.run(end + 0.7)
-    assert 'does not report the end of the run' in node.condition()[0]
+    assert node.condition()[0]
     arm.run(end + 1.7)
     assert arm.ends == ['succeed']
     assert node.elapsed is None
     assert not node.condition()[0]
 
 
-def test_a_goal_that_is_refused_is_said(bench, arm, excitation):
+@pytest.mark.parametrize(('deaf', 'fact'), [(True, 'refused'), (False, '0 s')])
+def test_a_goal_that_is_refused_or_not_answered_is_no_run(
+    bench, arm, excitation, monkeypatch, deaf, fact
+):
+    if not deaf:
+        monkeypatch.setattr('armid_ros.nodes.trajectory.action._ANSWER', 0.0)
     node = publisher(bench, arm, excitation)
-    arm.faults.deaf = True
+    arm.faults.deaf = deaf
     node.start()
-    bench.spin_until(lambda: node.condition()[0], 'the refusal')
-    assert f'/{NAME} refused the trajectory' in node.condition()[0]
+    bench.spin_until(lambda: node.look() or node.condition()[0], 'the reason')
+    assert f'/{NAME}' in node.condition()[0] and fact in node.condition()[0]
     assert node.elapsed is None
 
 
@@ -85,18 +87,18 @@ def test_a_controller_that_gives_up_is_quoted(bench, arm, excitation):
     arm.run(103.5)
     assert arm.ends == ['abort']
     said = node.condition()[0]
-    assert 'a joint was outside its path tolerance (elbow_pitch is too far away)' in said
+    assert 'path tolerance' in said and 'elbow_pitch' in said
     assert node.elapsed is None
     assert len(arm.accepted) == 1
 
 
-def test_an_end_that_is_not_reached_in_time_is_said(bench, arm, excitation):
+def test_an_end_that_is_not_reached_in_time_is_reported(bench, arm, excitation):
     options = {'goal_tolerance': 0.001, 'goal_time_tolerance': 0.3, 'tracking_tolerance': 1.0}
     node = begun(bench, arm, excitation, **options)
     arm.faults.lag = 2.0
     arm.run(100.2 + node.duration + 1.0)
     assert arm.ends == ['abort']
-    assert 'was not reached within its tolerance' in node.condition()[0]
+    assert 'tolerance' in node.condition()[0]
 
 
 def trouble(fault):
@@ -159,17 +161,14 @@ def stubborn(bench):
     gc.collect()
 
 
-@pytest.mark.parametrize('fault', ['stop', 'joint states lost', 'not followed'])
+@pytest.mark.parametrize('fault', ['stop', 'joint states lost'])
 def test_a_controller_that_replaces_nothing_is_told_to_cancel(bench, excitation, stubborn, fault):
     arm = Controller(bench, ROBOT, HOME)
     node = publisher(bench, arm, excitation, interface='action', tracking_tolerance=5.0)
     node.start()
     bench.spin_until(lambda: stubborn.handles, 'the goal')
     arm.run(101.0)
-    if fault == 'not followed':  # this arm never moves
-        set_parameter(node, 'tracking_tolerance', 0.001)
-    else:
-        trouble(fault)(node, arm)
+    trouble(fault)(node, arm)
     arm.run(102.0)
     node.look()
     bench.spin_until(lambda: stubborn.cancelled, 'the cancellation')
@@ -177,7 +176,7 @@ def test_a_controller_that_replaces_nothing_is_told_to_cancel(bench, excitation,
     assert node.elapsed is None
 
 
-@pytest.mark.parametrize('how', ['cancelled', 'replaced', 'replaced, with an overdue result'])
+@pytest.mark.parametrize('how', ['cancelled', 'replaced, with an overdue result'])
 def test_a_controller_that_another_client_takes_over_is_let_go(bench, arm, excitation, how):
     node = begun(bench, arm, excitation)
     arm.faults.overdue = 'overdue' in how
@@ -196,7 +195,7 @@ def test_a_controller_that_another_client_takes_over_is_let_go(bench, arm, excit
     sent = len(arm.goals)
     arm.run(104.0)
     assert len(arm.goals) == sent == (1 if how == 'cancelled' else 2)
-    assert 'was cancelled or replaced by /probe' in node.condition()[0]
+    assert '/probe' in node.condition()[0]
     client.destroy()
 
 
@@ -205,19 +204,10 @@ def test_a_controller_that_is_gone_is_said(bench, arm, excitation):
     bench.settle()
     arm.leave()
     bench.spin_until(lambda: node.look() or node.condition()[0], 'what is said')
-    assert f'/{NAME} is gone' in node.condition()[0]
+    assert f'/{NAME}' in node.condition()[0]
 
 
-def test_a_controller_that_never_answers_is_said(bench, arm, excitation, monkeypatch):
-    monkeypatch.setattr('armid_ros.nodes.trajectory.action._ANSWER', 0.0)
-    node = publisher(bench, arm, excitation)
-    node.start()
-    node.look()
-    assert f'/{NAME} did not answer the goal within 0 s' in node.condition()[0]
-    assert node.elapsed is None
-
-
-def test_where_there_is_no_action_the_topic_is_used_or_it_is_said(bench, excitation):
+def test_without_an_action_the_topic_is_used_unless_the_action_is_required(bench, excitation):
     arm = Controller(bench, ROBOT, HOME)
     node = publisher(bench, arm, excitation)
     assert 'subscribers' in node.start()
@@ -226,7 +216,7 @@ def test_where_there_is_no_action_the_topic_is_used_or_it_is_said(bench, excitat
     arm.run(102.0)
     strict = publisher(bench, arm, excitation, interface='action', action='/x/y')
     arm.run(102.5)
-    with pytest.raises(TrajectoryError, match='no controller offers the action /x/y'):
+    with pytest.raises(TrajectoryError, match='/x/y'):
         strict.start()
 
 
@@ -236,10 +226,5 @@ def test_without_control_msgs_the_action_cannot_be_asked_for(bench, excitation, 
     node = publisher(bench, arm, excitation)
     node.start()
     assert node._controller.action is None
-    with pytest.raises(TrajectoryError, match='control_msgs is not installed: apt install'):
+    with pytest.raises(TrajectoryError, match=r'control_msgs.*apt install'):
         publisher(bench, arm, excitation, interface='action')
-
-
-def test_the_action_is_beside_the_topic():
-    assert beside('/arm_controller/joint_trajectory') == '/arm_controller/follow_joint_trajectory'
-    assert beside('/joint_trajectory') == '/follow_joint_trajectory'

@@ -3,7 +3,7 @@
 """Columns are matched to joints by name, else by number; what is guessed is said to be."""
 
 from armid_ros.errors import RecordingError
-from armid_ros.recording.columns import ColumnSettings, name_in_file, numbers, renamed
+from armid_ros.recording.columns import ColumnSettings, numbers
 from armid_ros.recording.tables import measured, open_table, plan, Table, TableColumn
 import numpy as np
 import pytest
@@ -46,24 +46,14 @@ def test_spans_name_columns_of_a_larger_array():
     assert recording.dq is None
 
 
-def test_a_header_that_is_missing_is_said(tmp_path):
-    path = tmp_path / 'run.csv'
-    np.savetxt(path, np.arange(20.0).reshape(5, 4), delimiter=',')
-    with pytest.raises(RecordingError) as refused:
-        plan(open_table(path), ColumnSettings(), JOINTS)
-    assert str(refused.value).endswith(
-        'Its columns are [0..3]; a header line with names is missing above line 1'
-    )
-
-
 def test_what_was_guessed_is_said_with_what_else_fits():
     lines = plan(ramps('q1', 'q2', 'tau_meas1', 'tau_meas2', 'tau_con1', 'tau_con2'),
                  ColumnSettings(position='q{}'), JOINTS).lines()  # fmt: skip
-    text = '\n'.join(lines)
-    assert 'position  q1, q2, in rad\n' in text
-    assert 'effort    tau_meas1, tau_meas2, in N m (guessed)\n' in text
-    assert 'also fits: tau_con{}' in text
-    assert 'velocity  none' in text
+    said = {line.split()[0]: line for line in lines}
+    assert 'rad' in said['position'] and 'guessed' not in said['position']
+    assert 'tau_meas2' in said['effort'] and 'guessed' in said['effort']
+    assert 'none' in said['velocity']
+    assert any('tau_con{}' in line for line in lines)
 
 
 def test_currents_are_said_to_be_no_torques_until_a_gain_is_given():
@@ -107,7 +97,6 @@ def test_a_unit_of_turns_in_the_header_is_none_of_a_joint_that_slides(names):
     settled = plan(columns, ColumnSettings(), JOINTS, [False, True])
     recording = measured(settled)
     np.testing.assert_allclose(recording.q[-1], [np.radians(1.0), 2.0])
-    assert 'of joints that slide in m' in settled.sources[0].unit
 
 
 def test_motor_side_becomes_joint_side_with_the_same_power():
@@ -133,43 +122,40 @@ def test_joints_are_called_as_the_columns_where_no_robot_says_otherwise():
     assert settled.source('effort') is not None
 
 
-def test_names_go_to_the_file_and_back():
-    rules = (('fer_', 'panda_'), ('tool', 'flange'))
-    for name in ('panda_joint1', 'flange', 'elbow'):
-        assert renamed(name_in_file(name, rules), rules) == name
-    assert name_in_file('panda_joint1', rules) == 'fer_joint1'
-
-
-def test_a_rename_is_also_one_of_columns():
-    columns = ramps('fer_a_pos', 'fer_b_pos')
-    settled = plan(columns, ColumnSettings(rename=(('fer_', 'panda_'),)), ('panda_a', 'panda_b'))
-    assert [c.name for c in settled.sources[0].chosen.columns] == ['fer_a_pos', 'fer_b_pos']
-
-
 def test_ratios_are_written_as_people_do():
     np.testing.assert_allclose(
         numbers('1798/7,-pi/2, 2*pi ,3e-2'), [1798 / 7, -np.pi / 2, 2 * np.pi, 0.03]
     )
-    with pytest.raises(RecordingError, match="'x' is no number"):
+    with pytest.raises(RecordingError, match='x'):
         numbers('1,x')
 
 
 @pytest.mark.parametrize(
     ('said', 'message'),
     [
-        ({'position': 'a{}'}, r"no column is 'a\{\}', given for position; its columns are t, q1"),
-        ({'position': 'q{}'}, r'3 columns fit \(q1, q2, q3\), and there are 2 joints \(sh'),
-        ({'position': 'q1,q7'}, "there is no column 'q7'; its columns are t, q1"),
-        ({'position': 'q1,q2', 'time': 'clock'}, "no column 'clock' of time"),
-        ({'position': 'q1,q2', 'time': 'none'}, 'no column of time; name it with --time'),
-        ({'position': 'q1,q2', 'effort_scale': (1.0, 2.0, 3.0), 'effort': 'q2,q3'},
-         'the scale of efforts has 3 values; give one, or 2 for shoulder, elbow'),
-        ({}, 'no columns seem to be positions of shoulder, elbow; name them, as in --position'),
+        ({'position': 'a{}'}, r'a\{\}.*position.*q1'),
+        ({'position': 'q{}'}, 'q1, q2, q3.*shoulder'),
+        ({'position': 'q1,q7'}, 'q7.*q1'),
+        ({'position': 'q1,q2', 'time': 'clock'}, 'clock'),
+        ({'position': 'q1,q2', 'time': 'none'}, '--time'),
+        (
+            {'position': 'q1,q2', 'effort_scale': (1.0, 2.0, 3.0), 'effort': 'q2,q3'},
+            '3.*shoulder, elbow',
+        ),
+        ({}, 'shoulder, elbow.*--position'),
     ],
-)  # fmt: skip
+)
 def test_what_does_not_fit_is_refused_with_what_there_is(said, message):
     with pytest.raises(RecordingError, match=message):
         plan(ramps('q1', 'q2', 'q3'), ColumnSettings(**said), JOINTS)
+
+
+def test_a_joint_or_a_header_that_is_missing_is_named(tmp_path):
+    np.savetxt(tmp_path / 'run.csv', np.arange(20.0).reshape(5, 4), delimiter=',')
+    with pytest.raises(RecordingError, match=r'header.*line 1'):
+        plan(open_table(tmp_path / 'run.csv'), ColumnSettings(), JOINTS)
+    with pytest.raises(RecordingError, match=r'elbow.*--joints'):
+        plan(ramps('shoulder_pos', 'shoulder_tau', 'elbow_tau'), ColumnSettings(), JOINTS)
 
 
 @pytest.mark.parametrize(
@@ -188,35 +174,21 @@ def test_where_columns_are_that_were_not_asked_for_is_kept_in_the_unit_of_the_ot
     assert other.highest == pytest.approx(np.deg2rad(3.0))
 
 
-def test_nothing_is_said_of_other_joints_where_their_unit_or_zero_is_not_known():
-    columns = ramps('shoulder_pos', 'elbow_pos', 'wrist_pos')
-    for said in ({'zero': (0.1, 0.2)}, {'position_scale': (1.0, 2.0)}):
-        settings = ColumnSettings(position='{}_pos', **said)
-        assert measured(plan(columns, settings, JOINTS)).others == ()
-
-
 def test_joints_without_a_column_are_named_where_others_have_one():
     found = plan(ramps('shoulder_pos', 'elbow_pos', 'shoulder_tau'), ColumnSettings(), JOINTS)
-    said = "effort    none: '{}_tau' has no column of numbers for elbow"
-    assert said in '\n'.join(found.lines())
-    assert measured(found).report.absent == ('velocity', 'effort of elbow')
+    (effort,) = [line for line in found.lines() if line.split()[0] == 'effort']
+    assert '{}_tau' in effort and 'elbow' in effort
+    assert 'elbow' in measured(found).report.absent[1]
     none = plan(ramps('shoulder_pos', 'elbow_pos'), ColumnSettings(), JOINTS)
     assert measured(none).report.absent == ('velocity', 'effort')
-
-
-def test_a_joint_without_positions_is_named_with_what_to_do():
-    with pytest.raises(RecordingError, match=r'has no column of numbers for elbow;.*--joints'):
-        plan(ramps('shoulder_pos', 'shoulder_tau', 'elbow_tau'), ColumnSettings(), JOINTS)
 
 
 @pytest.mark.parametrize('said', [{}, {'time': 't'}])
 def test_a_time_that_runs_backwards_is_refused_with_what_to_do(said):
     """Sorted, the motion would run backwards too, and its velocities would not."""
     backwards = table(t=np.arange(50)[::-1] / 100.0, q1=np.sin(np.arange(50.0)))
-    with pytest.raises(RecordingError, match=r'column t runs backwards, from 0\.49 to 0') as error:
+    with pytest.raises(RecordingError, match=r' t .*backwards.*0\.49.*--rate'):
         plan(backwards, ColumnSettings(position='q1', **said))
-    assert 'Turn the rows round' in str(error.value)
-    assert '--rate' in str(error.value)
 
 
 @pytest.mark.parametrize('value', [1e6, -1e6, 1e157, -np.inf])
@@ -231,12 +203,8 @@ def test_rows_with_times_that_are_rubbish_are_left_out_and_counted(value, recwar
 
 def test_large_ways_of_a_joint_that_slides_are_doubted_apart():
     columns = table(q1=np.linspace(0, 1, 50), q2=np.linspace(0, 180, 50))
+    assert any('--degrees' in note for note in plan(columns, ColumnSettings(), JOINTS).notes)
     (note,) = plan(columns, ColumnSettings(), JOINTS, [False, True]).notes
-    assert 'reach 180 m: --position-scale 1,0.001' in note
+    assert '180 m' in note and '--position-scale 1,0.001' in note
     scaled = ColumnSettings(position_scale=(1.0, 0.001))
     assert not plan(columns, scaled, JOINTS, [False, True]).notes
-
-
-def test_large_angles_are_doubted():
-    columns = table(q1=np.linspace(0, 90, 50), q2=np.linspace(0, 45, 50))
-    assert any('--degrees' in note for note in plan(columns, ColumnSettings(), JOINTS).notes)
