@@ -1,42 +1,29 @@
 # Copyright 2026 The armid_ros developers
 # SPDX-License-Identifier: Apache-2.0
 """
-The two-link arm with elastic joints: what the three steps reach, wanted against measured.
+The two-link arm with elastic joints in MuJoCo, an engine with other dynamics and friction.
 
-The plant is the printed set after tuning, simulated by this package and by MuJoCo, an engine with
-other dynamics, integration and friction. Excitation: 48 experiments of 4 s, sensor noise 0.006
-rad/s (motors, at the joints), 0.003 rad/s and 0.2 rad/s^2 (links). Tuning: four steps of 0.5 s,
+The plant is the printed set after tuning. Excitation: experiments of 4 s, sensor noise 0.006 rad/s
+(motors, at the joints), 0.003 rad/s and 0.2 rad/s^2 (links). Tuning: four steps of 0.5 s,
 beginning at the set before tuning.
 
 """
 
 from __future__ import annotations
 
-import time
-
 from armid_ros.motion import ElasticRun, FloatArray
-from armid_ros.papers.elastic.identification.interaction import (
-    decibel_error,
-    decouple,
-    joint_signals,
-    measured_response,
-)
 from armid_ros.papers.elastic.identification.names import unpack
-from armid_ros.papers.elastic.identification.physical import ideal_response
-from armid_ros.papers.elastic.identification.three_steps import identify_two_inertia
 from armid_ros.papers.elastic.identification.tuning import tune
-from armid_ros.papers.elastic.plant.run import ElasticSensors, Experiment, run_all
+from armid_ros.papers.elastic.plant.run import ElasticSensors, Experiment
 from armid_ros.papers.elastic.plant.signals import (
     EXCITATION_RMS,
     resonance_experiments,
     step_experiments,
     STEP_POSES,
     STEPS,
-    WEAK,
 )
 from armid_ros.robots import load_robot
 from armid_ros.robots.two_link import ROBOT, two_link_set, TwoLinkParameters
-from armid_ros.simulation.elastic.two_link import two_link_loop, two_link_plant
 from armid_ros.simulation.motor_control import VelocityLoop
 from armid_ros.simulation.plant import Plant
 import numpy as np
@@ -193,80 +180,3 @@ def tuning(truth_runs: list[ElasticRun], noise: float, loop: VelocityLoop, seed:
         np.sqrt(np.mean((values[:, :, 2] - true) ** 2)) for values in (found.before, found.after)
     )
     return errors(found.parameters, two_link_set('after').parameters), float(before / after)
-
-
-def decoupling(runs: list[ElasticRun], parameters: TwoLinkParameters) -> list[tuple[float, float]]:
-    """Return FRF errors [dB], 5 to 60 Hz, by joint: decoupled, and of motor torque alone."""
-    frequency, table = np.geomspace(5.0, 60.0, 200), []
-    for joint, found in enumerate(decouple(runs, parameters)):
-        ideal = ideal_response(parameters, joint, frequency)
-        decoupled = decibel_error(found.response(frequency)[:, 0, 0], ideal[:, 0, 0])
-        signals = joint_signals(runs, parameters, joint, decoupled=False)
-        f, coupled = measured_response(signals, DT)
-        band = (f >= 5.0) & (f <= 60.0)
-        ideal = ideal_response(parameters, joint, f[band])
-        table.append((decoupled, decibel_error(coupled[band, 0, 0], ideal[:, 0, 0])))
-    return table
-
-
-def eigenfrequency_error() -> float:
-    """Return the largest difference from the printed frequencies [Hz], which have one decimal."""
-    plant = two_link_plant(two_link_set('after').parameters)
-    worst = 0.0
-    for locked, fixtures in ((False, FREE), (True, LOCKED)):
-        for pose, wanted in fixtures.items():
-            found = modes(plant, np.array([0.0, np.radians(pose)]), locked=locked)[:, 0]
-            worst = max(worst, float(np.abs(found - wanted).max()))
-    return worst
-
-
-def row(what: str, wanted: str, measured: str) -> None:
-    """Print a row of the table."""
-    print(f'{what:58s} {wanted:>16s}  {measured}', flush=True)
-
-
-def main() -> None:
-    """Print the table."""
-    shipped = two_link_set('after')
-    truth = shipped.parameters
-    loop, weak = two_link_loop(shipped), two_link_loop(shipped, WEAK)
-    row('', 'wanted', 'measured')
-    row('eigenfrequencies [Hz off]', '<= 0.05', f'{eigenfrequency_error():.3f}')
-    plant, engine = two_link_plant(truth, substeps=4), mujoco_arm(truth)
-    own = run_all(plant, loop, steps())
-    fine = mujoco_arm(truth, MANY)
-    other = [run_mujoco(fine, loop, experiment) for experiment in steps()]
-    for name, runs, factor in (('own plant', own, 1.0), ('MuJoCo', other, 2.0)):
-        for noise, limits in ((0.002, (0.5, 3.0, 1.0, 150)), (0.02, (5.0, None, None, 20))):
-            found, ratio = tuning(runs, noise, loop, seed=0)
-            head = f'{name}, noise {noise} rad/s: '
-            main_limit, dg, total, smaller = limits
-            row(
-                head + 'main parameters [%]', f'<= {factor * main_limit:g}', f'{found["main"]:.2f}'
-            )
-            if dg is not None and total is not None:
-                row(head + 'dg [%]', f'<= {factor * dg:g}', f'{found["dg"]:.2f}')
-                row(head + 'dl + 2500 dm [%]', f'<= {factor * total:g}', f'{found["sum"]:.2f}')
-            row(head + 'step error', f'>= {smaller} x less', f'{ratio:.0f} x less')
-    rng = np.random.default_rng(1)
-    runs = [SENSORS.measure(run_mujoco(engine, weak, e), rng) for e in excitation(48)]
-    table = decoupling(runs, truth)
-    for joint, (decoupled, coupled) in enumerate(table):
-        row(f'joint {joint + 1}: decoupled FRF [dB rms]', '<= 0.1', f'{decoupled:.3f}')
-        row(f'joint {joint + 1}: motor torque alone [dB rms]', '>= 3', f'{coupled:.2f}')
-    row('worse on link 2', 'yes', 'yes' if table[1][1] > table[0][1] else 'no')
-    rng = np.random.default_rng(2)
-    noisy = ElasticSensors(motor_velocity=0.002, link_velocity=0.002)
-    started, used = time.perf_counter(), time.process_time()
-    result = identify_two_inertia(
-        runs, truth, steps=[noisy.measure(run, rng) for run in other], loop=loop
-    )
-    elapsed, used = time.perf_counter() - started, time.process_time() - used
-    found = errors(result.parameters, truth)
-    row('three steps on 48 x 4 s (MuJoCo) [s]', '<= 60', f'{elapsed:.1f} ({used:.1f} of a core)')
-    row('  main parameters [%]', '<= 1', f'{found["main"]:.2f}')
-    row('  dg, dl + 2500 dm [%]', '<= 6, 2', f'{found["dg"]:.2f}, {found["sum"]:.2f}')
-
-
-if __name__ == '__main__':
-    main()

@@ -1,7 +1,7 @@
 # Copyright 2026 The armid_ros developers
 # SPDX-License-Identifier: Apache-2.0
 """
-A fleet whose truth is known: what `armid fleet` finds of it, and what that costs.
+A fleet whose truth is known, and what `armid fleet` finds of it.
 
 Arms of one kind differ in mass and friction, and move another way in every bag, a bag a day.
 Friction goes with the temperature of the day. Some arms change: friction steps up, a load stays in
@@ -9,8 +9,6 @@ the hand, a joint wears, or something acts that the model does not have. Some ba
 
     python -m benchmarks.fleet generate DIR [--arms N] [--bags M] [--changed K] [--damaged D]
     python -m benchmarks.fleet score DIR RESULTS     after `armid fleet identify` and `watch`
-    python -m benchmarks.fleet costs [DIR]           processor time, memory, bytes, efficiency
-    python -m benchmarks.fleet merge                 10,000 bags of 84 parameters
 
 Without a word: a small fleet, all of it.
 
@@ -22,16 +20,14 @@ import argparse
 import datetime
 import json
 from pathlib import Path
-import resource
 import subprocess
 import sys
 import tempfile
-import time
 
 from armid_ros.arm import ArmModel
 from armid_ros.effects import make_effect
 from armid_ros.motion import Motion
-from armid_ros.recording import read_recording, write_recording
+from armid_ros.recording import write_recording
 from armid_ros.robots import load_robot
 import numpy as np
 
@@ -178,110 +174,10 @@ def score(folder, results):
     return len(found & sick), len(found - sick)
 
 
-def costs(folder, workers=2):
-    """Print what runs cost beside identify in a loop: few bags and all, one worker and more."""
-    from armid_ros.fleet.bags import find_bags
-
-    bags = find_bags([f'{folder}/*/*'])
-    sample = bags[:: max(1, len(bags) // 30)]
-    for number, count in dict.fromkeys(
-        [(min(10, len(bags)), workers), (len(bags), workers), (len(bags), 1)]
-    ):
-        before = loop_seconds(sample)
-        cost = run_cost(bags[:number], count)
-        looped = 0.5 * (before + loop_seconds(sample))  # a busy machine is slow now and then
-        print(
-            f'{count} workers, {number} bags: {1e3 * cost["cpu"]:.0f} ms of processor a bag '
-            f'({1e3 * cost["client"]:.1f} ms of it scheduler and client), identify in a loop '
-            f'{1e3 * looped:.0f} ms, ratio {cost["cpu"] / looped:.2f}; '
-            f'{60.0 / cost["cpu"]:.0f} bag seconds per second and core; {cost["wall"]:.1f} s, '
-            f'workers busy {cost["busy"]:.2f}; peak of a worker {cost["peak"] / 1e6:.0f} MB; '
-            f'{cost["moved"] / 1e3:.1f} kB a bag moved between workers'
-        )
-
-
-def run_cost(bags, workers):
-    """Identify a fleet; return processor seconds a bag, wall time, memory and bytes."""
-    from armid_ros.fleet.cluster import connected
-    from armid_ros.fleet.job import FleetSettings
-    from armid_ros.fleet.plan import plan_fleet
-    from armid_ros.fleet.run import identify_fleet
-
-    with tempfile.TemporaryDirectory() as out, connected(None, workers) as client:
-        settings = FleetSettings(EFFECTS)
-        one_each = list({bag.arm: bag for bag in bags}.values())[: 4 * workers]
-        warm = plan_fleet(bags, str(ROBOT), f'{out}/warm', settings)
-        identify_fleet(client, one_each, warm)  # so that every worker has imported what it needs
-        jobs = plan_fleet(bags, str(ROBOT), f'{out}/run', settings)
-        before = client.run(_used)
-        start, own = time.perf_counter(), time.process_time()
-        done = identify_fleet(client, bags, jobs).done
-        wall, own = time.perf_counter() - start, time.process_time() - own
-        after = client.run(_used)
-    busy = sum(after[w]['cpu'] - before[w]['cpu'] for w in after)
-    return {
-        'cpu': (busy + own) / done,
-        'client': own / done,
-        'wall': wall,
-        'busy': busy / wall / workers,
-        'peak': max(one['peak'] for one in after.values()),
-        'moved': sum(after[w]['moved'] - before[w]['moved'] for w in after) / done,
-    }
-
-
-def loop_seconds(bags):
-    """Return processor seconds of identify for a bag, in one process."""
-    from armid_ros.fleet.job import FleetSettings
-    from armid_ros.fleet.plan import choose_filters
-    from armid_ros.identification import IdentificationSettings, identify, SignalSettings
-
-    arm = ArmModel.of(str(ROBOT), effects=EFFECTS)
-    theory = arm.base_parameters(np.random.default_rng(0))
-    chosen = choose_filters(arm, theory, bags, FleetSettings(EFFECTS))
-    filters = SignalSettings(chosen.cutoff_hz, chosen.decimation)
-    settings = IdentificationSettings('wls', filters)  # as the fleet: chosen once for all bags
-    done, start = 0, time.process_time()
-    for bag in bags:
-        try:
-            recording = read_recording(bag.url, joints=arm.robot.joints)
-        except Exception:
-            continue
-        identify(arm, [recording], settings, rng=np.random.default_rng(0))
-        done += 1
-    return (time.process_time() - start) / done
-
-
-def _used(dask_worker):
-    usage = resource.getrusage(resource.RUSAGE_SELF)
-    return {
-        'cpu': usage.ru_utime + usage.ru_stime,
-        'peak': usage.ru_maxrss * 1024,
-        'moved': sum(one['total'] for one in dask_worker.transfer_incoming_log),
-    }
-
-
-def merge(count=10_000, joints=7, rigid=63):
-    """Time the sum of normal equations of seven joints with 84 parameters."""
-    from armid_ros.identification.fitting.normal_equations import NormalEquations
-
-    rng = np.random.default_rng(0)
-    rank = rigid + 3 * joints
-    factors = rng.normal(size=(joints, rank + 1, rank + 1))
-    one = NormalEquations(factors.transpose(0, 2, 1) @ factors, np.full(joints, 1000.0))
-    start = time.process_time()
-    whole = sum([one] * (count - 1), one)
-    seconds = time.process_time() - start
-    error = np.abs(whole.products / (count * one.products) - 1.0).max()
-    print(
-        f'{count} bags of {rank} parameters added up in {seconds:.1f} s, '
-        f'{8 * len(one.packed()) / 1e3:.0f} kB each; off by {error:.1e}'
-    )
-
-
 def main():
     """Run one of the parts, or a small fleet through all of them."""
     parser = argparse.ArgumentParser(description=__doc__)
-    parser.add_argument('part', nargs='?', choices=['generate', 'score', 'costs', 'merge'])
+    parser.add_argument('part', nargs='?', choices=['generate', 'score'])
     parser.add_argument('folders', nargs='*', type=Path)
     parser.add_argument('--arms', type=int, default=200)
     parser.add_argument('--bags', type=int, default=10)
@@ -289,11 +185,7 @@ def main():
     parser.add_argument('--damaged', type=int, default=5)
     parser.add_argument('--seconds', type=float, default=60.0)
     parser.add_argument('--seed', type=int, default=0)
-    parser.add_argument('--workers', type=int, default=2)
     asked = parser.parse_args()
-    if asked.part == 'merge':
-        merge()
-        return
     if asked.changed > asked.arms or asked.damaged > asked.arms * asked.bags:
         parser.error('--changed and --damaged are at most the arms and their bags')
     sizes = asked.arms, asked.bags, asked.changed, asked.damaged, asked.seconds, asked.seed
@@ -301,21 +193,16 @@ def main():
         generate(asked.folders[0], *sizes)
     elif asked.part == 'score':
         score(*asked.folders)
-    elif asked.part == 'costs' and asked.folders:
-        costs(asked.folders[0], asked.workers)
     else:
         with tempfile.TemporaryDirectory() as folder:
             generate(f'{folder}/bags', 20, 10, 4, 2, asked.seconds, asked.seed)
-            costs(f'{folder}/bags', asked.workers)
-            if asked.part is None:
-                for command in (
-                    ['identify', f'{folder}/bags/*/*', '--robot', str(ROBOT)],
-                    ['watch'],
-                ):
-                    told = [sys.executable, '-m', 'armid_ros.cli', 'fleet', *command]
-                    subprocess.run([*told, '--out', f'{folder}/results'], check=True)
-                score(f'{folder}/bags', f'{folder}/results')
-                merge()
+            for command in (
+                ['identify', f'{folder}/bags/*/*', '--robot', str(ROBOT)],
+                ['watch'],
+            ):
+                told = [sys.executable, '-m', 'armid_ros.cli', 'fleet', *command]
+                subprocess.run([*told, '--out', f'{folder}/results'], check=True)
+            score(f'{folder}/bags', f'{folder}/results')
 
 
 if __name__ == '__main__':

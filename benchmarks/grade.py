@@ -27,19 +27,18 @@ from armid_ros.identification.assess import hypotheses, mistakes, prediction_err
 from armid_ros.identification.assess.grade_limits import LIMITS
 from armid_ros.identification.assess.mistakes import find_mistake
 from armid_ros.identification.rows.signals import conditioning, SignalSettings
-from armid_ros.motion import Motion
 from armid_ros.recording import read_recording, Recording
 from armid_ros.robots import load_robot
 import numpy as np
 
 from benchmarks import real_recordings
+from benchmarks.coverage import FRICTION, multisine
 
-FRICTION = {'viscous_friction': 0.08, 'coulomb_friction': 0.05, 'torque_offset': 0.02}
 #: What decides whether a mistake is believed; the others are limits of errors that are printed.
 DECIDING = ('poor', 'unusable', 'floor', 'gain', 'free_body', 'torque_factor', 'gravity_change')
 
 
-def simulated(seed, duration=20.0, rate=100.0):
+def simulated(seed):
     """Return a robot and a recording of an arm that is nearly as described."""
     rng = np.random.default_rng(seed)
     robot = load_robot('humanoid_arm')
@@ -47,21 +46,11 @@ def simulated(seed, duration=20.0, rate=100.0):
     arm = ArmModel(robot.with_inertias(links.ravel()))
     for name, value in FRICTION.items():
         arm = arm.with_effect(make_effect(name, robot), np.full(6, value))
-    t = np.arange(round(duration * rate)) / rate
-    w = 2 * np.pi * np.array([0.12, 0.24, 0.6])[:, None]
-    size = np.array([0.5, 0.3, 0.1])[:, None]
-    angle = w * t[:, None, None] + rng.uniform(0, 2 * np.pi, (3, 6))
-    q, dq, ddq = (
-        np.sum(part, axis=1)
-        for part in (
-            size * np.sin(angle),
-            size * w * np.cos(angle),
-            -size * w**2 * np.sin(angle),
-        )
-    )
-    tau = arm.torque(Motion(robot.joints, t, q, dq, ddq))
+    motion = multisine(robot.joints, 20.0, rng)
+    tau = arm.torque(motion)
     tau += 0.02 * np.sqrt(np.mean(tau**2, axis=0)) * rng.normal(size=tau.shape)
-    return robot, Recording(joints=robot.joints, t=t, q=q, tau=tau, source=f'simulated {seed}')
+    source = f'simulated {seed}'
+    return robot, Recording(joints=robot.joints, t=motion.t, q=motion.q, tau=tau, source=source)
 
 
 def sound(folder) -> Iterator:

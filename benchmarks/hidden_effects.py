@@ -26,7 +26,6 @@ import os
 from pathlib import Path
 import time
 import traceback
-from typing import Any
 
 from armid_ros.arm import ArmModel
 from armid_ros.diagnosis import DiagnosisSettings
@@ -34,9 +33,11 @@ from armid_ros.diagnosis.verdict.finding import Overlay
 from armid_ros.effects import CATALOGUE
 import numpy as np
 
+from benchmarks.laboratory_scoring import Judged, score, Truth
 from benchmarks.looks import look, results_of
+from benchmarks.metrics import table
+from benchmarks.two_days import Answer, answer_of
 from tests.hidden.cases import Case, make_case, VISIBLE
-from tests.hidden.scoring import Finding, Judged, Metric, Outcome, score, Truth
 from tests.hidden.specification import case_list, CaseSpec, SETS
 
 #: Every so many cases of a kind are in the slice.
@@ -73,8 +74,8 @@ def true_arm(case: Case) -> ArmModel:
     return arm
 
 
-def run_diagnosis(case: Case) -> Outcome:
-    """Diagnose a case. This is the one place that knows how."""
+def run_diagnosis(case: Case) -> tuple[Answer, float]:
+    """Diagnose a case; return the answer, and the share of the gap that is closed."""
     from armid_ros.diagnosis import diagnose, diagnosis_document
 
     library = tuple(name for name in CATALOGUE if name not in case.removed)
@@ -91,7 +92,7 @@ def run_diagnosis(case: Case) -> Outcome:
     closed = np.nan
     if known and diagnosis.gap is not None:
         closed = share_closed(case, diagnosis.gap.overlays)
-    return outcome_of(diagnosis_document(diagnosis), closed, seconds)
+    return answer_of(diagnosis_document(diagnosis), seconds), closed
 
 
 def share_closed(case: Case, overlays: Sequence[Overlay]) -> float:
@@ -115,36 +116,9 @@ def share_closed(case: Case, overlays: Sequence[Overlay]) -> float:
     return float(np.clip(np.sum(e0 - e1) / np.sum(explainable), 0.0, 1.0))
 
 
-def outcome_of(document: dict[str, Any], closed: float, seconds: float) -> Outcome:
-    """Read an outcome from a document of the schema armid/diagnosis/1."""
-    return Outcome(
-        verdict=document['verdict'],
-        findings=tuple(
-            Finding(
-                name=effect['name'],
-                joints=tuple(effect['joints']),
-                ambiguous_with=tuple(effect.get('ambiguous_with', ())),
-                rivals=tuple((r['name'], tuple(r['joints'])) for r in effect.get('rivals', ())),
-                parameters=tuple(
-                    (p['name'], p.get('joint') or '', _number(p['value']), _number(p['std']))
-                    for p in effect.get('parameters', ())
-                ),
-            )
-            for effect in document['effects']
-        ),
-        closed=closed,
-        seconds=seconds,
-    )
-
-
 def judge(spec: CaseSpec) -> Judged:
     """Make a case and diagnose it; an exception is an outcome, too."""
-    case = make_case(spec)
-    try:
-        outcome = run_diagnosis(case)
-    except Exception:
-        outcome = Outcome(verdict='failed', error=traceback.format_exc(limit=-3))
-    return Judged(Truth.of(case), outcome)
+    return _judged(make_case(spec))
 
 
 def judge_single(spec: CaseSpec) -> Judged:
@@ -153,8 +127,15 @@ def judge_single(spec: CaseSpec) -> Judged:
     fastest = case.bags[-1]
     end = int(np.searchsorted(fastest.recording.t, fastest.periods[0][1]))
     alone = replace(fastest, recording=fastest.recording.select(slice(0, end)))
-    outcome = run_diagnosis(replace(case, bags=(alone,), validation=()))
-    return Judged(Truth.of(case), outcome)
+    return _judged(replace(case, bags=(alone,), validation=()))
+
+
+def _judged(case: Case) -> Judged:
+    try:
+        answer, closed = run_diagnosis(case)
+    except Exception:
+        answer, closed = Answer(verdict='failed', error=traceback.format_exc(limit=-3)), np.nan
+    return Judged(Truth.of(case), answer, closed)
 
 
 def run(
@@ -166,10 +147,7 @@ def run(
     with ProcessPoolExecutor(processes, mp_context=context) as pool:
         for count, one in enumerate(pool.map(judge, specs), start=1):
             judged.append(one)
-            names = ' + '.join(
-                '|'.join([f.name, *f.ambiguous_with]) + f'@{",".join(f.joints)}'
-                for f in one.outcome.findings
-            )
+            names = ' + '.join(map(str, one.outcome.headline))
             print(
                 f'{count}/{len(specs)} {one.truth.key} (gap {one.truth.size:.2g}): '
                 f'{one.outcome.verdict} {names} [{one.outcome.seconds:.1f} s]'
@@ -191,23 +169,6 @@ def select(name: str, only: Iterable[str] = (), part: bool = False) -> list[Case
     return [spec for spec in specs if not texts or any(text in spec.key for text in texts)]
 
 
-def report(judged: Sequence[Judged]) -> str:
-    """Return the table."""
-    return table(score(judged))
-
-
-def table(metrics: Iterable[Metric]) -> str:
-    """Return metrics as the rows of a table."""
-    rows = [f'{"":30s} {"value":>7s}  {"95 %":>15s} {"cases":>6s}  reach']
-    for metric in metrics:
-        interval = '' if np.isnan(metric.low) else f'{metric.low:.3f} - {metric.high:.3f}'
-        verdict = {True: 'reached', False: 'NOT reached', None: ''}[metric.good]
-        wanted = f'{metric.reach}: {verdict}' if metric.reach else ''
-        row = f'{metric.name:30s} {metric.value:7.3f}  {interval:>15s} {metric.count:6d}  {wanted}'
-        rows.append(row.rstrip())
-    return '\n'.join(rows)
-
-
 def main() -> None:
     """Run a set of cases, print the table and write what is asked for."""
     parser = argparse.ArgumentParser(prog='python -m benchmarks.hidden_effects')
@@ -225,7 +186,7 @@ def main() -> None:
     with ExitStack() as stack:
         record = stack.enter_context(look(_part(options))) if options.set == 'locked' else None
         judged = run(specs, options.processes, judge_single if options.single else judge)
-        print(f'\n{report(judged)}')
+        print(f'\n{table(score(judged))}')
         if record is not None:
             record['results'] = results_of(score(judged))
     if options.out:
@@ -242,10 +203,6 @@ def _part(options: argparse.Namespace) -> str:
     parts += ['one period of one recording each'] if options.single else []
     parts += [f'only {" ".join(options.only)}'] if options.only else []
     return ', '.join(parts)
-
-
-def _number(value: Any) -> float:
-    return float('nan') if value is None else float(value)
 
 
 if __name__ == '__main__':

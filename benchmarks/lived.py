@@ -7,7 +7,7 @@ A model is identified on day 1, and the diagnosis is asked about day 2, with day
 about day 1 itself, of which nothing may be named. Cases: tests/hidden/lived/README.md.
 
     python -m benchmarks.lived [KIND] [--cases FIRST:LAST] [--only CAUSE ...] [--no-again]
-        [--plain] [--each N] [--out FILE] [--processes N]
+        [--each N] [--out FILE] [--processes N]
 
 """
 
@@ -32,11 +32,10 @@ from armid_ros.motion import FloatArray
 from armid_ros.recording import Recording
 import numpy as np
 
-from benchmarks.hidden_effects import table
 from benchmarks.lived_questions import score_of_question
 from benchmarks.lived_scoring import breakdown, LivedJudged, LivedTruth, probabilities, score
 from benchmarks.looks import look, results_of
-from benchmarks.plain_ranking import plain_ranking
+from benchmarks.metrics import table
 from benchmarks.two_days import Answer, ask, identification_of
 from tests.hidden.lived.adapter import recording_of, robot_of
 from tests.hidden.lived.cases import lived_case, LivedCase
@@ -159,7 +158,6 @@ def main() -> None:
     parser.add_argument('--cases', default=':', metavar='FIRST:LAST', help='some of them')
     parser.add_argument('--only', nargs='+', default=[], metavar='CAUSE', help='of some causes')
     parser.add_argument('--no-again', action='store_true', help='do not ask about day 1')
-    parser.add_argument('--plain', action='store_true', help='ask the plain ranking instead')
     parser.add_argument('--each', type=int, help='ask with so many recordings of each day')
     parser.add_argument('--out', type=Path, help='file for all answers, as JSON')
     parser.add_argument('--probabilities', type=Path, help='file for those of names, as JSON')
@@ -170,11 +168,8 @@ def main() -> None:
     cases = select(options.kind, options.cases, options.only)
     what = f'lived, {options.kind}, {len(cases)} cases'
     what += f', only {" ".join(options.only)}' if options.only else ''
-    what += ', the plain ranking' if options.plain else ''
     what += f', {options.each} recordings a day' if options.each else ''
-    question: Ask = plain_ranking if options.plain else ask
-    if options.each:
-        question = partial(ask_few, options.each)
+    question: Ask = partial(ask_few, options.each) if options.each else ask
     with ExitStack() as stack:
         locked = options.kind.startswith('locked')
         record = stack.enter_context(look(what)) if locked else None

@@ -9,7 +9,7 @@ from collections.abc import Callable, Sequence
 import numpy as np
 
 from benchmarks.lived_scoring import LivedJudged
-from tests.hidden.scoring import Metric, number, rate
+from benchmarks.metrics import Metric, number, rate
 
 _MASS = 'payload_m'
 

@@ -10,12 +10,12 @@ from dataclasses import dataclass, field
 import numpy as np
 from scipy.spatial.transform import Rotation
 
+from benchmarks.metrics import Metric, number, rate
 from benchmarks.two_days import Answer, Named
 from tests.hidden.arrays import FloatArray
 from tests.hidden.lived.arms import load_arm
 from tests.hidden.lived.cases import LivedCase
 from tests.hidden.lived.chain import Chain
-from tests.hidden.scoring import Metric, number, rate
 
 #: Below this gap a cause is no more than the model of day 1 leaves anyway.
 VISIBLE = 1.0

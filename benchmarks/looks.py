@@ -20,7 +20,7 @@ from pathlib import Path
 import subprocess
 from typing import Any
 
-from tests.hidden.scoring import Metric
+from benchmarks.metrics import Metric
 
 LOG = Path(__file__).parent / 'results' / 'looks.jsonl'
 

@@ -16,7 +16,7 @@ from pathlib import Path
 from typing import Any
 
 from benchmarks.looks import LOG
-from tests.hidden.scoring import wilson
+from benchmarks.metrics import wilson
 
 PAGE = Path(__file__).with_name('rates.md')
 RATES = LOG.with_name('rates.json')

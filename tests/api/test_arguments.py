@@ -24,13 +24,7 @@ def run(arm):
 @pytest.mark.parametrize('ask', [ar.identify, ar.diagnose])
 @pytest.mark.parametrize(
     ('recordings', 'said'),
-    [
-        ([], 'no recordings: give one'),
-        ((), 'no recordings: give one'),
-        (None, "'None' is no recording; give a Recording, or the path"),
-        (3, "'3' is no recording"),
-        ([None], "'None' is no recording"),
-    ],
+    [([], 'no recordings'), (None, "'None'.*Recording"), (3, "'3'"), ([None], "'None'")],
 )
 def test_no_recording_is_said(arm, ask, recordings, said):
     with pytest.raises(ar.ArmidError, match=said):
@@ -67,8 +61,8 @@ def test_a_misspelt_keyword_is_answered_with_the_one_that_was_meant(call, wrong,
 
 
 def test_a_misspelt_robot_or_prior_is_answered_with_what_was_meant(run):
-    with pytest.raises(ar.ArmidError, match=r"mean 'humanoid_arm'"):
+    with pytest.raises(ar.ArmidError, match="'humanoid_arm'"):
         ar.load_robot('humanoid_am')
     for prior in ({'viscus_friction': 'often'}, {'viscous_friction': 'ofen'}):
-        with pytest.raises(ar.ArmidError, match=r"did you mean '(viscous_friction|often)'"):
+        with pytest.raises(ar.ArmidError, match=r"'(viscous_friction|often)'"):
             ar.diagnose('humanoid_arm', run, prior=prior)

@@ -2,7 +2,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """What `import armid_ros` offers: late, complete, and readable."""
 
-import dataclasses
 import json
 import os
 from pathlib import Path
@@ -46,6 +45,12 @@ def loaded(arm, excitation):
     return ar.simulate(held, excitation, torque_noise=0.005, rng=5)
 
 
+@pytest.fixture(scope='module')
+def found(model, loaded):
+    """Return the diagnosis of a load, the recordings of the model being its baseline."""
+    return ar.diagnose(model, loaded)
+
+
 def test_importing_it_imports_nothing_else():
     """The numerical libraries come with the first name that needs them."""
     code = (
@@ -68,15 +73,11 @@ def test_every_name_is_there_and_documented(name):
     value = getattr(ar, name)
     assert value.__doc__
     assert name in dir(ar)
-
-
-def test_the_list_of_names_is_complete_and_short():
     assert set(ar.__all__) == set(ar._HOMES)
-    assert 20 <= len(ar.__all__) <= 31
 
 
 def test_an_unknown_name_is_answered_with_the_known_ones():
-    with pytest.raises(AttributeError, match=r"'identfy'.* load_robot, .*identify"):
+    with pytest.raises(AttributeError, match=r"'identfy'.*identify"):
         _ = ar.identfy
 
 
@@ -90,7 +91,7 @@ def test_an_identification_shows_itself_in_ten_lines_and_in_a_notebook(model, tm
     assert short(model)
     assert repr(model).startswith('GOOD') and 'elbow_pitch' in repr(model)
     html = model._repr_html_()
-    assert html.startswith('<iframe srcdoc="&lt;!DOCTYPE html') and html.count('"') == 6
+    assert html.startswith('<iframe ') and html.count('"') == 6
     assert model.report(tmp_path / 'page.html').read_text().startswith('<!')
     table = model.to_dataframe()
     assert list(table.columns) == ['name', 'joint', 'value', 'std', 'unit']
@@ -107,21 +108,6 @@ def test_a_saved_identification_is_what_the_command_line_writes(model, tmp_path)
     np.testing.assert_allclose(again.theta, model.arm.theta)
 
 
-def test_what_a_model_was_identified_from_is_its_baseline(model, loaded):
-    found = ar.diagnose(model, loaded)
-    assert found.names == ('payload',)
-    again = ar.diagnose(model, model.recordings[0])
-    assert found.core.baseline != again.core.baseline
-
-
-def test_what_a_model_left_is_known_of_an_identification_and_of_its_file(model, loaded, tmp_path):
-    written = model.save(tmp_path / 'result') / 'model.yaml'
-    first, second = (ar.diagnose(arm, loaded, baseline=()) for arm in (model, written))
-    assert first.names == ('payload',)
-    assert second.document()['effects'] == first.document()['effects']
-    assert not first.core.notes
-
-
 def test_a_physical_identification_gives_a_urdf_that_loads(runs, tmp_path):
     found = ar.identify('humanoid_arm', runs[0], physical=True)
     found.urdf(tmp_path / 'arm.urdf')
@@ -129,12 +115,24 @@ def test_a_physical_identification_gives_a_urdf_that_loads(runs, tmp_path):
     np.testing.assert_allclose(robot.rigid_parameters, found.arm.robot.rigid_parameters, atol=1e-6)
 
 
-def test_a_diagnosis_and_a_comparison_find_the_load(model, loaded, tmp_path):
-    found = ar.diagnose(model.arm, loaded)
+def test_recordings_and_residuals_of_a_model_are_its_baseline_from_memory_and_file(
+    model, found, loaded, tmp_path
+):
+    written = model.save(tmp_path / 'result') / 'model.yaml'
+    first, second = (ar.diagnose(arm, loaded, baseline=()) for arm in (model, written))
+    assert found.names == first.names == ('payload',)
+    assert found.core.baseline != first.core.baseline
+    assert second.document()['effects'] == first.document()['effects']
+    assert not first.core.notes
+
+
+def test_a_diagnosis_and_a_comparison_find_the_load(model, found, loaded, tmp_path):
     assert short(found)
-    assert 'payload' in repr(found) and '\nnext: Look at' in repr(found)
+    assert 'payload' in repr(found) and '\nnext: ' in repr(found)
+    assert found.to_dict() == found.document()
     assert found.to_dataframe().effect.str.contains('payload').any()
     assert (found.save(tmp_path / 'found') / 'diagnosis.json').is_file()
+    assert 'damping="0.' in found.urdf()
     after = ar.identify(ar.ArmModel.of('humanoid_arm', effects=EFFECTS), loaded)
     compared = ar.compare(model, after)
     assert short(compared)
@@ -169,24 +167,9 @@ def test_a_recording_is_read_by_robot_or_by_names_from_bags_and_tables(runs, tmp
         )
 
 
-def test_columns_without_names_are_read_by_number_from_zero(runs, tmp_path):
-    path = tmp_path / 'run.csv'
-    np.savetxt(path, np.column_stack([runs[0].t, runs[0].q]), delimiter=',')
-    read = ar.read_recording(path, runs[0].joints, time='[0]', position='[1..6]')
-    np.testing.assert_allclose(read.q, runs[0].q)
-
-
 def test_a_recording_of_other_joints_is_refused(runs):
     with pytest.raises(ar.ArmidError, match='two_link_elastic'):
         ar.identify('two_link_elastic', runs[0])
-
-
-@pytest.mark.slow
-def test_a_seed_is_enough(arm, excitation):
-    first, second = (ar.simulate(arm, excitation, torque_noise=0.1, rng=3) for _ in range(2))
-    np.testing.assert_array_equal(first.tau, second.tau)
-    other = ar.simulate(arm, excitation, torque_noise=0.1, rng=np.random.default_rng(3))
-    np.testing.assert_array_equal(first.tau, other.tau)
 
 
 def test_a_summary_of_many_joints_stays_short_and_says_so():
@@ -210,11 +193,6 @@ def test_recordings_of_one_name_are_told_apart(model, runs):
     assert list(found.validation) == ['simulation 2', 'simulation 3']
 
 
-def test_what_is_found_goes_into_a_urdf(runs):
-    found = ar.diagnose(ar.ArmModel.of('humanoid_arm'), runs[0])
-    assert 'damping="0.' in found.urdf() or 'friction="0.' in found.urdf()
-
-
 def test_a_trajectory_is_a_table(excitation):
     table = excitation.to_dataframe()
     joint = 'shoulder_pitch'
@@ -223,12 +201,11 @@ def test_a_trajectory_is_a_table(excitation):
 
 
 def test_a_recording_a_plan_and_results_are_drawn_joint_by_joint(
-    monkeypatch, excitation, runs, model, loaded
+    monkeypatch, excitation, runs, model, found
 ):
     monkeypatch.setenv('MPLBACKEND', 'agg')
     from matplotlib import pyplot as plt
 
-    found = ar.diagnose(model.arm, loaded, baseline=runs[:1])
     counts = {}
     for drawn in (runs[0], excitation, model, found):
         axes = drawn.plot()
@@ -280,11 +257,6 @@ def test_a_value_has_the_name_of_its_effect_or_parameter(model):
         _ = estimate['viscous_friction', 'elbow']
 
 
-def test_a_plan_without_a_trajectory_shows_why(excitation):
-    blocked = dataclasses.replace(excitation, given_start=np.full(6, 3.0))
-    assert 'no way to the trajectory' in blocked._repr_html_()
-
-
 def test_an_inspection_takes_robot_and_recording_in_either_order(runs, tmp_path):
     path = ar.write_recording(tmp_path / 'run', runs[0]) or tmp_path / 'run'
     given = [('humanoid_arm', path), (path, 'humanoid_arm'), (path,), (None, path)]
@@ -296,16 +268,11 @@ def test_an_inspection_takes_robot_and_recording_in_either_order(runs, tmp_path)
         ar.inspect(path, seed=1)
 
 
-def test_residuals_are_a_table_of_every_joint(model, loaded):
+def test_residuals_are_a_table_of_every_joint(model, found):
     table = model.residual_table()
     joints = list(model.arm.robot.joints)
     assert list(table.columns) == ['recording', 't', *joints]
     errors = table[joints].std()
-    found = ar.diagnose(model.arm, loaded).residual_table()
-    assert list(found.columns) == list(table.columns)
-    assert (found[joints].std() < 3.0 * errors).all()
-
-
-def test_every_result_is_a_dict(model, excitation, runs):
-    for result in (model, excitation, ar.inspect(runs[0])):
-        assert result.to_dict() == result.document()
+    left = found.residual_table()
+    assert list(left.columns) == list(table.columns)
+    assert (left[joints].std() < 3.0 * errors).all()

@@ -10,9 +10,9 @@ from armid_ros.motion import Motion
 import numpy as np
 import pytest
 
-from benchmarks.hidden_effects import table
 from benchmarks.lived import judge, true_shares
 from benchmarks.lived_scoring import gravity_of, LivedJudged, score
+from benchmarks.metrics import table
 from benchmarks.two_days import Answer, answer_of, identification_of, Named
 from tests.benchmarks.truths import EARTH, truth
 from tests.hidden.lived.adapter import recording_of, robot_of
@@ -132,14 +132,6 @@ def test_joint_share_and_parameters_are_compared_with_the_truth():
     assert 'NOT reached' in table(score(judged))
 
 
-def test_silence_is_right_where_nothing_happened():
-    free = replace(COULOMB, name='', joints=(), parameters=(), in_catalogue=False, gap=0.0)
-    loud = said(Named('torque_ripple', ('elbow',)))
-    judged = [LivedJudged(free, said(), again=said()), LivedJudged(free, loud, again=loud)]
-    for name in ('nothing happened, silent', 'same day again, silent', 'names too many'):
-        assert metric(judged, name) == 0.5
-
-
 def test_gravity_is_read_from_any_of_its_names():
     wall = Named('base_tilt', (), (), (('tilt_x', '', 0.0, 0.0), ('tilt_y', '', np.pi / 2, 0.0)))
     moon = Named('gravity_magnitude', (), (), (('gravity_difference', '', 1.62 - 9.81, 0.0),))
@@ -184,13 +176,6 @@ def test_true_share_is_what_the_torque_of_the_cause_takes():
     assert 0.3 < of_power < of_excess < 1.5
     nothing = np.zeros_like(case.held_out.contribution)
     assert np.isnan(true_shares(found, held_out, nothing)).all()
-
-
-@pytest.mark.long
-def test_a_share_is_stated_of_the_rows_that_it_is_compared_in():
-    one = judge('development', 9, again=False)
-    assert 0.5 < one.answer.true_share < 1.0
-    assert abs(one.share_error) < 0.03
 
 
 def test_a_question_that_fails_is_counted_as_one():

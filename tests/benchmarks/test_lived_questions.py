@@ -2,15 +2,12 @@
 # SPDX-License-Identifier: Apache-2.0
 """What only one question of lived arms asks is counted against what was said."""
 
-import numpy as np
 import pytest
 
 from benchmarks.lived_questions import exact, pairs
-from benchmarks.lived_scoring import felt_directions, LivedJudged
+from benchmarks.lived_scoring import LivedJudged
 from benchmarks.two_days import Answer, Named
 from tests.benchmarks.truths import truth
-from tests.hidden.lived.arms import load_arm
-from tests.hidden.lived.chain import Chain
 
 
 def loaded(key, **changes):
@@ -58,10 +55,3 @@ def test_exact_arms_are_counted_by_what_is_known_of_friction():
         LivedJudged(free('development/exact/4', friction='names'), Answer('unknown')),
     ]
     assert values(exact(judged)) == [1.0, 1.0, 1.0, 1.0, 0.0, 0.0]
-
-
-def test_gravity_along_axes_that_are_all_parallel_is_not_felt():
-    np.testing.assert_allclose(
-        felt_directions(Chain.of(load_arm('drawn-3-0'))), np.diag([1.0, 0.0, 1.0]), atol=1e-9
-    )
-    np.testing.assert_allclose(felt_directions(Chain.of(load_arm('ur5'))), np.eye(3), atol=1e-9)

@@ -8,7 +8,7 @@ import subprocess
 import pytest
 
 from benchmarks.looks import clean_commit, look, results_of
-from tests.hidden.scoring import Metric
+from benchmarks.metrics import Metric
 
 
 @pytest.fixture

@@ -13,6 +13,7 @@ import numpy as np
 import pytest
 
 ROBOT = 'humanoid_arm'
+DURATION, RATE = 14, 100  # s, Hz
 
 
 def armid(*arguments, code=0):
@@ -22,10 +23,10 @@ def armid(*arguments, code=0):
     return result
 
 
-def bag_of(path, arm, seed, duration=20.0, moving=slice(None)):
+def bag_of(path, arm, seed, moving=slice(None)):
     """Write what sensors would record of a motion in closed form, of all joints or of some."""
     rng = np.random.default_rng(seed)
-    t = np.arange(round(200 * duration)) / 200.0
+    t = np.arange(DURATION * RATE) / RATE
     q, dq, ddq = np.zeros((3, len(t), 6))
     for hz, size in ((0.15, 0.5), (0.4, 0.25), (0.9, 0.08)):
         w = 2 * np.pi * hz

@@ -2,8 +2,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """A table becomes a bag, or is identified as it is; guesses are shown first."""
 
-import json
-
 from armid_ros.recording import read_recording, read_robot_description
 from armid_ros.robots import load_robot
 import numpy as np
@@ -34,8 +32,7 @@ SAID = ('--degrees', '--current-gain', 0.05)
 
 def test_a_table_becomes_a_bag(csv, recording, tmp_path):
     text = armid('convert', csv, '--robot', ROBOT, *SAID, '--out', tmp_path / 'bag').stdout
-    assert 'pos1, .., pos6' in text and '(guessed)' in text
-    assert f'{len(recording)} samples' in text
+    assert 'pos1' in text and '(guessed)' in text and str(len(recording)) in text
     again = read_recording(tmp_path / 'bag', joints=recording.joints)
     np.testing.assert_allclose(again.q, recording.q, atol=1e-9)
     np.testing.assert_allclose(again.tau, recording.tau, atol=1e-9)
@@ -48,15 +45,6 @@ def test_a_dry_run_shows_and_writes_nothing(csv, tmp_path):
     assert "'current{}'" in words and '--current-gain' in words and '--degrees' in words
     assert not (tmp_path / 'bag').exists()
     assert all(len(line) <= 80 for line in text.splitlines()[1:-1])
-
-
-def test_a_table_is_identified_as_the_bag_is(bags, csv, tmp_path):
-    same = ('--robot', ROBOT, '--no-verify', '--json')
-    bag = armid('identify', bags[0], *same, '--out', tmp_path / 'a')
-    table = armid('identify', csv, *SAID, *same, '--out', tmp_path / 'b')
-    assert '(guessed)' in table.stderr
-    errors = [json.loads(run.stdout)['training']['relative_error_percent'] for run in (bag, table)]
-    assert errors[0] == pytest.approx(errors[1], rel=1e-3)
 
 
 @pytest.mark.parametrize(
@@ -84,7 +72,7 @@ def test_joints_get_other_names_in_a_copy(bags, tmp_path):
     text = armid(
         'convert', bags[0], '--rename', 'shoulder_:left_', '--out', tmp_path / 'bag'
     ).stdout
-    assert 'shoulder_pitch to left_pitch' in text
+    assert 'shoulder_pitch' in text and 'left_pitch' in text
     assert len(read_recording(tmp_path / 'bag', joints=('left_pitch', 'elbow_pitch')))
 
 

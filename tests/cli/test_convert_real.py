@@ -25,20 +25,6 @@ def test_a_table_that_says_it_all_needs_no_word(real_data, tmp_path):
         '--robot', folder / 'parameters' / 'design_A.0_model_2.1' / 'pendubot.urdf',
         '--cutoff', 5, out=tmp_path / 'out',
     )  # fmt: skip
-    rows = {(row['name'], row['joint']): row['value'] for row in document['parameters']}
-    assert -rows['mz1 - 0.3 m2', 'Joint1'] == pytest.approx(0.33, rel=0.02)
-    assert rows['mz2', 'Joint2'] == pytest.approx(0.116, rel=0.02)
+    moments = [row['value'] for row in document['parameters'] if row['name'].startswith('mz')]
+    assert moments == pytest.approx([-0.33, 0.116], rel=0.02)
     assert document['training']['relative_error_percent'] < 10.0
-
-
-def test_columns_of_an_array_without_names(real_data, tmp_path):
-    """Counted by the authors' description; time in nanoseconds since 1970."""
-    file = next((real_data / 'franka_fr3_teleop' / 'data').glob('*_162545.npy.gz'))
-    text = armid(
-        'convert', file, '--joints', ','.join(f'fr3_joint{k}' for k in range(1, 8)),
-        '--time', '[0]', '--position', '[1..7]', '--velocity', '[8..14]', '--effort', '[15..21]',
-        '--out', tmp_path / 'bag',
-    ).stdout  # fmt: skip
-    assert '[0], in ns' in text
-    assert '10384 samples' in text
-    assert '974' in text

@@ -1,22 +1,14 @@
 # Copyright 2026 The armid_ros developers
 # SPDX-License-Identifier: Apache-2.0
-"""Every command that reads a bag says what is wrong with it, and takes --no-crc."""
+"""Commands name damage that checksums show, and read it with --no-crc."""
 
-from armid_ros.cli import main
-from armid_ros.papers.exo.plant.gait import read_gait
-from armid_ros.papers.exo.plant.leg_pair import leg_pair
-from armid_ros.papers.exo.work import SimulationOptions
 from armid_ros.recording import Recording, write_recording
 from armid_ros.recording.mcap.records import map_file
 from armid_ros.robots import load_robot
-import click
 import numpy as np
 import pytest
 
-from tests.cli.conftest import armid, ROBOT
-
-READERS = ('convert', 'diagnose', 'elastic', 'excite', 'exo', 'identify', 'inspect', 'recover')
-READERS += ('simulate',)
+from .conftest import armid, ROBOT
 
 
 @pytest.fixture(scope='module')
@@ -37,12 +29,6 @@ def damaged(tmp_path_factory):
     return bag
 
 
-@pytest.mark.parametrize('name', READERS)
-def test_checksums_may_be_left_out(name):
-    command = main.get_command(click.Context(main), name)
-    assert any('--no-crc' in option.secondary_opts for option in command.params)
-
-
 def test_what_a_copy_lacks_is_said(damaged, tmp_path):
     said = armid('convert', damaged, '--rename', 'elbow:knee', '--out', tmp_path / 'copy').output
     assert 'checksum' in said
@@ -56,16 +42,3 @@ def test_inspect_reads_with_and_without(damaged):
     said = ' '.join(armid('inspect', damaged).output.split())
     assert '3940 messages' in said and 'checksum' in said
     assert 'checksum' not in armid('inspect', damaged, '--no-crc').output
-
-
-def test_an_exoskeleton_s_bag_is_not_read_without_a_word(tmp_path):
-    recorded, topics = tmp_path / 'recording', ('/exo/joint_states', '/human/joint_states')
-    walk = SimulationOptions(None, None, 'step', 4.0, torque_noise=0.5, angle_noise=0.05)
-    walk.record(recorded, topics, leg_pair(), read_gait(), np.random.default_rng(0))
-    path = next(recorded.glob('*.mcap'))
-    content = bytearray(path.read_bytes())
-    chunk = map_file(bytes(content), path).chunks[-1]
-    content[(chunk.begin + chunk.end) // 2] ^= 4
-    path.write_bytes(content)
-    said = armid('exo', recorded, '--out', tmp_path / 'again').output
-    assert 'checksum' in said or 'damaged' in said

@@ -5,7 +5,6 @@
 from importlib.metadata import files
 import json
 import shutil
-import time
 
 import armid_ros.api.excitation as excitation_files
 from armid_ros.arm import ArmModel
@@ -18,8 +17,7 @@ from armid_ros.robots import collision_model, load_robot
 import numpy as np
 import pytest
 
-from ..excitation.conftest import urdf
-from .conftest import armid, ROBOT
+from .conftest import armid, DURATION, RATE, ROBOT
 
 pytestmark = pytest.mark.slow
 
@@ -75,27 +73,11 @@ def test_an_arm_that_stands_stays_above_its_base_plane(ur5):
     assert document['not_checked'] == [] and document['verdict'] in said.lower()
 
 
-def test_an_arm_whose_zero_is_on_the_floor_starts_beside_it_and_says_so(ur5):
+def test_an_arm_whose_zero_is_on_the_floor_starts_near_it_and_names_the_link(ur5):
     out, said = ur5
     first = plan_of(example('ur5_robot'), out).q[0]
     assert 0.0 < np.abs(first).max() < 0.2
-    assert 'wrist_3_link and floor' in said
-
-
-@pytest.mark.long
-def test_an_arm_of_fifty_five_joints_takes_a_minute_of_processor_time_by_default(tmp_path):
-    names = ['base', *(f'l{k}' for k in range(55))]
-    joints = [
-        (f'j{k}', 'revolute', *names[k : k + 2], '0 0 0.3', f'{k % 2} 1 0', -0.3, 0.3, 9e3)
-        for k in range(55)
-    ]
-    path = tmp_path / 'long.urdf'
-    path.write_text(urdf(*joints))
-    begun = time.process_time()
-    armid('excite', '--robot', path, '--floor', 'none', '--out', tmp_path / 'plan')
-    assert time.process_time() - begun < 60.0
-    document = json.loads((tmp_path / 'plan' / 'excitation.json').read_text())
-    assert all(row['std'] is not None for row in document['parameters'])
+    assert 'wrist_3_link' in said
 
 
 @pytest.mark.long
@@ -111,13 +93,12 @@ def test_an_arm_that_hangs_is_asked_for_its_floor(tmp_path):
     assert 'class="verdict fair"' in page and document['verdict'] in page
 
 
-@pytest.mark.parametrize(('start', 'speed'), [(None, 'slow'), ('0.3,-0.2,0.1,0.5,0,0', 'fast')])
-def test_a_trajectory_begins_and_ends_at_rest_where_the_arm_stands(tmp_path, start, speed):
+def test_a_trajectory_begins_and_ends_at_rest_where_the_arm_stands(tmp_path):
     """All of it is inside the limits and clear, the way there and back as well."""
-    options = () if start is None else ('--start', start)
-    excite(ROBOT, tmp_path / 'plan', '--speed', speed, *options)
+    start, speed = '0.3,-0.2,0.1,0.5,0,0', 'fast'
+    excite(ROBOT, tmp_path / 'plan', '--speed', speed, '--start', start)
     motion, robot = plan_of(ROBOT, tmp_path / 'plan'), load_robot(ROBOT)
-    pose = np.zeros(6) if start is None else np.array([float(x) for x in start.split(',')])
+    pose = np.array(start.split(','), dtype=float)
     assert motion.t[0] == 0.0
     np.testing.assert_allclose(motion.q[[0, -1]], [pose, pose], atol=1e-9)
     np.testing.assert_allclose(motion.dq[[0, -1]], 0.0, atol=1e-9)
@@ -156,24 +137,6 @@ def test_the_design_is_kept_where_no_way_leads_to_it(tmp_path, monkeypatch):
     assert load_excitation(tmp_path / 'plan' / 'excitation.yaml').n_periods == 2
 
 
-def test_a_design_is_replaced_by_one_and_kept_where_the_next_one_fails(
-    made, tmp_path, monkeypatch
-):
-    def nothing(*_, **__):
-        raise TrajectoryError('walled in')
-
-    out = shutil.copytree(made, tmp_path / 'plan')
-    first = {path: path.read_bytes() for path in out.rglob('*') if path.is_file()}
-    with monkeypatch.context() as patch:
-        patch.setattr(excitation_files, 'plan_run', nothing)
-        excite(ROBOT, out, '--seed', 1, code=2)
-    assert {path: path.read_bytes() for path in out.rglob('*') if path.is_file()} == first
-    excite(ROBOT, out, '--seed', 1)
-    second = {path: path.read_bytes() for path in out.rglob('*') if path.is_file()}
-    assert second.keys() == first.keys()
-    assert all(second[path] != first[path] for path in first if path.suffix != '.yaml')
-
-
 def test_steps_are_replaced_by_steps(tmp_path):
     out, robot = tmp_path / 'steps', 'two_link_elastic'
     for _ in range(2):
@@ -187,13 +150,14 @@ def test_a_recording_where_the_trajectory_goes_is_not_replaced(made, tmp_path, b
     shutil.copytree(bags[0], out / 'trajectory')
     refused = excite(ROBOT, out, '--force', code=2).stderr
     assert str(out / 'trajectory') in refused and '--out' in refused
-    assert len(read_recording(out / 'trajectory', joints=load_robot(ROBOT).joints)) == 4000
+    assert (
+        len(read_recording(out / 'trajectory', joints=load_robot(ROBOT).joints)) == DURATION * RATE
+    )
 
 
 @pytest.mark.parametrize(
     ('kind', 'criterion'),
-    [(kind, 'D') for kind in ('revolute', 'continuous', 'prismatic')]
-    + [('revolute', criterion) for criterion in ('A', 'E', 'condition', 'T')],
+    [('continuous', 'D'), ('prismatic', 'condition'), ('revolute', 'T')],
 )
 @pytest.mark.filterwarnings('error')
 def test_an_arm_of_one_joint_is_excited(tmp_path, kind, criterion):
@@ -207,15 +171,6 @@ def test_an_arm_of_one_joint_is_excited(tmp_path, kind, criterion):
     motion = plan_of(urdf, tmp_path / 'plan')
     assert np.ptp(motion.q) > 0.05
     assert (tmp_path / 'plan' / 'report.html').is_file()
-
-
-def test_a_recording_is_no_folder_for_a_design(tmp_path):
-    bag = tmp_path / 'monday'
-    bag.mkdir()
-    (bag / 'monday_0.mcap').write_bytes(b'recorded')
-    refused = excite(ROBOT, bag, code=2)
-    assert str(bag) in refused.stderr and '--out' in refused.stderr
-    assert [path.name for path in bag.iterdir()] == ['monday_0.mcap']
 
 
 def test_a_report_that_fails_costs_nothing_else(tmp_path, monkeypatch):

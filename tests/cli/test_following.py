@@ -9,6 +9,7 @@ import pytest
 
 from .conftest import armid, ROBOT
 
+FAST = ('--no-physical', '--no-verify')
 QUICK = ('--duration', 6, '--starts', 1, '--iterations', 1)
 
 
@@ -27,11 +28,10 @@ def folder(tmp_path_factory):
             ('--topic', 'joint_states'),
         ),
         (('check', ROBOT, 'BAG', '--gravity', 'moon'), 'inspect', ('BAG', '--gravity', 'moon')),
-        (('inspect', 'BAG'), 'inspect', ('BAG', '-')),
         (('inspect', 'BAG', '--robot', '-'), 'identify', ('BAG', '-')),
         (('excite', '--robot', ROBOT, *QUICK, '--out', 'plan'), 'simulate', (ROBOT,)),
-        (('identify', 'BAG', '--robot', ROBOT, '--no-verify', '--out', 'a'), 'excite', (ROBOT,)),
-        (('identify', 'HELD', '--robot', ROBOT, '--no-verify', '--out', 'b'), 'excite', (ROBOT,)),
+        (('identify', 'BAG', '--robot', ROBOT, *FAST, '--out', 'a'), 'excite', (ROBOT,)),
+        (('identify', 'HELD', '--robot', ROBOT, *FAST, '--out', 'b'), 'excite', (ROBOT,)),
         (('compare', 'a', 'b', '--out', 'c'), 'identify', ('BAG', 'HELD', ROBOT)),
         (('diagnose', 'BAG', '--robot', ROBOT, '--out', 'd'), 'simulate', (ROBOT, '--model')),
     ],

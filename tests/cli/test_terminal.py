@@ -2,16 +2,19 @@
 # SPDX-License-Identifier: Apache-2.0
 """What a log sees of long work."""
 
+import re
+
 from armid_ros.cli.terminal import print_rows, ProgressLines, say
 import click
 from click.testing import CliRunner
 import pytest
 
+VALUE = '0.20003 ± 0.00011 kg m²'
 ROW = {
     'joint': 'a_joint_of_a_long_name',
     'from [rad]': '-1.22',
     'to': '0.0396',
-    'value, 95 %': '0.20003 ± 0.00011 kg m²',
+    'value, 95 %': VALUE,
     'note': 'words that may be broken where there is no room for all of them',
 }
 
@@ -21,8 +24,7 @@ def test_tables_say_their_units_and_break_no_number(capsys, monkeypatch):
     print_rows([ROW], as_json=False, right=('from [rad]', 'to', 'value, 95 %'))
     lines = capsys.readouterr().out.splitlines()
     assert max(map(len, lines)) <= 80
-    assert 'from [rad]' in lines[0]
-    assert '0.20003 ± 0.00011 kg m²' in lines[1]
+    assert '[rad]' in lines[0] and VALUE in lines[1]
 
 
 def test_progress_without_a_terminal_is_a_line_every_ten_seconds():
@@ -35,12 +37,9 @@ def test_progress_without_a_terminal_is_a_line_every_ten_seconds():
     now[0] += 25.0  # work that says nothing is still shown to go on
     progress.look()
     progress.look()
-    assert lines == [
-        'identifying: 25 %, 10 s, about 30 s to go',
-        'identifying: 50 %, 20 s, about 20 s to go',
-        'identifying: 75 %, 30 s, about 10 s to go',
-        'identifying: 75 %, 55 s, about 18 s to go',
-    ]
+    shown = [tuple(map(int, re.findall(r'\d+', line))) for line in lines]
+    assert shown == [(25, 10, 30), (50, 20, 20), (75, 30, 10), (75, 55, 18)]  # %, s, s to go
+    assert all(line.startswith('identifying: ') for line in lines)
 
 
 @pytest.mark.parametrize(

@@ -7,7 +7,6 @@ from pathlib import Path
 import pytest
 
 from docsite.architecture import architecture_page, JOBS, steps
-from docsite.sample import drawn
 
 PACKAGE = Path(__file__).parents[2] / 'armid_ros'
 
@@ -27,8 +26,3 @@ def test_a_job_leads_from_its_command_to_its_result(job):
 def test_every_job_has_a_diagram():
     page = architecture_page(PACKAGE)
     assert page.count('<svg ') == page.count('</svg>') == len(JOBS)
-
-
-def test_a_sample_is_drawn_alike_from_docstrings_messages_and_pages():
-    sample = drawn(1, 30)
-    assert len(set(sample)) == 30 and sample == drawn(1, 30)

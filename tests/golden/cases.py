@@ -123,7 +123,7 @@ CASES = {
     ),
     'lunar': Case(('lunar --out {out}/lunar --json',), long=True),
     'elastic': Case(('elastic --demo --experiments 3 --out {out}/elastic --json',), long=True),
-    'exo': Case(('exo --duration 4 --out {out}/exo --json',)),
+    'exo': Case(('exo --duration 4 --out {out}/exo --json',), long=True),
     'fleet_identify': Case(
         (
             'fleet identify {inputs}/fleet/*/* --robot {root}/examples/arm.urdf --workers 1'

@@ -1,11 +1,13 @@
 # Copyright 2026 The armid_ros developers
 # SPDX-License-Identifier: Apache-2.0
-"""Each command answers what is stored; `python -m tests.golden` writes it anew."""
+"""Each command answers what is stored, by its schema; `python -m tests.golden` writes it anew."""
 
 import json
 
 import pytest
+import yaml
 
+from docsite.schemas import faults
 from tests.golden.cases import answer, CASES, LIVED, lived_answer, RESULTS
 from tests.golden.facts import differences, facts
 from tests.golden.inputs import lay_out
@@ -13,6 +15,18 @@ from tests.golden.inputs import lay_out
 
 def stored(name):
     return json.loads((RESULTS / f'{name}.json').read_text(encoding='utf-8'))
+
+
+def written(folder):
+    """Yield the documents that have a schema, with its name."""
+    for path in folder.rglob('*.*'):
+        if path.suffix in ('.json', '.yaml'):
+            text = path.read_text(encoding='utf-8')
+            document = json.loads(text) if path.suffix == '.json' else yaml.safe_load(text)
+            _, _, name = str(document.get('schema', '')).partition('armid/')
+            kind = 'excitation_quality' if path.name == 'excitation.json' else name.split('/')[0]
+            if kind:
+                yield kind, document
 
 
 @pytest.fixture(scope='module')
@@ -40,6 +54,8 @@ def test_a_command_answers_what_is_stored(name, inputs, tmp_path, request):
     if CASES[name].real:
         request.getfixturevalue('real_data')
     assert differences(stored(name), answer(name, inputs, tmp_path)) == []
+    for schema, document in written(tmp_path):
+        assert faults(schema, document) == []
 
 
 @pytest.mark.long

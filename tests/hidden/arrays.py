@@ -9,6 +9,7 @@ from typing import ClassVar, Self
 
 import numpy as np
 import numpy.typing as npt
+from scipy.signal import lfilter
 
 FloatArray = npt.NDArray[np.float64]
 #: Name and unit of the ten parameters of a body.
@@ -99,3 +100,17 @@ def named_body(label: str, joint: str, values: FloatArray) -> tuple[Parameter, .
         Parameter(label.format(name), joint, float(value), unit)
         for (name, unit), value in zip(BODY.items(), values, strict=True)
     )
+
+
+def sampled(times: FloatArray, t: FloatArray, values: FloatArray) -> FloatArray:
+    """Return signals (N, n) at other times."""
+    return np.column_stack([np.interp(times, t, column) for column in values.T])
+
+
+def coloured_noise(shape: tuple[int, ...], lasting: float, rng: np.random.Generator) -> FloatArray:
+    """Return noise of variance 1, half white and half correlated over a number of samples."""
+    decay = np.exp(-1.0 / lasting)
+    start = rng.normal(size=(1, shape[1]))
+    steps = np.sqrt(1.0 - decay**2) * rng.normal(size=shape)
+    slow, _ = lfilter([1.0], [1.0, -decay], steps, axis=0, zi=decay * start)
+    return np.asarray(np.sqrt(0.5) * (slow + rng.normal(size=shape)))

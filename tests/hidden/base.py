@@ -138,8 +138,6 @@ class HiddenEffect(Sized, ABC):
     replaces: ClassVar[tuple[str, ...]] = ()
     #: Known effects that the plant must have.
     needs: ClassVar[tuple[str, ...]] = ()
-    #: Largest factor on the ordinary size that still makes sense.
-    largest_factor: ClassVar[float] = 30.0
     #: Step of the integration [s].
     dt: ClassVar[float] = 1e-3
 

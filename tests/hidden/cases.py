@@ -11,18 +11,17 @@ import json
 from pathlib import Path
 from typing import Any
 
-from armid_ros.recording import Recording, write_recording
+from armid_ros.recording import Recording
 from armid_ros.robots import Robot
 import numpy as np
 import pinocchio as pin
 
-from tests.hidden.arrays import FloatArray, Signals
+from tests.hidden.arrays import FloatArray
 from tests.hidden.base import HiddenEffect, Setting
 from tests.hidden.catalogue import HIDDEN
 from tests.hidden.machines import drive_size, load_machine, with_rigid_errors
 from tests.hidden.plant import Plant, run
 from tests.hidden.sensors import Sensors
-from tests.hidden.sizing import Evidence, Gap, measure_gap
 from tests.hidden.specification import CaseSpec
 from tests.hidden.trajectories import draw_orbit, Orbit, reference, SPEEDS
 
@@ -70,8 +69,6 @@ class Bag:
         Beginning and end of each identical period, on the recording's time base [s].
     clean : Recording
         What perfect instruments would have recorded: for judging, not for the diagnosis.
-    signals : Signals
-        The truth at the step of the plant: for judging, not for the diagnosis.
 
     """
 
@@ -79,17 +76,6 @@ class Bag:
     recording: Recording
     periods: tuple[tuple[float, float], ...]
     clean: Recording
-    signals: Signals
-
-    @property
-    def evidence(self) -> Evidence:
-        """Return the bag as the oracle has it."""
-        stamps, truth = self.clean.t, self.signals
-        rates = (
-            np.column_stack([np.interp(stamps, truth.t, column) for column in values.T])
-            for values in (truth.dq, truth.ddq)
-        )
-        return Evidence(self.clean, self.recording, *rates, self.periods)
 
 
 @dataclass(frozen=True)
@@ -113,8 +99,8 @@ class Case:
         With the true rigid parameters, without hidden effects.
     true_known : mapping of str to ndarray, shape (n,)
         True values of the known effects, zero in joints where they are not known.
-    gap : Gap
-        How much of the hidden effects the bags show.
+    size : float
+        Excess loss of the worst joint by the largest effect alone, as sizes.json has it.
 
     """
 
@@ -126,12 +112,7 @@ class Case:
     effects: tuple[HiddenEffect, ...]
     true_robot: Robot
     true_known: Mapping[str, FloatArray]
-    gap: Gap
-
-    @property
-    def size(self) -> float:
-        """Excess loss in the worst joint, after a fit unless the rigid body would absorb it."""
-        return gap_size(self.gap, self.effects)
+    size: float
 
     @property
     def visible(self) -> bool:
@@ -164,25 +145,24 @@ def make_case(spec: CaseSpec) -> Case:
     size = _sizes().get(spec.sized_as, {'draw': 0, 'effects': []})
     entries = size['effects']
     if len(entries) != len(spec.effects):
-        raise LookupError(f'{spec.key} has no size yet: python -m tests.hidden calibrate')
+        raise LookupError(f'{spec.key} has no size in {SIZES.name}')
     draft = draw(spec, size['draw'])
     effects = tuple(
         effect.scaled(entry['factor'])
         for effect, entry in zip(draft.effects, entries, strict=True)
     )
     draft = replace(draft, effects=effects)
-    bags = simulate(draft, TRAINING)
     robot, known = _nominal(draft)
     return Case(
         spec=spec,
         robot=robot,
         known=known,
-        bags=bags,
+        bags=simulate(draft, TRAINING),
         validation=simulate(draft, VALIDATION),
         effects=effects,
         true_robot=draft.robot,
         true_known=draft.known,
-        gap=draft_gap(draft, bags),
+        size=max((entry['gap'] for entry in entries), default=0.0),
     )
 
 
@@ -226,26 +206,8 @@ def simulate(draft: Draft, speeds: Sequence[str], periods: int = 2) -> tuple[Bag
         joints = draft.robot.joints
         noise_rng = _rng(draft.spec, 5, list(SPEEDS).index(speed))
         recording = draft.sensors.record(signals, joints, noise_rng)
-        bags.append(Bag(speed, recording, spans, draft.sensors.perfect(signals, joints), signals))
+        bags.append(Bag(speed, recording, spans, draft.sensors.perfect(signals, joints)))
     return tuple(bags)
-
-
-def draft_gap(draft: Draft, bags: Sequence[Bag]) -> Gap:
-    """Compute how much of the hidden effects the bags show."""
-    return measure_gap(draft.robot, draft.known, [bag.evidence for bag in bags])
-
-
-def gap_size(gap: Gap, effects: Sequence[HiddenEffect]) -> float:
-    """Return the one number that a case is classed by."""
-    fixed = any(effect.rigid for effect in effects)
-    return float((gap.fixed if fixed else gap.refit).max())
-
-
-def write_case(case: Case, folder: Path) -> None:
-    """Write all recordings of a case as bags, named after their speeds."""
-    folder.mkdir(parents=True, exist_ok=True)
-    for bag in (*case.bags, *case.validation):
-        write_recording(folder / bag.speed, bag.recording)
 
 
 @cache

@@ -59,7 +59,6 @@ class ActuatorSaturation(InJoint):
 
     name = 'actuator_saturation'
     sized_by = 'excess'
-    largest_factor = 10.0
     index: int
     peak: float
     excess: float = 0.1

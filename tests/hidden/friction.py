@@ -124,7 +124,6 @@ class LoadDependentFriction(OneJoint):
     name = 'load_dependent_friction'
     stated = (('load_coefficient', 'value', ''),)
     acts = True
-    largest_factor = 8.0
 
     @classmethod
     def draw(cls, setting: Setting, rng: np.random.Generator) -> Self:

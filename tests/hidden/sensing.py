@@ -72,7 +72,6 @@ class TorqueGain(_Reading):
 
     name = 'torque_gain'
     stated = (('gain_error', 'value', ''),)
-    largest_factor = 6.0
 
     @classmethod
     def draw(cls, setting: Setting, rng: np.random.Generator) -> Self:
@@ -90,7 +89,6 @@ class TorqueCrosstalk(InPair):
     name = 'torque_crosstalk'
     sized_by = 'share'
     share: float
-    largest_factor = 15.0
 
     @classmethod
     def draw(cls, setting: Setting, rng: np.random.Generator) -> Self:
@@ -117,7 +115,6 @@ class TimeDelay(HiddenEffect):
 
     name = 'time_delay'
     stated = (('delay', 'value', 's'),)
-    largest_factor = 5.0
     value: float
 
     @classmethod
@@ -135,7 +132,6 @@ class TorqueLag(_Reading):
 
     name = 'torque_lag'
     stated = (('lag', 'value', 's'),)
-    largest_factor = 3.0
 
     @classmethod
     def draw(cls, setting: Setting, rng: np.random.Generator) -> Self:
@@ -157,7 +153,6 @@ class EncoderOffset(OneJoint):
     name = 'encoder_offset'
     stated = (('encoder_offset', 'value', 'rad'),)
     rigid = True
-    largest_factor = 5.0
 
     @classmethod
     def draw(cls, setting: Setting, rng: np.random.Generator) -> Self:

@@ -8,9 +8,8 @@ from dataclasses import dataclass
 
 from armid_ros.recording import Recording
 import numpy as np
-from scipy.signal import lfilter
 
-from tests.hidden.arrays import FloatArray, Signals
+from tests.hidden.arrays import coloured_noise, FloatArray, sampled, Signals
 
 
 @dataclass(frozen=True)
@@ -78,33 +77,22 @@ class Sensors:
         """Sample the signals as these instruments do."""
         stamps = np.arange(int(signals.t[-1] * self.rate) - 1) / self.rate
         taken = np.clip(stamps + self.jitter * rng.normal(size=len(stamps)), 0.0, signals.t[-1])
-        q, dq, tau = (_at(taken, signals.t, x) for x in (signals.q, signals.dq, signals.tau))
+        q, dq, tau = (sampled(taken, signals.t, x) for x in (signals.q, signals.dq, signals.tau))
         noisy = q + self.position_noise * rng.normal(size=q.shape)
         counted = self.resolution * np.round(noisy / self.resolution)
+        lasting = self.rate * self.correlation_time
         speed_noise = (self.position_noise + 0.3 * self.resolution) * self.rate
         return Recording(
             joints=joints,
             t=stamps,
             q=counted,
             dq=dq + speed_noise * rng.normal(size=dq.shape),
-            tau=tau + self.torque_noise * self._coloured(tau.shape, rng),
+            tau=tau + self.torque_noise * coloured_noise(tau.shape, lasting, rng),
             start_ns=1_700_000_000_000_000_000,
         )
 
     def perfect(self, signals: Signals, joints: tuple[str, ...]) -> Recording:
         """Return what instruments without noise, steps and jitter would record."""
         stamps = np.arange(int(signals.t[-1] * self.rate) - 1) / self.rate
-        q, dq, tau = (_at(stamps, signals.t, x) for x in (signals.q, signals.dq, signals.tau))
+        q, dq, tau = (sampled(stamps, signals.t, x) for x in (signals.q, signals.dq, signals.tau))
         return Recording(joints=joints, t=stamps, q=q, dq=dq, tau=tau)
-
-    def _coloured(self, shape: tuple[int, int], rng: np.random.Generator) -> FloatArray:
-        """Return noise of variance 1, shape (N, n)."""
-        decay = np.exp(-1.0 / (self.rate * self.correlation_time))
-        start = rng.normal(size=(1, shape[1]))
-        steps = np.sqrt(1.0 - decay**2) * rng.normal(size=shape)
-        slow, _ = lfilter([1.0], [1.0, -decay], steps, axis=0, zi=decay * start)
-        return np.sqrt(0.5) * (slow + rng.normal(size=shape))
-
-
-def _at(times: FloatArray, t: FloatArray, values: FloatArray) -> FloatArray:
-    return np.column_stack([np.interp(times, t, column) for column in values.T])

@@ -103,7 +103,6 @@ class JointElasticity(InJoint):
     sized_by = 'compliance'
     stated = (('compliance', 'compliance', 'rad/(N m)'),)
     needs = ('rotor_inertia',)
-    largest_factor = 10.0
     dt = 2.5e-4
     index: int
     compliance: float
@@ -131,7 +130,6 @@ class Backlash(InJoint):
         ('crossing_width', 'width', 'rad'),
     )
     needs = ('rotor_inertia',)
-    largest_factor = 8.0
     dt = 2.5e-4
     index: int
     width: float

@@ -19,7 +19,6 @@ from scipy.signal import butter, sosfiltfilt
 from benchmarks.hidden_effects import nominal_arm, true_arm
 from tests.hidden.cases import Case, draw, KnownEffect, simulate
 from tests.hidden.catalogue import CATALOGUED, HIDDEN
-from tests.hidden.sizing import Gap
 from tests.hidden.specification import CaseSpec
 
 pytestmark = pytest.mark.long
@@ -37,8 +36,7 @@ def make(name):
     draft = draw(spec)
     draft = replace(draft, effects=tuple(effect.scaled(2.0) for effect in draft.effects))
     bags = simulate(draft, ['fast' if name == 'actuator_saturation' else 'medium'])
-    gap = Gap(np.zeros(7), np.zeros(7))
-    return Case(spec, draft.robot, (), bags, (), draft.effects, draft.robot, draft.known, gap)
+    return Case(spec, draft.robot, (), bags, (), draft.effects, draft.robot, draft.known, 1.0)
 
 
 def smooth(values):

@@ -29,6 +29,7 @@ def wanted(root, group):
 def pinned(root, lock):
     """Return name to version in requirements/<lock>.txt; each must have a hash."""
     text = (root / 'requirements' / f'{lock}.txt').read_text()
+    assert not re.search(r'://|--(extra-)?index-url|--find-links', text)  # the user's to choose
     pins = {}
     for entry in re.findall(r'^[a-z].*(?:\n    .*)*', text, re.MULTILINE):
         name, version = re.match(r'([\w.-]+)(?:\[.*\])?==([^ ]+)', entry).groups()
@@ -63,14 +64,6 @@ def test_requirements_of_users_have_a_lowest_and_a_highest_version(root, group):
         assert re.search(r'>=\d[\d.]*,<\d', line), line
 
 
-@pytest.mark.parametrize('lock', LOCKS)
-def test_lock_names_no_registry(root, lock):
-    """Where packages come from is the user's to say."""
-    text = (root / 'requirements' / f'{lock}.txt').read_text()
-    assert '://' not in text
-    assert not re.search(r'--(extra-)?index-url|--find-links', text)
-
-
 @pytest.fixture
 def host(root, monkeypatch, tmp_path):
     """Load the check, in a folder without an environment."""
@@ -84,39 +77,29 @@ def host(root, monkeypatch, tmp_path):
     return module
 
 
-def test_this_machine_lacks_nothing(host):
-    """The tests run on a supported Python, with a compiler."""
-    assert host.missing() is None
-
-
 @pytest.mark.parametrize('version', [(2, 7, 18), (3, 10, 13), (3, 13, 0)])
 def test_unsupported_python_is_named(host, monkeypatch, version):
     """The line says which are supported, which this is, and how to name another."""
     monkeypatch.setattr(sys, 'version_info', version)
     message = host.missing()
-    assert 'Python 3.11 or 3.12' in message
-    assert '.'.join(map(str, version)) in message
-    assert 'make PYTHON=' in message
+    for fact in ('3.11', '3.12', '.'.join(map(str, version)), 'PYTHON='):
+        assert fact in message
 
 
-def test_missing_venv_module_is_named(host, monkeypatch):
-    """Debian ships Python without it."""
-    monkeypatch.setitem(sys.modules, 'ensurepip', None)
-    assert 'python3-venv' in host.missing()
-
-
-def test_missing_headers_are_named(host, monkeypatch, tmp_path):
-    """Debian ships Python without them too."""
+def test_what_debian_leaves_out_of_python_is_named(host, monkeypatch, tmp_path):
+    assert host.missing() is None
     monkeypatch.setattr(sysconfig, 'get_path', lambda name: str(tmp_path))
     assert 'python3-dev' in host.missing()
+    monkeypatch.setitem(sys.modules, 'ensurepip', None)
+    assert 'python3-venv' in host.missing()
 
 
 def test_missing_compiler_is_named(host, monkeypatch):
     """Either on the path, or as CC and CXX name it."""
     monkeypatch.setattr(shutil, 'which', lambda name: None if '+' in name else name)
-    assert '(c++, g++, clang++)' in host.missing()
+    assert 'clang++' in host.missing()
     monkeypatch.setenv('CXX', 'mine++ -O2')
-    assert '(mine++ -O2)' in host.missing()
+    assert 'mine++' in host.missing()
 
 
 def test_environment_of_another_python_is_not_mixed_with(host, tmp_path):

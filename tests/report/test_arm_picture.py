@@ -29,26 +29,6 @@ def test_a_joint_without_end_is_drawn_at_zero_and_others_in_the_middle_of_their_
     assert {name for *_, name in drawn.dots} == {'turn', 'lift'}
 
 
-def test_names_are_not_printed_over_one_another_or_over_the_arm():
-    """Joints at one place have a line of text each, at the right of the drawing and within it."""
-    chain = ''.join(
-        f'<link name="l{k}"><inertial><mass value="1"/>'
-        '<inertia ixx="1" ixy="0" ixz="0" iyy="1" iyz="0" izz="1"/></inertial></link>'
-        f'<joint name="j{k}" type="revolute"><parent link="{f"l{k - 1}" if k else "base"}"/>'
-        f'<child link="l{k}"/><origin xyz="0 0 {0.02 if k else 1.0}"/><axis xyz="0 0 1"/>'
-        '<limit lower="-1" upper="1" velocity="1" effort="1"/></joint>'
-        for k in range(6)
-    )
-    robot = robot_from_urdf(f'<robot name="chain"><link name="base"/>{chain}</robot>')
-    drawn = draw_arm(robot, robot.joints)
-    heights = [y for *_, y, _ in drawn.labels]
-    assert {name for *_, name in drawn.labels} == set(robot.joints)
-    assert min(np.diff(heights)) >= 14.0
-    assert 0.0 <= min(heights) and max(heights) <= drawn.height
-    points = [float(p.split(',')[0]) for body, _ in drawn.bodies for p in body.split()]
-    assert min(x for _, _, x, _, _ in drawn.labels) > max(points)
-
-
 def test_an_arm_on_a_ceiling_hangs():
     """What the base carries is at the bottom; without gravity it is drawn as described."""
     below = {}

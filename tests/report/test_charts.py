@@ -11,8 +11,6 @@ from armid_ros.report.blocks import Bar, BarChart
 from armid_ros.report.charts import (
     Chart,
     image_data,
-    joined,
-    joined_time,
     rounded,
     Series,
     thinned,
@@ -44,13 +42,6 @@ def test_thinning_keeps_breaks():
     y = np.sin(np.arange(50_000.0))
     y[30_000] = np.nan
     assert 30_000 in thinned(y, most=500)
-
-
-def test_stretches_are_joined_with_a_break():
-    t = joined_time([np.array([0.0, 1.0]), np.array([5.0, 6.0])])
-    y = joined([np.array([1.0, 2.0]), np.array([3.0, 4.0])])
-    np.testing.assert_array_equal(t, [0.0, 1.0, 1.0, 5.0, 6.0])
-    np.testing.assert_array_equal(y, [1.0, 2.0, np.nan, 3.0, 4.0])
 
 
 def test_rounding_is_far_below_a_pixel():
@@ -85,9 +76,3 @@ def test_an_image_is_a_png_of_its_pixels():
     assert kind == 'data:image/png;base64'
     pixels = imread(BytesIO(b64decode(content)), format='png')
     np.testing.assert_allclose(pixels, [[[1, 0, 0, 1], [0, 0, 1, 0.5]]], atol=1 / 255)
-
-
-def test_bars_of_nothing_have_no_length():
-    chart = BarChart([('<b>', [Bar(0.0, 'floor', 'none')])])
-    assert 'width: 0.0%' in chart.html()
-    assert '<b>' not in chart.html() and '&lt;b&gt;' in chart.html()

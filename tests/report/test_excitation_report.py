@@ -20,19 +20,13 @@ from armid_ros.excitation import (
 )
 from armid_ros.excitation.fitness import PARTLY
 from armid_ros.report.arm_drawing import draw_poses, OBSTACLE
-from armid_ros.robots import collision_model, load_robot, robot_from_urdf
+from armid_ros.robots import collision_model, load_robot
 import numpy as np
 import pytest
 
 from tests.clearance import path_clearance
 
 TABLE = Obstacle('table <b>', 'box', (1.0, 1.0, 0.1), (0.0, 0.0, -1.5))
-BARE = (
-    '<robot name="bare"><link name="base"/><link name="rod"><inertial><origin xyz="0 0 0.4"/>'
-    '<mass value="1"/><inertia ixx="1" ixy="0" ixz="0" iyy="1" iyz="0" izz="1"/></inertial></link>'
-    '<joint name="hinge" type="continuous"><parent link="base"/><child link="rod"/>'
-    '<axis xyz="0 1 0"/></joint></robot>'
-)
 
 
 @pytest.fixture(scope='module')
@@ -106,25 +100,6 @@ def test_what_the_run_does_not_show_comes_first(case, planned):
     blind = replace(planned, information=replace(planned.information, matrix=matrix))
     page = ExcitationResult(blind, case.truth, scene_of(case.truth.robot)).page()
     assert '>blind<' in page
-
-
-def test_bodies_are_drawn_where_they_are():
-    """A rod that hangs is below its hinge, one that stands above it."""
-    robot = robot_from_urdf(BARE)
-    drawing = draw_poses(
-        collision_model(robot), np.array([[0.0], [np.pi]]), ['up', 'down'], np.zeros((2, 1))
-    )
-    up, down = (height for _, height, *_ in drawing.dots)
-    assert down - up > 0.35 * drawing.height
-    assert [text for _, text in drawing.captions] == ['up', 'down']
-
-
-def test_browser_draws_every_chart_and_pose(browser, charts_drawn, html):
-    assert charts_drawn(html, 390, dark=False) == html.count('<figure') > 24
-    sizes = browser.run(
-        '[...document.querySelectorAll("#poses polygon")].map(p => p.getBBox().height)'
-    )
-    assert len(sizes) >= 6 * 7 and min(sizes) > 1.0
 
 
 def test_an_arm_without_bodies_is_drawn_though_its_links_are_points_for_the_floor():

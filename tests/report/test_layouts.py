@@ -56,12 +56,6 @@ def test_panels_of_foxglove_have_the_settings_that_foxglove_reads():
         assert set(settings) == set(known[panel.partition('!')[0]].split())
 
 
-def test_names_that_xml_does_not_like_are_escaped():
-    text = plotjuggler_layout('arm', ('a<b&"c',))
-    curves = [curve.get('name') for curve in ElementTree.fromstring(text).iter('curve')]
-    assert '/joint_states/a<b&"c/effort' in curves
-
-
 def test_the_arm_and_what_is_drawn_on_it_are_shown_in_the_frame_of_its_base():
     configured = json.loads(foxglove_layout(('a',), 'left', 'foot'))['configById']
     scene = configured['3D!arm']

@@ -28,13 +28,12 @@ def test_a_long_prefix_before_a_letter_is_common(names, prefix):
 def test_labels_of_a_page_have_short_names_and_sentences_whole_ones():
     label = f'friction, {", ".join(PANDA)}'
     blocks = (
-        Paragraph('Look at panda_joint3.'),
+        Paragraph('See panda_joint3.'),
         DataTable(('Joint',), [('panda_joint2',), ('bags/panda_joint2',), ('panda_joint21',)]),
         BarChart([(label, [])], full=1.0),
     )
     page = Page('', '', [ContentSection('A', blocks)], charts=False, names=PANDA).html()
-    for text in ('at panda_joint3', '>joint2<', 'bags/panda_joint2', '>panda_joint21<'):
+    for text in ('See panda_joint3', '>joint2<', 'bags/panda_joint2', '>panda_joint21<'):
         assert text in page
-    assert 'friction, 7 joints' in page
-    assert page.count('prefix panda_') == 1
+    assert '7 joints' in page and page.count('panda_<') <= 1
     assert '>panda_joint2<' in blocks[1].html()

@@ -22,10 +22,9 @@ def fit_with(residual):
 
 def test_noise_goes_with_nothing():
     rng = np.random.default_rng(4)
-    shares = [
-        Trend.of(rng.standard_normal(2000), rng.standard_normal(2000)).share for _ in range(50)
-    ]
-    assert max(shares) < 0.03
+    pairs = rng.standard_normal((50, 2, 2000))
+    assert max(Trend.of(*pair).share for pair in pairs) < 0.03
+    assert Trend.of(np.arange(100.0), np.ones(100)).share == 0.0
 
 
 def test_a_residual_that_follows_a_variable_is_found_with_its_share():
@@ -36,13 +35,9 @@ def test_a_residual_that_follows_a_variable_is_found_with_its_share():
     np.testing.assert_allclose(trend.mean, np.sign(trend.centre), atol=0.15)
 
 
-def test_constant_residual_has_no_share():
-    assert Trend.of(np.arange(100.0), np.ones(100)).share == 0.0
-
-
 def test_white_noise_stays_in_its_band():
     rng = np.random.default_rng(6)
-    outside = [Whiteness.of([fit_with(rng.standard_normal(1000))], 0).outside for _ in range(200)]
+    outside = [Whiteness.of([fit_with(rng.standard_normal(1000))], 0).outside for _ in range(100)]
     assert np.mean(outside) == pytest.approx(0.01, abs=0.006)
 
 
@@ -63,29 +58,13 @@ def test_worst_known_direction_is_the_largest_variance_of_the_torque(case):
     assert values == sorted(values, reverse=True) and len(values) == case.result.base.rank
 
 
-def test_without_held_out_data_the_next_step_is_to_record_them(case):
-    judgement = judge(case.result, {}, case.recordings)
-    assert any('validate' in step for step in judgement.next_steps)
-
-
-def test_a_joint_that_is_predicted_badly_is_named(case):
-    ((source, fits),) = case.validation.items()
-    rng = np.random.default_rng(7)
-    predicted = np.array(fits[0].predicted)
-    predicted[:, 3] = rng.standard_normal(len(predicted))
-    worse = replace(fits[0], predicted=predicted)
-    judgement = judge(case.result, {source: (worse,)}, case.recordings)
-    assert any('elbow_pitch' in line for line in judgement.beware)
-    assert any('elbow_pitch' in step for step in judgement.next_steps)
-
-
 def test_missing_friction_is_seen_in_the_residual(case):
     ((source, fits),) = case.validation.items()
     coulomb = 0.1 * np.sign(fits[0].motion.dq)
     worse = replace(fits[0], predicted=fits[0].predicted - coulomb)
     judgement = judge(case.result, {source: (worse,)}, case.recordings)
     count = len(case.result.arm.robot.joints)
-    assert any(f'speed ({count} joints)' in line for line in judgement.beware)
+    assert any('speed' in line and f'{count} joints' in line for line in judgement.beware)
 
 
 def test_what_reading_met_is_said(case):

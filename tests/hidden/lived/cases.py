@@ -11,11 +11,11 @@ from pathlib import Path as FilePath
 from armid_ros.robots import Robot
 import numpy as np
 
-from tests.hidden.arrays import FloatArray, Parameter
+from tests.hidden.arrays import FloatArray, Parameter, sampled
 from tests.hidden.lived.arms import load_arm, worn_bodies
 from tests.hidden.lived.causes import Cause, CAUSES, Mounting, Scene
 from tests.hidden.lived.chain import Chain
-from tests.hidden.lived.instruments import Instruments, sampled
+from tests.hidden.lived.instruments import Instruments
 from tests.hidden.lived.motions import draw_path, Path, tracked
 from tests.hidden.lived.plant import LivedArm
 from tests.hidden.lived.sizing import gap, misfit, rows_of, sized
@@ -167,18 +167,7 @@ def lived_case(kind: str, index: int) -> LivedCase:
         Number, from 0.
 
     """
-    return case_of(specify(kind, index))
-
-
-def case_with(kind: str, index: int, cause: str, size: tuple[float, float]) -> LivedCase:
-    """Make a case with another cause, of a gap in the middle of a range."""
-    wanted = float(np.sqrt(size[0] * size[1]))
-    return case_of(replace(specify(kind, index), cause=cause, wanted=wanted))
-
-
-def case_of(spec: LivedSpec) -> LivedCase:
-    """Make a case of any specification."""
-    return _record_case(draw_case(spec))
+    return _record_case(draw_case(specify(kind, index)))
 
 
 def _record_case(draft: Draft) -> LivedCase:

@@ -9,7 +9,7 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.signal import lfilter
 
-from tests.hidden.arrays import FloatArray
+from tests.hidden.arrays import coloured_noise, FloatArray
 
 
 @dataclass(frozen=True)
@@ -87,14 +87,5 @@ class Instruments:
 
     def torques(self, tau: FloatArray, rng: np.random.Generator) -> FloatArray:
         """Return torques with noise, half white and half coloured."""
-        decay = np.exp(-1.0 / (self.rate * self.correlation_time))
-        start = rng.normal(size=(1, tau.shape[1]))
-        steps = np.sqrt(1.0 - decay**2) * rng.normal(size=tau.shape)
-        slow, _ = lfilter([1.0], [1.0, -decay], steps, axis=0, zi=decay * start)
-        noise = np.sqrt(0.5) * (slow + rng.normal(size=tau.shape))
+        noise = coloured_noise(tau.shape, self.rate * self.correlation_time, rng)
         return tau + self.torque_noise * noise
-
-
-def sampled(times: FloatArray, t: FloatArray, values: FloatArray) -> FloatArray:
-    """Return signals (N, n) at other times."""
-    return np.column_stack([np.interp(times, t, column) for column in values.T])

@@ -17,13 +17,6 @@ pytestmark = pytest.mark.long
 ROUND = len(ORDER)
 
 
-def described_part(case, run):
-    """Return the effort that description and true gravity explain of a run, and the rest."""
-    draft = draw_case(case.spec)
-    path = draft.paths[run]
-    return draft.arm.chain.torque(path.q, path.dq, path.ddq), draft.worn[run].effort(path)
-
-
 def test_a_case_is_the_same_every_time_and_like_no_other():
     first = lived_case('development', 5)
     lived_case.cache_clear()
@@ -86,33 +79,6 @@ def test_only_day_2_has_the_cause_and_nothing_is_nothing():
         assert np.all(run.contribution.any(axis=0) == guilty)
     assert free.truth == ()
     assert not any(run.contribution.any() for run in (*free.day_2, free.held_out))
-
-
-def test_effort_less_contribution_is_a_healthy_arm_with_noise():
-    case = lived_case('development', 9)
-    draft = draw_case(case.spec)
-    path, run = draft.paths['held_out'], case.held_out
-    healthy = draft.worn['held_out'].effort(path)
-    expected = np.column_stack([np.interp(run.t, path.t, column) for column in healthy.T])
-    left = run.tau - run.contribution - expected
-    # noise, and what a stamp that is off makes of a torque that jumps
-    assert np.all(np.median(np.abs(left), axis=0) < 1.5 * run.noise)
-    assert np.all(np.abs(left.mean(axis=0)) < 0.3 * run.noise)
-
-
-def test_exact_arms_are_their_description():
-    case = lived_case('development/exact', 2)
-    assert case.day_1 == ()
-    assert case.truth == ()
-    assert [known.name for known in case.known] == ['viscous_friction', 'coulomb_friction']
-    rigid, effort = described_part(case, 'held_out')
-    draft = draw_case(case.spec)
-    viscous, coulomb = (known.values for known in case.known)
-    dq = draft.paths['held_out'].dq
-    moving = np.abs(dq) > 0.1
-    friction = viscous * dq + coulomb * np.sign(dq)
-    np.testing.assert_allclose((effort - rigid)[moving], friction[moving], atol=1e-6)
-    assert lived_case('development/exact', 1).known[0].values is None
 
 
 def test_the_second_of_a_pair_has_the_cause_of_the_first():

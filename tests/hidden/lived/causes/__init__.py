@@ -19,14 +19,12 @@ from tests.hidden.lived.causes.drive import (
     Stribeck,
     Viscous,
 )
-from tests.hidden.lived.causes.nameless import CableSnag, PositionFriction
 from tests.hidden.lived.causes.rigid import Link, Mounting, Payload, Tilt, Wall
 from tests.hidden.lived.causes.sensing import Delay, Encoder, Gain, Offset
 
 __all__ = [
     'CAUSES',
     'Bumps',
-    'CableSnag',
     'Cause',
     'Coulomb',
     'CubicDrag',
@@ -40,7 +38,6 @@ __all__ = [
     'Mounting',
     'Offset',
     'Payload',
-    'PositionFriction',
     'Pulling',
     'Rotor',
     'Scene',
@@ -73,7 +70,5 @@ CAUSES: Mapping[str, type[Cause]] = MappingProxyType(
         'knocks': Knocks,
         'bumps': Bumps,
         'cubic_drag': CubicDrag,
-        'position_friction': PositionFriction,
-        'cable_snag': CableSnag,
     }
 )

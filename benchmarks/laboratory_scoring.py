@@ -1,84 +1,22 @@
 # Copyright 2026 The armid_ros developers
 # SPDX-License-Identifier: Apache-2.0
-"""How good a diagnosis is: outcomes against the truth, as rates with 95 % intervals."""
+"""How good answers about hidden effects are: against the truth, as rates with 95 % intervals."""
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
 
+from benchmarks.metrics import Metric, number, rate
+from benchmarks.two_days import Answer, Named
 from tests.hidden.arrays import Parameter
 from tests.hidden.cases import Case
 from tests.hidden.machines import load_machine
 
 #: What says that a gap is there but nothing that is known explains it.
 UNEXPLAINED = ('unknown', 'partial')
-
-
-@dataclass(frozen=True)
-class Finding:
-    """
-    An effect that was named.
-
-    Attributes
-    ----------
-    name : str
-        Name in the catalogue.
-    joints : tuple of str
-        Where; empty for the whole arm.
-    ambiguous_with : tuple of str
-        Other names that the data cannot exclude.
-    parameters : tuple of (name, joint, value, std)
-        What was estimated.
-    rivals : tuple of (name, joints)
-        Where those other names would be.
-
-    """
-
-    name: str
-    joints: tuple[str, ...] = ()
-    ambiguous_with: tuple[str, ...] = ()
-    parameters: tuple[tuple[str, str, float, float], ...] = ()
-    rivals: tuple[tuple[str, tuple[str, ...]], ...] = ()
-
-    def joints_of(self, name: str) -> tuple[str, ...]:
-        """Return where it is if it is a name."""
-        return self.joints if name == self.name else dict(self.rivals).get(name, self.joints)
-
-    @property
-    def names(self) -> set[str]:
-        """All names it may be."""
-        return {self.name, *self.ambiguous_with}
-
-
-@dataclass(frozen=True)
-class Outcome:
-    """
-    What a diagnosis said, as in diagnosis.json.
-
-    Attributes
-    ----------
-    verdict : str
-        consistent, named, ambiguous, partial, unknown, not_repeatable or bad_data.
-    findings : tuple of Finding
-        What was named, most important first.
-    closed : float
-        Share of the explainable gap that is closed on motions never used; nan if they have none.
-    seconds : float
-        Processor time it took [s].
-    error : str
-        Why there is no outcome; empty if there is one.
-
-    """
-
-    verdict: str
-    findings: tuple[Finding, ...] = ()
-    closed: float = np.nan
-    seconds: float = np.nan
-    error: str = ''
 
 
 @dataclass(frozen=True)
@@ -115,21 +53,34 @@ class Truth:
 
 @dataclass(frozen=True)
 class Judged:
-    """One case: what is true, and what was said."""
+    """
+    One case: what is true, and what was said.
+
+    Attributes
+    ----------
+    truth : Truth
+        What is hidden.
+    outcome : Answer
+        What the diagnosis said.
+    closed : float
+        Share of the explainable gap that is closed on motions never used; nan if they have none.
+
+    """
 
     truth: Truth
-    outcome: Outcome
+    outcome: Answer
+    closed: float = np.nan
 
     @property
-    def findings(self) -> tuple[Finding, ...]:
+    def findings(self) -> tuple[Named, ...]:
         """Return what was named; a body that is off where the nominal one is off is no finding."""
         honest = () if self.truth.exact else ('link_inertia',)
-        return tuple(f for f in self.outcome.findings if f.name not in honest)
+        return tuple(f for f in self.outcome.headline if f.name not in honest)
 
     @property
     def false_alarm(self) -> bool:
         """Whether anything but silence was said of an arm without hidden effects."""
-        only_bodies = bool(self.outcome.findings) and not self.findings
+        only_bodies = bool(self.outcome.headline) and not self.findings
         return self.outcome.verdict != 'consistent' and not only_bodies
 
     @property
@@ -138,7 +89,7 @@ class Judged:
         return bool(self.findings) and self.findings[0].name in self.truth.names
 
     @property
-    def found(self) -> Finding | None:
+    def found(self) -> Named | None:
         """Return the finding that has the (first) truth among its names."""
         return next((f for f in self.findings if self.truth.names[0] in f.names), None)
 
@@ -209,47 +160,6 @@ class Judged:
         return errors
 
 
-def wilson(hits: int, total: int, z: float = 1.96) -> tuple[float, float]:
-    """Return the 95 % interval of a rate (Wilson 1927)."""
-    if total == 0:
-        return 0.0, 1.0
-    p = hits / total
-    centre = (p + z**2 / (2 * total)) / (1 + z**2 / total)
-    half = z / (1 + z**2 / total) * np.sqrt(p * (1 - p) / total + z**2 / (4 * total**2))
-    return float(max(centre - half, 0.0)), float(min(centre + half, 1.0))
-
-
-@dataclass(frozen=True)
-class Metric:
-    """
-    One row of the table.
-
-    Attributes
-    ----------
-    name : str
-        What it says.
-    value : float
-        Rate, share or number; nan if nothing counts.
-    low, high : float
-        95 % interval; nan where it is not a rate.
-    count : int
-        Cases that count.
-    reach : str
-        What is wanted, in words; empty if nothing is.
-    good : bool or None
-        Whether it is reached.
-
-    """
-
-    name: str
-    value: float
-    low: float
-    high: float
-    count: int
-    reach: str
-    good: bool | None
-
-
 def score(judged: Sequence[Judged]) -> tuple[Metric, ...]:
     """Compute all metrics."""
     free = [j for j in judged if j.truth.kind == 'free']
@@ -260,7 +170,7 @@ def score(judged: Sequence[Judged]) -> tuple[Metric, ...]:
     removed = [j for j in judged if j.truth.kind == 'removed' and j.truth.visible]
     placed = [j for j in single if j.found and not j.whole_arm]
     sets = [len(j.found.names) for j in single if j.found]
-    closed = [0.0 if j.outcome.error else j.outcome.closed for j in (*single, *pairs)]
+    closed = [0.0 if j.outcome.error else j.closed for j in (*single, *pairs)]
     closed = [share for share in closed if not np.isnan(share)]  # some never show it again
     errors = [error for j in single for error in j.parameter_errors()]
     sizes = np.array([size for size, _ in errors])
@@ -297,35 +207,3 @@ def score(judged: Sequence[Judged]) -> tuple[Metric, ...]:
         number('processor time, median [s]', np.median, seconds, '', None),
         number('processor time, longest [s]', np.max, seconds, 'at most 30', lambda x: x <= 30.0),
     )
-
-
-def rate(
-    name: str,
-    cases: Sequence[Any],
-    test: Callable[[Any], bool],
-    *,
-    least: float | None = None,
-    most: float | None = None,
-) -> Metric:
-    """Return a row with the share of cases that pass a test, and what is wanted of it."""
-    hits, total = sum(map(bool, map(test, cases))), len(cases)
-    value = hits / total if total else np.nan
-    wanted = [f'at least {least:g}'] if least is not None else []
-    wanted += [f'at most {most:g}'] if most is not None else []
-    good = None
-    if wanted and total:
-        good = (least is None or value >= least) and (most is None or value <= most)
-    return Metric(name, value, *wilson(hits, total), total, ', '.join(wanted), good)
-
-
-def number(
-    name: str,
-    statistic: Callable[[Any], Any],
-    values: Sequence[float] | np.ndarray,
-    reach: str,
-    test: Callable[[float], bool] | None,
-) -> Metric:
-    """Return a row with a statistic of values, and what is wanted of it."""
-    value = float(statistic(values)) if len(values) else np.nan
-    good = bool(test(value)) if test and len(values) else None
-    return Metric(name, value, np.nan, np.nan, len(values), reach, good)

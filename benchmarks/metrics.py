@@ -1,0 +1,96 @@
+# Copyright 2026 The armid_ros developers
+# SPDX-License-Identifier: Apache-2.0
+"""Rows of a table of success rates, with 95 % intervals."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+
+def wilson(hits: int, total: int, z: float = 1.96) -> tuple[float, float]:
+    """Return the 95 % interval of a rate (Wilson 1927)."""
+    if total == 0:
+        return 0.0, 1.0
+    p = hits / total
+    centre = (p + z**2 / (2 * total)) / (1 + z**2 / total)
+    half = z / (1 + z**2 / total) * np.sqrt(p * (1 - p) / total + z**2 / (4 * total**2))
+    return float(max(centre - half, 0.0)), float(min(centre + half, 1.0))
+
+
+@dataclass(frozen=True)
+class Metric:
+    """
+    One row of the table.
+
+    Attributes
+    ----------
+    name : str
+        What it says.
+    value : float
+        Rate, share or number; nan if nothing counts.
+    low, high : float
+        95 % interval; nan where it is not a rate.
+    count : int
+        Cases that count.
+    reach : str
+        What is wanted, in words; empty if nothing is.
+    good : bool or None
+        Whether it is reached.
+
+    """
+
+    name: str
+    value: float
+    low: float
+    high: float
+    count: int
+    reach: str
+    good: bool | None
+
+
+def rate(
+    name: str,
+    cases: Sequence[Any],
+    test: Callable[[Any], bool],
+    *,
+    least: float | None = None,
+    most: float | None = None,
+) -> Metric:
+    """Return a row with the share of cases that pass a test, and what is wanted of it."""
+    hits, total = sum(map(bool, map(test, cases))), len(cases)
+    value = hits / total if total else np.nan
+    wanted = [f'at least {least:g}'] if least is not None else []
+    wanted += [f'at most {most:g}'] if most is not None else []
+    good = None
+    if wanted and total:
+        good = (least is None or value >= least) and (most is None or value <= most)
+    return Metric(name, value, *wilson(hits, total), total, ', '.join(wanted), good)
+
+
+def number(
+    name: str,
+    statistic: Callable[[Any], Any],
+    values: Sequence[float] | np.ndarray,
+    reach: str,
+    test: Callable[[float], bool] | None,
+) -> Metric:
+    """Return a row with a statistic of values, and what is wanted of it."""
+    value = float(statistic(values)) if len(values) else np.nan
+    good = bool(test(value)) if test and len(values) else None
+    return Metric(name, value, np.nan, np.nan, len(values), reach, good)
+
+
+def table(metrics: Iterable[Metric]) -> str:
+    """Return metrics as the rows of a table."""
+    rows = [f'{"":30s} {"value":>7s}  {"95 %":>15s} {"cases":>6s}  reach']
+    for metric in metrics:
+        interval = '' if np.isnan(metric.low) else f'{metric.low:.3f} - {metric.high:.3f}'
+        verdict = {True: 'reached', False: 'NOT reached', None: ''}[metric.good]
+        wanted = f'{metric.reach}: {verdict}' if metric.reach else ''
+        row = f'{metric.name:30s} {metric.value:7.3f}  {interval:>15s} {metric.count:6d}  {wanted}'
+        rows.append(row.rstrip())
+    return '\n'.join(rows)
