@@ -6,7 +6,6 @@ from armid_ros.arm import ArmModel
 from armid_ros.effects import CATALOGUE, make_effect, parse_effect
 from armid_ros.effects.testing import CHECKS, EffectCase
 from armid_ros.errors import ModelError
-from armid_ros.robots import load_robot
 import numpy as np
 import pytest
 

@@ -2,8 +2,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """Small machines with closed-form motion, and the robots that others made."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 
 from armid_ros.robots import load_robot, Robot
