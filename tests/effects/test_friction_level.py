@@ -5,7 +5,6 @@
 from armid_ros.arm import ArmModel
 from armid_ros.effects import CATALOGUE, merge_actions, parse_effect
 from armid_ros.effects.friction import friction_level
-from armid_ros.motion import Motion
 import numpy as np
 import pytest
 
@@ -28,13 +27,6 @@ def arm(robot):
 def level(arm, robot):
     kind, _ = friction_level(zip(arm.effects, arm.values, strict=True), robot, CATALOGUE)
     return kind.on(robot)
-
-
-@pytest.fixture(scope='module')
-def motion(robot):
-    rng = np.random.default_rng(0)
-    q, dq, ddq = rng.standard_normal((3, 50, robot.n_joints))
-    return Motion(robot.joints, 0.01 * np.arange(50), q, dq, ddq)
 
 
 def test_its_column_is_the_friction_that_there_was(arm, level, motion, robot):

@@ -2,8 +2,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """What sensors make of torque and position: gain, crosstalk, drift, delay, offset, clipping."""
 
-from dataclasses import replace
-
 from armid_ros.arm import ArmModel
 from armid_ros.effects import make_effect
 from armid_ros.effects.timing import earlier_samples
@@ -127,19 +125,3 @@ def test_a_report_that_ends_is_clipped(robot, motion, with_values):
     tau = inverse_dynamics(robot, motion)
     np.testing.assert_allclose(read, np.clip(tau, -2.0, 2.0), atol=1e-12)
     assert np.abs(tau).max() > 3.0
-
-
-def test_noise_of_positions_does_not_make_a_delay_too_small(robot, sines):
-    """The rate of a torque has the third derivative of positions, most of which is noise."""
-    rng = np.random.default_rng(0)
-    motion = sines(4.0)
-    noise = 0.05 * np.abs(motion.ddq).max() * rng.normal(size=motion.ddq.shape)
-    shaken = replace(motion, ddq=motion.ddq + noise, band_hz=8.0)
-    delay, arm = make_effect('time_delay', robot), ArmModel(robot)
-    inner = slice(100, -100)
-    true, found, raw = (
-        delay.columns(m, arm)[inner, :, 0]
-        for m in (motion, shaken, replace(shaken, band_hz=np.inf))
-    )
-    assert np.sum(true * raw) / np.sum(raw**2) < 0.7
-    assert np.sum(true * found) / np.sum(found**2) == pytest.approx(1.0, abs=0.05)
