@@ -2,14 +2,12 @@
 # SPDX-License-Identifier: Apache-2.0
 """The evidence of causes is that of normal distributions, written out here."""
 
-from dataclasses import replace
-
 from armid_ros.diagnosis.data.days import Rows
 from armid_ros.diagnosis.data.trajectory import trajectories
 from armid_ros.diagnosis.search.candidates import Causes
 from armid_ros.diagnosis.search.nuisance import Nuisance
-from armid_ros.diagnosis.search.odds import EQUAL, odds, usual_spread, without
-from armid_ros.diagnosis.search.priors import log_prior, SIZES, THERE
+from armid_ros.diagnosis.search.odds import EQUAL, odds, without
+from armid_ros.diagnosis.search.priors import SIZES, THERE
 from armid_ros.diagnosis.search.setting import Setting
 from armid_ros.effects import CATALOGUE
 from armid_ros.identification.rows.signals import Conditioning
@@ -118,27 +116,3 @@ def test_what_is_integrated_out_is_what_a_normal_distribution_leaves():
     np.testing.assert_allclose(aim, rows.T @ inverse @ y, atol=1e-9)
     expected = 0.5 * (y @ y - y @ inverse @ y) - 0.5 * np.linalg.slogdet(total)[1]
     assert gained == pytest.approx(expected)
-
-
-def test_one_recording_tells_nothing_of_what_values_differ_by(nuisance):
-    under = nuisance.marginal(Setting(True, 0.4, 0.3, 0.7, 1.0))
-    causes = causes_of(nuisance, under, 'torque_offset')
-    alone = replace(nuisance, rows=replace(nuisance.rows, before=1))
-    assert usual_spread(causes, alone, under) == usual_spread([], nuisance, under) == 1.0
-
-
-@pytest.mark.parametrize(
-    ('common', 'rare'),
-    [
-        (('viscous_friction', ('elbow',)), ('stribeck_friction', ('elbow',))),
-        (('payload', ('elbow',)), ('payload', ('shoulder',))),
-        (('payload', ('elbow',)), ('link_inertia', ('elbow',))),
-        (('torque_drift', ('elbow',)), ('human_interaction', ('elbow',))),
-    ],
-)
-def test_the_common_goes_first(bench, common, rare):
-    odds_of = [
-        log_prior(CATALOGUE[name].on(bench.robot, joints), bench.robot, changed=True)
-        for name, joints in (common, rare)
-    ]
-    assert odds_of[0] > odds_of[1]

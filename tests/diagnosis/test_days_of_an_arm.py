@@ -35,10 +35,3 @@ def test_a_joint_that_starts_cold_is_one_cause_of_two_names(bench):
     assert change == pytest.approx(-0.8, rel=0.1)
     assert warm_up == pytest.approx(3.0, rel=0.2)
     assert named['viscous_friction'].values[0] == pytest.approx(0.8, rel=0.1)
-
-
-@pytest.mark.long
-def test_a_friction_that_has_grown_is_not_said_to_warm_up(bench):
-    found = since(bench, lambda motion, tau: motion.dq * [0.0, 0.3])
-    assert [one.name for one in found.findings] == ['viscous_friction'], found.summary
-    assert not found.findings[0].rivals

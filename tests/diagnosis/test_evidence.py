@@ -2,12 +2,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """Columns are computed at a few times the rate of the rows, however fast a recording is."""
 
-from dataclasses import replace
-
-from armid_ros.diagnosis.data.evidence import Evidence, noise_floor
 from armid_ros.diagnosis.data.trajectory import thinnable, trajectories
-from armid_ros.diagnosis.prepare import choose_filters
-from armid_ros.diagnosis.settings import DiagnosisSettings
 from armid_ros.identification.rows.signals import Conditioning
 from armid_ros.motion import Motion
 from armid_ros.recording import Recording
@@ -15,9 +10,10 @@ import numpy as np
 import pytest
 
 
-def swings(bench, rate):
-    """Return twenty seconds of swings that were recorded at a rate [Hz]."""
-    t, w = np.arange(round(20.0 * rate)) / rate, 2.0 * np.pi * 0.7
+@pytest.fixture(scope='module')
+def swings(bench):
+    """Return twenty seconds of swings that were recorded at 1 kHz."""
+    t, w = np.arange(20_000) / 1000.0, 2.0 * np.pi * 0.7
     angle = w * t[:, np.newaxis] + np.arange(bench.robot.n_joints)
     q, dq, ddq = 0.4 * np.sin(angle), 0.4 * w * np.cos(angle), -0.4 * w**2 * np.sin(angle)
     noise = np.random.default_rng(0).normal(size=q.shape)
@@ -34,38 +30,13 @@ def test_a_prime_decimation_gives_way_to_one_that_a_motion_can_be_thinned_by(dec
 
 
 @pytest.mark.parametrize('cutoff', [10.0, 40.0, 80.0])
-def test_squares_of_a_motion_are_below_half_of_the_rate_it_is_thinned_to(bench, cutoff):
-    (part,) = trajectories([swings(bench, 1000.0)], Conditioning(1000.0, cutoff, 64))
+def test_squares_of_a_motion_are_below_half_of_the_rate_it_is_thinned_to(swings, cutoff):
+    (part,) = trajectories([swings], Conditioning(1000.0, cutoff, 64))
     assert 4.0 * cutoff <= part.used.rate_hz <= 1000.0
     assert part.used.rate_hz / part.used.decimation == 1000.0 / 64
 
 
-@pytest.mark.parametrize('rate', [100.0, 1000.0, 1013.0, 2000.0])
-def test_a_motion_has_so_many_samples_a_row_at_any_rate(bench, rate):
-    arm, recordings = bench.arm, [swings(bench, rate)]
-    rng = np.random.default_rng(0)
-    used = choose_filters(arm, recordings, (), DiagnosisSettings(), rng)
-    (part,) = trajectories(recordings, used)
-    assert len(part.motion) < 20 * len(part.rows)
-
-
-def test_a_decimation_that_was_asked_for_stays(bench):
-    recording = swings(bench, 1000.0)
-    (part,) = trajectories([recording], Conditioning(1000.0, 20.0, 53))
+def test_a_decimation_that_was_asked_for_stays(swings):
+    (part,) = trajectories([swings], Conditioning(1000.0, 20.0, 53))
     step = np.diff(part.t)
     np.testing.assert_allclose(step, 0.053, atol=1e-9)
-
-
-def test_noise_that_nothing_repeats_is_no_surer_than_a_misfit(bench):
-    data = trajectories(bench.recordings(), Conditioning(200.0, 10.0, 11))
-    single = [replace(part) for part in data]
-    for part in single:
-        vars(part)['period'] = None
-    settings = DiagnosisSettings()
-    sigma = tuple(noise_floor(part, bench.arm).sigma for part in data)
-    left = [part.residual(bench.arm) for part in data]
-    repeated, assumed = (
-        evidence.limits(left, settings) - evidence.matters(settings)
-        for evidence in (Evidence(tuple(own), sigma, sigma) for own in (data, single))
-    )
-    np.testing.assert_allclose(assumed, settings.thresholds.same_fit * repeated)

@@ -2,6 +2,8 @@
 # SPDX-License-Identifier: Apache-2.0
 """The noise floor comes from repeated periods, encoder noise included, of each trajectory."""
 
+from dataclasses import replace
+
 from armid_ros.diagnosis.data.evidence import noise_floor
 from armid_ros.diagnosis.data.trajectory import trajectories
 from armid_ros.diagnosis.settings import Thresholds
@@ -31,10 +33,7 @@ def test_noise_of_the_encoders_is_inside(bench):
     quiet = [noise_floor(part, bench.arm) for part in cut(bench.recordings(noise=0.1))]
     noisy = bench.recordings(noise=0.1)
     rng = np.random.default_rng(5)
-    shaken = [
-        type(r)(joints=r.joints, t=r.t, q=r.q + 3e-4 * rng.normal(size=r.q.shape), tau=r.tau)
-        for r in noisy
-    ]
+    shaken = [replace(r, q=r.q + 3e-4 * rng.normal(size=r.q.shape)) for r in noisy]
     loud = [noise_floor(part, bench.arm) for part in cut(shaken)]
     for a, b in zip(quiet, loud, strict=True):
         assert np.all(b.sigma > 2.0 * a.sigma)
@@ -82,18 +81,14 @@ def test_no_torque_is_known_to_more_than_its_resolution(bench):
         size = np.sqrt(np.mean(part.motion.tau**2, axis=0))
         floor = noise_floor(part, bench.arm)
         assert np.all(floor.sigma >= 0.99e-4 * size)
-        assert np.all(
-            floor.structure < ONE_PERIOD
-        )  # what two periods of it differ by is nothing to speak of
+        assert np.all(floor.structure < ONE_PERIOD)
 
 
 def test_each_trajectory_has_a_floor_of_its_own(bench):
     recordings = bench.recordings(noise=0.3)
     rng = np.random.default_rng(1)
     slow, middle, fast = recordings
-    fast = type(fast)(
-        joints=fast.joints, t=fast.t, q=fast.q, tau=fast.tau + 0.3 * rng.normal(size=fast.q.shape)
-    )
+    fast = replace(fast, tau=fast.tau + 0.3 * rng.normal(size=fast.q.shape))
     floors = [noise_floor(part, bench.arm).sigma for part in cut([slow, middle, fast])]
     assert np.all(floors[2] > 3.0 * floors[0])
 
@@ -107,7 +102,7 @@ def test_coloured_noise_repeats_and_a_machine_nearby_does_not(bench):
         coloured = lfilter([0.6], [1.0, -0.8], white, axis=0)[200:]
         hum = np.sin(2.0 * np.pi * (0.5 + 0.1 * recording.t) * recording.t)
         tau = recording.tau + 0.1 * coloured + sweep * hum[:, np.newaxis] * [0.0, 1.0]
-        return type(recording)(joints=recording.joints, t=recording.t, q=recording.q, tau=tau)
+        return replace(recording, tau=tau)
 
     quiet, swept = (
         [

@@ -4,7 +4,6 @@
 
 from dataclasses import replace
 
-from armid_ros.arm.memoized_arm import memoized_arm
 from armid_ros.diagnosis import diagnose, known_misfit
 from armid_ros.diagnosis.data.baseline import described_precision
 from armid_ros.diagnosis.data.evidence import Evidence
@@ -12,7 +11,6 @@ from armid_ros.diagnosis.data.trajectory import trajectories
 from armid_ros.diagnosis.search.cause import SelectedEffect
 from armid_ros.diagnosis.search.posterior import JointFit
 from armid_ros.effects import CATALOGUE
-from armid_ros.effects.load import described_spread
 from armid_ros.identification import identify, SignalSettings
 from armid_ros.identification.output import identification_document
 from armid_ros.identification.parameters_file import parameters_of
@@ -65,38 +63,14 @@ def test_a_value_is_as_unsure_as_the_model_that_it_makes_up_for(bench):
     assert np.mean(np.abs(as_exact) < 2.0) < 0.7, as_exact
 
 
-def test_what_is_not_told_leaves_what_it_does_not_act_on_as_sure(bench):
-    """A precision of zero is the limit of a variance without end."""
-    arm = bench.arm.with_effect(CATALOGUE['torque_offset'].on(bench.robot, bench.robot.joints))
-    arm = memoized_arm(arm)
-    base = arm.base_parameters(np.random.default_rng(0))
-    size = len(bench.arm.parameters)
-    body = described_spread(bench.robot).ravel()
-    friction = np.abs(bench.arm.theta[len(body) :])
-    offsets = np.full(2, 1e4)
-    spread = np.concatenate([body, friction, offsets])
-    assert len(spread) == len(arm.parameters) == size + 2
-    expected = np.linalg.inv((base.grouping * spread**2) @ base.grouping.T)
-    scale = 1.0 / np.sqrt(np.diag(expected))
-    error = (described_precision(base, arm) - expected) * np.outer(scale, scale)
-    known = scale < 1e3
-    np.testing.assert_allclose(error[np.ix_(known, known)], 0.0, atol=1e-4)
-
-
 @pytest.mark.slow
-@pytest.mark.parametrize('seed', [0, pytest.param(1, marks=pytest.mark.long)])
-def test_what_a_model_was_identified_wrong_is_no_change(upright, seed):
+def test_what_a_model_was_identified_wrong_is_no_change(upright):
     """A slow short motion hardly tells inertias; a fast one of another day does."""
-    known = upright.recordings(seed=seed)[:1]
-    short = [replace_end(known[0], 0.25)]
+    known = upright.recordings()[0]
+    short = [known.select(slice(0, len(known.t) // 4))]
     model = identify(upright.arm, short, rng=np.random.default_rng(0))
     misfit = replace(known_misfit(model.arm, short, model.used), information=told_of(model))
     found = diagnose(
-        model.arm, upright.recordings(seed=seed + 5), misfit=misfit, rng=np.random.default_rng(0)
+        model.arm, upright.recordings(seed=5), misfit=misfit, rng=np.random.default_rng(0)
     )
     assert (found.verdict, found.findings) == ('consistent', ())
-
-
-def replace_end(recording, share):
-    """Return the first part of a recording."""
-    return recording.select(slice(0, int(share * len(recording.t))))

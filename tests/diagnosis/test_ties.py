@@ -2,8 +2,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """A diagnosis of an arm with another machine names the ties between them."""
 
-from __future__ import annotations
-
 from armid_ros.arm import ArmModel
 from armid_ros.diagnosis import diagnose, DiagnosisSettings
 from armid_ros.effects.tied import Partner
@@ -46,19 +44,6 @@ def test_springs_are_named_where_all_effects_are_asked_for(arm, partner, togethe
         arm,
         together,
         settings=DiagnosisSettings(everything=True, partner=partner),
-        rng=np.random.default_rng(0),
-    )
-    assert {tie.name for finding in found.findings for tie in finding.ties} == set(TIED)
-
-
-@pytest.mark.long
-def test_recordings_from_before_do_not_hide_springs(arm, partner, together) -> None:
-    before = together[:1]
-    found = diagnose(
-        arm,
-        together,
-        baseline=before,
-        settings=DiagnosisSettings(partner=partner),
         rng=np.random.default_rng(0),
     )
     assert {tie.name for finding in found.findings for tie in finding.ties} == set(TIED)

@@ -25,14 +25,7 @@ def left(arm, data):
     return np.sqrt(np.nanmean(np.concatenate(rows) ** 2, axis=0))
 
 
-@pytest.mark.parametrize(
-    'speed',
-    [
-        0,
-        -1,
-    ],
-    ids=['slow', 'fast'],
-)
+@pytest.mark.parametrize('speed', [0, -1], ids=['slow', 'fast'])
 def test_a_substitute_of_cubic_drag_makes_no_joint_worse(bench, speed):
     recordings = bench.recordings(drag)
     new = [bench.recordings(drag, seed=50)[speed]]

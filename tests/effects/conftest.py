@@ -2,8 +2,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """The shipped arm, a smooth motion of it, and the arm with one effect."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from functools import partial
 

@@ -6,7 +6,6 @@ from armid_ros.arm import ArmModel
 from armid_ros.effects import CATALOGUE, make_effect, parse_effect
 from armid_ros.effects.testing import CHECKS, EffectCase
 from armid_ros.errors import ModelError
-from armid_ros.robots import load_robot
 import numpy as np
 import pytest
 
@@ -148,15 +147,6 @@ def test_impossible_shapes_are_named(robot, values, message):
         make_effect('stribeck_friction', robot).with_shape(values)
 
 
-def test_names_joints_and_units():
-    robot = load_robot('humanoid_arm')
-    effect = make_effect('viscous_friction@elbow_pitch+wrist_pitch', robot)
-    assert [(p.joint, p.unit) for p in effect.parameters(robot)] == [
-        ('elbow_pitch', 'N m s/rad'),
-        ('wrist_pitch', 'N m s/rad'),
-    ]
-
-
 @pytest.mark.parametrize(
     ('text', 'message'),
     [
@@ -196,9 +186,3 @@ def test_shapes_are_parsed_with_the_values(robot):
     effect, values = parse_effect(text, robot)
     assert effect.shape == (0.02, 2.0)
     np.testing.assert_array_equal(values, [0.3])
-
-
-def test_crosstalk_names_both_joints(robot):
-    effect = make_effect('torque_crosstalk@elbow_pitch+wrist_pitch', robot)
-    (parameter,) = effect.parameters(robot)
-    assert (parameter.name, parameter.joint) == ('crosstalk_from_wrist_pitch', 'elbow_pitch')

@@ -5,15 +5,8 @@
 from armid_ros.arm import ArmModel
 from armid_ros.effects import CATALOGUE, merge_actions, parse_effect
 from armid_ros.effects.friction import friction_level
-from armid_ros.motion import Motion
-from armid_ros.robots import load_robot
 import numpy as np
 import pytest
-
-
-@pytest.fixture(scope='module')
-def robot():
-    return load_robot('humanoid_arm')
 
 
 @pytest.fixture(scope='module')
@@ -36,13 +29,6 @@ def level(arm, robot):
     return kind.on(robot)
 
 
-@pytest.fixture(scope='module')
-def motion(robot):
-    rng = np.random.default_rng(0)
-    q, dq, ddq = rng.standard_normal((3, 50, robot.n_joints))
-    return Motion(robot.joints, 0.01 * np.arange(50), q, dq, ddq)
-
-
 def test_its_column_is_the_friction_that_there_was(arm, level, motion, robot):
     friction = arm.torque(motion) - ArmModel(robot).torque(motion)
     assert level.joints == robot.joints[:4]
@@ -60,11 +46,6 @@ def test_viscous_friction_alone_may_have_the_factor(arm, motion, robot):
     ((said, values),) = viscous.named_as(np.array([0.5]), arm)
     assert said.name == 'viscous_friction'
     np.testing.assert_allclose(values, [0.2, 0.05, 0.2])
-
-
-def test_there_is_one_factor_where_there_is_no_coulomb_friction(arm, robot):
-    pairs = list(zip(arm.effects, arm.values, strict=True))[:2]
-    assert len(friction_level(pairs, robot, CATALOGUE)) == 1
 
 
 def test_it_acts_as_it_is_said(arm, level, motion, robot):
@@ -95,12 +76,17 @@ def test_each_joint_has_its_own_factor_once_it_is_found(arm, level, motion, robo
     np.testing.assert_allclose(found.action(k, bare).damping, parts.damping)
 
 
-@pytest.mark.parametrize('effects', [(), ('viscous_friction@elbow_pitch:viscous_coefficient=1',)])
-def test_nothing_is_looked_for_where_one_joint_at_most_has_friction(robot, effects):
-    found = (parse_effect(text, robot) for text in effects)
-    assert friction_level(found, robot, CATALOGUE) == ()
-
-
-def test_nothing_is_looked_for_that_may_not_be_named(arm, robot):
-    pairs = list(zip(arm.effects, arm.values, strict=True))
-    assert friction_level(pairs, robot, ['viscous_friction']) == ()
+@pytest.mark.parametrize(
+    ('effects', 'named', 'factors'),
+    [
+        (slice(0), CATALOGUE, 0),
+        (slice(1, 2), CATALOGUE, 0),
+        (slice(2), CATALOGUE, 1),
+        (slice(3), ['viscous_friction'], 0),
+        (slice(3), CATALOGUE, 2),
+    ],
+    ids=['none', 'one joint', 'no Coulomb', 'may not be named', 'both'],
+)
+def test_there_are_as_many_factors_as_kinds_of_friction(arm, robot, effects, named, factors):
+    pairs = list(zip(arm.effects, arm.values, strict=True))[effects]
+    assert len(friction_level(pairs, robot, named)) == factors

@@ -1,6 +1,6 @@
 # Copyright 2026 The armid_ros developers
 # SPDX-License-Identifier: Apache-2.0
-"""What ties a joint that slides to one that turns has the unit that it has between the two."""
+"""Units of effects go with how their joints move, slide or turn."""
 
 from armid_ros.arm import ArmModel, load_model, save_model
 from armid_ros.effects import make_effect
@@ -33,6 +33,8 @@ def scara():
 @pytest.mark.parametrize(
     ('effect', 'units'),
     [
+        ('rotor_inertia@lift', ['kg']),
+        ('payload@lift', ['kg', *['kg m'] * 3, *['kg m^2'] * 6]),
         ('joint_coupling@lift+shoulder', ['N/rad']),
         ('joint_coupling@shoulder+lift', ['N/rad']),
         ('joint_coupling@shoulder+elbow', ['N m/rad']),
@@ -43,7 +45,7 @@ def scara():
         ('coupled_joint_friction@shoulder+lift', ['kg m', 'N s/rad', 'N m, N']),
     ],
 )
-def test_each_pair_has_its_own_unit_in_a_file_as_well(scara, tmp_path, effect, units):
+def test_units_are_those_of_joint_or_pair_in_a_file_as_well(scara, tmp_path, effect, units):
     made = make_effect(effect, scara)
     assert [name.unit for name in made.parameters(scara)] == units
     (tmp_path / 'scara.urdf').write_text(scara.urdf)

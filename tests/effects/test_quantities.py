@@ -8,7 +8,6 @@ import pytest
 
 TIME = Shape('time', 's', 0.1, 1e5, 600.0, (10.0, 60.0, 3000.0))
 LAG = Shape('lag', 's', 0.0, 1.0, 0.0, (0.0, 0.001, 0.01))
-STOP = Shape('stop', 'rad', -1e4, 1e4, 1.0, (0.5, 1.0, 2.0))
 POWER = Shape('power', '', 0.3, 4.0, 2.0, (1.0, 2.0))
 
 
@@ -17,12 +16,9 @@ POWER = Shape('power', '', 0.3, 4.0, 2.0, (1.0, 2.0))
     [
         (TIME, 206.0, 40.0, True),
         (TIME, 206.0, 25000.0, False),
-        (TIME, 206.0, np.nan, False),
         (TIME, 206.0, np.inf, False),
         (LAG, 0.0, 0.002, True),
         (LAG, 0.0, 0.05, False),
-        (STOP, 0.0, 0.1, True),
-        (STOP, 1.0, 5.0, False),
         (POWER, 2.0, 0.5, True),
         (POWER, 2.0, 3.0, False),
     ],

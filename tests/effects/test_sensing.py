@@ -2,12 +2,9 @@
 # SPDX-License-Identifier: Apache-2.0
 """What sensors make of torque and position: gain, crosstalk, drift, delay, offset, clipping."""
 
-from dataclasses import replace
-
 from armid_ros.arm import ArmModel
-from armid_ros.effects import CATALOGUE, make_effect
+from armid_ros.effects import make_effect
 from armid_ros.effects.timing import earlier_samples
-from armid_ros.effects.unexplained import Unexplained
 from armid_ros.errors import ModelError
 from armid_ros.model import inverse_dynamics
 from armid_ros.motion import Motion
@@ -53,14 +50,7 @@ def test_drift_depends_on_time_alone(sines, added):
     np.testing.assert_allclose(drift, 0.3 * (1 - np.exp(-motion.t / 5.0))[:, None] * np.ones(6))
 
 
-def test_a_delay_shifts_the_torque(robot, sines, with_values):
-    fine = sines(2.0, 1000.0)
-    tau = inverse_dynamics(robot, fine)
-    read = with_values('time_delay', 0.012).torque(fine)
-    np.testing.assert_allclose(read[12:], tau[:-12], atol=1e-9)
-
-
-def test_each_joint_may_have_a_delay_of_its_own(robot, sines, with_values):
+def test_a_delay_shifts_the_torque_of_each_joint_by_its_own(robot, sines, with_values):
     fine = sines(2.0, 1000.0)
     tau = inverse_dynamics(robot, fine)
     read = with_values('time_delay@elbow_pitch+wrist_pitch', [0.003, -0.002]).torque(fine)
@@ -105,16 +95,6 @@ def test_delay_and_lag_are_the_same_to_first_order(robot, sines):
     np.testing.assert_allclose(delay, lag, atol=1e-12)
 
 
-def test_a_lag_of_the_whole_arm_is_that_of_every_joint(robot, sines):
-    motion, tau = sines(2.0, 500.0), np.random.default_rng(0).normal(size=(1000, 6)).cumsum(axis=0)
-    motion, tau = motion.select(slice(0, 1000)), tau[: len(motion)]
-    whole, each = CATALOGUE['torque_lag'].on(robot, ()), make_effect('torque_lag', robot)
-    one, six = np.array([0.02]), np.full(6, 0.02)
-    np.testing.assert_array_equal(whole.read(one, motion, tau), each.read(six, motion, tau))
-    sums = each.sensitivity(six, motion, tau).sum(axis=2, keepdims=True)
-    np.testing.assert_allclose(whole.sensitivity(one, motion, tau), sums)
-
-
 def test_lateness_needs_more_than_one_sample(robot, motion):
     with pytest.raises(ModelError, match='two samples'):
         ArmModel(robot).columns_of(make_effect('time_delay', robot), motion.select(slice(0, 1)))
@@ -145,48 +125,3 @@ def test_a_report_that_ends_is_clipped(robot, motion, with_values):
     tau = inverse_dynamics(robot, motion)
     np.testing.assert_allclose(read, np.clip(tau, -2.0, 2.0), atol=1e-12)
     assert np.abs(tau).max() > 3.0
-
-
-def test_below_its_level_a_drive_is_as_it_should_be(robot, motion, added):
-    assert not np.any(added(motion, 'actuator_saturation', [0.8, 0.0], [1000.0]))
-
-
-def unexplained(motion):
-    """Return nothing that is left along a motion."""
-    q = motion.q
-    return Unexplained(motion, q, np.zeros_like(q), np.ones_like(q), np.zeros((*q.shape, 0)))
-
-
-def test_the_search_for_a_level_begins_at_the_torques_that_were_measured(robot, motion):
-    torque = np.outer(np.linspace(-1.0, 1.0, len(motion)), np.arange(1.0, 7.0))
-    effect = make_effect('actuator_saturation', robot)
-    (levels,) = effect.shape_starts(unexplained(motion.with_torque(torque)), ArmModel(robot))
-    assert np.all(levels.max(axis=1) < np.arange(1.0, 7.0))
-    assert np.all(levels.min(axis=1) > 0.25 * np.arange(1.0, 7.0))
-
-
-def test_noise_of_positions_does_not_make_a_delay_too_small(robot, sines):
-    """The rate of a torque has the third derivative of positions, most of which is noise."""
-    rng = np.random.default_rng(0)
-    motion = sines(4.0)
-    noise = 0.05 * np.abs(motion.ddq).max() * rng.normal(size=motion.ddq.shape)
-    shaken = replace(motion, ddq=motion.ddq + noise, band_hz=8.0)
-    delay, arm = make_effect('time_delay', robot), ArmModel(robot)
-    inner = slice(100, -100)
-    true, found, raw = (
-        delay.columns(m, arm)[inner, :, 0]
-        for m in (motion, shaken, replace(shaken, band_hz=np.inf))
-    )
-    assert np.sum(true * raw) / np.sum(raw**2) < 0.7
-    assert np.sum(true * found) / np.sum(found**2) == pytest.approx(1.0, abs=0.05)
-
-
-def test_times_of_a_drift_go_with_the_length_of_a_recording(robot, sines):
-    drift = make_effect('torque_drift@elbow_pitch', robot)
-    motion = sines()
-    for factor in (1.0, 100.0):
-        longer = replace(motion, t=factor * motion.t)
-        (grid,) = drift.shape_starts(unexplained(longer), ArmModel(robot))
-        assert grid.shape == (1, 3)
-        assert grid.max() == pytest.approx(3.0 * np.ptp(longer.t))
-        assert grid.min() >= drift.shapes[0].lower

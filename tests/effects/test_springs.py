@@ -51,12 +51,6 @@ def test_the_preload_is_the_torque_at_zero(robot, motion, added):
     np.testing.assert_allclose(added(motion, 'joint_spring', [4.0, -1.0]), expected, atol=1e-12)
 
 
-def test_without_stiffness_a_spring_is_an_offset(robot, motion, added):
-    np.testing.assert_allclose(
-        added(motion, 'joint_spring', [0.0, 0.7]), added(motion, 'torque_offset', 0.7), atol=1e-12
-    )
-
-
 def test_a_coupling_is_symmetric(robot, motion, added):
     torque = added(motion, 'joint_coupling@shoulder_pitch+elbow_pitch', 2.0)
     expected = np.zeros_like(torque)
@@ -140,11 +134,6 @@ def test_a_person_holds_the_arm_where_it_is_though_a_fit_has_no_mass_there(robot
     np.testing.assert_allclose(light.shape_values[:-1, :3], others)
 
 
-def test_a_damper_takes_energy(robot, motion, added):
-    power = added(motion, 'human_interaction', [0.0, 20.0, 0.0, 0.0, 0.0]) * motion.dq
-    assert np.all(power.sum(axis=1) > 0.0)
-
-
 def test_without_slack_an_interface_is_a_spring(robot, motion):
     anchor = np.array([0.3, 0.2, 0.4])
     spring = make_effect('human_interaction@elbow_pitch', robot).with_shape([0.05, 0.0, 0.1])
@@ -155,11 +144,6 @@ def test_without_slack_an_interface_is_a_spring(robot, motion):
         ArmModel(robot).with_effect(strap, [400.0]),
     )
     np.testing.assert_allclose(arms[0].torque(motion), arms[1].torque(motion), atol=1e-9)
-
-
-def test_a_slack_strap_does_not_pull(robot, added, motion):
-    shape = [0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 1.0]
-    assert not np.any(added(motion, 'interface_slack@elbow_pitch', 400.0, shape))
 
 
 def test_two_chains_that_move_alike_do_not_pull_each_other(robot, motion):

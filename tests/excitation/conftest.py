@@ -8,37 +8,19 @@ from armid_ros.excitation import DesignSettings
 from armid_ros.robots import collision_model, robot_from_urdf
 import pytest
 
-_LINK = (
-    '<link name="{name}"><inertial><origin xyz="0.05 0.02 0.1"/><mass value="{mass}"/>'
-    '<inertia ixx="0.02" ixy="0.001" ixz="0" iyy="0.03" iyz="0.002" izz="0.01"/></inertial>'
-    '<collision><origin xyz="0 0 0.15"/><geometry><cylinder radius="0.04" length="0.3"/>'
-    '</geometry></collision></link>'
-)
-_JOINT = (
-    '<joint name="{name}" type="{kind}"><origin xyz="{xyz}" rpy="0.1 {pitch} 0"/>'
-    '<parent link="{parent}"/><child link="{child}"/><axis xyz="{axis}"/>'
-    '<limit lower="{lower}" upper="{upper}" velocity="2" effort="{effort}"/></joint>'
-)
-
 
 def urdf(*joints, name='small'):
     """Write a URDF of (name, kind, parent, child, xyz, axis, lower, upper, effort) joints."""
     parts = ['<link name="base"/>']
     for joint, kind, parent, child, xyz, axis, lower, upper, effort in joints:
-        parts.append(_LINK.format(name=child, mass=1.5))
         parts.append(
-            _JOINT.format(
-                name=joint,
-                kind=kind,
-                xyz=xyz,
-                pitch=0.3,
-                parent=parent,
-                child=child,
-                axis=axis,
-                lower=lower,
-                upper=upper,
-                effort=effort,
-            )
+            f'<link name="{child}"><inertial><origin xyz="0.05 0.02 0.1"/><mass value="1.5"/>'
+            '<inertia ixx="0.02" ixy="0.001" ixz="0" iyy="0.03" iyz="0.002" izz="0.01"/>'
+            '</inertial><collision><origin xyz="0 0 0.15"/><geometry>'
+            '<cylinder radius="0.04" length="0.3"/></geometry></collision></link>'
+            f'<joint name="{joint}" type="{kind}"><origin xyz="{xyz}" rpy="0.1 0.3 0"/>'
+            f'<parent link="{parent}"/><child link="{child}"/><axis xyz="{axis}"/>'
+            f'<limit lower="{lower}" upper="{upper}" velocity="2" effort="{effort}"/></joint>'
         )
     return f'<robot name="{name}">{"".join(parts)}</robot>'
 

@@ -36,30 +36,30 @@ MESH = '<mesh filename="nowhere/link.stl"/>'
 CASES = {
     'floor': (
         {'floor': Floor(None, GROUND.up, 'given'), 'obstacles': ()},
-        r'the floor \(none is given\)',
+        'floor.*none',
     ),
     'environment': (
         {
             'floor': Floor(None, GROUND.up, 'environment'),
             'obstacles': (Obstacle('post', 'sphere', (0.1,), (5.0, 0.0, 0.0)),),
         },
-        'the environment has no plane',
+        'environment.*plane',
     ),
     'mesh': (
         {'text': urdf(*JOINTS).replace('<cylinder radius="0.04" length="0.3"/>', MESH, 1)},
-        r'bodies of upper \(mesh not found\)',
+        'upper.*mesh',
     ),
-    'collision': ({'text': without('collision')}, r'bodies of upper \(no collision body\)'),
-    'inertia': ({'text': without('inertial')}, r'the weight of upper \(no inertia\)'),
+    'collision': ({'text': without('collision')}, 'upper.*collision'),
+    'inertia': ({'text': without('inertial')}, 'upper.*inertia'),
     'position': (
         {'text': urdf(*JOINTS).replace('lower="-2.5" upper="2.5"', '', 1)},
-        r'the position of shoulder \(no limit\)',
+        'position of shoulder',
     ),
     'velocity': (
         {'velocity': np.array([np.inf, 1.0])},
-        r'the velocity of shoulder \(no limit\)',
+        'velocity of shoulder',
     ),
-    'torque': ({'torque': np.array([1.0, np.inf])}, r'the torque of elbow \(no limit\)'),
+    'torque': ({'torque': np.array([1.0, np.inf])}, 'torque of elbow'),
 }
 
 
@@ -77,15 +77,20 @@ def test_what_is_missing_is_named_and_is_in_the_verdict(case):
     options, words = CASES[case]
     (found,) = unchecked(**options)
     assert re.search(words, found)
-    options = {'floor': GROUND, 'obstacles': PLANE, 'text': urdf(*JOINTS), **options}
-    robot = robot_from_urdf(options['text'])
-    bound = {k: v for k, v in options.items() if k not in ('floor', 'obstacles', 'text')}
+    result = judged({'floor': GROUND, 'obstacles': PLANE, 'text': urdf(*JOINTS), **options})
+    assert result.word == PARTLY and FIT not in str(result)
+    assert found in str(result)
+
+
+def judged(options):
+    """Judge an arm that holds still."""
+    robot = robot_from_urdf(options.pop('text'))
+    scene = CollisionScene(
+        collision_model(robot), options.pop('floor'), options.pop('obstacles'), 0.01
+    )
     rest = np.zeros((2, 2))
     motion = Motion(robot.joints, np.arange(2.0), rest, rest, rest)
-    scene = CollisionScene(collision_model(robot), options['floor'], options['obstacles'], 0.01)
-    result = fitness(motion, replace(Limits.of(robot), **bound), scene)
-    assert result.word == PARTLY and FIT not in str(result)
-    assert re.search(f'^{PARTLY}: .*lowest point.*not checked.*{words}', str(result))
+    return fitness(motion, replace(Limits.of(robot), **options), scene)
 
 
 def swung(angle):
@@ -102,7 +107,7 @@ def test_a_verdict_without_reserve_has_the_lowest_point_above_the_floor():
     assert result.word == FIT
     assert result.lowest.link == 'lower' and result.lowest.time == 1.0
     assert result.lowest.height == pytest.approx(result.nearest.distance, abs=1e-6)
-    assert f'{result.lowest.height:.3f} m above' in str(result) and '(lower)' in str(result)
+    assert f'{result.lowest.height:.3f} m' in str(result) and '(lower)' in str(result)
 
 
 def test_what_goes_through_the_floor_is_never_fit_to_run():

@@ -33,7 +33,7 @@ def test_torque_limit_below_gravity_is_named(two_link_arm):
     pinned = replace(
         limits, lower=np.array([1.2, -0.1]), upper=np.array([1.4, 0.1]), torque=np.array([2.0, 90])
     )
-    with pytest.raises(TrajectoryError, match=r'shoulder.*2 N m'):
+    with pytest.raises(TrajectoryError, match=r'shoulder.*2 N'):
         random_feasible(two_link_arm, pinned, 6.0, 3, np.random.default_rng(0))
 
 
@@ -61,7 +61,7 @@ def test_bodies_that_cannot_be_kept_apart_are_named(two_link_arm):
     walled = with_obstacles(
         collision_model(robot), [Obstacle('wall', 'box', (3.0, 3.0, 3.0), (0.0, 0.0, 0.5))]
     )
-    with pytest.raises(TrajectoryError, match=r'(upper|lower) and wall'):
+    with pytest.raises(TrajectoryError, match=r'(upper|lower).*wall'):
         random_feasible(
             two_link_arm, Limits.of(robot), 6.0, 3, np.random.default_rng(0), collision=walled
         )

@@ -17,7 +17,8 @@ def test_a_pose_is_put_together_by_name_from_any_messages():
     pose = pose.updated(['a'], [1.0], 6, 10.5)
     np.testing.assert_array_equal(pose.q, [1.0, 2.0])
     assert pose.staleness(10.9, 1.0) == ''
-    assert "'b' came 1.20 s" in pose.staleness(11.2, 1.0)
+    late = pose.staleness(11.2, 1.0)
+    assert "'b'" in late and '1.20 s' in late
 
 
 @pytest.mark.parametrize(('stamp', 'position'), [(5, 1.0), (7, np.nan), (7, np.inf)])
@@ -36,7 +37,8 @@ def test_messages_without_stamps_are_news_every_time():
 def test_the_joint_that_lags_most_is_named_with_how_far():
     wanted, measured = np.array([1.0, 1.0]), np.array([0.9, 1.3])
     assert tracking_fault(JOINTS, ('rad', 'm'), wanted, measured, 0.31) == ''
-    assert "'b' is 0.3 m" in tracking_fault(JOINTS, ('rad', 'm'), wanted, measured, 0.2)
+    fault = tracking_fault(JOINTS, ('rad', 'm'), wanted, measured, 0.2)
+    assert "'b'" in fault and '0.3 m' in fault
 
 
 @pytest.mark.parametrize(('time', 'faulty'), [(0.0, True), (0.2, True), (0.3, False)])

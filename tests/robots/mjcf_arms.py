@@ -1,6 +1,6 @@
 # Copyright 2026 The armid_ros developers
 # SPDX-License-Identifier: Apache-2.0
-"""Ten arms as people write them in MJCF, each with other means of the format."""
+"""Nine arms as people write them in MJCF, each with other means of the format."""
 
 DIAG = 'diaginertia="0.02 0.03 0.01"'
 
@@ -53,14 +53,6 @@ name="pitch" axis="0 1 0" pos="0 0.2 0.1"/><inertial mass="3" pos="0.1 0.2 0.3" 
 pos="0.5 0 0"><joint name="roll" axis="1 0 0" pos="0 0 -0.1"/><geom type="box"
 size="0.1 0.2 0.3"/>
 </body></body></worldbody></mujoco>""",
-    'slides and a gantry': f"""<mujoco><worldbody><body name="bridge"><joint name="x" type="slide"
-axis="1 0 0" range="-1 2"/><inertial mass="30" pos="0 0 0" {DIAG}/><body name="trolley">
-<joint name="y" type="slide" axis="0 1 0" range="-1 1" damping="20"/><inertial mass="10"
-pos="0 0 0.1" {DIAG}/><body
-name="lift" euler="180 0 0"><joint name="z" type="slide" axis="0 0 1"/><inertial mass="5"
-pos="0.1 0 0.3" {DIAG}/><body name="hand"><joint name="turn"/><inertial mass="1" pos="0.2 0 0"
-{DIAG}/>
-</body></body></body></body></worldbody></mujoco>""",
     'a gripper with an equality': f"""<mujoco><worldbody><body name="a"><joint name="j1"
 axis="0 1 0"/><inertial mass="3" pos="0 0 0.2" {DIAG}/><body name="hand" pos="0 0 0.4"
 euler="0 0 -45">

@@ -2,8 +2,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """The plant against MuJoCo, an engine with other dynamics, contact and friction code."""
 
-from __future__ import annotations
-
 from xml.etree import ElementTree
 
 from armid_ros.arm import ArmModel

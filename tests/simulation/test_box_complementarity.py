@@ -2,8 +2,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """The complementarity solver against trying everything."""
 
-from __future__ import annotations
-
 from itertools import product
 
 from armid_ros.simulation.box_complementarity import BoxLaw, solve_box_complementarity

@@ -2,8 +2,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """How well an arm follows what it is told, and what its drives do not have."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 
 from armid_ros.arm import ArmModel
@@ -53,18 +51,6 @@ def test_computed_torque_closes_an_error_like_a_critically_damped_spring(humanoi
         state = step(plant, state, torque)
     left = 0.1 * (1.0 + omega * state.t) * np.exp(-omega * state.t)
     np.testing.assert_allclose(state.q - MIDDLE, left, rtol=0.05)
-
-
-def test_a_spring_and_damper_hold_the_arm_against_gravity_to_rounding(humanoid) -> None:
-    hold = Reference(humanoid.joints, np.zeros(1), MIDDLE[np.newaxis])
-    run = simulate(
-        ArmModel(humanoid),
-        hold,
-        rng=np.random.default_rng(0),
-        controller=GravityPD(ArmModel(humanoid)),
-        duration=2.0,
-    )
-    assert np.abs(run.truth.q - MIDDLE).max() < 1e-12
 
 
 def test_spring_and_damper_sag_under_a_gravity_they_do_not_know(humanoid) -> None:

@@ -68,10 +68,10 @@ def test_ways_that_are_not_clear_are_not_taken(robot):
 
     course = multisine_course(robot, 40.0, 0.1, np.random.default_rng(2), clear)
     assert course.q[:, 0].min() >= -0.11
-    with pytest.raises(TrajectoryError, match='1000 poses'):
+    with pytest.raises(TrajectoryError, match='1000'):
         step_course(robot, 40.0, STEP, np.random.default_rng(2), lambda way: False)
 
 
 def test_too_short_a_course_is_refused(robot):
-    with pytest.raises(TrajectoryError, match='takes 6 s'):
+    with pytest.raises(TrajectoryError, match=' 6 s'):
         multisine_course(robot, 5.0, 0.1, np.random.default_rng(1), anywhere)

@@ -2,16 +2,12 @@
 # SPDX-License-Identifier: Apache-2.0
 """Friction that holds, and lets go, as dry friction does."""
 
-from __future__ import annotations
-
 from armid_ros.arm import ArmModel
 from armid_ros.effects import make_effect, merge_actions
 from armid_ros.errors import ModelError
 from armid_ros.simulation import Plant, State, step
 import numpy as np
 import pytest
-
-WEIGHT = 2.0 * 9.81
 
 
 def run(plant: Plant, state: State, seconds: float, torque) -> list[State]:
@@ -36,10 +32,10 @@ def with_coulomb(robot, values) -> ArmModel:
     return ArmModel(robot).with_effect(make_effect('coulomb_friction', robot), values)
 
 
-@pytest.mark.parametrize('push', [9.99999, -9.99999, 3.0])
+@pytest.mark.parametrize('push', [9.99999, -9.99999])
 def test_a_block_pushed_less_than_breakaway_does_not_move_at_all(slider, push: float) -> None:
     plant = Plant(with_coulomb(slider(), [10.0]))
-    for state in run(plant, plant.state([0.123456789]), 10.0, [push]):
+    for state in run(plant, plant.state([0.123456789]), 2.0, [push]):
         assert state.q[0] == 0.123456789
         assert state.dq[0] == 0.0
 
@@ -69,21 +65,6 @@ def test_asymmetric_levels_hold_between_both(slider) -> None:
     plant = Plant(arm)
     for push, moves in ((13.9, 0), (14.1, 1), (-5.9, 0), (-6.1, -1)):
         assert np.sign(run(plant, plant.state([0.0]), 0.5, [push])[-1].dq[0]) == moves
-
-
-def test_friction_holds_a_block_on_a_steep_rail(slider) -> None:
-    plant = Plant(with_coulomb(slider('0 0 1'), [1.001 * WEIGHT]))
-    assert run(plant, plant.state([0.0]), 2.0, [0.0])[-1].q[0] == 0.0
-    plant = Plant(with_coulomb(slider('0 0 1'), [0.999 * WEIGHT]))
-    assert run(plant, plant.state([0.0]), 2.0, [0.0])[-1].q[0] < 0.0
-
-
-def test_an_arm_that_friction_holds_stands_still_in_every_joint(humanoid) -> None:
-    plant = Plant(with_coulomb(humanoid, np.full(6, 6.0)))
-    start = plant.state([0.1, -0.2, 0.3, 0.4, -0.1, 0.2])
-    final = run(plant, start, 10.0, np.zeros(6))[-1]
-    np.testing.assert_array_equal(final.q, start.q)
-    np.testing.assert_array_equal(final.dq, np.zeros(6))
 
 
 def test_joints_stick_and_slip_each_for_itself(humanoid) -> None:

@@ -2,8 +2,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """Every effect, simulated: the torque that is recorded is the one predicted from the recording."""
 
-from __future__ import annotations
-
 from armid_ros.arm import ArmModel
 from armid_ros.effects import CATALOGUE, make_effect
 from armid_ros.motion import FloatArray, Motion
@@ -11,7 +9,7 @@ from armid_ros.simulation import ComputedTorque, Reference, simulate, SimulatedA
 import numpy as np
 import pytest
 
-MIDDLE = np.array([0.3, -0.4, 0.2, 0.8, 0.1, 0.2])
+from tests.simulation.test_run import MIDDLE, swinging
 
 #: How strong a joint is beside the shoulder; the wrist has 1e-4 kg m^2 to move.
 STRENGTH = np.array([1.0, 1.0, 0.5, 0.5, 0.02, 0.02])
@@ -74,11 +72,7 @@ COARSE = {
 @pytest.fixture(scope='module')
 def reference(humanoid) -> Reference:
     """Return two seconds of cosines, from rest."""
-    t = np.linspace(0.0, 2.0, 101)[:, np.newaxis]
-    w = np.linspace(2.5, 5.0, humanoid.n_joints)
-    q = MIDDLE + 0.3 * np.cos(w * t)
-    dq, ddq = -0.3 * w * np.sin(w * t), -0.3 * w**2 * np.cos(w * t)
-    return Reference(humanoid.joints, t[:, 0], q, dq, ddq)
+    return swinging(humanoid, 2.0, 101, (2.5, 5.0))
 
 
 def arm_with(robot, name) -> ArmModel:
@@ -133,24 +127,13 @@ def test_friction_with_load_holds_a_joint_against_less_than_its_share(pendulum) 
     """A pendulum hangs aside where friction takes what the drive does not."""
     robot = pendulum()
     arm = ArmModel(robot).with_effect(make_effect('load_dependent_friction', robot), [0.3])
-    here = np.array([0.5])
-    held = simulate(
-        arm,
-        Motion(robot.joints, np.array([0.0, 1.0]), np.tile(here, (2, 1)), *np.zeros((2, 2, 1))),
-        controller=ComputedTorque(
-            ArmModel(robot.with_inertias(0.8 * robot.rigid_parameters)), 0.0
-        ),
-        rng=np.random.default_rng(0),
+    here = Reference(robot.joints, np.array([0.0, 1.0]), np.full((2, 1), 0.5))
+    weak = ComputedTorque(ArmModel(robot.with_inertias(0.8 * robot.rigid_parameters)), 0.0)
+    held, free = (
+        simulate(one, here, controller=weak, rng=np.random.default_rng(0))
+        for one in (arm, ArmModel(robot))
     )
     assert np.ptp(held.truth.q) < 1e-9
-    free = simulate(
-        ArmModel(robot),
-        Motion(robot.joints, np.array([0.0, 1.0]), np.tile(here, (2, 1)), *np.zeros((2, 2, 1))),
-        controller=ComputedTorque(
-            ArmModel(robot.with_inertias(0.8 * robot.rigid_parameters)), 0.0
-        ),
-        rng=np.random.default_rng(0),
-    )
     assert np.ptp(free.truth.q) > 0.05
 
 
@@ -168,10 +151,8 @@ def test_a_drive_that_gives_less_than_it_is_asked_for_reports_what_it_was_asked(
 def test_an_arm_that_is_read_step_by_step_reads_the_same(humanoid, reference, name) -> None:
     arm = arm_with(humanoid, name)
     whole = simulate(arm, reference, rng=np.random.default_rng(0))
-    start = reference.q[0]
-    live = SimulatedArm(arm, rng=np.random.default_rng(0), start=start)
-    resting = Reference(reference.joints, reference.t, reference.q, reference.dq, reference.ddq)
-    live.set_trajectory(stopped(resting))
+    live = SimulatedArm(arm, rng=np.random.default_rng(0), start=reference.q[0])
+    live.set_trajectory(stopped(reference))
     for steps in (1, 7, 30, 200):
         sample = live.advance(steps)
     row = sample.steps

@@ -2,8 +2,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """Waypoints, the curve through them, and what is refused."""
 
-from __future__ import annotations
-
 from armid_ros.errors import TrajectoryError
 from armid_ros.simulation import Reference
 import numpy as np
@@ -41,7 +39,7 @@ def test_positions_alone_are_joined_by_lines() -> None:
     np.testing.assert_allclose(motion.dq[1], (q[1] - q[0]) / 0.3)
 
 
-def test_outside_its_points_a_reference_holds_still() -> None:
+def test_outside_its_points_or_with_one_alone_a_reference_holds_still() -> None:
     reference = Reference(
         ('a',), np.array([1.0, 2.0]), np.array([[0.1], [0.7]]), np.ones((2, 1)), np.ones((2, 1))
     )
@@ -49,12 +47,8 @@ def test_outside_its_points_a_reference_holds_still() -> None:
     np.testing.assert_array_equal(motion.q[:, 0], [0.1, 0.1, 0.7, 0.7])
     np.testing.assert_array_equal(motion.dq, 0.0)
     np.testing.assert_array_equal(motion.ddq, 0.0)
-
-
-def test_one_point_is_a_pose_to_hold() -> None:
-    motion = Reference(('a', 'b'), np.zeros(1), np.array([[0.1, 0.2]])).sample(FINE)
-    np.testing.assert_array_equal(motion.q, np.tile([0.1, 0.2], (len(FINE), 1)))
-    np.testing.assert_array_equal(motion.dq, 0.0)
+    pose = Reference(('a', 'b'), np.zeros(1), np.array([[0.1, 0.2]])).sample(FINE)
+    np.testing.assert_array_equal(pose.q, np.tile([0.1, 0.2], (len(FINE), 1)))
 
 
 def test_joints_are_matched_by_name(humanoid) -> None:
@@ -95,7 +89,7 @@ def test_malformed_waypoints_are_refused(t, q, message: str) -> None:
 def test_accelerations_without_velocities_and_repeated_joints_are_refused() -> None:
     with pytest.raises(TrajectoryError, match='velocities'):
         Reference(('a',), np.zeros(1), np.zeros((1, 1)), None, np.zeros((1, 1)))
-    with pytest.raises(TrajectoryError, match='named twice'):
+    with pytest.raises(TrajectoryError, match='twice'):
         Reference(('a', 'a'), np.zeros(1), np.zeros((1, 2)))
 
 
@@ -106,8 +100,7 @@ def test_a_limit_that_only_the_curve_passes_is_found(humanoid) -> None:
     q[:, 3] = upper - 0.01
     dq[:, 3] = [1.0, -1.0]
     reference = Reference(humanoid.joints, np.array([0.0, 0.5]), q, dq)
-    message = rf"'{humanoid.joints[3]}' reaches .* beyond its upper limit of {upper:.4g} rad"
-    with pytest.raises(TrajectoryError, match=message):
+    with pytest.raises(TrajectoryError, match=f"'{humanoid.joints[3]}'.*upper.*{upper:.4g} rad"):
         reference.require_limits(humanoid, 1e-3)
     q[:, 3] = upper - 0.2
     Reference(humanoid.joints, np.array([0.0, 0.5]), q, dq).require_limits(humanoid, 1e-3)
@@ -117,11 +110,11 @@ def test_lower_and_velocity_limits_are_named(humanoid) -> None:
     q = np.zeros((2, 6))
     q[1, 0] = humanoid.lower[0] - 0.1
     slow = Reference(humanoid.joints, np.array([0.0, 100.0]), q)
-    with pytest.raises(TrajectoryError, match=r"'shoulder_pitch' .* lower"):
+    with pytest.raises(TrajectoryError, match=r"'shoulder_pitch'.*lower"):
         slow.require_limits(humanoid, 1e-3)
     q[1, 0] = 0.5
     fast = Reference(humanoid.joints, np.array([0.0, 0.1]), q)
-    with pytest.raises(TrajectoryError, match=r"'shoulder_pitch' .* 5 rad/s"):
+    with pytest.raises(TrajectoryError, match=r"'shoulder_pitch'.*velocity"):
         fast.require_limits(humanoid, 1e-3)
 
 

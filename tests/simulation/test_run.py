@@ -2,8 +2,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """Recorded runs: what is said to be true is true, and the same again with the same generator."""
 
-from __future__ import annotations
-
 from armid_ros.arm import ArmModel
 from armid_ros.effects import make_effect
 from armid_ros.errors import ModelError, TrajectoryError
@@ -30,9 +28,9 @@ def arm(humanoid) -> ArmModel:
     return arm
 
 
-def swinging(robot: Robot, duration: float = 3.0, count: int = 61) -> Reference:
+def swinging(robot: Robot, duration=3.0, count=61, rates=(1.5, 4.0)) -> Reference:
     t = np.linspace(0.0, duration, count)[:, np.newaxis]
-    w = np.linspace(1.5, 4.0, robot.n_joints)
+    w = np.linspace(*rates, robot.n_joints)
     q = MIDDLE + 0.3 * np.cos(w * t)
     return Reference(
         robot.joints, t[:, 0], q, -0.3 * w * np.sin(w * t), -0.3 * w**2 * np.cos(w * t)
@@ -108,12 +106,6 @@ def test_progress_goes_up_to_the_end(arm) -> None:
     reference = swinging(arm.robot, 2.5)
     simulate(arm, reference, rng=np.random.default_rng(0), progress=shares.append)
     assert len(shares) >= 2 and shares == sorted(shares) and shares[-1] == 1.0
-
-
-def test_a_run_cannot_be_written_to(run) -> None:
-    for array in (run.t, run.q, run.dq, run.tau, run.truth.q, run.reference.q):
-        with pytest.raises(ValueError, match='read-only'):
-            array[0] = 0.0
 
 
 def test_what_does_not_fit_is_refused(arm) -> None:

@@ -2,8 +2,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """The arm that stands there: holds, follows, refuses, and is where `simulate` would have it."""
 
-from __future__ import annotations
-
 from armid_ros.arm import ArmModel
 from armid_ros.effects import make_effect
 from armid_ros.errors import TrajectoryError
@@ -11,7 +9,8 @@ from armid_ros.simulation import GravityPD, Plant, Reference, Sensors, simulate,
 import numpy as np
 import pytest
 
-HOME = np.array([0.3, -0.4, 0.2, 0.8, 0.1, 0.2])
+from tests.simulation.test_run import MIDDLE
+
 SENSORS = Sensors(
     torque_noise=0.05,
     position_noise=1e-5,
@@ -33,7 +32,7 @@ def model(humanoid) -> ArmModel:
 @pytest.fixture
 def arm(model) -> SimulatedArm:
     """Return the arm at its home pose, with sensors that have every fault."""
-    return SimulatedArm(model, rng=np.random.default_rng(0), sensors=SENSORS, start=HOME)
+    return SimulatedArm(model, rng=np.random.default_rng(0), sensors=SENSORS, start=MIDDLE)
 
 
 def there_and_back(joints, duration: float = 1.5, first: float = 0.0) -> Reference:
@@ -41,7 +40,7 @@ def there_and_back(joints, duration: float = 1.5, first: float = 0.0) -> Referen
     t = np.linspace(0.0, duration, 31)[:, np.newaxis]
     w = 2.0 * np.pi / duration
     reach = 0.1 * np.array([1.0, -1.0, 1.0, -1.0, 1.0, -1.0])
-    q = HOME + reach * (1.0 - np.cos(w * t))
+    q = MIDDLE + reach * (1.0 - np.cos(w * t))
     dq, ddq = reach * w * np.sin(w * t), reach * w**2 * np.cos(w * t)
     return Reference(joints, first + t[:, 0], q, dq, ddq)
 
@@ -50,7 +49,7 @@ def test_without_a_trajectory_it_stands_still(arm) -> None:
     for _ in range(10):
         sample = arm.advance(100)
     assert (sample.steps, sample.t) == (1000, 1.0)
-    np.testing.assert_array_equal(arm.state.q, HOME)
+    np.testing.assert_array_equal(arm.state.q, MIDDLE)
     np.testing.assert_array_equal(arm.state.dq, 0.0)
 
 
@@ -60,7 +59,7 @@ def test_it_reads_what_simulate_records(model, stride: int) -> None:
     rng = np.random.default_rng(3)
     run = simulate(Plant(model, dt=1.0 / 700), reference, rng=rng, sensors=SENSORS, rate=100.0)
     rng = np.random.default_rng(3)
-    arm = SimulatedArm(Plant(model, dt=1.0 / 700), rng=rng, start=HOME)
+    arm = SimulatedArm(Plant(model, dt=1.0 / 700), rng=rng, start=MIDDLE)
     arm.set_trajectory(reference)
     for _ in range(0, 700, stride):
         arm.advance(stride)
@@ -72,7 +71,7 @@ def test_noise_and_delay_are_those_of_simulate_sample_by_sample(model) -> None:
     rng = np.random.default_rng(3)
     run = simulate(model, reference, rng=rng, sensors=SENSORS, rate=200.0)
     rng = np.random.default_rng(3)
-    arm = SimulatedArm(model, rng=rng, sensors=SENSORS, start=HOME)
+    arm = SimulatedArm(model, rng=rng, sensors=SENSORS, start=MIDDLE)
     arm.set_trajectory(reference)
     rng.standard_normal((1, 3, 6))  # the sample at time zero, which a stepped arm does not take
     samples = [arm.advance(5) for _ in range(len(run.t) - 1)]
@@ -90,32 +89,32 @@ def test_it_follows_and_then_holds_the_last_point(arm) -> None:
     arm.advance(750)
     np.testing.assert_allclose(arm.state.q, reference.sample(np.array([0.75])).q[0], atol=2e-3)
     arm.advance(2000)
-    np.testing.assert_allclose(arm.state.q, HOME, atol=2e-3)
+    np.testing.assert_allclose(arm.state.q, MIDDLE, atol=2e-3)
     np.testing.assert_array_equal(arm.state.dq, 0.0)
 
 
 def test_it_goes_to_a_first_point_that_is_later(arm) -> None:
-    shifted = Reference(arm.joints, np.array([2.0]), HOME[np.newaxis] + 0.3, np.zeros((1, 6)))
+    shifted = Reference(arm.joints, np.array([2.0]), MIDDLE[np.newaxis] + 0.3, np.zeros((1, 6)))
     arm.set_trajectory(shifted)
     arm.advance(1000)
-    np.testing.assert_allclose(arm.state.q, HOME + 0.15, atol=5e-3)
+    np.testing.assert_allclose(arm.state.q, MIDDLE + 0.15, atol=5e-3)
     arm.advance(2000)
-    np.testing.assert_allclose(arm.state.q, HOME + 0.3, atol=5e-3)
+    np.testing.assert_allclose(arm.state.q, MIDDLE + 0.3, atol=5e-3)
 
 
 def test_a_new_trajectory_takes_the_place_of_the_old_one(arm) -> None:
     arm.set_trajectory(there_and_back(arm.joints, first=0.1))
     arm.advance(700)
-    end = Reference(arm.joints, np.array([1.0]), HOME[np.newaxis], np.zeros((1, 6)))
+    end = Reference(arm.joints, np.array([1.0]), MIDDLE[np.newaxis], np.zeros((1, 6)))
     arm.set_trajectory(end)
     arm.advance(1500)
-    np.testing.assert_allclose(arm.state.q, HOME, atol=5e-3)
+    np.testing.assert_allclose(arm.state.q, MIDDLE, atol=5e-3)
 
 
 def bad_trajectories(joints):
     """Return trajectories that must be refused, with what the message has to say."""
     still = np.zeros((2, 6))
-    home = np.stack([HOME, HOME])
+    home = np.stack([MIDDLE, MIDDLE])
     t = np.array([0.0, 1.0])
     beyond, rushed, coasting = home.copy(), home.copy(), still.copy()
     beyond[1, 3] = 9.0
@@ -123,22 +122,19 @@ def bad_trajectories(joints):
     coasting[1, 2] = 0.5
     unknown = (*joints[:-1], 'tail')
     return [
-        (Reference(joints, t + 9, beyond, still), rf"'{joints[3]}' reaches .* upper limit of"),
-        (
-            Reference(joints, 0.2 * t, rushed, still),
-            rf"'{joints[3]}' reaches .* velocity limit of",
-        ),
+        (Reference(joints, t + 9, beyond, still), rf"'{joints[3]}'.*upper"),
+        (Reference(joints, 0.2 * t, rushed, still), rf"'{joints[3]}'.*velocity"),
         (Reference(joints, t, home, coasting), rf"'{joints[2]}' ends with 0.5 rad/s"),
         (Reference(joints, t, home, coasting[::-1]), rf"'{joints[2]}' starts with a jump of"),
-        (Reference(joints, t, home + 0.1, still), r'starts away by 0.1 rad.* later time'),
-        (Reference(unknown, t, home, still), "'tail' is not one of"),
-        (Reference(joints[:-1], t, home[:, :-1]), f"'{joints[-1]}' is missing"),
+        (Reference(joints, t, home + 0.1, still), r'0\.1 rad.*later'),
+        (Reference(unknown, t, home, still), "'tail'"),
+        (Reference(joints[:-1], t, home[:, :-1]), f"'{joints[-1]}'"),
     ]
 
 
 @pytest.mark.parametrize('which', range(7))
 def test_a_refused_trajectory_leaves_the_arm_with_what_it_was_doing(arm, model, which) -> None:
-    twin = SimulatedArm(model, rng=np.random.default_rng(0), sensors=SENSORS, start=HOME)
+    twin = SimulatedArm(model, rng=np.random.default_rng(0), sensors=SENSORS, start=MIDDLE)
     for each in (arm, twin):
         each.advance(100)
     bad, message = bad_trajectories(arm.joints)[which]
@@ -160,7 +156,7 @@ def test_reset_brings_it_home_and_forgets_the_trajectory(arm) -> None:
     arm.reset()
     assert (arm.state.steps, arm.state.t) == (0, 0.0)
     arm.advance(500)
-    np.testing.assert_array_equal(arm.state.q, HOME)
+    np.testing.assert_array_equal(arm.state.q, MIDDLE)
     arm.reset(steps=2000)
     assert arm.advance().t == 2.001
 

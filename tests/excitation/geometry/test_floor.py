@@ -13,12 +13,10 @@ from armid_ros.excitation import (
     Obstacle,
     with_obstacles,
 )
-from armid_ros.excitation.geometry.heights import link_heights, lowest_point, vertical
-from armid_ros.model import LinkFrames
+from armid_ros.excitation.geometry.heights import link_heights, lowest_point
 from armid_ros.motion import Motion
 from armid_ros.robots import collision_model, load_robot, robot_from_urdf, shipped_robots
 import numpy as np
-import pinocchio as pin
 import pytest
 
 from ..conftest import urdf
@@ -50,7 +48,7 @@ def test_arms_of_other_people_that_stand_have_one_too(example_robot, name):
 @pytest.mark.parametrize('name', ['talos_left_arm', 'baxter'])
 def test_arms_that_hang_or_reach_below_their_base_are_asked_for(example_robot, name):
     collision = collision_model(load_robot(example_robot(f'{name}.urdf')))
-    with pytest.raises(TrajectoryError, match=r'--floor Z.*--floor none'):
+    with pytest.raises(TrajectoryError, match=r'--floor.*none'):
         find_floor(collision)
     assert find_floor(collision, 'none').height is None
     assert find_floor(collision, '-0.93').height == -0.93
@@ -76,7 +74,7 @@ def test_a_mount_below_a_world_is_no_floor(mount):
 
 
 def test_an_arm_whose_only_link_is_below_its_base_is_asked_for():
-    with pytest.raises(TrajectoryError, match=r'0\.\d+ m below.*upper'):
+    with pytest.raises(TrajectoryError, match=r'0\.\d+ m.*upper'):
         find_floor(bodies(BELOW))
 
 
@@ -107,9 +105,6 @@ def test_the_floor_is_where_its_height_and_normal_say(seed):
     q = rng.uniform(-2.0, 2.0, (20, 2))
     lowest = np.min([low for _, low, _ in link_heights(collision, up, q)], axis=0)
     np.testing.assert_allclose(model.smallest(q), lowest + 3.0, atol=1e-6)
-    bound = model._bound(LinkFrames.of(collision.robot, q))
-    assert np.all(bound.min(axis=1) <= lowest + 3.0 + 1e-9)
-    assert np.all(np.isfinite(bound))
 
 
 def collision_without_pairs(collision):
@@ -144,26 +139,6 @@ def test_a_pose_that_is_clear_of_the_floor_is_above_it_with_links_that_have_no_b
         clear.append(model.closest(motion).distance > 0.0)
         assert above or not clear[-1]
     assert 20 < sum(clear) < 180
-
-
-def test_heights_are_those_of_points_on_the_bodies():
-    """Points drawn on a cylinder never leave the heights, and come near them."""
-    collision, rng = bodies(ABOVE, ON_TURRET), np.random.default_rng(0)
-    angle, along = rng.uniform(0, 2 * np.pi, 20000), rng.uniform(-0.15, 0.15, 20000)
-    ring = np.column_stack([0.04 * np.cos(angle), 0.04 * np.sin(angle), 0.15 + along])
-    up = vertical(np.array([1.0, -2.0, -3.0]))
-    q = rng.uniform(-2.0, 2.0, (10, 2))
-    model = collision.robot.model
-    data = model.createData()
-    heights = {name: (low, high) for name, low, high in link_heights(collision, up, q)}
-    for sample, pose in enumerate(q):
-        pin.forwardKinematics(model, data, pose)
-        for joint, link in ((1, 'upper'), (2, 'lower')):
-            points = ring @ data.oMi[joint].rotation.T + data.oMi[joint].translation
-            low, high = (values[sample] for values in heights[link])
-            drawn = points @ up
-            assert low - 1e-9 <= drawn.min() <= low + 0.01
-            assert high + 1e-9 >= drawn.max() >= high - 0.01
 
 
 def test_the_lowest_point_is_that_of_the_link_and_the_time():

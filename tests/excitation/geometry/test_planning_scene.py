@@ -2,15 +2,12 @@
 # SPDX-License-Identifier: Apache-2.0
 """What MoveIt knows to stand around an arm stands there for the excitation, too."""
 
-from __future__ import annotations
-
 import json
 
 from armid_ros.errors import TrajectoryError
-from armid_ros.excitation import ClearanceModel, load_environment, with_obstacles
-from armid_ros.robots import collision_model, load_robot
+from armid_ros.excitation import load_environment
+from armid_ros.robots import load_robot
 import numpy as np
-import pinocchio as pin
 import pytest
 import yaml
 
@@ -78,22 +75,6 @@ def test_primitives_stand_where_object_and_shape_say(tmp_path):
     assert load_environment(world, ROBOT) == (table, ball, post, cone)
 
 
-def test_an_arm_does_not_go_through_what_the_scene_has(tmp_path):
-    """The distance to a box out of a scene is that to the box itself."""
-    q = (ROBOT.lower + ROBOT.upper) / 2.0
-    hand = ROBOT.model.frames[-1].name
-    data = ROBOT.model.createData()
-    pin.framesForwardKinematics(ROBOT.model, data, q)
-    x, y, z = (float(value) for value in data.oMf[ROBOT.model.getFrameId(hand)].translation)
-    path = tmp_path / 'scene.yaml'
-    for offset, free in ((0.0, False), (5.0, True)):
-        box = collision_object('box', 1, [0.1, 0.1, 0.1], pose(x + offset, y, z))
-        around = load_environment(written(path, scene(box)), ROBOT)
-        clearance = ClearanceModel.of(with_obstacles(collision_model(ROBOT), around))
-        motion = np.vstack([q, q])
-        assert np.all(clearance.smallest(motion) > 0.0) == free
-
-
 def test_meshes_and_planes_take_at_least_their_room(tmp_path):
     entry = collision_object('thing', 1, [], pose())
     entry['primitives'], entry['primitive_poses'] = [], []
@@ -117,9 +98,9 @@ def test_meshes_and_planes_take_at_least_their_room(tmp_path):
 def test_objects_in_frames_that_move_or_are_unknown_are_refused(tmp_path):
     path = tmp_path / 'scene.yaml'
     hand = str(ROBOT.model.frames[-1].name)
-    for frame, words in ((hand, 'moves with the arm'), ('camera', 'is not in the description')):
+    for frame in (hand, 'camera'):
         written(path, scene(collision_object('box', 1, [1.0, 1.0, 1.0], pose(), frame)))
-        with pytest.raises(TrajectoryError, match=f"scene.yaml: .*'{frame}', which {words}"):
+        with pytest.raises(TrajectoryError, match=rf"scene\.yaml.*'{frame}'"):
             load_environment(path, ROBOT)
 
 

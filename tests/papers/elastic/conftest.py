@@ -1,27 +1,36 @@
 # Copyright 2026 The armid_ros developers
 # SPDX-License-Identifier: Apache-2.0
-"""The demo of the command, and the browser that looks at its page."""
+"""Recorded experiments with the two-link arm, from MuJoCo, so that no code tests itself."""
 
-from __future__ import annotations
-
-import json
-from pathlib import Path
-
-from armid_ros.papers.elastic.command import elastic
-from click.testing import CliRunner
+from armid_ros.motion import ElasticRun
+from armid_ros.papers.elastic.plant.signals import WEAK
+from armid_ros.robots.two_link import two_link_set, TwoLinkParameters
+from armid_ros.simulation.elastic.two_link import two_link_loop
+import numpy as np
 import pytest
 
+from benchmarks.elastic import excitation, MANY, mujoco_arm, run_mujoco, SENSORS, steps
 from tests.report.conftest import browser, charts_drawn
 
-__all__ = ['browser', 'charts_drawn', 'demo']
+__all__ = ['browser', 'charts_drawn']
 
 
 @pytest.fixture(scope='session')
-def demo(tmp_path_factory) -> Path:
-    """Simulate three experiments and the steps, and identify them."""
-    out = tmp_path_factory.mktemp('elastic') / 'result'
-    arguments = ['--demo', '--experiments', '3', '--out', str(out), '--json']
-    result = CliRunner().invoke(elastic, arguments, catch_exceptions=False)
-    assert result.exit_code == 0
-    assert json.loads(result.stdout) == json.loads((out / 'elastic.json').read_text())
-    return out
+def truth() -> TwoLinkParameters:
+    """Return the parameters of the arm that was recorded."""
+    return two_link_set('after').parameters
+
+
+@pytest.fixture(scope='session')
+def clean_steps(truth) -> list[ElasticRun]:
+    """Return step responses without noise."""
+    loop, engine = two_link_loop(two_link_set('after')), mujoco_arm(truth, MANY)
+    return [run_mujoco(engine, loop, experiment) for experiment in steps()]
+
+
+@pytest.fixture(scope='session')
+def runs(truth) -> list[ElasticRun]:
+    """Return twelve noisy experiments of 4 s through the resonances."""
+    rng = np.random.default_rng(3)
+    loop, engine = two_link_loop(two_link_set('after'), WEAK), mujoco_arm(truth)
+    return [SENSORS.measure(run_mujoco(engine, loop, e), rng) for e in excitation(12)]

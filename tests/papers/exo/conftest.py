@@ -2,8 +2,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """The shipped pair, walking."""
 
-from __future__ import annotations
-
 from armid_ros.papers.exo.plant.gait import read_gait
 from armid_ros.papers.exo.plant.gait_cycle import gait_cycle, GaitCycle
 from armid_ros.papers.exo.plant.walkers import walking_pair

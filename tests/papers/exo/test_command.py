@@ -2,8 +2,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """``armid exo``: from walking to stiffness, and from a recording alone."""
 
-from __future__ import annotations
-
 import json
 
 from armid_ros.cli import main
@@ -25,10 +23,12 @@ def result(tmp_path_factory):
     return out, json.loads(done.stdout)
 
 
+@pytest.mark.long
 def test_the_document_is_as_its_schema_says(result) -> None:
     assert faults('exo', result[1]) == []
 
 
+@pytest.mark.long
 def test_the_animation_has_a_frame_for_every_step_of_its_slider(result) -> None:
     page = (result[0] / 'report.html').read_text(encoding='utf-8')
     data = json.loads(page.split('id="walk-data">')[1].split('</script>')[0])
@@ -38,6 +38,7 @@ def test_the_animation_has_a_frame_for_every_step_of_its_slider(result) -> None:
     assert len(data['machine']) == 1 + len(data['error']) == 3
 
 
+@pytest.mark.long
 def test_a_recording_gives_the_same_again(result, tmp_path) -> None:
     out, document = result
     again = CliRunner().invoke(

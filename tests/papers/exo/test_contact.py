@@ -2,8 +2,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """The ground of Table 3."""
 
-from __future__ import annotations
-
 from armid_ros.papers.exo.plant.contact import Ground
 import numpy as np
 import pytest

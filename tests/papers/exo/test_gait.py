@@ -2,8 +2,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """The shipped gait, and files that are none."""
 
-from __future__ import annotations
-
 from armid_ros.errors import TrajectoryError
 from armid_ros.papers.exo.plant.gait import read_gait, stance_motion, steady_phase
 import numpy as np
@@ -48,9 +46,9 @@ def test_legs_are_half_a_cycle_apart() -> None:
 @pytest.mark.parametrize(
     ('text', 'message'),
     [
-        ('time,hip\n', 'a gait has'),
-        ('phase,hip_deg,knee_deg,ankle_deg\n0,1,2,x\n', 'four numbers'),
-        ('phase,hip_deg,knee_deg,ankle_deg\n0,1,2,3\n', 'at least 13'),
+        ('time,hip\n', 'gait'),
+        ('phase,hip_deg,knee_deg,ankle_deg\n0,1,2,x\n', 'numbers'),
+        ('phase,hip_deg,knee_deg,ankle_deg\n0,1,2,3\n', '13'),
     ],
 )
 def test_what_is_no_gait_is_refused(tmp_path, text, message) -> None:

@@ -2,11 +2,9 @@
 # SPDX-License-Identifier: Apache-2.0
 """A whole cycle: momentum, periodicity, supports, and the same in MuJoCo."""
 
-from __future__ import annotations
-
 from armid_ros.model.kinematics import points_motion
 from armid_ros.papers.exo.plant.gait_cycle import check_cycle, driving_torque, weight
-from armid_ros.papers.exo.plant.shares import feet_by_shares, ground_by_shares
+from armid_ros.papers.exo.plant.shares import feet_by_shares
 from armid_ros.papers.exo.plant.walkers import contacts, floating
 import numpy as np
 import pinocchio as pin
@@ -116,18 +114,3 @@ def test_a_joint_walks_the_cycle_by_its_torque_in_both_engines(cycle, joint) -> 
     assert np.abs(errors).max() < REACH[joint]
     assert np.abs(np.degrees(check.error)).max() < REACH[joint]
     np.testing.assert_allclose(np.degrees(check.error), errors[::2], atol=0.03)
-
-
-def test_springs_too_soft_have_errors_of_the_size_of_the_source(cycle) -> None:
-    soft = cycle.pair.with_stiffness(0.8 * cycle.pair.stiffness)
-    hip, knee = (
-        np.degrees(np.abs(check_cycle(cycle, joint, RATE, soft).error)).max() for joint in REACH
-    )
-    assert 0.4 < hip < 1.5
-    assert 1.0 < knee < 2.5
-
-
-def test_the_rule_of_shares_is_no_foot_force_to_walk_by(cycle) -> None:
-    shared = ground_by_shares(cycle)
-    check = check_cycle(cycle, 'exo_right_knee', RATE, ground_forces=shared)
-    assert np.degrees(np.abs(check.error)).max() > 2.5

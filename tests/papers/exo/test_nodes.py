@@ -2,8 +2,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """The leg pair on two topics, and what ties it, found from them."""
 
-from __future__ import annotations
-
 import re
 
 from armid_msgs.msg import ParameterEstimate
@@ -61,8 +59,8 @@ def test_springs_are_found_from_the_topics(bench):
         fresh.now = lambda: 0.0  # time does not go on while the estimate is made
         fresh.heard()
     state = bench.diagnose(learner, bench.diagnostics())
-    values = {v.key: v.value for v in state.values}
-    assert float(values['stiffness all [N/m]']) == pytest.approx(1e4, rel=0.02)
+    stated = next(float(v.value) for v in state.values if v.key.startswith('stiffness all'))
+    assert stated == pytest.approx(1e4, rel=0.02)
     assert state.level == state.OK
 
 
@@ -73,7 +71,7 @@ def test_a_pair_that_falls_behind_real_time_says_so(bench, monkeypatch):
     busy(node.real_time, monkeypatch)
     node.catch_up()
     said, values = node.condition()
-    assert re.fullmatch(r'\d+\.\d s .*', said)
+    assert re.match(r'\d+\.\d s', said)
     assert values['skipped_real_time'] > 9.0
     assert node.stamp_ns - before > 9 * 10**9
 

@@ -2,8 +2,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """Springs found while both move, and slack where there is some."""
 
-from __future__ import annotations
-
 from armid_ros.errors import IdentificationError
 from armid_ros.papers.exo.identification.online import InteractionSettings, OnlineInteraction
 from armid_ros.papers.exo.plant.gait import read_gait
@@ -66,5 +64,5 @@ def test_what_comes_after_an_interruption_is_not_mixed_with_what_was_before():
 
 
 def test_settings_that_do_not_fit_are_refused():
-    with pytest.raises(IdentificationError, match='memory of 1 s'):
+    with pytest.raises(IdentificationError, match='memory'):
         InteractionSettings(memory=1.0)

@@ -2,8 +2,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """The pair steps as the gait says, by torque as well, unless all of it is in open loop."""
 
-from __future__ import annotations
-
 from armid_ros.papers.exo.plant.gait import read_gait
 from armid_ros.papers.exo.plant.leg_pair import leg_pair, pair_torques, stepping
 from armid_ros.papers.exo.plant.simulated_pair import SimulatedPair

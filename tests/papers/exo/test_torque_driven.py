@@ -2,8 +2,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """Joints that follow torques, in this package's engine and in MuJoCo."""
 
-from __future__ import annotations
-
 from armid_ros.errors import TrajectoryError
 from armid_ros.papers.exo.plant.gait import read_gait
 from armid_ros.papers.exo.plant.leg_pair import (
@@ -47,19 +45,6 @@ def test_springs_believed_too_soft_lead_both_engines_astray_alike(pair, motions,
     assert most(followed - motions.own.q[::2, column]) == pytest.approx(DRIVEN[joint], abs=0.02)
     path = drive_in_mujoco(pair, motions, [joint], torque)[::2]
     assert most(path - followed) < 0.01
-
-
-@pytest.mark.long
-def test_all_joints_by_torque_fall_when_it_is_one_per_cent_wrong(pair) -> None:
-    """An inverted pendulum without feedback: exact torques hold it for a cycle, others do not."""
-    whole = walking(pair, read_gait(), np.linspace(0.0, 1.2, 601), 0.0)
-    tau = pair_torques(pair, *whole).tau
-    exact, wrong = (
-        drive_by_torque(pair, *whole, pair.robot.joints, splined(whole.own.t, share * tau, 400.0))
-        for share in (1.0, 1.01)
-    )
-    assert most(exact.q - whole.own.q[::2]) < 0.01
-    assert most(wrong.q - whole.own.q[::2]) > 20.0
 
 
 def test_an_even_number_of_samples_is_refused(pair) -> None:

@@ -2,8 +2,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """A gait with feet that stay where they stand."""
 
-from __future__ import annotations
-
 from armid_ros.papers.exo.plant.gait import read_gait
 from armid_ros.papers.exo.plant.walkable import (
     foot_points,
@@ -49,10 +47,3 @@ def test_curves_of_hip_and_knee_stay_near_those_asked_for(plan) -> None:
     phase = np.linspace(0.0, 1.0, 101)
     off = np.degrees(plan.gait(phase) - read_gait()(phase))[:, :2]
     assert np.sqrt(np.mean(off**2, axis=0)).max() < 3.0
-
-
-def test_a_gait_that_can_be_walked_stays_as_it_is(plan) -> None:
-    again = walkable(plan.gait, LEG, 1.2, stride=plan.stride, lean=plan.lean)
-    phase = np.linspace(0.0, 1.0, 101)
-    off = np.degrees(again.gait(phase) - plan.gait(phase))[:, :2]
-    assert np.sqrt(np.mean(off**2)) < 0.75

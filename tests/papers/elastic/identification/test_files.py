@@ -2,8 +2,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """Experiments survive the way through a bag, accelerometers and all."""
 
-from __future__ import annotations
-
 from armid_ros.errors import RecordingError
 from armid_ros.papers.elastic.identification.files import read_runs
 from armid_ros.recording import BagWriter, write_joint_states

@@ -2,8 +2,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """Decoupling: what one link does to the other, and what is left of each joint without it."""
 
-from __future__ import annotations
-
 from armid_ros.model import inverse_dynamics
 from armid_ros.motion import Motion
 from armid_ros.papers.elastic.identification.interaction import (
@@ -45,15 +43,6 @@ def test_ideal_response_is_that_of_python_control(truth, joint) -> None:
     plant = (link + spring) / ((motor + spring) * (link + spring) - spring * spring)
     theirs = control.frequency_response(plant, 2 * np.pi * FREQUENCY).complex
     np.testing.assert_allclose(ideal_response(truth, joint, FREQUENCY)[:, 0, 0], theirs, rtol=1e-9)
-
-
-@pytest.mark.long
-def test_decoupled_joints_are_one_link_systems(truth, runs) -> None:
-    for joint, found in enumerate(decouple(runs, truth)):
-        ideal = ideal_response(truth, joint, FREQUENCY)
-        response = found.response(FREQUENCY)
-        assert decibel_error(response[:, 0, 0], ideal[:, 0, 0]) < 0.1
-        assert decibel_error(response[:, 1, 0], ideal[:, 1, 0]) < 0.1
 
 
 def test_motor_torque_alone_shows_another_system_and_more_so_at_link_2(truth, runs) -> None:

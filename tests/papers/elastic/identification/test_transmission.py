@@ -2,8 +2,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """A spring and free play between two encoders: told apart where the load changes flanks."""
 
-from __future__ import annotations
-
 from armid_ros.errors import IdentificationError
 from armid_ros.papers.elastic.identification.transmission import fit_transmission, TwoEncoders
 import numpy as np

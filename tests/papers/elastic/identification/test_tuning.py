@@ -2,8 +2,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """Fine tuning to closed-loop steps, from the set before tuning to the one after it."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 
 from armid_ros.papers.elastic.identification.names import pack, unpack
@@ -20,7 +18,7 @@ from armid_ros.simulation.elastic.two_link import two_link_loop, two_link_plant
 import numpy as np
 import pytest
 
-from benchmarks.elastic import errors, steps, tuning
+from benchmarks.elastic import errors, steps
 
 pytestmark = pytest.mark.long
 
@@ -78,28 +76,11 @@ def test_small_noise(clean_steps, truth, tuned) -> None:
     assert after < before / 150.0
 
 
-def test_large_noise(clean_steps) -> None:
-    found, smaller = tuning(clean_steps, 0.02, LOOP, seed=1)
-    assert found['main'] < 10.0
-    assert smaller > 20.0
-
-
 def test_intervals_hold_the_truth(truth, tuned) -> None:
     """All thirteen, the split of friction between motor and link included."""
     off = np.abs(tuned.estimate.values - unpack(truth)) / tuned.estimate.std
     assert np.all(off < 4.0)
     assert np.sqrt(np.mean(off**2)) < 2.0
-
-
-def test_a_coulomb_torque_that_is_a_little_off_is_found(clean_steps, truth) -> None:
-    """Step 1 of a short recording is off by a per cent; the others must not pay for it."""
-    sensors = ElasticSensors(motor_velocity=0.002, link_velocity=0.002)
-    measured = [sensors.measure(run, np.random.default_rng(6)) for run in clean_steps]
-    wrong = replace(START, coulomb=truth.coulomb * np.array([1.05, 0.96]))
-    found = tune(measured, wrong, LOOP)
-    np.testing.assert_allclose(found.parameters.coulomb, truth.coulomb, rtol=0.015)
-    off = np.abs(found.estimate.values - unpack(truth)) / found.estimate.std
-    assert np.all(off < 4.0)
 
 
 def test_an_arm_that_still_rings_has_no_other_springs_for_it(
@@ -123,8 +104,3 @@ def test_an_arm_that_still_rings_has_no_other_springs_for_it(
     np.testing.assert_allclose(found.parameters.stiffness, truth.stiffness, rtol=1e-5)
     off = np.abs(found.estimate.values - unpack(truth)) / found.estimate.std
     assert np.all(off < 4.0)
-
-
-def test_friction_of_motor_and_link_is_not_known_apart(tuned) -> None:
-    relative = tuned.estimate.std / tuned.estimate.values
-    assert np.all(relative[7:11] > 10.0 * relative[:7].max())

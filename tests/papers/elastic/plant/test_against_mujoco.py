@@ -2,8 +2,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """Elastic joints against MuJoCo: other dynamics, other integration, other friction."""
 
-from __future__ import annotations
-
 from armid_ros.papers.elastic.plant.run import run_elastic
 from armid_ros.robots.two_link import two_link_set
 from armid_ros.simulation.elastic.two_link import two_link_loop, two_link_plant
@@ -13,7 +11,7 @@ import pytest
 from benchmarks.elastic import MANY, mujoco_arm, run_mujoco, steps
 
 
-@pytest.mark.parametrize('number', range(4))
+@pytest.mark.parametrize('number', [0, 3])
 def test_steps_move_both_alike(number) -> None:
     """The error of MuJoCo itself at 5 us is about 1e-4 rad/s, falling with the first power."""
     shipped = two_link_set('after')

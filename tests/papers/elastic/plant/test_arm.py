@@ -2,8 +2,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """An arm with elastic joints takes trajectories, and is read on both sides of its springs."""
 
-from __future__ import annotations
-
 from operator import attrgetter
 
 from armid_ros.arm import ArmModel
@@ -14,7 +12,7 @@ from armid_ros.papers.elastic.plant.run import run_elastic
 from armid_ros.papers.elastic.plant.signals import step_experiments
 from armid_ros.robots import load_robot
 from armid_ros.robots.two_link import two_link_set
-from armid_ros.simulation import Reference, SimulatedArm
+from armid_ros.simulation import Reference
 from armid_ros.simulation.accelerometers import LinkAccelerometers
 from armid_ros.simulation.elastic.setup import elastic_joints, make_elastic_arm, shipped_arm
 from armid_ros.simulation.elastic.two_link import two_link_loop, two_link_plant
@@ -113,17 +111,6 @@ def test_a_trajectory_beyond_a_limit_is_refused_and_the_arm_stays():
     np.testing.assert_allclose(arm.advance(100).link.q, home, atol=1e-9)
 
 
-def test_a_run_is_recorded_from_the_first_point_of_its_reference():
-    t = np.linspace(0.0, 1.0, 1001)
-    q = 0.3 * np.sin(2.0 * np.pi * t)[:, np.newaxis] * np.array([1.0, -1.0])
-    dq = 0.3 * 2.0 * np.pi * np.cos(2.0 * np.pi * t)[:, np.newaxis] * np.array([1.0, -1.0])
-    run = record(two_links(), Reference(TWO_LINKS.joints, t, q, dq), rate=500.0).sides
-    assert len(run.motor) == 501
-    np.testing.assert_allclose(run.motor.dq[0], dq[0])
-    np.testing.assert_allclose(run.reference, dq[::2], atol=0.02)
-    np.testing.assert_allclose(run.link.q, q[::2], atol=0.15)
-
-
 def test_accelerometers_feel_what_their_places_do():
     """Numerical second derivative of where they are, and gravity, in the frames of the links."""
     import pinocchio as pin
@@ -187,9 +174,3 @@ def test_a_run_has_what_its_samples_would_have_been():
         wanted = [attrgetter(name)(sample) for sample in samples]
         np.testing.assert_allclose(values, wanted, atol=1e-9, err_msg=name)
     np.testing.assert_allclose(run.reference, np.tile(velocity, (len(samples), 1)), atol=1e-9)
-
-
-def test_an_arm_without_springs_is_not_recorded_on_both_sides():
-    still = Reference(HUMANOID.joints, np.zeros(1), HUMANOID.lower[np.newaxis] + 0.5)
-    arm = SimulatedArm(ArmModel(HUMANOID), rng=np.random.default_rng(0))
-    assert record(arm, still).sides is None
