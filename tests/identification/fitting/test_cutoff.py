@@ -57,7 +57,7 @@ def test_ends_that_are_cut_off_with_a_lower_cutoff_do_not_choose_it(arm):
 
 
 def test_long_recordings_are_compared_on_a_part_with_the_same_answer(arm, monkeypatch):
-    data = recordings(arm, 1e-3, 80.0)
+    data = recordings(arm, 1e-3, 60.0)
     whole = chosen(arm, data)
     used = conditioning(data, SignalSettings())
     total = sum(len(recording) for recording in data)
