@@ -1,10 +1,18 @@
 # Copyright 2026 The armid_ros developers
 # SPDX-License-Identifier: Apache-2.0
-"""Run benchmarks by name, or all but the longest: ``python -m benchmarks [NAME ...]``."""
+"""
+Run benchmarks by name, or all but the longest: ``python -m benchmarks [NAME ...]``.
 
+What the benchmarks of speed print is kept in results/speed.json, of which the docs make a page.
+
+"""
+
+import json
 from pathlib import Path
 import subprocess
 import sys
+
+from benchmarks.reference_loop import processor
 
 LIBRARY = {
     '__init__',
@@ -26,10 +34,30 @@ LIBRARY = {
 }
 #: Run only when they are asked for: they take an hour.
 LONG = {'endurance'}
+#: Their output is kept.
+SPEED = {'nodes', 'offline_speed', 'online', 'reading', 'simulation'}
+RESULTS = Path(__file__).parent / 'results' / 'speed.json'
+
+
+def run(name: str) -> int:
+    """Run one in a process of its own, with memory and threads of its own; keep its output."""
+    command, lines = [sys.executable, '-m', f'benchmarks.{name}'], []
+    with subprocess.Popen(command, stdout=subprocess.PIPE, text=True) as process:
+        assert process.stdout is not None
+        for line in process.stdout:
+            print(line, end='', flush=True)
+            lines.append(line.rstrip())
+    if name in SPEED and process.returncode == 0:
+        head = ['git', 'rev-parse', '--short', 'HEAD']
+        commit = subprocess.run(head, capture_output=True, text=True).stdout.strip()
+        kept = json.loads(RESULTS.read_text(encoding='utf-8')) if RESULTS.exists() else {}
+        kept[name] = {'machine': processor(), 'commit': commit, 'lines': lines}
+        RESULTS.write_text(json.dumps(kept, indent=1, sort_keys=True) + '\n', encoding='utf-8')
+    return process.returncode
 
 
 def main() -> int:
-    """Run each in a process of its own, with memory and threads of its own."""
+    """Run the named ones."""
     known = sorted(
         path.stem for path in Path(__file__).parent.glob('*.py') if path.stem not in LIBRARY
     )
@@ -41,7 +69,7 @@ def main() -> int:
     failed = 0
     for name in names:
         print(f'== {name}', flush=True)
-        failed |= subprocess.run([sys.executable, '-m', f'benchmarks.{name}']).returncode
+        failed |= run(name)
     return failed
 
 

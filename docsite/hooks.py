@@ -17,6 +17,7 @@ from docsite.nodes import nodes_page
 from docsite.notebooks import executed
 from docsite.numbers import numbers_page
 from docsite.schemas import schemas_page
+from docsite.speed import speed_page
 
 ROOT = Path(__file__).parents[1]
 #: What explains gaps, finds faults of data and plans motions for a diagnosis, below armid_ros.
@@ -44,6 +45,7 @@ def on_files(files: Files, config: MkDocsConfig) -> Files:
         ),
         'reference/nodes.md': nodes_page(_taken(files, reference / 'nodes.md')),
         'reference/files.md': schemas_page(_taken(files, reference / 'files.md')),
+        'reference/speed.md': speed_page(ROOT / 'benchmarks' / 'results' / 'speed.json'),
     }
     for uri, text in pages.items():
         files.append(File.generated(config, uri, content=text))

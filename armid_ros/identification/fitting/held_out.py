@@ -31,6 +31,9 @@ import numpy.typing as npt
 #: Rows that are enough to compare halves and cut-offs: some fifty for every parameter of seven
 #: joints, and some hundred.
 _OF_HALVES, _OF_CUTOFFS = 4000, 6000
+#: Longer data are compared on so many evenly spread windows, of twice as many rows together: at
+#: 1 kHz each has half a minute, of which the filters of 1 Hz lose a tenth.
+_WINDOWS = 8
 #: A cut-off is compared with one lower by this factor.
 _STEP = 0.5
 #: A cut-off that loses more of the rows at the ends of stretches is too low for them.
@@ -146,6 +149,7 @@ def cutoff_of_torques(
         The same with the cut-off that was chosen.
 
     """
+    recordings = _windows(recordings, 2 * _OF_CUTOFFS * used.decimation)
     tried: dict[float, list[list[Regression]]] = {}
     losses: dict[float, FloatArray] = {}
     cutoff, rows = used.cutoff_hz, 0
@@ -168,6 +172,20 @@ def cutoff_of_torques(
     if not tried:
         return used
     return replace(used, cutoff_hz=max(hz for hz, own in losses.items() if _as_good(own, best)))
+
+
+def _windows(recordings: Sequence[Recording], samples: int) -> list[Recording]:
+    """Cut about a number of samples out of longer recordings, in evenly spread windows."""
+    total, size = sum(len(recording) for recording in recordings), samples // _WINDOWS
+    if total <= samples:
+        return list(recordings)
+    begins = np.linspace(0, total - size, _WINDOWS).astype(int)
+    result, before = [], 0
+    for recording in recordings:
+        inside = np.clip(np.stack([begins, begins + size]) - before, 0, len(recording))
+        result += [recording.select(slice(*ends)) for ends in inside.T if np.ptp(ends) > 1]
+        before += len(recording)
+    return result
 
 
 def _shared(

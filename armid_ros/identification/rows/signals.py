@@ -38,6 +38,9 @@ USUAL_RATES = (20.0, 20_000.0)
 JITTER_TOLERANCE = 0.05
 #: Torque and regressor keep this many times the band of the motion and what friction adds to it.
 MODEL_BANDS = 10.0
+#: Positions are cut off at this many times the band that rows keep at most: the Butterworth filter,
+#: run both ways, damps what rows keep by 5^-8 or less, below TORQUE_RESOLUTION.
+_POSITION_BANDS = 5.0
 #: The positions' spectrum ends where it is less than this many times the noise.
 NOISE_MARGIN = 3.0
 #: Periods of the cut-off that are cut off at both ends, where the filter has no neighbours.
@@ -147,7 +150,8 @@ def conditioning(recordings: list[Recording], settings: SignalSettings) -> Condi
     Choose the cut-off and the decimation for recordings of one kind.
 
     The positions keep what stands out of their noise: the cut-off is where their spectrum meets
-    it, at most a fifth of the rate, for beyond it there is nothing to differentiate but noise.
+    it, at most a fifth of the rate, for beyond it there is nothing to differentiate but noise, and
+    at most five times the band of torque and regressor, which hardly see what is beyond.
     Torque and regressor keep ten times the band of the motion, the frequency below which 99 % of
     the velocities' power lies, and are decimated to 2.5 samples per period of that.
 
@@ -172,8 +176,12 @@ def conditioning(recordings: list[Recording], settings: SignalSettings) -> Condi
             for q in _unbroken_positions(recording, rate)
         ]
         band = MODEL_BANDS * _motion_band(parts, rate)
-        decimation = decimation or max(1, int(rate / (2.5 * band)))
-        cutoff = cutoff or min(max(float(np.max(crossings)), band), 0.2 * rate)
+        if decimation is None:
+            stride = max(1, int(rate / (SMOOTH_SAMPLES * _POSITION_BANDS * band)))
+            decimation = max(1, int(rate / (2.5 * band)) // stride * stride)  # see smooth_stride
+        kept = max(band, _KEPT * rate / decimation)
+        highest = min(_POSITION_BANDS * kept, 0.2 * rate)
+        cutoff = cutoff or min(max(float(np.max(crossings)), band), highest)
     if cutoff >= 0.5 * rate:
         raise IdentificationError(
             f'{recordings[0].source}: a cut-off of {cutoff:g} Hz needs more than '

@@ -4,6 +4,7 @@
 
 from dataclasses import replace
 
+from armid_ros.identification.fitting import held_out
 from armid_ros.identification.fitting.held_out import cutoff_of_torques
 from armid_ros.identification.rows.signals import conditioning, SignalSettings
 import numpy as np
@@ -12,12 +13,12 @@ from scipy import signal
 from ..conftest import multisine, recorded
 
 
-def recordings(arm, shake=0.0):
+def recordings(arm, shake=0.0, duration=20.0):
     """Return motion whose positions shake at 8 to 15 Hz, which no torque makes [rad]."""
     made = []
     for seed in range(2):
         rng = np.random.default_rng(seed)
-        motion = multisine(arm.robot.joints, 20.0, 200.0, seed)
+        motion = multisine(arm.robot.joints, duration, 200.0, seed)
         recording = recorded(arm, motion, seed, torque_noise=0.02)
         band = signal.butter(2, (8.0, 15.0), 'band', fs=1.0 / recording.period, output='sos')
         slack = signal.sosfiltfilt(band, rng.normal(size=recording.q.shape), axis=0)
@@ -41,3 +42,33 @@ def test_what_no_torque_makes_is_cut_off(arm):
     spectra, torques = chosen(arm, recordings(arm, shake=1e-3))
     assert spectra > 15.0
     assert torques < 15.0
+
+
+def test_ends_that_are_cut_off_with_a_lower_cutoff_do_not_choose_it(arm):
+    data = recordings(arm)
+    loud = []
+    for recording in data:
+        rng = np.random.default_rng(0)
+        ends = (recording.t < recording.t[0] + 1.5) | (recording.t > recording.t[-1] - 1.5)
+        noise = rng.normal(size=recording.tau.shape) * np.std(recording.tau, axis=0)
+        loud.append(replace(recording, tau=recording.tau + 0.5 * ends[:, None] * noise))
+    spectra, torques = chosen(arm, loud)
+    assert torques == spectra
+
+
+def test_long_recordings_are_compared_on_a_part_with_the_same_answer(arm, monkeypatch):
+    data = recordings(arm, 1e-3, 60.0)
+    whole = chosen(arm, data)
+    used = conditioning(data, SignalSettings())
+    total = sum(len(recording) for recording in data)
+    monkeypatch.setattr(held_out, '_OF_CUTOFFS', total // (4 * used.decimation))
+    compared = []
+
+    def counted(arm, columns, parts, lower):
+        compared.append(sum(len(part) for part in parts))
+        return regressions(arm, columns, parts, lower)
+
+    regressions = held_out.regressions
+    monkeypatch.setattr(held_out, 'regressions', counted)
+    assert chosen(arm, data) == whole
+    assert 8 * max(compared) <= 0.5 * total

@@ -1,0 +1,139 @@
+# Copyright 2026 The armid_ros developers
+# SPDX-License-Identifier: Apache-2.0
+"""
+Straps hidden between an exoskeleton and its wearer in MuJoCo, found by the whole diagnosis.
+
+    python -m benchmarks.exo_diagnosis [--sets 24] [--first-seed 0]
+
+"""
+
+from __future__ import annotations
+
+import argparse
+
+from armid_ros.arm import ArmModel
+from armid_ros.diagnosis import diagnose, Diagnosis, DiagnosisSettings
+from armid_ros.effects.tied import Partner
+from armid_ros.identification.rows.signals import conditioning, SignalSettings
+from armid_ros.identification.ties.recorded import (
+    band_of_motion,
+    stacked,
+    together_interaction_problem,
+)
+from armid_ros.identification.ties.stiffness import identify_interaction
+from armid_ros.model.spring_ties import SEGMENTS
+from armid_ros.papers.exo.plant.leg_pair import leg_pair
+from armid_ros.recording import recorded_together, Recording
+from armid_ros.robots import load_robot
+import numpy as np
+
+from tests.hidden.leg_pair import Straps, walks
+
+SECONDS = 6.0
+#: A spring that is named when it is four deviations above zero is surely seen from here on.
+_VISIBLE = 6.0
+#: Hidden springs: which segments, at each of the stiffnesses.
+HIDDEN = (
+    SEGMENTS,
+    ('swing_shank',),
+    ('swing_thigh',),
+    ('stance_thigh',),
+    ('swing_shank', 'stance_shank'),
+    ('swing_thigh', 'stance_thigh'),
+)
+STIFFNESSES = (1e3, 3e3, 1e4, 5e4)
+
+
+def cases() -> list[tuple[float, tuple[str, ...]]]:
+    """Return stiffnesses and segments that are tied."""
+    return [(k, segments) for k in STIFFNESSES for segments in HIDDEN]
+
+
+def diagnosed(sets: int, first: int = 0) -> None:
+    """Hide springs in bags of an independent engine, and let the whole diagnosis look."""
+    ties = leg_pair()
+    partner = Partner(ties.other, ties.ties, 'human_legs')
+    right = alarms = words = 0
+    closed, inside = [], []
+    for number, (k, segments) in enumerate(cases()[:sets]):
+        recordings = recorded_pair(partner, Straps(segments, k), first + number)
+        found = _diagnosis(partner, recordings)
+        named = {tie.name for finding in found.findings for tie in finding.ties}
+        hidden = {name: z for name, z in expected_z(recordings, k).items() if name in segments}
+        visible = {name for name, z in hidden.items() if z >= _VISIBLE}
+        ok = visible <= named <= set(segments)
+        ok &= [f.name for f in found.findings] == ['human_interaction']
+        right, words = right + ok, words + (ok and found.verdict == 'named')
+        closed.append(found.gap.closed if found.gap else 0.0)
+        inside += [
+            abs(value - k) <= 1.96 * std
+            for finding in found.findings
+            for value, std in zip(finding.values, finding.std, strict=True)
+        ]
+        for name in hidden.keys() - visible:
+            told = 'named' if name in named else 'not named'
+            print(f'  {k:g} N/m at {name}: not visible, z = {hidden[name]:.1f}; {told}')
+        if not ok or found.verdict != 'named':
+            print(f'  {k:g} N/m at {", ".join(segments)}: {found.verdict} {_said(found)}')
+    for number in range(sets):
+        found = _diagnosis(partner, recorded_pair(partner, Straps(), first + 1000 + number))
+        body = number % 2 == 1 and [f.name for f in found.findings] == ['link_inertia']
+        alarms += bool(found.findings) and not body
+        if found.findings or found.verdict != 'consistent':
+            what = ', a body whose mass is off' if body else ''
+            print(f'  nothing: {found.verdict} {_said(found)}{what}')
+    print('the same by armid diagnose, MuJoCo           wanted   measured')
+    print(f'  name right, segments where visible         {sets}/{sets}    {right}/{sets}')
+    print(f'  of these, verdict "named"                  {sets}/{sets}    {words}/{sets}')
+    print(f'  named where there is nothing               0/{sets}     {alarms}/{sets}')
+    print(f'  held-out gap closed, least and median      -        {min(closed):.3f}, ', end='')
+    print(f'{np.median(closed):.3f}')
+    share = f'{100 * np.mean(inside):.0f} % of {len(inside)}'
+    print(f'  95 % intervals that hold the stiffness     90-98 %  {share}')
+
+
+def expected_z(recordings: list[Recording], stiffness: float) -> dict[str, float]:
+    """Return how many deviations above zero a stiffness is where all segments may be tied."""
+    exo = load_robot('exoskeleton_legs')
+    used = conditioning(recordings, SignalSettings())
+    used = band_of_motion(recordings, used, SignalSettings())
+    problem = stacked(
+        [
+            together_interaction_problem(exo, recording, used, inertias='free', separate=True)
+            for recording in recordings
+        ]
+    )
+    found = identify_interaction(problem)
+    return dict(zip(found.segments, stiffness / found.std, strict=True))
+
+
+def recorded_pair(partner: Partner, straps: Straps, seed: int) -> list[Recording]:
+    """Record a pair three times; its masses are off by up to a tenth in half of all cases."""
+    exo = load_robot('exoskeleton_legs')
+    recordings = []
+    for walk in walks(straps, seed, seconds=SECONDS, wrong_masses=0.1 * (seed % 2)):
+        own = Recording(joints=exo.joints, t=walk.t, q=walk.exo, tau=walk.tau)
+        other = Recording(joints=partner.robot.joints, t=walk.t, q=walk.human)
+        recordings.append(recorded_together(own, other, partner.robot, partner.ties))
+    return recordings
+
+
+def _diagnosis(partner: Partner, recordings: list[Recording]) -> Diagnosis:
+    arm = ArmModel(load_robot('exoskeleton_legs'))
+    settings = DiagnosisSettings(partner=partner)
+    return diagnose(arm, recordings, settings=settings, rng=np.random.default_rng(0))
+
+
+def _said(found: Diagnosis) -> str:
+    places = (
+        (f.name, ', '.join(t.name for t in f.ties) or ', '.join(f.joints)) for f in found.findings
+    )
+    return '; '.join(f'{name} at {place}' for name, place in places)
+
+
+if __name__ == '__main__':
+    parser = argparse.ArgumentParser(description=__doc__.splitlines()[1])
+    parser.add_argument('--sets', type=int, default=24, help='recordings with hidden springs')
+    parser.add_argument('--first-seed', type=int, default=0, help='of fit, masses and noise')
+    asked = parser.parse_args()
+    diagnosed(asked.sets, asked.first_seed)

@@ -1,0 +1,37 @@
+# Copyright 2026 The armid_ros developers
+# SPDX-License-Identifier: Apache-2.0
+"""The page of measured speeds, made from the last results that ``make bench`` wrote."""
+
+import json
+from pathlib import Path
+
+_BEGINNING = """# Speed
+
+Each block is what a benchmark printed when it was last run. Ratios compare both sides in one run on
+one machine; seconds are of that machine. `make bench BENCH=NAME` runs it again.
+"""
+
+
+def speed_page(results: Path) -> str:
+    """
+    Return the page.
+
+    Parameters
+    ----------
+    results : Path
+        File of names with machine, commit and the lines that were printed.
+
+    Returns
+    -------
+    str
+        Markdown.
+
+    """
+    parts = [_BEGINNING]
+    for name, found in json.loads(results.read_text(encoding='utf-8')).items():
+        printed = '\n'.join(found['lines'])
+        parts.append(
+            f'## {name}\n\n{found["machine"]}, commit `{found["commit"]}`:\n\n'
+            f'```text\n{printed}\n```\n'
+        )
+    return '\n'.join(parts)
