@@ -7,8 +7,8 @@ from pathlib import Path
 
 _BEGINNING = """# Speed
 
-Each block is what a benchmark printed when it was last run. Ratios compare both sides in one run on
-one machine; seconds are of that machine. `make bench BENCH=NAME` runs it again.
+Each block is what a benchmark printed when it was last run. Ratios compare both sides in one run
+on one machine; seconds are of that machine. `make bench BENCH=NAME` runs it again.
 """
 
 

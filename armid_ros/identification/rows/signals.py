@@ -38,9 +38,13 @@ USUAL_RATES = (20.0, 20_000.0)
 JITTER_TOLERANCE = 0.05
 #: Torque and regressor keep this many times the band of the motion and what friction adds to it.
 MODEL_BANDS = 10.0
-#: Positions are cut off at this many times the band that rows keep at most: the Butterworth filter,
-#: run both ways, damps what rows keep by 5^-8 or less, below TORQUE_RESOLUTION.
+#: Positions are cut off at no more than this many times the band that rows keep: the Butterworth
+#: filter, run both ways, damps what rows keep by 5^-8 or less, below TORQUE_RESOLUTION.
 _POSITION_BANDS = 5.0
+#: Share of their rate up to which rows keep what is there, where the decimation filter ends.
+_KEPT = 0.4
+#: Samples per period of the cut-off that describe a smooth function of the filtered positions.
+_SMOOTH_SAMPLES = 5.0
 #: The positions' spectrum ends where it is less than this many times the noise.
 NOISE_MARGIN = 3.0
 #: Periods of the cut-off that are cut off at both ends, where the filter has no neighbours.
@@ -114,8 +118,7 @@ class Conditioning:
     @property
     def kept_hz(self) -> float:
         """Frequency up to which rows keep what is there [Hz]."""
-        # the decimation filter ends at this share of the rate of the rows
-        return 0.4 * self.rate_hz / self.decimation
+        return _KEPT * self.rate_hz / self.decimation
 
     def taps(self) -> FloatArray:
         """Return the symmetric decimation filter; a single 1 where nothing is decimated."""
@@ -140,7 +143,7 @@ class Conditioning:
         """
         # five samples per period of the cut-off describe a smooth function of the filtered
         # positions
-        widest = self.rate_hz / (5.0 * self.cutoff_hz)
+        widest = self.rate_hz / (_SMOOTH_SAMPLES * self.cutoff_hz)
         divisors = [d for d in range(1, self.decimation + 1) if self.decimation % d == 0]
         return max(d for d in divisors if d <= max(1.0, widest))
 
@@ -177,7 +180,7 @@ def conditioning(recordings: list[Recording], settings: SignalSettings) -> Condi
         ]
         band = MODEL_BANDS * _motion_band(parts, rate)
         if decimation is None:
-            stride = max(1, int(rate / (SMOOTH_SAMPLES * _POSITION_BANDS * band)))
+            stride = max(1, int(rate / (_SMOOTH_SAMPLES * _POSITION_BANDS * band)))
             decimation = max(1, int(rate / (2.5 * band)) // stride * stride)  # see smooth_stride
         kept = max(band, _KEPT * rate / decimation)
         highest = min(_POSITION_BANDS * kept, 0.2 * rate)
