@@ -4,13 +4,11 @@
 
 from dataclasses import replace
 
-from armid_ros.diagnosis import diagnose, DiagnosisSettings, known_misfit
+from armid_ros.diagnosis import diagnose, known_misfit
 from armid_ros.diagnosis.doubt import doubt_of_names
 from armid_ros.diagnosis.verdict.finding import Finding
-from armid_ros.effects import CATALOGUE
-from armid_ros.identification import IdentificationSettings, identify, SignalSettings
+from armid_ros.identification import identify
 from armid_ros.model import inverse_dynamics
-from armid_ros.report.diagnosis_report import tone_of
 import numpy as np
 import pytest
 
@@ -37,23 +35,6 @@ def test_what_was_there_already_is_not_named(bench):
 
 
 @pytest.mark.long
-def test_the_gap_is_where_the_cause_is_and_not_where_a_motion_shows_more_of_the_misfit(bench):
-    """The hose is stretched more in the recordings that were not used."""
-
-    def day(stretched, drag, seed):
-        def torque(motion, tau):
-            return hose(motion, tau) * [stretched, 1.0] + np.array([0.0, drag]) * np.sign(
-                motion.dq
-            )
-
-        return bench.recordings(torque, seed=seed)
-
-    found = asked(bench, day(1.0, 0.0, 1), day(1.0, 1.2, 2), day(2.0, 1.2, 3))
-    assert [one.name for one in found.findings] == ['coulomb_friction']
-    assert [place.joint for place in found.where] == ['elbow']
-    assert 'shoulder' in [place.joint for place in found.left]
-
-
 def test_a_slow_recording_that_hardly_shows_a_cause_denies_it_not(bench):
     def stirring(motion, tau):
         return hose(motion, tau) + np.array([0.0, 0.5]) * motion.dq * np.abs(motion.dq)
@@ -108,31 +89,6 @@ def test_a_baseline_that_the_model_is_not_of_is_doubted(bench, changed):
     assert (result.doubt in result.summary) and bool(result.doubt) == changed
 
 
-@pytest.mark.long
-@pytest.mark.parametrize('factor', [0.75, 1.3])
-def test_an_arm_that_is_warmer_or_colder_has_another_friction_in_all_joints(bench, factor):
-    """Not a delay, which acts in all joints with one value, nor causes joint by joint."""
-    viscous, coulomb = bench.friction
-
-    def with_friction(level):
-        def torque(motion, tau):
-            own = viscous * motion.dq + coulomb * np.sign(motion.dq)
-            return 0.05 * hose(motion, tau) + (level - 1.0) * own
-
-        return torque
-
-    before = bench.recordings(with_friction(1.0), seed=1)
-    after, new = (bench.recordings(with_friction(factor), seed=seed) for seed in (2, 3))
-    found = asked(bench, before, after, new)
-    assert found.verdict == 'named', found.summary
-    assert {one.name for one in found.findings} == {'viscous_friction', 'coulomb_friction'}
-    for one in found.findings:
-        shares, wide = (np.array(each) / one.added_to for each in (one.values, one.std))
-        assert one.joints == bench.robot.joints
-        np.testing.assert_allclose(shares, factor - 1.0, atol=5.0 * wide.max())
-    assert {effect.name for effect in found.arm.effects} <= set(CATALOGUE)
-
-
 def test_joints_that_warm_up_each_by_its_own_share_are_told_so(bench):
     viscous, coulomb = bench.friction
     shares = np.array([-0.35, -0.15])
@@ -150,6 +106,7 @@ def test_joints_that_warm_up_each_by_its_own_share_are_told_so(bench):
         np.testing.assert_allclose(told, shares, atol=5.0 * wide.max())
 
 
+@pytest.mark.long
 def test_recordings_with_more_noise_than_the_baseline_have_a_floor_of_their_own(bench):
     """A simulated baseline has no noise at all."""
     floors = []
@@ -163,42 +120,10 @@ def test_recordings_with_more_noise_than_the_baseline_have_a_floor_of_their_own(
     np.testing.assert_allclose(floors[0], floors[1], rtol=0.5)
 
 
-@pytest.mark.parametrize('told', [False, True])
-def test_the_noise_of_a_wider_band_is_no_reason_to_doubt_a_baseline(bench, told):
-    """The recordings are those that the model is of, behind other filters."""
-    noise = np.random.default_rng(7)
-
-    def shaken(motion, tau):
-        return tau + 0.3 * noise.standard_normal(tau.shape)
-
-    before, after = (bench.recordings(shaken, seed=seed) for seed in (1, 2))
-    narrow, wide = SignalSettings(cutoff_hz=4.0, decimation=25), SignalSettings(decimation=1)
-    rng = np.random.default_rng(0)
-    found = identify(bench.arm, before, settings=IdentificationSettings(signals=narrow), rng=rng)
-    misfit = known_misfit(found.arm, before, found.used)
-    misfit = misfit if told else replace(misfit, filters=None)
-    settings = DiagnosisSettings(signals=wide)
-    result = diagnose(found.arm, after, baseline=before, misfit=misfit, settings=settings, rng=rng)
-    assert bool(result.doubt) != told, result.summary
-
-
 @pytest.mark.parametrize(('name', 'doubted'), [('link_inertia', True), ('payload', False)])
 def test_a_link_that_is_named_between_two_days_is_doubted(name, doubted):
     found = Finding(name, ('elbow',), (), (), (), 0.9, (0.8, 1.0), 0.0)
-    assert ('elbow was exchanged' in doubt_of_names([found])) == doubted
-
-
-@pytest.mark.long
-def test_a_model_that_was_unusable_is_doubted(bench):
-    rng = np.random.default_rng(0)
-    before = bench.recordings(hose, seed=1)
-    found = identify(bench.arm, before, rng=rng)
-    misfit = replace(known_misfit(found.arm, before, found.used), unusable=True)
-    after = bench.recordings(hose, seed=2)
-    result = diagnose(found.arm, after, baseline=before, misfit=misfit, rng=rng)
-    assert result.verdict == 'consistent'
-    assert 'unusable' in result.summary
-    assert tone_of(result) == 'fair'
+    assert ('exchanged' in doubt_of_names([found])) == doubted
 
 
 def test_what_slow_motion_does_not_tell_of_a_body_is_no_change(bench):
@@ -227,45 +152,6 @@ def test_friction_that_has_become_less_is_named(bench, with_baseline):
     assert first.values[0] == pytest.approx(-0.2, abs=4.0 * first.std[0])
 
 
-@pytest.mark.long
-def test_a_change_may_be_less_by_what_the_model_had_wrong_before(bench):
-    """The model lacks a ripple of which 0.05 N m were there; 0.3 N m are found of 0.25 more."""
-
-    def day(size, seed):
-        return bench.recordings(lambda m, tau: size * np.sin(8.0 * m.q) * [0.0, 1.0], seed)
-
-    found, fresh = (
-        diagnose(bench.arm, day(0.3, 0), baseline=day(before, 5), rng=np.random.default_rng(0))
-        for before in (0.05, 0.0)
-    )
-    for one in (found, fresh):
-        assert one.findings[0].name == 'torque_ripple'
-        assert one.findings[0].values[0] == pytest.approx(0.3, abs=0.03)
-    assert 0.02 < found.findings[0].std[0] < 0.07
-    assert fresh.findings[0].std[0] < 0.02
-
-
-@pytest.mark.long
-@pytest.mark.slow
-@pytest.mark.parametrize('seed', [7, 8])
-def test_what_another_motion_makes_of_a_misfit_is_no_change(upright, seed):
-    """A lag and friction with the load are there on both days; only numbers of the first are."""
-
-    def clutter(motion, tau):
-        lag = -0.004 * np.gradient(tau, motion.t, axis=0)
-        return lag + 0.02 * np.abs(tau) * np.sign(motion.dq)
-
-    before = upright.recordings(clutter, 3)
-    model = identify(upright.arm, before, rng=np.random.default_rng(0))
-    found = diagnose(
-        model.arm,
-        upright.recordings(clutter, seed),
-        misfit=known_misfit(model.arm, before, model.used),
-        rng=np.random.default_rng(0),
-    )
-    assert (found.verdict, found.findings) == ('consistent', ())
-
-
 def test_a_load_of_a_link_between_two_days_is_a_payload(upright):
     """Links do not change, and something may be fixed to any of them."""
     body = np.zeros(30)
@@ -280,42 +166,6 @@ def test_a_load_of_a_link_between_two_days_is_a_payload(upright):
     assert (found.name, found.joints) == ('payload', ('shoulder',))
     values = dict(zip([p.name for p in found.parameters], found.values, strict=True))
     assert values['payload_mz'] == pytest.approx(0.2, rel=0.05)
-
-
-@pytest.mark.long
-def test_drag_of_three_joints_is_no_person_who_slows_them_down(upright):
-    """One damper at a link slows all joints before it, each of them a little wrongly."""
-    drag = np.array([0.3, 0.35, 0.15])
-    before, after, new = (
-        upright.recordings(make, k)
-        for k, make in enumerate((None, *2 * (lambda motion, tau: drag * motion.dq,)))
-    )
-    (found,) = asked(upright, before, after, new).findings
-    assert (found.name, found.joints) == ('viscous_friction', upright.robot.joints)
-    assert np.allclose(found.values, drag, atol=0.05)
-
-
-@pytest.mark.long
-@pytest.mark.slow
-@pytest.mark.parametrize('with_baseline', [True, False])
-def test_what_happens_in_one_period_is_no_noise(bench, with_baseline):
-    """Equal periods differ by a push, and a misfit that was known before has none in it."""
-
-    def push(motion, tau):
-        late = (motion.t - 0.75 * motion.t[-1]) / 0.5
-        return np.outer(np.exp(-(late**2)), [0.0, 1.0])
-
-    before = bench.recordings(seed=1)
-    model = identify(bench.arm, before, rng=np.random.default_rng(0))
-    known = (
-        {'baseline': before}
-        if with_baseline
-        else {'misfit': known_misfit(model.arm, before, model.used)}
-    )
-    for hidden, wanted in ((None, 'consistent'), (push, 'unknown')):
-        now = bench.recordings(hidden, seed=2)
-        found = diagnose(model.arm, now, rng=np.random.default_rng(0), **known)
-        assert (found.verdict, found.findings) == (wanted, ()), found.summary
 
 
 def test_one_recording_a_day_names_what_takes_most_of_the_gap_alone(bench):
@@ -335,23 +185,3 @@ def test_one_recording_a_day_names_what_takes_most_of_the_gap_alone(bench):
     assert any('second motion' in note for note in large.notes)
     assert not small.findings
     assert [one.name for one in small.minor] == ['coulomb_friction']
-
-
-@pytest.mark.slow
-def test_what_a_model_lacks_in_every_motion_is_no_part_of_a_stated_value(bench):
-    """The day before was slow, so that friction that no model has was another misfit then."""
-
-    def always(motion, tau):
-        curve = np.tanh(motion.dq / 0.4) * np.exp(-np.abs(motion.dq))
-        return [0.3, 0.18] * (np.sin(2.2 * motion.q + 0.4) + curve)
-
-    def today(motion, tau):
-        return always(motion, tau) + np.array([0.0, 0.25])
-
-    rng = np.random.default_rng(0)
-    before = bench.recordings(always, seed=1)[:2]
-    arm = identify(bench.arm, before, rng=rng).arm
-    found = diagnose(arm, bench.recordings(today, seed=2)[1:], baseline=before, rng=rng)
-    (named,) = found.findings
-    assert (named.name, named.joints) == ('torque_offset', ('elbow',)), found.summary
-    assert named.values[0] == pytest.approx(0.25, abs=0.01)

@@ -4,13 +4,9 @@
 
 from dataclasses import replace
 import json
-from types import SimpleNamespace
 
 from armid_ros.arm import Misfit
 from armid_ros.diagnosis import diagnose, diagnosis_document
-from armid_ros.diagnosis.search.cause import SelectedEffect
-from armid_ros.diagnosis.verdict.document import smallest_size
-from armid_ros.effects import CATALOGUE
 import numpy as np
 import pytest
 
@@ -72,32 +68,7 @@ def test_torque_has_the_unit_of_its_joint(document):
     assert (gap['unit'], gap['units']) == ('N m', {'shoulder': 'N', 'elbow': 'N m'})
 
 
-@pytest.mark.parametrize(
-    ('name', 'size', 'possible'),
-    [
-        ('backlash', 0.006, True),
-        ('backlash', 6.8e12, False),
-        ('torque_offset', 1.9e17, False),
-        ('stribeck_friction', 1.0, True),
-        ('stribeck_friction', 5.7e3, False),
-        ('torque_lag', 0.1, True),
-        ('torque_lag', 53.0, False),
-    ],
-)
-def test_a_size_that_no_arm_has_is_not_detectable(name, size, possible):
-    robot = Bench().robot
-    effect = CATALOGUE[name].on(robot, ('elbow',))
-    trial = SimpleNamespace(
-        named=SelectedEffect(effect, (0,)),
-        effect=effect,
-        std=[size / 5.0],
-        resolution=[1.0],
-        least=[0.0],
-    )
-    found = smallest_size(trial, robot)[1]
-    assert found == pytest.approx(size) if possible else found == np.inf
-
-
+@pytest.mark.long
 def test_nothing_named_is_nothing_changed():
     """A body that is fitted anew is no name: before and after are the same model."""
     bench = Bench(UPRIGHT_URDF, (0.3, 0.2, 0.2), (0.5, 0.3, 0.3))

@@ -10,17 +10,23 @@ import pytest
 from tests.diagnosis.test_payload import held_by
 
 
-def test_what_never_happens_is_not_named_where_something_else_explains_as_much(upright):
+@pytest.mark.parametrize(
+    ('never', 'named'),
+    [
+        ('payload', 'link_inertia'),
+        pytest.param('link_inertia', 'payload', marks=pytest.mark.long),
+    ],
+)
+def test_what_never_happens_is_not_named_where_something_else_explains_as_much(
+    upright, never, named
+):
     """A load of an inner link has the same ten values as that link."""
     hidden = upright.recordings(held_by(upright.robot, link=1))
-    named = []
-    for other in ('payload', 'link_inertia'):
-        settings = DiagnosisSettings(prior={other: 'never'})
-        found = diagnose(upright.arm, hidden, settings=settings, rng=np.random.default_rng(0))
-        (one,) = found.findings
-        assert not one.rivals and f'prior knowledge given: {other} never' in found.notes
-        named.append(one.name)
-    assert named == ['link_inertia', 'payload']
+    settings = DiagnosisSettings(prior={never: 'never'})
+    found = diagnose(upright.arm, hidden, settings=settings, rng=np.random.default_rng(0))
+    (one,) = found.findings
+    assert one.name == named and not one.rivals
+    assert any(never in note and 'never' in note for note in found.notes)
 
 
 @pytest.mark.parametrize(

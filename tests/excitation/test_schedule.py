@@ -111,7 +111,7 @@ def test_coefficients_that_are_no_numbers_are_refused_with_the_joint():
 @pytest.mark.parametrize('start', ['[0.5]', '0.5'])
 def test_a_start_pose_that_would_be_another_motion_is_refused(make_run_file, start):
     path = make_run_file('run_in:', f'start: {start}\nrun_in:')
-    with pytest.raises(TrajectoryError, match='start'):
+    with pytest.raises(TrajectoryError, match='start pose'):
         load_excitation(path)
 
 

@@ -182,7 +182,7 @@ class TestRefused:
             ('<robot name="r">\n<link name="a">\n</robot>', 'line 3'),
             ('<mujoco/>', '<mujoco>'),
             ('<mujocoinclude/>', 'MJCF'),
-            ('<robot name="r"/>', 'links'),
+            ('<robot name="r"/>', 'no links'),
             (robot(link('base', ''), link('base', '')), "'base'"),
             (robot(ARM, joint('shoulder', 'base', 'upper')), "'shoulder'"),
             (robot(ARM, joint('elbow', 'upper', 'hand')), "'elbow'.* 'hand'"),

@@ -46,7 +46,7 @@ def test_legs_are_half_a_cycle_apart() -> None:
 @pytest.mark.parametrize(
     ('text', 'message'),
     [
-        ('time,hip\n', 'gait'),
+        ('time,hip\n', 'phase'),
         ('phase,hip_deg,knee_deg,ankle_deg\n0,1,2,x\n', 'numbers'),
         ('phase,hip_deg,knee_deg,ankle_deg\n0,1,2,3\n', '13'),
     ],
