@@ -65,7 +65,7 @@ def chain(joints: int) -> str:
             '<inertia ixx="0.01" iyy="0.012" izz="0.008" ixy="0" ixz="0" iyz="0"/></inertial>'
             f'</link><joint name="j{k}" type="revolute"><parent link="l{k - 1}"/>'
             f'<child link="l{k}"/><origin xyz="0 0 0.2"/><axis xyz="{axis}"/>'
-            '<limit lower="-3" upper="3" velocity="9" effort="90"/></joint>'
+            '<limit lower="-3" upper="3" velocity="9" effort="9000"/></joint>'
         )
     return ''.join(parts) + '</robot>'
 

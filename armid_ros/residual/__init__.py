@@ -8,8 +8,8 @@ maps and laws predict. ``lookup_table`` returns the maps as a table for other pr
 
 """
 
+from armid_ros.residual.joint_residual import JointResidual
 from armid_ros.residual.learn import (
-    JointResidual,
     learn_residual,
     lookup_table,
     require_libraries,

@@ -18,10 +18,10 @@ from armid_ros.effects.learned import LearnedTorque, TorqueMap
 from armid_ros.errors import IdentificationError
 from armid_ros.files import write_file
 from armid_ros.files.cells import csv_cell
-from armid_ros.motion import FloatArray
 from armid_ros.report.blocks import ContentSection
 from armid_ros.residual.gaussian_process import learn_map
-from armid_ros.residual.law import Law, share_of, suggest_law
+from armid_ros.residual.joint_residual import JointResidual
+from armid_ros.residual.law import share_of, suggest_law
 from armid_ros.residual.rows import BLOCKS, joint_rows, JointRows
 from armid_ros.residual.section import residual_map_section
 import numpy as np
@@ -33,45 +33,6 @@ _FEW = 100
 #: A map is informative if its standard deviation is less than this share of the prior's.
 _KNOWN = 0.5
 _HEAD = 'joint,position,velocity,load,torque,std'
-
-
-@dataclass(frozen=True)
-class JointResidual:
-    """
-    The learned map and the suggested law of one joint.
-
-    Attributes
-    ----------
-    joint : str
-        The joint.
-    learned : TorqueMap
-        The map.
-    ranges : ndarray, shape (3, 2)
-        Smallest and largest position, velocity and load in the data.
-    before, after : float
-        Root mean square of the residual without and with the map [N m].
-    gain : float
-        Share of the squared residual that the map predicts in held-out data: blocks left out in
-        turn, and samples of held-out recordings near the training data.
-    held_out : float or None
-        The same share for held-out recordings alone; None if none is near the training data.
-    law : Law or None
-        Suggested law; None if no law approximates the residual.
-
-    """
-
-    joint: str
-    learned: TorqueMap
-    ranges: FloatArray
-    before: float
-    after: float
-    gain: float
-    held_out: float | None
-    law: Law | None
-
-    def axis(self, number: int, count: int) -> FloatArray:
-        """Return evenly spaced values over the range of an input, shape (count,)."""
-        return np.linspace(float(self.ranges[number, 0]), float(self.ranges[number, 1]), count)
 
 
 @dataclass(frozen=True)
@@ -133,7 +94,7 @@ class Residual:
 
     def section(self) -> ContentSection:
         """Return the section of a report with the maps."""
-        return residual_map_section(self)
+        return residual_map_section(self.base.robot, self.joints, self.table_file)
 
     def write_table(self, folder: Path) -> None:
         """Write the maps as a table into a folder."""

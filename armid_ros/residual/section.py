@@ -4,7 +4,7 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
+from collections.abc import Sequence
 
 from armid_ros.report.blocks import (
     ContentSection,
@@ -16,20 +16,20 @@ from armid_ros.report.blocks import (
 from armid_ros.report.charts import image_data
 from armid_ros.report.notation import digits, percent
 from armid_ros.report.page import render
+from armid_ros.residual.joint_residual import JointResidual
+from armid_ros.robots import Robot
 from markupsafe import Markup
 import numpy as np
-
-if TYPE_CHECKING:
-    from armid_ros.residual.learn import JointResidual, Residual
 
 _POSITIVE, _NEGATIVE, _UNSURE = (0.0, 0.447, 0.698), (0.835, 0.369, 0.0), (0.5, 0.5, 0.5)
 
 
-def residual_map_section(residual: Residual) -> ContentSection:
-    """Return maps of the unexplained residual at the middle load of each joint."""
-    robot = residual.base.robot
+def residual_map_section(
+    robot: Robot, joints: Sequence[JointResidual], table_file: str
+) -> ContentSection:
+    """Return maps of the unexplained residual at the middle load of some joints."""
     rows, pictures = [], []
-    for one in residual.joints:
+    for one in joints:
         j = robot.joints.index(one.joint)
         unit, length = robot.torque_units[j], robot.position_units[j]
         held_out = '' if one.held_out is None else percent(one.held_out)
@@ -62,7 +62,7 @@ def residual_map_section(residual: Residual) -> ContentSection:
             Paragraph(
                 'No effect of the catalogue explains the residual of these joints. A Gaussian '
                 'process over position, velocity and load has learned it. model.yaml has it as '
-                f'an effect, {residual.table_file} as a table. It is zero where there were no '
+                f'an effect, {table_file} as a table. It is zero where there were no '
                 'data. Shares are of the squared residual in cross-validation, and in held-out '
                 'recordings close to the data.'
             ),
