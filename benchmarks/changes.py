@@ -113,11 +113,7 @@ class Tally:
 
 def arm_with(*effects: str) -> ArmModel:
     """Return the humanoid arm with effects."""
-    arm = ArmModel(load_robot('humanoid_arm'))
-    for text in effects:
-        effect, values = parse_effect(text, arm.robot)
-        arm = arm.with_effect(effect, values)
-    return arm
+    return ArmModel.of('humanoid_arm', effects=effects)
 
 
 def working_motion(duration: float, speed: float, rng: np.random.Generator) -> Reference:

@@ -36,21 +36,12 @@ import numpy as np
 from benchmarks.laboratory_scoring import Judged, score, Truth
 from benchmarks.looks import look, results_of
 from benchmarks.metrics import table
-from benchmarks.two_days import Answer, answer_of
+from benchmarks.two_days import Answer, answer_of, known_arm
 from tests.hidden.cases import Case, make_case, VISIBLE
 from tests.hidden.specification import case_list, CaseSpec, SETS
 
 #: Every so many cases of a kind are in the slice.
 SLICE = {'single': 9, 'free': 20, 'pair': 8, 'outside': 5, 'removed': 10}
-
-
-def nominal_arm(case: Case) -> ArmModel:
-    """Return what the diagnosis is given: the nominal bodies and what is known of the drives."""
-    arm = ArmModel(case.robot)
-    for known in case.known:
-        effect = CATALOGUE[known.name].on(case.robot, known.joints)
-        arm = arm.with_effect(effect, known.values)
-    return arm
 
 
 def true_arm(case: Case) -> ArmModel:
@@ -81,7 +72,7 @@ def run_diagnosis(case: Case) -> tuple[Answer, float]:
     library = tuple(name for name in CATALOGUE if name not in case.removed)
     begin = time.process_time()
     diagnosis = diagnose(
-        nominal_arm(case),
+        known_arm(case.robot, case.known),
         [bag.recording for bag in case.bags],
         validate=[bag.recording for bag in case.validation],
         settings=DiagnosisSettings(library=library, material=0.0),

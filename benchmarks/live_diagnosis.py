@@ -23,14 +23,12 @@ from __future__ import annotations
 import argparse
 from collections.abc import Iterator
 from contextlib import contextmanager
-from dataclasses import asdict, dataclass
-import json
-from pathlib import Path
+from dataclasses import dataclass
 import time
 
 from armid_ros.arm import ArmModel
 from armid_ros.effects import CATALOGUE, parse_effect
-from armid_ros.live import Answer, InProcess, LiveDiagnosis, LiveSettings
+from armid_ros.live import InProcess, LiveDiagnosis, LiveSettings
 from armid_ros.live.assistant import Job, Result
 from armid_ros.motion import Motion
 from armid_ros.nodes.live_diagnosis import LiveDiagnosisNode
@@ -82,10 +80,6 @@ class Draw:
     delay: float | None
     named: list[list[str]]
     right: bool
-    early: bool
-    diagnoses: int
-    seconds: float
-    said: list[str]
 
 
 class Unhurried:
@@ -96,18 +90,13 @@ class Unhurried:
     ----------
     now : float
         Time of the arm [s].
-    seconds : float
-        Processor time so far [s].
-    latest : Answer, Done or None
-        What was answered last.
 
     """
 
     def __init__(self) -> None:
         self._inner = InProcess()
         self._due = 0.0
-        self.now = self.seconds = 0.0
-        self.latest: Result | None = None
+        self.now = 0.0
 
     @property
     def busy(self) -> bool:
@@ -118,14 +107,11 @@ class Unhurried:
         """Do a job."""
         begun = time.process_time()
         self._inner.ask(job)
-        spent = time.process_time() - begun
-        self.seconds, self._due = self.seconds + spent, self.now + spent
+        self._due = self.now + time.process_time() - begun
 
     def poll(self) -> Result | None:
         """Return the answer, once, when it would have come."""
-        result = self._inner.poll() if self.now >= self._due else None
-        self.latest = result or self.latest
-        return result
+        return self._inner.poll() if self.now >= self._due else None
 
     def close(self) -> None:
         """Nothing to end."""
@@ -133,10 +119,7 @@ class Unhurried:
 
 def known_arm() -> ArmModel:
     """Return what is known of the arm."""
-    arm = ArmModel(ROBOT)
-    for text in KNOWN:
-        arm = arm.with_effect(*parse_effect(text, ROBOT))
-    return arm
+    return ArmModel.of(ROBOT, effects=KNOWN)
 
 
 def motion(duration: float, rng: np.random.Generator) -> Motion:
@@ -215,13 +198,6 @@ class Bench:
         (result,) = self.plant.set_parameters([Parameter('effects', value=[*KNOWN, text])])
         assert result.successful, result.reason
 
-    def said(self, t: float) -> str:
-        """Return the last answer in a line."""
-        answer = self.helper.latest
-        assert isinstance(answer, Answer)
-        names = ' '.join(f'{name}@{"+".join(joints)}' for name, joints in answer.named)
-        return f'{t:.1f} s: {answer.verdict} {names} of {answer.window.duration:.1f} s'
-
     @property
     def proposed(self) -> list[list[str]]:
         """Names that the node proposes, and their joints."""
@@ -245,16 +221,14 @@ def draw(number: int, seed: int) -> Draw:
     with bench(along) as nodes:
         early = any(nodes.proposed for _ in nodes.run(BEFORE))
         nodes.set_effect(effect)
-        delay, said = None, []
+        delay = None
         for t in nodes.run(WANTED):
-            said.append(nodes.said(t))
             if nodes.proposed:
                 delay = t
                 break
         first = nodes.proposed[0] if nodes.proposed else []
         right = not early and first == [name, place]
-        asked, seconds = nodes.live.asked, nodes.helper.seconds
-        return Draw(effect, delay, nodes.proposed, right, early, asked, seconds, said)
+        return Draw(effect, delay, nodes.proposed, right)
 
 
 def quiet(minutes: float, seed: int) -> tuple[int, int, list[list[list[str]]]]:
@@ -273,16 +247,14 @@ def quiet(minutes: float, seed: int) -> tuple[int, int, list[list[list[str]]]]:
 
 
 def main() -> None:
-    """Print every draw, and write all of them."""
+    """Print every draw, and what is named while nothing changes."""
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument('--draws', type=int, default=40)
-    parser.add_argument('--first', type=int, default=0, help='number of the first draw')
     parser.add_argument('--seed', type=int, default=0, help='other draws of the same kinds')
     parser.add_argument('--minutes', type=float, default=30.0)
-    parser.add_argument('--out', type=Path, default=Path('live_diagnosis.json'))
     chosen = parser.parse_args()
     begun, draws = time.process_time(), []
-    for number in range(chosen.first, chosen.first + chosen.draws):
+    for number in range(chosen.draws):
         one = draw(number, chosen.seed)
         draws.append(one)
         delay = '     -' if one.delay is None else f'{one.delay:5.1f} s'
@@ -290,28 +262,16 @@ def main() -> None:
             f'{number:3} {"right" if one.right else "WRONG":5} {delay}  {one.effect}  {one.named}',
             flush=True,
         )
-        for line in one.said:
-            print(f'    {line}', flush=True)
-        _write(chosen.out, draws, None)
     if draws:
         right = sum(one.right for one in draws)
         print(f'named rightly within {WANTED:g} s: {right} of {len(draws)}')
-    still = None
     if chosen.minutes:
-        still = quiet(chosen.minutes, chosen.seed)
+        asked, said, proposed = quiet(chosen.minutes, chosen.seed)
         print(
-            f'{chosen.minutes:g} min without a change: {still[0]} diagnoses, {still[1]} with a '
-            f'name, proposed: {still[2]}'
+            f'{chosen.minutes:g} min without a change: {asked} diagnoses, {said} with a name, '
+            f'proposed: {proposed}'
         )
-    _write(chosen.out, draws, still)
     print(f'{time.process_time() - begun:.0f} s of processor time')
-
-
-def _write(
-    out: Path, draws: list[Draw], still: tuple[int, int, list[list[list[str]]]] | None
-) -> None:
-    document = {'draws': [asdict(one) for one in draws], 'without_change': still}
-    out.write_text(json.dumps(document, indent=1), encoding='utf-8')
 
 
 if __name__ == '__main__':

@@ -26,7 +26,6 @@ from pathlib import Path
 import traceback
 
 from armid_ros.arm import ArmModel
-from armid_ros.effects import CATALOGUE
 from armid_ros.identification import Identification
 from armid_ros.motion import FloatArray
 from armid_ros.recording import Recording
@@ -36,9 +35,9 @@ from benchmarks.lived_questions import score_of_question
 from benchmarks.lived_scoring import breakdown, LivedJudged, LivedTruth, probabilities, score
 from benchmarks.looks import look, results_of
 from benchmarks.metrics import table
-from benchmarks.two_days import Answer, ask, identification_of
+from benchmarks.two_days import Answer, ask, identification_of, known_arm
 from tests.hidden.lived.adapter import recording_of, robot_of
-from tests.hidden.lived.cases import lived_case, LivedCase
+from tests.hidden.lived.cases import lived_case
 from tests.hidden.lived.specification import COUNTS, KINDS, specify
 
 #: Asks about recordings: see two_days.ask, which is the ordinary one.
@@ -64,7 +63,7 @@ def judge(kind: str, index: int, again: bool = True, question: Ask = ask) -> Liv
             found = identification_of(robot_of(case), day_1)
             arm, shares = found.arm, true_shares(found, held_out, case.held_out.contribution)
         else:
-            arm = known_arm(case)
+            arm = known_arm(robot_of(case), case.known)
         answer = question(
             arm,
             day_2,
@@ -90,14 +89,6 @@ def ask_few(
 ) -> Answer:
     """Ask with so many recordings of each day, none of which is held out."""
     return ask(arm, [*recordings, *validate][:each], baseline=baseline[:each])
-
-
-def known_arm(case: LivedCase) -> ArmModel:
-    """Return the description with the friction that is known, by values or by name."""
-    arm = ArmModel(robot_of(case))
-    for known in case.known:
-        arm = arm.with_effect(CATALOGUE[known.name].on(arm.robot, known.joints), known.values)
-    return arm
 
 
 def true_shares(

@@ -6,7 +6,6 @@ from pathlib import Path
 import tempfile
 
 from armid_ros.arm import ArmModel
-from armid_ros.effects import make_effect
 from armid_ros.identification import IdentificationSettings, identify, Score, SignalSettings
 from armid_ros.recording import read_recording
 from armid_ros.robots import load_robot
@@ -21,9 +20,7 @@ EMPS_PUBLISHED = {'M': 95.1089, 'Fv': 203.5034, 'Fc': 20.3935, 'offset': -3.1648
 def fit(data, effects, method='wls', **signals):
     """Identify one machine; returns the identification and its robot."""
     robot = load_robot(str(data.robot))
-    arm = ArmModel(robot)
-    for name in effects:
-        arm = arm.with_effect(make_effect(name, robot))
+    arm = ArmModel.of(robot, effects=effects)
     settings = IdentificationSettings(method, SignalSettings(**signals))
     recording = read_recording(data.bags[0], joints=robot.joints)
     return identify(arm, [recording], settings, rng=np.random.default_rng(0)), robot

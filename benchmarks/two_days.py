@@ -17,7 +17,7 @@ from typing import Any
 from armid_ros.arm import ArmModel
 from armid_ros.diagnosis import diagnose, diagnosis_document, DiagnosisSettings
 from armid_ros.diagnosis.verdict.finding import Gap
-from armid_ros.effects import make_effect
+from armid_ros.effects import CATALOGUE
 from armid_ros.identification import Identification, identify
 from armid_ros.motion import FloatArray
 from armid_ros.recording import Recording
@@ -108,11 +108,17 @@ class Answer:
     true_share: float = np.nan
 
 
+def known_arm(robot: Robot, known: Sequence[Any]) -> ArmModel:
+    """Return a described arm with what is known of its drives, by values or by name."""
+    arm = ArmModel(robot)
+    for one in known:
+        arm = arm.with_effect(CATALOGUE[one.name].on(robot, one.joints), one.values)
+    return arm
+
+
 def identification_of(robot: Robot, recordings: Sequence[Recording]) -> Identification:
     """Identify an arm as `armid identify` does with its defaults."""
-    arm = ArmModel(robot)
-    for name in EFFECTS:
-        arm = arm.with_effect(make_effect(name, robot))
+    arm = ArmModel.of(robot, effects=EFFECTS)
     return identify(arm, list(recordings), rng=np.random.default_rng(0))
 
 

@@ -2,10 +2,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """Shells complete commands and options, without waiting for all of the package."""
 
-import os
-import subprocess
-import sys
-
 from armid_ros.cli import main
 from click.shell_completion import ShellComplete
 import pytest
@@ -45,20 +41,3 @@ def test_values_are_completed():
 )
 def test_values_of_an_option_are_completed(words, found):
     assert completed(*words) == found
-
-
-def test_names_are_completed_without_importing_what_computes(pytestconfig):
-    code = (
-        'import os, sys\n'
-        'from armid_ros.cli import main\n'
-        'try:\n    main(prog_name="armid")\n'
-        'finally:\n    print(sorted({"numpy", "pinocchio"} & set(sys.modules)))'
-    )
-    asked = {'_ARMID_COMPLETE': 'bash_complete', 'COMP_WORDS': 'armid ins', 'COMP_CWORD': '1'}
-    done = subprocess.run(
-        [sys.executable, '-c', code],
-        env={**os.environ, **asked, 'PYTHONPATH': str(pytestconfig.rootpath)},
-        capture_output=True,
-        text=True,
-    )
-    assert done.stdout.splitlines() == ['plain,inspect', '[]'], done.stderr

@@ -2,7 +2,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """A table becomes a bag, or is identified as it is; guesses are shown first."""
 
-from armid_ros.recording import read_recording, read_robot_description
+from armid_ros.recording import read_recording
 from armid_ros.robots import load_robot
 import numpy as np
 import pytest
@@ -28,15 +28,6 @@ def csv(recording, tmp_path):
 
 
 SAID = ('--degrees', '--current-gain', 0.05)
-
-
-def test_a_table_becomes_a_bag(csv, recording, tmp_path):
-    text = armid('convert', csv, '--robot', ROBOT, *SAID, '--out', tmp_path / 'bag').stdout
-    assert 'pos1' in text and '(guessed)' in text and str(len(recording)) in text
-    again = read_recording(tmp_path / 'bag', joints=recording.joints)
-    np.testing.assert_allclose(again.q, recording.q, atol=1e-9)
-    np.testing.assert_allclose(again.tau, recording.tau, atol=1e-9)
-    assert read_robot_description(tmp_path / 'bag') is not None
 
 
 def test_a_dry_run_shows_and_writes_nothing(csv, tmp_path):

@@ -112,12 +112,6 @@ def test_a_trajectory_begins_and_ends_at_rest_where_the_arm_stands(tmp_path):
     np.testing.assert_allclose(first, second, atol=1e-9)
 
 
-def test_a_start_that_is_not_allowed_is_refused_before_the_design(tmp_path):
-    refused = excite(ROBOT, tmp_path / 'plan', '--start', '9,0,0,0,0,0', code=2).stderr
-    assert '--start: ' in refused and 'shoulder_pitch' in refused
-    assert not (tmp_path / 'plan').exists()
-
-
 def test_a_simulated_arm_follows_the_plan_from_its_first_point(made, tmp_path):
     arguments = ('--robot', ROBOT, '--rate', 200, '--trajectory', made / 'trajectory')
     armid('simulate', *arguments, '--out', tmp_path / 'run')
@@ -135,13 +129,6 @@ def test_the_design_is_kept_where_no_way_leads_to_it(tmp_path, monkeypatch):
     refused = excite(ROBOT, tmp_path / 'plan', code=2).stderr
     assert 'excitation.yaml' in refused and 'walled in' in refused
     assert load_excitation(tmp_path / 'plan' / 'excitation.yaml').n_periods == 2
-
-
-def test_steps_are_replaced_by_steps(tmp_path):
-    out, robot = tmp_path / 'steps', 'two_link_elastic'
-    for _ in range(2):
-        armid('excite', '--robot', robot, '--kind', 'steps', '--duration', 20, '--out', out)
-    assert [path.name for path in out.iterdir()] == ['trajectory']
 
 
 def test_a_recording_where_the_trajectory_goes_is_not_replaced(made, tmp_path, bags):

@@ -23,10 +23,9 @@ def written(folder):
         if path.suffix in ('.json', '.yaml'):
             text = path.read_text(encoding='utf-8')
             document = json.loads(text) if path.suffix == '.json' else yaml.safe_load(text)
-            _, _, name = str(document.get('schema', '')).partition('armid/')
-            kind = 'excitation_quality' if path.name == 'excitation.json' else name.split('/')[0]
-            if kind:
-                yield kind, document
+            if 'schema' in document:
+                name = document['schema'].split('/')[1]
+                yield 'excitation_quality' if path.name == 'excitation.json' else name, document
 
 
 @pytest.fixture(scope='module')

@@ -11,6 +11,7 @@ from armid_ros.identification.rows.signals import conditioning
 import pytest
 
 from benchmarks import hidden_effects
+from benchmarks.two_days import known_arm
 from tests.hidden.cases import make_case
 from tests.hidden.catalogue import CATALOGUED
 from tests.hidden.specification import find_case
@@ -25,7 +26,7 @@ def test_every_effect_of_the_catalogue_is_hidden():
 @pytest.mark.parametrize(('found', 'share'), [(0.0, 0.0), (1.0, 1.0)])
 def test_the_true_arm_closes_the_gap_and_the_old_one_nothing(found, share):
     case = make_case(find_case('development/quadratic_friction/20-0'))
-    before, after = hidden_effects.nominal_arm(case), hidden_effects.true_arm(case)
+    before, after = known_arm(case.robot, case.known), hidden_effects.true_arm(case)
     recordings = [bag.recording for bag in case.validation]
     used = conditioning(recordings, SignalSettings())
     overlays = []

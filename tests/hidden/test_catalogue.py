@@ -16,8 +16,8 @@ import pytest
 from scipy.ndimage import maximum_filter1d
 from scipy.signal import butter, sosfiltfilt
 
-from benchmarks.hidden_effects import nominal_arm, true_arm
-from tests.hidden.cases import Case, draw, KnownEffect, simulate
+from benchmarks.hidden_effects import true_arm
+from tests.hidden.cases import Case, draw, simulate
 from tests.hidden.catalogue import CATALOGUED, HIDDEN
 from tests.hidden.specification import CaseSpec
 
@@ -68,14 +68,3 @@ def test_true_parameters_predict_the_recorded_torque(name):
     )
     assert before > 0.3
     assert after < LEFT.get(name, 0.1) * before
-
-
-def test_nominal_arm_has_what_is_known():
-    case = make('torque_offset')
-    known = KnownEffect('viscous_friction', case.robot.joints[1:], np.arange(1.0, 7.0))
-    arm = nominal_arm(replace(case, known=(known,)))
-    assert arm.robot is case.robot
-    assert [(p.name, p.joint) for p in arm.parameters[70:]] == [
-        ('viscous_coefficient', joint) for joint in case.robot.joints[1:]
-    ]
-    np.testing.assert_array_equal(arm.theta[70:], np.arange(1.0, 7.0))
