@@ -25,6 +25,7 @@ from armid_ros.excitation import Excitation, Limits, random_feasible, save_excit
 from armid_ros.identification.online.identifier import OnlineIdentifier
 from armid_ros.nodes.lockstep import run_lockstep
 from armid_ros.nodes.online_identifier import OnlineIdentifierNode
+from armid_ros.nodes.qos import SAMPLES
 from armid_ros.nodes.running.domains import private_context
 from armid_ros.nodes.running.process import make_executor, steady
 from armid_ros.recording import read_recording
@@ -156,30 +157,28 @@ def at_one_kilohertz(seconds, folder):
     )
 
 
-def bare_round_trip(steps=4000):
-    """Return the processor time of a message to a node and its answer, with nothing done [s]."""
+def bare_step(steps=4000):
+    """Return the processor time of the messages of a step in lock step, with nothing done [s]."""
+    # a joint state that recorder, publisher and identifier take as bytes
+    names = ('plant', 'recorder', 'publisher', 'identifier')
     with private_context() as context:
         executor = make_executor('events', context)
-        plant, other = (
-            Node(name, context=context, use_global_arguments=False)
-            for name in ('plant', 'controller')
-        )
-        states = plant.create_publisher(JointState, 'joint_states', 10)
-        commands = other.create_publisher(JointState, 'commands', 10)
+        nodes = [Node(name, context=context, use_global_arguments=False) for name in names]
+        states = nodes[0].create_publisher(JointState, 'joint_states', SAMPLES)
         heard = []
-        other.create_subscription(JointState, 'joint_states', commands.publish, 10)
-        plant.create_subscription(JointState, 'commands', heard.append, 10)
+        for node in nodes[1:]:
+            node.create_subscription(JointState, 'joint_states', heard.append, SAMPLES, raw=True)
         message = JointState(name=[f'joint{k}' for k in range(6)])
         message.position = message.velocity = message.effort = [0.1] * 6
-        for node in (plant, other):
+        for node in nodes:
             executor.add_node(node)
-        while not (states.get_subscription_count() and commands.get_subscription_count()):
+        while states.get_subscription_count() < len(nodes) - 1:
             executor.spin_once(timeout_sec=0.1)
         begun = time.process_time()
         for _ in range(steps):
             heard.clear()
             states.publish(message)
-            while not heard:
+            while len(heard) < len(nodes) - 1:
                 executor.spin_once(timeout_sec=0.1)
         used = time.process_time() - begun
         executor.shutdown()
@@ -191,7 +190,7 @@ def in_lock_step(rate, folder):
     Print how much faster than real time the nodes are together.
 
     By the clock, which other processes slow down, and by processor time, which is what an idle
-    machine needs; beside it what the simulator and a bare round trip of messages need.
+    machine needs; beside it what the simulator and the bare messages need.
 
     """
     robot = load_robot('humanoid_arm', gravity='moon')
@@ -213,13 +212,13 @@ def in_lock_step(rate, folder):
         plant, run, folder / f'bag_{rate:.0f}', identifier, rate=rate, on_progress=tell
     )
     by_processor = 1.0 / np.diff(used)
-    bare = 1.0 / (rate * bare_round_trip())
+    bare = 1.0 / (rate * bare_step())
     wanted = 8 if rate <= 200.0 else 5
     print(
         f'lock step, joint_states at {rate:5.0f} Hz   {end.real_time_factor:.1f} x real time; '
         f'by processor time {np.median(by_processor):.1f}, in the best second '
         f'{by_processor.max():.1f} (wanted: {wanted}; the simulator alone {simulator:.1f}, '
-        f'a bare round trip {bare:.0f})'
+        f'the bare messages {bare:.0f})'
     )
 
 

@@ -32,6 +32,7 @@ from armid_ros.papers.exo.plant.walkers import walking_pair
 from armid_ros.robots.two_link import two_link_set
 from armid_ros.simulation.elastic.two_link import two_link_loop, two_link_plant
 from matplotlib.figure import Figure
+from matplotlib.ticker import NullLocator
 import numpy as np
 from PIL import Image
 from scipy import signal, stats
@@ -165,10 +166,15 @@ def growth() -> Figure:
             row['values'], np.maximum(row['megabytes'], 1.0), 'o-', color=colours[row['job']]
         )
         lower.set_xlabel(row['over'])
+        for axes in (upper, lower):
+            if row['over'] != 'samples':
+                axes.set_xticks(row['values'], row['values'])
+            axes.xaxis.set_minor_locator(NullLocator())
     panels[0, 0].set_ylabel('processor time [s]')
     panels[1, 0].set_ylabel('memory [MB]')
+    panels[0, 0].set_ylim(0.02, 1e4)
     for axes in panels[0]:
-        axes.legend(frameon=False, fontsize=6)
+        axes.legend(frameon=False, fontsize=6, loc='upper left')
     return _plain(figure)
 
 

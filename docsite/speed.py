@@ -9,6 +9,13 @@ _BEGINNING = """# Speed
 
 Each block is what a benchmark printed when it was last run. Ratios compare both sides in one run
 on one machine; seconds are of that machine. `make bench BENCH=NAME` runs it again.
+
+## Growth
+
+`python -m benchmarks.growth` measures the jobs as the data grow. Elsewhere there are 7 joints, one
+recording of 12 s at 1 kHz and two effects. The slope is the exponent over the upper half.
+
+![Processor time and memory over samples, joints, bags and effects](../images/growth.png)
 """
 
 

@@ -65,10 +65,13 @@ class _State(NamedTuple):
 
 @dataclass
 class _Source:
-    """Messages with the same list of names: indices of the arm's joints, and recent states."""
+    """Messages with the same list of names: the arm's joints, their limits, recent states."""
 
     columns: npt.NDArray[np.int_]
     joints: npt.NDArray[np.int_]
+    lower: FloatArray
+    upper: FloatArray
+    velocity: FloatArray
     states: deque[_State] = field(default_factory=deque)
     rivals: list[_State] = field(default_factory=list)
 
@@ -126,28 +129,29 @@ class PoseMonitor:
             else np.full(len(source.joints), np.nan)
             for values in (message.position, message.velocity)
         )
-        state = _State(now, message.stamp_ns, q, np.nan_to_num(dq, posinf=0.0, neginf=0.0))
-        fault = self._outside(source.joints, q)
+        state = _State(now, message.stamp_ns, q, dq)
+        fault = self._outside(source, q)
         if fault:
             self._reject(fault, now)
             return
         last = source.states[-1] if source.states else None
-        if last is not None and last.stamp_ns == state.stamp_ns and np.array_equal(last.q, q):
-            if state.stamp_ns:
-                return  # the same message again
-        seen = self.pose.seen[source.joints].max()
-        before = self.pose.q[source.joints]
-        fault = self._unreachable(source.joints, state, last or _State(seen, 0, before, dq))
+        if last is None:
+            seen = self.pose.seen[source.joints].max()
+            last = _State(seen, 0, self.pose.q[source.joints], dq)
+        elif state.stamp_ns == last.stamp_ns != 0 and np.array_equal(last.q, q):
+            return  # the same message again
+        fault = self._unreachable(source, state, last)
         if fault:
             self._reject(fault, now)
-            if source.rivals and self._unreachable(source.joints, state, source.rivals[-1]):
+            if source.rivals and self._unreachable(source, state, source.rivals[-1]):
                 source.rivals.clear()
             source.rivals.append(state)
+            seen = self.pose.seen[source.joints].max()
             if len(source.rivals) < AGREEING or seen >= source.rivals[0].arrived:
                 return
             source.states.clear()
         source.rivals.clear()
-        self._believe(source, state, message)
+        self._believe(source, state)
 
     def contradiction(self, now: float, count: int = AGREEING) -> str:
         """Return why many positions of the last 0.5 s were rejected; empty if few were."""
@@ -193,7 +197,8 @@ class PoseMonitor:
             if first < 0 or covered < span - 1e-6:
                 continue
             q = np.array([state.q for state in states[first:]])
-            dq = np.mean([state.dq for state in states[first:]], axis=0)
+            measured = [state.dq for state in states[first:]]
+            dq = np.nan_to_num(measured, posinf=0.0, neginf=0.0).mean(axis=0)
             moved = np.ptp(q, axis=0)
             for j, distance, velocity in zip(source.joints, moved, dq, strict=True):
                 speed = distance / covered if distance > _STILL else 0.0
@@ -210,22 +215,23 @@ class PoseMonitor:
         joints = self.pose.joints
         own = [(column, joints.index(name)) for column, name in enumerate(names) if name in joints]
         columns, indices = np.array(own, dtype=int).reshape(-1, 2).T
-        source = self._sources[names] = _Source(columns, indices)
+        limits = (limit[indices] for limit in (self._lower, self._upper, self._velocity))
+        source = self._sources[names] = _Source(columns, indices, *limits)
         return source
 
-    def _outside(self, joints: npt.NDArray[np.int_], q: FloatArray) -> str:
+    def _outside(self, source: _Source, q: FloatArray) -> str:
         """Return a message if a position is not finite or is outside the limits."""
-        inside = (q >= self._lower[joints]) & (q <= self._upper[joints])
+        inside = (q >= source.lower) & (q <= source.upper)
         if inside.all():
             return ''
         k = int(np.argmin(inside))
-        j = joints[k]
+        j = source.joints[k]
         return (
             f"the position of joint '{self.pose.joints[j]}' is {q[k]:.4g} {self._units[j]}, "
             f'outside its limits {self._lower[j]:.4g} to {self._upper[j]:.4g} {self._units[j]}'
         )
 
-    def _unreachable(self, joints: npt.NDArray[np.int_], state: _State, last: _State) -> str:
+    def _unreachable(self, source: _Source, state: _State, last: _State) -> str:
         """Return a message if a position is unreachable from the last, or a stamp is older."""
         if state.stamp_ns and state.stamp_ns <= last.stamp_ns:
             back = (last.stamp_ns - state.stamp_ns) * 1e-9
@@ -238,11 +244,12 @@ class PoseMonitor:
             between = (state.stamp_ns - last.stamp_ns) * 1e-9
             passed = max(passed, min(between, passed + _TRANSPORT))
         step = np.abs(state.q - last.q)
-        beyond = step - _NOISE - self._velocity[joints] * max(passed, 0.0)
+        beyond = step - _NOISE - source.velocity * max(passed, 0.0)
         k = int(np.argmax(beyond))
         if not beyond[k] > 0.0:  # NaN if no position was known
             return ''
-        j, unit = joints[k], self._units[joints[k]]
+        j = source.joints[k]
+        unit = self._units[j]
         return (
             f"the position of joint '{self.pose.joints[j]}' goes from {last.q[k]:.4g} to "
             f'{state.q[k]:.4g} {unit} within {passed:.3g} s, faster than its limit of '
@@ -253,11 +260,11 @@ class PoseMonitor:
         self._rejections.append((now, fault))
         self.rejected += 1
 
-    def _believe(self, source: _Source, state: _State, message: JointState) -> None:
+    def _believe(self, source: _Source, state: _State) -> None:
         states = source.states
         states.append(state)
         while len(states) > AGREEING and state.arrived - states[1].arrived > _WINDOW:
             states.popleft()
-        self.pose = self.pose.updated(
-            message.names, message.position.tolist(), message.stamp_ns, state.arrived
-        )
+        q = np.full(len(self.pose.joints), np.nan)
+        q[source.joints] = state.q
+        self.pose = self.pose.updated(q, state.stamp_ns, state.arrived)

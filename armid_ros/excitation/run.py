@@ -11,6 +11,7 @@ from armid_ros.arm import ArmModel
 from armid_ros.errors import TrajectoryError
 from armid_ros.excitation.limits import Limits
 from armid_ros.excitation.schedule import Excitation
+from armid_ros.excitation.supervision import Path
 from armid_ros.excitation.transfer import Transfer, TransferPlanner
 from armid_ros.motion import FloatArray, Motion
 import numpy as np
@@ -74,16 +75,21 @@ class Run:
         time = np.clip(np.asarray(t, dtype=float), 0.0, self.duration)
         begin, lasts = self.approach.duration, self._lasts
         early = 0.5 * (lasts - self.excitation.duration)
-        parts = [self.approach.at(time), self.excitation.at(time - begin - early)]
+        parts: list[tuple[Path, FloatArray]] = [
+            (self.approach, time),
+            (self.excitation, time - begin - early),
+        ]
         choice = (time > begin).astype(int)
         if self.back is not None:
-            parts.append(self.back.at(time - begin - lasts))
+            parts.append((self.back, time - begin - lasts))
             choice += time > begin + lasts
-        q, dq, ddq = (
-            np.choose(choice[:, np.newaxis], [getattr(part, name) for part in parts])
-            for name in ('q', 'dq', 'ddq')
-        )
-        return Motion(self.joints, time, q, dq, ddq)
+        states = np.empty((3, len(time), len(self.joints)))
+        for k, (path, elapsed) in enumerate(parts):
+            some = choice == k
+            if some.any():  # the single time of a moving arm is of one part
+                motion = path.at(elapsed[some])
+                states[:, some] = motion.q, motion.dq, motion.ddq
+        return Motion(self.joints, time, *states)
 
     def motion(self) -> Motion:
         """Sample the whole run, from time 0 on."""

@@ -5,8 +5,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
-import math
+from dataclasses import dataclass
 from typing import Protocol
 
 from armid_ros.motion import FloatArray, Motion, read_only
@@ -37,7 +36,7 @@ class MeasuredPose:
         Latest positions [rad or m]; NaN if none was received.
     seen : ndarray, shape (n,)
         Arrival time of each position [s]; minus infinity if none was received.
-    stamps : tuple of int
+    stamps : ndarray of int, shape (n,)
         Timestamps of the positions [ns]; a message with the same stamp is ignored.
 
     """
@@ -45,7 +44,7 @@ class MeasuredPose:
     joints: tuple[str, ...]
     q: FloatArray
     seen: FloatArray
-    stamps: tuple[int, ...]
+    stamps: npt.NDArray[np.int64]
 
     def __post_init__(self) -> None:
         """Freeze the arrays."""
@@ -56,35 +55,31 @@ class MeasuredPose:
     def unknown(cls, joints: tuple[str, ...]) -> MeasuredPose:
         """Return the pose of an arm without any received position."""
         n = len(joints)
-        return cls(joints, np.full(n, np.nan), np.full(n, -np.inf), (0,) * n)
+        return cls(joints, np.full(n, np.nan), np.full(n, -np.inf), np.zeros(n, np.int64))
 
-    def updated(
-        self, names: Sequence[str], positions: Sequence[float], stamp_ns: int, now: float
-    ) -> MeasuredPose:
+    def updated(self, positions: npt.ArrayLike, stamp_ns: int, now: float) -> MeasuredPose:
         """
         Return the pose updated with a message.
 
         Parameters
         ----------
-        names : sequence of str
-            Joints of the message, in any order; joints of other devices are ignored.
-        positions : sequence of float
-            Positions of these joints [rad or m]; values that are not finite are ignored.
+        positions : array_like, shape (n,)
+            Positions [rad or m]; not finite for joints that the message does not have.
         stamp_ns : int
             Timestamp of the message [ns]; 0 if it has none.
         now : float
             Arrival time [s].
 
         """
-        q, seen, stamps = self.q.copy(), self.seen.copy(), list(self.stamps)
-        for name, position in zip(names, positions, strict=False):
-            if name not in self.joints or not math.isfinite(position):
-                continue
-            j = self.joints.index(name)
-            if stamp_ns and stamp_ns == stamps[j]:
-                continue
-            q[j], seen[j], stamps[j] = position, now, stamp_ns
-        return replace(self, q=q, seen=seen, stamps=tuple(stamps))
+        new = np.isfinite(positions)
+        if stamp_ns:
+            new &= self.stamps != stamp_ns
+        return MeasuredPose(
+            self.joints,
+            np.where(new, positions, self.q),
+            np.where(new, now, self.seen),
+            np.where(new, stamp_ns, self.stamps),
+        )
 
     def staleness(self, now: float, timeout: float) -> str:
         """Return a message if a joint position is older than a timeout [s]; otherwise empty."""

@@ -42,7 +42,7 @@ class ArmWatch:
     """
 
     def __init__(
-        self, node: ArmidNode, robot: Robot, tolerance: float, on_state: Callable[[], None]
+        self, node: ArmidNode, robot: Robot, tolerance: float, on_state: Callable[[float], None]
     ) -> None:
         """
         Subscribe.
@@ -56,7 +56,7 @@ class ArmWatch:
         tolerance : float
             Largest distance beyond a position limit at which a position is accepted [rad or m].
         on_state : callable
-            Called after every message.
+            Called after every message with its time of arrival, see `now` [s].
 
         """
         self.monitor = PoseMonitor(robot, tolerance)
@@ -143,7 +143,8 @@ class ArmWatch:
         message = self._messages.read(data)
         stamp = message.sec * 10**9 + message.nanosec
         state = State(message.names, message.position, message.velocity, stamp)
-        self.monitor.update(state, self.now())
+        now = self.now()
+        self.monitor.update(state, now)
         self.stamps.take(stamp)
         self._efforts = message.names, message.effort
-        self._on_state()
+        self._on_state(now)

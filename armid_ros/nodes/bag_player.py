@@ -74,7 +74,8 @@ class _JumpGuard:
             return str(error)
         pose = MeasuredPose.unknown(reference.joints)
         for message, seen in self._latest.values():
-            pose = pose.updated(message.name, message.position, 0, seen)
+            known = dict(zip(message.name, message.position, strict=False))
+            pose = pose.updated([known.get(j, np.nan) for j in pose.joints], 0, seen)
         lost = pose.staleness(time.monotonic(), self.timeout)
         if lost:
             return f'trajectory: {self._states.topic_name}: {lost}; arm position unknown'

@@ -145,7 +145,7 @@ class ExcitationPublisherNode(ArmidNode):
     @property
     def last_stamp_ns(self) -> int:
         """Return the oldest stamp of the accepted joint positions [ns]."""
-        return min(self._arm.monitor.pose.stamps)
+        return int(self._arm.monitor.pose.stamps.min())
 
     @property
     def elapsed(self) -> float | None:
@@ -331,9 +331,8 @@ class ExcitationPublisherNode(ArmidNode):
 
         return super()._surviving(stopping, what)
 
-    def _on_state(self) -> None:
+    def _on_state(self, now: float) -> None:
         """Compare the measured position and effort with the run."""
-        now = self._arm.now()
         if 0.0 <= now - self._tracked < _TRACKING_PERIOD:
             return
         self._tracked = now
@@ -344,9 +343,10 @@ class ExcitationPublisherNode(ArmidNode):
             return
         monitor, robot = self._arm.monitor, self._planner.arm.robot
         pose, effort = monitor.pose, self._arm.effort
-        phase = (min(pose.stamps) - self._begun_ns) * 1e-9
+        stamp_ns = self.last_stamp_ns
+        phase = (stamp_ns - self._begun_ns) * 1e-9
         strange = abs(phase - elapsed) > self.value('state_timeout')
-        if not min(pose.stamps) or (strange and not self._simulated):
+        if not stamp_ns or (strange and not self._simulated):
             phase = elapsed  # the stamp is from another clock; simulated joint states may be late
         if self._rehearsal is not None:
             self._rehearsal.add(phase, pose.q, effort)

@@ -39,7 +39,6 @@ from armid_ros.nodes.parameters.identifier import (
 from armid_ros.nodes.parameters.table import NodeParameter
 from armid_ros.nodes.qos import LATCHED, STREAM
 from armid_ros.nodes.running.process import run
-from builtin_interfaces.msg import Time
 from diagnostic_msgs.msg import DiagnosticStatus
 import numpy as np
 from rclpy.publisher import Publisher
@@ -140,7 +139,7 @@ class OnlineIdentifierNode(ListeningNode):
         if identifier is None or identifier.samples in (0, self._published):
             return
         self._published = identifier.samples
-        self._publish(self._estimates, identifier.estimate(), self._last_sample_stamp)
+        self._publish(self._estimates, identifier.estimate(), self._last_sample)
 
     def condition(self) -> tuple[str, Mapping[str, object]]:
         """Return the state of the identification."""
@@ -265,25 +264,24 @@ class OnlineIdentifierNode(ListeningNode):
             self._last_sample = learned.t
             self._squares += learned.residual**2
             self._counted += 1
-            self._last_sample_stamp = self.reader.stamp(learned.t).to_msg()
             self._publish_effort(self._predictions, learned.predicted)
             self._publish_effort(self._residuals, learned.residual)
         for change in identifier.changes[self._told :]:
             self._told += 1
             self._progress.reset()  # a new estimate gets the same time before a warning
             self.get_logger().warning(str(change))
-            self._publish(self._changes, change.size, self.reader.stamp(change.t).to_msg())
+            self._publish(self._changes, change.size, change.t)
 
-    def _publish(self, publisher: Publisher, estimate: Estimate, stamp: Time) -> None:
+    def _publish(self, publisher: Publisher, estimate: Estimate, t: float) -> None:
         identifier = self._require()
         message = estimate_message(estimate, identifier.samples, identifier.condition_number)
-        message.header.stamp = stamp
+        message.header.stamp = self.reader.stamp(t).to_msg()
         publisher.publish(message)
 
     def _publish_effort(self, publisher: Publisher, effort: FloatArray) -> None:
         if publisher.get_subscription_count():
             message = JointState(name=self._names, effort=effort.tolist())
-            message.header.stamp = self._last_sample_stamp
+            message.header.stamp = self.reader.stamp(self._last_sample).to_msg()
             publisher.publish(message)
 
     def _begin(self, identifier: OnlineIdentifier) -> None:
@@ -295,7 +293,6 @@ class OnlineIdentifierNode(ListeningNode):
         self.adopt(robot)
         self.identifier = identifier
         self._names = list(robot.joints)
-        self._last_sample_stamp = self.reader.stamp(0.0).to_msg()
         self._last_sample = 0.0
         self._told = len(identifier.changes)
         self._progress = LearningProgress(

@@ -77,8 +77,7 @@ class JointStateLayout:
         except (struct.error, UnicodeDecodeError) as error:
             raise MalformedMessage(f'not a JointState: {error}') from error
         layout = cls(order, frame_length, names, tuple(counts))
-        # A writer reserves room to align what follows, and for each empty sequence as well.
-        if not 0 <= len(cdr) - layout.end <= 7 + 4 * counts.count(0):
+        if not 0 <= len(cdr) - layout.end <= layout.spare:
             raise MalformedMessage(f'{len(cdr)} bytes where a JointState has {layout.end}')
         return layout
 
@@ -111,6 +110,12 @@ class JointStateLayout:
     def end(self) -> int:
         """Where the last value ends."""
         return self.places[-1][1] + 8 * self.counts[-1]
+
+    @property
+    def spare(self) -> int:
+        """Largest number of bytes behind the last value."""
+        # A writer reserves room to align what follows, and for each empty sequence as well.
+        return 7 + 4 * self.counts.count(0)
 
     def dtype(self, length: int) -> np.dtype[np.void]:
         """Return messages of this layout and a total length as a numpy record."""

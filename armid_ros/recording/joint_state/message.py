@@ -54,11 +54,14 @@ class JointStateMessages:
 
         """
         for fields in self._known:
-            if fields.fit(data):
-                return fields.read(data)
+            values = fields.read(data)
+            if values is not None:
+                return values
         fields = _Fields(JointStateLayout.of(data))
         self._known = [fields, *self._known[:7]]  # one layout per sender on a topic
-        return fields.read(data)
+        values = fields.read(data)
+        assert values is not None
+        return values
 
 
 class _Fields:
@@ -72,28 +75,29 @@ class _Fields:
         self._text = int.from_bytes(expected.tobytes(), 'little')
         self._mask = int.from_bytes(mask.tobytes(), 'little')
         self._code = b'\x00\x01' if order == '<' else b'\x00\x00'
-        self._count = struct.Struct(order + 'I').unpack_from
-        self._stamp = struct.Struct(order + 'iI').unpack_from
-        counts = zip(layout.places, layout.counts, strict=True)
-        self._counts = [(12, (layout.frame_length,)), *((at, (n,)) for (at, _), n in counts)]
+        # the stamp and all lengths in one call
+        numbers, end = order + '4xiII', 16
+        for at, _ in layout.places:
+            numbers, end = f'{numbers}{at - end}xI', at + 4
+        self._numbers = struct.Struct(numbers).unpack_from
+        self._lengths = [layout.frame_length, *layout.counts]
         self._end = layout.end
+        self._longest = layout.end + layout.spare
         self._type = np.dtype(order + 'f8')
         begins = (begin for _, begin in layout.places)
         self._places = list(zip(layout.counts, begins, strict=True))
 
-    def fit(self, data: bytes) -> bool:
-        """Return whether a message has this layout; padding is not compared."""
-        if data[:2] != self._code or not self._end <= len(data) <= self._end + 7:
-            return False
+    def read(self, data: bytes) -> JointStateValues | None:
+        """Return the values; None if the layout is another one. Padding is not compared."""
+        if data[:2] != self._code or not self._end <= len(data) <= self._longest:
+            return None
         if int.from_bytes(data[self._named], 'little') & self._mask != self._text:
-            return False
-        return all(self._count(data, place) == count for place, count in self._counts)
-
-    def read(self, data: bytes) -> JointStateValues:
-        """Return the values of a message of this layout."""
+            return None
+        sec, nanosec, *lengths = self._numbers(data)
+        if lengths != self._lengths:
+            return None
         position, velocity, effort = (
             np.frombuffer(data, self._type, count, place) if count else _NOTHING
             for count, place in self._places
         )
-        sec, nanosec = self._stamp(data, 4)
         return JointStateValues(sec, nanosec, self.names, position, velocity, effort)
