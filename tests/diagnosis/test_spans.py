@@ -23,7 +23,7 @@ def two_days(upright):
         return body(motion, tau) * inside[:, np.newaxis]
 
     model = identify(upright.arm, before, rng=np.random.default_rng(0)).arm
-    return model, before, upright.recordings(held, seed=2)
+    return model, before, upright.recordings(held, seed=2), upright.recordings(held, seed=3)
 
 
 @pytest.mark.slow
@@ -31,9 +31,10 @@ def two_days(upright):
 def test_a_payload_that_is_picked_up_and_put_down_is_named_with_its_seconds(
     two_days, with_baseline
 ):
-    model, before, after = two_days
-    baseline = before if with_baseline else ()
-    found = diagnose(model, after, baseline=baseline, rng=np.random.default_rng(0))
+    model, before, after, new = two_days
+    known = {'baseline': before} if with_baseline else {'validate': new}
+    found = diagnose(model, after, **known, rng=np.random.default_rng(0))
+    assert any('held-out' in note for note in found.notes) != with_baseline
     assert [one.name for one in found.findings] == ['payload'], found.summary
     assert found.findings[0].values[0] == pytest.approx(MASS, rel=0.1)
     spans = diagnosis_document(found)['spans']
@@ -46,7 +47,7 @@ def test_a_payload_that_is_picked_up_and_put_down_is_named_with_its_seconds(
 @pytest.mark.long
 @pytest.mark.parametrize('seconds', [0.4, 1.5])
 def test_seconds_that_are_too_few_to_be_diagnosed_alone_are_a_verdict(two_days, upright, seconds):
-    model, before, _ = two_days
+    model, before, *_ = two_days
     body = held_by(upright.robot)
 
     def held(motion, tau):
@@ -60,7 +61,7 @@ def test_seconds_that_are_too_few_to_be_diagnosed_alone_are_a_verdict(two_days, 
 
 @pytest.mark.slow
 def test_a_cause_that_acts_throughout_has_no_seconds(two_days, upright):
-    model, before, _ = two_days
+    model, before, *_ = two_days
     after = upright.recordings(held_by(upright.robot), seed=3)
     found = diagnose(model, after, baseline=before, rng=np.random.default_rng(0))
     assert found.findings[0].name == 'payload' and not found.spans
