@@ -50,6 +50,11 @@ _ASSUMED = (
     'nothing repeats in some recordings: their noise is assumed from what rows differ by from '
     'their neighbours; two equal periods would measure it'
 )
+#: Note where a cause acts for a part of the time, and only a baseline would show it elsewhere.
+_NOT_TIMED = (
+    'held-out recordings are not used: without a baseline, the seconds in which the cause acts in '
+    'them are not determined'
+)
 #: Fault where predicting no torque at all would be better.
 _NO_MODEL = (
     'the model leaves {:.3g} times the torque of the baseline itself, more than no model would. '
@@ -175,7 +180,8 @@ def _within(
     if not settings.spans or look is None or not _hardly_explained(result, settings):
         return None
     spans = acting_spans(look, settings.thresholds)
-    cut = [_cut(*each) for each in zip(spans, [*recordings, *validate], strict=False)]
+    told = [*recordings, *validate][: len(spans)]
+    cut = [_cut(*each) for each in zip(spans, told, strict=True)]
     shorter, unseen = (
         [one for one in part if one is not None]
         for part in (cut[: len(recordings)], cut[len(recordings) :])
@@ -197,6 +203,8 @@ def _within(
         return None
     if _hardly_explained(found, settings):
         return None
+    if len(told) < len(recordings) + len(validate):
+        found = replace(found, notes=(*found.notes, _NOT_TIMED))
     return found.acting_in([one for one in spans if one.stop > one.start])
 
 

@@ -170,10 +170,6 @@ class Effect(ABC):
         """Return the equivalent effects of the catalogue, with values."""
         return ((self, values),)
 
-    def when_found(self, values: FloatArray) -> tuple[Effect, FloatArray]:
-        """Return the effect that is fitted once this one is found, and initial values."""
-        return self, values
-
     def _default_shape(self, robot: Robot) -> FloatArray:
         """Return an initial shape on this robot, shape (number of owners, S)."""
         return self.shape_values

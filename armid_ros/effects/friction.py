@@ -1,10 +1,9 @@
 # Copyright 2026 The armid_ros developers
 # SPDX-License-Identifier: Apache-2.0
-"""Friction that depends on velocity: viscous, Coulomb, further laws, and a common factor."""
+"""Friction that depends on velocity: viscous, Coulomb, and further laws."""
 
 from __future__ import annotations
 
-from collections.abc import Collection, Iterable
 from dataclasses import dataclass, replace
 from typing import ClassVar
 
@@ -14,7 +13,6 @@ from armid_ros.effects.direction import direction
 from armid_ros.effects.layout import joint_columns, scatter
 from armid_ros.effects.quantities import Quantity, Shape, SURELY
 from armid_ros.motion import FloatArray, Motion
-from armid_ros.robots import Robot
 import numpy as np
 
 
@@ -262,134 +260,3 @@ class ThermalChange(ThermalFriction):
             (ThermalFriction(self.joints, self.shape), change),
             (ViscousFriction(self.joints), first),
         )
-
-
-#: Kinds of friction that a common factor changes.
-_PARTS = ViscousFriction, CoulombFriction
-
-
-@dataclass(frozen=True)
-class FrictionLevel(Effect):
-    """
-    Relative change of the friction of several joints, tau = k (Fv dq + Fc sign(dq)).
-
-    A warm arm has less friction in all joints and a cold arm more, mainly viscous friction. A
-    search uses one factor, on both kinds or on viscous friction only. The fit then uses one factor
-    per joint, because joints warm up differently. The result is reported as viscous and Coulomb
-    friction.
-    Source: Bittencourt and Gunnarsson, Static friction in a robot joint - modeling and
-    identification of load and temperature effects, 2012.
-
-    Attributes
-    ----------
-    viscous, coulomb : tuple of float
-        Known coefficients Fv and torques Fc of the joints.
-    each : bool
-        Whether each joint has its own factor.
-
-    """
-
-    viscous: tuple[float, ...] = ()
-    coulomb: tuple[float, ...] = ()
-    each: bool = False
-
-    name = 'friction_level'
-    summary = 'friction of all joints by one factor'
-    holds_at_rest = True
-    quantities = (Quantity('friction_change', '', lower=-1.0, typical=(0.02, 3.0)),)
-
-    @property
-    def owners(self) -> tuple[str, ...]:
-        """Return the owners of a factor: the joints, or the whole arm."""
-        return self.joints if self.each else ('',)
-
-    @property
-    def said_as(self) -> str:
-        """Return coulomb_friction if any joint has it, otherwise viscous_friction."""
-        return CoulombFriction.name if any(self.coulomb) else ViscousFriction.name
-
-    def when_found(self, values: FloatArray) -> tuple[Effect, FloatArray]:
-        """Return the effect with one factor per joint."""
-        return replace(self, each=True), np.resize(values, len(self.joints))
-
-    def columns(self, motion: Motion, arm: Arm) -> FloatArray:
-        """Return dtau/dk, the known friction torque [N m], shape (N, n, P)."""
-        of_joints = [kind(self.joints).columns(motion, arm) * own for kind, own in self._parts]
-        each = np.sum(of_joints, axis=0)
-        return np.asarray(each if self.each else each.sum(axis=2, keepdims=True))
-
-    def action(self, values: FloatArray, arm: Arm) -> Action:
-        """Return damping and dry friction."""
-        viscous, coulomb = (
-            kind(self.joints).action(values * own, arm) for kind, own in self._parts
-        )
-        return Action(damping=viscous.damping, dry_friction=coulomb.dry_friction)
-
-    def named_as(self, values: FloatArray, arm: Arm) -> tuple[tuple[Effect, FloatArray], ...]:
-        """Return viscous and Coulomb friction of the joints with friction."""
-        said: list[tuple[Effect, FloatArray]] = []
-        for kind, own in self._parts:
-            there = own != 0.0  # noqa: RUF069 - as described
-            joints = tuple(joint for joint, has in zip(self.joints, there, strict=True) if has)
-            if joints:
-                said.append((kind(joints), (values * own)[there]))
-        return tuple(said)
-
-    @property
-    def _parts(self) -> tuple[tuple[type[Effect], FloatArray], ...]:
-        """Kinds of friction, each with the known values of the joints, (n,)."""
-        levels = (np.array(own) for own in (self.viscous, self.coulomb))
-        return tuple(zip(_PARTS, levels, strict=True))
-
-
-@dataclass(frozen=True)
-class FrictionOfJoints:
-    """The known friction of an arm, as a kind of effect; see `FrictionLevel`."""
-
-    effect: FrictionLevel
-    name: str = FrictionLevel.name
-
-    def on(self, robot: Robot, joints: tuple[str, ...] | None = None) -> Effect:
-        """Return the effect on the joints with friction."""
-        return self.effect
-
-    def places(self, robot: Robot) -> tuple[tuple[str, ...], ...]:
-        """Return all its joints as one place."""
-        return (self.effect.joints,)
-
-    def as_change(self) -> FrictionOfJoints:
-        """Return this kind: the factor already is a change of the known friction."""
-        return self
-
-
-def friction_level(
-    effects: Iterable[tuple[Effect, FloatArray]], robot: Robot, library: Collection[str]
-) -> tuple[FrictionOfJoints, ...]:
-    """
-    Return the kind of a common friction change, if at least two joints have friction.
-
-    Parameters
-    ----------
-    effects : iterable of (Effect, ndarray)
-        Effects of the arm, with values.
-    robot : Robot
-        The arm.
-    library : collection of str
-        Names of effects that a result may contain; both kinds of friction are required.
-
-    """
-    if not {kind.name for kind in _PARTS} <= set(library):
-        return ()
-    levels = np.zeros((len(_PARTS), robot.n_joints))
-    for effect, values in effects:
-        for level, kind in zip(levels, _PARTS, strict=True):
-            if isinstance(effect, kind):
-                level += scatter(effect, values, robot)[0]
-    found: list[FrictionOfJoints] = []
-    for some in (levels, levels * [[1.0], [0.0]])[: 2 if levels[1].any() else 1]:
-        there = np.flatnonzero(some.any(axis=0))
-        if len(there) >= 2:
-            joints = tuple(robot.joints[k] for k in there)
-            viscous, coulomb = (tuple(level[there].tolist()) for level in some)
-            found.append(FrictionOfJoints(FrictionLevel(joints, viscous=viscous, coulomb=coulomb)))
-    return tuple(found)

@@ -149,11 +149,6 @@ TRAITS = {
         look_at='how warm the gear was, and how long the arm had worked before',
         friction=True,
     ),
-    'friction_level': Traits(
-        shown_by='constant velocities, slow to fast, in both directions',
-        look_at='how warm the arm was and how long it had stood; then the grease and the seals',
-        friction=True,
-    ),
     'gravity_magnitude': Traits(
         shown_by='fast motion and static holds',
         look_at='the gravity in the settings, and the scale of all torques',

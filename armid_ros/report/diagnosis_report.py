@@ -7,6 +7,7 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
+import re
 from typing import Any, ClassVar, Protocol
 
 from armid_ros.arm import ArmModel
@@ -245,7 +246,8 @@ def _at_fault(
     if diagnosis.verdict != 'bad_data':
         return []
     sources = [one.source for several in read.values() for one in several if one.source]
-    named = [source for source in sources if source in diagnosis.summary]
+    whole = r'(?<![\w/]){}(?![\w/])'
+    named = [x for x in sources if re.search(whole.format(re.escape(x)), diagnosis.summary)]
     found = named or [one.source for one in read['training']]
     return [names.get(source, source) or 'in memory' for source in found]
 

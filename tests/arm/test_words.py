@@ -4,7 +4,6 @@
 
 from armid_ros.arm import ArmModel, load_model, save_model
 from armid_ros.effects import CATALOGUE, make_effect
-from armid_ros.effects.friction import friction_level
 from armid_ros.effects.gravity import GravityVector
 from armid_ros.motion import Motion
 from armid_ros.robots import load_robot
@@ -37,14 +36,12 @@ def test_a_model_with_what_is_looked_for_between_two_days_comes_back(
     np.testing.assert_allclose(back.torque(motion), arm.torque(motion), rtol=1e-9, atol=1e-9)
 
 
-def test_friction_of_all_joints_is_added_to_what_they_have(robot, motion, tmp_path):
-    arm = ArmModel(robot)
-    for name in ('viscous_friction', 'coulomb_friction'):
-        arm = arm.with_effect(make_effect(name, robot), np.ones(robot.n_joints))
-    pairs = zip(arm.effects, arm.values, strict=True)
-    kind, _ = friction_level(pairs, robot, list(CATALOGUE))
-    warm = arm.with_effect(kind.on(robot), np.array([-0.3]))
+def test_a_change_of_viscous_friction_is_added_to_what_joints_have(robot, motion, tmp_path):
+    friction = make_effect('viscous_friction', robot)
+    arm = ArmModel(robot).with_effect(friction, np.ones(robot.n_joints))
+    change = CATALOGUE['thermal_friction'].as_change().on(robot)
+    warm = arm.with_effect(change, np.tile([-0.3, 0.1], robot.n_joints))
     save_model(tmp_path / 'model.yaml', warm, robot.name)
     back = load_model(tmp_path / 'model.yaml')
-    assert back.effects == arm.effects
+    assert [effect.name for effect in back.effects] == ['viscous_friction', 'thermal_friction']
     np.testing.assert_allclose(back.torque(motion), warm.torque(motion), atol=1e-12)

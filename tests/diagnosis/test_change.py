@@ -4,13 +4,17 @@
 
 from dataclasses import replace
 
+from armid_ros.arm import ArmModel
 from armid_ros.diagnosis import diagnose, known_misfit
 from armid_ros.diagnosis.doubt import doubt_of_names
 from armid_ros.diagnosis.verdict.finding import Finding
+from armid_ros.effects import make_effect
 from armid_ros.identification import identify
 from armid_ros.model import inverse_dynamics
 import numpy as np
 import pytest
+
+from tests.diagnosis.conftest import Bench, UPRIGHT_URDF
 
 HOSE = np.array([1.5, 0.8])
 
@@ -107,6 +111,31 @@ def test_joints_that_warm_up_each_by_its_own_share_are_told_so(bench):
 
 
 @pytest.mark.long
+@pytest.mark.parametrize('new', ['coulomb_friction', 'viscous_friction'])
+def test_a_law_that_all_joints_have_since_is_one_cause(new):
+    """It is no factor of the friction that they had, with a rest that looks like other laws."""
+    had, more = np.array([0.8, 0.6, 0.4]), np.array([1.0, 0.9, 0.3])
+    coulomb = new == 'coulomb_friction'
+    old = Bench(UPRIGHT_URDF, *((had, 0.0 * had) if coulomb else (0.0 * had, had)))
+    known = 'viscous_friction' if coulomb else 'coulomb_friction'
+    arm = ArmModel(old.robot).with_effect(make_effect(known, old.robot), had)
+
+    def law(motion, tau):
+        return more * (np.sign(motion.dq) if coulomb else 0.3 * motion.dq)
+
+    before, after, new_ones = (
+        old.recordings(hidden, seed) for seed, hidden in enumerate((None, law, law))
+    )
+    model = identify(arm, before, rng=np.random.default_rng(0)).arm
+    found = diagnose(
+        model, after, validate=new_ones, baseline=before, rng=np.random.default_rng(0)
+    )
+    assert found.verdict == 'named', found.summary
+    (one,) = found.findings
+    assert (one.name, one.joints) == (new, old.robot.joints)
+    np.testing.assert_allclose(one.values, more * (1.0 if coulomb else 0.3), atol=0.03)
+
+
 def test_recordings_with_more_noise_than_the_baseline_have_a_floor_of_their_own(bench):
     """A simulated baseline has no noise at all."""
     floors = []

@@ -2,13 +2,23 @@
 # SPDX-License-Identifier: Apache-2.0
 """The evidence of causes is that of normal distributions, written out here."""
 
+from types import SimpleNamespace
+
 from armid_ros.diagnosis.data.days import Rows
 from armid_ros.diagnosis.data.trajectory import trajectories
 from armid_ros.diagnosis.search.candidates import Causes
+from armid_ros.diagnosis.search.comparison import CauseComparison
 from armid_ros.diagnosis.search.nuisance import Nuisance
-from armid_ros.diagnosis.search.odds import EQUAL, odds, without
+from armid_ros.diagnosis.search.odds import (
+    allowed,
+    CauseFit,
+    EQUAL,
+    odds,
+    without,
+)
 from armid_ros.diagnosis.search.priors import SIZES, THERE
 from armid_ros.diagnosis.search.setting import Setting
+from armid_ros.diagnosis.settings import Thresholds
 from armid_ros.effects import CATALOGUE
 from armid_ros.identification.rows.signals import Conditioning
 import numpy as np
@@ -116,3 +126,48 @@ def test_what_is_integrated_out_is_what_a_normal_distribution_leaves():
     np.testing.assert_allclose(aim, rows.T @ inverse @ y, atol=1e-9)
     expected = 0.5 * (y @ y - y @ inverse @ y) - 0.5 * np.linalg.slogdet(total)[1]
     assert gained == pytest.approx(expected)
+
+
+@pytest.mark.parametrize('joints', [[1], [0, 2], [0, 1, 2]])
+def test_a_family_has_the_joints_of_the_largest_evidence(upright, joints):
+    """Drag of one joint is no family; that of two of three is one, and has no third."""
+    size = 0.2 * np.isin(range(3), joints)
+    days = [
+        upright.recordings(seed=1),
+        upright.recordings(lambda motion, tau: size * motion.dq, seed=2),
+    ]
+    data = trajectories([*days[0], *days[1]], USED)
+    misfit = np.full(3, 0.05)
+    rows = Rows(tuple(data), (misfit,) * 6, 3, (misfit,) * 6)
+    nuisance = Nuisance.of(rows, upright.arm, np.random.default_rng(0))
+    under = nuisance.marginal(Setting(True, 0.4, 0.3, 0.7, 1.0))
+    causes = causes_of(nuisance, under, 'viscous_friction')
+    families = [one for one in causes if len(one.effect.joints) > 1]
+    wanted = tuple(upright.robot.joints[k] for k in joints)
+    assert [one.effect.joints for one in families] == ([wanted] if len(joints) > 1 else [])
+    for one in families:
+        assert odds(one, nuisance, under).values == pytest.approx(size[joints], abs=0.02)
+
+
+def test_every_value_of_a_cause_has_to_be_possible(upright):
+    """The last joint has 0.3 N m of Coulomb friction to lose."""
+    effect = CATALOGUE['coulomb_friction'].on(upright.robot)
+    cause = SimpleNamespace(effect=effect, kept=(0, 1, 2), unit=np.ones(3))
+    nuisance = SimpleNamespace(arm=upright.arm)
+    for value, possible in ((-0.2, True), (-0.6, False)):
+        values = np.array([0.5, 0.3, value])
+        fit = CauseFit(0.0, 0.0, 1.0, values, np.full(3, 0.01), np.ones(3))
+        assert (allowed(cause, fit, nuisance) > -10.0) == possible
+
+
+def test_earlier_causes_without_significance_are_dropped(nuisance):
+    setting = Setting(True, 0.4, 0.3, 0.7, 1.0)
+    under = nuisance.marginal(setting)
+    first, last = causes_of(nuisance, under, 'torque_offset')
+    for order in ((first, last), (last, first)):
+        both = nuisance
+        for cause in order:
+            both = both.and_cause(cause, 1.0)
+        comparison = CauseComparison(both, None, Thresholds(), (setting,))
+        accepted, left = comparison._pruned(list(order), both)
+        assert accepted == [order[1]] and len(left.accepted) == 1

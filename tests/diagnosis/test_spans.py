@@ -23,13 +23,14 @@ def two_days(upright):
         return body(motion, tau) * inside[:, np.newaxis]
 
     model = identify(upright.arm, before, rng=np.random.default_rng(0)).arm
-    return model, before, upright.recordings(held, seed=2)
+    return model, before, upright.recordings(held, seed=2), upright.recordings(held, seed=3)
 
 
 @pytest.mark.slow
 def test_a_payload_that_is_picked_up_and_put_down_is_named_with_its_seconds(two_days):
-    model, _, after = two_days
-    found = diagnose(model, after, rng=np.random.default_rng(0))
+    model, _, after, new = two_days
+    found = diagnose(model, after, validate=new, rng=np.random.default_rng(0))
+    assert any('held-out' in note for note in found.notes)
     assert [one.name for one in found.findings] == ['payload'], found.summary
     assert found.findings[0].values[0] == pytest.approx(MASS, rel=0.1)
     spans = diagnosis_document(found)['spans']
@@ -41,7 +42,7 @@ def test_a_payload_that_is_picked_up_and_put_down_is_named_with_its_seconds(two_
 
 @pytest.mark.long
 def test_a_cause_that_acts_throughout_has_no_seconds(two_days, upright):
-    model, before, _ = two_days
+    model, before, *_ = two_days
     after = upright.recordings(held_by(upright.robot), seed=3)
     found = diagnose(model, after, baseline=before, rng=np.random.default_rng(0))
     assert found.findings[0].name == 'payload' and not found.spans

@@ -162,7 +162,11 @@ def test_bad_data_have_no_green_tick():
     assert found.verdict == 'bad_data'
     page = diagnosis_report(found, {'training': turned}, robot='two_links')
     assert 'class="fine"' not in page
-    sound = [replace(one, source=f'before {k}') for k, one in enumerate(bench.recordings(seed=1))]
+    sources = 'before', 'speed 1', f'{turned[0].source}5'  # the last two begin as those at fault
+    sound = [
+        replace(one, source=source)
+        for source, one in zip(sources, bench.recordings(seed=1), strict=True)
+    ]
     both = {'training': turned, 'baseline': sound}
     beside = diagnosis_report(found, both, robot='two_links')
     assert beside.count('class="fine"') == len(sound)

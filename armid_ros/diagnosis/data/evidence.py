@@ -255,18 +255,21 @@ def _difference(
     t = (motion.t[first] - motion.t[first].mean()) / max(np.ptp(motion.t[first]), 1e-9)
     dq = motion.dq[first, joint]
     drifting = np.column_stack([np.ones_like(t), t, dq, t * dq])
-    used = _between_rows(trajectory, first, joint) & _between_rows(trajectory, first + lag, joint)
+    used = _in_informative_rows(trajectory, first, joint) & _in_informative_rows(
+        trajectory, first + lag, joint
+    )
     if used.sum() < _FEW:
         used = np.ones(len(first), dtype=bool)
     fit = np.linalg.lstsq(drifting[used], difference[used], rcond=None)[0]
     return difference - drifting @ fit, used
 
 
-def _between_rows(
+def _in_informative_rows(
     trajectory: Trajectory, samples: npt.NDArray[np.intp], joint: int
 ) -> npt.NDArray[np.bool_]:
-    """Return whether the row at or after each sample is informative for a joint, (K,)."""
-    nearest = np.clip(np.searchsorted(trajectory.rows, samples), 0, len(trajectory.rows) - 1)
+    """Return whether the row nearest to each sample is informative for a joint, (K,)."""
+    rows = trajectory.rows
+    nearest = np.searchsorted((rows[1:] + rows[:-1]) / 2, samples)
     return np.asarray(trajectory.informative[nearest, joint])
 
 

@@ -11,6 +11,7 @@ asked for only where no planned motion tells the two names.
 from __future__ import annotations
 
 from collections.abc import Sequence
+from math import hypot
 
 from armid_ros.diagnosis.next_run.plan import NextRun
 from armid_ros.diagnosis.verdict.finding import Diagnosis, Finding, Rival
@@ -119,7 +120,9 @@ def _centre(finding: Finding) -> str:
     moments = [row for row in rows if row[0].unit == 'kg m']
     if not (finding.weighs and mass and len(moments) == 3 and excludes_zero(*mass[0][1:])):
         return ''
-    at = ', '.join(as_sure(value / mass[0][1], std / abs(mass[0][1])) for _, value, std in moments)
+    _, kilograms, doubt = mass[0]
+    arms = [(value / kilograms, std) for _, value, std in moments]
+    at = ', '.join(as_sure(x, hypot(std, x * doubt) / abs(kilograms)) for x, std in arms)
     return f'. The load is centred at ({at}) m in the frame of that link'
 
 

@@ -15,12 +15,14 @@ from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 from itertools import pairwise, product
+from math import comb
 
 from armid_ros.arm import ArmModel
 from armid_ros.diagnosis.data.days import Rows
 from armid_ros.diagnosis.data.trajectory import Trajectory
 from armid_ros.diagnosis.search.cause import Cause, SelectedEffect
 from armid_ros.diagnosis.search.nuisance import Nuisance
+from armid_ros.diagnosis.search.odds import CauseInformation, odds
 from armid_ros.diagnosis.search.priors import HOW_OFTEN, log_prior
 from armid_ros.diagnosis.search.setting import Marginal
 from armid_ros.effects import Effect, Kind, Shape
@@ -73,20 +75,58 @@ class Causes:
 
     def causes(self, nuisance: Nuisance, under: Marginal) -> list[Cause]:
         """Return every cause that is not accepted yet, one for each starting shape."""
-        arm, result = nuisance.arm, list[Cause]()
+        arm, result, families = nuisance.arm, list[Cause](), list[Cause]()
         there = [term.cause.effect for term in nuisance.accepted]
-        taken = {(one.name, one.joints) for one in there}
+        taken = {(one.name, place) for one in there for place in (one.joints, *zip(one.joints))}
         bodies = {one.adds_to(arm.robot) for one in there} - {()}
         unexplained = _unexplained(nuisance, under)
         for whole, members in candidate_effects(arm.robot, self.kinds):
             for effect, singles in shaped(whole, members, arm, unexplained):
-                for cause in self._divided(effect, singles):
-                    own = cause.effect.name, cause.effect.joints
-                    same_body = cause.effect.adds_to(arm.robot) in bodies
-                    if own not in taken | self.fitted and not same_body:
-                        result.append(cause)
+                singly = [
+                    cause
+                    for cause in self._divided(effect, singles)
+                    if (cause.effect.name, cause.effect.joints) not in taken | self.fitted
+                    and cause.effect.adds_to(arm.robot) not in bodies
+                ]
+                result += singly
+                if effect.traits.friction and not effect.shapes and len(singly) > 1:
+                    families += self._family(singly, nuisance, under)
         counts = Counter(cause.key for cause in result)
-        return [replace(cause, shapes=counts[cause.key]) for cause in result]
+        result = [replace(cause, shapes=counts[cause.key]) for cause in result]
+        return [*result, *families]
+
+    def _family(
+        self, singles: Sequence[Cause], nuisance: Nuisance, under: Marginal
+    ) -> Iterator[Cause]:
+        """
+        Yield one law in the joints of the largest evidence, if these are several.
+
+        Values of joints are independent under a common prior; any number of joints is as likely.
+
+        """
+        first, count = singles[0].effect, len(singles)
+        size = len(first.quantities)
+        whole = replace(first, joints=tuple(one.effect.joints[0] for one in singles))
+        (every,) = self._divided(whole, [whole])
+        known = CauseInformation.of(every, nuisance, under, by_day=True)
+
+        def among(members: tuple[int, ...]) -> tuple[float, Cause]:
+            values = np.add.outer(size * np.array(members), np.arange(size)).ravel()
+            effect = replace(first, joints=tuple(whole.joints[k] for k in members))
+            cause = every.among(effect, values, comb(count, len(members)))
+            fit = odds(cause, nuisance, known.among(values))
+            return fit.factor + cause.prior, cause
+
+        chosen = tuple(range(count))
+        best, found = among(chosen)
+        while len(chosen) > 1:
+            fewer = [chosen[:k] + chosen[k + 1 :] for k in range(len(chosen))]
+            tried = [among(members) for members in fewer]
+            k = max(range(len(tried)), key=lambda k: tried[k][0])
+            if tried[k][0] <= best:
+                yield found
+                return
+            (best, found), chosen = tried[k], fewer[k]
 
     @property
     def effects(self) -> Iterator[Effect]:

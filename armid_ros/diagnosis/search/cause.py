@@ -10,6 +10,7 @@ from dataclasses import dataclass, replace
 from armid_ros.effects import Effect
 from armid_ros.motion import FloatArray
 import numpy as np
+import numpy.typing as npt
 
 
 @dataclass(frozen=True)
@@ -56,6 +57,22 @@ class Cause:
     def key(self) -> tuple[str, tuple[str, ...], tuple[int, ...]]:
         """Identity of the cause whatever its shape: name, joints and quantities."""
         return self.effect.name, self.effect.joints, self.kept
+
+    def among(self, effect: Effect, values: npt.NDArray[np.intp], shapes: int) -> Cause:
+        """Return the cause with some of its values, all those of an effect on fewer joints."""
+        return replace(
+            self,
+            effect=effect,
+            kept=tuple(range(len(values))),
+            unit=self.unit[values],
+            prior=self.prior - float(np.log(shapes)),
+            columns=tuple(x[:, :, values] for x in self.columns),
+            products=tuple(x[:, values] for x in self.products),
+            own=tuple(x[np.ix_(values, values)] for x in self.own),
+            aim=tuple(x[values] for x in self.aim),
+            torque=self.torque[:, values],
+            shapes=shapes,
+        )
 
     def aimed_at(self, residual: Sequence[FloatArray]) -> Cause:
         """Return the cause with `aim` recomputed for another residual, (n, M) per recording."""

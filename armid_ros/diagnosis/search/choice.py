@@ -41,7 +41,6 @@ from armid_ros.diagnosis.search.nuisance import Nuisance
 from armid_ros.diagnosis.search.posterior import JointFit
 from armid_ros.diagnosis.search.setting import Setting
 from armid_ros.diagnosis.settings import DiagnosisSettings
-from armid_ros.effects.friction import friction_level
 from armid_ros.motion import FloatArray
 import numpy as np
 
@@ -232,9 +231,7 @@ class Explainer:
         changed = self.baseline is not None or self.misfit is not None
         kinds = list(settings.kinds)
         if changed:
-            given = zip(arm.effects, arm.values, strict=True)
-            level = friction_level(given, arm.robot, settings.library)
-            kinds = [*(kind.as_change() for kind in kinds), *level]
+            kinds = [kind.as_change() for kind in kinds]
         fitted = () if changed else ((effect.name, effect.joints) for effect in unknown)
         catalogue = Causes(tuple(kinds), nuisance, changed, frozenset(fitted), settings.prior)
         used = settings_of_baseline(nuisance) if grid is None else tuple(grid)

@@ -262,8 +262,8 @@ class CauseComparison:
                 gain = float(mean @ np.linalg.solve(own, mean)) + np.linalg.slogdet(own)[1]
                 gain -= 2.0 * float(np.sum(np.log(size * cause.unit)))
                 worth.append(0.5 * gain + cause.prior)
-            least = int(np.argmin(worth))
-            if worth[least] > self.thresholds.alarm or least == len(accepted) - 1:
+            least = int(np.argmin(worth[:-1]))
+            if worth[least] > self.thresholds.alarm:
                 break
             accepted, nuisance = (
                 [*accepted[:least], *accepted[least + 1 :]],

@@ -65,10 +65,8 @@ def explain(
             continue
         whole = np.zeros(len(cause.effect.parameters(robot)))
         whole[list(cause.kept)] = means[span]
-        effect, first = cause.effect.when_found(whole)
-        kept = cause.kept if effect is cause.effect else tuple(range(len(first)))
-        named.append(SelectedEffect(effect, kept))
-        values.append(first)
+        named.append(SelectedEffect(cause.effect, cause.kept))
+        values.append(whole)
         steps.append(trial)
     there = [trial for trial in _open(result, unknown, settings) if trial.odds > alarm]
     large = {t.effect.name for t in there if np.any(np.abs(t.values) >= t.least)}

@@ -144,6 +144,11 @@ class CauseInformation:
         matrix = self.matrix[np.ix_(kept, kept)]
         return replace(self, matrix=matrix, vector=self.vector[kept], today=self.today[of_it])
 
+    def among(self, values: npt.NDArray[np.intp]) -> CauseInformation:
+        """Return the information where only some of the values are not zero."""
+        kept = np.add.outer(self.size * np.arange(len(self.today)), values).ravel()
+        return replace(self, matrix=self.matrix[np.ix_(kept, kept)], vector=self.vector[kept])
+
     def apart(self, spread: float) -> list[FloatArray]:
         """Return a root of the covariance of differences between recordings; empty if none."""
         if not spread:
@@ -231,22 +236,19 @@ def odds(
 
 
 def allowed(cause: Cause, fit: CauseFit, nuisance: Nuisance) -> float:
-    """Return the log ratio of posterior to prior probability within the bounds."""
+    """Return the log ratio of posterior to prior probability within the bounds, value by value."""
     arm, kept = nuisance.arm, list(cause.kept)
     whole, std = np.zeros((2, len(cause.effect.parameters(arm.robot))))
     whole[kept], std[kept] = fit.values, fit.std
     if not cause.effect.plausible(whole, std, arm):
         return IMPOSSIBLE
     lower, upper = (bound[kept] for bound in room(cause.effect, arm))
-    bounded = np.flatnonzero(np.isfinite(lower) | np.isfinite(upper))
-    if not len(bounded):
-        return 0.0
-    k = bounded[0]
     found, prior = (
-        stats.norm.cdf((upper[k] - mean) / wide) - stats.norm.cdf((lower[k] - mean) / wide)
-        for mean, wide in ((fit.values[k], fit.std[k]), (0.0, fit.size * cause.unit[k]))
+        stats.norm.cdf((upper - mean) / wide) - stats.norm.cdf((lower - mean) / wide)
+        for mean, wide in ((fit.values, fit.std), (0.0, fit.size * cause.unit))
     )
-    return float(np.log(max(found, 1e-300)) - np.log(max(prior, 1e-6)))
+    ratio = np.log(np.maximum(found, 1e-300)) - np.log(np.maximum(prior, 1e-6))
+    return float(np.sum(ratio))
 
 
 def usual_spread(causes: Sequence[Cause], nuisance: Nuisance, under: Marginal) -> float:

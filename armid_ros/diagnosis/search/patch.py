@@ -9,7 +9,7 @@ from functools import cached_property
 
 from armid_ros.arm import ArmModel
 from armid_ros.arm.memoized_arm import memoized_arm
-from armid_ros.arm.words import place_in, with_named
+from armid_ros.arm.words import with_named
 from armid_ros.diagnosis.data.trajectory import Trajectory
 from armid_ros.diagnosis.search.cause import SelectedEffect
 from armid_ros.effects import Effect, TorqueReading
@@ -96,11 +96,13 @@ class Patch:
 def room(effect: Effect, arm: ArmModel) -> tuple[FloatArray, FloatArray]:
     """Return the bounds of the change of values, given what the arm already has, each (P,)."""
     lower, upper = effect.bounds()
-    there = place_in(arm, effect)
-    if there is None:
-        return lower, upper
-    position, rows = there
-    values = arm.values[position][rows]
+    there = {
+        name: value
+        for own, values in zip(arm.effects, arm.values, strict=True)
+        if isinstance(effect, type(own)) and not own.shapes and not own.points
+        for name, value in zip(own.parameters(arm.robot), values.tolist(), strict=True)
+    }
+    values = np.array([there.get(name, 0.0) for name in effect.parameters(arm.robot)])
     return lower - values, upper - values
 
 

@@ -210,7 +210,7 @@ class ChangeSearch:
         yield
         number = self._candidates.index(found.best)
         values, covariance = window.size(self._slices[number])
-        usual = np.nanmax([u.factors[number] for u in self._usual.values()])
+        usual = np.fmax.reduce([u.factors[number] for u in self._usual.values()], initial=1.0)
         return values, covariance * usual
 
     def _window(self, first: int, residual_scale: float) -> Pieces[ScoreStatistics]:

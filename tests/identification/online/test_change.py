@@ -8,6 +8,7 @@ from armid_ros.estimate import Estimate, ParameterName
 from armid_ros.identification.online.background import at_once
 from armid_ros.identification.online.change import Change, change_candidates, ChangeCandidate
 from armid_ros.identification.online.change_score import Block, ScoreStatistics, weighing
+from armid_ros.identification.online.change_search import ChangeSearch, FoundChange
 from armid_ros.identification.online.change_watch import ChangeSettings, ChangeWatch
 from armid_ros.identification.online.nuisance_rows import Row
 from armid_ros.identification.online.null_calibration import NullCalibration
@@ -80,6 +81,15 @@ def test_the_size_of_a_change_is_that_of_least_squares_over_all_rows(noise):
     assert found[0] == pytest.approx(expected, rel=1e-6)
     variance = noise**2 * np.linalg.inv(both.T @ both)[-1, -1]
     assert covariance[0, 0] == pytest.approx(variance, rel=1e-6)
+
+
+def test_a_change_without_calibrated_statistics_has_the_deviation_of_its_data():
+    _, block, _, _ = learned_and_block(np.random.default_rng(0), 0.7, seen=5)
+    candidate = ChangeCandidate('payload', 'hand', NAMES[:1], CHANGED, CHANGED)
+    search = ChangeSearch([candidate], CHANGED, 1e-6, Foreground())
+    found = at_once(search.size(FoundChange((block,), 0, candidate, (), 9.0), 1.0))
+    expected = score_statistics(block, CHANGED).size(slice(0, 1))
+    np.testing.assert_allclose(np.ravel(found), np.ravel(expected))
 
 
 def test_without_a_change_the_ratio_is_chi_square():
