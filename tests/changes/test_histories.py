@@ -77,17 +77,17 @@ def test_the_interval_of_wear_holds_the_truth_as_often_as_it_says():
 def test_of_the_arms_named_few_are_healthy():
     rng = np.random.default_rng(4)
     false, true = 0, 0
-    for _ in range(2):
-        series = fleet(rng, 100)
-        for arm in range(20):
+    for _ in range(4):
+        series = fleet(rng, 200)
+        for arm in range(40):
             k = 8 * arm + int(rng.integers(8))
             step = rng.choice([0.03, 0.06, 0.12])
             series[k] = changed(series[k], np.where(np.arange(10) >= 5, step, 0.0))
         found = names(series)
-        sick = {f'arm_{arm}' for arm in range(20)}
+        sick = {f'arm_{arm}' for arm in range(40)}
         false, true = false + len(found - sick), true + len(found & sick)
     assert false <= 0.05 * (false + true) + 2 * np.sqrt(0.05 * (false + true))
-    assert true > 20
+    assert true > 80
 
 
 def test_what_bags_differ_by_beyond_their_deviations_is_learned_from_all_arms():
@@ -98,7 +98,7 @@ def test_what_bags_differ_by_beyond_their_deviations_is_learned_from_all_arms():
 
 @pytest.mark.parametrize('at', [0, 5])
 def test_one_odd_bag_is_no_change(at):
-    series = fleet(np.random.default_rng(8), 20)
+    series = fleet(np.random.default_rng(8), 50)
     for k in range(0, len(series), 16):
         series[k] = changed(series[k], np.where(np.arange(10) == at, 0.5, 0.0))
     assert names(series) == set()
@@ -106,7 +106,7 @@ def test_one_odd_bag_is_no_change(at):
 
 @pytest.mark.parametrize('lasting', [3, 7])
 def test_what_lasts_three_bags_is_a_change(lasting):
-    series = fleet(np.random.default_rng(9), 20)
+    series = fleet(np.random.default_rng(9), 50)
     series[16] = changed(series[16], np.where(np.arange(10) >= 10 - lasting, 0.5, 0.0))
     assert names(series) == {'arm_2'}
 

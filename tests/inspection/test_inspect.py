@@ -77,7 +77,7 @@ def jittering(clean):
 @pytest.mark.parametrize(
     ('spoil', 'said'),
     [
-        (lambda run: replace(run, q=np.degrees(run.q), dq=np.degrees(run.dq)), 'degrees'),
+        (lambda run: replace(run, q=np.degrees(run.q), dq=np.degrees(run.dq)), 'pitch reaches'),
         (lambda run: replace(run, dq=np.degrees(run.dq)), 'degrees/s'),
         (lambda run: replace(run, dq=-run.dq), 'opposite sign'),
         (lambda run: replace(run, dq=0 * run.dq), 'are zero'),
@@ -123,8 +123,7 @@ def test_stamps_that_are_rounded_are_said_with_their_step(clean):
     lost = len(clean) - len(first)
     report = ReadReport(messages=len(clean), samples=len(first), duplicates=lost)
     rounded = replace(clean.select(first), t=t[first], report=report)
-    (said,) = (remark for remark in remarks(rounded) if 'rounded' in remark)
-    assert '12.5 ms' in said and f'{lost} of' in said
+    assert any('12.5 ms' in remark and f'{lost} of' in remark for remark in remarks(rounded))
     twice = replace(clean, report=replace(report, samples=len(clean)))
     jittered = replace(twice, t=clean.t + 1e-3 * np.random.default_rng(1).uniform(size=2000))
     assert not any('rounded' in remark for remark in remarks(jittered))
@@ -147,8 +146,8 @@ def test_a_joint_that_moves_without_being_driven_is_doubted(clean):
     q, tau = clean.q[:, :-1], clean.tau[:, :-1]
     others = (PositionRange(clean.joints[-1], -0.5, 0.6),)
     part = replace(clean, joints=left.joints, q=q, dq=None, tau=tau, others=others)
-    (said,) = (text for text in remarks(part, left) if clean.joints[-1] in text)
-    assert said.startswith('doubt: ') and '-0.5' in said
+    said = [text for text in remarks(part, left) if clean.joints[-1] in text]
+    assert any(text.startswith('doubt: ') and '-0.5' in text for text in said)
 
 
 @pytest.mark.slow

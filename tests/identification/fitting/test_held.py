@@ -80,6 +80,6 @@ def test_what_is_held_is_as_described(structure, found):
 
 
 def test_a_motion_of_all_joints_holds_nothing(structure, real):
-    rich = recorded(real, multisine(real.robot.joints, 30.0, 100.0, seed=5), 0, NOISE, 2e-5)
+    rich = recorded(real, multisine(real.robot.joints, 60.0, 100.0, seed=5), 0, NOISE, 2e-5)
     found = identify(structure, [rich], rng=np.random.default_rng(0))
     assert found.base.rank == found.theory.rank

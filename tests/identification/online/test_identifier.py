@@ -11,13 +11,13 @@ from armid_ros.identification.online.identifier import OnlineIdentifier, OnlineS
 from armid_ros.identification.rows.causal import MOTION_FILTER_RATIO
 from armid_ros.identification.rows.regression import Fit, regressions
 from armid_ros.identification.samples.joint_merge import joint_places
+from armid_ros.motion import Motion
 from armid_ros.recording import read_recording
 from armid_ros.robots import load_robot
 import numpy as np
 import pytest
 
 from benchmarks import real_recordings
-from tests.identification.conftest import multisine
 
 PENDULUM = """<robot name="pendulum">
   <link name="base"/>
@@ -33,9 +33,18 @@ PENDULUM = """<robot name="pendulum">
 </robot>
 """
 NOISE = 0.02
-#: A little more than the period of the motion.
-SECONDS = 12.0
 SETTINGS = OnlineSettings(torque_noise=(NOISE,) * 6)
+
+
+def multisine(robot, duration, seed=0, rate=500.0):
+    """Return three harmonics per joint, up to 1.5 rad/s and 6 rad/s^2."""
+    rng = np.random.default_rng(seed)
+    t = np.arange(round(duration * rate)) / rate
+    w = 2.0 * np.pi * np.array([0.1, 0.3, 0.7])[:, None, None]
+    size = np.array([0.5, 0.3, 0.15])[:, None, None]
+    phase = w * t[:, None] + rng.uniform(0.0, 2.0 * np.pi, (3, 1, robot.n_joints))
+    q, dq, ddq = np.sin(phase), w * np.cos(phase), -w * w * np.sin(phase)
+    return Motion(robot.joints, t, *((size * x).sum(axis=0) for x in (q, dq, ddq)))
 
 
 def identifier(arm, settings=SETTINGS):
@@ -58,7 +67,7 @@ def torque_error(arm, online, motion):
 
 @pytest.fixture(scope='module')
 def motion(arm):
-    return multisine(arm.robot.joints, SECONDS, 500.0, seed=0)
+    return multisine(arm.robot, 20.0)
 
 
 @pytest.fixture(scope='module')
@@ -114,7 +123,7 @@ def test_predictions_are_made_before_the_sample_is_seen_and_get_good(arm, motion
 
 
 def test_rows_are_thinned_to_the_rate_that_the_filter_passes(arm, motion, clean):
-    assert clean.samples == pytest.approx(200.0 * SECONDS, rel=0.05)
+    assert clean.samples == pytest.approx(200.0 * 20.0, rel=0.05)
     assert clean.delay == pytest.approx(0.061, abs=0.002)
     assert clean.condition_number < 1e5
 
@@ -138,7 +147,7 @@ def test_an_arm_at_rest_teaches_nothing_it_could_unlearn(arm, motion, tau):
 def test_an_arm_may_have_a_single_joint():
     """A pendulum of 2 kg at 0.3 m: its moment is found from its weight."""
     robot = load_robot(PENDULUM)
-    motion = multisine(robot.joints, SECONDS, 200.0, seed=0)
+    motion = multisine(robot, 20.0)
     online = OnlineIdentifier(ArmModel(robot), rng=np.random.default_rng(0))
     feed(online, motion.t, motion.q, ArmModel(robot).torque(motion))
     estimate = online.estimate()
@@ -182,7 +191,7 @@ def test_before_any_motion_the_model_is_the_one_given(arm):
 
 def test_reset_forgets_everything(arm, motion, tau):
     fresh, online = identifier(arm), identifier(arm)
-    feed(online, motion.t[:1000], 2.0 * motion.q[:1000], tau[:1000])
+    feed(online, motion.t[:1000], motion.q[:1000], tau[:1000])
     online.update(0.0, motion.q[0], None, tau[0])
     online.reset()
     assert online.samples == 0

@@ -63,5 +63,5 @@ def test_the_identifier_uses_every_state_of_a_simulation_but_damage(spike: float
         sample = plant.advance(2)
         tau = sample.tau + spike * (k == 500)
         identifier.update(plant.state.t, sample.q, sample.dq, tau)
-    assert identifier.rejected == ({'spike': 1} if spike else {})
+    assert sum(identifier.rejected.values()) == (spike > 0.0)
     assert not identifier.restarts and not identifier.missing
