@@ -43,12 +43,10 @@ def metadata_of(bag):
     return yaml.safe_load((bag / 'metadata.yaml').read_text())['rosbag2_bagfile_information']
 
 
-@pytest.mark.parametrize('samples', [500, 0])
-def test_metadata_is_that_which_rosbags_writes(make_swing, stamps, tmp_path, samples):
-    recording, stamps = make_swing(samples), stamps[:samples]
-    write_recording(tmp_path / 'run', recording)
+def test_metadata_is_that_which_rosbags_writes(swinging, stamps, tmp_path):
+    write_recording(tmp_path / 'run', swinging)
     store = get_typestore(Stores.ROS2_JAZZY)
-    cdr = joint_state_cdr(JOINTS, stamps, recording.q, recording.dq, recording.tau)
+    cdr = joint_state_cdr(JOINTS, stamps, swinging.q, swinging.dq, swinging.tau)
     bag = tmp_path / 'run_0'  # whose file is run_0.mcap
     with Writer(bag, version=9, storage_plugin=StoragePlugin.MCAP) as writer:
         connection = writer.add_connection(
@@ -57,6 +55,17 @@ def test_metadata_is_that_which_rosbags_writes(make_swing, stamps, tmp_path, sam
         for stamp, message in zip(stamps.tolist(), cdr, strict=True):
             writer.write(connection, stamp, message)
     assert metadata_of(tmp_path / 'run') == metadata_of(bag) | {'ros_distro': 'jazzy'}
+
+
+def test_an_empty_bag_is_that_of_rosbag2(tmp_path):
+    with BagWriter(tmp_path / 'bag') as writer:
+        writer.add_topic('/joint_states', JOINT_STATE)
+    metadata = metadata_of(tmp_path / 'bag')
+    assert metadata['starting_time'] == {'nanoseconds_since_epoch': 9223372036854775807}
+    assert metadata['duration'] == {'nanoseconds': 0}
+    with Reader(tmp_path / 'bag') as reader:
+        assert [connection.topic for connection in reader.connections] == ['/joint_states']
+        assert list(reader.messages()) == []
 
 
 def test_the_file_is_in_order_by_mcaps_own_rules(swinging, tmp_path):

@@ -87,9 +87,10 @@ def test_a_controller_that_keeps_going_is_stopped_again_and_reported(bench, arm,
     assert count == len(arm.accepted) > 1
 
 
-def test_late_and_lost_joint_states_do_not_stop_the_arm(bench, arm, excitation):
+@pytest.mark.parametrize(('fault', 'value'), [('late', 0.2), ('lost', 3)])
+def test_late_and_lost_joint_states_do_not_stop_the_arm(bench, arm, excitation, fault, value):
     node = begun(bench, arm, excitation, tracking_tolerance=0.05)
-    arm.faults.late, arm.faults.lost = 0.2, 3
+    setattr(arm.faults, fault, value)
     arm.run(103.0)
     assert node.elapsed is not None
     assert len(arm.accepted) == 1

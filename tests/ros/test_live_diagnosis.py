@@ -95,7 +95,7 @@ def idle(bench):
 
 def test_friction_that_rises_is_named_and_taken_over(bench):
     arm = simulated(bench, *KNOWN)
-    live = LiveDiagnosis(arm_with(*KNOWN), LiveSettings(learning=8.0, every=6.0))
+    live = LiveDiagnosis(arm_with(*KNOWN), LiveSettings(learning=8.0))
     node = bench.add(LiveDiagnosisNode, live, InProcess())
     diagnoses = bench.listen(Diagnosis, 'live_diagnosis/diagnosis', LATCHED)
     models = bench.listen(String, 'live_diagnosis/model', LATCHED)

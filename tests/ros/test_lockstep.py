@@ -16,7 +16,7 @@ from armid_ros.simulation import Sensors, SimulatedArm
 import numpy as np
 import pytest
 
-RATE = 100.0
+RATE = 200.0
 AT_REST = 0.27  # what the publisher sees of the arm before it starts
 APPROACH = 2.5
 EFFECTS = ('viscous_friction:viscous_coefficient=0.5', 'torque_offset:torque_offset=0.1')
