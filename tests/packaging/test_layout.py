@@ -109,15 +109,6 @@ def test_interface_show_finds_the_definition(prefix, root):
     assert installed == (root / 'msg_schemas' / 'msg' / 'ParameterEstimate.msg').read_text()
 
 
-def test_launch_and_config_files_are_in_share(prefix, root):
-    """Where `ros2 launch armid_ros` and the launch files themselves look."""
-    share = prefix / 'share' / 'armid_ros'
-    for folder in ('launch', 'config'):
-        for path in (root / folder).rglob('*'):
-            if path.is_file() and path.suffix != '.pyc':
-                assert (share / path.relative_to(root)).is_file()
-
-
 @pytest.mark.parametrize(
     'name',
     [

@@ -54,7 +54,7 @@ def results(root, installed, tmp_path_factory):
     robot = ('--robot', root / 'examples' / 'arm.urdf')
     arm = ('--effect', 'viscous_friction:viscous_coefficient=0.3')
     hose = ('--effect', 'hose@elbow:hose_stiffness=4')
-    noise = ('--torque-noise', '0.05', '--rate', '100')
+    noise = ('--torque-noise', '0.05', '--rate', '200')
     known = ('--effects', 'viscous_friction')
     both = ('--effects', 'viscous_friction,hose')
     done = run(
@@ -66,7 +66,7 @@ def results(root, installed, tmp_path_factory):
         ),
         ['identify', 'run_1', *robot, *both, '--no-physical', '--no-verify', '--out', 'with'],
         ['diagnose', 'run_1', '--validate', 'run_2', *robot, *known, '--out', 'found'],
-        ['simulate', *robot, '--model', 'found/model.yaml', '--rate', 100, '--out', 'again'],
+        ['simulate', *robot, '--model', 'found/model.yaml', '--rate', 200, '--out', 'again'],
         ['effects'],
         folder=folder,
     )

@@ -23,7 +23,6 @@ from armid_ros.report.notation import (
 from armid_ros.report.sections.diagnosed import (
     candidates_section,
     evidence_section,
-    named_section,
     share_bars,
 )
 from armid_ros.report.sections.overlay import overlay_section, whole_overlays
@@ -127,20 +126,6 @@ def test_what_is_not_checked_is_said_in_short(found):
     rows = dict(Story(replace(nothing, data=tuple(still))).rows)
     assert 'elbow' in rows['Where'][1]
     assert len(dict(Story(nothing).rows)['Where']) == 1
-
-
-def test_values_of_a_body_are_in_words_and_those_told_from_zero_come_first(found):
-    effect = CATALOGUE['link_inertia'].on(found.arm.robot, ('elbow',))
-    names = effect.parameters(found.arm.robot)
-    values = tuple(0.5 if name.unit == 'kg m^2' else 0.0 for name in names)
-    numbers = {'values': values, 'std': (0.01,) * len(names), 'added_to': ()}
-    link = replace(found.findings[0], name='link_inertia', parameters=names, **numbers)
-    rows = named_section((link,)).blocks[0].rows
-    assert rows[0][1].endswith('of mass') and rows[1][1].endswith('along x')
-    values = tuple({'kg': 2.0, 'kg m': 0.5}.get(name.unit, 0.0) for name in names)
-    rows = named_section((replace(link, values=values, weighs=True),)).blocks[0].rows
-    centres = [row[3] for row in rows if 'centre of mass' in row[1]]
-    assert len(centres) == 3 and all(text.startswith('0.25') for text in centres)
 
 
 def test_a_model_that_simulates_worse_is_not_green(found, recordings, html):

@@ -106,11 +106,3 @@ def test_the_diagnosis_is_text_above_the_base(bench, drawn):
     assert 'not repeatable' in text.text and 'torque' in text.text
     assert '\n' in text.text
     assert text.pose.position.z > 0.0
-
-
-def test_nothing_is_drawn_before_the_arm_is_known(bench):
-    node = bench.add(ResidualMarkersNode)
-    out = bench.listen(MarkerArray, 'residual_markers/markers')
-    assert 'robot_description' in node.condition()[0]
-    bench.settle()
-    assert not out
