@@ -94,7 +94,7 @@ class Residual:
 
     def section(self) -> ContentSection:
         """Return the section of a report with the maps."""
-        return residual_map_section(self.base.robot, self.joints, self.table_file)
+        return residual_map_section(self.base, self.joints, self.table_file)
 
     def write_table(self, folder: Path) -> None:
         """Write the maps as a table into a folder."""

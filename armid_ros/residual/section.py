@@ -6,6 +6,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
+from armid_ros.arm import ArmModel
 from armid_ros.report.blocks import (
     ContentSection,
     DataTable,
@@ -17,7 +18,6 @@ from armid_ros.report.charts import image_data
 from armid_ros.report.notation import digits, percent
 from armid_ros.report.page import render
 from armid_ros.residual.joint_residual import JointResidual
-from armid_ros.robots import Robot
 from markupsafe import Markup
 import numpy as np
 
@@ -25,9 +25,10 @@ _POSITIVE, _NEGATIVE, _UNSURE = (0.0, 0.447, 0.698), (0.835, 0.369, 0.0), (0.5, 
 
 
 def residual_map_section(
-    robot: Robot, joints: Sequence[JointResidual], table_file: str
+    arm: ArmModel, joints: Sequence[JointResidual], table_file: str
 ) -> ContentSection:
     """Return maps of the unexplained residual at the middle load of some joints."""
+    robot = arm.robot
     rows, pictures = [], []
     for one in joints:
         j = robot.joints.index(one.joint)
