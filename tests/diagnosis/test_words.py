@@ -109,7 +109,7 @@ def test_names_that_are_one_cause_have_one_share(bench):
 def test_names_that_are_one_cause_are_said_with_their_places(bench):
     one = finding(bench, name='viscous_friction')
     group = [one, replace(one, name='coulomb_friction')]
-    assert names_and_places(group) == 'viscous friction and coulomb friction of elbow'
+    assert names_and_places(group) == 'viscous friction and Coulomb friction of elbow'
     assert names_and_places([replace(one, joints=())]).endswith('whole arm')
 
 

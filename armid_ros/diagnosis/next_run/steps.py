@@ -14,9 +14,8 @@ from collections.abc import Sequence
 
 from armid_ros.diagnosis.next_run.plan import NextRun
 from armid_ros.diagnosis.verdict.finding import Diagnosis, Finding, Rival
-from armid_ros.diagnosis.verdict.words import as_sure
 from armid_ros.effects import CATALOGUE
-from armid_ros.identification.fitting.identifiability import excludes_zero
+from armid_ros.identification.fitting.identifiability import excludes_zero, HALF_WIDTH
 
 #: The patched model, as one finds it who reads a page.
 MODEL = 'model.yaml in the folder of this diagnosis'
@@ -119,8 +118,9 @@ def _centre(finding: Finding) -> str:
     moments = [row for row in rows if row[0].unit == 'kg m']
     if not (finding.weighs and mass and len(moments) == 3 and excludes_zero(*mass[0][1:])):
         return ''
-    at = ', '.join(as_sure(value / mass[0][1], std / abs(mass[0][1])) for _, value, std in moments)
-    return f'. The load is centred at ({at}) m in the frame of that link'
+    at = ', '.join(f'{value / mass[0][1]:z.3f}' for _, value, _ in moments)
+    reach = HALF_WIDTH * max(std for *_, std in moments) / abs(mass[0][1])
+    return f'. The load is centred at ({at}) ± {reach:.1g} m in the frame of that link'
 
 
 def _look_at(name: str, diagnosis: Diagnosis) -> str:
