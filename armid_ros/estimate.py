@@ -45,7 +45,7 @@ class ParameterName:
         """Return the name in words, without the joint: 'viscous coefficient'."""
         found = _OF_BODY.fullmatch(self.name)
         if found is None:
-            return self.name.replace('_', ' ').replace('coulomb', 'Coulomb')
+            return name_in_words(self.name)
         what = symbol_in_words(found[1])
         return f'difference of {what}' if found[2] else what
 
@@ -53,6 +53,11 @@ class ParameterName:
     def rigid(self) -> bool:
         """Whether the name is, or begins with, a mass, first moment or inertia of a link."""
         return _RIGID.match(self.name) is not None
+
+
+def name_in_words(name: str) -> str:
+    """Return the name of an effect or parameter in words: 'Coulomb friction'."""
+    return name.replace('_', ' ').replace('coulomb', 'Coulomb')
 
 
 def symbol_in_words(symbol: str) -> str:

@@ -265,7 +265,7 @@ class IdentificationResult(ShownModel):
         """Return errors and friction of each joint, doubts, and the next step; or every value."""
         from armid_ros.report.families import joint_columns
         from armid_ros.report.judgement import judge, residual_trends
-        from armid_ros.report.notation import counted
+        from armid_ros.report.notation import counted, plain
 
         core, estimate, joints = self.core, self.estimate, self.arm.robot.joints
         others = self.graded.reasons[1:]
@@ -289,7 +289,7 @@ class IdentificationResult(ShownModel):
                 *residual_trends(joints, shown),
                 *(self.gains.sentences() if self.gains else ()),
                 *(f'{one.source}: {one.report.describe()}' for one in damaged),
-                f'{count}; condition number {core.condition_number:.3g}',
+                f'{count}; condition number {plain(core.condition_number)}',
                 *self._bodies(),
                 *(self._parameters() if every else ()),
             ),

@@ -47,8 +47,8 @@ Progress = Callable[[float, str], None]
 
 #: Note where no two equal periods measure the noise.
 _ASSUMED = (
-    'nothing repeats in some recordings: their noise is assumed from what rows differ by from '
-    'their neighbours; two equal periods would measure it'
+    'noise of recordings without two equal periods is estimated from differences between '
+    'neighbouring samples'
 )
 #: Note where a cause acts for a part of the time, and only a baseline would show it elsewhere.
 _NOT_TIMED = (

@@ -50,7 +50,15 @@ class Fitness:
 
     def __str__(self) -> str:
         """Return a sentence on the results and on the unchecked items."""
-        parts = ['no limit violated']
+        parts = ['no limit violated', *self.distances()]
+        sentence = f'{self.word}: {", ".join(parts)}'
+        if self.unchecked:
+            sentence += f'; not checked: {"; ".join(self.unchecked)}'
+        return sentence
+
+    def distances(self) -> list[str]:
+        """Return phrases on the smallest clearance and on the lowest point, where known."""
+        parts = []
         if self.nearest is not None:
             parts.append(
                 f'smallest clearance {1e3 * self.nearest.distance:.0f} mm '
@@ -58,10 +66,7 @@ class Fitness:
             )
         if self.lowest.link:
             parts.append(self.height())
-        sentence = f'{self.word}: {", ".join(parts)}'
-        if self.unchecked:
-            sentence += f'; not checked: {"; ".join(self.unchecked)}'
-        return sentence
+        return parts
 
     def height(self) -> str:
         """Return a phrase on the lowest point of the motion."""

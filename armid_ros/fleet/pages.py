@@ -42,6 +42,9 @@ from armid_ros.report.sections.frame import VerdictSection
 from markupsafe import escape, Markup
 import numpy as np
 
+#: Verdicts of a diagnosis that name what changed.
+_EXPLAINED = ('named', 'ambiguous', 'partial')
+
 Diagnoses = Mapping[str, Mapping[str, Any]]
 
 
@@ -91,15 +94,14 @@ def _arm_page(found: Watch, arm: WatchedArm, diagnoses: Diagnoses) -> str:
     quiet = 'No parameter has changed more than noise and other bags explain.'
     if diagnosis is not None and diagnosed:
         quiet = pretty(diagnosis['summary'])
-    sentence = (texts or [quiet])[0]
-    sentence = f'{sentence[0].upper()}{sentence[1:]}'
-    beware = [*texts[1:6]]
-    if len(texts) > 6:
-        beware.append(f'... and {len(texts) - 6} more')
+    sentences = [f'{text[0].upper()}{text[1:]}.' for text in texts[:1]] or [quiet]
+    if diagnosis is not None and texts and diagnosis['verdict'] in _EXPLAINED:
+        first, stop, more = pretty(diagnosis['summary']).partition('. ')
+        sentences = [first + stop.rstrip(), *filter(None, [more]), *sentences]
+    if len(texts) > 1:
+        sentences.append(f'{counted(len(texts) - 1, "more parameter")} changed; see below.')
     step = '' if diagnosis or not arm.named else f'armid fleet diagnose --arm {arm.arm}.'
-    sections: list[Section] = [
-        VerdictSection(diagnosed or arm.health, tone, [sentence], beware, step=step)
-    ]
+    sections: list[Section] = [VerdictSection(diagnosed or arm.health, tone, sentences, step=step)]
     if diagnosis is not None:
         report = f'../{quote(diagnosis["report"])}' if diagnosis['report'] else ''
         cells = (
@@ -112,8 +114,8 @@ def _arm_page(found: Watch, arm: WatchedArm, diagnoses: Diagnoses) -> str:
     shown.sort(key=lambda one: order.get(one.parameter, len(order)))
     cut = sum(one.parameter in order for one in shown)
     said = (
-        'Every point is a bag with its 95 % interval; it leads to the bag below. The range is '
-        'that of the ordinate.'
+        'Every point is a bag with its 95 % interval; it leads to the bag below. Numbers after a '
+        'name: range of the vertical axis.'
     )
     first, rest = ([_curve(arm, one) for one in part] for part in (shown[:cut], shown[cut:]))
     curves: list[PageBlock] = [SmallMultiples(first)] if first else []
@@ -182,12 +184,12 @@ def _arm_row(arm: WatchedArm, diagnosis: Mapping[str, Any] | None) -> list[str]:
     """Return the cells of an arm in the overview."""
     page = f'pages/{quote(file_name(arm.arm))}.html'
     what = Markup('')
-    for row in change_rows(arm)[:1]:
-        bag = _link(f'{page}#{BagFile(arm.arm, row["bag"]).name}', 'bag')
-        what = Markup('{} {}').format(pretty(row['text']), bag)
     if diagnosis is not None and diagnosis['verdict'] != 'failed':
         report = _link(diagnosis['report'], 'Diagnosis')
-        what += Markup('<br>' * bool(what) + '{}: {}').format(report, pretty(diagnosis['summary']))
+        what = Markup('{}: {}').format(report, pretty(diagnosis['summary']))
+    for row in change_rows(arm)[:1]:
+        bag = _link(f'{page}#{BagFile(arm.arm, row["bag"]).name}', 'bag')
+        what += Markup('<br>' * bool(what) + '{} {}').format(pretty(row['text']), bag)
     for first in arm.named[:1]:
         series = first.series
         label, last = parameter_label(*series.parameter), digits(series.values[-1], 3)

@@ -27,13 +27,14 @@ from armid_ros.changes.histories import (
 )
 from armid_ros.changes.scatter import ParameterHistory, Spread, spreads, without_days
 from armid_ros.errors import FleetError
-from armid_ros.estimate import ParameterName
+from armid_ros.estimate import name_in_words, ParameterName
 from armid_ros.fleet.bags import DAY_NS
 from armid_ros.fleet.plan import document, kind_arm
 from armid_ros.fleet.results import table_of
 from armid_ros.fleet.store import Store
 from armid_ros.identification.fitting.identifiability import HALF_WIDTH
 from armid_ros.report.families import full_label
+from armid_ros.report.notation import measured
 import numpy as np
 import pyarrow as pa
 import pyarrow.compute as pc
@@ -306,7 +307,9 @@ def sentence(change: HistoryChange) -> str:
         factor, lower, upper = np.exp(change.size + np.array([0.0, -reach, reach]))
         by = f'by a factor of {factor:.3g} ({lower:.3g} to {upper:.3g})'
     else:
-        by = f'by {change.size:+.3g} ± {HALF_WIDTH * change.std:.2g} {series.unit}'.rstrip()
+        size, reach = measured(change.size, HALF_WIDTH * change.std)
+        sign = '+' * (change.size > 0.0)
+        by = f'by {sign}{size} ± {reach} {series.unit}'.rstrip()
     if change.kind == 'trend':
         return f'{what} drifts {by} a month since {day_text(float(series.days[0]))}'
     last, first = (day_text(float(series.days[k])) for k in (change.index - 1, change.index))
@@ -325,7 +328,7 @@ def parameter_label(name: str, joint: str) -> str:
     if name == RESIDUAL:
         return f'residual torque of {joint}'
     if name.isidentifier() and '_' in name:
-        return f'{name.replace("_", " ")} of {joint}'
+        return f'{name_in_words(name)} of {joint}'
     return full_label(ParameterName(name, joint, ''))
 
 

@@ -96,7 +96,10 @@ def change_rows(comparison: Comparison) -> list[tuple[str, ...]]:
     rows = []
     for change in comparison.changed:
         values = [(change.before, change.before_std), (change.after, change.after_std)]
-        ends = [f'{x:.4g}' if excludes_zero(x, std) else 'includes 0' for x, std in values]
+        ends = [
+            measured(x, HALF_WIDTH * std)[0] if excludes_zero(x, std) else 'includes 0'
+            for x, std in values
+        ]
         number, reach = measured(change.difference, HALF_WIDTH * change.std)
         share = ''
         if ends[0] != 'includes 0':
@@ -114,7 +117,7 @@ def tell(comparison: Comparison) -> tuple[str, ...]:
         return (*(_unusable(one) for one in comparison.unusable), units)
     return (
         *(_unusable(one) for one in comparison.unusable),
-        *([] if comparison.load is None else [_load(comparison)]),
+        *([] if comparison.load is None else _load(comparison)),
         _sum(comparison),
         *(_residual(one, comparison) for one in comparison.changed_residuals),
         *_tell_not_compared(comparison),
@@ -199,7 +202,7 @@ def _why_left(comparison: Comparison) -> str:
     return f'No parameter of either explains that{ask}'
 
 
-def _load(comparison: Comparison) -> str:
+def _load(comparison: Comparison) -> tuple[str, str]:
     load = comparison.load
     assert load is not None
     joints = {
@@ -215,13 +218,15 @@ def _load(comparison: Comparison) -> str:
     verb = 'was added to' if load.mass > 0.0 else 'was removed from'
     where = ''
     if load.center is not None:
-        where = f', its centre at ({", ".join(f"{x:z.3f}" for x in load.center)}) m of its joint'
+        centre = ', '.join(f'{x:z.3f}' for x in load.center)
+        where = f'Its centre is at ({centre}) m in the frame of its joint. '
     rivals = ''
     if load.rivals:
         rivals = f'; it may as well be on {" or ".join(named[1:])}'
+    mass = ' ± '.join(measured(abs(load.mass), HALF_WIDTH * load.mass_std))
     return (
-        f'A load of {" ± ".join(measured(abs(load.mass), HALF_WIDTH * load.mass_std))} kg {verb} '
-        f'{named[0]}{where}. It explains every change of the inertial parameters{rivals}.'
+        f'A load of {mass} kg {verb} {named[0]}{rivals}.',
+        f'{where}It explains every change of the inertial parameters.',
     )
 
 

@@ -15,6 +15,7 @@ from armid_ros.diagnosis import Diagnosis, Finding, NextRun
 from armid_ros.diagnosis.next_run.steps import MODEL, next_steps
 from armid_ros.diagnosis.verdict.document import detectable
 from armid_ros.diagnosis.verdict.words import by_cause, names_and_places, share_in_words
+from armid_ros.estimate import name_in_words
 from armid_ros.identification.assess.verification import ForwardValidation
 from armid_ros.recording import Recording
 from armid_ros.report.arm_drawing import ArmDrawing, draw_arm
@@ -135,7 +136,7 @@ class Extras:
         ]
         lines += [
             f'minor (significant, but negligible or not confirmed): '
-            f'{one.name.replace("_", " ")} in {", ".join(one.joints) or "the whole arm"}, '
+            f'{name_in_words(one.name)} in {", ".join(one.joints) or "the whole arm"}, '
             f'p {probability(one.p)}'
             for one in diagnosis.minor
         ]
@@ -228,13 +229,15 @@ def diagnosis_report(
     if patched and not diagnosis.harmful:
         sections.append(patch_section(diagnosis.findings, patch))
     sections.append(Origin(provenance or Provenance()))
-    counts = [len(read.get(role, ())) for role in ('training', 'held-out', 'baseline')]
-    subtitle = (
-        f'{robot_label(robot)} · {counted(counts[0], "recording")} · '
-        f'{counted(counts[1], "held-out recording")}'
+    kinds = (
+        ('training', 'recording', '{}'),
+        ('held-out', 'held-out recording', '{}'),
+        ('baseline', 'recording', '{} from before'),
     )
-    if counts[2]:
-        subtitle += f' · {counted(counts[2], "recording")} from before'
+    used = [
+        kind.format(counted(len(read[role]), noun)) for role, noun, kind in kinds if read.get(role)
+    ]
+    subtitle = ' · '.join([robot_label(robot), *used])
     joints = (*arm.robot.joints, *arm.robot.links)
     return Page(f'Diagnosis of {arm.robot.name}', subtitle, sections, names=joints).html()
 
@@ -256,7 +259,9 @@ def _verdict(
     diagnosis: Diagnosis, names: Mapping[str, str], worse: Sequence[str], step: str
 ) -> VerdictSection:
     tone = tone_of(diagnosis, worse)
-    notes = [with_names(note, names) for note in diagnosis.notes]
+    notes = [
+        with_names(f'{note[0].upper()}{note[1:].rstrip(".")}.', names) for note in diagnosis.notes
+    ]
     if worse:
         notes.append(
             f'Driven by the recorded torques, the patched model has larger position errors than '
@@ -295,7 +300,7 @@ class Story(Section):
         """Draw the arm in a recorded pose, with the joints of the largest cause coloured."""
         data, robot = self.diagnosis.data, self.diagnosis.arm.robot
         cause: list[Finding] = next(iter(by_cause(self.diagnosis.findings)), [])
-        names = ', '.join(one.name.replace('_', ' ') for one in cause)
+        names = ', '.join(name_in_words(one.name) for one in cause)
         found = [*(place.joint for place in self.diagnosis.where), *self._gains]
         named = {joint for one in cause for joint in one.joints}
         joints = [joint for joint in robot.joints if joint in named] if cause else found[:1]
@@ -355,7 +360,7 @@ class Story(Section):
     def _patch(self) -> list[str]:
         diagnosis = self.diagnosis
         patched = not diagnosis.harmful
-        added = [finding.name.replace('_', ' ') for finding in diagnosis.findings if patched]
+        added = [name_in_words(finding.name) for finding in diagnosis.findings if patched]
         if self._gains:
             added.append(f'the learned residual of {", ".join(self._gains)}')
         if not added:

@@ -42,7 +42,7 @@ from armid_ros.report.blocks import (
 from armid_ros.report.charts import Chart, Level, Role, Series
 from armid_ros.report.families import effects_in_words, full_label, parameter_folds
 from armid_ros.report.judgement import GOOD_CONDITION, WEAK_CONDITION
-from armid_ros.report.notation import counted, digits, pretty, robot_label
+from armid_ros.report.notation import counted, digits, plain, pretty, robot_label
 from armid_ros.report.page import Page, Section
 from armid_ros.report.provenance import Provenance
 from armid_ros.report.sections.fit import ZOOM
@@ -149,15 +149,20 @@ def _verdict(
         for name, s in zip(design.information.parameters, design.information.std, strict=True)
         if not np.isfinite(s)
     ]
-    sentences = identifiable(design, links)
-    found = str(checked).removeprefix(f'{checked.word}: ')
-    sentences.insert(0, f'{found[0].upper()}{found[1:]}.')
+    distances = ', '.join(checked.distances())
+    distances = f'{distances[:1].upper()}{distances[1:]}.' if distances else ''
+    limits = 'No limit violated'
+    if checked.unchecked:
+        limits += f'; not checked: {"; ".join(checked.unchecked)}'
+    lead = [f'{limits}.', distances]
     quantity, share = max(shares.items(), key=lambda item: float(item[1].max()))
-    sentences.insert(
-        1,
+    closest = (
         f'The closest limit is the {quantity} of {design.limits.joints[int(share.argmax())]} at '
-        f'{100.0 * share.max():.0f} %.',
+        f'{100.0 * share.max():.0f} %.'
     )
+    if checked.word == UNFIT:
+        lead.reverse()
+    sentences = [lead[0], f'{lead[1]} {closest}'.lstrip(), ' '.join(identifiable(design, links))]
     beware = []
     if unseen:
         beware.append(f'Not identifiable from this run: {", ".join(unseen)}.')
@@ -194,7 +199,7 @@ def identifiable(design: Design, links: Sequence[str]) -> list[str]:
     sure = int(np.sum(std <= 0.1 * np.abs(design.described)))
     return [
         f'All {len(names)} parameters can be identified (condition number '
-        f'{information.condition:.3g}: {_conditioning(information.condition)}).',
+        f'{plain(information.condition)}: {_conditioning(information.condition)}).',
         f'{sure} of {len(names)} will be known to 10 % or better. The least accurate will be '
         f'{full_label(names[worst], links)}: ± {digits(float(std[worst]))} '
         f'{pretty(names[worst].unit)}.',

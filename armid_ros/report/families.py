@@ -9,7 +9,7 @@ import re
 
 from armid_ros.arm import ArmModel
 from armid_ros.effects import Effect
-from armid_ros.estimate import Estimate, ParameterName, symbol_in_words
+from armid_ros.estimate import Estimate, name_in_words, ParameterName, symbol_in_words
 from armid_ros.identification import Identification, Score
 from armid_ros.identification.fitting.identifiability import HALF_WIDTH, Unidentified
 from armid_ros.motion import FloatArray
@@ -49,7 +49,7 @@ def parameter_families(names: tuple[ParameterName, ...]) -> dict[tuple[str, str]
     kinds = {'kg m^2': 'Inertias', 'kg m': 'First moments', 'kg': 'Masses'}
     for position, name in enumerate(names):
         kind = kinds.get(name.unit) if name.rigid else None
-        title = kind or name.name.replace('_', ' ').capitalize()
+        title = kind or name_in_words(name.name).capitalize()
         families.setdefault((title, pretty(name.unit)), []).append(position)
     return families
 
@@ -100,7 +100,7 @@ def grouping(name: ParameterName, links: Sequence[str] = ()) -> str:
 
 def effects_in_words(effects: Sequence[Effect]) -> str:
     """List effects by name, or state that there are none."""
-    return ', '.join(effect.name.replace('_', ' ') for effect in effects) or 'none'
+    return ', '.join(name_in_words(effect.name) for effect in effects) or 'none'
 
 
 def parameter_folds(

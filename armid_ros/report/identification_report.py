@@ -26,7 +26,7 @@ from armid_ros.report.blocks import (
 from armid_ros.report.charts import Chart, Series
 from armid_ros.report.families import effects_in_words, full_label, parameter_section
 from armid_ros.report.judgement import judge
-from armid_ros.report.notation import counted, digits, pretty, robot_label
+from armid_ros.report.notation import counted, digits, plain, pretty, robot_label
 from armid_ros.report.page import Page, Section
 from armid_ros.report.provenance import Provenance
 from armid_ros.report.sections.data_quality import data_quality_section
@@ -157,10 +157,9 @@ def identification_report(
         _asked(result, robot, list(training), list(validation)),
         Origin(provenance or Provenance()),
     ]
-    subtitle = (
-        f'{robot_label(robot)} · {counted(len(training), "training recording")} · '
-        f'{counted(len(validation), "held-out recording")}'
-    )
+    subtitle = f'{robot_label(robot)} · {counted(len(training), "training recording")}'
+    if validation:
+        subtitle += f' · {counted(len(validation), "held-out recording")}'
     names = (*described.joints, *described.links)
     return Page(f'Identification of {described.name}', subtitle, sections, names=names).html()
 
@@ -201,7 +200,7 @@ def _excitation_section(result: Identification) -> ContentSection:
         [
             Paragraph(
                 f'This motion identifies {counted(result.base.rank, "parameter")}. The condition '
-                f'number of the weighted regressor is {result.condition_number:.3g}.'
+                f'number of the weighted regressor is {plain(result.condition_number)}.'
             ),
             Paragraph(
                 'The worst-determined combinations are listed first. Each number is the torque '

@@ -116,8 +116,6 @@ def headline(remarks: Sequence[Remark], found: LinkCheck | None) -> tuple[str, .
         f'Torque error: {digits(found.error_percent)} % with the links of the URDF, '
         f'{digits(found.fitted_error_percent)} % with fitted links.'
     )
-    if np.isnan(found.measured_mass).any() and not np.isnan(found.measured_mass).all():
-        errors += ' A dash is a mass that the recording does not determine.'
     if found.fault:
         first = f'The recording cannot check the links: {found.fault.rstrip(".")}.'
     elif found.agrees:
@@ -244,8 +242,8 @@ def _joints_section(found: Inspection) -> ContentSection:
     heads = [head.replace('N m', 'N\N{NO-BREAK SPACE}m') for head in heads]
     said = (
         'Speed: 99th percentile, from the positions. Step: smallest change of position between '
-        'samples. Dq ratio: recorded velocity over the derivative of the positions; 1 if units '
-        'and signs agree. Effort: rms and maximum.'
+        'samples. Velocity ratio: recorded velocity over the derivative of the positions; 1 if '
+        'units and signs agree.'
     )
     table = DataTable(heads, joint_rows(found), kind='tight')
     return ContentSection('Joints', [table, Paragraph(said, 'hint')])
@@ -318,8 +316,8 @@ def joint_heads(found: Inspection) -> tuple[str, ...]:
         f'speed{speed}',
         'moving',
         'step',
-        'dq ratio',
-        f'effort{torque}',
+        'velocity ratio',
+        f'effort, rms{torque}',
         'largest',
     )
 

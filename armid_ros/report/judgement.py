@@ -8,11 +8,12 @@ from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 
 from armid_ros.diagnosis.settings import DiagnosisSettings
+from armid_ros.estimate import name_in_words
 from armid_ros.identification import Fit, Identification, Score, Verification
 from armid_ros.identification.assess.grade_limits import LIMITS
 from armid_ros.identification.fitting.identifiability import excludes_zero
 from armid_ros.recording import Recording
-from armid_ros.report.notation import counted, digits
+from armid_ros.report.notation import counted, digits, plain
 from armid_ros.report.statistics import explained_shares, TELLING_SHARE, Whiteness
 import numpy as np
 
@@ -108,10 +109,7 @@ def _notes(result: Identification) -> list[str]:
 
 def _what(result: Identification) -> str:
     robot = result.arm.robot
-    effects = [
-        effect.name.replace('_', ' ').replace('coulomb', 'Coulomb')
-        for effect in result.arm.effects
-    ]
+    effects = [name_in_words(effect.name) for effect in result.arm.effects]
     time = sum(float(fit.motion.t[-1] - fit.motion.t[0]) for fit in result.training)
     count = counted(result.base.rank, 'parameter')
     if result.base.rank < result.theory.rank:
@@ -128,7 +126,7 @@ def _simulated(verification: Verification | None) -> list[str]:
     if verification is None or not verification.forward:
         return []
     worst = max(verification.forward, key=lambda pair: float(pair.after.position_error.max()))
-    before = '' if worst.before is None else f'; before, {worst.before.worst}'
+    before = '' if worst.before is None else f'; with the description, {worst.before.worst}'
     return [
         f'Driven by the recorded torques, its position error is at most {worst.after.worst} rms'
         f'{before}.'
@@ -204,7 +202,7 @@ def _of_residuals(result: Identification, fits: Sequence[Fit]) -> Iterator[Cauti
         )
     if result.condition_number > WEAK_CONDITION:
         yield (
-            f'The excitation is weak (condition number {result.condition_number:.3g}). '
+            f'The excitation is weak (condition number {plain(result.condition_number)}). '
             'Errors on other motions may be large.',
             'Design an excitation with armid excite and record it. With these recordings, '
             '--physical keeps undetermined links near their description.',

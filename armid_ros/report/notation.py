@@ -107,6 +107,8 @@ def counted(number: int, what: str) -> str:
 
 def robot_label(source: str) -> str:
     """Return the name of a robot for a heading: its own, or that of its file."""
+    if source == '-':
+        return 'description in the recording'
     path = source.split(' ')[0] if ':=' in source else source
     return PurePath(path).name or path
 

@@ -43,7 +43,7 @@ def residual_map_section(
                 f'{digits(one.after)} {unit}',
                 percent(one.gain),
                 held_out,
-                TableCell('none of few terms' if one.law is None else one.law.text, 'law'),
+                TableCell('no simple law' if one.law is None else one.law.text, 'law'),
                 '' if one.law is None else percent(one.law.share),
             )
         )
@@ -102,7 +102,7 @@ def _pictures(one: JointResidual, unit: str, length: str) -> list[tuple[str, str
             f'Learned torque of {one.joint} over position and velocity, {most}',
         ),
         (
-            f'{one.joint}: standard deviation (dark: large; {unsure} far from data)',
+            f'{one.joint}: standard deviation (shaded: large; {unsure} far from data)',
             image_data(np.broadcast_to(_UNSURE, (*std.shape, 3)), std / one.learned.amplitude),
             'Standard deviation of that torque',
         ),

@@ -82,7 +82,7 @@ def test_the_story_comes_first_and_what_was_looked_at_last(html):
         body.index(text)
         for text in (
             'Quadratic friction',
-            'block bootstrap',
+            'share of the <abbr',
             '>Measured and modelled<',
             '>In short<',
             '<svg class="arm"',

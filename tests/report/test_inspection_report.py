@@ -26,7 +26,7 @@ def test_every_column_of_the_joints_has_its_unit_in_one_piece(html):
     heads = html[html.index('id="joints"') :]
     heads = re.findall('<th[^>]*>([^<]*)</th>', heads[: heads.index('</thead>')])
     without = [head for head in heads if '[' not in head]
-    assert without == ['Joint', 'Moving', 'Dq ratio']
+    assert without == ['Joint', 'Moving', 'Velocity ratio']
     assert all('N m' not in head for head in heads)
 
 

@@ -15,9 +15,8 @@ from math import hypot
 
 from armid_ros.diagnosis.next_run.plan import NextRun
 from armid_ros.diagnosis.verdict.finding import Diagnosis, Finding, Rival
-from armid_ros.diagnosis.verdict.words import as_sure
 from armid_ros.effects import CATALOGUE
-from armid_ros.identification.fitting.identifiability import excludes_zero
+from armid_ros.identification.fitting.identifiability import excludes_zero, HALF_WIDTH
 
 #: The patched model, as one finds it who reads a page.
 MODEL = 'model.yaml in the folder of this diagnosis'
@@ -122,8 +121,9 @@ def _centre(finding: Finding) -> str:
         return ''
     _, kilograms, doubt = mass[0]
     arms = [(value / kilograms, std) for _, value, std in moments]
-    at = ', '.join(as_sure(x, hypot(std, x * doubt) / abs(kilograms)) for x, std in arms)
-    return f'. The load is centred at ({at}) m in the frame of that link'
+    at = ', '.join(f'{x:z.3f}' for x, _ in arms)
+    reach = HALF_WIDTH * max(hypot(std, x * doubt) for x, std in arms) / abs(kilograms)
+    return f'. The load is centred at ({at}) ± {reach:.1g} m in the frame of that link'
 
 
 def _look_at(name: str, diagnosis: Diagnosis) -> str:

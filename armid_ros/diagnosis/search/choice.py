@@ -45,8 +45,8 @@ from armid_ros.motion import FloatArray
 import numpy as np
 
 Progress = Callable[[float, str], None]
-OWN_MISFIT = 'the misfit that the model had before'
-WRITTEN_MISFIT = 'the misfit that the model had when it was identified'
+OWN_MISFIT = 'the error of the model before'
+WRITTEN_MISFIT = 'the error of the model when it was identified'
 #: Note where nothing is known of how well a model was identified.
 _AS_EXACT = (
     'values of the model are taken as exact, for want of its identification.json: intervals do '

@@ -26,7 +26,7 @@ from armid_ros.identification.physical.fit_among_bodies import physical_program,
 from armid_ros.motion import FloatArray
 import numpy as np
 
-NOISE, ESTIMATED = 'noise', 'an estimate of the misfit that such a model has'
+NOISE, ESTIMATED = 'noise', 'an estimate of the error of such a model'
 #: Weights of the description that are tried; the largest that fits as well is used.
 _WEIGHTS = (1e-3, 1e-5, 1e-7)
 #: Physically consistent links fit as well if they leave at most this many times the squares.

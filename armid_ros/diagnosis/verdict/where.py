@@ -210,7 +210,7 @@ def _in_words(axes: Sequence[Axis]) -> str:
     best = axes[0]
     if best.share < _TELLING:
         return 'no function of one quantity of the joint: fast in time, or of several joints'
-    share = f'{100 * best.share:.0f} % of its power'
+    share = f'{100 * best.share:.0f} % of its mean square'
     size = _CURVED * float(np.sum(best.means**2))
     slope = float(best.centres @ best.means) / max(float(best.centres @ best.centres), 1e-300)
     if np.sum((best.means - best.means.mean()) ** 2) < size:

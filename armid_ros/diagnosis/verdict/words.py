@@ -12,7 +12,7 @@ from armid_ros.arm import ArmModel
 from armid_ros.diagnosis.verdict.finding import Finding, SAID
 from armid_ros.diagnosis.verdict.where import Excess
 from armid_ros.effects import CATALOGUE
-from armid_ros.estimate import ParameterName
+from armid_ros.estimate import name_in_words, ParameterName
 from armid_ros.identification.fitting.identifiability import excludes_zero, HALF_WIDTH
 from armid_ros.robots import Robot
 import numpy as np
@@ -77,38 +77,40 @@ def decide(
     joint = arm.robot.joints[int(np.argmax(worst.ratio))]
     if strange and (not findings or open_gap):
         return Verdict('not_repeatable', _strange(strange, findings))
-    rest = (
-        f'the error of {joint} {worst.where} is {larger(np.sqrt(worst.ratio.max()))} '
-        f'{floor_in_words} can be{worst.more}'
-    )
+    error = f'the error of {joint} {worst.where}'
+    size = larger(np.sqrt(worst.ratio.max())) + f' expected from {floor_in_words}{worst.more}'
     refit = _refit(as_it_is, arm.robot, floor_in_words)
-    small = sentence(minor[0], 'the gap' if open_gap else 'what is left') if minor else ''
-    small = f' {small}' if small and minor[0].share >= SAID else ''
+    shown = bool(minor) and minor[0].share >= SAID
+    small = sentence(minor[0], 'the gap' if open_gap else 'the remaining error') if shown else ''
     if not findings:
         if open_gap:
-            nothing = 'closes it' if small else 'explains it'
-            text = f'Something is missing: {rest}. Nothing in the catalogue {nothing}.{small}'
+            text = f'No effect in the catalogue explains {error}: it is {size}.'
+            text += f' At best, {small[0].lower()}{small[1:]}' if small else ''
             return Verdict('unknown', f'{text} {refit}'.rstrip())
-        text = f'The model explains the recordings: what is left is no more than {floor_in_words}'
-        text += f', or too small to matter.{small}' if small else '.'
+        text = 'The model explains the recordings: the remaining error is no larger than '
+        text += (
+            f'{floor_in_words}, or too small to matter. {small}' if small else f'{floor_in_words}.'
+        )
         return Verdict('consistent', f'{refit}{text}')
     said, tied = _sentences(findings), _rivals_in_words(findings)
     if open_gap:
-        return Verdict('partial', f'{said}{tied} {refit}There is more: {rest}.')
+        return Verdict(
+            'partial', f'{said}{tied and f" {tied}"} {refit}There is more: {error} is {size}.'
+        )
     if tied:
-        return Verdict('ambiguous', f'{said}{tied} {refit}'.rstrip())
-    return Verdict('named', f'{said} {refit}The remaining error is no more than {floor_in_words}.')
+        return Verdict('ambiguous', f'{tied} {said} {refit}'.rstrip())
+    end = f'The remaining error is no larger than {floor_in_words}.'
+    return Verdict('named', f'{said} {refit}{end}')
 
 
 def _rivals_in_words(findings: Sequence[Finding]) -> str:
-    """Return a sentence on rivals, with a space before it; empty without rivals."""
-    several = len(findings) > 1
+    """Return a sentence on rivals; empty without rivals."""
     pairs = [
-        f'{f"the {one.name}".replace("_", " ") if several else "it"} from {others_in_words(one)}'
+        f'the {name_in_words(one.name)} from {others_in_words(one)}'
         for one in findings
         if one.rivals
     ]
-    return f' These data cannot tell {", nor ".join(pairs)}.' if pairs else ''
+    return f'These data cannot tell {", nor ".join(pairs)}.' if pairs else ''
 
 
 def _refit(as_it_is: Excess | None, robot: Robot, floor_in_words: str) -> str:
@@ -119,7 +121,7 @@ def _refit(as_it_is: Excess | None, robot: Robot, floor_in_words: str) -> str:
     times = larger(np.sqrt(as_it_is.ratio.max()))
     return (
         f'Rigid body and friction were refitted: as given, the error of {joint} is {times} '
-        f'{floor_in_words} can be. '
+        f'expected from {floor_in_words}. '
     )
 
 
@@ -166,7 +168,7 @@ def _sentences(findings: Sequence[Finding]) -> str:
 def names_and_places(group: Sequence[Finding]) -> str:
     """Return what names that are one cause are, and where."""
     joints = dict.fromkeys(joint for one in group for joint in one.joints)
-    names = ' and '.join(one.name.replace('_', ' ') for one in group)
+    names = ' and '.join(name_in_words(one.name) for one in group)
     where = ', '.join(joints) if len(joints) <= _JOINTS_SAID else f'{len(joints)} joints'
     return f'{names} of {where or "the whole arm"}'
 
@@ -185,7 +187,7 @@ def by_cause(findings: Sequence[Finding]) -> list[list[Finding]]:
 
 def _subject(finding: Finding) -> str:
     """Return what a cause is, where, and its values."""
-    words = finding.name.replace('_', ' ').replace('coulomb', 'Coulomb')
+    words = name_in_words(finding.name)
     subject = words[:1].upper() + words[1:]
     places = [finding.place_of(joint) for joint in finding.joints]
     if finding.weighs:
@@ -209,7 +211,8 @@ def _values(finding: Finding) -> Iterator[str]:
     """
     Yield the formatted values of a cause; repeated parameter names are left out.
 
-    Values whose interval includes zero are left to the table, unless all do.
+    Values whose interval includes zero are left to the table, unless all do. So is what the model
+    had before, where it is smaller than the interval.
 
     """
     before = ''
@@ -218,7 +221,8 @@ def _values(finding: Finding) -> Iterator[str]:
     not_zero = [row for row in every if excludes_zero(row[1], row[2])]
     for p, value, std, had in not_zero or every:
         name = '' if p.name == before else f'{p.words} '
-        yield f'{name}{_with_degrees(value, std, p.unit)}{added(had)}'
+        added = f', added to {had:.4g}' if had and not abs(had) < HALF_WIDTH * std else ''
+        yield f'{name}{_with_degrees(value, std, p.unit)}{added}'
         before = p.name
 
 
@@ -229,11 +233,6 @@ def vague(finding: Finding, parameter: ParameterName, value: float, std: float) 
         if shape.name == parameter.name:
             return not shape.determined(value, HALF_WIDTH * std)
     return not np.isfinite(std)
-
-
-def added(had: float) -> str:
-    """Format the value that a change is added to; empty where it is zero."""
-    return f', added to {had:.4g}' if had else ''
 
 
 def _with_degrees(value: float, std: float, unit: str) -> str:
@@ -249,7 +248,7 @@ def _strange(joints: Sequence[str], findings: Sequence[Finding]) -> str:
         'velocity. Something acts that does not repeat, such as contact or a person. '
     )
     if findings:
-        names = ', '.join(finding.name.replace('_', ' ') for finding in findings)
+        names = ', '.join(name_in_words(finding.name) for finding in findings)
         return text + f'{names} is provisional.'
     return text + 'No effect of the arm is named.'
 
@@ -260,7 +259,7 @@ def others_in_words(finding: Finding) -> str:
     words = []
     for rival in finding.rivals:
         place = f' of {", ".join(rival.joints)}' if elsewhere and rival.joints else ''
-        name = 'one' if rival.name == finding.name else rival.name.replace('_', ' ')
+        name = 'one' if rival.name == finding.name else name_in_words(rival.name)
         words.append(name + place)
     return ' or '.join(words)
 

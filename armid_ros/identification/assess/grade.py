@@ -161,7 +161,7 @@ def _errors(
     use = {
         'good': '',
         'poor': ', too much to compute torques with',
-        'unusable': ', the model does not describe this motion',
+        'unusable': ': the model does not describe this motion',
     }
     for bag, one in worst.items():
         word = by_error(one.beyond)

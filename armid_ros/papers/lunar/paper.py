@@ -17,8 +17,6 @@ import numpy as np
 
 #: Load in the hand in Table 4 [kg].
 LOAD = 0.3
-#: Mean percentage error that the abstract states.
-STATED_ERROR = 5.5
 
 
 @dataclass(frozen=True, eq=False)

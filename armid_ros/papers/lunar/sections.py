@@ -18,10 +18,10 @@ import numpy as np
 def tables_section(repeated: Sequence[Repeated]) -> ContentSection:
     """Return a section with the tables of paper and reproduction, joint by joint."""
     text = (
-        'Peak: of the paper, and the largest torque of gravity at the joint. Errors are those of '
-        'trajectories that were not used, against the true torque. Noisy is the error against the '
-        "noisy torque of the run, as the paper may have it. Weight is the paper's method, whole "
-        'the full dynamics.'
+        'Peak: as the paper prints it, and the largest gravity torque of the joint. Errors are '
+        'those of held-out trajectories against the true torque; noisy: against the noisy torque '
+        "of the run, as the paper may have it. Gravity: the gravity model, the paper's method. "
+        'Dynamics: the full dynamics.'
     )
     folds = [
         Fold(f'Table {one.table.number}: {one.table.title}', [_table(one)], opened=True)
@@ -45,13 +45,13 @@ def _table(one: Repeated) -> DataTable:
         )
     ]
     peaks = {'paper': one.table.peak, 'largest': one.peak}
-    errors = {'paper': one.table.error, 'weight': slow.held_out, 'whole': whole.held_out}
+    errors = {'paper': one.table.error, 'gravity': slow.held_out, 'dynamics': whole.held_out}
     rows = [
         *((f'Peak, {by} [N mm]', *_cells(1e3 * x, 3), '') for by, x in peaks.items()),
         *((f'{error}, {by} [N mm]', *_cells(1e3 * x), '') for by, x in errors.items()),
         *(
             (f'{share}, {by}', *_cells(ratio), digits(float(np.mean(ratio))))
-            for by, ratio in zip(('paper', 'noisy', 'weight', 'whole'), ratios, strict=True)
+            for by, ratio in zip(('paper', 'noisy', 'gravity', 'dynamics'), ratios, strict=True)
         ),
     ]
     return DataTable(('quantity', *one.joints, 'mean'), rows)
@@ -64,7 +64,7 @@ def _cells(values: FloatArray, count: int = 2) -> list[str]:
 def curves_section(repeated: Sequence[Repeated]) -> ContentSection:
     """Return a section with true and predicted torque along a held-out trajectory."""
     text = (
-        'Weight alone, identified from the noisy run, along a trajectory that was not used. Drag '
+        'Gravity model, identified from the noisy run, along a held-out trajectory. Drag '
         'across a plot, or pinch it, to zoom; double-click or double-tap to see it all.'
     )
     folds = [
@@ -107,7 +107,7 @@ def gravity_section(composites: Sequence[Composite], load: str) -> ContentSectio
 
     """
     text = (
-        'Masses and first moments times the gravity of the moon, in N mm, by the weight alone; '
+        'Masses and first moments times the gravity of the moon, in N mm, by the gravity model; '
         "± 95 %. An arm with revolute joints has an even number of them; of the paper's table "
         'nine are legible, and all nine have this form. The two runs differ by '
         f'{load} at the hand.'

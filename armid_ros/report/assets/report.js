@@ -9,6 +9,7 @@
   const widths = {measured: 4, faint: 1.3, trend: 2};
   const font = '12px system-ui, sans-serif';
   const charts = new Map();  // figure -> {plot, spec}
+  const hovers = matchMedia('(hover: hover)').matches;  // without, its buttons are always there
   let colour = {};
 
   const readColours = () => {
@@ -96,7 +97,7 @@
     const vertical = side === 3;
     return {
       ...(logarithmic ? {splits: decades, filter: (u, splits) => splits} : {}),
-      ...(whole ? {incrs: [1, 2, 5, 10, 20, 50, 100]} : {}),
+      ...(whole ? {incrs: [1, 2, 5].flatMap((x) => [0, 1, 2, 3, 4, 5].map((n) => x * 10 ** n)).sort((a, b) => a - b)} : {}),
       label: label || null, side, font, labelFont: font, labelSize: 18, labelGap: 0, gap: 4,
       stroke: () => colour.soft,
       size: vertical ? (u, values) => 16 + 7 * Math.max(5, ...(values || []).map((v) => v.length)) : 26,
@@ -274,7 +275,7 @@
       }
     }
     const plot = new uPlot({
-      width: figure.clientWidth, height: spec.height, series, bands, padding: [8, 12, 0, 0],
+      width: figure.clientWidth, height: spec.height, series, bands, padding: [spec.legend || hovers ? 8 : 26, 12, 0, 0],
       scales: {x: {time: false, range: rangeX(spec), distr: spec.logarithmic ? 3 : 1}, y: {range: rangeY(spec)}},
       axes: [axis(spec.xlabel, 2, {whole: spec.x.every(Number.isInteger), logarithmic: spec.logarithmic}),
         axis(spec.ylabel, 3)],
@@ -326,7 +327,7 @@
 
   // A button below each table copies it as CSV; a field above those of parameters filters rows.
   const csv = (table) => [...table.rows].map(
-    (row) => [...row.cells].map((cell) => quoted(cell.innerText)).join(',')).join('\n');
+    (row) => [...row.cells].map((cell) => quoted(cell.innerText.replaceAll('\u00a0', ' '))).join(',')).join('\n');
 
   function addCopy(table) {
     const button = document.createElement('button');
@@ -370,10 +371,23 @@
     section.querySelector('details').before(...tools);
   }
 
+  // A number and its unit stay on one line.
+  function keepUnits() {
+    for (const block of document.querySelectorAll('p, li, dd, td')) {
+      const walk = document.createTreeWalker(block, NodeFilter.SHOW_TEXT);
+      while (walk.nextNode()) {
+        const text = walk.currentNode;
+        text.data = text.data.replace(/(\d) (?=%|°|(?:N|[kmc]?m|k?g|m?s|m?rad|k?Hz|dB)\b)/g, '$1\u00a0')
+          .replace(/\b(k?N|kg) m/g, '$1\u00a0m').replace(/ ± /g, '\u00a0± ');
+      }
+    }
+  }
+
   matchMedia('(prefers-color-scheme: dark)').addEventListener('change', repaint);
   document.querySelectorAll('details').forEach((details) => details.addEventListener('toggle', drawAll));
   document.querySelectorAll('.scroll > table').forEach(addCopy);
   document.querySelectorAll('section:has(table.parameters)').forEach(addFilter);
+  keepUnits();
   readColours();
   drawAll();
 })();

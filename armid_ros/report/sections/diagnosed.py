@@ -15,6 +15,7 @@ from armid_ros.diagnosis.verdict.finding import Gap
 from armid_ros.diagnosis.verdict.where import Where
 from armid_ros.diagnosis.verdict.words import by_cause, share_interval_in_words
 from armid_ros.effects import CATALOGUE
+from armid_ros.estimate import name_in_words
 from armid_ros.identification.fitting.identifiability import excludes_zero
 from armid_ros.motion import FloatArray
 from armid_ros.report.blocks import (
@@ -44,7 +45,7 @@ import numpy as np
 
 #: Joints that are shown, and candidates.
 _JOINTS, _CANDIDATES = 3, 15
-#: Share of the power of a residual from which on its mean is said to be taken off.
+#: Share of the mean square of a residual from which on its mean is said to be taken off.
 _MEAN_SAID = 0.005
 #: Standard deviations by which a value has to differ from zero, and from what is possible.
 _SIGNIFICANT = 3.0
@@ -56,7 +57,7 @@ def share_bars(diagnosis: Diagnosis) -> BarChart:
     for group in by_cause(diagnosis.findings):
         one = group[0]
         where = ', '.join(one.place_of(joint) for joint in one.joints) or 'whole arm'
-        names = ' and '.join(other.name.replace('_', ' ') for other in group)
+        names = ' and '.join(name_in_words(other.name) for other in group)
         share = max(one.share, 0.0)
         taken += share
         text = percent(one.share) + share_interval_in_words(one)
@@ -65,8 +66,8 @@ def share_bars(diagnosis: Diagnosis) -> BarChart:
     rows.append(('unexplained (noise included)', [Bar(rest, 'floor', percent(rest))]))
     # the gap is the sum of squares, each joint in units of its floor; noise is part of it
     held_out = diagnosis.gap is not None and diagnosis.gap.predicted
-    data = 'on held-out recordings' if held_out else 'on parts predicted from the others'
-    legend = f'share of the gap explained {data}, 95 % intervals by block bootstrap'
+    data = 'held-out recordings' if held_out else 'cross-validation'
+    legend = f'share of the gap explained ({data}; 95 % intervals)'
     return BarChart(rows, [('after', legend)], full=1.0)
 
 
@@ -91,7 +92,7 @@ def named_rows(
             values = [row for row in values if excludes_zero(row[1], row[2])] or values
         rows += [
             (
-                finding.name.replace('_', ' '),
+                name_in_words(finding.name),
                 name.words,
                 finding.place_of(name.joint) or 'whole arm',
                 value_of(finding, name, value, std),
@@ -101,7 +102,7 @@ def named_rows(
         masses = [row[1] for row in values if row[0].unit == 'kg' and excludes_zero(*row[1:])]
         rows += [
             (
-                finding.name.replace('_', ' '),
+                name_in_words(finding.name),
                 name.words.replace('first moment', 'centre of mass'),
                 finding.place_of(name.joint) or 'whole arm',
                 with_interval(value / masses[0], std / abs(masses[0]), 'm'),
@@ -139,8 +140,8 @@ def evidence_section(places: Sequence[Where], share_of: str = 'the gap') -> Cont
             blocks.append(
                 Paragraph(
                     f'The mean of the residual, {digits(place.mean)} {place.unit} or '
-                    f'{percent(place.mean_share)} of its power, is subtracted; shares are of the '
-                    'rest.'
+                    f'{percent(place.mean_share)} of its mean square, is subtracted; shares '
+                    'are of the rest.'
                 )
             )
         varies = max(1.0 - place.mean_share, 1e-9)
@@ -156,7 +157,7 @@ def evidence_section(places: Sequence[Where], share_of: str = 'the gap') -> Cont
                 symmetric=True,
                 legend=False,
             )
-            panels.append((f'{axis.name}: {share} of the power', '', [chart]))
+            panels.append((f'{axis.name}: {share} of the mean square', '', [chart]))
         share = f'{100 * place.share_of_gap:.0f} % of {share_of}'
         folds.append(
             Fold(
@@ -184,7 +185,7 @@ def minor_section(minor: Sequence[Finding], patched: bool, named: bool) -> Conte
     """
     rows = [
         (
-            one.name.replace('_', ' '),
+            name_in_words(one.name),
             ', '.join(one.joints) or 'whole arm',
             value_of(one, one.parameters[0], one.values[0], one.std[0]) if one.values else '',
             percent(one.share),
@@ -201,7 +202,7 @@ def minor_section(minor: Sequence[Finding], patched: bool, named: bool) -> Conte
                 'Statistically significant but negligible, or not confirmed by held-out data.'
                 f'{outside} A value may stand for another effect with a similar torque.'
             ),
-            DataTable(('Effect', 'Joints', 'Value, 95 %', share, 'p'), rows, (0, 1)),
+            DataTable(('Effect', 'Joints', 'Value, 95 %', share, 'p value'), rows, (0, 1)),
         ],
     )
 
@@ -223,7 +224,7 @@ def detectable_section(sizes: Sequence[Detectable]) -> ContentSection:
         finite = sorted((s for s in own if math.isfinite(s.size)), key=lambda s: s.size)
         best, worst = (size(finite[0]), size(finite[-1])) if finite else ('', '')
         never = '; '.join(place(s) for s in own if not math.isfinite(s.size))
-        rows.append((name.replace('_', ' '), best, worst if worst != best else '', never))
+        rows.append((name_in_words(name), best, worst if worst != best else '', never))
     heads = (
         'Effect',
         'Detectable from',
@@ -263,7 +264,7 @@ def candidates_section(diagnosis: Diagnosis) -> ContentSection:
     rows = [
         (
             TableCell(
-                trial.effect.name.replace('_', ' '),
+                name_in_words(trial.effect.name),
                 'changed' if trial.effect.said_as in names else '',
             ),
             ', '.join(trial.effect.joints) or 'whole arm',

@@ -68,7 +68,7 @@ def overlay_section(
     return ContentSection(
         'Measured and modelled',
         [
-            Paragraph(f'{robot.joints[j]} in {source}, where the error is largest.'),
+            Paragraph(f'Joint {robot.joints[j]} in recording {source}: the largest error.'),
             Chart(
                 t[kept],
                 [Series('measured', measured[kept], 'measured'), *models(before, after)],

@@ -66,7 +66,7 @@ def verdict(result: TwoInertiaIdentification) -> VerdictSection:
             value += f' ± {HALF_WIDTH * estimate.std[estimate.index("kg", joint)]:.0f}'
         springs.append(f'{value} N m/rad at {joint}')
     interval = ' (95 %)' if result.tuning is not None else ''
-    sentences = [f'The springs have {" and ".join(springs)}{interval}.']
+    sentences = [f'The joint stiffness is {" and ".join(springs)}{interval}.']
     poor = [
         joint for k, joint in enumerate(result.joints) if decibels_apart(result, k) > _CLOSE_DB
     ]

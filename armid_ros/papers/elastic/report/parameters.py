@@ -4,8 +4,9 @@
 
 from __future__ import annotations
 
+from armid_ros.estimate import name_in_words
 from armid_ros.identification.fitting.identifiability import HALF_WIDTH
-from armid_ros.papers.elastic.identification.names import parameter_names, unpack
+from armid_ros.papers.elastic.identification.names import parameter_names, PER_JOINT, unpack
 from armid_ros.papers.elastic.identification.output import total_damping
 from armid_ros.papers.elastic.identification.rigid import CUTOFF, RigidFit
 from armid_ros.papers.elastic.identification.three_steps import TwoInertiaIdentification
@@ -31,7 +32,8 @@ def parameters_section(
 
     """
     names = parameter_names(result.joints)
-    lines = [(name.name, name.joint, name.unit) for name in names]
+    long = {symbol: f'{name_in_words(field)} ({symbol})' for field, symbol, _ in PER_JOINT}
+    lines = [(long.get(name.name, name.name), name.joint, name.unit) for name in names]
     values, untuned = unpack(result.parameters).tolist(), unpack(result.untuned).tolist()
     base = None if known is None else unpack(known).tolist()
     std: list[float] = []

@@ -20,7 +20,7 @@ import numpy.typing as npt
 #: Frequency ranges of the plots and of the comparison of responses [Hz].
 _SHOWN, _COMPARED = (2.0, 100.0), (5.0, 60.0)
 _ROLES: tuple[Role, Role] = ('residual', 'predicted')
-_SIZE = 'size [dB re rad/(N m s)]'
+_SIZE = 'magnitude [dB re rad/(N m s)]'
 
 
 def responses_section(result: TwoInertiaIdentification) -> ContentSection:
@@ -32,7 +32,8 @@ def responses_section(result: TwoInertiaIdentification) -> ContentSection:
     )
     hint = (
         'The response of the whole arm is the mean over the poses of joint 2 in the recording, '
-        'with the other motor free. Differences are those from 5 to 60 Hz.'
+        'with the other motor free. Dashed lines are the frequencies of the joint alone. Errors '
+        'are those from 5 to 60 Hz.'
     )
     panels = [panel for k in range(2) for panel in _joint(result, k)]
     return ContentSection(
@@ -67,7 +68,7 @@ def _joint(
         Mark(low, f'antiresonance {low:.1f} Hz', before=True),
         Mark(high, f'resonance {high:.1f} Hz'),
     ]
-    modelled = [('by subspaces', subspaces), ('by physical parameters', decoupled)]
+    modelled = [('subspace model', subspaces), ('physical model', decoupled)]
     within = (own >= _COMPARED[0]) & (own <= _COMPARED[1])
     rows = at[within]
     errors = (
@@ -87,10 +88,10 @@ def _joint(
     alone_chart = _chart(frequency, alone, whole, _decibel, _SIZE, 220, marks, last=True)
     facts = [
         ('Antiresonance, resonance of the joint', f'{low:.2f} Hz, {high:.2f} Hz'),
-        ('Lowest, highest from motor torque alone', f'{dip:.1f} Hz, {peak:.1f} Hz'),
-        ('Measured, decoupled, against the joint', f'{errors[0]:.2f} dB rms'),
-        ('From motor torque alone, against the joint', f'{errors[1]:.1f} dB rms'),
-        ('The same against the whole arm', f'{errors[2]:.1f} dB rms'),
+        ('Measured minimum and maximum, coupled', f'{dip:.1f} Hz, {peak:.1f} Hz'),
+        ('Joint model, decoupled: error', f'{errors[0]:.2f} dB rms'),
+        ('Joint model, coupled: error', f'{errors[1]:.1f} dB rms'),
+        ('Whole-arm model, coupled: error', f'{errors[2]:.1f} dB rms'),
     ]
     yield joint, 'coupled: from motor torque alone', (alone_chart, FactList(facts))
 

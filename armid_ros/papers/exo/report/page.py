@@ -82,7 +82,9 @@ def verdict(found: Sequence[Interaction], walked: SimulatedWalk | None) -> Verdi
     """Say what ties the two, how surely, and whether the torques walk."""
     overall = found[0]
     k, reach = overall.stiffness[0], HALF_WIDTH * overall.std[0]
-    sentences = [f'The straps between exoskeleton and wearer have {k:.0f} ± {reach:.0f} N/m.']
+    sentences = [
+        f'The stiffness of the straps between exoskeleton and wearer is {k:.0f} ± {reach:.0f} N/m.'
+    ]
     weak = [
         name.replace('_', ' ')
         for part in found[1:]

@@ -43,7 +43,7 @@ def stiffness_section(found: Sequence[Interaction], truth: Mapping[str, float]) 
         [
             segment.replace('_', ' '),
             *measured(part.stiffness[k], HALF_WIDTH * part.std[k]),
-            f'{100.0 * part.bias[k] / part.stiffness[k]:+.2f} %',
+            f'{100.0 * part.bias[k] / part.stiffness[k]:+z.2f} %',
             *([f'{truth[segment]:g}' if segment in truth else ''] if truth else []),
         ]
         for part in found
@@ -55,7 +55,7 @@ def stiffness_section(found: Sequence[Interaction], truth: Mapping[str, float]) 
     ]
     text = (
         'Springs are drawn out by millimetres, the small difference of measured angles. Noise in '
-        'the angles makes plain least squares wrong in a direction that more data do not heal. '
+        'the angles biases plain least squares, and more data do not help. '
         'The noise was measured in the recording and its effect taken out.'
     )
     table = DataTable([*heads, 'Simulated with'] if truth else heads, rows)

@@ -179,9 +179,9 @@ def feet_section(cycle: GaitCycle) -> ContentSection:
         "What the ground does to the feet, by the contact of the source's Table 3 "
         '(100 N/mm^1.5, 1 N s/mm, friction 0.3). Vertical lines: from one foot on the ground to '
         'two and back. In double support the source splits the trunk between the legs by the '
-        'distances of the thighs, (20) to (22).'
+        'distances of the thighs, equations (20) to (22).'
     )
-    off = '(20) to (22) off by [N rms]'
+    off = 'source off by [N rms]'
     heads = ('Machine', 'Weight [N]', 'Most on a foot [N]', 'On both feet', off)
     panels, rows = [], []
     for robot, other in ((cycle.pair.robot, False), (cycle.pair.other, True)):
@@ -191,8 +191,8 @@ def feet_section(cycle: GaitCycle) -> ContentSection:
         series = [
             Series('right foot', feet[:, 0], 'residual'),
             Series('left foot', feet[:, 1], 'predicted'),
-            Series('right, by (20) to (22)', np.where(two, rule[:, 0], np.nan), 'measured'),
-            Series('left, by (20) to (22)', np.where(two, rule[:, 1], np.nan), 'before'),
+            Series('right, source', np.where(two, rule[:, 0], np.nan), 'measured'),
+            Series('left, source', np.where(two, rule[:, 1], np.nan), 'before'),
         ]
         marks = [Mark(float(cycle.phase[k])) for k in np.flatnonzero(np.diff(two)) + 1]
         chart = Chart(
@@ -219,7 +219,7 @@ def by_torque_section(walked: SimulatedWalk) -> ContentSection:
         'errors over the cycle:'
     )
     soft = f'Springs {100.0 * walked.softer:g} % too soft [°]'
-    heads = ('Joint', 'Source [°]', 'Here [°]', soft, 'Feet by (20) to (22) [°]')
+    heads = ('Joint', 'Source [°]', 'Here [°]', soft, 'Feet of the source [°]')
     rows = [
         (
             d.joint,
