@@ -96,8 +96,8 @@ def _arm_page(found: Watch, arm: WatchedArm, diagnoses: Diagnoses) -> str:
         quiet = pretty(diagnosis['summary'])
     sentences = [f'{text[0].upper()}{text[1:]}.' for text in texts[:1]] or [quiet]
     if diagnosis is not None and texts and diagnosis['verdict'] in _EXPLAINED:
-        first, stop, more = pretty(diagnosis['summary']).partition('. ')
-        sentences = [first + stop.rstrip(), *filter(None, [more]), *sentences]
+        lead, stop, more = pretty(diagnosis['summary']).partition('. ')
+        sentences = [lead + stop.rstrip(), *filter(None, [more]), *sentences]
     if len(texts) > 1:
         sentences.append(f'{counted(len(texts) - 1, "more parameter")} changed; see below.')
     step = '' if diagnosis or not arm.named else f'armid fleet diagnose --arm {arm.arm}.'

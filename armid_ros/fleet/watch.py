@@ -307,9 +307,9 @@ def sentence(change: HistoryChange) -> str:
         factor, lower, upper = np.exp(change.size + np.array([0.0, -reach, reach]))
         by = f'by a factor of {factor:.3g} ({lower:.3g} to {upper:.3g})'
     else:
-        size, reach = measured(change.size, HALF_WIDTH * change.std)
+        size, half = measured(change.size, HALF_WIDTH * change.std)
         sign = '+' * (change.size > 0.0)
-        by = f'by {sign}{size} ± {reach} {series.unit}'.rstrip()
+        by = f'by {sign}{size} ± {half} {series.unit}'.rstrip()
     if change.kind == 'trend':
         return f'{what} drifts {by} a month since {day_text(float(series.days[0]))}'
     last, first = (day_text(float(series.days[k])) for k in (change.index - 1, change.index))
