@@ -79,7 +79,7 @@ def test_the_centre_of_a_load_is_said_where_it_is_determined():
     place = '(-0.1800 ± 0.0053, 0.0000 ± 0.0039, 0.0100 ± 0.0039) m'
     assert place in next_steps(found)[0]
     found.findings = (replace(load, values=values, std=(0.03, *std[1:])),)
-    assert '(-0.180 ± 0.036, 0.0000 ± 0.0039, 0.0100 ± 0.0044) m' in next_steps(found)[0]
+    assert '(-0.180 ± 0.035, 0.0000 ± 0.0039, 0.0100 ± 0.0044) m' in next_steps(found)[0]
     found.findings = (replace(load, values=values, std=(0.3, *std[1:])),)
     assert 'centred' not in next_steps(found)[0]
 
