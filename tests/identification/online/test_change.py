@@ -87,9 +87,10 @@ def test_a_change_without_calibrated_statistics_has_the_deviation_of_its_data():
     _, block, _, _ = learned_and_block(np.random.default_rng(0), 0.7, seen=5)
     candidate = ChangeCandidate('payload', 'hand', NAMES[:1], CHANGED, CHANGED)
     search = ChangeSearch([candidate], CHANGED, 1e-6, Foreground())
-    found = at_once(search.size(FoundChange((block,), 0, candidate, (), 9.0), 1.0))
-    expected = score_statistics(block, CHANGED).size(slice(0, 1))
-    np.testing.assert_allclose(np.ravel(found), np.ravel(expected))
+    found, covariance = at_once(search.size(FoundChange((block,), 0, candidate, (), 9.0), 1.0))
+    expected, certain = score_statistics(block, CHANGED).size(slice(0, 1))
+    np.testing.assert_allclose(found, expected)
+    np.testing.assert_allclose(covariance, certain)
 
 
 def test_without_a_change_the_ratio_is_chi_square():
