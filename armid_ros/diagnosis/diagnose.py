@@ -180,8 +180,8 @@ def _within(
     if not settings.spans or look is None or not _hardly_explained(result, settings):
         return None
     spans = acting_spans(look, settings.thresholds)
-    told = [*recordings, *validate][: len(spans)]
-    cut = [_cut(*each) for each in zip(spans, told, strict=True)]
+    timed = [*recordings, *validate][: len(spans)]
+    cut = [_cut(*each) for each in zip(spans, timed, strict=True)]
     shorter, unseen = (
         [one for one in part if one is not None]
         for part in (cut[: len(recordings)], cut[len(recordings) :])
@@ -203,7 +203,7 @@ def _within(
         return None
     if _hardly_explained(found, settings):
         return None
-    if len(told) < len(recordings) + len(validate):
+    if len(timed) < len(recordings) + len(validate):
         found = replace(found, notes=(*found.notes, _NOT_TIMED))
     return found.acting_in([one for one in spans if one.stop > one.start])
 

@@ -150,7 +150,7 @@ class MeasuredTorque(Effect):
         return Action()
 
 
-@pytest.mark.parametrize('hide', [pytest.param(None, marks=pytest.mark.long), drag])
+@pytest.mark.parametrize('hide', [None, drag])
 def test_columns_made_of_the_measured_torque_explain_nothing(bench, hide):
     found = look(bench, bench.recordings(hide), settings=DiagnosisSettings(own=(MeasuredTorque,)))
     assert 'measured_torque' not in {f.name for f in found.findings}
