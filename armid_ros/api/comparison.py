@@ -103,7 +103,7 @@ def compare(
     --------
     >>> import armid_ros as ar
     >>> print(ar.compare('monday_result', 'friday_result'))
-    CHANGED: ... parameters changed beyond uncertainty, at ...elbow...
+    CHANGED: A load of 0.39... kg was added to the link of elbow...
 
     """
     return ComparisonResult(run(_parameters('before', before), _parameters('after', after)))

@@ -153,6 +153,14 @@ class Extras:
         return tuple(dict.fromkeys(joint for pair in self.forward for joint in pair.worse))
 
 
+#: What recordings were used for, and the words for some of them.
+_ROLES = (
+    ('training', 'recording', '{}'),
+    ('held-out', 'held-out recording', '{}'),
+    ('baseline', 'recording', '{} from before'),
+)
+
+
 def diagnosis_report(
     diagnosis: Diagnosis,
     read: Mapping[str, Sequence[Recording]],
@@ -229,13 +237,10 @@ def diagnosis_report(
     if patched and not diagnosis.harmful:
         sections.append(patch_section(diagnosis.findings, patch))
     sections.append(Origin(provenance or Provenance()))
-    kinds = (
-        ('training', 'recording', '{}'),
-        ('held-out', 'held-out recording', '{}'),
-        ('baseline', 'recording', '{} from before'),
-    )
     used = [
-        kind.format(counted(len(read[role]), noun)) for role, noun, kind in kinds if read.get(role)
+        kind.format(counted(len(read[role]), noun))
+        for role, noun, kind in _ROLES
+        if read.get(role)
     ]
     subtitle = ' · '.join([robot_label(robot), *used])
     joints = (*arm.robot.joints, *arm.robot.links)
