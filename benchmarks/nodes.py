@@ -190,7 +190,7 @@ def in_lock_step(rate, folder):
     Print how much faster than real time the nodes are together.
 
     By the clock, which other processes slow down, and by processor time, which is what an idle
-    machine needs; beside it what the simulator and the bare messages need.
+    machine needs; and that of the simulator and of the bare messages alone.
 
     """
     robot = load_robot('humanoid_arm', gravity='moon')

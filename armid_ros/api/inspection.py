@@ -41,8 +41,6 @@ import numpy as np
 if TYPE_CHECKING:
     import pandas
 
-#: Of a check of a description.
-
 
 @dataclass(frozen=True, repr=False, eq=False)
 class InspectionResult(Shown):

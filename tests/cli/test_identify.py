@@ -88,7 +88,7 @@ def test_model_numbers_and_page_are_of_one_arm(made):
     out, _ = made
     document = document_of(out)
     assert document['validation'][0]['relative_error_percent'] < 3.0
-    arm = load_model(out / 'model.yaml')  # its robot came with the bag and lies beside it
+    arm = load_model(out / 'model.yaml')  # the robot of the bag is in the same folder
     viscous = arm.values[arm.effects.index(make_effect('viscous_friction', arm.robot))]
     np.testing.assert_allclose(viscous, 0.1, atol=0.01)
     robot = load_robot(out / 'identified.urdf')

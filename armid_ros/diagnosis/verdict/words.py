@@ -79,6 +79,7 @@ def decide(
         return Verdict('not_repeatable', _strange(strange, findings))
     error = f'the error of {joint} {worst.where}'
     size = larger(np.sqrt(worst.ratio.max())) + f' expected from {floor_in_words}{worst.more}'
+    no_larger = f'is no larger than {floor_in_words}'
     refit = _refit(as_it_is, arm.robot, floor_in_words)
     shown = bool(minor) and minor[0].share >= SAID
     small = sentence(minor[0], 'the gap' if open_gap else 'the remaining error') if shown else ''
@@ -87,20 +88,16 @@ def decide(
             text = f'No effect in the catalogue explains {error}: it is {size}.'
             text += f' At best, {small[0].lower()}{small[1:]}' if small else ''
             return Verdict('unknown', f'{text} {refit}'.rstrip())
-        text = 'The model explains the recordings: the remaining error is no larger than '
-        text += (
-            f'{floor_in_words}, or too small to matter. {small}' if small else f'{floor_in_words}.'
-        )
+        text = f'The model explains the recordings: the remaining error {no_larger}'
+        text += f', or too small to matter. {small}' if small else '.'
         return Verdict('consistent', f'{refit}{text}')
     said, tied = _sentences(findings), _rivals_in_words(findings)
     if open_gap:
-        return Verdict(
-            'partial', f'{said}{tied and f" {tied}"} {refit}There is more: {error} is {size}.'
-        )
+        first = f'{said} {tied}'.rstrip()
+        return Verdict('partial', f'{first} {refit}There is more: {error} is {size}.')
     if tied:
         return Verdict('ambiguous', f'{tied} {said} {refit}'.rstrip())
-    end = f'The remaining error is no larger than {floor_in_words}.'
-    return Verdict('named', f'{said} {refit}{end}')
+    return Verdict('named', f'{said} {refit}The remaining error {no_larger}.')
 
 
 def _rivals_in_words(findings: Sequence[Finding]) -> str:

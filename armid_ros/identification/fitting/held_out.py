@@ -31,8 +31,8 @@ import numpy.typing as npt
 #: Rows that are enough to compare halves and cut-offs: some fifty for every parameter of seven
 #: joints, and some hundred.
 _OF_HALVES, _OF_CUTOFFS = 4000, 6000
-#: Longer data are compared on so many evenly spread windows, of twice as many rows together: at
-#: 1 kHz each has half a minute, of which the filters of 1 Hz lose a tenth.
+#: Number of evenly spread windows for the comparison of cut-offs on longer data. Together they
+#: have twice as many rows; at 1 kHz, a filter of 1 Hz loses a tenth of each at its ends.
 _WINDOWS = 8
 #: A cut-off is compared with one lower by this factor.
 _STEP = 0.5

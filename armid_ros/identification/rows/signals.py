@@ -41,8 +41,6 @@ MODEL_BANDS = 10.0
 #: Positions are cut off at no more than this many times the band that rows keep: the Butterworth
 #: filter, run both ways, damps what rows keep by 5^-8 or less, below TORQUE_RESOLUTION.
 _POSITION_BANDS = 5.0
-#: Share of their rate up to which rows keep what is there, where the decimation filter ends.
-_KEPT = 0.4
 #: Samples per period of the cut-off that describe a smooth function of the filtered positions.
 _SMOOTH_SAMPLES = 5.0
 #: The positions' spectrum ends where it is less than this many times the noise.
@@ -118,7 +116,8 @@ class Conditioning:
     @property
     def kept_hz(self) -> float:
         """Frequency up to which rows keep what is there [Hz]."""
-        return _KEPT * self.rate_hz / self.decimation
+        # the decimation filter ends at this share of the rate of the rows
+        return 0.4 * self.rate_hz / self.decimation
 
     def taps(self) -> FloatArray:
         """Return the symmetric decimation filter; a single 1 where nothing is decimated."""
@@ -182,7 +181,7 @@ def conditioning(recordings: list[Recording], settings: SignalSettings) -> Condi
         if decimation is None:
             stride = max(1, int(rate / (_SMOOTH_SAMPLES * _POSITION_BANDS * band)))
             decimation = max(1, int(rate / (2.5 * band)) // stride * stride)  # see smooth_stride
-        kept = max(band, _KEPT * rate / decimation)
+        kept = max(band, Conditioning(rate, band, decimation).kept_hz)
         highest = min(_POSITION_BANDS * kept, 0.2 * rate)
         cutoff = cutoff or min(max(float(np.max(crossings)), band), highest)
     if cutoff >= 0.5 * rate:

@@ -45,7 +45,7 @@ import numpy as np
 
 #: Joints that are shown, and candidates.
 _JOINTS, _CANDIDATES = 3, 15
-#: Share of the mean square of a residual from which on its mean is said to be taken off.
+#: Smallest share of the mean square of a residual at which a page states its mean.
 _MEAN_SAID = 0.005
 #: Standard deviations by which a value has to differ from zero, and from what is possible.
 _SIGNIFICANT = 3.0

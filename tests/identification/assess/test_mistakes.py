@@ -57,7 +57,7 @@ def kinds(robot, recording):
 
 
 def sentence(robot, recording):
-    """Return what is said of the mistake of a recording."""
+    """Return the text of the mistake of a recording."""
     return find(robot, recording).sentence(robot)
 
 
