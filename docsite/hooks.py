@@ -25,6 +25,8 @@ BESIDE_THE_DIAGNOSIS = (
     'identification/assess/data_faults.py',
     'identification/assess/joint_units.py',
     'identification/assess/sensor_faults.py',
+    'identification/fitting/held_out.py',
+    'identification/rows/signals.py',
     'identification/rows/stamps.py',
     'excitation/templates.py',
 )
