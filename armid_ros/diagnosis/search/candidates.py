@@ -44,11 +44,6 @@ _EVALUATIONS = 9
 _BODY = np.array([1.0, *3 * [0.1], *6 * [0.01]])
 
 
-#: Laws whose values change in several joints by one cause, such as temperature or grease
-#: (Bittencourt and Gunnarsson 2012); of the others each joint is a cause of its own.
-_COMMON = ('viscous_friction', 'coulomb_friction')
-
-
 @dataclass(frozen=True)
 class Causes:
     """
@@ -94,7 +89,9 @@ class Causes:
                     and cause.effect.adds_to(arm.robot) not in bodies
                 ]
                 result += singly
-                if effect.name in _COMMON and len(singly) > 1:
+                # One cause, such as temperature or grease, changes the friction of several joints
+                # (Bittencourt and Gunnarsson 2012).
+                if effect.traits.friction and effect.traits.usual and len(singly) > 1:
                     families += self._family(singly, nuisance, under)
         counts = Counter(cause.key for cause in result)
         result = [replace(cause, shapes=counts[cause.key]) for cause in result]
