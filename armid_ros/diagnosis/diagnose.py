@@ -287,6 +287,7 @@ def _said(
     open_in = measured.shown_in(left, explanation)
     places = where_it_is(explanation, (unseen or evidence) if found else open_in, settings)
     hidden = set() if explanation.survey is None else explanation.survey.hidden
+    hidden -= {finding.name for finding in found}
     explainer.tell(1.0, word.word)
     return Diagnosis(
         verdict=word.word,

@@ -164,7 +164,7 @@ class CauseComparison:
         if not able or max(one.odds for one in able) < levels.alarm:
             return None
         winner = min(able, key=lambda one: able[0].ahead(one, levels))
-        others = [one for one in telling if one is not winner]
+        others = [one for one in able if one is not winner]
         # One that is ahead is not beyond doubt itself: it is as likely as the winner at the most.
         behind = np.array([min(-winner.ahead(one, levels), 0.0) for one in others])
         total = np.logaddexp.reduce(np.append(behind, 0.0)) + np.logaddexp(0.0, -winner.odds)

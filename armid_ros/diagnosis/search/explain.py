@@ -151,9 +151,12 @@ def survey_of(
 ) -> Survey:
     """Summarise the first comparison of all causes, named ones first."""
     look, material = result.first, settings.material
+    # Without the causes, the likeliest setting may be one that hides others.
+    under = look.nuisance.marginal(result.under.setting)
+    look = replace(look, under=under)
     ranking = sorted(look.ranking, key=lambda one: one.cause.key not in named)
     every = [
-        *(look.worth(one, material) for one in ranking),
+        *(look.worth(replace(one, under=under), material) for one in ranking),
         *(look.trial(one, material) for one in look.others),
         *_open(result, unknown, settings),
     ]
