@@ -19,9 +19,10 @@ from armid_ros.api.arguments import (
     RobotLike,
     some_recordings_of,
     spelled,
+    USUAL,
     with_sources_apart,
 )
-from armid_ros.api.identification import IdentificationResult
+from armid_ros.api.identification import identify, IdentificationResult
 from armid_ros.api.since import misfit_of, recordings_since
 from armid_ros.api.table import (
     data_frame,
@@ -63,6 +64,8 @@ import numpy.typing as npt
 if TYPE_CHECKING:
     import pandas
 
+#: Effects of a simulator's model: those that URDF, SDF and MJCF describe, and an offset.
+SIMULATED = f'{USUAL},rotor_inertia'
 _Made = TypeVar('_Made')
 
 
@@ -85,6 +88,8 @@ class DiagnosisResult(ShownModel):
         What the model left when it was identified, where there is no baseline.
     extras : Extras
         What was made of the diagnosis: a learned residual, simulations, a next run.
+    simulated : IdentificationResult or None
+        The model of the simulator that was asked about.
 
     Examples
     --------
@@ -108,6 +113,7 @@ class DiagnosisResult(ShownModel):
     settings: DiagnosisSettings = field(default_factory=DiagnosisSettings)
     misfit: Misfit | None = None
     extras: Extras = field(default_factory=Extras)
+    simulated: IdentificationResult | None = None
 
     @property
     def residual(self) -> LearnedResidual | None:
@@ -287,6 +293,10 @@ class DiagnosisResult(ShownModel):
         lines = self.extras.sentences(self.core)
         if self.baseline:
             lines.insert(0, f'baseline: {", ".join(one.source for one in self.baseline)}')
+        if self.simulated is not None:
+            sources = ', '.join(one.source for one in self.simulated.recordings)
+            error = self.simulated.error_percent
+            lines.insert(0, f'simulator: identified from {sources} to {error:.2g} %')
         return Summary(
             pretty(self.core.summary),
             self.core.verdict.replace('_', ' '),
@@ -314,6 +324,7 @@ def diagnose(
     *,
     validate: RecordingLike | Sequence[RecordingLike] = (),
     baseline: RecordingLike | Sequence[RecordingLike] | None = None,
+    against: RecordingLike | Sequence[RecordingLike] = (),
     effects: str = '',
     residual: Literal['gp'] | None = None,
     cutoff: float | None = None,
@@ -343,8 +354,12 @@ def diagnose(
         From when the model was right: what it left then is no cause. By default what it was
         identified from, where that is known and there, and is not looked at; ``()`` asks
         without.
+    against : recording or path, or several
+        Recordings of a simulator. The model in question is then the simulator's, which is
+        identified from them; their motion may differ from that of ``recordings``.
     effects : str
-        Catalogue names with commas, for a robot without a model.
+        Catalogue names with commas, for a robot without a model; with ``against`` those of the
+        simulator.
     residual : {'gp'}, optional
         Learn what is left without a name, where the verdict is partial or unknown.
     cutoff : float, optional
@@ -389,6 +404,12 @@ def diagnose(
         require_residual()
     model = arm.arm if isinstance(arm, IdentificationResult) else arm_of(arm, effects)
     require_any_mass(model.robot)
+    simulator, simulated = recordings_of(against, model.robot), None
+    if simulator:
+        if baseline:
+            raise IdentificationError('give recordings of a simulator or a baseline, not both')
+        simulated = identify(model.robot, simulator, effects=effects or SIMULATED, rng=rng)
+        arm = model = simulated.arm
     looked_at = some_recordings_of(recordings, model.robot)
     held_out = recordings_of(validate, model.robot)
     if baseline is None:
@@ -423,6 +444,7 @@ def diagnose(
         tuple(before),
         settings,
         None if before else misfit,
+        simulated=simulated,
     )
     seed = rng if isinstance(rng, int) else 0
     return found if residual is None else found.with_residual(seed)

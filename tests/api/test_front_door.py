@@ -140,6 +140,16 @@ def test_a_diagnosis_and_a_comparison_find_the_load(model, found, loaded, tmp_pa
     assert ar.compare(model.save(tmp_path / 'before'), after).load == compared.load
 
 
+def test_what_a_simulator_lacks_is_named_without_a_model(runs, excitation):
+    simulated = ar.simulate(ar.ArmModel(ar.load_robot('humanoid_arm')), excitation)
+    found = ar.diagnose('humanoid_arm', runs[0], validate=runs[1], against=simulated)
+    assert found.names == ('viscous_friction', 'coulomb_friction')
+    found_values = found.core.findings[0]
+    assert len(found_values.values) == 6 and np.allclose(found_values.values, 0.1, atol=0.02)
+    with pytest.raises(ar.ArmidError, match='baseline'):
+        ar.diagnose('humanoid_arm', runs[0], baseline=runs[1], against=simulated)
+
+
 def test_an_inspection_and_an_excitation_show_themselves(runs, excitation, tmp_path):
     found = ar.inspect('humanoid_arm', runs[0])
     assert short(found)

@@ -64,6 +64,14 @@ class Percent(click.ParamType):  # type: ignore[type-arg]
     'gap is beyond.',
 )
 @click.option(
+    '--against',
+    multiple=True,
+    type=click.Path(path_type=Path),
+    metavar='BAG',
+    help='A bag of a simulated arm, to ask what the simulator lacks; may be given several times. '
+    "The simulator's model is identified from it, with --effects if given.",
+)
+@click.option(
     '--material',
     type=Percent(),
     default='1%',
@@ -124,6 +132,7 @@ def diagnose(
     model: Path | None,
     baseline: tuple[Path, ...],
     no_baseline: bool,
+    against: tuple[Path, ...],
     effects: str,
     residual: str | None,
     strict: bool,
@@ -139,6 +148,8 @@ def diagnose(
     """Find which effect a model lacks, and add it."""
     if baseline and no_baseline:
         raise click.UsageError('give --baseline or --no-baseline, not both')
+    if against and (model or baseline):
+        raise click.UsageError('give --against without --model and --baseline')
     from armid_ros.api.diagnosis import diagnose as run
     from armid_ros.api.diagnosis import DiagnosisResult, require_residual
     from armid_ros.api.table import ResultOrigin
@@ -158,10 +169,10 @@ def diagnose(
     if model is not None and beside is None and not (baseline or no_baseline):
         baseline = _identified_from(model, [*bags, *validate])
     with progress('reading') as tick:
-        recordings, held_out, before = (
-            options.read(paths, robot, topic) for paths in (bags, validate, baseline)
+        recordings, held_out, before, simulated = (
+            options.read(paths, robot, topic) for paths in (bags, validate, baseline, against)
         )
-        options.tell_damage(*recordings, *held_out, *before)
+        options.tell_damage(*recordings, *held_out, *before, *simulated)
         if beside is not None:
             recordings, held_out = (
                 partner_options.read_together(named, some, beside, partner_topic)
@@ -172,6 +183,8 @@ def diagnose(
             recordings,
             validate=held_out,
             baseline=before,
+            against=simulated,
+            effects=effects,
             misfit=misfit,
             partner=beside,
             prior=dict(one.partition('=')[::2] for one in priors),
@@ -181,7 +194,7 @@ def diagnose(
         )
         source = options.kept_source(robot_source, robot, staged.folder)
         origin = ResultOrigin(
-            robot_source, source, provenance([*bags, *validate, *baseline], seed=seed)
+            robot_source, source, provenance([*bags, *validate, *baseline, *against], seed=seed)
         )
         result.fill(staged.folder, origin)
         staged.keep()
