@@ -12,6 +12,7 @@ from typing import Any, TYPE_CHECKING
 
 from armid_ros.api.table import data_frame, DEFAULT_ORIGIN, ResultOrigin, Shown, Summary
 from armid_ros.arm import ArmModel
+from armid_ros.diagnosis.next_run.isolability import Isolability, isolability
 from armid_ros.errors import TrajectoryError
 from armid_ros.excitation import (
     ClearanceModel,
@@ -27,6 +28,7 @@ from armid_ros.excitation import (
     transfer_limits,
     TransferPlanner,
 )
+from armid_ros.excitation.problem import torque_noise
 from armid_ros.files import json_text, settled, write_file
 from armid_ros.motion import FloatArray, Motion
 from armid_ros.recording import write_joint_trajectory
@@ -62,6 +64,8 @@ class ExcitationResult(Shown):
         Recordings that it adds to.
     seed : int
         Of the search.
+    with_isolability : bool
+        Whether results contain the `isolability`.
 
     Examples
     --------
@@ -80,6 +84,7 @@ class ExcitationResult(Shown):
     given_start: FloatArray | None = None
     after: tuple[str, ...] = ()
     seed: int = 0
+    with_isolability: bool = False
 
     files = (
         *('excitation.json', 'report.html', 'excitation.yaml', 'excitation.csv'),
@@ -131,6 +136,13 @@ class ExcitationResult(Shown):
         return plan_run(excitation, self.planner, self.start, WAYPOINT_RATE, seed=self.seed)
 
     @cached_property
+    def isolability(self) -> Isolability:
+        """Return which effects the trajectory shows, and which it cannot distinguish."""
+        settings = self.core.settings
+        noise, count = torque_noise(self.arm, settings), settings.rate * self.duration
+        return isolability(self.arm, self.motion(), noise, count)
+
+    @cached_property
     def fitness(self) -> Fitness:
         """Return the results of the checks of the run."""
         return fitness(self.run.motion(), self.core.limits, self.scene)
@@ -170,6 +182,7 @@ class ExcitationResult(Shown):
                 {'name': name.name, 'joint': name.joint, 'std': std, 'unit': name.unit}
                 for name, std in zip(information.parameters, information.std, strict=True)
             ],
+            **({'isolability': self.isolability.document()} if self.with_isolability else {}),
         }
 
     def page(self, origin: ResultOrigin = DEFAULT_ORIGIN) -> str:
@@ -183,6 +196,7 @@ class ExcitationResult(Shown):
             self.fitness,
             robot=origin.of(self.arm.robot).robot,
             scene=self.scene,
+            isolability=self.isolability if self.with_isolability else None,
             provenance=origin.provenance,
         )
 
@@ -223,6 +237,7 @@ class ExcitationResult(Shown):
             for k, joint in enumerate(self.arm.robot.joints)
         ]
         first, *more = identifiable(self.core, self.arm.robot.links)
+        more += [str(self.isolability)] if self.with_isolability else []
         word, lines = self._of_run()
         return Summary(
             first,

@@ -76,7 +76,7 @@ class DesignProblem:
 
         """
         limits = Limits.of(arm.robot, speed=settings.speed, acceleration=settings.acceleration)
-        noise = _noise(arm, settings)
+        noise = torque_noise(arm, settings)
         if (settings.criterion == 'T') != (rival is not None):
             raise TrajectoryError(
                 "criterion 'T' compares two models: it needs a rival, and a rival needs it"
@@ -171,7 +171,16 @@ def target_columns(arm: ArmModel, target: str, motion: Motion) -> FloatArray:
     return np.concatenate([rigid, effects], axis=2)
 
 
-def _noise(arm: ArmModel, settings: DesignSettings) -> FloatArray:
+def torque_noise(arm: ArmModel, settings: DesignSettings) -> FloatArray:
+    """
+    Return the standard deviation of the torque noise of each joint, shape (n,) [N m or N].
+
+    Raises
+    ------
+    TrajectoryError
+        If the settings have other than one positive number a joint.
+
+    """
     n = arm.robot.n_joints
     if settings.noise is not None:
         noise = np.asarray(settings.noise, dtype=float)

@@ -8,6 +8,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import replace
 
 from armid_ros.arm import ArmModel
+from armid_ros.diagnosis.next_run.isolability import Isolability
 from armid_ros.excitation import (
     ClearanceModel,
     CollisionScene,
@@ -45,6 +46,7 @@ from armid_ros.report.judgement import GOOD_CONDITION, WEAK_CONDITION
 from armid_ros.report.notation import counted, digits, plain, pretty, robot_label
 from armid_ros.report.page import Page, Section
 from armid_ros.report.provenance import Provenance
+from armid_ros.report.sections.diagnosed import isolability_section
 from armid_ros.report.sections.fit import ZOOM
 from armid_ros.report.sections.frame import Origin, VerdictSection
 import numpy as np
@@ -62,6 +64,7 @@ def excitation_report(
     *,
     robot: str,
     scene: CollisionScene,
+    isolability: Isolability | None = None,
     provenance: Provenance | None = None,
 ) -> str:
     """
@@ -81,6 +84,8 @@ def excitation_report(
         Shipped name or path of the description.
     scene : CollisionScene
         Bodies of the arm, its floor, and what stands around it.
+    isolability : Isolability, optional
+        What it shows of the effects of the catalogue.
     provenance : Provenance, optional
         Files, versions, settings, seed.
 
@@ -121,6 +126,7 @@ def excitation_report(
         _verdict(design, arm.robot.links, shares, checked, collision.notes),
         ContentSection('Poses', [poses, Legend(colours)]),
         _foreseen_section(design, arm.robot.links),
+        *([] if isolability is None else [isolability_section(isolability)]),
         _motion_section(limits, motion, shares),
         _clearance_section(motion.t, curves, design.settings.clearance, said),
         _harmonics_section(excitation.trajectory),

@@ -6,6 +6,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from contextlib import contextmanager
+from dataclasses import replace
 from pathlib import Path
 from typing import Any, TYPE_CHECKING
 
@@ -186,6 +187,12 @@ class Speed(click.ParamType[str | float]):
     type=click.FloatRange(min=0.0),
     help='Limit of processor time for the search [s]; default 120, 25 above 20 joints.',
 )
+@click.option(
+    '--show-isolability',
+    is_flag=True,
+    help='Add to report.html and excitation.json which effects of the catalogue the run shows, '
+    'from which size, and which it cannot distinguish.',
+)
 @parameters.gravity
 @parameters.joints
 @parameters.seed
@@ -213,6 +220,7 @@ def excite(
     environment: Path | None,
     floor: str | None,
     after: tuple[Path, ...],
+    show_isolability: bool,
     seed: int,
     as_json: bool,
     **settings: Any,
@@ -263,6 +271,7 @@ def excite(
             progress=lambda now: tick(now.done, f'designing, cost {now.cost:.2f}'),
             **{name: value for name, value in settings.items() if value is not None},
         )
+        result = replace(result, with_isolability=show_isolability)
         tick(1.0, 'writing')
         origin = ResultOrigin(robot_source, provenance=provenance(read, seed=seed))
         with _kept_design(staged):

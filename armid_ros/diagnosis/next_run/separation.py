@@ -121,13 +121,13 @@ class Separation:
         target = _stack([a.columns_of(named, motion) for a in arms], weight)
         target = target @ diagnosis.arm.values_of(named)
         free = _stack([_free(diagnosis, a, named, motion) for a in arms], weight)
-        basis = _basis(free)
+        basis = basis_of(free)
         rest = target - basis @ (basis.T @ target)
         columns = _stack([a.columns_of(doubt.rival, motion) for a in arms], weight)
         remainder = columns - basis @ (basis.T @ columns)
         scale = np.linalg.norm(columns, axis=0)
         visible = np.linalg.norm(remainder, axis=0) > 1e-6 * np.maximum(scale, 1e-300)
-        own = _basis(remainder[:, visible])
+        own = basis_of(remainder[:, visible])
         power = float(np.sum((rest - own @ (own.T @ rest)) ** 2))
         return Separation(named.said_as, doubt.rival.said_as, power)
 
@@ -221,7 +221,7 @@ def _free(diagnosis: Diagnosis, arm: ArmModel, named: Effect, motion: Motion) ->
     return np.concatenate([np.empty((*motion.q.shape, 0)), *blocks], axis=2)
 
 
-def _basis(columns: FloatArray) -> FloatArray:
+def basis_of(columns: FloatArray) -> FloatArray:
     """Return an orthonormal basis of columns (R, p), which are scaled to equal length first."""
     length = np.linalg.norm(columns, axis=0)
     columns = columns[:, length > 0.0] / length[length > 0.0]

@@ -29,7 +29,7 @@ SCHEMA = 'armid/diagnosis/1'
 _MOST_CANDIDATES = 20
 #: Standard deviations of a value from which on it is detectable. On a two-link arm, effects of one
 #: to four times the resulting size were named, of half of it none.
-_SHOWS = 5.0
+SHOWS = 5.0
 #: Least resolution of an identifiable value: two that data do not separate have a half or less.
 _IDENTIFIABLE = 0.9
 #: Relative difference of squares below which it is rounding.
@@ -222,8 +222,8 @@ def _sizes(trial: Trial, robot: Robot) -> Iterator[tuple[int, float]]:
     """Yield every identifiable parameter of a cause with its smallest detectable size."""
     rows = zip(trial.named.kept, trial.std, trial.resolution, trial.least, strict=True)
     for index, std, resolution, least in rows:
-        size = max(_SHOWS * float(std), float(least))
-        if resolution > _IDENTIFIABLE and _possible(trial.effect, index, size, robot):
+        size = max(SHOWS * float(std), float(least))
+        if resolution > _IDENTIFIABLE and is_possible(trial.effect, index, size, robot):
             yield index, size
 
 
@@ -245,12 +245,12 @@ def _said_size(trial: Trial, arm: ArmModel) -> tuple[ParameterName, float]:
             most = int(np.argmax(np.abs(theirs)))
             there = float(abs(theirs[most]))
             called_so = said.name == effect.said_as and there > 0.0
-            if called_so and _possible(said, most, there, arm.robot):
+            if called_so and is_possible(said, most, there, arm.robot):
                 return said.parameters(arm.robot)[most], there
     return names[trial.named.kept[0]], float('inf')
 
 
-def _possible(effect: Effect, index: int, size: float, robot: Robot) -> bool:
+def is_possible(effect: Effect, index: int, size: float, robot: Robot) -> bool:
     """
     Return whether a parameter can be as large as a size.
 

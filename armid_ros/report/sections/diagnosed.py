@@ -8,6 +8,7 @@ from collections.abc import Sequence
 import math
 
 from armid_ros.diagnosis import Diagnosis, Finding
+from armid_ros.diagnosis.next_run.isolability import DISTINCT, Isolability
 from armid_ros.diagnosis.search.patch import room
 from armid_ros.diagnosis.search.trial import Trial
 from armid_ros.diagnosis.verdict.document import Detectable
@@ -22,6 +23,7 @@ from armid_ros.report.blocks import (
     Bar,
     BarChart,
     BulletList,
+    Cells,
     ContentSection,
     DataTable,
     Fold,
@@ -49,6 +51,14 @@ _JOINTS, _CANDIDATES = 3, 15
 _MEAN_SAID = 0.005
 #: Standard deviations by which a value has to differ from zero, and from what is possible.
 _SIGNIFICANT = 3.0
+#: Background of equal effects [%].
+_SHADE = 55.0
+_DETECTABLE = (
+    'Effect',
+    'Detectable from',
+    'At the worst joint from',
+    'Not detectable with this motion in',
+)
 
 
 def share_bars(diagnosis: Diagnosis) -> BarChart:
@@ -209,6 +219,64 @@ def minor_section(minor: Sequence[Finding], patched: bool, named: bool) -> Conte
 
 def detectable_section(sizes: Sequence[Detectable]) -> ContentSection:
     """Return the smallest detectable size of every effect, where it shows best and worst."""
+    rows = [_detectable_row(name, sizes) for name in dict.fromkeys(one.name for one in sizes)]
+    return ContentSection(
+        'Smallest detectable effects',
+        [
+            Paragraph(
+                'An unnamed effect may exist if it is smaller than this. The limit is five '
+                'standard deviations of its value, at a torque above the misfit of the model.'
+            ),
+            Fold(
+                f'Sizes of {len(rows)} effects',
+                [DataTable(_DETECTABLE, rows, tuple(range(len(_DETECTABLE))))],
+            ),
+        ],
+    )
+
+
+def isolability_section(isolability: Isolability) -> ContentSection:
+    """Return from which size effects are detectable, and which are not distinguishable."""
+    kinds, apart = isolability.of_kinds()
+    near = (apart < DISTINCT) & ~np.eye(len(kinds), dtype=bool)
+    names = [name_in_words(kind) for kind in kinds]
+    rows: list[Cells] = []
+    for name in dict.fromkeys(one.name for one in isolability.effects):
+        others = np.flatnonzero(near[kinds.index(name)]) if name in kinds else ()
+        said = ', '.join(names[k] for k in others)
+        rows.append((*_detectable_row(name, isolability.effects), said))
+    shares: list[Cells] = [
+        (
+            f'{k + 1} {name}',
+            *(
+                TableCell('×' if near[k, j] else '', shade=round(_SHADE * (1.0 - apart[k, j])))
+                for j in range(len(kinds))
+            ),
+        )
+        for k, name in enumerate(names)
+    ]
+    heads = (*_DETECTABLE, 'Not distinguishable from')
+    return ContentSection(
+        'Isolability',
+        [
+            Paragraph(
+                'What this run shows of an arm whose model is known, at the assumed noise of the '
+                'torque. An effect is detectable at five standard deviations of its value. It is '
+                'not distinguishable from another one that reproduces its torque to 10 % (rms), in '
+                'any joint.'
+            ),
+            DataTable(heads, rows, tuple(range(len(heads)))),
+            Paragraph(
+                'How much alike two effects are, by number: the darker, the more alike. × marks '
+                'an effect in a row that the effect in the column can reproduce.'
+            ),
+            DataTable(('Effect', *(str(k + 1) for k in range(len(kinds)))), shares),
+        ],
+    )
+
+
+def _detectable_row(name: str, sizes: Sequence[Detectable]) -> tuple[str, str, str, str]:
+    """Return the cells of one effect, below the heads `_DETECTABLE`."""
 
     def place(one: Detectable) -> str:
         return ', '.join(one.joints) or 'the arm'
@@ -218,29 +286,11 @@ def detectable_section(sizes: Sequence[Detectable]) -> ContentSection:
         where = f' in {place(one)}' if one.joints else ''
         return f'{digits(one.size)} {unit}'.strip() + where
 
-    rows = []
-    for name in dict.fromkeys(one.name for one in sizes):
-        own = [one for one in sizes if one.name == name]
-        finite = sorted((s for s in own if math.isfinite(s.size)), key=lambda s: s.size)
-        best, worst = (size(finite[0]), size(finite[-1])) if finite else ('', '')
-        never = '; '.join(place(s) for s in own if not math.isfinite(s.size))
-        rows.append((name_in_words(name), best, worst if worst != best else '', never))
-    heads = (
-        'Effect',
-        'Detectable from',
-        'At the worst joint from',
-        'Not detectable with this motion in',
-    )
-    return ContentSection(
-        'Smallest detectable effects',
-        [
-            Paragraph(
-                'An unnamed effect may exist if it is smaller than this. The limit is five '
-                'standard deviations of its value, at a torque above the misfit of the model.'
-            ),
-            Fold(f'Sizes of {len(rows)} effects', [DataTable(heads, rows, (0, 1, 2, 3))]),
-        ],
-    )
+    own = [one for one in sizes if one.name == name]
+    finite = sorted((s for s in own if math.isfinite(s.size)), key=lambda s: s.size)
+    best, worst = (size(finite[0]), size(finite[-1])) if finite else ('', '')
+    never = '; '.join(place(s) for s in own if not math.isfinite(s.size))
+    return name_in_words(name), best, worst if worst != best else '', never
 
 
 def patch_section(findings: Sequence[Finding], text: str) -> ContentSection:

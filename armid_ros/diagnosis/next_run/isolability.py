@@ -1,0 +1,139 @@
+# Copyright 2026 The armid_ros developers
+# SPDX-License-Identifier: Apache-2.0
+"""
+Which effects a planned motion shows, and which it cannot distinguish.
+
+The model of the arm counts as known. Columns of an effect are weighted by the noise, so that the
+angle between two effects is all that matters (Basseville and Nikiforov 1993, isolability).
+
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any
+
+from armid_ros.arm import ArmModel
+from armid_ros.diagnosis.next_run.separation import basis_of
+from armid_ros.diagnosis.search.candidates import candidate_effects
+from armid_ros.diagnosis.settings import DiagnosisSettings
+from armid_ros.diagnosis.verdict.document import Detectable, is_possible, SHOWS
+from armid_ros.effects import Effect
+from armid_ros.motion import FloatArray, Motion
+import numpy as np
+import numpy.typing as npt
+
+#: Share of its torque by which an effect has to differ from another one: the other then needs ten
+#: times the size at which the effect itself is seen.
+DISTINCT = 0.1
+#: A joint slower than this share of its top speed is not informative: dry friction is arbitrary.
+_SLOW = 0.02
+
+
+@dataclass(frozen=True)
+class Isolability:
+    """
+    Smallest detectable effects of a motion, and how far they differ.
+
+    Attributes
+    ----------
+    effects : tuple of Detectable
+        Every effect of the catalogue in every place.
+    apart : ndarray, shape (E, E)
+        Share of the torque (rms) of the first effect that the second cannot reproduce, 0 to 1.
+
+    """
+
+    effects: tuple[Detectable, ...]
+    apart: FloatArray
+
+    @property
+    def seen(self) -> npt.NDArray[np.bool_]:
+        """Which effects the motion shows at a size that they can have, shape (E,)."""
+        return np.array([np.isfinite(one.size) for one in self.effects])
+
+    def rivals(self, k: int) -> list[Detectable]:
+        """Return the visible effects that cannot be distinguished from one, nearest first."""
+        order = np.argsort(self.apart[k])
+        near = [j for j in order if j != k and self.seen[j] and self.apart[k, j] < DISTINCT]
+        return [self.effects[j] for j in near]
+
+    def __str__(self) -> str:
+        """Return how many effects are visible and distinguishable."""
+        kinds, apart = self.of_kinds()
+        alone = int(np.sum(np.all(apart + np.eye(len(kinds)) >= DISTINCT, axis=1)))
+        total = len({one.name for one in self.effects})
+        return (
+            f'{len(kinds)} of {total} effects are detectable, {alone} of them distinguishable '
+            'from all others wherever they act'
+        )
+
+    def document(self) -> list[dict[str, Any]]:
+        """Return the rows of excitation.json."""
+        return [
+            {
+                'name': one.name,
+                'joints': list(one.joints),
+                'parameter': one.parameter and one.parameter.name,
+                'min_detectable': one.size if self.seen[k] else None,
+                'unit': one.parameter and one.parameter.unit,
+                'not_distinguishable_from': [
+                    {'name': rival.name, 'joints': list(rival.joints)} for rival in self.rivals(k)
+                ],
+            }
+            for k, one in enumerate(self.effects)
+        ]
+
+    def of_kinds(self) -> tuple[tuple[str, ...], FloatArray]:
+        """Return the names of visible effects, and the least of `apart` over places, (K, K)."""
+        names = [one.name for one in self.effects]
+        kinds = tuple(dict.fromkeys(np.array(names)[self.seen].tolist()))
+        places = [np.flatnonzero(self.seen & (np.array(names) == kind)) for kind in kinds]
+        other = self.apart + np.eye(len(names))
+        least = [[float(other[np.ix_(a, b)].min()) for b in places] for a in places]
+        return kinds, np.array(least)
+
+
+def isolability(arm: ArmModel, motion: Motion, noise: FloatArray, samples: float) -> Isolability:
+    """
+    Predict what a recording of a motion shows of every effect of the catalogue.
+
+    Parameters
+    ----------
+    arm : ArmModel
+        The arm, with what is known of it.
+    motion : Motion
+        The planned motion.
+    noise : ndarray, shape (n,)
+        Standard deviation of the torque noise [N m or N].
+    samples : float
+        Number of samples that are recorded.
+
+    """
+    moving = np.abs(motion.dq) > _SLOW * np.abs(motion.dq).max(axis=0)
+    weight = np.where(moving, np.sqrt(samples / len(motion)) / noise, 0.0)[:, :, np.newaxis]
+    found, bases = list[Detectable](), list[FloatArray]()
+    for _, members in candidate_effects(arm.robot, DiagnosisSettings().kinds):
+        for effect in members:
+            columns = (weight * arm.columns_of(effect, motion)).reshape(weight.size, -1)
+            basis = basis_of(columns)
+            bases.append(basis if basis.size else np.zeros((len(columns), 1)))
+            found.append(_detectable(effect, columns, arm))
+    sizes = [basis.shape[1] for basis in bases]
+    first = np.concatenate([[0], np.cumsum(sizes)[:-1]])
+    whole = np.concatenate(bases, axis=1)
+    products = whole.T @ whole
+    squares = np.add.reduceat(np.add.reduceat(products**2, first, axis=0), first, axis=1)
+    shared = squares / np.array(sizes)[:, np.newaxis]
+    return Isolability(tuple(found), np.sqrt(np.clip(1.0 - shared, 0.0, 1.0)))
+
+
+def _detectable(effect: Effect, columns: FloatArray, arm: ArmModel) -> Detectable:
+    """Return the smallest detectable size of the first visible parameter of an effect."""
+    for k, parameter in enumerate(effect.parameters(arm.robot)):
+        others = basis_of(np.delete(columns, k, axis=1))
+        own = columns[:, k] - others @ (others.T @ columns[:, k])
+        size = SHOWS / max(float(np.linalg.norm(own)), 1e-300)
+        if is_possible(effect, k, size, arm.robot):
+            return Detectable(effect.said_as, effect.joints, parameter, size, 1.0)
+    return Detectable(effect.said_as, effect.joints, None, float('inf'), 0.0)
