@@ -7,7 +7,7 @@ from dataclasses import replace
 from armid_ros.arm import ArmModel
 from armid_ros.diagnosis.next_run.isolability import isolability
 from armid_ros.effects import make_effect
-from armid_ros.excitation.random_trajectory import random_motion
+from armid_ros.motion import Motion
 from armid_ros.robots import load_robot
 import numpy as np
 import pytest
@@ -22,7 +22,18 @@ def arm():
 
 @pytest.fixture(scope='module')
 def motion(arm):
-    return random_motion(arm.robot, np.random.default_rng(3))
+    t, n = np.arange(0.0, 20.0, 0.02), arm.robot.n_joints
+    w = np.pi * np.arange(1, n + 1) / 10.0
+    angle = [np.outer(t, factor * w) + np.arange(n) for factor in (1.0, 2.3)]
+    q, dq, ddq = (
+        0.3 * sum(f(x) for f, x in zip(parts, angle, strict=True))
+        for parts in (
+            (np.sin, np.sin),
+            (lambda x: w * np.cos(x), lambda x: 2.3 * w * np.cos(x)),
+            (lambda x: -(w**2) * np.sin(x), lambda x: -((2.3 * w) ** 2) * np.sin(x)),
+        )
+    )
+    return Motion(arm.robot.joints, t, q + arm.robot.middle_pose, dq, ddq)
 
 
 @pytest.fixture(scope='module')
