@@ -28,9 +28,7 @@ def record(plan, source, noise, seed):
     return ar.Recording(joints=motion.joints, t=motion.t, q=motion.q, tau=tau, source=source)
 
 
-plans = [
-    ar.design_excitation(URDF, duration=12.0, starts=1, iterations=10, rng=k) for k in (0, 1)
-]
+plans = [ar.design_excitation(URDF, duration=12.0, starts=1, iterations=10, rng=k) for k in (0, 1)]
 simulated = [record(plan, f'simulated {k}', 0.0, k) for k, plan in enumerate(plans)]
 model.jnt_stiffness[2] = 3.0  # N m/rad, at rest at q = 0.4
 model.qpos_spring[2] = 0.4

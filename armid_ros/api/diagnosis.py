@@ -22,7 +22,7 @@ from armid_ros.api.arguments import (
     USUAL,
     with_sources_apart,
 )
-from armid_ros.api.identification import identify, IdentificationResult
+from armid_ros.api.identification import IdentificationResult, identify
 from armid_ros.api.since import misfit_of, recordings_since
 from armid_ros.api.table import (
     data_frame,

@@ -249,7 +249,7 @@ def isolability_section(isolability: Isolability) -> ContentSection:
         (
             f'{k + 1} {name}',
             *(
-                TableCell('×' if near[k, j] else '', shade=round(_SHADE * (1.0 - apart[k, j])))
+                TableCell('=' if near[k, j] else '', shade=round(_SHADE * (1.0 - apart[k, j])))
                 for j in range(len(kinds))
             ),
         )
@@ -262,12 +262,11 @@ def isolability_section(isolability: Isolability) -> ContentSection:
             Paragraph(
                 'What this run shows of an arm whose model is known, at the assumed noise of the '
                 'torque. An effect is detectable at five standard deviations of its value. It is '
-                'not distinguishable from another one that reproduces its torque to 10 % (rms), in '
-                'any joint.'
+                'not distinguishable from an effect that reproduces its torque to 10 % (rms).'
             ),
             DataTable(heads, rows, tuple(range(len(heads)))),
             Paragraph(
-                'How much alike two effects are, by number: the darker, the more alike. × marks '
+                'How much alike two effects are, by number: the darker, the more alike. "=" marks '
                 'an effect in a row that the effect in the column can reproduce.'
             ),
             DataTable(('Effect', *(str(k + 1) for k in range(len(kinds)))), shares),
