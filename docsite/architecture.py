@@ -96,10 +96,10 @@ def steps(package: Path, dotted: str, name: str) -> list[Step]:
     """Return the calls from room to room that a function leads to, each once, in its order."""
     seen: set[tuple[str, str]] = set()
 
-    def follow(dotted: str, name: str, depth: int) -> Iterator[Step]:
+    def follow(dotted: str, own: str, depth: int) -> Iterator[Step]:
         here = module(package, dotted)
         assert here is not None
-        function = ast.Module([*getattr(here.defined[name], 'body', [])], [])
+        function = ast.Module([*getattr(here.defined[own], 'body', [])], [])
         for called in calls(function):
             place = found(package, dotted, called)
             if place is None or place in seen:
@@ -114,7 +114,7 @@ def steps(package: Path, dotted: str, name: str) -> list[Step]:
                 text = ast.get_docstring(theirs.defined[place[1]]) or ''
                 summary = ' '.join(text.partition('\n\n')[0].split())
                 yield Step(depth, room.partition('.')[0], place[1], summary)
-                if _OPENED.match(room):
+                if _OPENED.match(room) and place[1] not in JOBS.keys() - {name}:
                     yield from follow(*place, depth + 1)
 
     return list(follow(dotted, name, 1))

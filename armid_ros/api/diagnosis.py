@@ -11,7 +11,6 @@ from pathlib import Path
 from typing import Any, Literal, TYPE_CHECKING, TypeVar
 
 from armid_ros.api.arguments import (
-    arm_of,
     Progress,
     RecordingLike,
     recordings_of,
@@ -19,11 +18,10 @@ from armid_ros.api.arguments import (
     RobotLike,
     some_recordings_of,
     spelled,
-    USUAL,
     with_sources_apart,
 )
-from armid_ros.api.identification import IdentificationResult, identify
-from armid_ros.api.since import misfit_of, recordings_since
+from armid_ros.api.identification import IdentificationResult
+from armid_ros.api.since import misfit_of, model_in_question, recordings_since
 from armid_ros.api.table import (
     data_frame,
     DEFAULT_ORIGIN,
@@ -44,7 +42,6 @@ from armid_ros.diagnosis import (
 from armid_ros.diagnosis.diagnose import OPEN
 from armid_ros.diagnosis.next_run.steps import MODEL
 from armid_ros.diagnosis.verdict.document import SCHEMA
-from armid_ros.diagnosis.verdict.finding import Overlay
 from armid_ros.effects.tied import Partner
 from armid_ros.errors import IdentificationError
 from armid_ros.excitation import save_excitation
@@ -57,15 +54,12 @@ from armid_ros.recording.curves import draw_joints
 from armid_ros.report.diagnosis_report import diagnosis_report, Extras, LearnedResidual
 from armid_ros.report.notation import pretty
 from armid_ros.report.sections.diagnosed import named_rows
-from armid_ros.simulation.bodies import require_any_mass
 import numpy as np
 import numpy.typing as npt
 
 if TYPE_CHECKING:
     import pandas
 
-#: Effects of a simulator's model: those that URDF, SDF and MJCF describe, and an offset.
-SIMULATED = f'{USUAL},rotor_inertia'
 _Made = TypeVar('_Made')
 
 
@@ -149,7 +143,7 @@ class DiagnosisResult(ShownModel):
             If the data were refused, so that there is no residual.
 
         """
-        shown = self._overlays()[0]
+        shown = self.core.overlays[0]
         curves = {
             'without the named effects': (shown.trajectory.t, shown.measured - shown.before),
             'with them': (shown.trajectory.t, shown.measured - shown.after),
@@ -168,14 +162,8 @@ class DiagnosisResult(ShownModel):
             If the data were refused, so that there is no residual.
 
         """
-        parts = [(o.source, o.trajectory.t, o.measured - o.after) for o in self._overlays()]
+        parts = [(o.source, o.trajectory.t, o.measured - o.after) for o in self.core.overlays]
         return residual_frame(self.description.robot.joints, parts)
-
-    def _overlays(self) -> tuple[Overlay, ...]:
-        """Return measured and predicted torques; IdentificationError if data were refused."""
-        if self.core.gap is None:
-            raise IdentificationError(f'no residual: {self.core.summary}')
-        return self.core.gap.overlays
 
     def to_dataframe(self) -> pandas.DataFrame:
         """Return the named effects as a pandas table, one row per parameter."""
@@ -294,9 +282,7 @@ class DiagnosisResult(ShownModel):
         if self.baseline:
             lines.insert(0, f'baseline: {", ".join(one.source for one in self.baseline)}')
         if self.simulated is not None:
-            sources = ', '.join(one.source for one in self.simulated.recordings)
-            error = self.simulated.error_percent
-            lines.insert(0, f'simulator: identified from {sources} to {error:.2g} %')
+            lines.insert(0, f'simulator: {self.simulated.fitted_to}')
         return Summary(
             pretty(self.core.summary),
             self.core.verdict.replace('_', ' '),
@@ -402,20 +388,10 @@ def diagnose(
     """
     if residual is not None:
         require_residual()
-    model = arm.arm if isinstance(arm, IdentificationResult) else arm_of(arm, effects)
-    require_any_mass(model.robot)
-    simulator, simulated = recordings_of(against, model.robot), None
-    if simulator:
-        if baseline:
-            raise IdentificationError('give recordings of a simulator or a baseline, not both')
-        simulated = identify(model.robot, simulator, effects=effects or SIMULATED, rng=rng)
-        arm = model = simulated.arm
-    looked_at = some_recordings_of(recordings, model.robot)
-    held_out = recordings_of(validate, model.robot)
-    if baseline is None:
-        before = recordings_since(arm, model, [*looked_at, *held_out])
-    else:
-        before = recordings_of(baseline, model.robot)
+    arm, model, simulated = model_in_question(arm, effects, against, baseline, rng)
+    robot = model.robot
+    looked_at, held_out = some_recordings_of(recordings, robot), recordings_of(validate, robot)
+    before = recordings_since(arm, model, baseline, [*looked_at, *held_out])
     looked_at, held_out, before = with_sources_apart(looked_at, held_out, before)
     require_once([*looked_at, *before], held_out)
     misfit = misfit or misfit_of(arm, model)
@@ -426,18 +402,17 @@ def diagnose(
         partner=partner,
         prior=prior or {},
     )
-    result = run(
-        model,
-        looked_at,
-        validate=held_out,
-        baseline=before,
-        misfit=misfit,
-        settings=settings,
-        rng=np.random.default_rng(rng),
-        progress=progress,
-    )
     found = DiagnosisResult(
-        result,
+        run(
+            model,
+            looked_at,
+            validate=held_out,
+            baseline=before,
+            misfit=misfit,
+            settings=settings,
+            rng=np.random.default_rng(rng),
+            progress=progress,
+        ),
         model,
         tuple(looked_at),
         tuple(held_out),
@@ -446,8 +421,7 @@ def diagnose(
         None if before else misfit,
         simulated=simulated,
     )
-    seed = rng if isinstance(rng, int) else 0
-    return found if residual is None else found.with_residual(seed)
+    return found if residual is None else found.with_residual(rng if isinstance(rng, int) else 0)
 
 
 def require_residual() -> None:

@@ -143,6 +143,12 @@ class IdentificationResult(ShownModel):
         return Score.of(fits) if fits else None
 
     @property
+    def fitted_to(self) -> str:
+        """Return the recordings of the identification and its error, in words."""
+        sources = ', '.join(one.source for one in self.recordings)
+        return f'identified from {sources} to {self.error_percent:.2g} %'
+
+    @property
     def error_percent(self) -> float:
         """Error of the worst joint, 100 |tau - tau_hat| / |tau|, as the grade states it."""
         return self.graded.error_percent

@@ -1,6 +1,6 @@
 # Copyright 2026 The armid_ros developers
 # SPDX-License-Identifier: Apache-2.0
-"""Misfit and recordings of a model from its identification."""
+"""Misfit and recordings of a model from its identification, and the model of a simulator."""
 
 from __future__ import annotations
 
@@ -9,12 +9,22 @@ from itertools import product
 from pathlib import Path
 from typing import TypeGuard
 
-from armid_ros.api.arguments import is_model, recordings_of, RobotLike
-from armid_ros.api.identification import IdentificationResult
+from armid_ros.api.arguments import (
+    arm_of,
+    is_model,
+    RecordingLike,
+    recordings_of,
+    Rng,
+    RobotLike,
+)
+from armid_ros.api.identification import IdentificationResult, identify
 from armid_ros.arm import ArmModel, Misfit
+from armid_ros.effects import CATALOGUE
+from armid_ros.errors import IdentificationError
 from armid_ros.identification.identified_from import identified_from, require_as_identified
 from armid_ros.identification.parameters_file import read_misfit
 from armid_ros.recording import Recording
+from armid_ros.simulation.bodies import require_any_mass
 import numpy as np
 
 
@@ -26,9 +36,19 @@ def misfit_of(arm: RobotLike | IdentificationResult, model: ArmModel) -> Misfit 
 
 
 def recordings_since(
-    arm: RobotLike | IdentificationResult, model: ArmModel, asked: Sequence[Recording]
+    arm: RobotLike | IdentificationResult,
+    model: ArmModel,
+    baseline: RecordingLike | Sequence[RecordingLike] | None,
+    asked: Sequence[Recording],
 ) -> list[Recording]:
-    """Return the recordings of the identification as baseline; none if one is diagnosed."""
+    """
+    Return the given baseline; by default the recordings of the identification.
+
+    There is no such default if one of them is diagnosed.
+
+    """
+    if baseline is not None:
+        return recordings_of(baseline, model.robot)
     if isinstance(arm, IdentificationResult):
         found = [*arm.recordings, *arm.held_out]
     elif _is_written(arm):
@@ -41,6 +61,33 @@ def recordings_since(
     if not isinstance(arm, IdentificationResult):
         require_as_identified(arm)
     return found
+
+
+def model_in_question(
+    arm: RobotLike | IdentificationResult,
+    effects: str,
+    against: RecordingLike | Sequence[RecordingLike],
+    baseline: RecordingLike | Sequence[RecordingLike] | None,
+    rng: Rng,
+) -> tuple[RobotLike | IdentificationResult, ArmModel, IdentificationResult | None]:
+    """
+    Return what is believed of an arm, its model, and the identification of a simulator.
+
+    The model of a simulator is identified from its recordings (`against`). Without given effects,
+    it has those that nearly every joint has or a MJCF describes.
+
+    """
+    model = arm.arm if isinstance(arm, IdentificationResult) else arm_of(arm, effects)
+    require_any_mass(model.robot)
+    recordings = recordings_of(against, model.robot)
+    if not recordings:
+        return arm, model, None
+    if baseline:
+        raise IdentificationError('give recordings of a simulator or a baseline, not both')
+    kinds = CATALOGUE.items()
+    usual = [name for name, kind in kinds if kind.traits.usual or kind.traits.mjcf_attribute]
+    found = identify(model.robot, recordings, effects=effects or ','.join(usual), rng=rng)
+    return found.arm, found.arm, found
 
 
 def _is_written(arm: RobotLike | IdentificationResult) -> TypeGuard[str | Path]:

@@ -260,10 +260,10 @@ def _said(
     least = 0.0 if chosen.measured else settings.thresholds.headline
     explanation, shares = headline(explanation, least, settings)
     whole = shares.share(range(len(explanation.steps)))
-    if chosen.untested and whole <= settings.thresholds.open_share:
+    if before is not None and chosen.untested and whole <= settings.thresholds.open_share:
         explanation, shares = headline(explanation.with_nothing_named(), least, settings)
     if unseen is not None:
-        shares = predicted(explanation, shares.order, unseen)
+        explanation, shares = predicted(explanation, shares.order, unseen)
     measured = RemainingMisfit(chosen, unseen, before, arm, settings)
     evidence, patched = explanation.evidence, explanation.fitted.arm
     found = findings(explanation, shares, arm, explainer.rng)

@@ -33,6 +33,8 @@ class Rows:
         Number of recordings of the first day.
     amplitude : tuple of ndarray, each (n,)
         What discrepancies of each recording are measured in [N m].
+    unseen : bool
+        Whether the amplitude is the misfit of a first day without recordings.
 
     """
 
@@ -40,6 +42,7 @@ class Rows:
     sigma: tuple[FloatArray, ...]
     before: int
     amplitude: tuple[FloatArray, ...]
+    unseen: bool = False
 
     @classmethod
     def over_noise(cls, evidence: Evidence) -> Rows:

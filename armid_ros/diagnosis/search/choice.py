@@ -134,23 +134,18 @@ class Explainer:
         """
         Explain the change since identification, whose misfit is known in size only.
 
-        Another motion makes another misfit, and without the recordings its form is unknown: where
-        the residual is within what a model may leave of motions that were not used, nothing is
-        named.
+        Without the recordings, its form is unknown: any cause may be a part of it. See `odds`.
 
         """
-        prepared, settings, known = self.prepared, self.settings, written.information
+        prepared, known = self.prepared, written.information
         misfit = written.of(self.arm.robot, torque_rms(prepared.data))
         noise = _noise_within(misfit, prepared, misfit)
         evidence = Evidence(prepared.data, tuple(np.maximum(s, misfit) for s in noise), noise)
-        rows = Rows(prepared.data, evidence.sigma, 0, (misfit,) * count_recordings(prepared.data))
+        amplitude = (misfit,) * count_recordings(prepared.data)
+        rows = Rows(prepared.data, evidence.sigma, 0, amplitude, unseen=True)
         grid = settings_of_misfit(known is not None)
         result = self.comparison(rows, grid, known).found()
         found = self._changes(result, evidence, 0.0)
-        usual = settings.thresholds.predicted * evidence.as_good(settings)
-        before = evidence.chi2_per_row(evidence.residuals(self.arm))
-        if np.all(before <= usual + evidence.matters(settings)):
-            found = found.with_nothing_named()
         notes = (_AS_EXACT,) if found.steps and known is None else ()
         return Chosen(found, misfit, WRITTEN_MISFIT, notes, _NO_BASELINE, result.first)
 

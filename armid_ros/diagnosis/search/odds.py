@@ -195,7 +195,10 @@ def odds(
     known = under
     if isinstance(known, Marginal):
         known = CauseInformation.of(cause, nuisance, known, by_day=not spreads.any())
-    p, before = known.size, not np.all(known.today)
+    p = known.size
+    there = [known.there()] if not np.all(known.today) else []
+    if nuisance.rows.unseen:
+        there = [np.tile(np.diag(_unseen(cause, nuisance)), (len(known.today), 1))]
     asked = np.kron(known.today.astype(float)[:, np.newaxis], np.eye(p))
     prior = -0.5 * np.log((spreads + 1.0) / (usual + 1.0)) ** 2
     prior -= np.logaddexp.reduce(prior)
@@ -203,7 +206,7 @@ def odds(
     best: tuple[float, int, FloatArray, FloatArray, FloatArray] | None = None
     for n, spread in enumerate(spreads):
         square, aim = known.matrix, known.vector
-        for root in [*known.apart(spread), *([known.there()] if before else [])]:
+        for root in [*known.apart(spread), *there]:
             square, aim, more = without(square, aim, root)
             nothing[n] += more
         own, to = asked.T @ square @ asked, asked.T @ aim
@@ -233,6 +236,13 @@ def odds(
     resolution = np.diag(covariance @ own)
     fit = CauseFit(factor, float(explained[first]), size, values, std, resolution)
     return replace(fit, factor=factor + allowed(cause, fit, nuisance)) if bounded else fit
+
+
+def _unseen(cause: Cause, nuisance: Nuisance) -> FloatArray:
+    """Return the largest values that a misfit in size only may contain, over their unit, (p,)."""
+    torque = cause.torque[list(cause.joints)] * cause.unit
+    misfit = nuisance.rows.amplitude[-1][list(cause.joints), np.newaxis]
+    return np.asarray(THERE * np.min(misfit / np.maximum(torque, 1e-300), axis=0))
 
 
 def allowed(cause: Cause, fit: CauseFit, nuisance: Nuisance) -> float:

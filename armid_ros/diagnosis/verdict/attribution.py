@@ -93,8 +93,15 @@ def headline(
     return explanation, shares
 
 
-def predicted(explanation: Explanation, order: Sequence[int], unseen: Evidence) -> Attribution:
-    """Measure on held-out data what each further name explains, in a given order."""
+def predicted(
+    explanation: Explanation, order: Sequence[int], unseen: Evidence
+) -> tuple[Explanation, Attribution]:
+    """
+    Measure on held-out data what each further name explains, in a given order.
+
+    A name that makes the prediction of these data worse becomes small print.
+
+    """
     fewer = [explanation.only(order[:count]) for count in range(1, len(order))]
     every = [explanation.reference, *(one.fitted for one in fewer), explanation.fitted]
     arms = [one.arm for one in every[: len(order) + 1]]
@@ -102,7 +109,12 @@ def predicted(explanation: Explanation, order: Sequence[int], unseen: Evidence) 
     taken = np.zeros((len(order), len(squares[0])))
     for position, k in enumerate(order):
         taken[k] = squares[position] - squares[position + 1]
-    return Attribution(tuple(order), squares[0], taken)
+    shares = Attribution(tuple(order), squares[0], taken)
+    worst = min(order, key=lambda k: shares.share([k]), default=0)
+    if not order or shares.share([worst]) >= 0.0:
+        return explanation, shares
+    others = [k - (k > worst) for k in order if k != worst]
+    return predicted(explanation.without(worst), others, unseen)
 
 
 def left_out(explanation: Explanation) -> Attribution:

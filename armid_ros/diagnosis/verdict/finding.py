@@ -18,6 +18,7 @@ from armid_ros.diagnosis.search.explanation import Explanation
 from armid_ros.diagnosis.search.spans import Span
 from armid_ros.diagnosis.verdict.where import Where
 from armid_ros.effects import CATALOGUE, Effect
+from armid_ros.errors import IdentificationError
 from armid_ros.estimate import Estimate, ParameterName
 from armid_ros.model.spring_ties import Tie
 from armid_ros.motion import FloatArray
@@ -297,6 +298,13 @@ class Diagnosis:
             np.array([*fit.values, *(value for _, value, _ in rows)]),
             scipy.linalg.block_diag(fit.covariance, np.diag(variance)),
         )
+
+    @property
+    def overlays(self) -> tuple[Overlay, ...]:
+        """Measured and predicted torques; IdentificationError if the data were refused."""
+        if self.gap is None:
+            raise IdentificationError(f'no residual: {self.summary}')
+        return self.gap.overlays
 
     @property
     def not_checked(self) -> tuple[str, ...]:
