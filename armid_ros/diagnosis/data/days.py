@@ -1,6 +1,6 @@
 # Copyright 2026 The armid_ros developers
 # SPDX-License-Identifier: Apache-2.0
-"""The recordings of two days in weighted rows, joint by joint."""
+"""Recordings of the baseline (first day) and of the day in question, in weighted rows."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from armid_ros.motion import FloatArray
 import numpy as np
 import numpy.typing as npt
 
-#: Share of a torque that the unit of its rows is at the least.
+#: Smallest unit of the rows of a joint, over its rms torque.
 _LEAST = 1e-4
 
 
@@ -26,13 +26,13 @@ class Rows:
     Attributes
     ----------
     data : tuple of Trajectory
-        Of the first day and of the day in question, recordings numbered through.
+        Trajectories of the first day, then of the day in question; `fold` counts through both.
     sigma : tuple of ndarray, each (n,)
         Unit of each trajectory [N m].
     before : int
         Number of recordings of the first day.
     amplitude : tuple of ndarray, each (n,)
-        What discrepancies of each recording are measured in [N m].
+        Unit of the discrepancies of each recording [N m].
 
     """
 
