@@ -45,7 +45,8 @@ class RotorInertia(Effect):
         return Action(inertia=np.diag(inertia))
 
 
-#: Lowest order of a ripple [1/rev]; gravity and springs have lower orders.
+#: Lowest order of a ripple [1/rev], as gravity and springs have lower ones; factor by which a
+#: fitted order has to exceed it.
 _SLOWEST, _EDGE = 1.5, 1.05
 
 

@@ -49,7 +49,7 @@ class TorqueMap:
     points : ndarray, shape (M, 3)
         Inducing points x_m: position [rad or m], velocity, load [N m or N].
     weights : ndarray, shape (M,)
-        a_m [N m or N].
+        Weights a_m [N m or N].
     noise : ndarray, shape (M,)
         Standard deviation of the torque at each point [N m or N].
     lengths : ndarray, shape (3,)
@@ -256,7 +256,7 @@ class LearnedTorque(Effect):
 
 
 def counted(inputs: FloatArray, knee: float) -> FloatArray:
-    """Return inputs (..., 3) with velocities on the scale with a knee."""
+    """Return inputs (..., 3) with velocities on the scale u of `TorqueMap`."""
     velocity = knee * np.arcsinh(inputs[..., 1] / knee)
     return np.stack([inputs[..., 0], velocity, inputs[..., 2]], axis=-1)
 
