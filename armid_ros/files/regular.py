@@ -17,7 +17,7 @@ from typing import BinaryIO
 
 from armid_ros.errors import ArmidError
 
-#: The largest document in text [bytes]; a description of 10,000 links has 6 MB.
+#: Largest size of a text file [bytes]; a description of 10,000 links has 6 MB.
 TEXT_LIMIT = 64 << 20
 
 _KINDS = (
@@ -30,7 +30,7 @@ _KINDS = (
 
 
 def is_file(path: str | Path) -> bool:
-    """Whether a path is a regular file."""
+    """Return whether a path is a regular file."""
     try:
         return stat.S_ISREG(os.stat(path).st_mode)
     except (OSError, ValueError):
@@ -46,12 +46,12 @@ def open_regular(path: str | Path, error: type[ArmidError]) -> BinaryIO:
     path : str or Path
         The file.
     error : type of ArmidError
-        What to raise.
+        Class of the raised error.
 
     Raises
     ------
     ArmidError
-        The file cannot be opened, or is a folder, a FIFO, a device or a socket.
+        If the file cannot be opened, or is a folder, a FIFO, a device or a socket.
 
     """
     try:
@@ -75,14 +75,14 @@ def read_text(path: str | Path, error: type[ArmidError], limit: int = TEXT_LIMIT
     path : str or Path
         The file, in UTF-8.
     error : type of ArmidError
-        What to raise.
+        Class of the raised error.
     limit : int
-        The largest size [bytes].
+        Largest permitted size [bytes].
 
     Raises
     ------
     ArmidError
-        The file cannot be opened, is no regular file, is too large, or is no text.
+        If the file cannot be opened, is not a regular file, is too large, or is not text.
 
     """
     with open_regular(path, error) as stream:
