@@ -288,7 +288,9 @@ class ArmModel:
         if not isinstance(motion, Motion):
             past = [effect.name for effect in self.effects if not effect.instantaneous]
             if past:
-                raise ModelError(f'{", ".join(past)} of {self.robot.name}: pass an ar.Motion')
+                raise ModelError(
+                    f'{self.robot.name}: {", ".join(past)} need past samples; pass an ar.Motion'
+                )
             states = Motion.of_states(self.robot.joints, motion, dq, ddq)
             return self.torque(states).reshape(np.shape(motion))
         tau = self.joint_torque(motion)

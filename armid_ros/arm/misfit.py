@@ -156,7 +156,7 @@ def misfit_of_block(block: Any) -> Misfit:
     if data not in _DATA:
         raise ModelError(f"misfit has data '{data}', not {' or '.join(_DATA)}")
     if loud is not None and not loud.keys() >= rms.keys():
-        raise ModelError('misfit: torque_rms is not of the joints that rms is of')
+        raise ModelError('misfit: torque_rms lacks joints of rms')
     relative = finite(error, 'relative_error_percent of the misfit')
     return Misfit(data, rms, relative, loud, filters=filters)
 

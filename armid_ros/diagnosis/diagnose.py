@@ -57,9 +57,9 @@ _NOT_TIMED = (
 )
 #: Fault where the residual of the baseline is larger than its torque.
 _NO_MODEL = (
-    'the model leaves {:.3g} times the torque of the baseline itself, more than no model would. '
-    'It is that of another arm, or has other units. Identify the arm from the baseline, and give '
-    'that model'
+    'the residual of the model is {:.3g} times the torque of the baseline, so it is worse than no '
+    'model. It belongs to another arm, or has other units. Identify the arm from the baseline, '
+    'and give that model'
 )
 #: Time by which the beginning and the end of a span are uncertain [s].
 _UNSURE = 0.25

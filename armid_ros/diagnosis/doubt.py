@@ -21,8 +21,8 @@ from armid_ros.recording import Recording
 import numpy as np
 
 _UNUSABLE = (
-    'The model was unusable when it was identified (see its identification.json): its residual is '
-    'no measure of a change.'
+    'The model was unusable when it was identified (see its identification.json): its residual '
+    'does not measure a change.'
 )
 
 
@@ -94,9 +94,9 @@ def _changed(
     if beyond[worst] <= 1.0:
         return ''
     return (
-        f'In the baseline the model leaves {times[worst]:.1f} times as much in '
-        f'{arm.robot.joints[worst]} as when it was identified. It is not what the model was '
-        'identified from, or something had changed by then.'
+        f'In the baseline, the residual of {arm.robot.joints[worst]} is {times[worst]:.1f} times '
+        'that of the identification. The model was not identified from this baseline, or '
+        'something had changed by then.'
     )
 
 
@@ -113,6 +113,6 @@ def _poor(arm: ArmModel, baseline: Baseline) -> str:
     if not bad:
         return ''
     return (
-        f'In the baseline itself the model leaves {", ".join(bad)}: is it the model of this arm? '
-        'A change of less is not seen.'
+        f'In the baseline, the residual of the model is {", ".join(bad)}: is it the model of this '
+        'arm? Smaller changes are not seen.'
     )

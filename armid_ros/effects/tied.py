@@ -84,8 +84,8 @@ class Tied(Attached):
     def _anchor(self, arm: Arm) -> Anchor:
         def unknown(t: FloatArray) -> tuple[FloatArray, FloatArray]:
             raise ModelError(
-                f'{self.name} of {", ".join(self.joints)} acts along recordings of '
-                f'{self.partner or "its partner"} alone; take it out of the model to simulate'
+                f'{self.name} of {", ".join(self.joints)} needs the recorded motion of '
+                f'{self.partner or "its partner"}; remove it from the model to simulate'
             )
 
         return self.anchor or unknown

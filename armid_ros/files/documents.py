@@ -175,7 +175,7 @@ def _check_size(text: str) -> None:
                 sizes[event.anchor] = 1
         if total > MAX_NODES:
             raise ValueError(
-                f'line {_line(event)}: more than {MAX_NODES} nodes, aliases written out'
+                f'line {_line(event)}: more than {MAX_NODES} nodes with aliases expanded'
             )
 
 

@@ -62,7 +62,7 @@ def open_regular(path: str | Path, error: type[ArmidError]) -> BinaryIO:
     if not stat.S_ISREG(mode):
         os.close(descriptor)
         kind = next((name for is_kind, name in _KINDS if is_kind(mode)), 'something else')
-        raise error(f'{path}: cannot be read: {kind}, and no file')
+        raise error(f'{path}: cannot be read: {kind}, not a file')
     return os.fdopen(descriptor, 'rb')
 
 
@@ -91,7 +91,7 @@ def read_text(path: str | Path, error: type[ArmidError], limit: int = TEXT_LIMIT
         except OSError as problem:
             raise error(f'{path}: cannot be read: {problem_text(problem)}') from problem
     if len(content) > limit:
-        raise error(f'{path}: larger than {limit >> 20} MiB, which no text of its kind is')
+        raise error(f'{path}: larger than {limit >> 20} MiB, the limit of a text file')
     try:
         return content.decode('utf-8-sig')
     except UnicodeDecodeError as problem:

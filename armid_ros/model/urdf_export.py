@@ -227,6 +227,6 @@ def _check(robot: Robot, urdf: str) -> None:
     if np.any(worst > ROUNDING * scale):
         link = robot.links[int(np.argmax(worst))]
         raise ModelError(
-            f"{robot.name}: the description would not have the parameters of link '{link}' when "
+            f"{robot.name}: the exported description has other parameters of link '{link}' when "
             f'read again: they differ by {worst.max():.3g}'
         )
