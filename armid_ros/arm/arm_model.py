@@ -289,7 +289,7 @@ class ArmModel:
             past = [effect.name for effect in self.effects if not effect.instantaneous]
             if past:
                 raise ModelError(
-                    f'{self.robot.name}: {", ".join(past)} need past samples; pass an ar.Motion'
+                    f'{self.robot.name}: {", ".join(past)}: positions have no times, pass an ar.Motion'
                 )
             states = Motion.of_states(self.robot.joints, motion, dq, ddq)
             return self.torque(states).reshape(np.shape(motion))
