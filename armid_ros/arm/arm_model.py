@@ -98,7 +98,7 @@ class ArmModel:
         joints: Sequence[str] | None = None,
     ) -> ArmModel:
         """
-        Make a model of a description.
+        Make an arm model from a robot description and effects.
 
         Parameters
         ----------
@@ -289,7 +289,7 @@ class ArmModel:
             past = [effect.name for effect in self.effects if not effect.instantaneous]
             if past:
                 raise ModelError(
-                    f'{self.robot.name}: {", ".join(past)}: positions have no times, pass an ar.Motion'
+                    f'{self.robot.name}: {", ".join(past)}: pass an ar.Motion, which has times'
                 )
             states = Motion.of_states(self.robot.joints, motion, dq, ddq)
             return self.torque(states).reshape(np.shape(motion))

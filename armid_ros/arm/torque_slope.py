@@ -16,7 +16,7 @@ import numpy as np
 @dataclass(frozen=True)
 class TorqueSlope:
     """
-    Derivatives of ``ArmModel.joint_torque`` along a motion.
+    Derivatives of the torque of an arm, ``ArmModel.joint_torque``, along a motion.
 
     The direction of motion in dry friction, and the twist between motors and links, count as
     constant.

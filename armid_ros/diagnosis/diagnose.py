@@ -77,7 +77,7 @@ def diagnose(
     progress: Progress | None = None,
 ) -> Diagnosis:
     """
-    Find what a model lacks.
+    Find the effects that a model lacks, or that have changed.
 
     Parameters
     ----------
@@ -251,7 +251,7 @@ def _apart(
 def _said(
     chosen: Chosen, notes: Sequence[str], explainer: Explainer, doubt: str, given: ArmModel
 ) -> Diagnosis:
-    """Turn an explanation into a diagnosis; shares are measured on held-out data."""
+    """Return the diagnosis of an explanation; shares are measured on held-out data."""
     arm, settings, before = explainer.arm, explainer.settings, explainer.baseline
     explainer.tell(0.85, 'held-out gap')
     explanation, said = as_bodies(chosen.explanation)

@@ -87,7 +87,7 @@ class Thresholds:
 @dataclass(frozen=True)
 class DiagnosisSettings:
     """
-    Choices of the user.
+    Settings of a diagnosis, chosen by the user.
 
     Attributes
     ----------

@@ -40,7 +40,7 @@ class RotorInertia(Effect):
         return joint_columns(self, motion, motion.ddq)
 
     def action(self, values: FloatArray, arm: Arm) -> Action:
-        """Return the inertia on the diagonal."""
+        """Return an action with the rotor inertias on the diagonal of the inertia matrix."""
         (inertia,) = scatter(self, values, arm.robot)
         return Action(inertia=np.diag(inertia))
 
@@ -99,7 +99,7 @@ class TorqueRipple(Effect):
         return joint_columns(self, motion, np.sin(angle), np.cos(angle))
 
     def action(self, values: FloatArray, arm: Arm) -> Action:
-        """Return the torque."""
+        """Return an action with the ripple torque."""
         (order,) = self.shape_over_joints(arm.robot)
         sine, cosine = scatter(self, values, arm.robot)
 

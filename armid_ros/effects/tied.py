@@ -161,7 +161,7 @@ class TiedKind:
 
     @property
     def name(self) -> str:
-        """Name in the catalogue."""
+        """Name of the effect in the catalogue."""
         return self.effect.name
 
     def places(self, robot: Robot) -> tuple[tuple[str, ...], ...]:
@@ -169,7 +169,7 @@ class TiedKind:
         return tuple((tie.joint,) for tie in self.ties)
 
     def as_change(self) -> TiedKind:
-        """Return the same kind."""
+        """Return the kind itself, which is used for changes as well."""
         return self
 
     def on(self, robot: Robot, joints: Sequence[str] | None = None) -> Effect:

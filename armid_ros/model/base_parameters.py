@@ -129,7 +129,7 @@ def group_columns(
     w: FloatArray, standard: tuple[ParameterName, ...], tolerance: float = RANK_TOLERANCE
 ) -> BaseParameters:
     """
-    Find the base parameters of a stacked regressor.
+    Find the base parameters of a regressor: group its dependent columns.
 
     Parameters
     ----------

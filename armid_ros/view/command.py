@@ -90,7 +90,7 @@ def _whole(out: Path | None) -> Iterator[Path | None]:
 
 
 def _named(model: Path | None) -> tuple[str, ...]:
-    """Return the joints of the effects that a diagnosis beside the model names."""
+    """Return the joints of the effects named in diagnosis.json in the folder of the model."""
     if model is None:
         return ()
     path = (model if model.is_dir() else model.parent) / 'diagnosis.json'

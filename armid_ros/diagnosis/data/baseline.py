@@ -141,7 +141,7 @@ class Baseline:
 
     @classmethod
     def of(cls, arm: ArmModel, data: Sequence[Trajectory], rng: np.random.Generator) -> Baseline:
-        """Measure the misfit of a model."""
+        """Measure the misfit of a model in recordings of a baseline."""
         residual = [part.residual(arm) for part in data]
         base, columns = excited(arm, arm.base_parameters(rng), data)
         held = described_precision(base, arm)

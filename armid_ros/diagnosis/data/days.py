@@ -49,7 +49,7 @@ class Rows:
         return cls(evidence.data, evidence.sigma, 0, amplitude).not_below_rounding()
 
     def not_below_rounding(self) -> Rows:
-        """Raise units to the rounding error of the torque where they are smaller."""
+        """Return the rows with units of at least the rounding error of the torque."""
         least = _LEAST * self.torque
         return replace(
             self,
@@ -65,7 +65,7 @@ class Rows:
 
     @cached_property
     def today(self) -> npt.NDArray[np.bool_]:
-        """Return which recordings are of the day in question."""
+        """Return whether each recording is of the day in question, (K,)."""
         return np.arange(max(part.fold for part in self.data) + 1) >= self.before
 
     @property
@@ -75,7 +75,7 @@ class Rows:
 
     @cached_property
     def in_question(self) -> list[int]:
-        """Return the trajectories of the day in question."""
+        """Return the indices of the trajectories of the day in question."""
         return [k for k, part in enumerate(self.data) if self.today[part.fold]]
 
     @cached_property
@@ -92,7 +92,7 @@ class Rows:
         return np.asarray(np.maximum(rms, 1e-3 * rms.max()))
 
     def weighted(self, columns: Sequence[FloatArray], joints: Sequence[int]) -> list[FloatArray]:
-        """Weight columns (M, n, p) of trajectories; return them per recording, (joints, M, p)."""
+        """Return weighted columns of each recording, (joints, M, p), from columns (M, n, p)."""
         index = list(joints)
         rows = [
             (own[:, index] * weight[:, index, np.newaxis]).swapaxes(0, 1)

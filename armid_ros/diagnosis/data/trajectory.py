@@ -243,7 +243,7 @@ def _trajectory(
 
 
 def _at_rest(motion: Motion) -> npt.NDArray[np.bool_]:
-    """Return where joints stand still, shape (N, n)."""
+    """Return whether each joint is at rest in each sample, shape (N, n)."""
     rest = np.zeros(motion.q.shape, dtype=bool)
     shortest = REST_TIME / float(motion.t[1] - motion.t[0])
     for joint in range(motion.n_joints):

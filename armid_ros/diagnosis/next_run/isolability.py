@@ -33,7 +33,7 @@ _SLOW = 0.02
 @dataclass(frozen=True)
 class Isolability:
     """
-    Smallest detectable effects of a motion, and how far they differ.
+    Smallest detectable effects of a motion, and their differences.
 
     Attributes
     ----------

@@ -119,7 +119,7 @@ def next_run(
     collision: CollisionModel | None = None,
 ) -> NextRun | None:
     """
-    Choose a motion that separates names in doubt from their rivals.
+    Choose a motion that separates named effects from their rivals.
 
     Parameters
     ----------
@@ -206,7 +206,7 @@ def _in_order(runs: Sequence[_Run]) -> list[_Run]:
 
 
 def _doubts(diagnosis: Diagnosis) -> tuple[Doubt, ...]:
-    """Return pairs of a name and a rival."""
+    """Return the pairs of a named effect and a rival."""
     explanation = diagnosis.explanation
     if explanation is None:
         return ()

@@ -30,7 +30,7 @@ def next_steps(
     worse: Sequence[str] = (),
 ) -> list[str]:
     """
-    Return the next steps for a person, as sentences in order.
+    Return sentences on the next steps of the user, in order.
 
     Parameters
     ----------

@@ -206,7 +206,7 @@ def _torque_of(columns: Sequence[FloatArray], rows: Rows) -> FloatArray:
 
 
 def _unit(own: SelectedEffect, torque: FloatArray, rows: Rows, robot: Robot) -> FloatArray:
-    """Return the unit of each value: a torque as of the joint, at most the plausible value."""
+    """Return the unit of each value: it makes the torque of the joint, or is the largest one."""
     effect, kept = own.effect, list(own.kept)
     spread = effect.spread(robot)[kept]
     if effect.adds_to(robot):  # a load and an error of a link are bodies alike
@@ -218,7 +218,7 @@ def _unit(own: SelectedEffect, torque: FloatArray, rows: Rows, robot: Robot) -> 
 def value_unit(
     nuisance: Nuisance, own: SelectedEffect, columns: Sequence[FloatArray]
 ) -> FloatArray:
-    """Return the scale of the values of an effect, (p,), from its columns (M, n, p)."""
+    """Return the unit of the values of an effect, (p,), from its columns (M, n, p)."""
     rows = nuisance.rows
     return _unit(own, _torque_of(columns, rows), rows, nuisance.arm.robot)
 

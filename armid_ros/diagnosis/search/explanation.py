@@ -112,7 +112,7 @@ class Explanation:
 @dataclass(frozen=True)
 class Chosen:
     """
-    The chosen explanation.
+    The chosen explanation of a gap, with the unit of the gap.
 
     Attributes
     ----------

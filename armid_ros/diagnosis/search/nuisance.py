@@ -113,7 +113,7 @@ class Nuisance:
         held: Sequence[int] = (),
     ) -> Nuisance:
         """
-        Compute the columns.
+        Compute the nuisance columns of the data.
 
         Parameters
         ----------

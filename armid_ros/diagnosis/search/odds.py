@@ -93,7 +93,7 @@ class CauseInformation:
     def of(
         cls, cause: Cause, nuisance: Nuisance, under: Marginal, by_day: bool = False
     ) -> CauseInformation:
-        """Integrate out the nuisance parameters; groups are recordings, or days."""
+        """Return the information per recording or day; nuisance parameters are integrated out."""
         today = nuisance.rows.today
         groups = [[k] for k in range(len(today))]
         if by_day:
@@ -145,12 +145,12 @@ class CauseInformation:
         return replace(self, matrix=matrix, vector=self.vector[kept], today=self.today[of_it])
 
     def among(self, values: npt.NDArray[np.intp]) -> CauseInformation:
-        """Return the information where only some of the values are not zero."""
+        """Return the information on some of the values, while the others are zero."""
         kept = np.add.outer(self.size * np.arange(len(self.today)), values).ravel()
         return replace(self, matrix=self.matrix[np.ix_(kept, kept)], vector=self.vector[kept])
 
     def apart(self, spread: float) -> list[FloatArray]:
-        """Return a root of the covariance of differences between recordings; empty if none."""
+        """Return a root of the prior covariance of differences u_k, in a list; empty if none."""
         if not spread:
             return []
         p, groups = self.size, len(self.today)
@@ -161,7 +161,7 @@ class CauseInformation:
         return [np.kron(np.eye(groups), axes * np.sqrt(np.minimum(spread / size, THERE**2)))]
 
     def there(self) -> FloatArray:
-        """Return the root of the covariance of values that act on both days."""
+        """Return a root of the prior covariance of values that act on both days (g0)."""
         return np.tile(THERE * np.eye(self.size), (len(self.today), 1))
 
 

@@ -17,7 +17,7 @@ LASTING = 2.0
 @dataclass(frozen=True)
 class Setting:
     """
-    Whether the body is free, and the amplitudes of discrepancy and noise.
+    Amplitudes of discrepancy and noise, with a fixed or a free body.
 
     Attributes
     ----------

@@ -137,7 +137,7 @@ class _Timed:
         return found, spans
 
     def refined(self, found: Ranked, spans: Spans) -> tuple[Ranked, Spans]:
-        """Return spans with each edge moved to where the cause is likeliest."""
+        """Return spans after each edge is moved to the likeliest change point."""
         for _ in range(_PASSES):
             for k, edges in self.edges.items():
                 near = (len(edges) - 1) // (_COARSE - 1)

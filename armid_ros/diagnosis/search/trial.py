@@ -118,7 +118,7 @@ class Ranked:
 
     @property
     def left(self) -> float:
-        """Half of the weighted residual squares that remain."""
+        """Half of the remaining squares of the weighted residual."""
         return self.under.loss - self.fit.explained
 
     def ahead(self, other: Ranked, levels: Thresholds) -> float:

@@ -252,7 +252,7 @@ def _said_size(trial: Trial, arm: ArmModel) -> tuple[ParameterName, float]:
 
 def is_possible(effect: Effect, index: int, size: float, robot: Robot) -> bool:
     """
-    Return whether a parameter can have a size.
+    Return whether a parameter of an effect can have a size on a robot.
 
     The size must not exceed the largest value of its quantity. A size of a million typical values
     means that the motion excites the effect less than rounding errors do.

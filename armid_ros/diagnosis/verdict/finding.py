@@ -40,7 +40,7 @@ class Rival:
 @dataclass(frozen=True)
 class Finding:
     """
-    One named effect.
+    One effect that the diagnosis names.
 
     Attributes
     ----------
@@ -106,7 +106,7 @@ class Finding:
 
     @property
     def ambiguous_with(self) -> tuple[str, ...]:
-        """Names of the rivals."""
+        """Names of the effects that are rivals."""
         return tuple(rival.name for rival in self.rivals)
 
     @property
@@ -140,7 +140,7 @@ class Finding:
         return f'To tell {names}, record {best}.'
 
     def place_of(self, joint: str) -> str:
-        """Return where the parameters of a joint act: its tied segment, or the joint itself."""
+        """Return the name of the tied segment of a joint, or of the joint without a tie."""
         return next((tie.name for tie in self.ties if tie.joint == joint), joint)
 
     def values_of(self, joint: str) -> list[tuple[ParameterName, float, float]]:
@@ -178,7 +178,7 @@ class Overlay:
 @dataclass(frozen=True)
 class Gap:
     """
-    The gap in numbers.
+    Size of the gap, without and with the named effects.
 
     Attributes
     ----------

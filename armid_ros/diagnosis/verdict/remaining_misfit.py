@@ -154,7 +154,7 @@ class RemainingMisfit:
 
 
 def places_held(arm: ArmModel, excesses: Sequence[Excess]) -> tuple[Where, ...]:
-    """Return the joints that something holds at rest, the worst first."""
+    """Return joints with a torque beyond friction at rest, the largest excess first."""
     excess = np.max([np.zeros(arm.robot.n_joints), *(one.ratio for one in excesses)], axis=0)
     beyond = np.where(excess > 1.0, excess, 0.0)
     order = np.argsort(-beyond)[: np.count_nonzero(beyond)]

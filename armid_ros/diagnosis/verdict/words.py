@@ -52,7 +52,7 @@ def decide(
     minor: Sequence[Finding] = (),
 ) -> Verdict:
     """
-    Decide the verdict.
+    Return the verdict: word and sentence.
 
     Parameters
     ----------
@@ -135,7 +135,7 @@ def sentence(finding: Finding, of: str = 'the gap') -> str:
 
 
 def share_interval_in_words(finding: Finding) -> str:
-    """Return the 95 % interval of a share in brackets; empty where both ends print alike."""
+    """Return the 95 % interval of a share in brackets; empty if both ends have the same text."""
     low, high = (percent(end) for end in finding.share_interval)
     return f' ({low} to {high})' if low != high else ''
 
