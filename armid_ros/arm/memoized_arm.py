@@ -86,7 +86,7 @@ class _Memoized(ArmModel):
         return self._once('frames', motion, super().link_frames)
 
     def _regressor(self, motion: Motion) -> FloatArray | None:
-        """Return the cached regressor; None if the links' motion differs, or without memory."""
+        """Return the cached regressor; None if links move otherwise, or memory is exhausted."""
         if self.action().displacement is not None:
             return None
         return self.regressors.of(self, motion)

@@ -41,7 +41,7 @@ def view(
     mark: str | None,
     topic: str | None,
 ) -> None:
-    """Look at a recording in rerun: the moving arm, torques, and what a model leaves."""
+    """Look at a recording in rerun: the moving arm, torques, and the residual of a model."""
     from armid_ros.arm import ArmModel
     from armid_ros.cli import options
     from armid_ros.files.cells import listed

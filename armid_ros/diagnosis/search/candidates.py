@@ -206,7 +206,7 @@ def _torque_of(columns: Sequence[FloatArray], rows: Rows) -> FloatArray:
 
 
 def _unit(own: SelectedEffect, torque: FloatArray, rows: Rows, robot: Robot) -> FloatArray:
-    """Return the unit of each value: it makes the torque of the joint, or is the largest one."""
+    """Return values whose torque is that of the joint, at most the largest plausible ones."""
     effect, kept = own.effect, list(own.kept)
     spread = effect.spread(robot)[kept]
     if effect.adds_to(robot):  # a load and an error of a link are bodies alike

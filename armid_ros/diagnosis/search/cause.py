@@ -25,7 +25,7 @@ class Cause:
     kept : tuple of int
         Its parameters that are fitted; the others are zero.
     unit : ndarray, shape (p,)
-        Unit of each value: makes the torque of the joint, and is at most the plausible value.
+        Unit of each value: has the torque of the joint, or is the largest plausible value if less.
     prior : float
         Log odds before any data.
     joints : tuple of int

@@ -66,7 +66,7 @@ _ONE_EACH = (
 @dataclass(frozen=True)
 class Explainer:
     """
-    Finds the explanation of a gap among the effects of a library.
+    Search for the explanation of a gap among the effects of the catalogue.
 
     Attributes
     ----------
