@@ -200,7 +200,7 @@ def arm_table(name, arguments, python, file):
 
 def urdf_of(name):
     """Return the file of an arm of example-robot-data."""
-    from benchmarks.real_recordings import example_robot  # imports are missing beside figaroh
+    from benchmarks.real_recordings import example_robot  # not installed beside figaroh
 
     return str(example_robot(URDF[name]))
 
