@@ -288,9 +288,7 @@ class ArmModel:
         if not isinstance(motion, Motion):
             past = [effect.name for effect in self.effects if not effect.instantaneous]
             if past:
-                raise ModelError(
-                    f'{self.robot.name}: {", ".join(past)}: pass an ar.Motion, which has times'
-                )
+                raise ModelError(f'{", ".join(past)}: pass an ar.Motion, as positions lack times')
             states = Motion.of_states(self.robot.joints, motion, dq, ddq)
             return self.torque(states).reshape(np.shape(motion))
         tau = self.joint_torque(motion)

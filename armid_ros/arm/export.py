@@ -29,8 +29,7 @@ class Exported:
     left_out : tuple of str
         Parts of the description that the file lacks.
     values : mapping of str to mapping of str to float
-        Values in the file, 'damping' [N m s/rad], 'friction' [N m] and 'armature' [kg m^2], each
-        by joint.
+        'damping' [N m s/rad], 'friction' [N m] and 'armature' [kg m^2] of the file, by joint.
 
     """
 

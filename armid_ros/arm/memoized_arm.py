@@ -19,10 +19,9 @@ _Result = TypeVar('_Result')
 
 class Regressors:
     """
-    Cache of the regressors of recorded motions.
+    Cache of the regressors of recorded motions, by motion and gravity.
 
-    Regressors do not depend on inertial parameters, so arms of one description share them. The
-    key is the motion and the gravity.
+    Regressors do not depend on inertial parameters, so arms of one description share them.
 
     """
 

@@ -45,8 +45,7 @@ class RotorInertia(Effect):
         return Action(inertia=np.diag(inertia))
 
 
-#: Lowest order of a ripple [1/rev], as gravity and springs have lower ones; factor by which a
-#: fitted order has to exceed it.
+#: Lowest order of a ripple [1/rev] (gravity has lower ones); factor by which fits exceed it.
 _SLOWEST, _EDGE = 1.5, 1.05
 
 

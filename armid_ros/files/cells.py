@@ -6,8 +6,7 @@ from __future__ import annotations
 
 import re
 
-#: First characters of a formula in a spreadsheet or a comment in our tables; such a cell gets an
-#: apostrophe in front.
+#: First characters of formulas and comments; an apostrophe is written before such a cell.
 _GUARDED = ('=', '+', '-', '@', '#', '\t', '\r', "'")
 
 

@@ -41,8 +41,7 @@ class Staged:
     folder : Path
         Staging folder, in which files are written until `keep`.
     replaced : tuple of str
-        Names, or patterns, of files of an earlier result; those that the new one lacks are
-        deleted.
+        Names or patterns of earlier files, which are deleted if the new result lacks them.
     spared : tuple of Path
         Files that are not deleted, as the new result refers to them.
 

@@ -221,9 +221,8 @@ def gravity_composites(robot: Robot, rng: np.random.Generator) -> BaseParameters
     """
     Find the combinations of masses and first moments that an arm at rest identifies.
 
-    An arm with revolute joints only has an even number of combinations. Multiplied by the
-    magnitude of gravity, they are the composite gravity parameters of Table 5 of the humanoid-arm
-    paper.
+    An arm with revolute joints only has an even number of them. Multiplied by the magnitude of
+    gravity, they are the composite gravity parameters of Table 5 of the humanoid-arm paper.
 
     """
     robot = levelled(robot)
