@@ -3,7 +3,7 @@
 """
 Run benchmarks by name, or all but the longest: ``python -m benchmarks [NAME ...]``.
 
-What the benchmarks of speed print is kept in results/speed.json, of which the docs make a page.
+The output of the benchmarks of speed is kept in results/speed.json; the docs show it.
 
 """
 
@@ -32,15 +32,15 @@ LIBRARY = {
     'real_recordings',
     'two_days',
 }
-#: Run only when they are asked for: they take an hour.
+#: Benchmarks of an hour, which run only by name.
 LONG = {'endurance'}
-#: Their output is kept.
+#: Benchmarks whose output is kept.
 SPEED = {'nodes', 'offline_speed', 'online', 'reading', 'simulation'}
 RESULTS = Path(__file__).parent / 'results' / 'speed.json'
 
 
 def run(name: str) -> int:
-    """Run one in a process of its own, with memory and threads of its own; keep its output."""
+    """Run a benchmark in a separate process, and keep its output; return its exit code."""
     command, lines = [sys.executable, '-m', f'benchmarks.{name}'], []
     with subprocess.Popen(command, stdout=subprocess.PIPE, text=True) as process:
         assert process.stdout is not None
@@ -57,7 +57,7 @@ def run(name: str) -> int:
 
 
 def main() -> int:
-    """Run the named ones."""
+    """Run the benchmarks named on the command line, or all."""
     known = sorted(
         path.stem for path in Path(__file__).parent.glob('*.py') if path.stem not in LIBRARY
     )

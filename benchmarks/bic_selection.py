@@ -1,11 +1,11 @@
 # Copyright 2026 The armid_ros developers
 # SPDX-License-Identifier: Apache-2.0
 """
-What textbook model selection names: the baseline that a diagnosis has to beat.
+Textbook model selection, for comparison with the diagnosis.
 
-Forward selection by the Bayesian information criterion on all rows pooled, as if their errors were
-independent and alike: no noise floor, nothing held out, no replication. Library, filters, columns
-and what is free of the rigid body are those of the diagnosis.
+Forward selection by the Bayesian information criterion uses all rows pooled, as if their errors
+were independent and identically distributed: no noise floor, no held-out data, no replication.
+Catalogue, filters, columns and free rigid parameters are those of the diagnosis.
 
 """
 
@@ -30,11 +30,11 @@ from armid_ros.recording import Recording
 import numpy as np
 import scipy.linalg
 
-#: Columns of which what is free leaves less than this share add nothing.
+#: Smallest share of its columns that a tried candidate has beyond the free parameters.
 _LEAST_VISIBLE = 0.02
-#: Directions of a candidate with less than this share of its squares are left at zero.
+#: Share of the squares of a candidate below which a direction of its values stays zero.
 _DEPENDENT = 1e-6
-#: Standard deviation of values that are fitted freely, over their unit.
+#: Prior standard deviation of the values, over their unit; so large that they are free.
 _FREE = 1e3
 
 
@@ -45,7 +45,7 @@ def bic_selection(
     rng: np.random.Generator,
 ) -> list[Cause]:
     """
-    Return the candidates that lower the criterion, in the order in which they do.
+    Return the candidates that lower the criterion, in the order of selection.
 
     Parameters
     ----------
@@ -54,9 +54,9 @@ def bic_selection(
     recordings : sequence of Recording
         Data with torques.
     settings : DiagnosisSettings
-        Library.
+        Catalogue of effects.
     rng : numpy.random.Generator
-        Draws the states over which base parameters are found.
+        Draws the random states from which base parameters are found.
 
     """
     used = choose_filters(arm, recordings, (), settings, rng)

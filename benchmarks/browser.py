@@ -1,6 +1,6 @@
 # Copyright 2026 The armid_ros developers
 # SPDX-License-Identifier: Apache-2.0
-"""A headless Chromium that reports are looked at with."""
+"""A headless Chromium, in which reports are tested."""
 
 import fcntl
 import itertools
@@ -33,7 +33,7 @@ os.execv(sys.argv[3], sys.argv[3:])
 
 
 def find_browser():
-    """Return the command of a Chromium; None where there is none."""
+    """Return the command of a Chromium; None if none is installed."""
     return next(filter(None, map(shutil.which, BROWSERS)), None)
 
 
@@ -67,7 +67,7 @@ class Browser:
             self.call(f'{domain}.enable')
 
     def call(self, method, **parameters):
-        """Send a command and return its result; what happens meanwhile is kept."""
+        """Send a command and return its result; events in between are recorded."""
         number = next(self._numbers)
         message = {'id': number, 'method': method, 'params': parameters}
         if self._session:
@@ -81,7 +81,7 @@ class Browser:
             self._notice(answer)
 
     def open(self, path, width, height=900, dark=False):
-        """Load a file in a window of a width; return when it and its scripts are done."""
+        """Load a file in a window of a given width; return when page and scripts are complete."""
         self.complaints.clear()
         self.requested.clear()
         self.call(
@@ -100,7 +100,7 @@ class Browser:
         )
 
     def run(self, script):
-        """Evaluate JavaScript in the page and return what it comes to."""
+        """Evaluate JavaScript in the page and return its value."""
         answer = self.call(
             'Runtime.evaluate', expression=script, awaitPromise=True, returnByValue=True
         )

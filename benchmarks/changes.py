@@ -1,14 +1,13 @@
 # Copyright 2026 The armid_ros developers
 # SPDX-License-Identifier: Apache-2.0
 """
-Changes of an arm at work: how soon they are seen, what is said of them, and false alarms.
+Changes of an arm at work: detection delay, named cause, intervals, and false alarms.
 
-The simulated humanoid arm under a controller, samples at 1 kHz, encoders of 17 bits, torque noise
-that is white and as much that is not (0.05 s). Beside the friction that is identified it has
-Stribeck friction and torque that goes with the load, which are not: so what the model lacks is in
-the residuals. First it moves for a minute and changes then, in mid-motion; the controller is not
-told. Then it works for half an hour, another motion every minute, slow and fast, with rests, and
-nothing changes.
+The simulated humanoid arm is under a controller, with samples at 1 kHz, encoders of 17 bits, white
+torque noise and as much coloured noise (0.05 s). It has Stribeck friction and load-dependent
+friction that the model lacks, so residuals contain a model error. In the first part it moves for a
+minute and then changes during a motion. In the second part it works for half an hour without a
+change, with another slow or fast motion every minute, and rests.
 
     python -m benchmarks.changes [--draws 4] [--minutes 30] [--works 3]
 
@@ -53,9 +52,9 @@ LACKING = (
     'load_dependent_friction:load_coefficient=0.01',
 )
 NOISE = 0.02
-#: Time constant of the part of the noise that is not white [s].
+#: Time constant of the coloured part of the noise [s].
 COLOUR = 0.05
-#: What changes, and how soon it has to be seen [s].
+#: Changes, and longest accepted delay of their detection, WANTED [s].
 CHANGES = (
     *(f'payload:{ball(mass)}' for mass in (0.1, 0.3, 1.0)),
     'viscous_friction@elbow_pitch:viscous_coefficient=0.3',
@@ -67,10 +66,10 @@ CHANGES = (
     'coulomb_friction@elbow_pitch:coulomb_torque=0.05',
 )
 WANTED = 2.0
-#: For how long the arm moves before it changes and afterwards [s].
+#: Duration of the motion before and after the change [s].
 BEFORE, AFTER = 60.0, 4.0
 SENSORS = Sensors(torque_noise=NOISE, resolution=2.0 * np.pi / 2**17)
-#: Beginning and end of a motion, from and to rest [s].
+#: Duration of the fade from rest at the beginning of a motion, and to rest at its end [s].
 _RAMP = 3.0
 
 Sample = tuple[float, FloatArray, FloatArray]
@@ -78,7 +77,7 @@ Sample = tuple[float, FloatArray, FloatArray]
 
 @dataclass
 class Tally:
-    """Changes that were seen: whether the name is right, and how many intervals hold the truth."""
+    """Counts over detected changes: right names, and intervals that contain the truth."""
 
     named: int = 0
     among: int = 0
@@ -87,7 +86,7 @@ class Tally:
     intervals: int = 0
 
     def add(self, truth: Mapping[ParameterName, float], found: Change) -> str:
-        """Compare what was said with what was done; return a remark."""
+        """Count a detected change, compared with the true one; return a remark."""
         told = {p for p, value in truth.items() if value} & set(found.size.parameters)
         if not told:
             among = any(set(rival.parameters) & set(truth) for rival in found.rivals)
@@ -103,7 +102,7 @@ class Tally:
         return '' if holds.all() else f'({np.sum(~holds)} not true)'
 
     def __str__(self) -> str:
-        """Say both."""
+        """Return the counts in words."""
         return (
             f'of changes that were seen {self.named} named, {self.among} named second, '
             f'{self.wrong} wrongly; {self.held} of {self.intervals} 95 % intervals of sizes hold '
@@ -144,14 +143,14 @@ def working_motion(duration: float, speed: float, rng: np.random.Generator) -> R
 
 
 def coloured(count: int, joints: int, rate: float, rng: np.random.Generator) -> FloatArray:
-    """Return noise that is not white, shape (count, joints) [N m]."""
+    """Return coloured noise, shape (count, joints) [N m]."""
     keep = np.exp(-1.0 / (COLOUR * rate))
     white = np.sqrt(1.0 - keep**2) * rng.normal(size=(count, joints))
     return np.asarray(NOISE * signal.lfilter([1.0], [1.0, -keep], white, axis=0))
 
 
 def moving_arm(seed: int, duration: float, rate: float = RATE) -> tuple[SimulatedArm, FloatArray]:
-    """Return an arm that begins to move, and noise for each sample of its torques."""
+    """Return a simulated arm at the start of a motion, and the noise of its torque samples."""
     rng = np.random.default_rng(seed)
     motion = working_motion(duration + _RAMP, 1.0, rng)
     plant = Plant(arm_with(*IDENTIFIED, *LACKING), dt=1.0 / rate)
@@ -161,7 +160,7 @@ def moving_arm(seed: int, duration: float, rate: float = RATE) -> tuple[Simulate
 
 
 def sampled(simulated: SimulatedArm, noise: FloatArray) -> Iterator[Sample]:
-    """Let an arm go on, one sample for every row of noise."""
+    """Advance an arm and yield a sample for every row of noise."""
     for more in noise:
         sample = simulated.advance()
         yield sample.t, sample.q, sample.tau + more
@@ -174,7 +173,7 @@ def changed(change: str) -> ArmModel:
 
 
 def size(change: str) -> dict[ParameterName, float]:
-    """Return what is added to which parameter by a change."""
+    """Return the values that a change adds, by parameter."""
     effect, values = parse_effect(change, load_robot('humanoid_arm'))
     names = effect.parameters(load_robot('humanoid_arm'))
     return dict(zip(names, values, strict=True))
@@ -183,7 +182,7 @@ def size(change: str) -> dict[ParameterName, float]:
 def changing(
     change: str, seed: int, before: float = BEFORE, after: float = AFTER, rate: float = RATE
 ) -> Iterator[Sample]:
-    """Let the arm move and change at the time `before`."""
+    """Yield samples of an arm that changes at the time `before` [s]."""
     simulated, noise = moving_arm(seed, before + after, rate)
     count = round(before * rate)
     yield from sampled(simulated, noise[:count])
@@ -192,7 +191,7 @@ def changing(
 
 
 def unchanging(minutes: int, seed: int, rate: float = RATE) -> Iterator[Sample]:
-    """Let the arm work: another motion every minute, every fifth of them a rest."""
+    """Yield samples of a working arm: another motion every minute, every fifth one a rest."""
     rng = np.random.default_rng(seed)
     plant = Plant(arm_with(*IDENTIFIED, *LACKING), dt=1.0 / rate)
     for minute in range(minutes):
@@ -208,7 +207,7 @@ def unchanging(minutes: int, seed: int, rate: float = RATE) -> Iterator[Sample]:
 
 
 def identifier() -> OnlineIdentifier:
-    """Return an identifier to which what is not given is unknown."""
+    """Return an online identifier without prior values of the effects."""
     nothing = replace(arm_with(*IDENTIFIED, 'torque_offset'), values=())
     return OnlineIdentifier(nothing, rng=np.random.default_rng(0))
 
@@ -218,7 +217,7 @@ def watch(
     tell: Callable[[float, Change], None] | None = None,
     online: OnlineIdentifier | None = None,
 ) -> OnlineIdentifier:
-    """Identify online, and tell of changes as they are named."""
+    """Identify online, and call `tell` with the time and each named change."""
     online = online or identifier()
     seen = len(online.changes)
     for t, q, tau in samples:
@@ -231,7 +230,7 @@ def watch(
 
 
 def print_changes(draws: int) -> None:
-    """Print how soon every change is seen and could be, and what is said."""
+    """Print the delay of the detection of every change, and its named cause."""
     delays = np.full((len(CHANGES), draws), np.nan)
     tally = Tally()
     for seed in range(draws):
@@ -268,7 +267,7 @@ def _listed(values: FloatArray, digits: int) -> str:
 
 
 def print_false_alarms(minutes: int, seed: int) -> int:
-    """Print what is said where nothing changes; return how often that is."""
+    """Print the false alarms of an arm without a change; return their number."""
     begun = time.process_time()
     online = watch(
         unchanging(minutes, seed), lambda t, c: print(f'  at {t:.1f} s: {c}', flush=True)
@@ -283,7 +282,7 @@ def print_false_alarms(minutes: int, seed: int) -> int:
 
 
 def main() -> None:
-    """Print both."""
+    """Print detected changes and false alarms."""
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[1])
     parser.add_argument('--minutes', type=int, default=30, help='without a change')
     parser.add_argument('--works', type=int, default=3, help='such half hours')

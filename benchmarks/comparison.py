@@ -1,10 +1,10 @@
 # Copyright 2026 The armid_ros developers
 # SPDX-License-Identifier: Apache-2.0
 """
-How often two identifications of one arm are said to differ: unchanged, loaded, worn.
+Rates of reported differences between two identifications of an arm: unchanged, loaded, worn.
 
-Both are made from recordings of other motions with coloured torque noise and encoder noise, and
-pass through the document that identification.json holds.
+Both are made from recordings of different motions with coloured torque noise and encoder noise,
+and read from their identification.json.
 
 """
 
@@ -34,7 +34,7 @@ WEAR = 1.5
 
 
 def identified(arm, structure, duration, rng):
-    """Identify an arm from a recording of its own, and return what its document says."""
+    """Identify an arm from a new recording; return the parameters in its document."""
     motion = multisine(arm.robot.joints, duration, rng)
     tau = arm.torque(motion)
     recording = Recording(
@@ -51,7 +51,7 @@ def identified(arm, structure, duration, rng):
 
 
 def arms():
-    """Return the arm as it was, with a load in its hand, and with an elbow that rubs."""
+    """Return the unchanged arm, the arm with a load, and the arm with more elbow friction."""
     robot = load_robot('humanoid_arm')
     arm = ArmModel(robot)
     for name, value in FRICTION.items():

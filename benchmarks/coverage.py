@@ -1,10 +1,10 @@
 # Copyright 2026 The armid_ros developers
 # SPDX-License-Identifier: Apache-2.0
 """
-How often 95 % intervals hold the truth, over repeats with coloured torque and encoder noise.
+Coverage of 95 % intervals, over repeats with coloured torque noise and encoder noise.
 
-The truth of a base parameter, of an effect and of the torque along a motion that was not recorded
-is known here, because the arm is simulated. The intervals are those that an identification prints,
+The arm is simulated, so the true base parameters, effects and torques along another motion are
+known. The intervals are those that an identification prints,
 from a recording and online.
 
     python -m benchmarks.coverage [--repeats 500] [--online-repeats 200] [--duration 20]
@@ -32,14 +32,14 @@ HALF_WIDTH = 1.959964
 
 @dataclass
 class Tally:
-    """Hits of intervals and what they were made of, over repeats."""
+    """Hits, errors and stated standard deviations over repeats."""
 
     hits: list = field(default_factory=list)
     errors: list = field(default_factory=list)
     stated: list = field(default_factory=list)
 
     def add(self, estimate, truth, std):
-        """Note one repeat."""
+        """Add one repeat."""
         self.hits.append(np.abs(estimate - truth) <= HALF_WIDTH * std)
         self.errors.append(estimate - truth)
         self.stated.append(std)
@@ -58,7 +58,7 @@ class Tally:
 
 
 def multisine(joints, duration, rng, amplitude=0.5):
-    """Return a rich motion, exact to the second derivative."""
+    """Return an exciting motion with exact derivatives."""
     t = np.arange(round(duration * RATE)) / RATE
     w = 2 * np.pi * np.array([0.1, 0.2, 0.5])[:, None]
     size = amplitude * np.array([1.0, 0.6, 0.2])[:, None]
@@ -79,14 +79,14 @@ def coloured(rng, shape, pole):
 
 
 def from_recording(arm, recording):
-    """Identify offline; return what is estimated and the estimate."""
+    """Identify offline; return base parameters and estimate."""
     settings = IdentificationSettings(signals=SignalSettings(10.0, 4))
     result = identify(arm, [recording], settings, rng=np.random.default_rng(0))
     return result.base, result.estimate
 
 
 def online(arm, recording):
-    """Identify sample by sample; return what is estimated and the estimate."""
+    """Identify sample by sample; return base parameters and estimate."""
     identifier = OnlineIdentifier(arm, rng=np.random.default_rng(0))
     for t, q, tau in zip(recording.t, recording.q, recording.tau, strict=True):
         identifier.update(float(t), q, None, tau)
@@ -94,7 +94,7 @@ def online(arm, recording):
 
 
 def coverage(identified, repeats, duration, encoder, torque, pole, seed=0):
-    """Identify again and again; prints a table."""
+    """Identify repeatedly and print a table of coverages."""
     rng = np.random.default_rng(seed)
     robot = load_robot('humanoid_arm')
     arm = ArmModel(robot)

@@ -79,17 +79,17 @@ def modes(plant: Plant, q: FloatArray, *, locked: bool = False) -> FloatArray:
 
 
 def excitation(count: int, seed: int = 0) -> list[Experiment]:
-    """Return experiments through the resonances."""
+    """Return experiments that excite the resonances."""
     return resonance_experiments(count, rms=EXCITATION_RMS, rng=np.random.default_rng(seed))
 
 
 def steps() -> list[Experiment]:
-    """Return the steps that parameters are tuned to."""
+    """Return the step experiments for tuning."""
     return step_experiments(STEP_POSES, STEPS)
 
 
 def mujoco_arm(parameters: TwoLinkParameters, substeps: int = FEW):
-    """Return the arm as MuJoCo has it: links, rotors on axes of their own, tendons as springs."""
+    """Return a MuJoCo model of the arm: links, separate rotors, and tendons as springs."""
     import mujoco
 
     body = parameters.body(load_robot(ROBOT))
@@ -170,7 +170,7 @@ def errors(found: TwoLinkParameters, truth: TwoLinkParameters) -> dict[str, floa
 
 
 def tuning(truth_runs: list[ElasticRun], noise: float, loop: VelocityLoop, seed: int):
-    """Tune 'before' to noisy steps; return errors [%] and by how much the step error shrinks."""
+    """Tune the set 'before' to noisy steps; return errors [%] and the ratio of step errors."""
     rng = np.random.default_rng(seed)
     sensors = ElasticSensors(motor_velocity=noise, link_velocity=noise)
     start = two_link_set('before').parameters

@@ -1,14 +1,14 @@
 # Copyright 2026 The armid_ros developers
 # SPDX-License-Identifier: Apache-2.0
 """
-What is lost over half an hour at 1 kHz, and what kills at random moments leave.
+Losses of a recorder over half an hour at 1 kHz, and after kills at random moments.
 
     python -m benchmarks.endurance [--kills 100] [--minutes 30] [--seed 0]
 
-A part of 0 is left out. Kills: a recorder of 3,000 messages/s is killed with SIGKILL; what was
-published and is not in its bag is lost. Minutes: a player publishes a bag of 7 joints at 1 kHz and
-a recorder records it; both as processes. Losses are to be measured on an otherwise idle machine;
-the load is printed. What a killed command leaves: tests/files/test_staging.py.
+A part with the number 0 is left out. Kills: a recorder of 3,000 messages/s is killed with SIGKILL;
+published messages that are not in its bag are lost. Minutes: a player publishes a bag of 7 joints
+at 1 kHz and a recorder records it, both as processes. Losses are valid on an otherwise idle
+machine; the load is printed. For killed commands see tests/files/test_staging.py.
 
 """
 
@@ -35,14 +35,14 @@ from benchmarks.nodes import process
 
 JOINTS = tuple(f'joint_{k}' for k in range(7))
 RATE, TOPICS = 1000, 3
-#: What may be lost by a kill [s], and by how much memory may differ after the first minute.
+#: Largest accepted loss by a kill [s], and largest relative change of memory after a minute.
 MOST_LOST, FLAT = 0.2, 0.05
-#: How long memory is left to settle, and how often it is looked at [s].
+#: Time in which memory settles, and interval of its measurements [s].
 WARM_UP, LOOK = 60.0, 5.0
 
 
 def verdict(reached: bool) -> str:
-    """Say whether a bound holds."""
+    """Return in words whether a bound holds."""
     return 'reached' if reached else 'NOT reached'
 
 
@@ -50,7 +50,7 @@ def verdict(reached: bool) -> str:
 
 
 def killed_recorder(bag: Path, seconds: float) -> tuple[float, int]:
-    """Kill a recorder after some seconds; return what it lost [s] and how many it kept."""
+    """Kill a recorder after some seconds; return lost time [s] and number of kept messages."""
     with private_context() as context:
         executor = make_executor('events', context)
         node = Node('source', context=context, use_global_arguments=False)
@@ -89,7 +89,7 @@ def killed_recorder(bag: Path, seconds: float) -> tuple[float, int]:
 
 
 def kills(folder: Path, count: int, rng: np.random.Generator) -> bool:
-    """Kill recorders at random moments; print what was lost."""
+    """Kill recorders at random moments and print the losses; return whether bounds hold."""
     losses, unread = [], []
     for number in range(count):
         seconds = float(rng.uniform(0.6, 3.0))
@@ -123,7 +123,7 @@ def endless_motion(path: Path, seconds: float) -> int:
 
 
 def memory(pid: int) -> float:
-    """Return the memory of a process that is its own, without files that it maps [MB]."""
+    """Return the memory of a process without mapped files [MB]."""
     text = Path(f'/proc/{pid}/status').read_text()
     found = re.search(r'RssAnon:\s+(\d+) kB', text)
     return int(found[1]) / 1024.0 if found else np.nan
@@ -135,7 +135,7 @@ def load() -> str:
 
 
 def half_an_hour(folder: Path, minutes: float) -> bool:
-    """Play and record; print what was lost and how much memory was taken."""
+    """Play and record; print losses and memory; return whether bounds hold."""
     count = endless_motion(folder / 'played', 60.0 * minutes)
     used: dict[str, list[tuple[float, float]]] = {'recorder': [], 'bag_player': []}
     loads, begin = [], time.monotonic()
@@ -174,7 +174,7 @@ def half_an_hour(folder: Path, minutes: float) -> bool:
 
 
 def main() -> int:
-    """Measure and print; 1 if a bound does not hold."""
+    """Measure and print; return 1 if a bound does not hold."""
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[1])
     parser.add_argument('--kills', type=int, default=100, help='of a recorder')
     parser.add_argument('--minutes', type=float, default=30.0, help='of playing and recording')

@@ -11,7 +11,7 @@ best of 1000 random feasible trajectories and figaroh's cubic splines (same limi
 waypoints, condition number minimised by Ipopt). The predicted standard deviation of every
 parameter against its scatter in 200 simulated repeats.
 
-figaroh and its solver, cyipopt, are installed into a temporary environment of their own.
+figaroh and its solver, cyipopt, are installed into a temporary environment.
 
 """
 
@@ -53,7 +53,7 @@ LUNAR_NOISE = 1e-3 * np.array([32.64, 39.93, 4.89, 6.79, 0.46, 0.13])
 LUNAR_SAMPLES = 200
 REPEATS = 200
 HELD_OUT = 5
-#: Samples of the 20 s that all trajectories are judged by, as if recorded at this rate [Hz].
+#: Rate of the samples from which all trajectories of 20 s are evaluated [Hz].
 RATE = 100.0
 PEER_PACKAGES = ('figaroh==1.0.2', 'cyipopt-wheels==1.7.0.dev0')
 
@@ -121,7 +121,7 @@ def humanoid(seed):
 
 
 def narrow(arm, problem, clearance, rng):
-    """Draw a clear trajectory that spans 20 % of every joint's range about its middle."""
+    """Draw a collision-free trajectory over the middle 20 % of every joint's range."""
     lower, upper = position_range(problem.limits.lower, problem.limits.upper)
     while True:
         a, b = rng.normal(size=(2, len(lower), 3)) * np.arange(1, 4)
@@ -200,13 +200,13 @@ def arm_table(name, arguments, python, file):
 
 def urdf_of(name):
     """Return the file of an arm of example-robot-data."""
-    from benchmarks.real_recordings import example_robot  # what it imports, the peer has not
+    from benchmarks.real_recordings import example_robot  # not installed beside figaroh
 
     return str(example_robot(URDF[name]))
 
 
 def friction_arm(urdf):
-    """Load an arm with friction to be seen."""
+    """Load an arm with viscous and Coulomb friction."""
     arm = ArmModel(load_robot(urdf))
     for effect in ('viscous_friction', 'coulomb_friction'):
         arm = arm.with_effect(make_effect(effect, arm.robot))
@@ -229,7 +229,7 @@ def print_scatter(problem, result, rng):
 
 
 def timed(work):
-    """Return a result, the seconds it took, and those of processor time in all processes."""
+    """Return a result, its time [s], and its processor time in all processes [s]."""
 
     def used():
         kinds = (resource.RUSAGE_SELF, resource.RUSAGE_CHILDREN)
@@ -241,7 +241,7 @@ def timed(work):
 
 
 def peer_environment(folder):
-    """Install figaroh and its solver; return the interpreter, or None and say why."""
+    """Install figaroh and its solver; return the interpreter, or print why and return None."""
     venv.create(folder / 'venv', with_pip=True)
     python = folder / 'venv' / 'bin' / 'python'
     done = subprocess.run(
@@ -255,7 +255,7 @@ def peer_environment(folder):
 
 
 def peer_row(name, arguments, python, file, row):
-    """Run figaroh in its environment and print what it designed."""
+    """Run figaroh in its environment and print a row for its design."""
     environment = {**os.environ, 'PYTHONPATH': str(Path(__file__).parents[1])}
     command = [python, '-m', 'benchmarks.excitation', '--peer', urdf_of(name), '--out', file]
     options = ['--peer-iterations', str(arguments.peer_iterations), '--seed', str(arguments.seed)]
@@ -325,7 +325,7 @@ def figaroh(urdf, iterations, seed, out):
 
         def _solve_segment(self, number, start, *rest):
             if number == 0:
-                start[:] = first  # it draws one, which may be in collision
+                start[:] = first  # the drawn pose of figaroh may be in collision
             return super()._solve_segment(number, start, *rest)
 
     np.random.seed(seed)  # noqa: NPY002 - figaroh draws from the global generator

@@ -3,7 +3,7 @@
 """
 The human-exoskeleton leg pair: gait by torque in MuJoCo, stiffness from noisy angles.
 
-What the source claims, what is wanted here, what is measured.
+The tables compare the claims of the source, the aims of this package, and measurements.
 
     python -m benchmarks.exo [--draws 8] [--repeats 400] [--sets 24] [--first-seed 0]
 
@@ -43,7 +43,7 @@ from benchmarks.leg_pair_in_mujoco import drive_in_mujoco
 from benchmarks.walking_in_mujoco import walk_in_mujoco
 
 SECONDS = 6.0
-#: Time of a step forward and back, of the steps that poses are chosen from [s].
+#: Duration of a step forward and back, for the steps from which poses are chosen [s].
 SPEEDS = (1.8, 1.2, 0.9)
 
 
@@ -88,7 +88,7 @@ def _most(error: FloatArray) -> float:
 
 
 def stiffness(draws: int) -> None:
-    """Find the springs from 200 poses and from a recording, with noise."""
+    """Identify the springs from 200 poses and from a recording, with noise; print a table."""
     pair, gait = leg_pair(1e4), read_gait()
     seconds = stepping(pair, gait, np.arange(0.0, 10.0, 1e-3))
     sets = {
@@ -122,7 +122,7 @@ def stiffness(draws: int) -> None:
 
 
 def chosen_poses(pair: TiedPair) -> PairMotion:
-    """Choose 200 poses that tell four springs best, of steps at three speeds."""
+    """Choose the 200 poses of steps at three speeds that determine four springs best."""
     gait = read_gait()
     parts = [stepping(pair, gait, np.linspace(0.0, period, 601)[:-1], period) for period in SPEEDS]
     own, other = (_joined([part[side] for part in parts]) for side in (0, 1))
@@ -158,7 +158,7 @@ def _planned(
 def _bound(
     pair: TiedPair, motions: PairMotion, degrees: float, inertias: Inertias, separate: bool
 ) -> FloatArray:
-    """Return the least scatter that any estimate without bias can have [per cent]."""
+    """Return the smallest possible scatter of an unbiased estimate [per cent]."""
     problem, theta = _planned(pair, motions, degrees, inertias, separate)
     return 100.0 * stiffness_bound(problem, theta, TORQUE_NOISE) / 1e4
 
@@ -166,7 +166,7 @@ def _bound(
 def _judged(
     found: list[Interaction], degrees: float, inertias: Inertias, bound: FloatArray | None
 ) -> str:
-    """Return mean error, scatter and what plain least squares gives, of the worst spring."""
+    """Return a text of mean error, scatter and error of least squares, for the worst spring."""
     errors = np.array([100.0 * (part.stiffness / 1e4 - 1.0) for part in found])
     plain = errors + np.array([100.0 * part.bias / 1e4 for part in found])
     mean, scatter = errors.mean(axis=0), errors.std(axis=0, ddof=1)

@@ -1,7 +1,7 @@
 # Copyright 2026 The armid_ros developers
 # SPDX-License-Identifier: Apache-2.0
 """
-Deviations of springs as they are stated, beside the scatter of repeats.
+Stated standard deviations of springs, compared with the scatter of repeats.
 
     python -m benchmarks.exo_deviations [--repeats 400] [--first-seed 0] [--row 6]
 
@@ -19,12 +19,12 @@ import numpy as np
 from benchmarks.exo_noise import find_springs, with_torques
 
 STIFFNESS = 1e4
-#: Repeats of a recording for each of poses: they take ten times as long.
+#: Repeats with poses per repeat with a recording, which takes ten times as long.
 _SHARE = 4
 
 
 def deviations(repeats: int, first: int = 0, only: int | None = None) -> None:
-    """Print stated deviations over scatter, and how many 95 % intervals hold the stiffness."""
+    """Print stated deviations over scatter, and the coverage of 95 % intervals."""
     pair, gait = leg_pair(STIFFNESS), read_gait()
     poses = stepping(pair, gait, np.linspace(0.0, 1.8, 201)[:-1])
     seconds = stepping(pair, gait, np.arange(0.0, 10.0, 1e-3))
@@ -49,7 +49,7 @@ def deviations(repeats: int, first: int = 0, only: int | None = None) -> None:
 def stated(
     motions: PairMotion, inertias: Inertias, separate: bool, repeats: int, first: int = 0
 ) -> tuple[float, float, float]:
-    """Return the ratio, its own deviation, and the per cent of intervals; means of all springs."""
+    """Return stated over true deviation, its standard deviation, and the coverage [per cent]."""
     pair = leg_pair(STIFFNESS)
     exact = with_torques(pair, motions)
     found = [
@@ -60,7 +60,7 @@ def stated(
     variance = np.mean([part.std**2 for part in found], axis=0)
     ratio = np.sqrt(variance) / values.std(axis=0, ddof=1)
     hold = [np.prod(np.sign(part.interval() - STIFFNESS), axis=1) <= 0.0 for part in found]
-    sure = (2.0 * (len(values) - 1)) ** -0.5  # of one spring, for those of one draw are alike
+    sure = (2.0 * (len(values) - 1)) ** -0.5  # as for one spring: those of a draw are correlated
     return float(np.mean(ratio)), sure, 100.0 * float(np.mean(hold))
 
 

@@ -30,9 +30,9 @@ import numpy as np
 from tests.hidden.leg_pair import Straps, walks
 
 SECONDS = 6.0
-#: A spring that is named when it is four deviations above zero is surely seen from here on.
+#: Expected z-score from which a spring has to be named; names need four standard deviations.
 _VISIBLE = 6.0
-#: Hidden springs: which segments, at each of the stiffnesses.
+#: Segments with hidden springs, combined with each stiffness.
 HIDDEN = (
     SEGMENTS,
     ('swing_shank',),
@@ -50,7 +50,7 @@ def cases() -> list[tuple[float, tuple[str, ...]]]:
 
 
 def diagnosed(sets: int, first: int = 0) -> None:
-    """Hide springs in bags of an independent engine, and let the whole diagnosis look."""
+    """Diagnose bags of an independent engine with hidden springs, and print rates."""
     ties = leg_pair()
     partner = Partner(ties.other, ties.ties, 'human_legs')
     right = alarms = words = 0
@@ -93,7 +93,7 @@ def diagnosed(sets: int, first: int = 0) -> None:
 
 
 def expected_z(recordings: list[Recording], stiffness: float) -> dict[str, float]:
-    """Return how many deviations above zero a stiffness is where all segments may be tied."""
+    """Return the expected z-score of a stiffness by segment, if all segments may be tied."""
     exo = load_robot('exoskeleton_legs')
     used = conditioning(recordings, SignalSettings())
     used = band_of_motion(recordings, used, SignalSettings())
@@ -108,7 +108,7 @@ def expected_z(recordings: list[Recording], stiffness: float) -> dict[str, float
 
 
 def recorded_pair(partner: Partner, straps: Straps, seed: int) -> list[Recording]:
-    """Record a pair three times; its masses are off by up to a tenth in half of all cases."""
+    """Record a pair three times; its masses are wrong by up to a tenth for odd seeds."""
     exo = load_robot('exoskeleton_legs')
     recordings = []
     for walk in walks(straps, seed, seconds=SECONDS, wrong_masses=0.1 * (seed % 2)):

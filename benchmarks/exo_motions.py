@@ -1,7 +1,7 @@
 # Copyright 2026 The armid_ros developers
 # SPDX-License-Identifier: Apache-2.0
 """
-Which motion shows four springs: the bound for 200 poses, and what 10 s at 1 kHz give.
+Motions that determine four springs: the bound for 200 poses, and the result of 10 s at 1 kHz.
 
     python -m benchmarks.exo_motions
 
@@ -25,7 +25,7 @@ SECONDS = 10.0
 
 
 def bound(name: str, samples: int = 200) -> FloatArray:
-    """Return the least scatter of four stiffnesses from poses of an exercise [per cent]."""
+    """Return the smallest possible scatter of four stiffnesses from poses [per cent]."""
     pair = leg_pair(STIFFNESS)
     t = np.linspace(0.0, EXERCISES[name].period, samples + 1)[:-1]
     motions = with_torques(pair, exercise(pair, name, t))

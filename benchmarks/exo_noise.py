@@ -1,6 +1,6 @@
 # Copyright 2026 The armid_ros developers
 # SPDX-License-Identifier: Apache-2.0
-"""Noise of the leg pair's sensors, and springs that are found in spite of it."""
+"""Noise of the leg pair's sensors, and identification of its springs."""
 
 from __future__ import annotations
 
@@ -26,7 +26,7 @@ def find_springs(
     inertias: Inertias = 'known',
     separate: bool = False,
 ) -> Interaction:
-    """Draw noise, and find the springs of poses or, where there are many, of a recording."""
+    """Draw noise, and identify springs from poses, or from 1000 samples on as a recording."""
     own, other = measured(motions, degrees, np.random.default_rng(seed))
     if len(own) < 1000:
         problem = interaction_problem(
@@ -55,7 +55,7 @@ def with_torques(pair: TiedPair, motions: PairMotion) -> PairMotion:
 
 
 def measured(motions: PairMotion, degrees: float, rng: np.random.Generator) -> PairMotion:
-    """Return a motion with exact torques as noisy sensors show it."""
+    """Return a motion with exact torques and added sensor noise."""
     own, other = (
         replace(m, q=m.q + np.radians(degrees) * rng.normal(size=m.q.shape)) for m in motions
     )
@@ -65,7 +65,7 @@ def measured(motions: PairMotion, degrees: float, rng: np.random.Generator) -> P
 
 
 def recorded(motion: Motion, start_ns: int = 0) -> Recording:
-    """Return a motion as a sensor records it."""
+    """Return a motion as a recording."""
     return Recording(
         joints=motion.joints, t=motion.t, q=motion.q, tau=motion.tau, start_ns=start_ns
     )

@@ -1,11 +1,11 @@
 # Copyright 2026 The armid_ros developers
 # SPDX-License-Identifier: Apache-2.0
 """
-How well poses can tell the stiffness of springs, and which poses tell it best.
+The accuracy of spring stiffnesses from poses, and the choice of the best poses.
 
-Of torques and angles with Gaussian noise no estimate without bias has less variance than the
-inverse of their information (Cramer and Rao). Which poses have most of it is a matter of geometry
-alone: it is decided before they are measured.
+With Gaussian noise of torques and angles, the variance of an unbiased estimate is at least the
+inverse of the information (Cramer and Rao). The information of a pose depends on geometry alone,
+so poses are chosen before they are measured.
 
 """
 
@@ -17,7 +17,7 @@ from armid_ros.motion import FloatArray
 import numpy as np
 import numpy.typing as npt
 
-#: Rounds of the multiplicative algorithm: weights are known to some per cent by then.
+#: Rounds of the multiplicative algorithm, after which weights are accurate to some per cent.
 _ROUNDS = 200
 
 
@@ -25,12 +25,12 @@ def stiffness_bound(
     problem: InteractionProblem, theta: FloatArray, torque_noise: npt.ArrayLike
 ) -> FloatArray:
     """
-    Return the least standard deviation that stiffnesses can have, shape (S,) [N/m].
+    Return the smallest possible standard deviations of stiffnesses, shape (S,) [N/m].
 
     Parameters
     ----------
     problem : InteractionProblem
-        Of the motion without noise, with the noise that its angles will have.
+        Regression of the motion without noise, with the expected noise of its angles.
     theta : ndarray, shape (P,)
         Stiffnesses and inertias.
     torque_noise : array_like, number or shape (n,)
@@ -39,7 +39,7 @@ def stiffness_bound(
     Raises
     ------
     IdentificationError
-        If the poses do not tell every stiffness.
+        If the poses do not determine every stiffness.
 
     """
     information = _information(problem, theta, torque_noise).sum(axis=0)
@@ -51,32 +51,31 @@ def choose_poses(
     problem: InteractionProblem, theta: FloatArray, torque_noise: npt.ArrayLike, count: int
 ) -> npt.NDArray[np.intp]:
     """
-    Choose the poses that tell the stiffnesses best, each relative to its own deviation.
+    Choose the poses that determine the stiffnesses best, in units of their standard deviations.
 
-    Weights of a best design by the multiplicative algorithm (Silvey, Titterington and Torsney
-    1978); the poses with the largest ones are taken.
+    The multiplicative algorithm (Silvey, Titterington and Torsney 1978) gives the weights of an
+    optimal design; the poses with the largest weights are chosen.
 
     Parameters
     ----------
     problem : InteractionProblem
-        Of all poses to choose from, as they are planned: chosen by measured angles, their noise
-        would be chosen with them.
+        Regression of all planned poses. A choice by measured angles would depend on their noise.
     theta : ndarray, shape (P,)
-        Stiffnesses and inertias, as far as they are known; a factor of two does not matter.
+        Approximate stiffnesses and inertias; a factor of two does not matter.
     torque_noise : array_like, number or shape (n,)
-        Standard deviation that the torques will have [N m].
+        Expected standard deviation of the torques [N m].
     count : int
-        How many to choose.
+        Number of poses.
 
     Returns
     -------
     ndarray of int, shape (count,)
-        Which samples of the problem, in their order.
+        Chosen samples of the problem, in their order.
 
     Raises
     ------
     IdentificationError
-        If there are fewer, or all of them do not tell every stiffness.
+        If there are fewer poses, or all of them do not determine every stiffness.
 
     """
     each = _information(problem, theta, torque_noise)

@@ -1,16 +1,16 @@
 # Copyright 2026 The armid_ros developers
 # SPDX-License-Identifier: Apache-2.0
 """
-A fleet whose truth is known, and what `armid fleet` finds of it.
+A simulated fleet with known changes, and the changes that `armid fleet` finds.
 
-Arms of one kind differ in mass and friction, and move another way in every bag, a bag a day.
-Friction goes with the temperature of the day. Some arms change: friction steps up, a load stays in
-the hand, a joint wears, or something acts that the model does not have. Some bags are damaged.
+Arms of one kind differ in mass and friction, and have a different motion in every bag, a bag per
+day. Friction varies with the temperature of the day. Some arms change: friction steps up, a load
+stays in the hand, a joint wears, or an effect acts that the model lacks. Some bags are damaged.
 
     python -m benchmarks.fleet generate DIR [--arms N] [--bags M] [--changed K] [--damaged D]
     python -m benchmarks.fleet score DIR RESULTS     after `armid fleet identify` and `watch`
 
-Without a word: a small fleet, all of it.
+Without arguments both parts run on a small fleet.
 
 """
 
@@ -40,11 +40,11 @@ HARMONICS = ((0.1, 0.5), (0.25, 0.3), (0.55, 0.12))
 #: Noise of the torque sensors [N m].
 NOISE = np.array([0.05, 0.05, 0.02])
 VISCOUS, COULOMB = np.array([0.6, 0.6, 0.3]), np.array([0.5, 0.5, 0.25])
-#: Speed at which joints slide; below, dry friction is less, which the model does not know [rad/s].
+#: Speed below which dry friction decreases, which the model lacks [rad/s].
 SLIDING = 0.02
-#: How much the temperature of a day changes viscous friction, as a share.
+#: Relative standard deviation of viscous friction by the temperature of a day.
 TEMPERATURE = 0.01
-#: What happens to arms: effect of the catalogue, and the range its size is drawn from.
+#: Kinds of changes, and range of their sizes.
 CHANGES = {
     'friction': (0.08, 0.3),  # share by which the dry friction of a joint steps up
     'load': (0.05, 0.3),  # mass in the hand [kg]
@@ -54,7 +54,7 @@ CHANGES = {
 
 
 def healthy(rng):
-    """Draw an arm: the description with other masses, and its own friction."""
+    """Draw an arm: the description with other masses and friction."""
     robot = load_robot(str(ROBOT))
     arm = ArmModel.of(robot, effects=EFFECTS)
     bodies = robot.rigid_parameters.reshape(-1, 10) * rng.normal(1.0, 0.03, (robot.n_joints, 1))
@@ -65,7 +65,7 @@ def healthy(rng):
 
 
 def lived(arm, truth, day, rng):
-    """Return an arm as it is on a day."""
+    """Return the state of an arm on a day."""
     theta = arm.theta.copy()
     rigid = len(arm.robot.rigid_parameters)
     theta[rigid : rigid + 3] *= 1.0 + TEMPERATURE * rng.normal()
@@ -88,7 +88,7 @@ def lived(arm, truth, day, rng):
 
 
 def moved(arm, seconds, rng):
-    """Return what is recorded of a motion in closed form."""
+    """Return a motion in closed form with noisy torque."""
     t = np.arange(round(seconds * RATE)) / RATE
     q, dq, ddq = np.zeros((3, len(t), arm.robot.n_joints))
     for hz, size in HARMONICS:
@@ -105,7 +105,7 @@ def moved(arm, seconds, rng):
 
 
 def draw(arms, bags, changed, damaged, seed=0):
-    """Return every arm with what happens to it, and which bags are damaged."""
+    """Return every arm with its change, and the days of its damaged bags."""
     root = np.random.default_rng(seed)
     sick = set(root.choice(arms, changed, replace=False).tolist())
     broken = set(root.choice(arms * bags, damaged, replace=False).tolist())
@@ -127,7 +127,7 @@ def draw(arms, bags, changed, damaged, seed=0):
 
 
 def generate(folder, arms, bags, changed, damaged, seconds=60.0, seed=0):
-    """Write a fleet, its truth first."""
+    """Write a fleet and its true changes."""
     drawn = draw(arms, bags, changed, damaged, seed)
     days = [FIRST_DAY + datetime.timedelta(days=day) for day in range(bags)]
     truth = {
@@ -148,7 +148,7 @@ def generate(folder, arms, bags, changed, damaged, seconds=60.0, seed=0):
 
 
 def score(folder, results):
-    """Compare what was named with the truth."""
+    """Compare named changes with the truth, and print the result."""
     from pyarrow import parquet
 
     truth = json.loads(Path(folder, 'truth.json').read_text())
@@ -175,7 +175,7 @@ def score(folder, results):
 
 
 def main():
-    """Run one of the parts, or a small fleet through all of them."""
+    """Run one of the parts, or both on a small fleet."""
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument('part', nargs='?', choices=['generate', 'score'])
     parser.add_argument('folders', nargs='*', type=Path)

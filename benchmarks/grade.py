@@ -1,12 +1,12 @@
 # Copyright 2026 The armid_ros developers
 # SPDX-License-Identifier: Apache-2.0
 """
-What is said of sound recordings and of mistakes made of them, and how far numbers decide it.
+False and missed reports of mistakes in recordings, and their sensitivity to the limits.
 
-Recordings are those of an UR10 and a TX40 in the folder that ARMID_DATA names, if it does, and of
-arms in simulation whose links are up to a fifth lighter or heavier than described. Every limit is
-made 30 % smaller and larger; one row a limit says what of the sound is suspected then and what of
-the mistakes is missed.
+The recordings are of a UR10 and a TX40, if the environment variable ARMID_DATA names their folder,
+and of simulated arms whose links are up to a fifth lighter or heavier than described. Mistakes are
+made in sound ones. Every limit is made 30 % smaller and larger; a row per limit has the numbers of
+suspected sound recordings and of missed mistakes.
 
     python -m benchmarks.grade
 
@@ -34,7 +34,7 @@ import numpy as np
 from benchmarks import real_recordings
 from benchmarks.coverage import FRICTION, multisine
 
-#: What decides whether a mistake is believed; the others are limits of errors that are printed.
+#: Limits that decide whether a mistake is reported; the others are limits of grades.
 DECIDING = ('poor', 'unusable', 'floor', 'gain', 'free_body', 'torque_factor', 'gravity_change')
 
 
@@ -70,7 +70,7 @@ def sound(folder) -> Iterator:
 
 
 def mistaken(robot, recording) -> Iterator:
-    """Yield mistakes made of a recording, each with what has to be said of it."""
+    """Yield mistakes in a recording, each with words that its report has to contain."""
     sign = np.where(np.arange(robot.n_joints) == 1, -1.0, 1.0)
     quarter = np.where(np.arange(robot.n_joints) == 2, np.pi / 2, 0.0)
     order = [0, 2, 1, *range(3, robot.n_joints)]
@@ -93,13 +93,13 @@ def mistaken(robot, recording) -> Iterator:
 
 
 def said_of(robot, recording):
-    """Return what is said of a recording; nothing if nothing is."""
+    """Return the report on a mistake in a recording; empty without one."""
     found = find_mistake(robot, recording, conditioning([recording], SignalSettings()))
     return '' if found is None else found.sentence(robot)
 
 
 def judged(cases, limits):
-    """Return how many sound recordings are suspected, and how many mistakes are missed."""
+    """Return the numbers of suspected sound recordings and of missed mistakes."""
     with ExitStack() as stack:
         for module in (hypotheses, mistakes, prediction_error):
             stack.enter_context(mock.patch.object(module, 'LIMITS', limits))
@@ -111,7 +111,7 @@ def judged(cases, limits):
 
 
 def main():
-    """Print one row a limit."""
+    """Print one row per limit."""
     with tempfile.TemporaryDirectory() as folder:
         clean = list(sound(Path(folder)))
         cases = [('', robot, recording) for robot, recording in clean]

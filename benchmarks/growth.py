@@ -3,8 +3,8 @@
 """
 Processor time and memory of the jobs over samples, joints, bags and effects, with slopes.
 
-``python -m benchmarks.growth [--quick]`` writes results/growth.json, of which the docs draw a
-picture. Each point is a process of its own. The arms are chains with friction on sums of sines.
+``python -m benchmarks.growth [--quick]`` writes results/growth.json, which the docs plot. Each
+point is measured in a separate process. The arms are chains with friction on sums of sines.
 
 """
 
@@ -31,7 +31,7 @@ from benchmarks.reference_loop import processor
 OUT = Path(__file__).parent / 'results' / 'growth.json'
 FRICTION = ('viscous_friction:viscous_coefficient=0.5', 'coulomb_friction:coulomb_torque=0.3')
 OFFSET = 'torque_offset:torque_offset=1'
-#: Job, what grows, and its values; elsewhere 7 joints, one bag of 12 s, two effects.
+#: Job, varied quantity, and its values; otherwise 7 joints, one bag of 12 s, two effects.
 POINTS = {
     ('read', 'samples'): (10**4, 10**5, 10**6, 3 * 10**6),
     ('identify', 'samples'): (10**4, 10**5, 10**6),
@@ -56,7 +56,7 @@ QUICK = {'samples': 10**5, 'joints': 7, 'bags': 10, 'effects': 2}
 
 
 def chain(joints: int) -> str:
-    """Return the URDF of links one behind the other, whose axes take turns."""
+    """Return the URDF of a serial chain whose axes alternate."""
     parts = ['<robot name="chain"><link name="l0"/>']
     for k in range(1, joints + 1):
         axis = ('0 0 1', '0 1 0', '1 0 0')[k % 3]
@@ -78,7 +78,7 @@ def recording(arm: ar.ArmModel, samples: int, seed: int) -> ar.Recording:
 
 
 def prepared(job: str, sizes: dict[str, int], folder: Path) -> Callable[[], object]:
-    """Make the data of a job, and return the job."""
+    """Make the data of a job, and return the job as a function."""
     truth = ar.ArmModel.of(chain(sizes['joints']), effects=list(FRICTION))
     arm = ar.ArmModel.of(truth.robot, effects=EFFECTS[: sizes['effects']])
     size = sizes['samples'] if sizes['bags'] == 1 else BAG
@@ -113,7 +113,7 @@ def slope(x: list[int], y: list[float]) -> float:
 
 
 def main() -> None:
-    """Measure every point in a process of its own; write and print the table."""
+    """Measure every point in a separate process; write and print the table."""
     parser = argparse.ArgumentParser(description=__doc__.strip().partition('\n')[0])
     parser.add_argument(
         '--quick', action='store_true', help='small sizes only; nothing is written'

@@ -1,12 +1,13 @@
 # Copyright 2026 The armid_ros developers
 # SPDX-License-Identifier: Apache-2.0
 """
-How many healthy arms are accused among a thousand, whose days differ as real ones do.
+False alarms among a thousand healthy arms with realistic differences between days.
 
-Summaries of bags are drawn, not bags. What differs from day to day is no white noise of known
-size: friction follows a temperature that all arms share, with seasons, and one that each has to
-itself, and both last for days; arms answer to it unlike each other; deviations are stated too
-small or too large; errors have heavy tails; bags are missing. Some arms change, by steps or wear.
+Summaries of bags are drawn, not bags. Differences between days are not white noise of known size.
+Friction follows a temperature common to all arms, with seasons, and one of each arm; both are
+correlated over days, and arms differ in their sensitivity. Stated standard deviations are too
+small or too large, errors have heavy tails, and bags are missing. Some arms change, by steps or
+wear.
 
     python -m benchmarks.healthy_arms [--arms N] [--bags M] [--fleets F] [--seed S]
 
@@ -28,16 +29,16 @@ PARAMETERS = (
     ('ixx', 0.2, 0.005, 0.0),
     ('residual', -3.0, 0.0, 0.0),
 )
-#: Share by which friction follows the season, the days that all arms have, and their own.
+#: Relative change of friction by season, by the common and by the individual temperature.
 SEASON, SHARED, OWN = 0.02, 0.01, 0.01
-#: What is left of a day's temperature on the next.
+#: Correlation of the temperatures of successive days.
 LASTING = 0.7
 #: Share of bags that are missing.
 MISSING = 0.1
 
 
 def lasting(rng, days, size):
-    """Draw what lasts for days: a first-order autoregression of a standard deviation."""
+    """Draw a first-order autoregressive series over days, of unit standard deviation."""
     values = np.empty(size)
     values[..., 0] = rng.normal(size=size[:-1])
     for day in range(1, days):
@@ -52,7 +53,7 @@ def heavy(rng, size):
 
 
 def draw(arms, bags, sick, rng):
-    """Return the series of a fleet of which the first arms change, in steps and by wear."""
+    """Return the series of a fleet whose first arms change, by steps or wear."""
     days = np.arange(bags, dtype=float) + 20_000.0
     shared = SEASON * np.sin(2 * np.pi * days / 365.25 + rng.uniform(0, 6.3))
     shared = shared + SHARED * lasting(rng, bags, (bags,))
@@ -83,7 +84,7 @@ def draw(arms, bags, sick, rng):
 
 
 def change_of(arm, bags, rng):
-    """Return which parameter changes, and by how much of its size on every day."""
+    """Return the changed parameter, and its relative change on every day."""
     joint = JOINTS[int(rng.integers(3))]
     start = int(rng.integers(bags // 3, 2 * bags // 3))
     if arm % 2:
@@ -92,7 +93,7 @@ def change_of(arm, bags, rng):
 
 
 def tally(arms, bags, sick, rng, alpha=0.05):
-    """Return how many arms that have changed are named, and how many healthy ones."""
+    """Return the numbers of named arms that have changed and that are healthy."""
     series = draw(arms, bags, sick, rng)
     compared = without_days(series)
     judged = judge([(compared, spreads(compared))])
@@ -102,7 +103,7 @@ def tally(arms, bags, sick, rng, alpha=0.05):
 
 
 def main():
-    """Print the arms that are named, of fleets with and without arms that change."""
+    """Print the numbers of named arms in fleets with and without changes."""
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument('--arms', type=int, default=1000)
     parser.add_argument('--bags', type=int, nargs='+', default=[10, 30, 90])

@@ -1,12 +1,11 @@
 # Copyright 2026 The armid_ros developers
 # SPDX-License-Identifier: Apache-2.0
 """
-Whether the diagnosis names effects that are hidden in recordings of MuJoCo arms.
+Rates of the diagnosis for effects hidden in recordings of MuJoCo arms.
 
-The cases are those of tests/hidden, whose data come from code that has nothing in common with the
-diagnosis; rates have 95 % intervals (Wilson). Reach and what counts: tests/hidden/README.md. The
-laboratory asks for everything that is there: the sizes that are hidden are multiples of the noise,
-and so nothing is too small to matter (a share of the torque of zero is material).
+The cases are those of tests/hidden, whose data come from code that is independent of the
+diagnosis; rates have 95 % intervals (Wilson). For scope and rules see tests/hidden/README.md. The
+sizes of hidden effects are multiples of the noise, so every size is material (`material` is zero).
 
     python -m benchmarks.hidden_effects [SET] [--slice] [--only TEXT]
         [--single] [--out FOLDER]
@@ -40,12 +39,12 @@ from benchmarks.two_days import Answer, answer_of, known_arm
 from tests.hidden.cases import Case, make_case, VISIBLE
 from tests.hidden.specification import case_list, CaseSpec, SETS
 
-#: Every so many cases of a kind are in the slice.
+#: Interval of the cases of a kind that are in the slice.
 SLICE = {'single': 9, 'free': 20, 'pair': 8, 'outside': 5, 'removed': 10}
 
 
 def true_arm(case: Case) -> ArmModel:
-    """Return the arm as it is, with the hidden effects that the catalogue has."""
+    """Return the true arm, with those hidden effects that the catalogue has."""
     arm = ArmModel(case.true_robot)
     for name, values in case.true_known.items():
         joints = tuple(j for j, value in zip(arm.robot.joints, values, strict=True) if value)
@@ -88,10 +87,10 @@ def run_diagnosis(case: Case) -> tuple[Answer, float]:
 
 def share_closed(case: Case, overlays: Sequence[Overlay]) -> float:
     """
-    Return how much of what could be explained of motions never used is explained.
+    Return the share of the explainable gap that is closed in held-out motions.
 
-    That is (e0 - e1) / (e0 - e_true), of losses with the model without what was named, with it,
-    and of the true arm; nan where these motions hardly show the effect.
+    The share is (e0 - e1) / (e0 - e_true), with the losses of the model without the named effects,
+    with them, and of the true arm. It is nan if these motions hardly excite the effect.
 
     """
     truth = true_arm(case)
@@ -108,7 +107,7 @@ def share_closed(case: Case, overlays: Sequence[Overlay]) -> float:
 
 
 def judge(spec: CaseSpec) -> Judged:
-    """Make a case and diagnose it; an exception is an outcome, too."""
+    """Make a case and diagnose it; an exception counts as an outcome."""
     return _judged(make_case(spec))
 
 
@@ -149,7 +148,7 @@ def run(
 
 
 def select(name: str, only: Iterable[str] = (), part: bool = False) -> list[CaseSpec]:
-    """Return the cases of a set, of the slice of it, or those with any of the texts in the key."""
+    """Return the cases of a set or of its slice, whose key contains any of the given texts."""
     specs = list(case_list(name))
     if part:
         chosen = []
@@ -161,7 +160,7 @@ def select(name: str, only: Iterable[str] = (), part: bool = False) -> list[Case
 
 
 def main() -> None:
-    """Run a set of cases, print the table and write what is asked for."""
+    """Run a set of cases, print the table and write the requested files."""
     parser = argparse.ArgumentParser(prog='python -m benchmarks.hidden_effects')
     parser.add_argument('set', nargs='?', choices=SETS)
     parser.add_argument('--slice', action='store_true', help='a few cases of every kind')
@@ -188,7 +187,7 @@ def main() -> None:
 
 
 def _part(options: argparse.Namespace) -> str:
-    """Say which part of a set is looked at."""
+    """Return the name of the selected part of a set."""
     parts = [f'laboratory, {options.set}']
     parts += ['a slice'] if options.slice else []
     parts += ['one period of one recording each'] if options.single else []

@@ -1,6 +1,6 @@
 # Copyright 2026 The armid_ros developers
 # SPDX-License-Identifier: Apache-2.0
-"""How good answers about hidden effects are: against the truth, as rates with 95 % intervals."""
+"""Comparison of answers about hidden effects with the truth, as rates with 95 % intervals."""
 
 from __future__ import annotations
 
@@ -15,13 +15,13 @@ from tests.hidden.arrays import Parameter
 from tests.hidden.cases import Case
 from tests.hidden.machines import load_machine
 
-#: What says that a gap is there but nothing that is known explains it.
+#: Verdicts of a gap that no known effect explains.
 UNEXPLAINED = ('unknown', 'partial')
 
 
 @dataclass(frozen=True)
 class Truth:
-    """What is hidden in a case, without its recordings."""
+    """The hidden effects of a case, without its recordings."""
 
     key: str
     kind: str
@@ -36,7 +36,7 @@ class Truth:
 
     @classmethod
     def of(cls, case: Case) -> Truth:
-        """Take the truth out of a case."""
+        """Return the truth of a case."""
         return cls(
             key=case.spec.key,
             kind=case.spec.kind,
@@ -54,16 +54,16 @@ class Truth:
 @dataclass(frozen=True)
 class Judged:
     """
-    One case: what is true, and what was said.
+    One case with its truth and the answer of the diagnosis.
 
     Attributes
     ----------
     truth : Truth
-        What is hidden.
+        The hidden effects.
     outcome : Answer
-        What the diagnosis said.
+        The answer of the diagnosis.
     closed : float
-        Share of the explainable gap that is closed on motions never used; nan if they have none.
+        Share of the explainable gap that is closed in held-out motions; nan without such a gap.
 
     """
 
@@ -73,13 +73,13 @@ class Judged:
 
     @property
     def findings(self) -> tuple[Named, ...]:
-        """Return what was named; a body that is off where the nominal one is off is no finding."""
+        """Return the findings; a wrong link is left out if the nominal model has wrong links."""
         honest = () if self.truth.exact else ('link_inertia',)
         return tuple(f for f in self.outcome.headline if f.name not in honest)
 
     @property
     def false_alarm(self) -> bool:
-        """Whether anything but silence was said of an arm without hidden effects."""
+        """Whether the verdict is not `consistent`, link errors of the nominal model aside."""
         only_bodies = bool(self.outcome.headline) and not self.findings
         return self.outcome.verdict != 'consistent' and not only_bodies
 
@@ -90,33 +90,33 @@ class Judged:
 
     @property
     def found(self) -> Named | None:
-        """Return the finding that has the (first) truth among its names."""
+        """Return the finding with the (first) hidden effect among its names."""
         return next((f for f in self.findings if self.truth.names[0] in f.names), None)
 
     @property
     def wrong(self) -> bool:
-        """Whether there are names, and the truth is not among them."""
+        """Whether there are findings, and the truth is not among their names."""
         return bool(self.findings) and self.found is None
 
     @property
     def extra(self) -> bool:
-        """Whether there are more names than truths, the truth being one of them."""
+        """Whether the truth is found, and there are more findings than hidden effects."""
         return self.found is not None and len(self.findings) > len(self.truth.names)
 
     @property
     def localised(self) -> bool:
-        """Whether the truth was found in the joints that it is in, named first or as a rival."""
+        """Whether the truth was found in its joints, named first or as a rival."""
         found, (name, *_) = self.found, self.truth.names
         return found is not None and set(found.joints_of(name)) == set(self.truth.joints[0])
 
     @property
     def exact(self) -> bool:
-        """Whether the names are those of the truth, no more and no fewer."""
+        """Whether the named effects are exactly the hidden ones."""
         return sorted(f.name for f in self.findings) == sorted(self.truth.names)
 
     @property
     def exact_set(self) -> bool:
-        """Whether each truth is in a finding of its own, and there are no other findings."""
+        """Whether each hidden effect is in a separate finding, and there are no others."""
         if len(self.findings) != len(self.truth.names):
             return False
         first, second = self.truth.names
@@ -125,13 +125,13 @@ class Judged:
 
     @property
     def admitted(self) -> bool:
-        """Whether it was admitted that nothing explains what is there."""
+        """Whether the verdict admits that no known effect explains the gap."""
         honest = UNEXPLAINED if self.truth.repeats else (*UNEXPLAINED, 'not_repeatable')
         return self.outcome.verdict in honest
 
     @property
     def whole_arm(self) -> bool:
-        """Whether the effect has no joint of its own."""
+        """Whether the effect acts on the whole arm."""
         joints = self.truth.joints[0]
         return not joints or len(joints) == load_machine(self.truth.machine).n_joints
 
@@ -142,8 +142,8 @@ class Judged:
         Returns
         -------
         list of (float, bool)
-            Error over the largest true value of that unit in the effect, and whether the 95 %
-            interval has the truth; for parameters of a third of that value at least.
+            Error over the largest true value of its unit in the effect, and whether the 95 %
+            interval contains the truth. Parameters below a third of that value are left out.
 
         """
         found = self.found
@@ -161,7 +161,7 @@ class Judged:
 
 
 def score(judged: Sequence[Judged]) -> tuple[Metric, ...]:
-    """Compute all metrics."""
+    """Return all metrics of judged cases."""
     free = [j for j in judged if j.truth.kind == 'free']
     single = [j for j in judged if j.truth.kind == 'single' and j.truth.visible]
     unseen = [j for j in judged if j.truth.kind == 'single' and not j.truth.visible]
@@ -171,7 +171,7 @@ def score(judged: Sequence[Judged]) -> tuple[Metric, ...]:
     placed = [j for j in single if j.found and not j.whole_arm]
     sets = [len(j.found.names) for j in single if j.found]
     closed = [0.0 if j.outcome.error else j.closed for j in (*single, *pairs)]
-    closed = [share for share in closed if not np.isnan(share)]  # some never show it again
+    closed = [share for share in closed if not np.isnan(share)]  # nan: not excited when held out
     errors = [error for j in single for error in j.parameter_errors()]
     sizes = np.array([size for size, _ in errors])
     seconds = np.array([j.outcome.seconds for j in judged])

@@ -1,11 +1,11 @@
 # Copyright 2026 The armid_ros developers
 # SPDX-License-Identifier: Apache-2.0
 """
-The human-exoskeleton leg pair in MuJoCo: torques of one engine against another.
+The human-exoskeleton leg pair in MuJoCo, to compare torques of two engines.
 
-Both descriptions are read by MuJoCo itself, the springs are its tendons. Prescribed joints are
-moved as the reference says: an armature that nothing else can move, driven by its own inertia, and
-put back onto the reference after every step.
+MuJoCo reads both descriptions itself; the springs are tendons. Prescribed joints follow the
+reference: their armature is so large that other torques do not move them, a torque accelerates
+it, and their state is reset to the reference after every step.
 
 """
 
@@ -29,7 +29,7 @@ _SUBSTEPS = 4
 
 
 def pair_model(pair: TiedPair) -> mujoco.MjModel:
-    """Let MuJoCo read both machines and tie them."""
+    """Return a MuJoCo model of both machines with their ties."""
     spec = mujoco.MjSpec.from_string(side_by_side(pair.robot.urdf, pair.other.urdf))
     for number, tie in enumerate(pair.ties):
         ends = ((pair.robot, tie.joint, tie.point), (pair.other, tie.other_joint, tie.other_point))
@@ -51,7 +51,7 @@ def drive_in_mujoco(
     pair: TiedPair, motions: PairMotion, driven: Sequence[str], torque: DrivingTorque
 ) -> FloatArray:
     """
-    Move everything as prescribed but the driven joints of the machine, which follow torques.
+    Simulate driven joints of the machine by torques; all other joints have prescribed motion.
 
     Returns
     -------

@@ -1,18 +1,18 @@
 # Copyright 2026 The armid_ros developers
 # SPDX-License-Identifier: Apache-2.0
 """
-Effects that appear in a running arm: how soon, and how rightly, the live diagnosis names them.
+Effects that appear in a running arm: delay and correctness of the live diagnosis.
 
-The simulated humanoid arm and the node `live_diagnosis` in one process, in lock step. Joint states
-at 200 Hz with torque noise of 0.05 N m and encoders of 18 bits are handed over without topics,
-each of which would wait for its turn on a busy machine. The arm moves along random harmonics. From
-the first 16 s the node measures the misfit of the model. Then one effect of the catalogue is set
-on the parameter `effects` of the running arm; the node knows nothing of it. A draw is right when
-the effect is the first name of a diagnosis that the node proposes within 30 s, on the right joint;
-a name before the effect appears, or another first name that is proposed, is wrong. While a
-diagnosis is under way the arm moves on for as long as its processor time, as it does beside a
-process of its own. Sizes are such that the effect makes up a tenth of the torque of its joint, or
-the largest that arms have. Then the arm moves for half an hour and nothing changes.
+The simulated humanoid arm and the node `live_diagnosis` run in one process, in lock step. Joint
+states at 200 Hz have torque noise of 0.05 N m and encoders of 18 bits. They are passed without
+topics, which would be late on a busy machine. The arm moves along random harmonics. In the first
+16 s the node measures the misfit of the model. Then the parameter `effects` of the running arm
+gets one effect of the catalogue.
+
+A draw is right if the first name that the node proposes within 30 s is the effect on its joint. A
+name before the effect appears, or another first name, is wrong. During a diagnosis the arm moves
+on for its processor time, as with a separate process. An effect has a tenth of the torque of its
+joint, or the largest typical size. At last the arm moves for half an hour without a change.
 
     python -m benchmarks.live_diagnosis [--draws 40] [--seed 0] [--minutes 30]
 
@@ -49,17 +49,17 @@ KNOWN = (
     'coulomb_friction:coulomb_torque=0.2',
     'torque_offset:torque_offset=0.05',
 )
-#: How long the arm moves before the effect appears, and how soon it has to be named [s].
+#: Time before the effect appears, and longest accepted time until it is named [s].
 BEFORE, WANTED = 20.0, 30.0
-#: Motion from which the node measures the misfit of the model [s].
+#: Duration of the motion from which the node measures the misfit of the model [s].
 LEARNING = 16.0
-#: Share of the torque of its joint that an effect takes, root mean square.
+#: Rms torque of an effect over that of its joint.
 SHARE = 0.1
-#: Part of that which it takes at least, where no arm has more: an encoder is not off by 0.2 rad.
+#: Least part of `SHARE` that an effect of the largest typical size has.
 LEAST = 1.0 / 3.0
-#: Joints that are tried for one on which the size is one that arms have.
+#: Number of joints that are tried to find one on which the size is typical.
 _TRIES = 50
-#: What may appear: name and the quantity that its size is, or none of a joint.
+#: Effects that may appear, each with the quantity that is set.
 KINDS = (
     ('viscous_friction', 'viscous_coefficient'),
     ('coulomb_friction', 'coulomb_torque'),
@@ -74,7 +74,7 @@ KINDS = (
 
 @dataclass(frozen=True)
 class Draw:
-    """One effect that appeared, and what was said of it."""
+    """One effect that appeared, and the answer of the diagnosis."""
 
     effect: str
     delay: float | None
@@ -84,7 +84,7 @@ class Draw:
 
 class Unhurried:
     """
-    Answers in this process, and as late in the time of the arm as its processor time says.
+    Diagnoses in this process, whose answers are delayed by their processor time.
 
     Attributes
     ----------
@@ -100,25 +100,25 @@ class Unhurried:
 
     @property
     def busy(self) -> bool:
-        """Whether an answer is under way."""
+        """Whether a diagnosis is running."""
         return self._inner.busy
 
     def ask(self, job: Job) -> None:
-        """Do a job."""
+        """Run a diagnosis, and set the time of its answer."""
         begun = time.process_time()
         self._inner.ask(job)
         self._due = self.now + time.process_time() - begun
 
     def poll(self) -> Result | None:
-        """Return the answer, once, when it would have come."""
+        """Return the answer once its time has come; None before."""
         return self._inner.poll() if self.now >= self._due else None
 
     def close(self) -> None:
-        """Nothing to end."""
+        """Do nothing, as there is no other process."""
 
 
 def known_arm() -> ArmModel:
-    """Return what is known of the arm."""
+    """Return the arm with the effects that the diagnosis knows."""
     return ArmModel.of(ROBOT, effects=KNOWN)
 
 
@@ -130,7 +130,7 @@ def motion(duration: float, rng: np.random.Generator) -> Motion:
 
 
 def drawn(arm: ArmModel, along: Motion, kind: tuple[str, str], rng: np.random.Generator) -> str:
-    """Return an effect of a size that arms have, which takes a share of the torque of a joint."""
+    """Return an effect of typical size with a share of the torque of a joint."""
     name, quantity = kind
     largest = next(own.typical[1] for own in CATALOGUE[name].quantities if own.name == quantity)
     for _ in range(_TRIES):
@@ -142,7 +142,7 @@ def drawn(arm: ArmModel, along: Motion, kind: tuple[str, str], rng: np.random.Ge
 
 
 def sized(arm: ArmModel, along: Motion, kind: tuple[str, str], joint: str) -> float:
-    """Return the size at which an effect takes its share of the torque of a joint."""
+    """Return the size at which an effect has the share `SHARE` of the torque of a joint."""
     name, quantity = kind
     column = ROBOT.joints.index(joint)
     torque = arm.torque(along)
@@ -182,7 +182,7 @@ class Bench:
         return bool(self.plant.readers and self.node.get_clock().now().nanoseconds)
 
     def run(self, seconds: float) -> Iterator[float]:
-        """Go on; yield the time since then whenever a diagnosis came [s]."""
+        """Run for some seconds; yield the time of each diagnosis since the start [s]."""
         for count in range(round(seconds * RATE)):
             stamp = self.plant.step()
             self.helper.now += 1.0 / RATE
@@ -194,25 +194,25 @@ class Bench:
                 yield count / RATE
 
     def set_effect(self, text: str) -> None:
-        """Let an effect appear."""
+        """Add an effect to the running arm."""
         (result,) = self.plant.set_parameters([Parameter('effects', value=[*KNOWN, text])])
         assert result.successful, result.reason
 
     @property
     def proposed(self) -> list[list[str]]:
-        """Names that the node proposes, and their joints."""
+        """Effects that the node proposes, with their joints."""
         return [[name, *joints] for name, joints in self.live.belief.named]
 
 
 @contextmanager
 def bench(along: Motion) -> Iterator[Bench]:
-    """Make the nodes."""
+    """Yield a bench with both nodes."""
     with Stage() as stage:
         yield Bench(stage, along)
 
 
 def draw(number: int, seed: int) -> Draw:
-    """Let one effect appear in a running arm."""
+    """Run one draw: an effect appears in a running arm."""
     rng = np.random.default_rng(number + 1000 * seed)
     along = motion(BEFORE + WANTED + 6.0, rng)
     arm = known_arm()
@@ -232,7 +232,7 @@ def draw(number: int, seed: int) -> Draw:
 
 
 def quiet(minutes: float, seed: int) -> tuple[int, int, list[list[list[str]]]]:
-    """Return diagnoses, names that were said, and what was proposed while nothing changed."""
+    """Return the numbers of diagnoses and of named ones, and all proposals, without a change."""
     rng = np.random.default_rng([1000, seed])
     asked, said, proposed = 0, 0, []
     for _ in range(max(1, round(minutes / 5.0))):
@@ -247,7 +247,7 @@ def quiet(minutes: float, seed: int) -> tuple[int, int, list[list[list[str]]]]:
 
 
 def main() -> None:
-    """Print every draw, and what is named while nothing changes."""
+    """Print every draw, and the names without a change."""
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument('--draws', type=int, default=40)
     parser.add_argument('--seed', type=int, default=0, help='other draws of the same kinds')

@@ -1,10 +1,11 @@
 # Copyright 2026 The armid_ros developers
 # SPDX-License-Identifier: Apache-2.0
 """
-Whether the diagnosis names what happened to arms that have lived.
+Rates of the diagnosis for arms that changed between two days.
 
-A model is identified on day 1, and the diagnosis is asked about day 2, with day 1 as baseline; and
-about day 1 itself, of which nothing may be named. Cases: tests/hidden/lived/README.md.
+A model is identified on day 1. The diagnosis gets the recordings of day 2, with day 1 as baseline,
+and then those of day 1 itself, where nothing may be named. For the cases see
+tests/hidden/lived/README.md.
 
     python -m benchmarks.lived [KIND] [--cases FIRST:LAST] [--only CAUSE ...] [--no-again]
         [--each N] [--out FILE] [--processes N]
@@ -40,12 +41,12 @@ from tests.hidden.lived.adapter import recording_of, robot_of
 from tests.hidden.lived.cases import lived_case
 from tests.hidden.lived.specification import COUNTS, KINDS, specify
 
-#: Asks about recordings: see two_days.ask, which is the ordinary one.
+#: Function that diagnoses recordings, as two_days.ask, the default.
 Ask = Callable[..., Answer]
 
 
 def judge(kind: str, index: int, again: bool = True, question: Ask = ask) -> LivedJudged | None:
-    """Make a case and ask about it; an exception is an answer, too. None: it cannot be made."""
+    """Make a case and diagnose it; an exception is an answer; None if it cannot be made."""
     try:
         case = lived_case(kind, index)
     except RuntimeError as error:
@@ -87,7 +88,7 @@ def ask_few(
     baseline: Sequence[Recording],
     **others: object,
 ) -> Answer:
-    """Ask with so many recordings of each day, none of which is held out."""
+    """Diagnose with a number of recordings of each day, none of which is held out."""
     return ask(arm, [*recordings, *validate][:each], baseline=baseline[:each])
 
 
@@ -95,23 +96,23 @@ def true_shares(
     found: Identification, held_out: Recording, contribution: FloatArray
 ) -> tuple[float, float]:
     """
-    Return which share a cause takes of what a model leaves of a recording.
+    Return the true share of a cause in the squared residual of a model.
 
-    Joints count by what the model leaves of them on the day it was identified.
+    Squares of each joint are divided by those on the day of the identification.
 
     Parameters
     ----------
     found : Identification
         The model.
     held_out : Recording
-        With the cause.
+        Recording with the cause.
     contribution : ndarray, shape (N, n)
         Torque of the cause [N m].
 
     Returns
     -------
     of_power, of_excess : float
-        Of all that is left, and of what of it is more than on the day of identification.
+        Share of the squared residual, and of its excess over the day of the identification.
 
     """
     if not np.any(contribution):
@@ -143,7 +144,7 @@ def run(
 
 
 def main() -> None:
-    """Run a kind of cases, print the table and write what is asked for."""
+    """Run a kind of cases, print the table and write the requested files."""
     parser = argparse.ArgumentParser(prog='python -m benchmarks.lived')
     parser.add_argument('kind', nargs='?', default='development', choices=KINDS)
     parser.add_argument('--cases', default=':', metavar='FIRST:LAST', help='some of them')
@@ -180,7 +181,7 @@ def main() -> None:
 
 
 def select(kind: str, cases: str = ':', only: Sequence[str] = ()) -> list[int]:
-    """Return the numbers of cases: a range such as '0:24', and of some causes."""
+    """Return the numbers of the cases in a range such as '0:24' that have some causes."""
     first, _, last = cases.partition(':')
     question = kind.removeprefix(kind.partition('/')[0])
     numbers = range(int(first or 0), int(last or COUNTS[question]))
@@ -188,7 +189,7 @@ def select(kind: str, cases: str = ':', only: Sequence[str] = ()) -> list[int]:
 
 
 def _power(fits: Sequence) -> FloatArray:
-    """Return the mean square that is left of each joint, where its torque says something."""
+    """Return the mean square residual of each joint over its informative rows."""
     used = np.concatenate([fit.informative for fit in fits])
     residual = np.concatenate([fit.residual for fit in fits])
     return np.sum(residual**2, axis=0, where=used) / np.maximum(used.sum(axis=0), 1)

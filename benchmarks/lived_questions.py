@@ -1,6 +1,6 @@
 # Copyright 2026 The armid_ros developers
 # SPDX-License-Identifier: Apache-2.0
-"""What only one question of lived arms asks: exact arms, point to point beside periodic."""
+"""Metrics of single kinds of cases: exact arms, point to point against periodic motion."""
 
 from __future__ import annotations
 
@@ -15,12 +15,12 @@ _MASS = 'payload_m'
 
 
 def score_of_question(kind: str, judged: Sequence[LivedJudged]) -> tuple[Metric, ...]:
-    """Return the metrics of the question that a kind asks beside those of all kinds."""
+    """Return the metrics of a kind of cases in addition to the common ones."""
     return _QUESTIONS.get(kind.partition('/')[2], lambda _: ())(judged)
 
 
 def pairs(judged: Sequence[LivedJudged]) -> tuple[Metric, ...]:
-    """Return how many causes point to point motions show, over how many periodic ones do."""
+    """Return the rates of causes found in point to point and in periodic motion, and the ratio."""
     by_number = {int(one.truth.key.rpartition('/')[2]): one for one in judged}
     whole = [k for k in sorted(by_number) if k % 2 == 0 and k + 1 in by_number]
     periodic = [by_number[k] for k in whole]
@@ -37,7 +37,7 @@ def pairs(judged: Sequence[LivedJudged]) -> tuple[Metric, ...]:
 
 
 def exact(judged: Sequence[LivedJudged]) -> tuple[Metric, ...]:
-    """Return how often a payload is named, and nothing where nothing is, in exact descriptions."""
+    """Return the rates of named payloads and of false alarms, for exact descriptions."""
     rows: list[Metric] = []
     for known in ('values', 'names'):
         own = [one for one in judged if one.truth.friction == known]
@@ -63,7 +63,7 @@ def mass_is_right(judged: LivedJudged) -> bool:
 
 
 def is_consistent(judged: LivedJudged) -> bool:
-    """Return whether the arm is said to be as described."""
+    """Return whether the verdict is `consistent` without names."""
     return judged.answer.verdict == 'consistent' and not judged.answer.headline
 
 

@@ -1,6 +1,6 @@
 # Copyright 2026 The armid_ros developers
 # SPDX-License-Identifier: Apache-2.0
-"""How good answers about arms that have lived are: against the truth, with 95 % intervals."""
+"""Comparison of answers about arms on two days with the truth, as rates with 95 % intervals."""
 
 from __future__ import annotations
 
@@ -17,13 +17,13 @@ from tests.hidden.lived.arms import load_arm
 from tests.hidden.lived.cases import LivedCase
 from tests.hidden.lived.chain import Chain
 
-#: Below this gap a cause is no more than the model of day 1 leaves anyway.
+#: Gap of a visible cause: its power equals the squared misfit of day 1.
 VISIBLE = 1.0
 
-#: A tie of more names says nothing.
+#: Largest number of names in a useful tie.
 LARGEST_TIE = 3
 
-#: Names of one and the same thing in the same joint, by the name of the truth.
+#: Other right names of a cause in the same joint, by the true name.
 ALSO = {
     'payload': ('link_inertia',),
     'link_inertia': ('payload',),
@@ -31,7 +31,7 @@ ALSO = {
     'base_tilt': ('gravity',),
 }
 
-#: What is honest where no catalogue has the cause.
+#: Right verdicts for causes outside of the catalogue.
 ADMITTED = ('unknown', 'partial', 'not_repeatable')
 
 
@@ -43,27 +43,27 @@ class LivedTruth:
     Attributes
     ----------
     key, cause, size, style, arm : str
-        What it was made of.
+        Specification of the case.
     name : str
-        What happened, as the catalogue calls it; empty for nothing.
+        Name of the cause in the catalogue; empty without a change.
     joints : tuple of str
-        Where.
+        Joints of the cause.
     parameters : tuple of (name, joint, value)
-        True values.
+        True values of the cause.
     in_catalogue : bool
-        Whether the catalogue has it.
+        Whether the catalogue has the cause.
     gap : float
-        Power over the squared misfit of day 1.
+        Power of the cause over the squared misfit of day 1.
     share_of_power, share_of_excess : float
-        What the torque of the cause takes of the power that the model of day 1 leaves of the
-        held-out recording, and of what of it is more than the model's misfit on day 1.
+        Share of the cause in the squared held-out residual of the model of day 1, and in its
+        excess over the misfit of day 1.
     gravity, described : ndarray, shape (3,)
         True and described gravity [m/s^2].
     friction : str
-        What the engineer's model has of the friction: unknown, values or names.
+        Friction in the given model: unknown, values or names.
     felt : ndarray, shape (3, 3)
-        Projection on the directions of gravity that the joints feel: where all axes are parallel,
-        nothing shows gravity along them.
+        Projection on the directions of gravity that affect torques: with parallel axes, gravity
+        along them has no effect.
 
     """
 
@@ -86,7 +86,7 @@ class LivedTruth:
 
     @classmethod
     def of(cls, case: LivedCase, shares: tuple[float, float], described: FloatArray) -> LivedTruth:
-        """Take the truth out of a case."""
+        """Return the truth of a case."""
         spec = case.spec
         (truth,) = case.truth or (None,)
         return cls(
@@ -111,7 +111,7 @@ class LivedTruth:
         )
 
     def among(self, named: Named) -> int | None:
-        """Return which name of a finding is right, 0 for its own, then rivals; None if none is."""
+        """Return the index of the right name: 0 for the finding, then its rivals; None if none."""
         for k, (name, joints) in enumerate(((named.name, named.joints), *named.rivals)):
             same = name in ALSO.get(self.name, ())
             if name == self.name or (same and set(joints) == set(self.joints)):
@@ -122,16 +122,16 @@ class LivedTruth:
 @dataclass(frozen=True)
 class LivedJudged:
     """
-    One case: what is true, what was said of it, and what was said of the day before.
+    One case with its truth and the answers of the diagnosis.
 
     Attributes
     ----------
     truth : LivedTruth
-        What happened.
+        The true change.
     answer : Answer
-        What was said of day 2.
+        Answer for day 2.
     again : Answer or None
-        What was said of day 1; None if it was not asked.
+        Answer for day 1; None if day 1 was not diagnosed.
 
     """
 
@@ -147,7 +147,7 @@ class LivedJudged:
 
     @property
     def tied(self) -> bool:
-        """Whether the cause is named first, or in a tie with the first that is short."""
+        """Whether the cause is named first, or is in a short tie with the first name."""
         if not self.answer.headline:
             return False
         leading = self.answer.headline[0]
@@ -162,14 +162,14 @@ class LivedJudged:
 
     @property
     def too_many(self) -> int:
-        """Names in the headline that nothing stands behind."""
+        """Number of wrong or redundant names in the headline."""
         true = [named for named in self.answer.headline if self.truth.among(named) is not None]
         mounting = self.truth.name == 'gravity'  # direction and magnitude are two names
         return len(self.answer.headline) - min(len(true), 2 if mounting else 1)
 
     @property
     def placed(self) -> bool:
-        """Whether the first of the headline is in the joints of the cause."""
+        """Whether the first finding of the headline has the joints of the cause."""
         first = self.answer.headline[0]
         names = (first.joints, *(joints for _, joints in first.rivals))
         return set(names[self.truth.among(first) or 0]) == set(self.truth.joints)
@@ -177,10 +177,10 @@ class LivedJudged:
     @property
     def share_error(self) -> float:
         """
-        Stated share less the true one; nan if none is stated.
+        Stated share minus the true one; nan if no share is stated.
 
-        Where an answer does not tell what its shares are of, the nearer of the two of the rows of
-        the identification.
+        If the answer has no true share, the nearer one of `share_of_power` and `share_of_excess`
+        is used.
 
         """
         said = self.answer.headline[0].share
@@ -191,14 +191,14 @@ class LivedJudged:
 
     @property
     def admitted(self) -> bool:
-        """Whether it is admitted that nothing in the catalogue explains what is there."""
+        """Whether the answer admits that no effect of the catalogue explains the gap."""
         pushed = self.truth.name == 'pushes' and any(
             'human_interaction' in named.names for named in self.answer.headline
         )
         return self.answer.verdict in ADMITTED or pushed
 
     def parameter_errors(self) -> list[tuple[float, bool]]:
-        """Return errors over the largest value of their kind, and whether intervals hold."""
+        """Return relative errors of large values, and whether their intervals hold the truth."""
         if not self.first:
             return []
         said = {(n, j): (value, std) for n, j, value, std in self.answer.headline[0].parameters}
@@ -212,7 +212,7 @@ class LivedJudged:
         return errors
 
     def gravity_error(self) -> tuple[float, float]:
-        """Return how far gravity is off: direction [deg], and magnitude as a share."""
+        """Return the error of gravity: of its direction [deg], relative of its magnitude [-]."""
         told = self.truth.felt @ gravity_of(self.answer.headline, self.truth.described)
         there = self.truth.felt @ self.truth.gravity
         size, true = np.linalg.norm(told), np.linalg.norm(there)
@@ -221,7 +221,7 @@ class LivedJudged:
 
 
 def gravity_of(headline: Iterable[Named], described: FloatArray) -> FloatArray:
-    """Return the gravity that a headline stands for, shape (3,) [m/s^2]."""
+    """Return the gravity by the values of a headline, shape (3,) [m/s^2]."""
     values = {name: value for named in headline for name, _, value, _ in named.parameters}
     if 'gravity_x' in values:
         return np.array([values[f'gravity_{axis}'] for axis in 'xyz'])
@@ -258,7 +258,7 @@ def reliability(
 
 
 def score(judged: Sequence[LivedJudged]) -> tuple[Metric, ...]:
-    """Compute all metrics."""
+    """Return all metrics of judged cases."""
     free = [j for j in judged if not j.truth.name]
     named = [j for j in judged if nameable(j.truth)]
     seen = [j for j in named if j.truth.gap >= VISIBLE]
@@ -301,7 +301,7 @@ def score(judged: Sequence[LivedJudged]) -> tuple[Metric, ...]:
 
 
 def breakdown(judged: Sequence[LivedJudged]) -> str:
-    """Return how many are named first of those that are visible, by cause, style and size."""
+    """Return the numbers of visible causes that are named first, by cause, style and size."""
     seen = [j for j in judged if j.truth.name and j.truth.gap >= VISIBLE]
     rows = []
     for what in ('cause', 'style', 'size'):
@@ -316,7 +316,7 @@ def breakdown(judged: Sequence[LivedJudged]) -> str:
 
 
 def seconds_by_joints(judged: Sequence[LivedJudged]) -> str:
-    """Return the median and the longest processor time of arms of so many joints."""
+    """Return the median and the longest processor time by number of joints."""
     taken: dict[int, list[float]] = {}
     for one in judged:
         if np.isfinite(one.answer.seconds):
@@ -329,10 +329,10 @@ def seconds_by_joints(judged: Sequence[LivedJudged]) -> str:
 
 
 def nameable(truth: LivedTruth) -> bool:
-    """Return whether the catalogue has a name for what happened."""
+    """Return whether the catalogue has a name for the cause."""
     return truth.in_catalogue or truth.name == 'gravity'
 
 
 def silent(answer: Answer | None) -> bool:
-    """Whether there is an answer, and it names nothing."""
+    """Return whether there is an answer, and it names nothing."""
     return answer is not None and not answer.headline and not answer.error

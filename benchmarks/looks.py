@@ -1,11 +1,11 @@
 # Copyright 2026 The armid_ros developers
 # SPDX-License-Identifier: Apache-2.0
 """
-The record of runs on locked sets: which commit was judged by them, when, and the result.
+The record of runs on locked sets: commit, time and result.
 
-A set that is used often enough is a development set. So a benchmark records each run by itself, at
-its beginning and again with its results, and refuses code that is in no commit. The record is one
-JSON object a line; a run without results was broken off.
+A locked set that is used often becomes a development set. So a benchmark records each run by
+itself, at its beginning and again with its results, and rejects uncommitted code. The record has
+one JSON object per line; a run without results was interrupted.
 
 """
 
@@ -28,19 +28,19 @@ LOG = Path(__file__).parent / 'results' / 'looks.jsonl'
 @contextmanager
 def look(what: str, log: Path = LOG) -> Iterator[dict[str, Any]]:
     """
-    Record a run on a locked set; SystemExit where the code is in no commit.
+    Record a run on a locked set; SystemExit for uncommitted code.
 
     Parameters
     ----------
     what : str
-        The set, and which part of it.
+        Name of the set, and of its part.
     log : Path
         File of the record.
 
     Yields
     ------
     dict
-        The entry; `results` is added to it.
+        The entry, to which the caller adds `results`.
 
     """
     commit = clean_commit(log)
@@ -54,12 +54,12 @@ def look(what: str, log: Path = LOG) -> Iterator[dict[str, Any]]:
 
 def results_of(metrics: Iterable[Metric]) -> dict[str, dict[str, Any]]:
     """
-    Return metrics as they are recorded, a part of another with the name of both.
+    Return metrics for the record; a part of another metric has both names.
 
     Parameters
     ----------
     metrics : iterable of Metric
-        In the order of their table.
+        Metrics in the order of their table.
 
     """
     rows: dict[str, dict[str, Any]] = {}
@@ -77,7 +77,7 @@ def results_of(metrics: Iterable[Metric]) -> dict[str, dict[str, Any]]:
 
 
 def clean_commit(log: Path = LOG) -> str:
-    """Return the commit of the tree; SystemExit where anything but the log is not in it."""
+    """Return the commit of the tree; SystemExit if a file other than the log is uncommitted."""
     folder = log.parent
     changed = [
         line[3:]

@@ -3,10 +3,10 @@
 """
 The humanoid arm on the moon, with torque noise as large as the paper's errors.
 
-Noise of each joint: the RMSE of the paper's Table 3, without and with the load of 0.3 kg. The arm
-is identified from one designed excitation; its torque error is taken against the true torque on
-five collision-free trajectories that were not used, as a share of each joint's peak torque. The
-load is the difference of the two identifications along the columns of a payload.
+Noise of each joint is the RMSE of the paper's Table 3, without and with the load of 0.3 kg. The
+arm is identified from one designed excitation. Its torque error is relative to the true peak
+torque of each joint, on five held-out trajectories without collisions. The load is the difference
+of two identifications along the columns of a payload.
 
 """
 
@@ -52,7 +52,7 @@ def held_out_error(identified, truth, run):
 
 
 def load_between(first, second):
-    """Return the point-like payload that two identifications differ by: mass [kg]."""
+    """Return the mass of a point-like payload, the difference of two identifications [kg]."""
     change = second.estimate.values - first.estimate.values
     columns = first.base.grouping[:, -10:-6]  # m, mx, my, mz of the last link
     covariance = first.estimate.covariance + second.estimate.covariance

@@ -29,17 +29,17 @@ class Metric:
     Attributes
     ----------
     name : str
-        What it says.
+        Name of the metric.
     value : float
-        Rate, share or number; nan if nothing counts.
+        Rate, share or number; nan without cases.
     low, high : float
-        95 % interval; nan where it is not a rate.
+        95 % interval of a rate; nan for other numbers.
     count : int
-        Cases that count.
+        Number of cases.
     reach : str
-        What is wanted, in words; empty if nothing is.
+        Required value, in words; empty without one.
     good : bool or None
-        Whether it is reached.
+        Whether the required value is reached; None without one.
 
     """
 
@@ -60,7 +60,7 @@ def rate(
     least: float | None = None,
     most: float | None = None,
 ) -> Metric:
-    """Return a row with the share of cases that pass a test, and what is wanted of it."""
+    """Return a row with the share of cases that pass a test, and its required value."""
     hits, total = sum(map(bool, map(test, cases))), len(cases)
     value = hits / total if total else np.nan
     wanted = [f'at least {least:g}'] if least is not None else []
@@ -78,7 +78,7 @@ def number(
     reach: str,
     test: Callable[[float], bool] | None,
 ) -> Metric:
-    """Return a row with a statistic of values, and what is wanted of it."""
+    """Return a row with a statistic of values, and its required value."""
     value = float(statistic(values)) if len(values) else np.nan
     good = bool(test(value)) if test and len(values) else None
     return Metric(name, value, np.nan, np.nan, len(values), reach, good)

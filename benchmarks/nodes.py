@@ -1,10 +1,10 @@
 # Copyright 2026 The armid_ros developers
 # SPDX-License-Identifier: Apache-2.0
 """
-The nodes at speed: what is lost at 1 kHz, update times, lock step; kills: benchmarks.endurance.
+Speed of the nodes: losses at 1 kHz, update times, lock step; for kills see benchmarks.endurance.
 
 ``python -m benchmarks.nodes [--seconds 60]``; the identifier runs in this process, the arm and the
-recorder in theirs. Losses are to be measured on an otherwise idle machine.
+recorder in others. Losses are valid on an otherwise idle machine.
 
 """
 
@@ -47,7 +47,7 @@ def panda():
 
 
 def with_friction(robot):
-    """Return the arm with friction and offset to be estimated."""
+    """Return the arm with unknown friction and offset."""
     arm = ArmModel(robot)
     for name in EFFECTS:
         arm = arm.with_effect(make_effect(name, robot))
@@ -64,7 +64,7 @@ def short_run(robot, period, n_periods):
 
 @contextmanager
 def process(context, node, *parameters):
-    """Run a node as a process until the block ends."""
+    """Run a node as a separate process until the block ends."""
     environment = {
         **os.environ,
         'ROS_DOMAIN_ID': str(context.get_domain_id()),
@@ -81,7 +81,7 @@ def process(context, node, *parameters):
 
 
 def lost(first, last, count):
-    """Return how many of the messages between two stamps, 1 ms apart, are missing."""
+    """Return the number of missing messages between two stamps, for one message per ms."""
     return round((last - first) / MS) + 1 - count
 
 
@@ -122,7 +122,7 @@ def at_one_kilohertz(seconds, folder):
                 while not node.received:
                     executor.spin_once(timeout_sec=0.1)
                 first, begun = node.last_stamp_ns, time.monotonic()
-                for share in (0.1, 0.5, 1.0):  # of the run; windows and caches are full at first
+                for share in (0.1, 0.5, 1.0):  # of the run; caches are full after the first part
                     while time.monotonic() < begun + share * seconds:
                         executor.spin_once(timeout_sec=0.1)
                     memory.append(
@@ -158,7 +158,7 @@ def at_one_kilohertz(seconds, folder):
 
 
 def bare_step(steps=4000):
-    """Return the processor time of the messages of a step in lock step, with nothing done [s]."""
+    """Return the processor time of the messages alone of a step in lock step [s]."""
     # a joint state that recorder, publisher and identifier take as bytes
     names = ('plant', 'recorder', 'publisher', 'identifier')
     with private_context() as context:
@@ -187,10 +187,10 @@ def bare_step(steps=4000):
 
 def in_lock_step(rate, folder):
     """
-    Print how much faster than real time the nodes are together.
+    Print the speed of all nodes in lock step over real time.
 
-    By the clock, which other processes slow down, and by processor time, which is what an idle
-    machine needs; and that of the simulator and of the bare messages alone.
+    It is measured by the clock, which other processes slow down, and by processor time, as on an
+    idle machine. The speeds of the simulator alone and of the messages alone are printed as well.
 
     """
     robot = load_robot('humanoid_arm', gravity='moon')

@@ -1,11 +1,11 @@
 # Copyright 2026 The armid_ros developers
 # SPDX-License-Identifier: Apache-2.0
 """
-Ten minutes of a 7-joint arm at 1 kHz, from bag to parameters with standard deviations.
+Time to identify a 7-joint arm from ten minutes at 1 kHz, with standard deviations.
 
-Ours reads a bag; figaroh (1.0.2) is handed the same samples as arrays, with the same filter,
-decimation and parameters, and solves by weighted least squares as ours does. Each is a process of
-its own, started in turn; processor time says the same on a busy machine.
+This package reads a bag; figaroh (1.0.2) gets the same samples as arrays. Both use the same
+filter, decimation and parameters, and weighted least squares. Each runs in a separate process, one
+after the other; processor time is also valid on a busy machine.
 
 """
 
@@ -41,7 +41,7 @@ def panda():
 
 
 def motion(arm, minutes, rng):
-    """Return three sines per joint with torque and its noise."""
+    """Return a motion of three sines per joint with noisy torque."""
     t = np.arange(round(60 * minutes * RATE)) / RATE
     q, dq, ddq = np.zeros((3, len(t), arm.robot.n_joints))
     for hz, size in ((0.1, 0.5), (0.2, 0.3), (0.5, 0.1)):
@@ -55,7 +55,7 @@ def motion(arm, minutes, rng):
 
 
 def ours(bag):
-    """Read and identify; returns both times, and the friction of joint 1."""
+    """Identify with this package; return both times, viscous friction of joint 1, and its std."""
     from armid_ros.identification import IdentificationSettings, identify, SignalSettings
 
     arm = panda()
@@ -70,7 +70,7 @@ def ours(bag):
 
 
 def theirs(bag):
-    """Give figaroh the arrays; returns both times, viscous friction of joint 1, its deviation."""
+    """Identify with figaroh; return both times, viscous friction of joint 1, and its std."""
     from figaroh.identification.base_identification import BaseIdentification
     from pinocchio.robot_wrapper import RobotWrapper
 
@@ -131,7 +131,7 @@ def _since(start):
 
 
 def main():
-    """Print seconds of both and the ratio."""
+    """Print the times of both and their ratio."""
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument('--minutes', type=float, default=10.0)
     parser.add_argument('--run', choices=['ours', 'theirs'], help=argparse.SUPPRESS)

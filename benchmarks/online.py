@@ -3,9 +3,9 @@
 """
 Online identification: processor time of an update.
 
-The Panda of example-robot-data, 7 joints, all base parameters with viscous and Coulomb friction
-and torque offset. Samples at 1 kHz, in process and without ROS: an update that uses a row of the
-regressor, and all of them, with the default rate of rows and with a row for every sample.
+The arm is the Panda of example-robot-data with 7 joints, all base parameters, viscous and Coulomb
+friction and torque offset. Samples at 1 kHz are processed without ROS. Times are of updates with a
+row of the regressor and of all updates, with the default rate of rows and a row per sample.
 
     python -m benchmarks.online [--seconds 30]
 
@@ -43,7 +43,7 @@ def panda() -> ArmModel:
 
 
 def exciting_motion(robot: Robot, seconds: float, rng: np.random.Generator) -> Motion:
-    """Return five harmonics of 0.1 Hz per joint, up to 2 rad/s and 4 rad/s^2."""
+    """Return a motion of five harmonics of 0.1 Hz per joint, up to 2 rad/s and 4 rad/s^2."""
     t = np.arange(0.0, seconds, 1.0 / RATE)
     w = 2.0 * np.pi * 0.1 * np.arange(1.0, 6.0)[:, None, None]
     size = 0.5 * rng.normal(size=(5, 1, robot.n_joints))
@@ -54,7 +54,7 @@ def exciting_motion(robot: Robot, seconds: float, rng: np.random.Generator) -> M
 
 
 def update_times(arm: ArmModel, motion: Motion, tau: FloatArray, settings: OnlineSettings) -> str:
-    """Feed all samples; return one line of the table."""
+    """Identify online from all samples; return one line of the table of update times."""
     online = OnlineIdentifier(arm, settings, rng=np.random.default_rng(0))
     with_row, everything = [], []
     for t, q, torque in zip(motion.t, motion.q, tau, strict=True):
@@ -74,7 +74,7 @@ def update_times(arm: ArmModel, motion: Motion, tau: FloatArray, settings: Onlin
 
 
 def print_update_times(arm: ArmModel, motion: Motion, tau: FloatArray) -> None:
-    """Time the default and a row for every sample, without and with forgetting."""
+    """Print update times with default rows and with a row per sample, and with forgetting."""
     print('\nmicroseconds of processor time per sample at 1 kHz')
     print(f'{"":31s}with a row                         all samples')
     columns = 2 * ('p50', 'p99', 'p99.9', 'mean') + ('rows', 'par.')

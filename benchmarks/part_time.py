@@ -1,10 +1,10 @@
 # Copyright 2026 The armid_ros developers
 # SPDX-License-Identifier: Apache-2.0
 """
-Whether a payload that is picked up and put down is named, with its seconds.
+Rate of right names and spans for a payload that is picked up and put down.
 
-The arms are lived ones whose payload is there throughout. Outside of a span that is drawn for each
-recording its torque is taken out.
+The arms are those of tests/hidden/lived with a payload throughout. Its torque is subtracted
+outside of a span that is drawn for each recording.
 
     python -m benchmarks.part_time [DRAWS]
 
@@ -25,9 +25,9 @@ from tests.hidden.lived.adapter import recording_of, robot_of
 from tests.hidden.lived.cases import lived_case, LivedCase
 from tests.hidden.lived.specification import specify
 
-#: Shares of a recording at which a span begins, and that it lasts.
+#: Ranges of the beginning and of the length of a span, as shares of the recording.
 BEGINS, LASTS = (0.15, 0.4), (0.3, 0.45)
-#: Error of a second that is none [s].
+#: Largest accepted error of a beginning or an end [s].
 WITHIN = 1.0
 
 
@@ -39,7 +39,7 @@ def payloads() -> Iterator[LivedCase]:
 
 
 def answer(case: LivedCase, seed: int) -> tuple[Diagnosis, list[tuple[float, float]]]:
-    """Return the diagnosis of an arm, and in which seconds of each recording its payload acts."""
+    """Return the diagnosis of an arm, and the true span of the payload in each recording [s]."""
     rng = np.random.default_rng(seed)
     day_1, recordings, spans = [recording_of(run) for run in case.day_1], [], []
     for run in (*case.day_2, case.held_out):
@@ -62,7 +62,7 @@ def answer(case: LivedCase, seed: int) -> tuple[Diagnosis, list[tuple[float, flo
 
 
 def main() -> None:
-    """Print what is named, and by how much seconds are off."""
+    """Print the named effects and the errors of their spans."""
     draws = int(sys.argv[1]) if len(sys.argv) > 1 else 12
     named = timed = 0
     for seed, case in enumerate(islice(payloads(), draws)):

@@ -1,7 +1,7 @@
 # Copyright 2026 The armid_ros developers
 # SPDX-License-Identifier: Apache-2.0
 """
-The page of success rates, made of the recorded results.
+The page of success rates, generated from the recorded results.
 
     python -m benchmarks.rates        writes benchmarks/rates.md
 
@@ -31,7 +31,7 @@ The decision is new since 2026-11-28: of the locked sets it has only answered 30
 413), the last line of looks.jsonl. All other rates here are of the rules before.
 """
 
-#: Command, number of runs that have all cases, and rows of each locked set.
+#: Command, number of runs that together have all cases, and rows, of each locked set.
 _LOCKED = {
     'lived, locked, 36 cases': (
         'python -m benchmarks.lived locked --cases 312:384',

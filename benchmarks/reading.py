@@ -1,16 +1,16 @@
 # Copyright 2026 The armid_ros developers
 # SPDX-License-Identifier: Apache-2.0
 """
-How fast joint states are read from bags: this package, rosbags and mcap-ros2-support.
+Speed of reading joint states from bags: this package, rosbags and mcap-ros2-support.
 
-Each reader does the same work: the header stamps, positions, velocities and efforts of one topic
-of an MCAP file as arrays. The files are written by mcap's own writer with its default chunks of
-1 MiB, first with one topic of 7 joints, then with three topics in turn, of which one is read.
+Each reader returns the header stamps, positions, velocities and efforts of one topic of an MCAP
+file as arrays. The files are written by mcap's own writer with its default chunks of 1 MiB, first
+with one topic of 7 joints, then with three alternating topics, of which one is read.
 
     python benchmarks/reading.py [--messages 1000000]
 
-The time of this package is the median of five runs, that of the slower ones of one. Every reader
-has to unpack the chunks, and this one compares their checksums as well, in two threads.
+The time of this package is the median of five runs; the slower readers run once. Every reader
+has to unpack the chunks. This package also compares their checksums, in two threads.
 
 """
 
@@ -66,7 +66,7 @@ def write_file(path: Path, count: int, compression: CompressionType, topics: lis
 
 
 def motion_messages(stamps: np.ndarray, number: int) -> list[bytes]:
-    """Return messages of a moving arm with noise; each topic has a frame of its own."""
+    """Return messages of a moving arm with noise; each topic has another frame."""
     t = (stamps - START_NS)[:, np.newaxis] * 1e-9
     rates = np.linspace(0.3, 2.0, len(JOINTS)) * (1 + number)
     noise = np.random.default_rng(int(stamps[0] % 2**32)).normal(size=(3, len(t), len(JOINTS)))
@@ -103,7 +103,7 @@ def read_mcap_ros2(path: Path) -> Arrays:
 
 
 def stacked(messages: Iterable[Any]) -> Arrays:
-    """Put decoded messages into arrays; keeping the messages would tire the garbage collector."""
+    """Return arrays of decoded messages, one by one, as kept messages slow garbage collection."""
     stamps, position, velocity, effort = [], [], [], []
     for message in messages:
         stamp = message.header.stamp
@@ -125,7 +125,7 @@ READERS: dict[str, Callable[[Path], Arrays]] = {
 def measure(
     read: Callable[[Path], Arrays], path: Path, repeats: int
 ) -> tuple[float, float, Arrays]:
-    """Return the median time of some runs and of the processor in them [s], and the arrays."""
+    """Return the median time and processor time of some runs [s], and the arrays."""
     seconds, used = [], []
     for _ in range(repeats):
         begin, used_before = time.perf_counter(), time.process_time()
@@ -139,7 +139,7 @@ def compare(path: Path, count: int, wanted: float, title: str) -> bool:
     """Print one table; return whether the wanted ratio is reached."""
     seconds, used, arrays = {}, {}, {}
     for name, read in READERS.items():
-        # A short run may fall into another program's second; a long one sees the average.
+        # other programs may disturb a short run; a long one averages over them
         repeats = 5 if read is read_ours else 1
         seconds[name], used[name], arrays[name] = measure(read, path, repeats)
         if name != 'armid_ros':

@@ -1,10 +1,10 @@
 # Copyright 2026 The armid_ros developers
 # SPDX-License-Identifier: Apache-2.0
 """
-What the diagnosis says happened to real machines between two days.
+Changes of real machines between two days, as the diagnosis names them.
 
-A model is identified on day 1, the diagnosis is asked about day 2, and about day 1 again. What
-happened is known: see benchmarks/real_days.py.
+A model is identified on day 1; the recordings of day 2 are diagnosed, and those of day 1 again.
+The true changes are known: see benchmarks/real_days.py.
 
     python -m benchmarks.real_changes [TEXT ...]    # only the questions that have one of the texts
 
@@ -25,7 +25,7 @@ from benchmarks.two_days import Answer, ask, identification_of
 
 
 def answers(days: RealDays) -> tuple[Answer, Answer]:
-    """Return what is said of day 2, and of day 1 again."""
+    """Return the answers of the diagnosis for day 2, and for day 1 again."""
     try:
         arm = identification_of(days.robot, days.day_1).arm
     except ArmidError as error:
@@ -42,7 +42,7 @@ def answers(days: RealDays) -> tuple[Answer, Answer]:
 
 
 def main() -> int:
-    """Print what is said, below what happened."""
+    """Print the true changes, and the answers below them."""
     folder = os.environ.get('ARMID_DATA')
     if not folder:
         print('real_changes: ARMID_DATA names no folder with recordings', file=sys.stderr)

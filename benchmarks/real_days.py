@@ -1,12 +1,12 @@
 # Copyright 2026 The armid_ros developers
 # SPDX-License-Identifier: Apache-2.0
 """
-Recordings of real machines on two days, between which it is known what happened.
+Recordings of real machines on two days with a known change between them.
 
-Two builds of a double pendulum; pushes on it by its own motors, whose profile was recorded; two
-bobs of a simple pendulum, and a hand that guides it; free motions of a Franka FR3 between which
-nothing happened. The folder that the environment variable ARMID_DATA names holds them; its README
-files give sources and licences.
+The changes are: two builds of a double pendulum; recorded pushes on it by its own motors; two bobs
+of a simple pendulum; a hand that guides it; and none, for free motions of a Franka FR3. The
+recordings are in the folder of the environment variable ARMID_DATA; its README files give sources
+and licences.
 
 """
 
@@ -29,7 +29,7 @@ _C0 = tuple(f'C0_sysid/trajectory_0{k}' for k in range(5))
 _C1 = tuple(
     f'C1_sysid/20230629-{time}' for time in ('143339', '143524', '143601', '143704', '143747')
 )
-#: Motion of the simple pendulum before it stands on top [s].
+#: Duration of the swing-up of the simple pendulum [s].
 _SWING_UP = 8.0
 
 
@@ -41,15 +41,15 @@ class RealDays:
     Attributes
     ----------
     name : str
-        What it is called here.
+        Name of the case.
     robot : Robot
-        As described by its authors.
+        Description by the authors of the data.
     day_1, day_2 : tuple of Recording
-        Before and after.
+        Recordings before and after the change.
     held_out : tuple of Recording
-        More of day 2; empty where there is not enough of it.
+        Held-out recordings of day 2; empty if there are too few.
     wanted : str
-        What a right answer is.
+        The right answer, in words.
     push : ndarray, shape (N, n), or None
         Torque of a recorded push on the first recording of day 2 [N m].
 
@@ -85,12 +85,12 @@ def pushes(data: Path, out: Path, torque: str = 'tau_con', task: str = 'acrobot'
     Parameters
     ----------
     data, out : Path
-        Where recordings are, and where a description may be written.
+        Folder of the recordings, and folder for written descriptions.
     torque : {'tau_con', 'tau_meas'}
-        The commanded torque, which does not have the pushes, so that they come from outside; or
-        the measured one, which has them, so that there is nothing to be found.
+        The commanded torque, which lacks the pushes, so they are external; or the measured one,
+        which contains them, so there is no change.
     task : {'acrobot', 'pendubot'}
-        Which swing-up.
+        The task of the pendulum.
 
     """
     runs = {
@@ -151,9 +151,9 @@ def fr3(data: Path, out: Path, first: Sequence[int] = (0, 1)) -> RealDays:
     Parameters
     ----------
     data, out : Path
-        Where recordings are, and where a description may be written.
+        Folder of the recordings, and folder for written descriptions.
     first : sequence of int
-        The two that are taken for day 1, in the order of recording.
+        Indices of the two motions that are taken as day 1.
 
     """
     files = sorted((data / 'franka_fr3_teleop' / 'data').glob('*.npy.gz'))
@@ -170,7 +170,7 @@ def fr3(data: Path, out: Path, first: Sequence[int] = (0, 1)) -> RealDays:
     )
 
 
-#: All questions, by name.
+#: All cases, by name.
 DAYS: Mapping[str, Callable[[Path, Path], RealDays]] = MappingProxyType(
     {
         'builds': builds,
@@ -188,7 +188,7 @@ DAYS: Mapping[str, Callable[[Path, Path], RealDays]] = MappingProxyType(
 
 
 def _table(path: Path) -> dict[str, np.ndarray]:
-    """Read a CSV file with a header; its columns by name."""
+    """Return the columns of a CSV file with a header, by name."""
     raw = path.read_bytes()
     text = (gzip.decompress(raw) if path.suffix == '.gz' else raw).decode()
     names = [name.strip() for name in text.partition('\n')[0].split(',')]
@@ -235,8 +235,8 @@ def _double_pendulum(data: Path, out: Path, design: str) -> Robot:
     """
     Load a double pendulum.
 
-    Its authors leave out the link 'world', which is added, and give limits of half a turn that the
-    swing-ups go beyond, so that the joints are continuous here.
+    The link 'world', which the description lacks, is added. The joints are made continuous, as
+    swing-ups exceed the described limits of half a turn.
 
     """
     path = data / 'dfki_double_pendulum' / 'parameters' / design / 'acrobot.urdf'

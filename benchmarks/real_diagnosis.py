@@ -1,12 +1,12 @@
 # Copyright 2026 The armid_ros developers
 # SPDX-License-Identifier: Apache-2.0
 """
-What the diagnosis names on recordings of real machines.
+Effects that the diagnosis names in recordings of real machines.
 
-Three questions with known answers: what is named from the rigid body alone; whether a term is
-named again that was taken out of the model; whether an effect is named that was added to the
-measured torque, which leaves the noise, the friction and the faults of a real machine in.
-Recordings are those of the folder that the environment variable ARMID_DATA names.
+There are three questions with known answers. Which effects are named from the rigid body alone? Is
+an effect named that was removed from the model? Is an effect named that was added to the measured
+torque, with its noise, friction and errors? The recordings are in the folder of the environment
+variable ARMID_DATA.
 
     python -m benchmarks.real_diagnosis [TEXT ...]    # only the rows that have one of the texts
 
@@ -34,7 +34,7 @@ from scipy import signal
 
 from benchmarks import real_recordings
 
-#: What the model of each machine is known to need (effects, joints; none: all).
+#: Known effects of each machine, with their joints (empty: all joints).
 KNOWN: dict[str, tuple[tuple[str, tuple[str, ...]], ...]] = {
     'emps': (
         ('viscous_friction', ()),
@@ -51,10 +51,10 @@ KNOWN: dict[str, tuple[tuple[str, tuple[str, ...]], ...]] = {
     ),
     'ur10': (('viscous_friction', ()), ('coulomb_friction', ()), ('torque_offset', ())),
 }
-#: Band in which a motion is differentiated to make an effect of it [Hz].
+#: Cut-off of the positions from which an added effect is computed [Hz].
 _BAND = {'emps': 40.0, 'tx40': 20.0, 'ur10': 6.0}
 
-#: A torque from position, velocity, acceleration and load of the joint, all (N,).
+#: Function from position, velocity, acceleration and load of a joint to a torque, all (N,).
 Law = Callable[[FloatArray, FloatArray, FloatArray, FloatArray], FloatArray]
 
 LAWS: dict[str, Law] = {
@@ -79,12 +79,12 @@ class Question:
     what : str
         'from rigid', 'without NAME' or 'with NAME'.
     name : str
-        What has to be named; empty for 'from rigid'.
+        Effect that has to be named; empty for 'from rigid'.
     joint : str
-        Where; empty for all joints that have it.
+        Joint of the effect; empty for all joints that have it.
     size : float
-        Root mean square of what a fit of the known model leaves of what is added, over what it
-        leaves there without, or the noise.
+        Rms of the added torque that a fit of the known model does not absorb, over the rms
+        residual without it, or over the noise if that is larger.
 
     """
 
@@ -96,13 +96,13 @@ class Question:
 
     @property
     def label(self) -> str:
-        """Say it in a few words."""
+        """Return the question in a few words."""
         where = f' in {self.joint}' if self.joint else ''
         return f'{self.machine} {self.what} {self.name}{where}'.strip()
 
 
 def questions(machines: Machines) -> Iterator[Question]:
-    """Yield all questions; what is added is added where most of it can be seen."""
+    """Yield all questions; an effect is added to the joint in which it is most visible."""
     for machine in KNOWN:
         yield Question(machine, 'from rigid')
     for machine, terms in KNOWN.items():
@@ -138,7 +138,7 @@ class Machines:
         return self._read[machine]
 
     def ask(self, question: Question) -> Diagnosis:
-        """Diagnose."""
+        """Return the diagnosis of a question."""
         bare, recording = self.bare(question.machine)
         without = question.name if question.what == 'without' else None
         arm = bare if question.what == 'from rigid' else known_arm(bare, question.machine, without)
@@ -147,20 +147,20 @@ class Machines:
         return diagnose(arm, [recording], rng=np.random.default_rng(0))
 
     def with_effect(self, question: Question) -> Recording:
-        """Return the recording with a torque added to what was measured in one joint."""
+        """Return the recording with a torque added to the measured one in one joint."""
         _, recording = self.bare(question.machine)
         size = question.size / self.visible(question)
         return replace(recording, tau=recording.tau + size * self._added(question))
 
     def visible(self, question: Question) -> float:
-        """Return which share of a torque a fit of the known model leaves, rms over rms."""
+        """Return the share of the added torque that a fit does not absorb, rms over rms."""
         arm, _ = self.bare(question.machine)
         joint = arm.robot.joints.index(question.joint)
         seen = self._seen(question.machine, self._added(question))[joint]
         return float(seen / self.left(question.machine)[joint])
 
     def _added(self, question: Question) -> FloatArray:
-        """Return a torque as large as what the known model leaves of its joint, rms, (N, n)."""
+        """Return a torque with the rms of the residual of its joint, shape (N, n) [N m]."""
         arm, recording = self.bare(question.machine)
         joint = arm.robot.joints.index(question.joint)
         rate = 1.0 / float(np.median(np.diff(recording.t)))
@@ -175,7 +175,7 @@ class Machines:
         return added
 
     def _seen(self, machine: str, added: FloatArray) -> FloatArray:
-        """Return what a fit of the known model leaves of a torque that is added, rms (n,)."""
+        """Return the rms of the added torque that a fit does not absorb, (n,) [N m]."""
         bare, recording = self.bare(machine)
         with_it = replace(recording, tau=recording.tau + added)
         known = known_arm(bare, machine, None)
@@ -187,7 +187,7 @@ class Machines:
         return np.sqrt(np.mean(rest**2, axis=0, where=without.informative))
 
     def left(self, machine: str) -> FloatArray:
-        """Return what the known model leaves of each joint, or its noise if more [N m]."""
+        """Return the rms residual of the known model, or its noise if larger, (n,) [N m]."""
         if machine not in self._left:
             bare, recording = self.bare(machine)
             found = diagnose(
@@ -199,7 +199,7 @@ class Machines:
 
 
 def known_arm(bare: ArmModel, machine: str, without: str | None) -> ArmModel:
-    """Return the arm with the effects that its machine is known to have, but one."""
+    """Return the arm with the known effects of its machine, except one."""
     arm = bare
     for name, joints in KNOWN[machine]:
         if name != without:
@@ -208,7 +208,7 @@ def known_arm(bare: ArmModel, machine: str, without: str | None) -> ArmModel:
 
 
 def answered(question: Question, found: Diagnosis) -> str:
-    """Say whether the right name was given in the right joint: first, also, as one of several."""
+    """Return whether the right effect in its joint is first, named, among rivals, or NOT."""
     if not question.name:
         return ''
     wanted = {question.joint} if question.joint else set()
@@ -221,7 +221,7 @@ def answered(question: Question, found: Diagnosis) -> str:
 
 
 def error_percent(found: Diagnosis) -> float:
-    """Return the relative error of the torque with what was named, rows at reversals left out."""
+    """Return the relative torque error with the named effects, over informative rows [%]."""
     assert found.gap is not None
     squares = np.zeros(2)
     for one in found.gap.overlays:

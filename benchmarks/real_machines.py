@@ -1,6 +1,6 @@
 # Copyright 2026 The armid_ros developers
 # SPDX-License-Identifier: Apache-2.0
-"""Relative errors and parameters on recordings of real machines, next to the published ones."""
+"""Relative errors and parameters on recordings of real machines, and the published values."""
 
 from pathlib import Path
 import tempfile
@@ -18,7 +18,7 @@ EMPS_PUBLISHED = {'M': 95.1089, 'Fv': 203.5034, 'Fc': 20.3935, 'offset': -3.1648
 
 
 def fit(data, effects, method='wls', **signals):
-    """Identify one machine; returns the identification and its robot."""
+    """Identify one machine; return the identification and the robot."""
     robot = load_robot(str(data.robot))
     arm = ArmModel.of(robot, effects=effects)
     settings = IdentificationSettings(method, SignalSettings(**signals))

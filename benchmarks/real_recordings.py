@@ -3,8 +3,8 @@
 """
 Recordings of real machines as bags and URDFs.
 
-The folder that the environment variable ARMID_DATA names holds the recordings in the formats of
-their authors; its README files give sources and licences.
+The recordings, in the formats of their authors, are in the folder of the environment variable
+ARMID_DATA; its README files give sources and licences.
 
 """
 
@@ -93,7 +93,7 @@ def tx40(data: Path, out: Path) -> RealData:
 
 
 def ur10(data: Path) -> RealData:
-    """Find the bag of the UR10, which is a ROS 2 recording as it is, and its description."""
+    """Return the bag of the UR10, an unchanged ROS 2 recording, and its description."""
     robot = example_robot('ur_description/urdf/ur10_robot.urdf')
     return RealData(robot, (data / 'ur10_ros2bag' / 'ur10_exciting_trajectory.db3',))
 

@@ -1,12 +1,12 @@
 # Copyright 2026 The armid_ros developers
 # SPDX-License-Identifier: Apache-2.0
 """
-How much faster than real time the simulated arm is, and where the time goes.
+Speed of the simulated arm over real time, and the time of its parts.
 
-Every arm has viscous and Coulomb friction in each joint and rotor inertias, follows a smooth
-reference at 1 kHz by computed torque, and is read by sensors with noise, quantisation and a
-delay. Reach: 60 times real time. A number is processor time, the least of many short repetitions,
-which is what the code needs when nothing else wants the processor.
+Every arm has rotor inertias, and viscous and Coulomb friction in each joint. It follows a smooth
+reference at 1 kHz by computed torque; sensors have noise, quantisation and a delay. The aim is 60
+times real time. Times are processor times, the least of many short repetitions, as on an idle
+processor.
 
 """
 
@@ -46,7 +46,7 @@ def main() -> None:
 
 
 def report(name: str, robot: Robot) -> None:
-    """Measure one arm."""
+    """Measure one arm and print its table."""
     arm, reference = with_friction(robot), swinging(robot)
     plant, controller = Plant(arm), ComputedTorque(ArmModel(robot))
     sensors = Sensors(
@@ -109,7 +109,7 @@ def with_friction(robot: Robot) -> ArmModel:
 
 
 def swinging(robot: Robot) -> Reference:
-    """Return a motion of all joints in a quarter of their range, each at a rhythm of its own."""
+    """Return a motion of all joints in a quarter of their range, at different frequencies."""
     t = np.linspace(0.0, SECONDS, 26)[:, np.newaxis]
     w = np.linspace(4.0, 8.0, robot.n_joints)
     middle, reach = (robot.upper + robot.lower) / 2, (robot.upper - robot.lower) / 8

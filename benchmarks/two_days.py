@@ -1,9 +1,9 @@
 # Copyright 2026 The armid_ros developers
 # SPDX-License-Identifier: Apache-2.0
 """
-One arm on two days: a model is identified on the first, and the diagnosis is asked what changed.
+One arm on two days: a model is identified on the first, and the second is diagnosed.
 
-This is the one place of the benchmarks that knows how the question is put.
+All benchmarks of two days call the diagnosis through this module.
 
 """
 
@@ -24,7 +24,7 @@ from armid_ros.recording import Recording
 from armid_ros.robots import Robot
 import numpy as np
 
-#: What a model of day 1 has besides its bodies: the default of `armid identify`.
+#: Effects in a model of day 1, the default of `armid identify`.
 EFFECTS = ('viscous_friction', 'coulomb_friction', 'torque_offset')
 
 
@@ -38,17 +38,17 @@ class Named:
     name : str
         Name in the catalogue.
     joints : tuple of str
-        Where; empty for the whole arm.
+        Joints of the cause; empty for the whole arm.
     rivals : tuple of (name, joints)
-        What the data cannot tell from it.
+        Rivals of the cause.
     parameters : tuple of (name, joint, value, std)
-        What was estimated.
+        Estimated parameters.
     share : float
-        Share of the held-out gap that it takes; nan if it is not said.
+        Share of the held-out gap that the cause explains; nan if not stated.
     share_interval : (float, float)
-        Its interval.
+        The 95 % interval of the share.
     probability : float
-        That it is the cause; nan if not stated.
+        Probability of the cause; nan if not stated.
 
     """
 
@@ -62,15 +62,15 @@ class Named:
 
     @property
     def names(self) -> set[str]:
-        """All names it may be."""
+        """Names of the cause and of its rivals."""
         return {self.name, *(name for name, _ in self.rivals)}
 
     def joints_of(self, name: str) -> tuple[str, ...]:
-        """Return where it is if it is a name."""
+        """Return the joints of the cause, or of its rival with a name."""
         return self.joints if name == self.name else dict(self.rivals).get(name, self.joints)
 
     def __str__(self) -> str:
-        """Write names and joints."""
+        """Return names, joints and share in a line."""
         where = ','.join(self.joints) if len(self.joints) < 4 else f'{len(self.joints)} joints'
         share = '' if np.isnan(self.share) else f' {self.share:.2f}'
         return '|'.join((self.name, *dict(self.rivals))) + (f'@{where}' if where else '') + share
@@ -79,23 +79,23 @@ class Named:
 @dataclass(frozen=True)
 class Answer:
     """
-    What a diagnosis said.
+    Answer of a diagnosis.
 
     Attributes
     ----------
     verdict : str
-        As in diagnosis.json; 'failed' where there was none.
+        Verdict in diagnosis.json; 'failed' after an exception.
     headline, minor : tuple of Named
-        What takes the gap, and what else is there.
+        Causes in the headline, and minor ones.
     seconds : float
         Processor time [s].
     summary : str
-        In words.
+        The verdict in words.
     error : str
-        Why there is no diagnosis; empty if there is one.
+        Reason why there is no diagnosis; empty if there is one.
     true_share : float
-        Share of the held-out gap that the torque of the cause truly takes, in the rows and the
-        unit of the shares that are stated; nan if that is not known.
+        True share of the cause in the held-out gap, in the rows and the unit of the stated shares;
+        nan if unknown.
 
     """
 
@@ -109,7 +109,7 @@ class Answer:
 
 
 def known_arm(robot: Robot, known: Sequence[Any]) -> ArmModel:
-    """Return a described arm with what is known of its drives, by values or by name."""
+    """Return a described arm with its known effects, with or without values."""
     arm = ArmModel(robot)
     for one in known:
         arm = arm.with_effect(CATALOGUE[one.name].on(robot, one.joints), one.values)
@@ -132,20 +132,20 @@ def ask(
     contributions: Sequence[FloatArray] = (),
 ) -> Answer:
     """
-    Ask the diagnosis what is not in a model.
+    Return the answer of the diagnosis on an arm.
 
     Parameters
     ----------
     arm : ArmModel
-        What is known.
+        The given model.
     recordings, validate : sequence of Recording
-        Of the day in question; the second are not fitted.
+        Fitted and held-out recordings of the day in question.
     baseline : sequence of Recording
-        Of the day on which the model was identified.
+        Recordings of the day on which the model was identified.
     settings : DiagnosisSettings, optional
-        The numbers that decide.
+        Settings of the diagnosis.
     contributions : sequence of ndarray, each (N, n), optional
-        Torque of the cause in each recording, those of ``validate`` last, which tells its true
+        Torque of the cause in each recording, with those of ``validate`` last; gives the true
         share [N m].
 
     """
@@ -170,14 +170,14 @@ def ask(
 
 def true_share(gap: Gap, made: Sequence[tuple[FloatArray, FloatArray]]) -> float:
     """
-    Return the share of the squares of a gap that goes with a torque.
+    Return the share of a gap that disappears if a torque is subtracted.
 
     Parameters
     ----------
     gap : Gap
-        Where it was measured.
+        The gap with its data.
     made : sequence of (ndarray, shape (N,), ndarray, shape (N, n))
-        Times and torque of each recording in which it was measured [s, N m].
+        Times and torque of the cause in each recording of the gap [s, N m].
 
     """
     there = rest = 0.0

@@ -1,10 +1,10 @@
 # Copyright 2026 The armid_ros developers
 # SPDX-License-Identifier: Apache-2.0
 """
-Stiffness of a real arm with two encoders a joint, and how far it can be told from free play.
+Stiffness of a real arm with two encoders per joint, and its distinction from free play.
 
-KUKA KR300, axes 1 to 3, three recordings of 10 s (Weigand et al. 2021), in the folder that the
-environment variable ARMID_DATA names.
+The arm is a KUKA KR300, axes 1 to 3, with three recordings of 10 s (Weigand et al. 2021) in the
+folder of the environment variable ARMID_DATA.
 
 """
 
@@ -45,13 +45,13 @@ def kr300(data: Path, axis: int) -> list[TwoEncoders]:
 
 def named(fit: TransmissionFit) -> tuple[str, ...]:
     """
-    Name what twists a joint: what its 95 % intervals tell from nothing.
+    Return the names of the causes of the twist of a joint that are significant.
 
     Returns
     -------
     tuple of str
-        joint_elasticity, backlash, both, or none; one name with both in it where the intervals
-        cannot tell them from each other.
+        joint_elasticity, backlash, both, or none; one name with both in it if their estimates
+        are too correlated to separate them.
 
     """
     soft = bool(np.isfinite(fit.stiffness_alone[2]))

@@ -1,12 +1,12 @@
 # Copyright 2026 The armid_ros developers
 # SPDX-License-Identifier: Apache-2.0
 """
-The walking leg pair in MuJoCo: a whole cycle on ground as the source's Table 3 has it.
+The walking leg pair in MuJoCo: a whole cycle on the ground of the source's Table 3.
 
-MuJoCo reads both bodies from their descriptions; the springs are its tendons. The ground is
-written here anew, as a force on heels and toes at every stage of the engine's integrator.
-Prescribed joints are moved by an armature that nothing else can move, and put back after every
-step; the hips of both machines are free, and a joint may follow a torque.
+MuJoCo reads both bodies from their descriptions; the springs are tendons. The ground is
+implemented here independently, as a force on heels and toes at every stage of the integrator.
+Prescribed joints have so large an armature that other torques do not move them, and their state is
+reset after every step. The hips of both machines are free, and a joint may follow a torque.
 
 """
 
@@ -34,14 +34,14 @@ _MACHINES, _LEGS = ('exo', 'human'), ('right', 'left')
 @dataclass(frozen=True)
 class Walked:
     """
-    What MuJoCo makes of a cycle.
+    A simulated cycle.
 
     Attributes
     ----------
     driven : ndarray, shape (N,)
-        The joint that follows its torque [rad]; empty without one.
+        Position of the joint that follows a torque [rad]; empty without one.
     hips : ndarray, shape (N, 2, 2)
-        Of machine and wearer, forward and up [m].
+        Positions of the hips of machine and wearer, forward and up [m].
     feet : ndarray, shape (N, 2, 2, 2)
         Force on machine and wearer, right and left foot, forward and up [N].
 
@@ -53,7 +53,7 @@ class Walked:
 
 
 def ground(height: float, speed: FloatArray) -> FloatArray:
-    """Return 100 N/mm^1.5, 1 N s/mm and friction of 0.3 on a point, shape (3,) [N]."""
+    """Return the ground force on a point, (3,) [N]: 100 N/mm^1.5, 1 N s/mm, friction 0.3."""
     if height >= 0.0:
         return np.zeros(3)
     up = max(1e5 * 10.0**1.5 * (-height) ** 1.5 - 1e3 * speed[2], 0.0)
@@ -63,7 +63,7 @@ def ground(height: float, speed: FloatArray) -> FloatArray:
 def walk_in_mujoco(
     cycle: GaitCycle, joint: str | None = None, torque: Callable[[float], float] | None = None
 ) -> Walked:
-    """Let both walk a cycle; a joint of the machine follows a torque, if one is given."""
+    """Simulate a cycle of both; a joint of the machine follows a torque, if one is given."""
     model = _model(cycle.pair)
     own, other = cycle.motions
     step = float(own.t[1] - own.t[0])
@@ -143,7 +143,7 @@ def _model(pair: TiedPair) -> mujoco.MjModel:
 
 
 def _with_masses(urdf: str) -> str:
-    """Give links without a mass a nanogram: MuJoCo takes none for nothing."""
+    """Return the URDF with 1 nanogram for links without mass, which MuJoCo would reject."""
     root = ElementTree.fromstring(urdf)
     for link in root.findall('link'):
         if not link.get('name').endswith('ground') and link.find('inertial') is None:

@@ -1,6 +1,6 @@
 # Copyright 2026 The armid_ros developers
 # SPDX-License-Identifier: Apache-2.0
-"""What every test may ask for: recordings of real machines, and a ROS 2 domain of its own."""
+"""Fixtures of all tests: recordings of real machines, robots, and a separate ROS 2 domain."""
 
 from contextlib import ExitStack
 from importlib.metadata import files
@@ -12,24 +12,24 @@ import sys
 
 import pytest
 
-#: Rooms of processes, ROS graphs, papers, whole pages and many repeats: not in `make test-fast`.
+#: Slow rooms (subprocesses, ROS graphs, pages, many repeats), left out by `make test-fast`.
 SLOW = set('benchmarks docsite examples fleet fuzz hidden live papers ros'.split())
 
 
 def pytest_addoption(parser):
-    """Add --seed, for tests that pass in one order alone."""
+    """Add --seed, which shuffles the tests to find those that depend on their order."""
     parser.addoption('--seed', type=int, help='shuffle modules, and the tests of each')
 
 
 def pytest_report_header(config):
-    """Print the seed of the order."""
+    """Return a line on the seed of the order for the header."""
     seed = config.getoption('seed')
     return None if seed is None else f'order of the tests: --seed {seed}'
 
 
 @pytest.hookimpl(tryfirst=True)
 def pytest_collection_modifyitems(config, items):
-    """Mark rooms; shuffle modules, and the tests of each, in the same way in every worker."""
+    """Mark slow rooms; shuffle modules and their tests in the same way in every worker."""
     for item in items:
         if item.path.relative_to(Path(__file__).parent).parts[0] in SLOW:
             item.add_marker('slow')
@@ -43,7 +43,7 @@ def pytest_collection_modifyitems(config, items):
 
 
 def pytest_configure(config):
-    """Keep ROS 2 to this process and its children, before anything makes a context."""
+    """Restrict ROS 2 to this process and its children, before a context is made."""
     os.environ['ROS_AUTOMATIC_DISCOVERY_RANGE'] = 'LOCALHOST'
     os.environ.setdefault('AMENT_PREFIX_PATH', sys.prefix)
     from armid_ros.nodes.running.domains import reserved_domain
@@ -53,13 +53,13 @@ def pytest_configure(config):
 
 
 def pytest_unconfigure(config):
-    """Leave the domain to others."""
+    """Release the ROS 2 domain."""
     config.ros_domain.close()
 
 
 @pytest.fixture(scope='session', autouse=True)
 def ros_log_directory(tmp_path_factory):
-    """Keep the logs of the nodes out of the home directory."""
+    """Write the logs of nodes to a temporary folder."""
     os.environ['ROS_LOG_DIR'] = str(tmp_path_factory.mktemp('ros_log'))
 
 
@@ -71,7 +71,7 @@ def real_data():
     Returns
     -------
     Path
-        The folder that the environment variable ARMID_DATA names; the test is skipped without.
+        The folder in the environment variable ARMID_DATA; without it, the test is skipped.
 
     """
     folder = os.environ.get('ARMID_DATA')

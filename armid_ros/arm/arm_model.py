@@ -46,19 +46,19 @@ class ArmModel:
     """
     A rigid body plus effects: tau = Y pi + sum over effects of tau_e(motion; theta_e).
 
-    Motions are as recorded: effects of the sensors are part of the arm.
+    Motions are recorded ones; the model includes the effects of the sensors.
 
     Attributes
     ----------
     robot : Robot
         The rigid body, with its inertial parameters and its gravity.
     effects : tuple of Effect
-        What else acts.
+        Effects in addition to the rigid body.
     values : tuple of ndarray, each of shape (P_e,)
         Parameter values of every effect, zero by default.
     quasi_static : bool
-        Whether the rigid body is felt by its weight alone, as in motions slow enough for inertia
-        not to matter: tau = Y(q, 0, 0) pi + effects.
+        Whether the torque of the rigid body is its weight alone, as in slow motion without
+        inertia torques: tau = Y(q, 0, 0) pi + effects.
 
     Examples
     --------
@@ -98,25 +98,25 @@ class ArmModel:
         joints: Sequence[str] | None = None,
     ) -> ArmModel:
         """
-        Make a model of a description.
+        Make an arm model from a robot description and effects.
 
         Parameters
         ----------
         robot : Robot, str or Path
-            As it is, a shipped name, or the path of a URDF or xacro.
+            A robot, a shipped name, or the path of a URDF or xacro.
         effects : str or sequence of str or Effect
-            What acts beside the rigid body: catalogue names, with commas in one text; joints as
-            in 'payload@wrist', values as in 'viscous_friction:viscous_coefficient=0.1', the
-            latter one a text.
+            Effects, or their names in the catalogue; one text may list names with commas. A text
+            may have joints, 'payload@wrist'. A text of one effect may have values,
+            'viscous_friction:viscous_coefficient=0.1'.
         gravity : str or sequence of float
-            'earth', 'moon', or a vector in the base frame [m/s^2]; not for a Robot as it is.
+            'earth', 'moon', or a vector in the base frame [m/s^2]; not used for a Robot.
         joints : sequence of str, optional
             Driven joints; all but grippers by default.
 
         Raises
         ------
         RobotError or ModelError
-            The description cannot be used, or the catalogue has no such effect.
+            If the description cannot be used, or the catalogue has no such effect.
 
         """
         if not isinstance(robot, Robot):
@@ -145,7 +145,7 @@ class ArmModel:
         return '\n'.join(lines)
 
     def with_effect(self, effect: Effect, values: npt.ArrayLike | None = None) -> ArmModel:
-        """Return the arm with one more effect; without values its parameters are zero."""
+        """Return the arm with one more effect; its parameters are zero by default."""
         if values is None:
             values = np.zeros(len(effect.parameters(self.robot)))
         array = np.asarray(values, dtype=float)
@@ -165,7 +165,7 @@ class ArmModel:
         return np.concatenate([self.robot.rigid_parameters, *self.values])
 
     def with_theta(self, theta: npt.ArrayLike) -> ArmModel:
-        """Return the same structure with other standard parameters, shape (P,)."""
+        """Return the arm with other standard parameters, shape (P,)."""
         theta = np.asarray(theta, dtype=float)
         size = len(self.robot.rigid_parameters)
         cuts = np.cumsum([size, *(len(v) for v in self.values)])
@@ -180,11 +180,11 @@ class ArmModel:
         return np.zeros(len(effect.parameters(self.robot)))
 
     def action(self) -> Action:
-        """Return how the robot and all effects together act on plant and sensors."""
+        """Return the merged action of robot and effects on plant and sensors."""
         return self._acting
 
     def __getstate__(self) -> dict[str, Any]:
-        """Leave out what is derived: it has functions that do not go to other processes."""
+        """Return the fields only: cached properties contain functions that cannot be pickled."""
         return {part.name: getattr(self, part.name) for part in fields(self)}
 
     @cached_property
@@ -200,18 +200,18 @@ class ArmModel:
 
     @property
     def body(self) -> Robot:
-        """Return the rigid body that effects make: with payload, under the gravity there is."""
+        """Return the rigid body with effects, such as a payload or a changed gravity."""
         assert self._acting.robot is not None
         return self._acting.robot
 
     def along(self, motion: Motion) -> ArmModel:
-        """Return the arm with effects that have the motion of its partner."""
+        """Return the arm with tied effects that follow the recorded motion of the partner."""
         effects = tuple(effect.along(motion) for effect in self.effects)
         known = all(new is old for new, old in zip(effects, self.effects, strict=True))
         return self if known else replace(self, effects=effects)
 
     def link_motion(self, motion: Motion) -> Motion:
-        """Return the true motion of the links where another one was recorded."""
+        """Return the true motion of the links for a recorded motion."""
         displacement = self._acting.displacement
         if displacement is None:
             return motion
@@ -221,16 +221,16 @@ class ArmModel:
         )
 
     def link_frames(self, motion: Motion) -> LinkFrames:
-        """Return where all links are along a recorded motion, for any of their points."""
+        """Return the frames of all links along a recorded motion."""
         return LinkFrames.of(self.robot, self.link_motion(motion).q)
 
     @cached_property
     def middle_frames(self) -> LinkFrames:
-        """Where all links are in the middle of the range of motion."""
+        """Frames of all links in the middle of the range of motion."""
         return LinkFrames.in_the_middle(self.robot)
 
     def load(self, motion: Motion) -> FloatArray:
-        """Return what the rigid body takes along a motion of the links, shape (N, n) [N m]."""
+        """Return the torque of the rigid body along a motion of the links, (N, n) [N m]."""
         return inverse_dynamics(self.body, self.felt(motion))
 
     def body_columns(self, motion: Motion) -> FloatArray:
@@ -242,7 +242,7 @@ class ArmModel:
         return gravity_sensitivity(self.body, self.link_motion(motion).q)
 
     def smoothed(self, motion: Motion) -> Motion:
-        """Return a recorded motion without what is beyond its band."""
+        """Return a recorded motion without frequencies beyond its band."""
         return smoothed(motion)
 
     def load_derivatives(self, motion: Motion) -> tuple[FloatArray, FloatArray, FloatArray]:
@@ -250,12 +250,12 @@ class ArmModel:
         return inverse_dynamics_derivatives(self.body, self.felt(motion))
 
     def link_torque_derivatives(self, motion: Motion) -> tuple[FloatArray, FloatArray] | None:
-        """Differentiate what holds the links by q and dq, each (N, n, n); None if nothing does."""
+        """Differentiate torques on the link side by q and dq, each (N, n, n); None without any."""
         law = self.along(motion).action().link_torque
         return None if law is None else law_derivatives(law, self.link_motion(motion))
 
     def joint_torque(self, motion: Motion) -> FloatArray:
-        """Return the torque of ideal sensors along a motion, shape (N, n) [N m or N]."""
+        """Return the true torque along a recorded motion, shape (N, n) [N m or N]."""
         link = self.link_motion(motion)
         load = self.load(link)
         return load + self.along(motion).action().effort(motion, link, load)
@@ -264,31 +264,31 @@ class ArmModel:
         self, motion: Motion | npt.ArrayLike, dq: npt.ArrayLike = 0.0, ddq: npt.ArrayLike = 0.0
     ) -> FloatArray:
         """
-        Predict what the torque sensors read along a recorded motion, all effects included.
+        Predict the torque readings along a recorded motion, with all effects.
 
         Parameters
         ----------
         motion : Motion, or array of shape (N, n) or (n,)
-            As the position sensors have it, or positions alone [rad or m]. The torque of a motion
-            counts only for drives that report more than they give.
+            Recorded motion, or positions alone [rad or m]. The torque of a motion is used only for
+            drives that report more torque than they supply.
         dq, ddq : array_like of the same shape
-            Velocities and accelerations at positions; zero by default.
+            Velocities and accelerations, if `motion` is positions; zero by default.
 
         Returns
         -------
         ndarray, shape (N, n) or (n,)
-            Actuator torque as read [N m or N].
+            Torque reading of the actuators [N m or N].
 
         Raises
         ------
         ModelError
-            An effect needs more than the moment: positions have no times.
+            If an effect depends on past samples, and `motion` is positions without times.
 
         """
         if not isinstance(motion, Motion):
             past = [effect.name for effect in self.effects if not effect.instantaneous]
             if past:
-                raise ModelError(f'{", ".join(past)} of {self.robot.name}: pass an ar.Motion')
+                raise ModelError(f'{", ".join(past)}: pass an ar.Motion, as positions lack times')
             states = Motion.of_states(self.robot.joints, motion, dq, ddq)
             return self.torque(states).reshape(np.shape(motion))
         tau = self.joint_torque(motion)
@@ -302,19 +302,19 @@ class ArmModel:
 
     def columns_of(self, effect: Effect, motion: Motion) -> FloatArray:
         """
-        Return the sensitivities of what is read to the parameters of an effect.
+        Return the sensitivities of the torque readings to the parameters of an effect.
 
         Parameters
         ----------
         effect : Effect
-            One that the arm has, or one that it may be lacking.
+            An effect of the arm, or one that it may lack.
         motion : Motion
-            As recorded; a whole unbroken stretch unless the effect is instantaneous.
+            Recorded motion; a whole unbroken stretch unless the effect is instantaneous.
 
         Returns
         -------
         ndarray, shape (N, n, P_e)
-            Derivative of ``torque`` at the arm as it is.
+            Derivative of ``torque`` at the present values of the arm.
 
         """
         columns = effect.columns(motion, self)
@@ -332,8 +332,8 @@ class ArmModel:
         """
         Return the sensitivities to all ``parameters``, shape (N, n, P).
 
-        They are the derivative of ``torque``. An effect that depends on the load of a joint takes
-        it from the arm as it is.
+        They are the derivative of ``torque``. Effects that depend on the load of a joint use the
+        load at the present values.
 
         """
         return np.concatenate([self.rigid_columns(motion), self.effect_columns(motion)], axis=2)
@@ -345,9 +345,9 @@ class ArmModel:
         Parameters
         ----------
         motion : Motion
-            As recorded.
+            Recorded motion.
         change : Displacement
-            Directions, arrays of shape (N, n, P).
+            Changes of position, velocity and acceleration, each (N, n, P).
 
         Returns
         -------
@@ -375,11 +375,11 @@ class ArmModel:
         return tau
 
     def neighbours(self, period: float) -> int:
-        """Return how many samples to either side a reading depends on, a period [s] apart."""
+        """Return the number of samples to either side that affect a reading, for a period [s]."""
         action = self._acting
         if action.displacement is None and action.reading_memory == 0.0:  # noqa: RUF069 - of laws, never computed
             return 0
-        # samples to either side that rates of change of rates of change are taken from
+        # four more samples to either side for second derivatives by finite differences
         return int(np.ceil(action.reading_memory / period)) + 4
 
     @cached_property
@@ -417,21 +417,21 @@ class ArmModel:
         return np.asarray(columns + along @ (gain[:, :, np.newaxis] * (along.T @ columns)))
 
     def felt(self, motion: Motion) -> Motion:
-        """Return a link motion as the rigid body feels it: at rest if quasi-static."""
+        """Return the link motion for the rigid body: the positions at rest if quasi-static."""
         return motion.at_rest() if self.quasi_static else motion
 
     def base_parameters(
         self, rng: np.random.Generator, free: npt.NDArray[np.intp] | None = None
     ) -> BaseParameters:
         """
-        Find the combinations of standard parameters that any motion can tell apart.
+        Find the combinations of standard parameters that a suitable motion identifies.
 
         Parameters
         ----------
         rng : numpy.random.Generator
-            Draws the states over which they are told apart.
+            Draws the random states of the regressor.
         free : ndarray of int, optional
-            Which ``parameters`` may change; all by default.
+            Indices of the ``parameters`` that may change; all by default.
 
         """
         motion = random_motion(self.robot, rng)

@@ -1,6 +1,6 @@
 # Copyright 2026 The armid_ros developers
 # SPDX-License-Identifier: Apache-2.0
-"""An identified arm as the files that other programs read: URDF and MJCF."""
+"""Export of an identified arm as URDF and MJCF."""
 
 from __future__ import annotations
 
@@ -17,19 +17,19 @@ import numpy as np
 @dataclass(frozen=True)
 class Exported:
     """
-    A description of an arm.
+    An exported description of an arm.
 
     Attributes
     ----------
     text : str
-        The file.
+        Content of the file.
     without_place : tuple of str
-        Parameters of effects that the format has no place for, one a line; a comment in the file
+        Parameters of effects that the format cannot contain, one per line; a comment in the file
         lists them too.
     left_out : tuple of str
-        What of the description is not in the file.
+        Parts of the description that the file lacks.
     values : mapping of str to mapping of str to float
-        By joint: 'damping' [N m s/rad], 'friction' [N m] and 'armature' [kg m^2] of the file.
+        'damping' [N m s/rad], 'friction' [N m] and 'armature' [kg m^2] of the file, by joint.
 
     """
 
@@ -41,14 +41,14 @@ class Exported:
 
 def arm_urdf(arm: ArmModel) -> Exported:
     """
-    Return the arm's own URDF with its inertial parameters and friction, otherwise as it was.
+    Return the URDF of the arm with identified inertial parameters and friction.
 
     A payload is part of the link that carries it. Text expanded from xacro stays expanded.
 
     Raises
     ------
     ModelError
-        If the parameters of a link are not those of a body.
+        If the parameters of a link are not physically consistent.
 
     """
     found, missing = _placed(arm, lambda effect: effect.traits.urdf_attribute)
@@ -59,7 +59,7 @@ def arm_urdf(arm: ArmModel) -> Exported:
         remarks=_remarks('a URDF', missing),
     )
     left_out = ('ros2_control',) if '<ros2_control' in arm.robot.urdf else ()
-    robot = arm.robot  # what is not identified stays as described
+    robot = arm.robot  # friction that was not identified keeps its described values
     described = {'damping': robot.urdf_damping, 'friction': robot.urdf_friction}
     values = {
         key: dict(zip(robot.joints, own.tolist(), strict=True)) | found.get(key, {})
@@ -75,7 +75,7 @@ def arm_mjcf(arm: ArmModel) -> Exported:
     Raises
     ------
     ModelError
-        If the parameters of a link are not those of a body.
+        If the parameters of a link are not physically consistent.
 
     """
     found, missing = _placed(arm, lambda effect: effect.traits.mjcf_attribute)
@@ -93,7 +93,7 @@ def arm_mjcf(arm: ArmModel) -> Exported:
 def _placed(
     arm: ArmModel, attribute: Callable[[Effect], str]
 ) -> tuple[dict[str, dict[str, float]], tuple[str, ...]]:
-    """Return values by attribute and joint, and a line for each that has no place in a format."""
+    """Return values by attribute and joint, and a line for each value without an attribute."""
     found: dict[str, dict[str, float]] = {}
     missing = []
     for effect, values in zip(arm.effects, arm.values, strict=True):

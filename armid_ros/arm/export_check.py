@@ -1,6 +1,6 @@
 # Copyright 2026 The armid_ros developers
 # SPDX-License-Identifier: Apache-2.0
-"""Whether the program that a file is for computes the same torque."""
+"""Comparison of the torque of an exported file, as MuJoCo computes it, with that of the arm."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from armid_ros.motion import FloatArray, Motion
 from armid_ros.robots import held_joints
 import numpy as np
 
-#: Random states that are compared.
+#: Number of random states that are compared.
 STATES = 50
 
 
@@ -29,14 +29,14 @@ def torque_check(exported: Exported, arm: ArmModel, seed: int = 0) -> dict[str, 
     arm : ArmModel
         The arm.
     seed : int
-        Of the states.
+        Seed of the states.
 
     Returns
     -------
     dict
         'program', 'states', the largest 'difference' [N m or N] and its 'share' of the largest
-        torque, and 'shapes' where those of an MJCF are not loaded; or 'not_checked' with the
-        reason. Dry friction counts as it is at any speed.
+        torque, and 'shapes' with the reason if MuJoCo cannot load the shapes of an MJCF; or
+        'not_checked' with the reason. Dry friction has its value in motion.
 
     """
     try:
@@ -74,7 +74,7 @@ def torque_check(exported: Exported, arm: ArmModel, seed: int = 0) -> dict[str, 
 
 
 def _shapes(spec: Any) -> dict[str, str]:
-    """Return why MuJoCo does not load the shapes of a file; empty where it does."""
+    """Return the reason why MuJoCo does not load the shapes of a file; empty if it does."""
     try:
         spec.compile()
     except (ValueError, RuntimeError) as error:

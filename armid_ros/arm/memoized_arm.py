@@ -1,6 +1,6 @@
 # Copyright 2026 The armid_ros developers
 # SPDX-License-Identifier: Apache-2.0
-"""An arm that is asked the same again and again while everything is compared with everything."""
+"""An arm with caches, for searches that evaluate the same motions many times."""
 
 from __future__ import annotations
 
@@ -19,20 +19,20 @@ _Result = TypeVar('_Result')
 
 class Regressors:
     """
-    Regressors of recorded motions, which are the same for all values of an arm.
+    Cache of the regressors of recorded motions, by motion and gravity.
 
-    Arms of one description that are asked about one motion differ in their values and in gravity.
+    Regressors do not depend on inertial parameters, so arms of one description share them.
 
     """
 
     def __init__(self) -> None:
         self._known: dict[tuple[object, ...], tuple[Motion, FloatArray]] = {}
         self._in_rows: dict[int, FloatArray | None] = {}
-        # bytes; larger regressors are computed whenever they are needed
+        # remaining memory of the cache [bytes]; regressors beyond it are not kept
         self._room = 1_000_000_000
 
     def of(self, arm: ArmModel, motion: Motion) -> FloatArray | None:
-        """Return the regressor of a motion, shape (N, n, 10 n); None where there is no room."""
+        """Return the regressor of a motion, shape (N, n, 10 n); None if memory is exhausted."""
         path = (motion.q, motion.dq, motion.ddq)
         gravity = tuple(np.asarray(arm.body.gravity).tolist())
         key = *(array.ctypes.data for array in path), len(motion), gravity, arm.quasi_static
@@ -48,7 +48,7 @@ class Regressors:
     def in_rows(
         self, columns: FloatArray, reduce: Callable[[FloatArray], FloatArray]
     ) -> FloatArray:
-        """Return columns in rows; a regressor of a motion has one filter."""
+        """Return filtered columns, cached for a known regressor; each has only one filter."""
         if id(columns) not in self._in_rows:
             return reduce(columns)
         rows = self._in_rows[id(columns)]
@@ -59,7 +59,7 @@ class Regressors:
 
 @dataclass(frozen=True, repr=False)
 class _Memoized(ArmModel):
-    """An arm with caches of torques and regressors; arms made of it share the regressors."""
+    """An arm with caches of torques and regressors; copies of it share the regressors."""
 
     regressors: Regressors = field(default_factory=Regressors, compare=False)
 
@@ -75,23 +75,23 @@ class _Memoized(ArmModel):
         return result
 
     def link_motion(self, motion: Motion) -> Motion:
-        """Return where the links are along a recorded motion."""
+        """Return the true motion of the links for a recorded motion."""
         if self.action().displacement is None:
             return motion
         return self._once('link', motion, super().link_motion)
 
     def link_frames(self, motion: Motion) -> LinkFrames:
-        """Return where all links are along a recorded motion."""
+        """Return the frames of all links along a recorded motion."""
         return self._once('frames', motion, super().link_frames)
 
     def _regressor(self, motion: Motion) -> FloatArray | None:
-        """Return the regressor where links move as was recorded, and there is room for it."""
+        """Return the cached regressor; None if links move otherwise, or memory is exhausted."""
         if self.action().displacement is not None:
             return None
         return self.regressors.of(self, motion)
 
     def load(self, motion: Motion) -> FloatArray:
-        """Return what the rigid body takes, shape (N, n) [N m]."""
+        """Return the torque of the rigid body along a motion of the links, (N, n) [N m]."""
         return np.array(self._once('load', motion, self._load))
 
     def _load(self, motion: Motion) -> FloatArray:
@@ -111,7 +111,7 @@ class _Memoized(ArmModel):
         return self._once('gravity', motion, super().gravity_columns)
 
     def smoothed(self, motion: Motion) -> Motion:
-        """Return a recorded motion without what is beyond its band."""
+        """Return a recorded motion without frequencies beyond its band."""
         return self._once('smooth', motion, super().smoothed)
 
     def load_derivatives(self, motion: Motion) -> tuple[FloatArray, FloatArray, FloatArray]:
@@ -119,7 +119,7 @@ class _Memoized(ArmModel):
         return self._once('derivatives', motion, super().load_derivatives)
 
     def link_torque_derivatives(self, motion: Motion) -> tuple[FloatArray, FloatArray] | None:
-        """Differentiate what holds the links by position and velocity, each (N, n, n)."""
+        """Differentiate torques on the link side by q and dq, each (N, n, n); None without any."""
         return self._once('holding', motion, super().link_torque_derivatives)
 
     def joint_torque(self, motion: Motion) -> FloatArray:
@@ -142,7 +142,7 @@ def plain_arm(arm: ArmModel) -> ArmModel:
 def rigid_rows(
     arm: ArmModel, motion: Motion, reduce: Callable[[FloatArray], FloatArray]
 ) -> FloatArray:
-    """Return the sensitivities to rigid parameters in rows, (M, n, 10 n), by a motion's filter."""
+    """Return the filtered sensitivities to the rigid parameters, (M, n, 10 n)."""
     columns = arm.rigid_columns(motion)
     return (
         arm.regressors.in_rows(columns, reduce) if isinstance(arm, _Memoized) else reduce(columns)

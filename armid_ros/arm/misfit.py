@@ -1,13 +1,13 @@
 # Copyright 2026 The armid_ros developers
 # SPDX-License-Identifier: Apache-2.0
 """
-What a model leaves of the recordings it was tried on, kept in model.yaml.
+The misfit of a model: its residual in the recordings of its identification, kept in model.yaml.
 
-No real arm is as its model to the noise. A diagnosis that asks what has changed measures in units
-of what the model left before. The block ``misfit`` of model.yaml has ``unit``, ``data`` - held-out
-or training -, ``rms`` of the residual by joint, and ``relative_error_percent`` of the torque. What
-a model gets wrong of an arm grows with what the arm does: ``torque_rms`` says what it did. Rows of
-a wider band have more noise: ``filters`` says behind which it was measured.
+No real arm agrees with its model to within the noise, so a diagnosis of changes measures them in
+units of the misfit. The block ``misfit`` of model.yaml has ``unit``, ``data`` (held-out or
+training), ``rms`` of the residual by joint, and ``relative_error_percent`` of the torque. As a
+misfit grows with the torque, ``torque_rms`` has the torque of these recordings. As it includes
+noise, ``filters`` has the filters behind which it was measured.
 
 """
 
@@ -32,7 +32,7 @@ class RowFilters(NamedTuple):
     """
     Filters of the rows: sampling rate and cut-off [Hz], and decimation.
 
-    They are those of `armid_ros.identification.rows.signals.Conditioning`.
+    The fields are those of `armid_ros.identification.rows.signals.Conditioning`.
 
     """
 
@@ -55,14 +55,14 @@ class Misfit:
     relative_error_percent : float
         100 |tau - tau_hat| / |tau| over all joints.
     torque_rms : mapping of str to float, or None
-        Root mean square torque of each joint [N m]; None where it is not known.
+        Root mean square torque of each joint [N m]; None if unknown.
     information : ndarray, shape (P, P), or None
-        What the recordings tell of the parameters of the model that it was identified from (the
-        inverse of a covariance), where it is known; model.yaml does not have it.
+        Inverse covariance of the parameters by the recordings of the identification; None if
+        unknown. model.yaml does not have it.
     unusable : bool
-        Whether the model was called unusable when it was identified; model.yaml does not have it.
+        Whether the grade of the identification was unusable; model.yaml does not have it.
     filters : RowFilters or None
-        What it was measured behind; None where it is not known.
+        Filters of the data of the misfit; None if unknown.
 
     """
 
@@ -97,13 +97,13 @@ class Misfit:
         robot : Robot
             The arm.
         torque_rms : ndarray, shape (n,), optional
-            Root mean square torque of other recordings [N m]: where it is more, so is what is
-            left.
+            Root mean square torque of other recordings [N m]; the residual is scaled up where
+            this torque is larger.
 
         Raises
         ------
         ModelError
-            If it does not say what is left of a joint.
+            If the misfit has no value for a joint.
 
         """
         missing = [joint for joint in robot.joints if joint not in self.rms]
@@ -124,7 +124,7 @@ def louder(now: FloatArray, before: FloatArray) -> FloatArray:
 
 def load_misfit(path: str | Path) -> Misfit | None:
     """
-    Read the residual of a model from when it was identified; None if the file has none.
+    Read the misfit of a model from model.yaml; None if the file has none.
 
     Parameters
     ----------
@@ -134,7 +134,7 @@ def load_misfit(path: str | Path) -> Misfit | None:
     Raises
     ------
     ModelError
-        Naming the file and what is wrong in it.
+        If the file is invalid; the message names the file and the fault.
 
     """
     path = Path(path)
@@ -156,7 +156,7 @@ def misfit_of_block(block: Any) -> Misfit:
     if data not in _DATA:
         raise ModelError(f"misfit has data '{data}', not {' or '.join(_DATA)}")
     if loud is not None and not loud.keys() >= rms.keys():
-        raise ModelError('misfit: torque_rms is not of the joints that rms is of')
+        raise ModelError('misfit: torque_rms lacks joints of rms')
     relative = finite(error, 'relative_error_percent of the misfit')
     return Misfit(data, rms, relative, loud, filters=filters)
 

@@ -1,10 +1,10 @@
 # Copyright 2026 The armid_ros developers
 # SPDX-License-Identifier: Apache-2.0
 """
-What a model.yaml has to be before anything is made of it: the check that its readers share.
+The check of model.yaml that all its readers share.
 
-A key that is misspelt, a number that is none and another unit are refused with the line and the
-parameter, whether the file is simulated, diagnosed or compared.
+It rejects unknown keys, invalid numbers and wrong units. The error names the line and the
+parameter.
 
 """
 
@@ -34,12 +34,12 @@ def checked_model(text: str) -> dict[str, Any]:
     Parameters
     ----------
     text : str
-        What the file holds.
+        Content of the file.
 
     Raises
     ------
     ModelError
-        Naming the line, and the parameter with its joint.
+        If the document is invalid; the message names the line, and the parameter with its joint.
 
     """
     document = parsed_yaml(text, ModelError)
@@ -71,7 +71,7 @@ def wrong_unit(row: Mapping[str, Any], units: Collection[str]) -> str:
 def _rows(
     document: Mapping[str, Any], text: str
 ) -> Iterator[tuple[tuple[str | int, ...], Any, tuple[str, ...]]]:
-    """Yield where each parameter is, the parameter, and the units it may have; none if any."""
+    """Yield the place of each parameter, the parameter, and its permitted units (empty: any)."""
     for k, row in enumerate(document['rigid_parameters']):
         yield ('rigid_parameters', k), row, link_unit(_name(row))
     for k, entry in enumerate(document['effects']):

@@ -1,14 +1,14 @@
 # Copyright 2026 The armid_ros developers
 # SPDX-License-Identifier: Apache-2.0
 """
-model.yaml: an arm model as a file that a person can read and a simulator can load.
+model.yaml: an arm model as a file for people and simulators.
 
 Schema armid/model/1: ``robot`` (shipped name or path of the description), ``gravity`` [m/s^2],
 ``rigid_parameters`` and ``effects``, each a list of parameters with name, joint, value, std, unit.
-A std of null says that the data did not determine the parameter on its own. An effect has
-``shapes`` as well if the torque is not linear in all that describes it, and ``partner`` and
-``ties`` - points of both machines, in the frames of their joints [m] - if it ends at another one.
-A model that was identified has ``misfit`` as well: what it leaves of recordings, see `Misfit`.
+A std of null means that the data did not determine the parameter on its own. An effect with
+nonlinear parameters also has ``shapes``. An effect that ties the arm to another machine also has
+``partner`` and ``ties``: points of both machines, in the frames of their joints [m]. An identified
+model also has ``misfit``; see `Misfit`.
 
 """
 
@@ -60,12 +60,12 @@ def model_text(
     arm : ArmModel
         The model.
     robot : str
-        Shipped name or path of the description it belongs to.
+        Shipped name or path of the description.
     estimate : Estimate, optional
-        Where the standard deviations come from; a parameter has one if it was estimated by itself
-        and not in a group.
+        Estimate with the standard deviations; only parameters that were estimated by themselves,
+        and not in a group, have one.
     misfit : Misfit, optional
-        What the model leaves of recordings.
+        Misfit of the model.
 
     """
     arm = in_words(arm)
@@ -116,16 +116,16 @@ def save_model(
     arm : ArmModel
         The model.
     robot : str
-        Shipped name or path of the description; a relative one from the file's own folder.
+        Shipped name or path of the description; a relative path starts at the folder of the file.
     estimate : Estimate, optional
-        Where the standard deviations come from.
+        Estimate with the standard deviations.
     misfit : Misfit, optional
-        What the model leaves of recordings.
+        Misfit of the model.
 
     Raises
     ------
     OSError
-        The file cannot be written.
+        If the file cannot be written.
 
     Examples
     --------
@@ -148,8 +148,8 @@ def load_model(path: str | Path, robot: Robot | ArmModel | str | Path | None = N
     path : str or Path
         The file.
     robot : robot, model, name or path, optional
-        The description, where the one that the file names is not to be used; its inertial
-        parameters and gravity are replaced by the file's.
+        Description to use instead of the one in the file; its inertial parameters and gravity
+        are replaced by those of the file.
 
     Returns
     -------
@@ -159,9 +159,9 @@ def load_model(path: str | Path, robot: Robot | ArmModel | str | Path | None = N
     Raises
     ------
     ModelError
-        Naming the file and what is wrong in it.
+        If the file is invalid; the message names the file and the fault.
     RobotError
-        If the description is not there, or cannot be used.
+        If the description does not exist, or cannot be used.
 
     Examples
     --------
@@ -197,16 +197,16 @@ def read_model(text: str, robot: Robot, source: str) -> ArmModel:
     Parameters
     ----------
     text : str
-        As `model_text` makes it.
+        Content of a model.yaml, see `model_text`.
     robot : Robot
-        The description; its inertial parameters and gravity are replaced by the text's.
+        The description; its inertial parameters and gravity are replaced by those of the text.
     source : str
-        Where it came from, for messages.
+        Name of the source of the text, for messages.
 
     Raises
     ------
     ModelError
-        Naming the source and what is wrong in it.
+        If the text is invalid; the message names the source and the fault.
 
     """
     with reading(source, ModelError):

@@ -1,6 +1,6 @@
 # Copyright 2026 The armid_ros developers
 # SPDX-License-Identifier: Apache-2.0
-"""How the torque of an arm changes with its motion, all effects included."""
+"""Derivatives of the torque of an arm by its motion, with all effects."""
 
 from __future__ import annotations
 
@@ -16,19 +16,19 @@ import numpy as np
 @dataclass(frozen=True)
 class TorqueSlope:
     """
-    Derivatives of ``ArmModel.joint_torque`` along a motion.
+    Derivatives of the torque of an arm, ``ArmModel.joint_torque``, along a motion.
 
-    The direction of motion, which dry friction jumps with, counts as constant, and so does what
-    gives way between motors and links.
+    The direction of motion in dry friction, and the twist between motors and links, count as
+    constant.
 
     Attributes
     ----------
     motion : Motion
         N samples.
     by_q, by_dq, by_ddq : ndarray, shape (N, n, n)
-        [k, j, m]: derivative of the torque of joint j by the motion of joint m in that sample.
+        Derivatives; [k, j, m] is that of the torque of joint j by joint m in sample k.
     hysteresis : Hysteresis or None
-        What depends on the motion before a sample as well.
+        Friction that depends on the motion before a sample as well.
 
     """
 
@@ -64,7 +64,7 @@ class TorqueSlope:
         Parameters
         ----------
         weights : ndarray, shape (N, n)
-            One per torque.
+            Weight of each joint torque.
 
         Returns
         -------

@@ -1,6 +1,6 @@
 # Copyright 2026 The armid_ros developers
 # SPDX-License-Identifier: Apache-2.0
-"""An arm with more effects, each said in the words of the catalogue."""
+"""An arm with more effects, each translated into effects of the catalogue."""
 
 from __future__ import annotations
 
@@ -40,10 +40,10 @@ def place_in(arm: ArmModel, effect: Effect) -> tuple[int, list[int]] | None:
 
 def in_words(arm: ArmModel) -> ArmModel:
     """
-    Return the arm with its effects expressed by those of the catalogue.
+    Return the arm with its effects translated into those of the catalogue.
 
-    What only a search looks for, such as a gravity vector, is said as others are: a tilted base
-    and the magnitude of gravity.
+    An effect that only a search uses, such as a gravity vector, becomes several effects: a tilted
+    base and the magnitude of gravity.
 
     """
     said = replace(arm, effects=(), values=())

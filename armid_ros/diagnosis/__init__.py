@@ -4,8 +4,8 @@
 Diagnosis: where model and measurement disagree, and which effect is missing.
 
 ``diagnose`` names the missing effects, ``diagnosis_document`` returns the result as a document,
-``next_run`` plans the motion that separates two names, ``known_misfit`` measures what a model
-leaves, for later diagnoses.
+``next_run`` plans the motion that separates two names, ``known_misfit`` measures the misfit of a
+model for later diagnoses.
 
 """
 

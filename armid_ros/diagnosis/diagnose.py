@@ -3,8 +3,8 @@
 """
 The diagnosis: from recordings and a model to a verdict.
 
-The model is tried as given, with single causes added (which shows errors of the description), and
-with its rigid body and known effects fitted anew, where only its structure counts.
+Two models are compared with the data, each with and without single causes: the model as given
+(which shows errors of the description), and the model with body and known effects fitted anew.
 
 """
 
@@ -40,26 +40,26 @@ from armid_ros.recording import Recording
 import numpy as np
 import numpy.typing as npt
 
-#: Verdicts by which a gap stays open.
+#: Verdicts that leave a part of the gap without a cause.
 OPEN = ('unknown', 'partial')
-#: Called with the share that is done and what is being done.
+#: Called with the share of the work that is done, and the name of the present step.
 Progress = Callable[[float, str], None]
 
-#: Note where no two equal periods measure the noise.
+#: Note on recordings without two equal periods, whose difference would measure the noise.
 _ASSUMED = (
     'noise of recordings without two equal periods is estimated from differences between '
     'neighbouring samples'
 )
-#: Note where a cause acts for a part of the time, and only a baseline would show it elsewhere.
+#: Note where a cause acts for a part of the time and no baseline shows when in held-out data.
 _NOT_TIMED = (
     'held-out recordings are not used: without a baseline, the seconds in which the cause acts in '
     'them are not determined'
 )
-#: Fault where predicting no torque at all would be better.
+#: Fault where the residual of the baseline is larger than its torque.
 _NO_MODEL = (
-    'the model leaves {:.3g} times the torque of the baseline itself, more than no model would. '
-    'It is that of another arm, or has other units. Identify the arm from the baseline, and give '
-    'that model'
+    'the residual of the model is {:.3g} times the torque of the baseline, so it is worse than no '
+    'model. It belongs to another arm, or has other units. Identify the arm from the baseline, '
+    'and give that model'
 )
 #: Time by which the beginning and the end of a span are uncertain [s].
 _UNSURE = 0.25
@@ -77,7 +77,7 @@ def diagnose(
     progress: Progress | None = None,
 ) -> Diagnosis:
     """
-    Find what a model lacks.
+    Find the effects that a model lacks, or that have changed.
 
     Parameters
     ----------
@@ -88,22 +88,22 @@ def diagnose(
     validate : sequence of Recording
         Recordings that are predicted and not fitted.
     baseline : sequence of Recording
-        Recordings from when nothing was wrong, such as those the model was identified from: their
-        residual is the model's own misfit, and the diagnosis asks what has changed since.
+        Recordings from when nothing was wrong, such as those the model was identified from. Their
+        residual is the misfit of the model, and the diagnosis finds what has changed since.
     misfit : Misfit, optional
-        Misfit of the model when it was identified. A baseline measures it, and is doubted where
-        the model leaves much more of it.
+        Misfit of the model when it was identified. The result is in doubt if the residual of the
+        baseline is much larger.
     settings : DiagnosisSettings, optional
-        Library and thresholds.
+        Catalogue and thresholds.
     rng : numpy.random.Generator
-        Draws the states over which base parameters are found, and resamplings of the data.
+        Draws the random states from which base parameters are found, and resamples the data.
     progress : callable, optional
-        Called with the share that is done and what is being done.
+        Called with the share of the work that is done, and the name of the present step.
 
     Returns
     -------
     Diagnosis
-        Verdict, names, patched model.
+        Verdict, named effects, patched model.
 
     Raises
     ------
@@ -163,7 +163,7 @@ def diagnose(
 
 
 def _hardly_explained(result: Diagnosis, settings: DiagnosisSettings) -> bool:
-    """Return whether a gap stays open, or no named cause explains more than half of it."""
+    """Return whether the verdict leaves a gap, or no named cause explains half of the gap."""
     largest = max((one.share for one in result.findings), default=0.0)
     return result.verdict in OPEN or largest <= settings.thresholds.open_share
 
@@ -174,7 +174,7 @@ def _within(
     explainer: Explainer,
     read: tuple[Sequence[Recording], Sequence[Recording], Sequence[Recording]],
 ) -> Diagnosis | None:
-    """Diagnose only the seconds in which a cause acts; None if that explains no more."""
+    """Diagnose only the seconds in which a cause acts; None if no cause explains the gap there."""
     settings, look = explainer.settings, chosen.look
     recordings, validate, baseline = read
     if not settings.spans or look is None or not _hardly_explained(result, settings):
@@ -222,7 +222,7 @@ def _each_alone(
     used: Conditioning,
     explainer: Explainer,
 ) -> Diagnosis:
-    """Return the result; bad data if it is open or in doubt and some recordings are faulty."""
+    """Return the result, or `bad_data` if it is open or in doubt and a recording is faulty."""
     arm = explainer.arm
     open_or_doubted = result.verdict in OPEN or bool(result.doubt)
     if not open_or_doubted or explainer.settings.partner is not None:
@@ -235,7 +235,7 @@ def _each_alone(
 def _apart(
     arm: ArmModel, day: Sequence[Recording], used: Conditioning
 ) -> Iterator[tuple[Recording, npt.NDArray[np.bool_]]]:
-    """Yield recordings with the joints whose model is unusable in them, and usable in others."""
+    """Yield recordings with joints that the model fits in other recordings and not in this one."""
     unit = np.ones(arm.robot.n_joints)
     bad, sound = np.zeros((2, len(day), len(unit)), dtype=bool)
     for k, one in enumerate(day):
@@ -251,7 +251,7 @@ def _apart(
 def _said(
     chosen: Chosen, notes: Sequence[str], explainer: Explainer, doubt: str, given: ArmModel
 ) -> Diagnosis:
-    """Turn an explanation into a diagnosis; shares are measured on held-out data."""
+    """Return the diagnosis of an explanation; shares are measured on held-out data."""
     arm, settings, before = explainer.arm, explainer.settings, explainer.baseline
     explainer.tell(0.85, 'held-out gap')
     explanation, said = as_bodies(chosen.explanation)
@@ -317,7 +317,7 @@ def _remarks(
     doubt: str,
     explainer: Explainer,
 ) -> list[str]:
-    """Return remarks: why the model is not patched or in doubt, and what was not checked."""
+    """Return remarks: why the model is not patched or in doubt, and which joints are unchecked."""
     still = ', '.join(not_shown(explainer.prepared.data, explainer.arm.robot.joints))
     names = ' and '.join(one.name.replace('_', ' ') for one in found)
     remarks = {

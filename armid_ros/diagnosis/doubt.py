@@ -1,6 +1,6 @@
 # Copyright 2026 The armid_ros developers
 # SPDX-License-Identifier: Apache-2.0
-"""Why a model may be none of the arm: what it leaves of recordings in which nothing was wrong."""
+"""Whether a model may belong to another arm: its residual in the baseline is too large."""
 
 from __future__ import annotations
 
@@ -21,8 +21,8 @@ from armid_ros.recording import Recording
 import numpy as np
 
 _UNUSABLE = (
-    'The model was unusable when it was identified (see its identification.json): its residual is '
-    'no measure of a change.'
+    'The model was unusable when it was identified (see its identification.json): its residual '
+    'does not measure a change.'
 )
 
 
@@ -41,13 +41,13 @@ def doubt_of(
     arm : ArmModel
         The model.
     baseline : Baseline or None
-        What it leaves of recordings in which nothing was wrong.
+        Residual of the model in recordings in which nothing was wrong.
     recordings : sequence of Recording
-        These recordings.
+        Recordings of the baseline.
     misfit : Misfit or None
-        What it left when it was identified.
+        Misfit of the model when it was identified.
     thresholds : Thresholds
-        How much a misfit varies from motion to motion.
+        Factors by which a misfit varies from motion to motion.
 
     """
     unusable = _UNUSABLE if misfit is not None and misfit.unusable else ''
@@ -62,9 +62,9 @@ def doubt_of_names(findings: Sequence[Finding]) -> str:
     for one in findings:
         if one.name in CATALOGUE and CATALOGUE[one.name].traits.corrects:
             return (
-                f'Links do not change between two days: unless that of {" and ".join(one.joints)} '
-                'was exchanged or something was bolted to it, what is not in the catalogue acts '
-                'like it.'
+                'Links do not change between two days. Unless the link of '
+                f'{" and ".join(one.joints)} was exchanged or something was bolted to it, a cause '
+                'outside of the catalogue resembles this change.'
             )
     return ''
 
@@ -84,19 +84,19 @@ def _changed(
         return times, times / most
 
     times, beyond = compared(baseline)
-    if misfit.filters is not None and beyond.max() > 1.0:  # behind others there is more noise
+    if misfit.filters is not None and beyond.max() > 1.0:  # other filters pass more noise
         try:
             parts = trajectories(recordings, Conditioning(*misfit.filters), arm)
-        except IdentificationError:  # too short for them, or of a lower rate: nothing to compare
+        except IdentificationError:  # too short for these filters, or sampled more slowly
             return ''
         times, beyond = compared(Baseline.of(arm, parts, np.random.default_rng(0)))
     worst = int(np.argmax(beyond))
     if beyond[worst] <= 1.0:
         return ''
     return (
-        f'In the baseline the model leaves {times[worst]:.1f} times as much in '
-        f'{arm.robot.joints[worst]} as when it was identified. It is not what the model was '
-        'identified from, or something had changed by then.'
+        f'In the baseline, the residual of {arm.robot.joints[worst]} is {times[worst]:.1f} times '
+        'that of the identification. The model was not identified from this baseline, or '
+        'something had changed by then.'
     )
 
 
@@ -113,6 +113,6 @@ def _poor(arm: ArmModel, baseline: Baseline) -> str:
     if not bad:
         return ''
     return (
-        f'In the baseline itself the model leaves {", ".join(bad)}: is it the model of this arm? '
-        'A change of less is not seen.'
+        f'In the baseline, the residual of the model is {", ".join(bad)}: is it the model of this '
+        'arm? Smaller changes are not seen.'
     )

@@ -22,11 +22,11 @@ from armid_ros.motion import FloatArray
 from armid_ros.recording import given_twice, Recording
 import numpy as np
 
-#: A diagnosis keeps six times the band of the motion where an identification keeps ten: what is
-#: beyond is mostly noise, which a gap has to stand out from.
+#: Kept band over the band of the motion. An identification keeps ten times the band, but the upper
+#: part is mostly noise, which would hide a gap.
 _BANDS = 6.0
-#: With a partner, noise of angles dominates. The pass band is wider by this factor than where the
-#: motion falls below it; else a fit reduces inertias to get rid of the noise of accelerations.
+#: Pass band over the band in which the motion exceeds the noise of angles, with a partner. Noise
+#: dominates beyond it, and a fit would reduce inertias to fit the noise of accelerations.
 _NARROW = 1.25
 
 
@@ -38,7 +38,7 @@ class Prepared:
     Attributes
     ----------
     used : Conditioning
-        Filters.
+        Filters and decimation.
     data : tuple of Trajectory
         Stretches of the recordings in rows.
     base : BaseParameters
@@ -46,7 +46,7 @@ class Prepared:
     floors : tuple of NoiseFloor
         Noise of each trajectory in the residual of the arm as fitted to the data.
     as_described : tuple of ndarray, shape (n,)
-        Noise in the residual of the arm as described; as in `floors` where nothing repeats [N m].
+        Noise in the residual of the arm as described [N m]; without equal periods as in `floors`.
 
     """
 
@@ -80,9 +80,9 @@ def choose_filters(
     rng: np.random.Generator,
 ) -> Conditioning:
     """
-    Return the filters of an identification, narrowed to what a diagnosis needs.
+    Return the filters of an identification, narrowed to the band that a diagnosis needs.
 
-    The effect of noise of positions is best seen in a baseline, where nothing is wrong.
+    The cut-off is chosen from the baseline if there is one: its residual has no missing effect.
 
     """
     used = conditioning([*recordings, *baseline], settings.signals)
@@ -110,9 +110,9 @@ def prepare(
     """
     Measure the noise of data, and which of their rows are informative.
 
-    Rows next to reversals are informative as far as noise exceeds the error of their friction.
-    Where the unit is a misfit they are not: dry friction is what a model gets wrong most, and
-    differently in every motion.
+    Rows next to reversals are informative if their noise exceeds the error of dry friction. With a
+    misfit as unit they are not informative: dry friction is the largest error of a model, and it
+    differs from motion to motion.
 
     """
     whole = arm.base_parameters(rng)
@@ -173,7 +173,7 @@ def mended(
     baseline: Sequence[Recording],
     settings: DiagnosisSettings,
 ) -> tuple[list[Recording], list[Recording], list[Recording], list[str]]:
-    """Return recordings without damaged samples, and notes of what was damaged and mended."""
+    """Return recordings without damaged samples, and notes on each damage and repair."""
     notes: list[str] = []
     whole: list[list[Recording]] = []
     for part in (recordings, validate, baseline):

@@ -1,6 +1,6 @@
 # Copyright 2026 The armid_ros developers
 # SPDX-License-Identifier: Apache-2.0
-"""What a user may choose of a diagnosis, and every number that decides a name."""
+"""Settings of a diagnosis, and every threshold that decides a name."""
 
 from __future__ import annotations
 
@@ -17,51 +17,49 @@ from armid_ros.identification import SignalSettings
 @dataclass(frozen=True)
 class Thresholds:
     """
-    The thresholds of the diagnosis. Shares are of the held-out squares in the unit of the gap.
+    The thresholds of the diagnosis. Shares are of the squared held-out residual, in its unit.
 
     Attributes
     ----------
     alarm : float
-        Log odds from which something is there, or has changed: 50 to 1.
+        Log odds required to accept that an effect is there, or has changed: 50 to 1.
     alone : float
-        Log odds from which a cause may be it, where something surely is there.
+        Log odds required of a cause and of its rivals, once one of them reaches `alarm`: 7 to 1.
     tie : float
-        Log odds within which two causes are tied: 20 to 1.
+        Log odds within which two causes are rivals: 20 to 1.
     inexact : float
-        Share of what a cause explains by which its law is inexact: a lead of less is none, and a
-        joint that has less of it is not where the gap is.
+        Relative error of the law of a cause: a lead below this share of the explained part does
+        not count, nor does a joint with less than this share of the gap.
     headline : float
-        Share that a cause takes of a gap beside the misfit that a model had before, below which it
-        is small print.
+        Share of the gap below which a cause is minor, if the model has a known misfit.
     same_fit : float
-        Factor between losses of two explanations that are as good as each other where the unit is
-        a misfit of other data, which varies so from motion to motion as a rule, or a noise that
-        is assumed because nothing repeats. What holds a joint at rest varies so, too.
+        Largest ratio of the losses of two equally good explanations, if the unit is a misfit or
+        an assumed noise: both vary by this factor from motion to motion. The torque that holds a
+        joint at rest varies by it, too.
     uncertain : float
-        Share of the noise of a row that dry friction may be wrong by where the sign of a velocity
-        is uncertain: beside reversals it is wrong by 0.5 to 2 times itself in five kinds of arms.
+        Largest error of dry friction in an informative row, over its noise. Next to reversals,
+        dry friction is wrong by 0.5 to 2 times itself in five kinds of arms.
     least_visible : float
-        A group of which what is free leaves less than this share of its columns is not visible.
+        Smallest share of its columns that a visible cause has beyond the nuisance columns.
     confidence : float
-        Level, of all joints together, up to which what is left counts as noise that two periods
-        measure so well: of a thousand healthy arms one is `unknown`.
+        Confidence, over all joints, up to which a residual counts as noise measured by two
+        periods: of a thousand healthy arms one is `unknown`.
     predicted : float
-        Factor by which squares may be larger on motions that were not used: values that other data
-        gave are not exact there, and a misfit is another one.
+        Factor by which the squared residual may be larger in motions that were not fitted: the
+        parameters are not exact there, and the misfit differs.
     open_share : float
-        Share of the gap that names have to take where recordings do not tell a change from the
-        misfit of another motion; less of it is hardly explained.
+        Share of the gap that named causes have to explain, if the recordings do not separate a
+        change from the misfit of another motion.
     surely : float
-        Deviations that noise may make: a value may be beyond what is possible by so many, and a
-        joint is worse, or held, beyond them.
+        Standard deviations attributed to noise: a value may exceed its bound by as many, and a
+        joint is worse, or held, only beyond them.
     one_period : float
-        Power of the difference of two periods at low frequency over that at high frequency from
-        which something happened in one of them only: 3.6 at the most in 60 sets of the laboratory
-        in which nothing did.
+        Power of the difference of two periods at low over high frequency that shows an event in
+        one of them: at most 3.6 in 60 sets of the laboratory without events.
     one_period_on_average : float
-        The same as the mean of three recordings or more: 2.4 at the most in those. Noise that
-        lasts for 80 ms makes up to 3.7, and what happens in one period 3.7 and more: an alarm
-        goes before a contact that is not seen.
+        The same ratio as a mean of three recordings or more: at most 2.4 in these sets. Noise
+        correlated over 80 ms reaches 3.7, and events in one period start there. A false alarm is
+        preferred to an unseen contact.
 
     """
 
@@ -89,29 +87,29 @@ class Thresholds:
 @dataclass(frozen=True)
 class DiagnosisSettings:
     """
-    What a user chooses.
+    Settings of a diagnosis, chosen by the user.
 
     Attributes
     ----------
     library : tuple of str
-        Names that may be given.
+        Effects of the catalogue that may be named.
     own : tuple of Kind
-        Effects of one's own that may be named besides.
+        Effects of the user that may be named as well.
     partner : Partner or None
-        Another machine that was recorded beside the arm, to which it may be tied. What holds the
-        arm is then looked for between the two, and not at unknown places.
+        Another machine that was recorded with the arm, to which it may be tied. Springs and
+        contacts are then searched for between the two, and not at unknown places.
     signals : SignalSettings
         Filters; chosen from the recordings by default.
     material : float
-        Share of a joint's torque, root mean square, below which a cause does not matter [-].
+        Share of a joint's rms torque below which a cause is not material [-].
     everything : bool
-        Whether causes that do not matter are added to the patched model as well.
+        Whether causes that are not material are added to the patched model as well.
     spans : bool
-        Whether causes may act for a part of the time, where a gap stays open otherwise.
+        Whether causes that act for a part of the time are tried if a gap stays open.
     prior : mapping of str to str
         How often effects happen to this arm, by name: often, usual, seldom or never.
     thresholds : Thresholds
-        The numbers that decide.
+        The thresholds of the decisions.
 
     Raises
     ------

@@ -214,7 +214,7 @@ class Effect(ABC):
         return np.full(len(self.parameters(robot)), np.inf)
 
     def shape_parameters(self, robot: Robot) -> tuple[ParameterName, ...]:
-        """Name the shape parameters, owner by owner."""
+        """Return the names of the shape parameters, owner by owner."""
         return tuple(
             ParameterName(s.name, owner, joint_unit(s.unit, owner, robot))
             for owner in self.owners
@@ -246,7 +246,7 @@ class Effect(ABC):
         return self.joints or ('',)
 
     def parameters(self, robot: Robot) -> tuple[ParameterName, ...]:
-        """Name the P parameters, owner by owner."""
+        """Return the names of the P parameters, owner by owner."""
         return tuple(
             ParameterName(q.name, owner, joint_unit(q.unit, owner, robot), self.name)
             for owner in self.owners
@@ -356,7 +356,7 @@ class Arm(Protocol):
 
     @property
     def robot(self) -> Robot:
-        """The robot."""
+        """The described robot."""
 
     @property
     def body(self) -> Robot:

@@ -222,8 +222,8 @@ def _number(text: str, effect: Effect, key: str, number: str) -> float:
         raise ModelError(f"{text}: '{number}' is not a number; write {effect.name}:{key}=0.1")
     first = effect.quantities[0].name
     raise ModelError(
-        f"{text}: '{key}' has no value. A value is that of every joint; for another one in each "
-        f'joint give the effect several times, as {effect.name}@{effect.joints[0]}:{first}=0.1'
+        f"{text}: '{key}' has no value. One value applies to all joints; for separate values, "
+        f'give the effect once per joint, as {effect.name}@{effect.joints[0]}:{first}=0.1'
     )
 
 

@@ -39,7 +39,7 @@ class BlurredMotion(Motion):
 
 def direction(motion: Motion, joints: Sequence[int] | None = None) -> FloatArray:
     """
-    Return the direction of motion.
+    Return the sign of the velocity of each joint, or of a shaft.
 
     Parameters
     ----------

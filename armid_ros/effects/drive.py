@@ -40,12 +40,12 @@ class RotorInertia(Effect):
         return joint_columns(self, motion, motion.ddq)
 
     def action(self, values: FloatArray, arm: Arm) -> Action:
-        """Return the inertia on the diagonal."""
+        """Return an action with the rotor inertias on the diagonal of the inertia matrix."""
         (inertia,) = scatter(self, values, arm.robot)
         return Action(inertia=np.diag(inertia))
 
 
-#: Lowest order of a ripple [1/rev]; gravity and springs have lower orders.
+#: Lowest order of a ripple [1/rev] (gravity has lower ones); factor by which fits exceed it.
 _SLOWEST, _EDGE = 1.5, 1.05
 
 
@@ -98,7 +98,7 @@ class TorqueRipple(Effect):
         return joint_columns(self, motion, np.sin(angle), np.cos(angle))
 
     def action(self, values: FloatArray, arm: Arm) -> Action:
-        """Return the torque."""
+        """Return an action with the ripple torque."""
         (order,) = self.shape_over_joints(arm.robot)
         sine, cosine = scatter(self, values, arm.robot)
 

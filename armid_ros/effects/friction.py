@@ -35,7 +35,7 @@ class ViscousFriction(Effect):
         return joint_columns(self, motion, motion.dq)
 
     def action(self, values: FloatArray, arm: Arm) -> Action:
-        """Return the damping matrix."""
+        """Return an action with the damping matrix."""
         (viscous,) = scatter(self, values, arm.robot)
         return Action(damping=np.diag(viscous))
 
@@ -61,7 +61,7 @@ class CoulombFriction(Effect):
         return joint_columns(self, motion, direction(motion))
 
     def action(self, values: FloatArray, arm: Arm) -> Action:
-        """Return dry friction between -Fc and Fc."""
+        """Return an action with dry friction between -Fc and Fc."""
         (coulomb,) = scatter(self, values, arm.robot)
         return Action(dry_friction=DryFriction(np.eye(len(coulomb)), -coulomb, coulomb))
 
@@ -132,7 +132,7 @@ class QuadraticFriction(Effect):
         return joint_columns(self, motion, motion.dq * np.abs(motion.dq))
 
     def action(self, values: FloatArray, arm: Arm) -> Action:
-        """Return the torque."""
+        """Return an action with the torque that is quadratic in the velocity."""
         (quadratic,) = scatter(self, values, arm.robot)
 
         def torque(t: FloatArray, q: FloatArray, dq: FloatArray) -> FloatArray:
@@ -168,7 +168,7 @@ class StribeckFriction(Effect):
         return joint_columns(self, motion, self._left(motion.dq, arm) * direction(motion))
 
     def action(self, values: FloatArray, arm: Arm) -> Action:
-        """Return dry friction of the breakaway torque, and its decrease with velocity."""
+        """Return an action with dry friction of breakaway, and its decrease with velocity."""
         (breakaway,) = scatter(self, values, arm.robot)
 
         def torque(t: FloatArray, q: FloatArray, dq: FloatArray) -> FloatArray:
@@ -213,7 +213,7 @@ class ThermalFriction(Effect):
         return joint_columns(self, motion, self._warm(motion.t, arm) * motion.dq)
 
     def action(self, values: FloatArray, arm: Arm) -> Action:
-        """Return the torque."""
+        """Return an action with the change of the viscous torque."""
         (change,) = scatter(self, values, arm.robot)
 
         def torque(t: FloatArray, q: FloatArray, dq: FloatArray) -> FloatArray:
@@ -249,12 +249,12 @@ class ThermalChange(ThermalFriction):
         return joint_columns(self, motion, self._warm(motion.t, arm) * motion.dq, motion.dq)
 
     def action(self, values: FloatArray, arm: Arm) -> Action:
-        """Return the sum of both torques."""
+        """Return an action with the sum of both viscous torques."""
         both = self.named_as(values, arm)
         return merge_actions(arm.robot, [part.action(own, arm) for part, own in both])
 
     def named_as(self, values: FloatArray, arm: Arm) -> tuple[tuple[Effect, FloatArray], ...]:
-        """Return both effects."""
+        """Return thermal_friction and viscous_friction with their values."""
         change, first = values.reshape(-1, 2).T
         return (
             (ThermalFriction(self.joints, self.shape), change),

@@ -121,7 +121,7 @@ class GravityVector(_GravityEffect):
 
     @property
     def said_as(self) -> str:
-        """Return the name of the tilt."""
+        """Return the name of the effect in the catalogue, that of the tilt."""
         return BaseTilt.name
 
     def columns(self, motion: Motion, arm: Arm) -> FloatArray:

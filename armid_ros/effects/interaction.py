@@ -188,7 +188,7 @@ class InterfaceSlack(Attached):
             columns = thin.rest(straps)
             own, aim = np.sum(columns**2, axis=0), columns.T @ target
             gain = np.maximum(aim, 0.0) ** 2 / np.maximum(own, max(1e-12 * own.max(), 1e-300))
-            best = np.argsort(-gain)[:2]  # are compared with other causes
+            best = np.argsort(-gain)[:2]  # both are compared with other causes
             starts.append([(*shape[:3], *anchors[k], slacks[k]) for k in best])
         return tuple(np.array(starts).transpose(2, 0, 1))
 

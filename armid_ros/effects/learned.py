@@ -49,7 +49,7 @@ class TorqueMap:
     points : ndarray, shape (M, 3)
         Inducing points x_m: position [rad or m], velocity, load [N m or N].
     weights : ndarray, shape (M,)
-        a_m [N m or N].
+        Weights a_m [N m or N].
     noise : ndarray, shape (M,)
         Standard deviation of the torque at each point [N m or N].
     lengths : ndarray, shape (3,)
@@ -83,11 +83,11 @@ class TorqueMap:
             )
 
     def __eq__(self, other: object) -> bool:
-        """Compare all numbers."""
+        """Return whether another map has the same numbers."""
         return isinstance(other, TorqueMap) and self._numbers == other._numbers
 
     def __hash__(self) -> int:
-        """Hash all numbers."""
+        """Return a hash of all numbers of the map."""
         return hash(self._numbers)
 
     @property
@@ -195,7 +195,7 @@ class LearnedTorque(Effect):
             )
 
     def particulars(self) -> dict[str, Any]:
-        """Return the maps."""
+        """Return the maps for model.yaml."""
         rows = zip(self.joints, self.maps, strict=bool(self.maps))
         return {'maps': [{'joint': joint, **own.document()} for joint, own in rows]}
 
@@ -245,7 +245,7 @@ class LearnedTorque(Effect):
         return joint_columns(self, motion, self.torque(arm.body, link.q, link.dq))
 
     def action(self, values: FloatArray, arm: Arm) -> Action:
-        """Return the torque of the maps."""
+        """Return an action with the torque of the maps."""
         (share,) = scatter(self, values, arm.robot)
         robot = arm.robot
 
@@ -256,7 +256,7 @@ class LearnedTorque(Effect):
 
 
 def counted(inputs: FloatArray, knee: float) -> FloatArray:
-    """Return inputs (..., 3) with velocities on the scale with a knee."""
+    """Return inputs (..., 3) with velocities on the scale u of `TorqueMap`."""
     velocity = knee * np.arcsinh(inputs[..., 1] / knee)
     return np.stack([inputs[..., 0], velocity, inputs[..., 2]], axis=-1)
 

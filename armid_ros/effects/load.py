@@ -47,7 +47,7 @@ class _LinkBody(Effect):
         return described_spread(robot).ravel()[list(self.adds_to(robot))]
 
     def adds_to(self, robot: Robot) -> tuple[int, ...]:
-        """Return the rigid-body parameters of its links."""
+        """Return the indices of the rigid-body parameters of the links."""
         size = len(LINK_PARAMETERS)
         return tuple(size * joint + i for joint in self.indices(robot.joints) for i in range(size))
 

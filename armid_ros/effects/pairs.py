@@ -172,7 +172,7 @@ class JointCoupling(_Pairs):
         return combinations(joints, 2)
 
     def columns(self, motion: Motion, arm: Arm) -> FloatArray:
-        """Return dtau/dK [rad], shape (N, n, P)."""
+        """Return the derivative of the torque by the coupling stiffness, (N, n, P) [rad]."""
         q = arm.link_motion(motion).q
         columns = np.zeros((*q.shape, len(self.owners)))
         for position, (i, k) in enumerate(self.pairs(motion.joints)):
@@ -223,7 +223,7 @@ class TorqueCrosstalk(_Pairs, TorqueReading):
     def transfer(
         self, values: FloatArray, motion: Motion, tau: FloatArray, columns: FloatArray
     ) -> FloatArray:
-        """Apply the crosstalk to columns."""
+        """Return columns of true torques as columns of readings with crosstalk."""
         return np.asarray(columns + self._shares(values, motion) @ columns)
 
     def sensitivity(self, values: FloatArray, motion: Motion, tau: FloatArray) -> FloatArray:

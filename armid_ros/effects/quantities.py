@@ -82,7 +82,7 @@ class Quantity:
             size = min(size, drive if drive > 0.0 else np.inf)
         if self.typical is None:
             return size
-        # ten times a typical size, which is that of arms of up to 10 kg, or of a heavier arm more
+        # typical sizes are those of arms up to 10 kg; they grow with the mass of a heavier arm
         heavier = max(float(robot.rigid_parameters[::10].sum()) / 10.0, 1.0)
         return min(size, 10.0 * heavier * self.typical[1])
 

@@ -44,7 +44,7 @@ class Displacing(Effect):
         return arm.torque_change(motion, self.displacements(motion, arm))
 
     def action(self, values: FloatArray, arm: Arm) -> Action:
-        """Return the displacement in proportion to the values."""
+        """Return an action with a displacement in proportion to the values."""
 
         def displacement(motion: Motion) -> Displacement:
             parts = self.displacements(motion, arm)
@@ -92,7 +92,7 @@ class TorqueReading(Effect):
         return self.sensitivity(arm.values_of(self), motion, arm.torque_before(self, motion))
 
     def action(self, values: FloatArray, arm: Arm) -> Action:
-        """Return the law of the reading."""
+        """Return an action with the function from true torque to reading."""
         if not np.any(values):
             return Action()
 

@@ -120,8 +120,8 @@ class Catalogue(Mapping[str, type[Effect]]):
         there = self._kinds.get(kind.name)
         if there is not None and _home(there) != _home(kind):
             raise ModelError(
-                f"the name '{kind.name}' of {_home(kind)} is that of {_home(there)}; choose "
-                'another one'
+                f"the name '{kind.name}' of {_home(kind)} is already used by {_home(there)}; "
+                'choose another one'
             )
         taken = {
             name: other.name
@@ -132,7 +132,7 @@ class Catalogue(Mapping[str, type[Effect]]):
         for name in part_names(kind):
             if name in taken:
                 raise ModelError(
-                    f"{kind.name}: the name '{name}' is that of a quantity of "
+                    f"{kind.name}: the name '{name}' is already used by a quantity of "
                     f'{taken[name]}; one model may contain both, so choose another name'
                 )
         self._kinds[kind.name] = kind

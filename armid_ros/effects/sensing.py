@@ -36,7 +36,7 @@ class TorqueOffset(Effect):
         return joint_columns(self, motion, np.ones_like(motion.q))
 
     def action(self, values: FloatArray, arm: Arm) -> Action:
-        """Return the constant torque."""
+        """Return an action with the constant torque."""
         (offset,) = scatter(self, values, arm.robot)
 
         def torque(t: FloatArray, q: FloatArray, dq: FloatArray) -> FloatArray:
@@ -67,7 +67,7 @@ class TorqueGain(TorqueReading):
     def transfer(
         self, values: FloatArray, motion: Motion, tau: FloatArray, columns: FloatArray
     ) -> FloatArray:
-        """Scale columns."""
+        """Return columns of true torques, scaled to columns of readings."""
         return np.asarray(columns * self._gain(values, motion)[:, np.newaxis])
 
     def sensitivity(self, values: FloatArray, motion: Motion, tau: FloatArray) -> FloatArray:

@@ -81,7 +81,7 @@ class Hysteresis:
         q, dq : ndarray, shape (N, n)
             Positions and velocities, as for ``along``.
         weights : ndarray, shape (N, n)
-            One per torque.
+            Weight of each joint torque.
 
         Returns
         -------

@@ -67,7 +67,7 @@ class EffectCase:
         seed: int = 3,
     ) -> EffectCase:
         """
-        Make the test case of a class.
+        Make a test case of a class of effects.
 
         Parameters
         ----------

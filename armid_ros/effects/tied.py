@@ -84,8 +84,8 @@ class Tied(Attached):
     def _anchor(self, arm: Arm) -> Anchor:
         def unknown(t: FloatArray) -> tuple[FloatArray, FloatArray]:
             raise ModelError(
-                f'{self.name} of {", ".join(self.joints)} acts along recordings of '
-                f'{self.partner or "its partner"} alone; take it out of the model to simulate'
+                f'{self.name} of {", ".join(self.joints)} needs the recorded motion of '
+                f'{self.partner or "its partner"}; remove it from the model to simulate'
             )
 
         return self.anchor or unknown
@@ -161,7 +161,7 @@ class TiedKind:
 
     @property
     def name(self) -> str:
-        """Name in the catalogue."""
+        """Name of the effect in the catalogue."""
         return self.effect.name
 
     def places(self, robot: Robot) -> tuple[tuple[str, ...], ...]:
@@ -169,7 +169,7 @@ class TiedKind:
         return tuple((tie.joint,) for tie in self.ties)
 
     def as_change(self) -> TiedKind:
-        """Return the same kind."""
+        """Return the kind itself, which is used for changes as well."""
         return self
 
     def on(self, robot: Robot, joints: Sequence[str] | None = None) -> Effect:

@@ -152,7 +152,7 @@ def rate_of_change(t: FloatArray, x: FloatArray) -> FloatArray:
 def _require_change(t: FloatArray) -> None:
     if len(t) < 2:
         raise ModelError(
-            'delay, lag, elasticity and backlash depend on how the torque changes: they need a '
+            'delay, lag, elasticity and backlash depend on the rate of the torque: they need a '
             'motion of two samples or more'
         )
 

@@ -65,7 +65,7 @@ TRAITS = {
     'encoder_offset': Traits(
         shown_by='hard stops, or a payload at two poses',
         look_at='the zero of the encoder, at a mark or a stop of the joint',
-        sign='the joint is at its reading plus that',
+        sign='position is reading plus offset',
     ),
     'joint_elasticity': Traits(
         shown_by='a sweep of frequency through the resonance',
@@ -87,7 +87,7 @@ TRAITS = {
     'torque_gain': Traits(
         shown_by='the same motion with and without a known payload',
         look_at='the scale of the torque in the driver, of the sensor or of the motor constant',
-        sign='readings are 1 plus that times the torque',
+        sign='readings are 1 + error times the torque',
     ),
     'torque_drift': Traits(
         shown_by='the same static hold, repeated for half an hour',

@@ -91,13 +91,13 @@ class Backlash(Displacing):
     instantaneous = False
 
     def displacements(self, motion: Motion, arm: Arm) -> Displacement:
-        """Return minus the motor position within the gap over the gap, and its derivatives."""
+        """Return the negative motor position in the gap over its width, and its derivatives."""
         (width,) = self.shape_over_joints(arm.robot)
         load = arm.load(motion)
         inertia = np.diagonal(arm.load_derivatives(motion)[2], axis1=1, axis2=2)
         place = np.zeros(motion.q.shape)
         for joint in self.indices(motion.joints):
-            # kg m^2 of a link without inertia
+            # lower limit of the inertia, for a link without inertia [kg m^2]
             pull = load[:, joint] / np.maximum(inertia[:, joint], 1e-9)
             place[:, joint] = place_in_gap(motion.t, pull, float(width[joint]))
         return _twist(self, motion, place / width)

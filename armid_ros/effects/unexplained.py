@@ -10,7 +10,7 @@ from functools import cached_property
 from armid_ros.motion import FloatArray, Motion
 import numpy as np
 
-#: Number of wave orders that are compared, and of likely orders that are refined.
+#: Number of returned orders, of likely orders that are refined, and of finer steps per step.
 _MOST_PEAKS, _LIKELY, _FINER = 3, 12, 8
 
 
@@ -41,7 +41,7 @@ class Unexplained:
     beside: FloatArray
 
     def thinned(self, count: int) -> Unexplained:
-        """Return a given number of rows, spread evenly."""
+        """Return the residual in a given number of rows, spread evenly."""
         rows = np.unique(np.linspace(0, len(self.q) - 1, count).astype(int))
         parts = (self.q, self.residual, self.weight, self.beside)
         return Unexplained(self.motion, *(part[rows] for part in parts))
@@ -99,7 +99,7 @@ def wave_gains(
     angle: FloatArray, rest: FloatArray, weight: FloatArray, orders: FloatArray
 ) -> FloatArray:
     """
-    Return the reduction of the squares of a residual by a sine and cosine of each order, (K,).
+    Return the reduction of the squared residual by a sine and cosine of each order, (K,).
 
     With few cycles, orders leak into each other; least squares separate them better than a
     spectrum.

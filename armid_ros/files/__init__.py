@@ -3,10 +3,10 @@
 """
 Files as untrusted input, and as output that is whole or absent.
 
-Every reader of text goes through `read_text` (no FIFO, no device, a bounded size), `load_yaml` or
-`load_json` (bounded depth and expansion) and `reading`, which turns what a parser raises into the
-error of the package with the path. Every writer of results goes through `write_file`, inside the
-`result_folder` of its command and into what is `staged` there until all of it is written.
+Readers of text use `read_text` (no FIFO, no device, a bounded size), `load_yaml` or `load_json`
+(bounded depth and expansion) and `reading`, which converts errors of a parser into an error of the
+package with the path. Writers of results use `write_file`, inside the `result_folder` of the
+command. A result of several files is written into a `staged` folder until it is complete.
 
 """
 

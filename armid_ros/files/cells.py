@@ -1,17 +1,17 @@
 # Copyright 2026 The armid_ros developers
 # SPDX-License-Identifier: Apache-2.0
-"""Names that may hold any character, as cells of a CSV table and in lists of an option."""
+"""Names with any characters, as cells of a CSV table and in lists of an option."""
 
 from __future__ import annotations
 
 import re
 
-#: What begins a formula in a spreadsheet or a comment in our tables; an apostrophe guards it.
+#: First characters of formulas and comments; an apostrophe is written before such a cell.
 _GUARDED = ('=', '+', '-', '@', '#', '\t', '\r', "'")
 
 
 def csv_cell(name: str) -> str:
-    """Return a name as a cell: an apostrophe before what would be a formula, quotes as needed."""
+    """Return a name as a cell: with an apostrophe before a formula, and quotes as needed."""
     text = f"'{name}" if name.startswith(_GUARDED) else name
     if any(char in text for char in ',"\r\n'):
         text = '"' + text.replace('"', '""') + '"'
@@ -19,7 +19,7 @@ def csv_cell(name: str) -> str:
 
 
 def parted(text: str, separator: str = ',') -> list[str]:
-    """Split a text at a separator, except within double quotes, which stay."""
+    """Split a text at a separator, except within double quotes; the quotes are kept."""
     parts, last = [], 0
     for match in re.finditer(rf'"[^"]*"|{re.escape(separator)}', text):
         if match[0] == separator:
@@ -29,5 +29,5 @@ def parted(text: str, separator: str = ',') -> list[str]:
 
 
 def listed(text: str, separator: str = ',') -> tuple[str, ...]:
-    """Return the names of a list; one that has the separator is in double quotes."""
+    """Return the names of a list; a name with the separator is in double quotes."""
     return tuple(part.replace('"', '') for part in parted(text, separator))

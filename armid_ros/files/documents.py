@@ -1,10 +1,10 @@
 # Copyright 2026 The armid_ros developers
 # SPDX-License-Identifier: Apache-2.0
 """
-Documents in YAML and JSON, whatever is in them.
+Documents in YAML and JSON with untrusted content.
 
-The parser of a document sees nothing deeper or larger than a document of this package can be, and
-what it raises for content it did not expect becomes one error that names the file.
+Documents that are deeper or larger than any of this package are rejected before they are parsed.
+Errors of a parser become one error of the package that names the file.
 
 """
 
@@ -22,16 +22,16 @@ from typing import Any
 from armid_ros.errors import ArmidError
 import yaml
 
-#: Nesting beyond which a text is no document of this package; theirs have six levels at most.
+#: Largest nesting of a document; documents of this package have six levels at most.
 MAX_DEPTH = 64
-#: Largest number of a document. No quantity is as large, and products of three are still numbers.
+#: Largest number of a document. No quantity is as large, and products of three stay finite.
 LARGEST = 1e100
-#: Nodes of a document with its aliases written out; a model of 1,000 joints has 200,000.
+#: Largest number of nodes with aliases expanded; a model of 1,000 joints has 200,000.
 MAX_NODES = 2_000_000
 
 # The parser in C, where there is one, is ten times as fast.
 _LOADER: type[Any] = getattr(yaml, 'CSafeLoader', yaml.SafeLoader)
-#: What code that walks over a document raises when the document is not what it takes it for.
+#: Errors that code can raise while it reads a document with unexpected content.
 _UNEXPECTED = (
     ArithmeticError,
     AssertionError,
@@ -58,12 +58,12 @@ def reading(path: str | Path, error: type[ArmidError]) -> Iterator[None]:
     path : str or Path
         The file, for the message.
     error : type of ArmidError
-        What to raise.
+        Class of the raised error.
 
     Raises
     ------
     ArmidError
-        In place of any error that content can cause; one of the package is given the path.
+        For any error by the content; the message begins with the path.
 
     """
     try:
@@ -104,8 +104,7 @@ def load_yaml(text: str) -> Any:
     Raises
     ------
     ValueError or yaml.YAMLError
-        It is no YAML, is nested too deep, or grows beyond all measure when its aliases are
-        written out.
+        If the text is not YAML, is nested too deep, or has too many nodes with aliases expanded.
 
     """
     _check_size(text)
@@ -114,14 +113,14 @@ def load_yaml(text: str) -> Any:
 
 def yaml_line(text: str, place: Sequence[str | int]) -> int:
     """
-    Return the line of a place in a text in YAML, from 1.
+    Return the line of an entry in a text in YAML, from 1.
 
     Parameters
     ----------
     text : str
-        As `load_yaml` takes it.
+        Text that `load_yaml` can parse.
     place : sequence of str or int
-        Keys and positions that lead there; where they end in nothing, the last that is there.
+        Keys and positions that lead to the entry; if it does not exist, the last existing one.
 
     """
     node: Any = yaml.compose(text, Loader=_LOADER)
@@ -147,14 +146,14 @@ def load_json(text: str) -> Any:
     Raises
     ------
     ValueError or RecursionError
-        It is no JSON, or is nested too deep.
+        If the text is not JSON, or is nested too deep.
 
     """
     return json.loads(text)
 
 
 def _check_size(text: str) -> None:
-    """Refuse a YAML text by its events, before anything is built of it."""
+    """Raise ValueError for a YAML text that is too deep or too large, from its events alone."""
     open_nodes: list[tuple[str | None, int]] = []
     sizes: dict[str, int] = {}
     total = 0
@@ -176,12 +175,12 @@ def _check_size(text: str) -> None:
                 sizes[event.anchor] = 1
         if total > MAX_NODES:
             raise ValueError(
-                f'line {_line(event)}: more than {MAX_NODES} nodes, aliases written out'
+                f'line {_line(event)}: more than {MAX_NODES} nodes with aliases expanded'
             )
 
 
 def _written_out(event: yaml.AliasEvent, sizes: Mapping[str, int]) -> int:
-    """Return how many nodes an alias stands for."""
+    """Return the number of nodes of an expanded alias."""
     if event.anchor is None or event.anchor not in sizes:
         raise ValueError(f"line {_line(event)}: the alias '{event.anchor}' has no anchor")
     return sizes[event.anchor]

@@ -1,6 +1,6 @@
 # Copyright 2026 The armid_ros developers
 # SPDX-License-Identifier: Apache-2.0
-"""How much memory an input may take before it is refused."""
+"""Limit of the memory that an input may take."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ import os
 from pathlib import Path
 import resource
 
-#: Share of the memory that one input may take by default.
+#: Memory over the default limit of one input.
 _SHARE = 4
 _CONTROL_GROUP = Path('/sys/fs/cgroup/memory.max')
 
@@ -27,7 +27,7 @@ def default_memory_limit() -> int:
 
 
 def size_text(size: int) -> str:
-    """Return a number of bytes as a person reads it."""
+    """Return a number of bytes as text with a unit, such as '1.5 MB'."""
     for unit, scale in (('GB', 10**9), ('MB', 10**6), ('kB', 10**3)):
         if size >= scale:
             return f'{size / scale:.3g} {unit}'

@@ -1,11 +1,11 @@
 # Copyright 2026 The armid_ros developers
 # SPDX-License-Identifier: Apache-2.0
 """
-Results as files: each whole or absent, and none of another run lost unawares.
+Results as files: each is whole or absent, and results of other runs are not replaced by accident.
 
-A file is written beside its place and moved there, which also means that a symbolic link in the
-folder is replaced and not followed. The folder is locked as long as a command works on it; the
-system lets go of the lock when the process ends, however it ends.
+A file is written under a temporary name and then moved, so a symbolic link in the folder is
+replaced and not followed. The folder is locked while a command works on it; the system releases
+the lock when the process ends.
 
 """
 
@@ -25,7 +25,7 @@ from armid_ros.files.documents import load_json, load_yaml, reading
 from armid_ros.files.own import refuse_foreign, settled
 from armid_ros.files.regular import read_text
 
-#: Files by whose schema a folder is known; each is the one that its command writes last.
+#: Documents whose schema identifies the results in a folder; a command writes its document last.
 DOCUMENTS = (
     'identification.json',
     'diagnosis.json',
@@ -36,26 +36,26 @@ DOCUMENTS = (
     'lunar.json',
     'fleet.json',
 )
-#: What a run that was ended early leaves, or somebody put there, and the kinds that replace it.
+#: Model file that may be in a folder without document, and schemas of results that replace it.
 _MODEL = 'model.yaml'
 _WITH_MODEL = ('armid/identification/1', 'armid/diagnosis/1')
 
 
 def write_file(path: str | Path, content: str | bytes) -> None:
     """
-    Write a file beside its place and move it there, so that it is whole or absent.
+    Write a file under a temporary name and move it, so that it is whole or absent.
 
     Parameters
     ----------
     path : str or Path
-        The file; one that exists is replaced, a symbolic link itself and not what it points to.
+        The file; an existing one is replaced, and a symbolic link is not followed.
     content : str or bytes
-        All of it; text is written in UTF-8.
+        Whole content; text is written in UTF-8.
 
     Raises
     ------
     OutputError
-        It cannot be written; what was there before is as it was.
+        If the file cannot be written; an existing file is then unchanged.
 
     """
     path = Path(path)
@@ -74,7 +74,7 @@ def write_file(path: str | Path, content: str | bytes) -> None:
 
 
 def json_text(document: Any, indent: int | None = None) -> str:
-    """Return a document as JSON; a number that is not finite, which JSON has not, is null."""
+    """Return a document as JSON; numbers that are not finite become null."""
     return json.dumps(_representable(document), indent=indent, allow_nan=False)
 
 
@@ -88,25 +88,25 @@ def result_folder(
     force: bool = False,
 ) -> Iterator[Path]:
     """
-    Hold a folder for the results of one command.
+    Make and lock a folder for the results of one command.
 
     Parameters
     ----------
     path : Path
-        The folder; made if it is not there.
+        The folder; created if it does not exist.
     schema : str
-        Of the results, such as 'armid/identification/1'.
+        Schema of the results, such as 'armid/identification/1'.
     robot : str
-        What the results call the robot; empty where they have none.
+        Name of the robot in the results; empty without a robot.
     also : collection of str
-        Names of what the command writes beside such results.
+        Names of further files that the command writes.
     force : bool
-        Whether to write over results of another kind or robot, and over files of others.
+        Whether to replace results of another kind or robot, and files of other programs.
 
     Raises
     ------
     OutputError
-        The folder cannot be written to, another run works on it, or it has results of another
+        If the folder cannot be written to, another run works on it, or it has results of another
         kind or robot, or files that the command did not write.
 
     """
@@ -122,7 +122,7 @@ def result_folder(
                 refuse_foreign(path, schema, also)
             yield path
     finally:
-        with suppress(OSError):  # what failed before it wrote anything leaves no folder behind
+        with suppress(OSError):  # folders that are still empty after a failure are removed
             for one in made:
                 one.rmdir()
 
@@ -130,12 +130,12 @@ def result_folder(
 @contextmanager
 def locked(path: Path) -> Iterator[None]:
     """
-    Make a folder if it is not there, and lock it against other runs.
+    Make a folder if it does not exist, and lock it against other runs.
 
     Raises
     ------
     OutputError
-        It cannot be made or opened, or another run holds it.
+        If the folder cannot be made or opened, or another run holds its lock.
 
     """
     try:
@@ -180,7 +180,7 @@ def _refuse_other_results(path: Path, schema: str, robot: str) -> None:
 
 
 def _in_words(schema: str) -> str:
-    """Return the kind of result that a schema such as 'armid/comparison/1' stands for."""
+    """Return the kind of result of a schema such as 'armid/comparison/1', in words."""
     parts = schema.split('/')
     return f'results of kind {parts[1]}' if len(parts) == 3 else schema
 
@@ -200,8 +200,8 @@ _HINT = 'name another folder, or write over it with --force'
 
 
 def _same(robot: str, other: str) -> bool:
-    """Whether two names mean one robot: shipped names, or paths of one file."""
-    if '-' in (robot, other):  # that of the bag, whichever it is
+    """Return whether two names are of one robot: shipped names, or paths of one file."""
+    if '-' in (robot, other):  # '-' is the description in the bag, which may be any robot
         return True
     return robot == other or Path(robot).absolute() == Path(other).absolute()
 

@@ -1,11 +1,11 @@
 # Copyright 2026 The armid_ros developers
 # SPDX-License-Identifier: Apache-2.0
 """
-Which files are results of this package, and so may be replaced by others.
+Recognition of files that are results of this package, and so may be replaced.
 
-A document names its schema and a page its generator near the beginning; a layout has its schema in
-a comment or a variable. Other files have no room for a name: they are results if a document or a
-page lies beside them.
+A document has its schema and a page its generator near the beginning; a layout has its schema in
+a comment or a variable. Other files have no mark: they are results if a document or a page is in
+the same folder.
 
 """
 
@@ -19,7 +19,7 @@ import re
 from armid_ros.errors import OutputError
 from armid_ros.files.regular import open_regular, read_text
 
-#: What each kind of result may leave in its folder.
+#: Files and folders of each kind of result, by schema.
 _WRITES = {
     'armid/identification/1': (
         'model.yaml',
@@ -66,14 +66,14 @@ _WRITES = {
         'watch',
     ),
 }
-#: Folder in which a run writes until its result is whole.
+#: Folder in which a run writes until its result is complete.
 STAGING = '.armid-part'
-#: What a page has in its head.
+#: Element in the head of each page of this package.
 GENERATOR = '<meta name="generator" content="armid_ros">'
-#: Types of messages as metadata.yaml has them, and those of a bag that is to be run.
+#: Pattern of message types in metadata.yaml, and message types of a bag with a planned motion.
 _KIND = re.compile(r'^ *type: *(\S+)', re.MULTILINE)
 _OF_A_PLAN = {'trajectory_msgs/msg/JointTrajectory', 'std_msgs/msg/String'}
-#: Where a file says what it is [bytes from the beginning].
+#: Size of the beginning of a file that contains its mark [bytes].
 _HEAD = 4096
 _SCHEMA = re.compile(rb'schema"?: *"?armid/[a-z_]+/[0-9]')
 _MARKS = {
@@ -91,7 +91,7 @@ def settled(path: Path) -> Path:
 
 
 def written_by(schema: str, also: Collection[str] = ()) -> tuple[str, ...]:
-    """Return the names of what a kind of result may leave; patterns such as '*.png' among them."""
+    """Return names and patterns, such as '*.png', of the files of a kind of result."""
     return (*_WRITES.get(schema, ()), *also)
 
 
@@ -102,16 +102,16 @@ def refuse_foreign(folder: Path, schema: str, also: Collection[str] = ()) -> Non
     Parameters
     ----------
     folder : Path
-        The folder to fill.
+        The folder of the results.
     schema : str
-        Of the results; nothing is refused where it is not known what belongs to them.
+        Schema of the results; nothing is refused for an unknown schema.
     also : collection of str
-        Names of what else the command writes; may be patterns such as '*.png'.
+        Names of further files that the command writes, or patterns such as '*.png'.
 
     Raises
     ------
     OutputError
-        Naming the folder and the file.
+        If there is such a file; the message names the folder and the file.
 
     """
     if schema not in _WRITES:
@@ -138,14 +138,14 @@ def refuse_replacing(folder: Path, names: Collection[str]) -> None:
     Parameters
     ----------
     folder : Path
-        The folder, which need not be there.
+        The folder, which need not exist.
     names : collection of str
-        What is to be written.
+        Names of the files to be written.
 
     Raises
     ------
     OutputError
-        Naming the folder and the file.
+        If there is such a file; the message names the folder and the file.
 
     """
     for name in _foreign(folder, [name for name in names if (folder / name).exists()]):
@@ -155,7 +155,7 @@ def refuse_replacing(folder: Path, names: Collection[str]) -> None:
 
 
 def _foreign(folder: Path, names: Sequence[str]) -> Iterator[str]:
-    """Yield foreign files; those without room for a mark only if no name has room."""
+    """Return foreign files; files that cannot have a mark count only if all names are such."""
     known = [name for name in names if _mark_of(name)]
     return (name for name in known or names if not is_own(folder / name))
 
@@ -165,7 +165,7 @@ def _mark_of(name: str) -> re.Pattern[bytes] | None:
 
 
 def is_plan(path: Path) -> bool:
-    """Whether a folder is a bag with a trajectory and no measurements."""
+    """Return whether a folder is a bag with a trajectory and no measurements."""
     try:
         text = read_text(path / 'metadata.yaml', OutputError)
     except OutputError:
@@ -175,7 +175,7 @@ def is_plan(path: Path) -> bool:
 
 
 def is_own(path: Path) -> bool:
-    """Whether a document, page or trajectory is a result of this package."""
+    """Return whether a document, page or trajectory is a result of this package."""
     if path.is_dir():
         return is_plan(path)
     mark = _mark_of(path.name)

@@ -17,7 +17,7 @@ from typing import BinaryIO
 
 from armid_ros.errors import ArmidError
 
-#: The largest document in text [bytes]; a description of 10,000 links has 6 MB.
+#: Largest size of a text file [bytes]; a description of 10,000 links has 6 MB.
 TEXT_LIMIT = 64 << 20
 
 _KINDS = (
@@ -30,7 +30,7 @@ _KINDS = (
 
 
 def is_file(path: str | Path) -> bool:
-    """Whether a path is a regular file."""
+    """Return whether a path is a regular file."""
     try:
         return stat.S_ISREG(os.stat(path).st_mode)
     except (OSError, ValueError):
@@ -46,12 +46,12 @@ def open_regular(path: str | Path, error: type[ArmidError]) -> BinaryIO:
     path : str or Path
         The file.
     error : type of ArmidError
-        What to raise.
+        Class of the raised error.
 
     Raises
     ------
     ArmidError
-        The file cannot be opened, or is a folder, a FIFO, a device or a socket.
+        If the file cannot be opened, or is a folder, a FIFO, a device or a socket.
 
     """
     try:
@@ -62,7 +62,7 @@ def open_regular(path: str | Path, error: type[ArmidError]) -> BinaryIO:
     if not stat.S_ISREG(mode):
         os.close(descriptor)
         kind = next((name for is_kind, name in _KINDS if is_kind(mode)), 'something else')
-        raise error(f'{path}: cannot be read: {kind}, and no file')
+        raise error(f'{path}: cannot be read: {kind}, not a file')
     return os.fdopen(descriptor, 'rb')
 
 
@@ -75,14 +75,14 @@ def read_text(path: str | Path, error: type[ArmidError], limit: int = TEXT_LIMIT
     path : str or Path
         The file, in UTF-8.
     error : type of ArmidError
-        What to raise.
+        Class of the raised error.
     limit : int
-        The largest size [bytes].
+        Largest permitted size [bytes].
 
     Raises
     ------
     ArmidError
-        The file cannot be opened, is no regular file, is too large, or is no text.
+        If the file cannot be opened, is not a regular file, is too large, or is not text.
 
     """
     with open_regular(path, error) as stream:
@@ -91,7 +91,7 @@ def read_text(path: str | Path, error: type[ArmidError], limit: int = TEXT_LIMIT
         except OSError as problem:
             raise error(f'{path}: cannot be read: {problem_text(problem)}') from problem
     if len(content) > limit:
-        raise error(f'{path}: larger than {limit >> 20} MiB, which no text of its kind is')
+        raise error(f'{path}: larger than {limit >> 20} MiB, the limit of a text file')
     try:
         return content.decode('utf-8-sig')
     except UnicodeDecodeError as problem:

@@ -1,11 +1,11 @@
 # Copyright 2026 The armid_ros developers
 # SPDX-License-Identifier: Apache-2.0
 """
-Results of several files as one: all of a run, or all of the one before.
+Results of several files that replace an earlier result together or not at all.
 
-A run writes into a folder of its own inside the folder of its results, which is on the same file
-system wherever that is mounted. Once all files are written, the whole folder is exchanged; a run
-that fails, or is interrupted or killed, leaves what was there before.
+A run writes into a staging folder inside the folder of its results, so both are on the same file
+system. Once all files are written, the whole folder is exchanged. A run that fails, or is
+interrupted or killed, leaves the earlier result unchanged.
 
 """
 
@@ -25,7 +25,7 @@ from armid_ros.errors import OutputError
 from armid_ros.files.output import DOCUMENTS, locked
 from armid_ros.files.own import STAGING
 
-#: Of renameat2(2).
+#: Constants of the system call renameat2(2).
 _AT_FDCWD, _RENAME_EXCHANGE = -100, 2
 
 
@@ -37,13 +37,13 @@ class Staged:
     Attributes
     ----------
     out : Path
-        Folder that the result is for.
+        Folder of the results.
     folder : Path
-        Where it is written until it is kept.
+        Staging folder, in which files are written until `keep`.
     replaced : tuple of str
-        Names, or patterns, of the files of an earlier result; those go that this one has not.
+        Names or patterns of earlier files, which are deleted if the new result lacks them.
     spared : tuple of Path
-        Files that stay all the same, as the result refers to them.
+        Files that are not deleted, as the new result refers to them.
 
     """
 
@@ -56,22 +56,22 @@ class Staged:
 
     @property
     def alone(self) -> bool:
-        """Whether nothing else is in the folder."""
+        """Whether the folder of the results contains only the staging folder."""
         return all(path.name == STAGING for path in self.out.iterdir())
 
     def keep(self) -> None:
         """
         Commit the staged result with one rename of the folder.
 
-        Other files of the folder are linked into the new one, which then takes the place of the
-        old one. Where a folder cannot be exchanged (the current one, a mount point, a file system
-        without hard links), the files are moved one by one: the document that names the result
-        goes first and comes last, so that a run that is killed in between leaves no document.
+        Other files of the folder are linked into the new one, which then replaces the old one. If
+        the folder cannot be exchanged (the current one, a mount point, a file system without hard
+        links), the files are moved one by one. The document of the result is then removed first
+        and moved last, so a run that is killed in between leaves no document.
 
         Raises
         ------
         OutputError
-            A file cannot be moved.
+            If a file cannot be moved.
 
         """
         names = sorted(os.listdir(self.folder), key=lambda name: (name in DOCUMENTS, name))
@@ -90,7 +90,7 @@ class Staged:
             raise OutputError(f'{self.out}: cannot be written: {error.strerror}') from error
 
     def _exchanged(self, names: Collection[str]) -> bool:
-        """Exchange the folder for one with the result and what stays, if that is possible."""
+        """Exchange the folder for one with the result and other files; False if impossible."""
         out = self.out.resolve()
         old, own = out.stat(), self.folder.stat()
         if Path.cwd().is_relative_to(out) or (old.st_uid, old.st_gid) != (own.st_uid, own.st_gid):
@@ -99,7 +99,7 @@ class Staged:
         goes = {STAGING, *names, *(path.name for path in self._earlier())}
         kept = [path for path in out.iterdir() if path.name not in goes]
         try:
-            _remove(new)  # of a run that was killed
+            _remove(new)  # left by a run that was killed
             new.mkdir()
             for path in (*kept, *self.folder.iterdir()):
                 _link(path, new / path.name)
@@ -133,23 +133,23 @@ def staged(
     out: Path, replaced: Collection[str] = (), spared: Collection[Path] = ()
 ) -> Iterator[Staged]:
     """
-    Create a staging folder; it is deleted at the end unless it was kept.
+    Create a staging folder; it is deleted at the end.
 
     Parameters
     ----------
     out, replaced, spared
-        As for `Staged`; the folder is made if it is not there.
+        Attributes of `Staged`; the folder `out` is made if it does not exist.
 
     Raises
     ------
     OutputError
-        The folder cannot be made or written to.
+        If the folder cannot be made or written to.
 
     """
     folder = out / STAGING
     try:
         out.mkdir(parents=True, exist_ok=True)
-        _remove(folder)  # of a run that was killed
+        _remove(folder)  # left by a run that was killed
         folder.mkdir()
     except OSError as error:
         raise OutputError(f'{out}: cannot be made or written to: {error.strerror}') from error
@@ -162,7 +162,7 @@ def staged(
 
 
 def _move(source: Path, target: Path) -> None:
-    """Replace a file; a folder is taken out of the way first, as none replaces another."""
+    """Replace a file or folder; an existing folder is moved away first, as required by rename."""
     if target.is_dir() and not target.is_symlink():
         aside = source.with_name(f'{source.name}.old')
         target.replace(aside)
@@ -173,7 +173,7 @@ def _move(source: Path, target: Path) -> None:
 
 
 def _link(source: Path, target: Path) -> None:
-    """Give a file, or the files of a folder, a second name."""
+    """Make a hard link of a file, or of each file of a folder."""
     if source.is_dir() and not source.is_symlink():
         shutil.copytree(source, target, symlinks=True, copy_function=os.link)
     else:
@@ -181,7 +181,7 @@ def _link(source: Path, target: Path) -> None:
 
 
 def _exchange(first: Path, second: Path) -> None:
-    """Exchange two folders in one step; OSError where kernel or file system cannot."""
+    """Exchange two folders in one step; OSError if kernel or file system cannot do so."""
     rename = getattr(ctypes.CDLL(None, use_errno=True), 'renameat2', None)
     if rename is None:
         raise OSError(errno.ENOSYS, os.strerror(errno.ENOSYS))
@@ -191,7 +191,7 @@ def _exchange(first: Path, second: Path) -> None:
 
 
 def _remove(path: Path) -> None:
-    """Take a folder away, or a link with its name and not what it points to."""
+    """Remove a folder, file or symbolic link; the target of a link stays."""
     if path.is_dir() and not path.is_symlink():
         shutil.rmtree(path)
     else:

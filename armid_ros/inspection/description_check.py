@@ -33,8 +33,8 @@ _DENSITIES = 30.0, 8000.0
 _TURNS = 6.0 * np.pi
 #: A velocity limit above this [rad/s], or a shape above this [m], has probably another unit.
 _FASTEST, _LONGEST = 50.0, 10.0
-#: Length of an axis that is not rounding, and how far outside of the box of its shapes a centre of
-#: mass is doubtful, as a share of the box's diagonal.
+#: Deviation from unit length that makes an axis doubtful; distance of a centre of mass from the
+#: box of its shapes that makes it doubtful, over the diagonal of the box.
 _ROUNDED, _OUTSIDE = 0.01, 1.0
 #: A fitted model whose torque error is smaller by less than this shows no wrong link [%].
 _MATERIAL = 1.0
@@ -133,7 +133,7 @@ def _of_limits(robot: Robot) -> Iterator[Remark]:
 
 
 def _of_axes(robot: Robot) -> Iterator[Remark]:
-    """Check the length of axes as they are written; a model has them scaled to one."""
+    """Yield remarks on axes whose length in the file is not one; a model scales them."""
     for joint in parse_xml(robot.urdf).iter('joint'):
         axis = joint.find('axis')
         if axis is None or joint.get('type') not in MOVABLE:

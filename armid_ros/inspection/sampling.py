@@ -1,6 +1,6 @@
 # Copyright 2026 The armid_ros developers
 # SPDX-License-Identifier: Apache-2.0
-"""How a recording is sampled in time, and whether its motion repeats."""
+"""Sampling of a recording in time, and the period of its motion."""
 
 from __future__ import annotations
 

@@ -1,12 +1,12 @@
 # Copyright 2026 The armid_ros developers
 # SPDX-License-Identifier: Apache-2.0
 """
-Base parameters: the combinations of parameters that a motion can tell apart.
+Base parameters: the identifiable combinations of parameters.
 
-The columns of a regressor depend on one another. Going through them from left to right, a column
-that the kept ones span is dropped and its parameter is grouped with theirs, which gives the
-groupings of Gautier (1991), 'Ixx2 - Iyy2', in an order that a person chose. This is a QR
-factorisation in which the length that is left of each column reveals the rank.
+The columns of a regressor are linearly dependent. In a chosen order, each column in the span of
+the kept columns is dropped, and its parameter is grouped with theirs. The result are the
+groupings of Gautier (1991), such as 'Ixx2 - Iyy2'. This is a QR factorisation in which the
+remaining length of each column reveals the rank.
 
 """
 
@@ -26,17 +26,17 @@ from armid_ros.robots import NO_MASS, Robot
 import numpy as np
 import numpy.typing as npt
 
-#: Columns are scaled to unit norm; what the kept ones leave of a dependent column is rounding,
-#: 1e-15 to 1e-13, and what they leave of an independent one is rarely below 1e-5.
+#: Part of a unit column beyond the kept columns, below which it is dependent. It is 1e-15 to 1e-13
+#: for dependent columns, by rounding, and rarely below 1e-5 for independent ones.
 RANK_TOLERANCE = 1e-9
 
 
-#: Angles of a description are rounded. Gravity that is across an axis by less than this share of
-#: it is along the axis: it would show first moments by that share of what others show.
+#: Share of gravity across an axis below which gravity counts as along the axis, as angles of a
+#: description are rounded.
 _ROUNDED = 2e-3
 
-#: The order in which the parameters of a link are kept: inertia first, mass last, so that masses
-#: are grouped into moments and moments of later links into those of earlier ones.
+#: Order in which the parameters of a link are kept: inertia first, mass last, so that masses are
+#: grouped with moments, and moments of later links with those of earlier ones.
 _KEEP_ORDER = ('Ixx', 'Ixy', 'Ixz', 'Iyy', 'Iyz', 'Izz', 'mx', 'my', 'mz', 'm')
 
 
@@ -54,7 +54,7 @@ class BaseParameters:
     independent : ndarray of int, shape (r,)
         Columns of W that are kept: W theta = W[:, independent] beta.
     grouping : ndarray, shape (r, P)
-        beta = grouping @ theta.
+        Matrix from standard to base parameters: beta = grouping @ theta.
 
     """
 
@@ -70,7 +70,7 @@ class BaseParameters:
 
     @property
     def terms(self) -> tuple[dict[str, float], ...]:
-        """Factor of each standard parameter in each base parameter, as their names have them."""
+        """Factors of the standard parameters in each base parameter, by symbol."""
         symbols = [symbol(parameter) for parameter in self.standard]
         return tuple(
             {symbols[column]: float(row[column]) for column in np.flatnonzero(row)}
@@ -81,14 +81,14 @@ class BaseParameters:
         self, standard: tuple[ParameterName, ...], columns: npt.NDArray[np.intp]
     ) -> BaseParameters:
         """
-        Return the parameters embedded in a longer list; they do not depend on the others.
+        Return the parameters embedded in a longer list; they do not depend on the added ones.
 
         Parameters
         ----------
         standard : tuple of ParameterName
             The longer list.
         columns : ndarray of int, shape (P,)
-            Where the standard parameters are in it.
+            Positions of the present standard parameters in the longer list.
 
         """
         grouping = np.zeros((self.rank, len(standard)))
@@ -109,7 +109,7 @@ class BaseParameters:
         beta : array_like, shape (r,)
             Base parameters.
         prior : array_like, shape (P,)
-            Standard parameters to stay near to, such as those of the URDF.
+            Standard parameters of the prior, such as those of the URDF.
 
         Returns
         -------
@@ -119,7 +119,7 @@ class BaseParameters:
         """
         prior = np.array(prior, dtype=float)
         masses = [_symbol_of(parameter) == 'm' for parameter in self.standard]
-        # mass of a link of which a description gives none, for its first moments to stand on [kg]
+        # mass of a link that has none in the description, so that first moments are possible [kg]
         prior[masses & (np.abs(prior) < NO_MASS)] = 1e-6
         correction = np.linalg.pinv(self.grouping) @ (np.asarray(beta) - self.values(prior))
         return np.asarray(prior + correction)
@@ -129,17 +129,17 @@ def group_columns(
     w: FloatArray, standard: tuple[ParameterName, ...], tolerance: float = RANK_TOLERANCE
 ) -> BaseParameters:
     """
-    Find the base parameters of a stacked regressor.
+    Find the base parameters of a regressor: group its dependent columns.
 
     Parameters
     ----------
     w : ndarray, shape (M, P)
         Regressor over states that excite everything, M >= P.
     standard : tuple of ParameterName
-        Names of the P columns. Earlier columns are kept in preference to later ones, except that
-        those of one link go inertia first, mass last.
+        Names of the P columns. Earlier columns are kept in preference to later ones; within a
+        link, inertia is kept first and mass last.
     tolerance : float
-        A column of which the kept ones leave less than this share of its length is grouped.
+        Share of its length beyond the kept columns, below which a column is grouped.
 
     Returns
     -------
@@ -157,7 +157,7 @@ def group_columns(
     kept: list[int] = []
     for position in range(len(candidates)):
         rest = triangle[:, position]
-        for _ in range(2):  # twice is enough to be orthogonal to rounding (Kahan, Parlett)
+        for _ in range(2):  # two passes make it orthogonal within rounding (Kahan, Parlett)
             rest = rest - basis @ (basis.T @ rest)
         length = np.linalg.norm(rest)
         if length > tolerance:
@@ -177,14 +177,15 @@ def group_columns(
 
 def regroup(theory: BaseParameters, data: BaseParameters) -> BaseParameters:
     """
-    Join two steps of grouping: of all parameters, and of the base parameters in certain data.
+    Join two steps of grouping: for any motion, and for given data.
 
     Parameters
     ----------
     theory : BaseParameters
-        What any motion can tell apart.
+        Combinations that are identifiable with a suitable motion.
     data : BaseParameters
-        What some data tell apart of it; its standard parameters are those that theory keeps.
+        Combinations of these that the data identify; its standard parameters are those that
+        `theory` keeps.
 
     """
     independent = theory.independent[data.independent]
@@ -204,10 +205,10 @@ def _named(
 
 def levelled(robot: Robot) -> Robot:
     """
-    Return a robot whose gravity is along an axis of its first joint, if it is but for rounding.
+    Return the robot with gravity exactly along an axis of its first joint, if it nearly is.
 
-    A base that hangs by an angle of 3.1416 shows first moments by 7e-6 of their weight, which no
-    recording tells.
+    A base that hangs at a rounded angle of 3.1416 excites first moments by 7e-6 of their weight,
+    which no recording shows.
 
     """
     turn = robot.model.jointPlacements[1].rotation
@@ -218,10 +219,10 @@ def levelled(robot: Robot) -> Robot:
 
 def gravity_composites(robot: Robot, rng: np.random.Generator) -> BaseParameters:
     """
-    Find the combinations of masses and first moments that an arm at rest can tell apart.
+    Find the combinations of masses and first moments that an arm at rest identifies.
 
-    An arm with revolute joints only has an even number of them; multiplied by the magnitude of
-    gravity they are the composite gravity parameters of Table 5 of the humanoid-arm paper.
+    An arm with revolute joints only has an even number of them. Multiplied by the magnitude of
+    gravity, they are the composite gravity parameters of Table 5 of the humanoid-arm paper.
 
     """
     robot = levelled(robot)
@@ -250,7 +251,7 @@ def _keep_order(standard: tuple[ParameterName, ...]) -> list[int]:
 
 
 def symbol(parameter: ParameterName) -> str:
-    """Name a grouped parameter; a rigid one carries the number of its joint already."""
+    """Return the symbol of a parameter, with its joint unless the name ends with its number."""
     numbered = parameter.name[-1:].isdigit() or not parameter.joint
     return parameter.name if numbered else f'{parameter.name}[{parameter.joint}]'
 

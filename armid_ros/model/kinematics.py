@@ -16,25 +16,25 @@ def points_motion(
     robot: Robot, joints: Sequence[str], offsets: FloatArray, q: FloatArray
 ) -> tuple[FloatArray, FloatArray]:
     """
-    Follow points of links.
+    Return positions and Jacobians of points of links.
 
     Parameters
     ----------
     robot : Robot
         The arm.
     joints : sequence of str
-        The joints that move the links, one of each of k points.
+        The joints that move the links of the k points.
     offsets : ndarray, shape (k, 3)
-        The points in the frames of those joints [m].
+        The points in the frames of these joints [m].
     q : ndarray, shape (N, n)
         Joint positions.
 
     Returns
     -------
     positions : ndarray, shape (N, k, 3)
-        In the base frame [m].
+        Positions in the base frame [m].
     jacobians : ndarray, shape (N, k, 3, n)
-        Derivatives by the joint positions.
+        Derivatives of the positions by the joint positions.
 
     """
     return LinkFrames.of(robot, q, joints).points(joints, offsets)
@@ -49,7 +49,7 @@ class _Frame:
     movers: tuple[int, ...]
 
     def turned(self, vectors: FloatArray) -> FloatArray:
-        """Return what vectors of the link, (3,), (3, N) or (3, m, N), are in the base frame."""
+        """Return vectors of the link, (3,), (3, N) or (3, m, N), in the base frame."""
         x, y, z = (self.rotation[:, axis] for axis in range(3))
         if vectors.ndim == 3:
             x, y, z = x[:, np.newaxis], y[:, np.newaxis], z[:, np.newaxis]
@@ -59,19 +59,19 @@ class _Frame:
 @dataclass(frozen=True)
 class LinkFrames:
     """
-    Where links are along a motion, for any of their points.
+    Frames of links along a motion.
 
-    Samples are the last axis of what is kept, and the fastest one of what is returned.
+    Samples are the last axis of attributes, and the first axis of results.
 
     Attributes
     ----------
     joints : tuple of str
         All joints of the robot.
     frames : dict
-        The links that can be asked for, by the number of their joint.
+        Frames of the links, by the number of their joint.
     lines, turns : ndarray, shape (n, 3, N)
-        What each joint does to what it moves, per unit: velocity of the body at the origin of the
-        base frame [m/rad, or m/m] and angular velocity.
+        Twist of the moved bodies per unit velocity of each joint: velocity at the origin of the
+        base frame [m/rad, or m/m], and angular velocity.
 
     """
 
@@ -83,7 +83,7 @@ class LinkFrames:
     @classmethod
     def of(cls, robot: Robot, q: FloatArray, joints: Sequence[str] | None = None) -> LinkFrames:
         """
-        Follow the links that some joints move, all by default.
+        Return the frames of the links that some joints move.
 
         Parameters
         ----------
@@ -92,7 +92,7 @@ class LinkFrames:
         q : ndarray, shape (N, n)
             Joint positions.
         joints : sequence of str, optional
-            The joints.
+            The joints; all by default.
 
         """
         ends = [robot.joints.index(joint) for joint in joints or robot.joints]
@@ -113,11 +113,11 @@ class LinkFrames:
 
     @classmethod
     def in_the_middle(cls, robot: Robot) -> LinkFrames:
-        """Follow no motion: all joints in the middle of their range, at 0 where there is none."""
+        """Return the frames with all joints in the middle of their range, or at 0 without one."""
         return cls.of(robot, robot.middle_pose[np.newaxis])
 
     def places(self, joint: str, offset: FloatArray) -> FloatArray:
-        """Return where a point (3,) of the link that a joint moves is, shape (N, 3) [m]."""
+        """Return the positions of a point (3,) of the link of a joint, shape (N, 3) [m]."""
         frame = self.frames[self.joints.index(joint)]
         return np.asarray((frame.origin + frame.turned(offset)).T)
 
@@ -133,14 +133,14 @@ class LinkFrames:
 
     def torques(self, joint: str, places: FloatArray, forces: FloatArray) -> FloatArray:
         """
-        Return J^T f of forces on a link.
+        Return the joint torques J^T f of forces on a link.
 
         Parameters
         ----------
         joint : str
             The joint that moves the link.
         places, forces : ndarray, shape (N, 3)
-            Where each force acts [m], and the force [N], in the base frame.
+            Point of application [m] and vector [N] of each force, in the base frame.
 
         Returns
         -------

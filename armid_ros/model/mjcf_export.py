@@ -16,10 +16,10 @@ from armid_ros.robots.geometry import LinkShape, shapes_of
 import numpy as np
 import pinocchio as pin
 
-#: Files of meshes that MuJoCo reads.
+#: File types of meshes that MuJoCo reads.
 _MESHES = ('.stl', '.obj', '.msh')
-#: Visuals touch nothing; collision bodies touch what is around the arm, and not each other, for
-#: links that are joined overlap.
+#: Contact attributes: visuals have no contacts; collision shapes have contacts with the
+#: environment and not with each other, because neighbouring links overlap.
 _CLASSES: dict[Literal['visual', 'collision'], dict[str, str]] = {
     'visual': {'contype': '0', 'conaffinity': '0', 'group': '2', 'mass': '0'},
     'collision': {'contype': '1', 'conaffinity': '0', 'group': '3', 'mass': '0'},
@@ -42,24 +42,23 @@ def export_mjcf(
     robot : Robot
         The arm, with its gravity.
     damping, friction, armature : mapping of str to float, optional
-        Joint, and its viscous coefficient [N m s/rad], Coulomb torque [N m] or rotor inertia
-        [kg m^2].
+        Viscous coefficient [N m s/rad], Coulomb torque [N m] and rotor inertia [kg m^2] by joint.
     remarks : sequence of str
-        Lines to put into a comment.
+        Lines of a comment in the file.
 
     Returns
     -------
     text : str
         MJCF; files of meshes have absolute paths.
     left_out : tuple of str
-        What of the description is not in it; a comment lists it too.
+        Parts of the description that the file lacks; a comment lists them too.
 
     Raises
     ------
     ModelError
-        If the parameters of a link are not those of a body.
+        If the parameters of a link are not physically consistent.
     RobotError
-        If a shape of the description is none.
+        If a shape of the description is invalid.
 
     """
     require_consistent(robot.links, robot.rigid_parameters)
@@ -113,7 +112,7 @@ def export_mjcf(
 def _shapes(
     robot: Robot, bodies: Mapping[int, ElementTree.Element], assets: ElementTree.Element
 ) -> list[str]:
-    """Add the shapes of links to their bodies; return those that MuJoCo has no place for."""
+    """Add the shapes of links to their bodies; return names of meshes that MuJoCo cannot read."""
     left_out: dict[str, None] = {}
     files: dict[tuple[Path, tuple[float, ...]], str] = {}
     for of in _CLASSES:
@@ -136,7 +135,7 @@ def _shapes(
 
 
 def _size(shape: LinkShape) -> dict[str, str]:
-    """Return the attribute of a geom with halves of its edges and lengths."""
+    """Return the size attribute of a geom: half edges, radius, or radius and half length."""
     if shape.kind in ('box', 'sphere'):
         return {'size': _numbers([(0.5 if shape.kind == 'box' else 1.0) * x for x in shape.size])}
     return {'size': _numbers([shape.size[0], 0.5 * shape.size[1]])}

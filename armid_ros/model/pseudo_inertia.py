@@ -1,12 +1,12 @@
 # Copyright 2026 The armid_ros developers
 # SPDX-License-Identifier: Apache-2.0
 """
-The pseudo-inertia of a link, and what it says of its being a body.
+The pseudo-inertia of a link, and the physical consistency of its parameters.
 
-Ten parameters are those of a body with positive mass density somewhere in space exactly if the
-4x4 matrix P = [[S, h], [h', m]] is positive definite; S is the second moment of the mass about
-the origin of the joint frame, h the first, m the mass. Positive mass, positive principal moments
-and their triangle inequalities are all contained in it.
+A body with positive mass density can have ten given inertial parameters exactly if the 4x4 matrix
+P = [[S, h], [h', m]] is positive definite. S is the second moment of the mass about the origin of
+the joint frame, h the first moment, m the mass. This condition includes positive mass, positive
+principal moments and their triangle inequalities.
 Source: Wensing, Kim and Slotine 2018, eqs. 9 to 13.
 
 """
@@ -21,7 +21,7 @@ from armid_ros.robots import NO_MASS
 import numpy as np
 import numpy.typing as npt
 
-#: Parameters of a link, in the order of ``LINK_PARAMETERS``.
+#: Number of inertial parameters of a link; their order is ``LINK_PARAMETERS``.
 PER_LINK = 10
 
 
@@ -40,7 +40,7 @@ def _basis() -> FloatArray:
     return basis
 
 
-#: Pseudo-inertia of each unit parameter: it is linear in the ten.
+#: Pseudo-inertia of each unit parameter; a pseudo-inertia is linear in the ten parameters.
 BASIS = _basis()
 
 
@@ -51,8 +51,8 @@ def pseudo_inertia(parameters: npt.ArrayLike) -> FloatArray:
     Parameters
     ----------
     parameters : array_like, shape (..., 10)
-        m, first moments [kg m], inertia about the joint frame [kg m^2], as in
-        ``LINK_PARAMETERS``.
+        Mass [kg], first moments [kg m] and inertia about the joint frame [kg m^2], in the order
+        of ``LINK_PARAMETERS``.
 
     Returns
     -------
@@ -70,7 +70,7 @@ def link_parameters(matrix: npt.ArrayLike) -> FloatArray:
     Parameters
     ----------
     matrix : array_like, shape (..., 4, 4)
-        Symmetric.
+        Symmetric pseudo-inertias.
 
     Returns
     -------
@@ -88,16 +88,16 @@ def link_parameters(matrix: npt.ArrayLike) -> FloatArray:
 @dataclass(frozen=True)
 class Consistency:
     """
-    Whether the parameters of a link are those of a body.
+    Physical consistency of the parameters of a link.
 
     Attributes
     ----------
     link : str
         The link.
     eigenvalues : ndarray, shape (4,)
-        Of its pseudo-inertia, ascending, [kg m^2] and [kg] mixed: their signs count.
+        Eigenvalues of its pseudo-inertia, ascending; only signs count, as kg m^2 and kg mix.
     mass : float
-        [kg]
+        Mass [kg].
     center : ndarray, shape (3,)
         Centre of mass in the joint frame [m]; NaN without mass.
     moments : ndarray, shape (3,)
@@ -113,7 +113,7 @@ class Consistency:
 
     @staticmethod
     def of(link: str, parameters: npt.ArrayLike) -> Consistency:
-        """Examine ten parameters."""
+        """Return the consistency of ten parameters of a link."""
         matrix = pseudo_inertia(parameters)
         mass = float(matrix[3, 3])
         center = moments = np.full(3, np.nan)
@@ -127,25 +127,25 @@ class Consistency:
 
     @property
     def consistent(self) -> bool:
-        """Whether a body with positive density has these parameters."""
+        """Whether a body with positive density can have these parameters."""
         return bool(self.eigenvalues[0] > 0.0)
 
 
 def require_consistent(links: tuple[str, ...], parameters: npt.ArrayLike) -> None:
     """
-    Raise an error for parameters that no body has.
+    Raise an error if a link is not physically consistent.
 
     Parameters
     ----------
     links : tuple of str
-        n links.
+        Names of the n links.
     parameters : array_like, shape (10 n,)
         Rigid parameters.
 
     Raises
     ------
     ModelError
-        Naming the first link that is none.
+        If a link is not physically consistent; the message names the first such link.
 
     """
     for link, values in zip(links, np.reshape(parameters, (-1, PER_LINK)), strict=True):

@@ -3,8 +3,8 @@
 """
 Rigid-body quantities over whole motions.
 
-The only place that loops over samples: Pinocchio's algorithms take one configuration at a time.
-Everything here is linear in the gravity vector and in the inertial parameters of the robot.
+Only this module loops over samples, as Pinocchio's algorithms take one configuration at a time.
+All its quantities are linear in the gravity vector and in the inertial parameters of the robot.
 
 """
 
@@ -32,7 +32,7 @@ def rigid_parameter_names(robot: Robot) -> tuple[ParameterName, ...]:
     Returns
     -------
     tuple of ParameterName, length 10 n
-        'm1', 'mx1', ... 'Izz1', 'm2', ...: numbered by joint, from 1.
+        Names such as 'm1', 'mx1', ... 'Izz1', 'm2', numbered by joint from 1.
 
     """
     return tuple(
@@ -43,14 +43,14 @@ def rigid_parameter_names(robot: Robot) -> tuple[ParameterName, ...]:
 
 
 def link_unit(name: str) -> tuple[str, ...]:
-    """Return the unit of an inertial parameter such as 'mx2'; none of what is called otherwise."""
+    """Return the unit of an inertial parameter such as 'mx2'; empty for other names."""
     units = dict(zip(LINK_PARAMETERS, LINK_UNITS, strict=True))
     unit = units.get(name.rstrip('0123456789'))
     return () if unit is None else (unit,)
 
 
 class _Scratch(threading.local):
-    """Space that Pinocchio works in, once for a robot and thread: to make it takes longer."""
+    """Work space of Pinocchio, kept per robot and thread, as making it is slow."""
 
     def __init__(self) -> None:
         self._of: WeakKeyDictionary[Robot, pin.Data] = WeakKeyDictionary()
@@ -67,7 +67,7 @@ _SCRATCH = _Scratch()
 
 def inverse_dynamics(robot: Robot, motion: Motion) -> FloatArray:
     """
-    Compute the joint torques that a motion takes, by recursive Newton-Euler.
+    Compute the joint torques of the rigid body along a motion, by recursive Newton-Euler.
 
     Returns
     -------
@@ -86,7 +86,7 @@ def inverse_dynamics_derivatives(
     robot: Robot, motion: Motion
 ) -> tuple[FloatArray, FloatArray, FloatArray]:
     """
-    Differentiate the joint torques that a motion takes by the motion.
+    Differentiate the joint torques of the rigid body by position, velocity and acceleration.
 
     Returns
     -------
@@ -95,9 +95,9 @@ def inverse_dynamics_derivatives(
 
     Notes
     -----
-    Source: Carpentier and Mansard 2018; Pinocchio's computeRNEADerivatives. It divides by the
-    masses of links together, which a fit may have made negative: derivatives are linear in the
-    parameters, and those of a ballast that makes all masses positive are taken off again.
+    Source: Carpentier and Mansard 2018; Pinocchio's computeRNEADerivatives. It divides by sums of
+    link masses, so it needs positive masses. If a fit has a negative mass, a ballast is added to
+    all links, and the derivatives of the ballast alone are subtracted: they are linear.
 
     """
     lightest = float(np.min(robot.rigid_parameters[:: len(LINK_PARAMETERS)]))
@@ -127,14 +127,14 @@ def regressor(robot: Robot, motion: Motion) -> FloatArray:
     Parameters
     ----------
     robot : Robot
-        Gives axes, lengths and gravity; its inertial parameters do not matter.
+        Arm with axes, lengths and gravity; its inertial parameters are not used.
     motion : Motion
         N samples of the n joints.
 
     Returns
     -------
     ndarray, shape (N, n, 10 n)
-        Rows: joints; columns: ``rigid_parameter_names``.
+        Y of each sample, with joints as rows and ``rigid_parameter_names`` as columns.
 
     Notes
     -----
@@ -161,7 +161,7 @@ def regressor(robot: Robot, motion: Motion) -> FloatArray:
 
 def gravity_sensitivity(robot: Robot, q: FloatArray) -> FloatArray:
     """
-    Differentiate the joint torques by the gravity vector; exact, as they are linear in it.
+    Differentiate the joint torques by the gravity vector, exactly as they are linear in gravity.
 
     Parameters
     ----------
@@ -173,7 +173,7 @@ def gravity_sensitivity(robot: Robot, q: FloatArray) -> FloatArray:
     Returns
     -------
     ndarray, shape (N, n, 3)
-        dtau/dg [N m per m/s^2], g in the base frame.
+        Derivatives dtau/dg [N m per m/s^2], with g in the base frame.
 
     """
     columns = np.empty((len(q), robot.n_joints, 3))
@@ -189,9 +189,9 @@ def random_motion(robot: Robot, rng: np.random.Generator, n_samples: int | None 
     """
     Draw independent random states that excite every identifiable parameter.
 
-    Positions are uniform within the limits (one turn where there are none), velocities and
-    accelerations are normal with a standard deviation of 1 rad/s and 1 rad/s^2 (or m). By default
-    there are as many states as tell all parameters.
+    Positions are uniform within the limits (one turn without limits), velocities and accelerations
+    are normal with a standard deviation of 1 rad/s and 1 rad/s^2 (or m). The default number of
+    states identifies all base parameters.
 
     """
     n = robot.n_joints

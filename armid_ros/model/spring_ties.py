@@ -4,9 +4,9 @@
 Two chains tied to each other by springs: geometry, forces, torques, derivatives.
 
 A tie is between a point of a link of one machine and a point of a link of the other, such as a
-strap between a shank and the shank of an exoskeleton. With D = p - r, the way from the other
-machine's point to the machine's own, a spring k pulls the machine with -k D and the other one
-with +k D: equal, opposite, and in one point of space as far as it is relaxed.
+strap between a shank and the shank of an exoskeleton. With the vector D = p - r from the other
+machine's point r to the machine's own point p, a spring k pulls the machine with the force -k D
+and the other one with +k D. A relaxed spring has D = 0.
 Source: the human-exoskeleton leg pair, equations (16), (18), (23), (25), physical signs.
 
 """
@@ -26,25 +26,25 @@ import numpy as np
 #: Step of the central differences of spring columns [rad or m].
 _STEP = 1e-5
 
-#: Segments of the leg pair that are tied: in the order of the source, F1 to F4.
+#: Tied segments of the leg pair, in the order of the source, F1 to F4.
 SEGMENTS = ('swing_shank', 'swing_thigh', 'stance_thigh', 'stance_shank')
-#: The joint that moves each of them.
+#: Joint that moves each segment.
 _MOVED_BY = ('swing_knee', 'swing_hip', 'stance_knee', 'stance_ankle')
 
 
 @dataclass(frozen=True)
 class Tie:
     """
-    Where one spring is.
+    Place of a spring between two machines.
 
     Attributes
     ----------
     name : str
-        What it ties, such as 'swing_shank'.
+        Name of the tied segment, such as 'swing_shank'.
     joint, other_joint : str
         The joints that move the two links.
     point, other_point : tuple of float, length 3
-        The ends in the frames of those joints [m].
+        The ends of the spring in the frames of these joints [m].
 
     """
 
@@ -58,14 +58,14 @@ class Tie:
 @dataclass(frozen=True)
 class TiedMachines:
     """
-    Two machines and where springs tie them.
+    Two machines and the places of the springs that tie them.
 
     Attributes
     ----------
     robot, other : Robot
-        The machine whose torques are measured, and the one it is tied to.
+        The machine whose torques are measured, and the machine to which it is tied.
     ties : sequence of Tie
-        Where the springs are.
+        Places of the springs.
 
     """
 
@@ -81,13 +81,13 @@ class TieGeometry(NamedTuple):
     Attributes
     ----------
     way : ndarray, shape (N, S, 3)
-        D, from the point of the other machine to that of the machine [m].
+        Vector D from the point of the other machine to that of the machine [m].
     position, other_position : ndarray, shape (N, S, 3)
-        The ends [m].
+        Positions of the two ends [m].
     jacobian : ndarray, shape (N, S, 3, n)
-        Of the machine's end.
+        Jacobian of the machine's end.
     other_jacobian : ndarray, shape (N, S, 3, m)
-        Of the other machine's end.
+        Jacobian of the other machine's end.
 
     """
 
@@ -103,8 +103,8 @@ class TieGeometry(NamedTuple):
         return np.asarray(np.einsum('nsxj,nsx->njs', self.jacobian, self.way))
 
     def pulled(self, slack: float | FloatArray) -> FloatArray:
-        """Return the columns of springs that give by a slack [m] before they pull, (N, n, S)."""
-        # shorter ways [m] have no direction
+        """Return the columns of springs that pull only beyond a slack [m], (N, n, S)."""
+        # the direction of a vector shorter than this [m] is undefined
         length = np.maximum(np.linalg.norm(self.way, axis=2), 1e-12)
         share = np.maximum(1.0 - slack / length, 0.0)
         return np.asarray(self.columns * share[:, np.newaxis])
@@ -112,19 +112,19 @@ class TieGeometry(NamedTuple):
 
 def centroid_ties(robot: Robot, other: Robot, joints: Sequence[tuple[str, str]]) -> list[Tie]:
     """
-    Tie the centroids of links.
+    Return ties between the centroids of links.
 
     Parameters
     ----------
     robot, other : Robot
-        The machines; their base frames have to be one.
+        The machines; they have the same base frame.
     joints : sequence of (str, str)
         Joint of the machine and joint of the other one for every tie.
 
     Returns
     -------
     list of Tie
-        Named after the machine's links.
+        The ties, named after the machine's links.
 
     """
     return [
@@ -143,7 +143,7 @@ def tie_geometry(
     robot: Robot, q: FloatArray, other: Robot, other_q: FloatArray, ties: Sequence[Tie]
 ) -> TieGeometry:
     """
-    Follow ties along positions of both machines, shapes (N, n) and (N, m).
+    Return the geometry of ties along positions of both machines, shapes (N, n) and (N, m).
 
     Raises
     ------
@@ -184,18 +184,18 @@ def tie_columns_derivatives(
     robot, other : Robot
         The machines.
     q, other_q : ndarray, shape (N, n) and (N, m)
-        Their positions.
+        Joint positions of the machines.
     ties : sequence of Tie
-        Where the springs are.
+        Places of the springs.
     slack : float or ndarray, shape (S,)
-        Way that they give before they pull [m].
+        Length beyond which the springs pull [m].
 
     Returns
     -------
     by_q : ndarray, shape (N, n, S, n)
-        By the machine's own positions, from central differences of 1e-5 rad.
+        Derivatives by the machine's own positions, from central differences of 1e-5 rad.
     by_other_q : ndarray, shape (N, n, S, m)
-        By the other machine's; exact without slack, -J^T J of the two ends.
+        Derivatives by the other machine's positions; without slack exact, -J^T J of the two ends.
 
     """
     by_q = np.empty((len(q), robot.n_joints, len(ties), robot.n_joints))
@@ -221,12 +221,12 @@ def _known(robot: Robot, joint: str) -> str:
 
 def leg_ties(exo: Robot, human: Robot, segments: Sequence[str] = SEGMENTS) -> tuple[Tie, ...]:
     """
-    Tie the shipped exoskeleton to its wearer where the source has springs.
+    Return the ties of the shipped exoskeleton to its wearer, at the springs of the source.
 
     Raises
     ------
     ModelError
-        If there is no such segment.
+        If a segment does not exist.
 
     """
     unknown = [segment for segment in segments if segment not in SEGMENTS]

@@ -1,11 +1,11 @@
 # Copyright 2026 The armid_ros developers
 # SPDX-License-Identifier: Apache-2.0
 """
-A URDF with other inertial parameters, and otherwise as its author wrote it.
+A URDF with other inertial parameters, and otherwise unchanged.
 
-What a driven joint moves may be several links, on fixed joints or on joints that are not driven.
-The other links keep their inertials as far as bodies allow, and the driven joint's own link gets
-what is left, so that the file read again has exactly the parameters that were put in.
+A driven joint may move several links, on fixed joints or on joints that are not driven. The other
+links keep their inertials as far as physical consistency permits. The driven joint's own link gets
+the remainder, so that the file, when read again, has exactly the given parameters.
 
 """
 
@@ -30,9 +30,9 @@ import numpy as np
 import pinocchio as pin
 import scipy.linalg
 
-#: The least share of a body's pseudo-inertia, in any direction, that its own link keeps.
+#: Least share of a body's pseudo-inertia, in any direction, that its own link keeps.
 LEAST_SHARE = 0.05
-#: Largest difference of what the file says when read again, as a share of the largest parameter.
+#: Largest error of the parameters when the file is read again, over the largest parameter.
 ROUNDING = 1e-11
 
 
@@ -51,21 +51,21 @@ def export_urdf(
     robot : Robot
         The arm; ``robot.urdf`` is the description that is changed.
     damping, friction : mapping of str to float, optional
-        Joint, and its viscous coefficient [N m s/rad] or Coulomb torque [N m], for <dynamics>.
+        Viscous coefficient [N m s/rad] and Coulomb torque [N m] by joint, for <dynamics>.
     remarks : sequence of str
-        Lines to put into a comment at the end, such as what a URDF has no place for.
+        Lines of a comment at the end, such as parameters that a URDF cannot contain.
 
     Returns
     -------
     str
-        URDF. Only <inertial> and <dynamics> differ, the comment at the end, names of meshes, which
-        become absolute, and <ros2_control>, which is left out.
+        URDF. Only <inertial>, <dynamics> and the comment at the end differ; paths of meshes become
+        absolute, and <ros2_control> is left out.
 
     Raises
     ------
     ModelError
-        If the parameters of a link are not those of a body, or if the file read again would not
-        have the parameters.
+        If the parameters of a link are not physically consistent, or if the file read again would
+        not have them.
 
     """
     require_consistent(robot.links, robot.rigid_parameters)
@@ -111,7 +111,7 @@ def _parameters(robot: Robot, urdf: str) -> FloatArray:
 
 
 def _without_inertials(urdf: str, links: Sequence[str]) -> str:
-    """Take the inertials of some links out."""
+    """Return a URDF without the inertials of some links."""
     document = XmlText(urdf)
     for link in document.root.all('link'):
         inertial = link.find('inertial')
@@ -121,7 +121,7 @@ def _without_inertials(urdf: str, links: Sequence[str]) -> str:
 
 
 def _share(body: FloatArray, others: FloatArray) -> float:
-    """Return the share of the other links' inertia to keep, 1 for all, so a body is left."""
+    """Return the share of the other links' inertia that leaves a consistent own link, 0 to 1."""
     if not np.any(others):
         return 1.0
     if not Consistency.of('', others).eigenvalues[0] > -1e-12:
@@ -131,7 +131,7 @@ def _share(body: FloatArray, others: FloatArray) -> float:
 
 
 def _scaled(robot: Robot, shares: FloatArray) -> str:
-    """Scale mass and inertia of the links that share a body with a driven one."""
+    """Return the URDF with scaled mass and inertia of links that are fixed to driven ones."""
     document = XmlText(robot.urdf)
     carriers = _carriers(robot, document.root)
     for link in document.root.all('link'):
@@ -153,7 +153,7 @@ def _scaled(robot: Robot, shares: FloatArray) -> str:
 
 
 def _carriers(robot: Robot, root: Element) -> dict[str, int]:
-    """Return, for every link that a driven joint moves, which driven joint is nearest to it."""
+    """Return the nearest driven joint of every link that a driven joint moves."""
     parents: dict[str, tuple[str, str]] = {}
     for joint in root.all('joint'):
         parent, child = joint.find('parent'), joint.find('child')
@@ -209,7 +209,7 @@ def _set_inertial(document: XmlText, link: Element, parameters: FloatArray) -> N
 
 
 def _set_meshes(document: XmlText, element: Element, urdf: Path | None) -> None:
-    """Name meshes by where they are, as the file will lie in another folder."""
+    """Replace paths of meshes by absolute ones, as the file will be in another folder."""
     for child in element.children:
         name = child.attributes.get('filename', '')
         if child.name == 'mesh' and '://' not in name:
@@ -220,13 +220,13 @@ def _set_meshes(document: XmlText, element: Element, urdf: Path | None) -> None:
 
 
 def _check(robot: Robot, urdf: str) -> None:
-    """Read the result again as a check."""
+    """Raise ModelError if the result, read again, has other parameters."""
     found, wanted = _parameters(robot, urdf), robot.rigid_parameters.reshape(-1, PER_LINK)
     worst = np.max(np.abs(found - wanted), axis=1)
     scale = float(np.max(np.abs(wanted)))
     if np.any(worst > ROUNDING * scale):
         link = robot.links[int(np.argmax(worst))]
         raise ModelError(
-            f"{robot.name}: the description would not have the parameters of link '{link}' when "
+            f"{robot.name}: the exported description has other parameters of link '{link}' when "
             f'read again: they differ by {worst.max():.3g}'
         )

@@ -1,10 +1,10 @@
 # Copyright 2026 The armid_ros developers
 # SPDX-License-Identifier: Apache-2.0
 """
-Changing a few attributes of an XML text and nothing else: not a space, not a comment.
+Editing of single attributes and elements of an XML text; all other bytes stay, comments included.
 
-Elements are found by a parser, which knows comments and CDATA; what is written goes into the text
-as it stands.
+A parser, which handles comments and CDATA, finds the positions of elements in the text. Edits
+replace bytes at these positions.
 
 """
 
@@ -22,24 +22,24 @@ _ATTRIBUTE = re.compile(rb"""([^\s=<>"'/]+)\s*=\s*("[^"]*"|'[^']*')""")
 @dataclass
 class Element:
     """
-    An element and where it is in the text, in bytes.
+    An element and its positions in the text [bytes].
 
     Attributes
     ----------
     name : str
-        Tag.
+        Tag of the element.
     attributes : mapping of str to str
-        As they are in the text.
+        Values of the attributes by name.
     start : int
-        Of the start tag.
+        First byte of the start tag.
     start_end : int
-        Behind the start tag.
+        First byte after the start tag.
     end : int
-        Of the end tag; that of the start tag if the element is empty ('<x/>').
+        First byte of the end tag; equal to `start` if the element is empty ('<x/>').
     stop : int
-        Behind the element.
+        First byte after the element.
     children : list of Element
-        In order.
+        Child elements in the order of the text.
 
     """
 
@@ -52,22 +52,22 @@ class Element:
     children: list[Element] = field(default_factory=list)
 
     def find(self, name: str) -> Element | None:
-        """Return the first child of a name."""
+        """Return the first child with a tag; None without one."""
         return next(self.all(name), None)
 
     def all(self, name: str) -> Iterator[Element]:
-        """Return the children of a name."""
+        """Return the children with a tag."""
         return (child for child in self.children if child.name == name)
 
     @property
     def empty(self) -> bool:
-        """Whether it is written without an end tag."""
+        """Whether the element has no end tag, as '<x/>'."""
         return self.end == self.start
 
 
 class XmlText:
     """
-    An XML text that is changed in places.
+    An XML text with edits.
 
     Parameters
     ----------
@@ -77,7 +77,7 @@ class XmlText:
     Attributes
     ----------
     root : Element
-        Its root element, as it was at the beginning.
+        Root element of the text before the edits.
 
     """
 
@@ -87,7 +87,7 @@ class XmlText:
         self.root = self._parse()
 
     def set_attributes(self, element: Element, values: Mapping[str, str]) -> None:
-        """Set attributes of an element; those that it has keep their place and quotes."""
+        """Set attributes of an element; existing attributes keep their position and quotes."""
         tag = self._bytes[element.start : element.start_end]
         spans = {match[1].decode(): match.span(2) for match in _ATTRIBUTE.finditer(tag)}
         behind = max((stop for _, stop in spans.values()), default=1 + len(element.name.encode()))
@@ -119,11 +119,11 @@ class XmlText:
         self._edits.append((place, place, (added + tail).encode()))
 
     def remove(self, element: Element) -> None:
-        """Take an element out."""
+        """Remove an element."""
         self._edits.append((element.start, element.stop, b''))
 
     def text(self) -> str:
-        """Return the text with the changes."""
+        """Return the text with the edits."""
         result, last = [], 0
         for first, stop, new in sorted(self._edits, key=lambda edit: edit[:2]):
             result += [self._bytes[last:first], new]
@@ -159,7 +159,7 @@ class XmlText:
         return roots[0]
 
     def _tag_end(self, start: int) -> int:
-        """Return the place behind the tag that starts somewhere; '>' may be in a quoted value."""
+        """Return the position after the tag at `start`; quoted values may contain '>'."""
         match = re.compile(rb"""<(?:[^"'>]|"[^"]*"|'[^']*')*>""").match(self._bytes, start)
         assert match is not None
         return match.end()

@@ -40,7 +40,7 @@ class _Cells(NamedTuple):
 
 def learn_map(rows: JointRows, rng: np.random.Generator) -> tuple[TorqueMap, FloatArray]:
     """
-    Learn the map of a joint.
+    Learn a map of the residual torque of a joint.
 
     Parameters
     ----------

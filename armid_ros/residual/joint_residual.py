@@ -1,6 +1,6 @@
 # Copyright 2026 The armid_ros developers
 # SPDX-License-Identifier: Apache-2.0
-"""What was learned of the residual of one joint."""
+"""The learned map and law of the residual of one joint."""
 
 from __future__ import annotations
 

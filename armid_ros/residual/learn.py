@@ -38,7 +38,7 @@ _HEAD = 'joint,position,velocity,load,torque,std'
 @dataclass(frozen=True)
 class Residual:
     """
-    The residual of a diagnosis, learned.
+    The learned residual of a diagnosis.
 
     Attributes
     ----------

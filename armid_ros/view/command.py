@@ -41,7 +41,7 @@ def view(
     mark: str | None,
     topic: str | None,
 ) -> None:
-    """Look at a recording in rerun: the moving arm, torques, and what a model leaves."""
+    """Look at a recording in rerun: the moving arm, torques, and the residual of a model."""
     from armid_ros.arm import ArmModel
     from armid_ros.cli import options
     from armid_ros.files.cells import listed
@@ -90,7 +90,7 @@ def _whole(out: Path | None) -> Iterator[Path | None]:
 
 
 def _named(model: Path | None) -> tuple[str, ...]:
-    """Return the joints of the effects that a diagnosis beside the model names."""
+    """Return the joints of the effects named in diagnosis.json in the folder of the model."""
     if model is None:
         return ()
     path = (model if model.is_dir() else model.parent) / 'diagnosis.json'

@@ -42,7 +42,7 @@ _LINK, _MARKED = (175, 182, 190), (230, 60, 40)
 
 def rerun() -> ModuleType:
     """
-    Return the module rerun.
+    Import and return the module rerun.
 
     Raises
     ------
@@ -231,7 +231,7 @@ def _drawn(shape: LinkShape, colour: tuple[int, int, int]) -> Any:
     """Return a shape in its own frame as rerun draws it; RobotError for a broken mesh."""
     rr = rerun()
     if shape.path is not None:
-        load_mesh(shape.path, np.ones(3))  # the viewer leaves a broken one out without a word
+        load_mesh(shape.path, np.ones(3))  # the viewer ignores a broken mesh without a message
         return rr.Asset3D(path=shape.path, albedo_factor=colour)
     look = {'colors': colour, 'fill_mode': 'solid'}
     if shape.kind == 'box':

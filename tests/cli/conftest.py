@@ -1,6 +1,6 @@
 # Copyright 2026 The armid_ros developers
 # SPDX-License-Identifier: Apache-2.0
-"""Recordings to run commands on."""
+"""Recordings for tests of commands."""
 
 from armid_ros.arm import ArmModel
 from armid_ros.cli import main
@@ -17,14 +17,14 @@ DURATION, RATE = 14, 100  # s, Hz
 
 
 def armid(*arguments, code=0):
-    """Run a command, which has to end with a code."""
+    """Run a command and check its exit code; return its result."""
     result = CliRunner().invoke(main, [str(argument) for argument in arguments])
     assert result.exit_code == code, result.output
     return result
 
 
 def bag_of(path, arm, seed, moving=slice(None)):
-    """Write what sensors would record of a motion in closed form, of all joints or of some."""
+    """Write a noisy recording of a motion in closed form, of all joints or of some."""
     rng = np.random.default_rng(seed)
     t = np.arange(DURATION * RATE) / RATE
     q, dq, ddq = np.zeros((3, len(t), 6))

@@ -1,6 +1,6 @@
 # Copyright 2026 The armid_ros developers
 # SPDX-License-Identifier: Apache-2.0
-"""Small arms, and recordings of them that were made without the simulator."""
+"""Small arms, and recordings of them made without the simulator."""
 
 from armid_ros.arm import ArmModel
 from armid_ros.effects import make_effect
@@ -62,13 +62,13 @@ class Bench:
         self.arm = arm.with_effect(make_effect('coulomb_friction', self.robot), coulomb)
 
     def named_friction(self):
-        """Return the arm with friction that nobody gave values of."""
+        """Return the arm with friction effects whose values are not given."""
         return self.arm.with_theta(
             np.concatenate([self.robot.rigid_parameters, 0.0 * self.friction.ravel()])
         )
 
     def motion(self, speed, period, seed):
-        """Return a motion of sums of harmonics from the second of time 0 on, two periods."""
+        """Return a motion of sums of harmonics over two periods and a second."""
         rng = np.random.default_rng(seed)
         t = np.arange(round((2 * period + 1.0) * RATE)) / RATE
         joints = self.robot.n_joints
@@ -91,9 +91,9 @@ class Bench:
         Parameters
         ----------
         hidden : callable, optional
-            Torque (N, n) of a motion and the torque of the rigid arm, added to what is measured.
+            Function from a motion and the torque of the known arm to an additional torque (N, n).
         seed : int
-            Of motions and noise.
+            Seed of motions and noise.
         noise : float
             Factor on both noises.
 
@@ -118,18 +118,18 @@ class Bench:
         return result
 
     def torque(self, motion):
-        """Return rigid body and known friction, written out here."""
+        """Return the torque of rigid body and known friction, computed without effects."""
         friction = self.friction[0] * motion.dq + self.friction[1] * np.sign(motion.dq)
         return inverse_dynamics(self.robot, motion) + friction
 
 
 @pytest.fixture(scope='session')
 def bench():
-    """Return a vertical arm of two links with what is known of it."""
+    """Return a bench of an arm of two links in a vertical plane."""
     return Bench()
 
 
 @pytest.fixture(scope='session')
 def upright():
-    """Return an arm that turns about an upright axis and two level ones: it feels all gravity."""
+    """Return a bench of an arm with an upright axis and two level ones."""
     return Bench(UPRIGHT_URDF, (0.4, 0.3, 0.2), (0.6, 0.5, 0.3))

@@ -1,6 +1,6 @@
 # Copyright 2026 The armid_ros developers
 # SPDX-License-Identifier: Apache-2.0
-"""The files that pages and docstrings talk about."""
+"""The files that examples in pages and docstrings use."""
 
 import shutil
 
@@ -11,13 +11,13 @@ from docsite.desk import lay_out
 
 @pytest.fixture(scope='session')
 def desk(tmp_path_factory):
-    """Make them once."""
+    """Make the files once, and return their folder."""
     return lay_out(tmp_path_factory.mktemp('desk'))
 
 
 @pytest.fixture
 def at_desk(desk, tmp_path, monkeypatch):
-    """Work in a copy of them."""
+    """Change to a copy of the folder of files, and return it."""
     folder = shutil.copytree(desk, tmp_path / 'desk')
     monkeypatch.chdir(folder)
     return folder

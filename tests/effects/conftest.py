@@ -28,13 +28,13 @@ def sines(robot) -> Callable[..., Motion]:
 
 @pytest.fixture(scope='session')
 def motion(sines) -> Motion:
-    """Return half a second at 200 Hz."""
+    """Return a motion of half a second at 200 Hz."""
     return sines()
 
 
 @pytest.fixture(scope='session')
 def with_values(robot) -> Callable[..., ArmModel]:
-    """Return a maker of the arm with one effect; one value counts for all parameters."""
+    """Return a maker of the arm with one effect; a single value is used for all parameters."""
 
     def make(text: str, values: npt.ArrayLike, shape: npt.ArrayLike | None = None) -> ArmModel:
         effect = make_effect(text, robot)
@@ -48,7 +48,7 @@ def with_values(robot) -> Callable[..., ArmModel]:
 
 @pytest.fixture(scope='session')
 def added(with_values) -> Callable[..., npt.NDArray[np.float64]]:
-    """Return a function that gives the torque that one effect adds along a motion."""
+    """Return a function that computes the torque of one effect along a motion."""
 
     def add(
         motion: Motion, text: str, values: npt.ArrayLike, shape: npt.ArrayLike | None = None

@@ -27,7 +27,7 @@ def urdf(*joints, name='small'):
 
 @pytest.fixture(scope='session')
 def tree():
-    """Make a slide that carries two chains of revolute joints, one of a single joint."""
+    """Return a robot with a slide that carries two chains of revolute joints."""
     return robot_from_urdf(
         urdf(
             ('slide', 'prismatic', 'base', 'cart', '0 0 0.5', '0 1 0', -0.5, 0.5, 200),
@@ -40,7 +40,7 @@ def tree():
 
 @pytest.fixture(scope='session')
 def two_link():
-    """Make an arm of two joints."""
+    """Return a robot with two joints."""
     return robot_from_urdf(
         urdf(
             ('shoulder', 'revolute', 'base', 'upper', '0 0 0.5', '0 1 0', -2.5, 2.5, 60),
@@ -70,7 +70,7 @@ def two_link_arm(two_link, with_effects):
 
 @pytest.fixture(scope='session')
 def humanoid_collision(humanoid):
-    """Return its collision bodies."""
+    """Return the collision bodies of the humanoid arm."""
     return collision_model(humanoid)
 
 

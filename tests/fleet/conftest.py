@@ -1,6 +1,6 @@
 # Copyright 2026 The armid_ros developers
 # SPDX-License-Identifier: Apache-2.0
-"""A small fleet in bags, and a cluster of two processes to work on it."""
+"""A small fleet in bags, and a cluster of two processes."""
 
 from armid_ros.fleet.cluster import connected
 from armid_ros.fleet.job import FleetSettings
@@ -15,13 +15,13 @@ URDF = str(ROBOT)
 
 
 def identified(client, bags, robots, out, settings, *tell):
-    """Plan and run; return the outcome."""
+    """Plan and run the identification of a fleet; return its outcome."""
     return identify_fleet(client, bags, plan_fleet(bags, robots, out, settings), *tell)
 
 
 @pytest.fixture(scope='session')
 def bags(tmp_path_factory):
-    """Return a folder of three arms with three bags each, whole and without changes."""
+    """Return a folder with undamaged bags of three unchanged arms, three each."""
     folder = tmp_path_factory.mktemp('fleet')
     generate(folder, arms=3, bags=3, changed=0, damaged=0, seconds=12.0)
     return folder

@@ -1,6 +1,6 @@
 # Copyright 2026 The armid_ros developers
 # SPDX-License-Identifier: Apache-2.0
-"""How many mutants are tried, and the table of what became of them."""
+"""The number of mutants, and the table of their outcomes."""
 
 import os
 from pathlib import Path
@@ -10,7 +10,7 @@ from hypothesis.database import DirectoryBasedExampleDatabase
 
 from tests.fuzz.property import TALLY
 
-#: Mutants of each kind that pytest tries; up to as many are always the same ones.
+#: Default number of mutants of each kind; up to this number, mutants are the same in each run.
 USUAL = 300
 WANTED = int(os.environ.get('ARMID_FUZZ', USUAL))
 
@@ -43,7 +43,7 @@ _COLUMNS = (
 
 
 def pytest_terminal_summary(terminalreporter):
-    """Print what became of the mutants of each kind."""
+    """Print the outcomes of the mutants of each kind."""
     if not TALLY:
         return
     terminalreporter.section('mutants')

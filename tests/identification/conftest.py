@@ -1,6 +1,6 @@
 # Copyright 2026 The armid_ros developers
 # SPDX-License-Identifier: Apache-2.0
-"""An arm, a rich motion in closed form, and what would be recorded of it."""
+"""An arm, an exciting motion in closed form, and noisy recordings of it."""
 
 from armid_ros.arm import ArmModel
 from armid_ros.effects import make_effect
@@ -14,10 +14,10 @@ FRICTION = {'viscous_friction': 0.08, 'coulomb_friction': 0.05, 'torque_offset':
 
 
 class Foreground(Background):
-    """What does every job at once, where nothing waits for it."""
+    """A background that does every job at once in the foreground."""
 
     def begin(self, job, *, urgent=False):
-        """Do a job."""
+        """Do a job at once."""
         at_once(job)
 
 
@@ -38,7 +38,7 @@ def arm(robot):
 
 @pytest.fixture(scope='session')
 def structure(arm):
-    """Return the same arm with nothing known of its effects."""
+    """Return the same arm without values of its effects."""
     return ArmModel(arm.robot, arm.effects)
 
 
@@ -60,7 +60,7 @@ def multisine(joints, duration, rate, seed, amplitude=0.5, base_hz=0.1):
 
 
 def recorded(arm, motion, seed=0, torque_noise=0.0, position_noise=0.0, source='bag'):
-    """Return what sensors with white noise would record of an arm in exact motion."""
+    """Return a recording of an arm along a motion, with white sensor noise."""
     rng = np.random.default_rng(seed)
     tau = arm.torque(motion)
     return Recording(

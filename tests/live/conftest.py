@@ -1,6 +1,6 @@
 # Copyright 2026 The armid_ros developers
 # SPDX-License-Identifier: Apache-2.0
-"""A moving arm of three joints whose model is known, and what happens to it."""
+"""Recordings of a moving arm with a known model, with and without a change."""
 
 from __future__ import annotations
 
@@ -26,7 +26,7 @@ def arm_with(*effects):
 
 
 def moving(robot, duration, rng):
-    """Return a motion of three harmonics a joint, at rest in the beginning."""
+    """Return a motion of three harmonics per joint that begins and ends at rest."""
     t = np.arange(0.0, duration, 0.01)[:, np.newaxis]
     q = np.zeros((len(t), robot.n_joints))
     for rate, share in ((0.9, 1.0), (1.9, 0.6), (4.7, 0.2)):
@@ -43,7 +43,7 @@ def moving(robot, duration, rng):
 
 
 def recorded(before, after, then=None):
-    """Record an arm that becomes another one `before` seconds after the begin."""
+    """Record an arm that gets the effect `then` after `before` seconds."""
     rng = np.random.default_rng(5)
     arm = arm_with(*KNOWN)
     motion = moving(arm.robot, before + after + 4.0, rng)
@@ -84,7 +84,7 @@ def asked(known_arm, changed):
 
 @pytest.fixture(scope='session')
 def answered(asked):
-    """Return what answered the request in this process, and its answer."""
+    """Return the in-process diagnosis that answered the request, and its answer."""
     here = InProcess()
     here.ask(asked)
     return here, here.poll()

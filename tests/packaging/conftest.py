@@ -1,6 +1,6 @@
 # Copyright 2026 The armid_ros developers
 # SPDX-License-Identifier: Apache-2.0
-"""Where the source tree is, and where it has been installed."""
+"""Folders of the source tree and of the installation."""
 
 from importlib import metadata
 from pathlib import Path
@@ -20,7 +20,7 @@ def root():
 
 @pytest.fixture(scope='session')
 def distribution():
-    """Return what pip installed in this environment; skip the test where it has not."""
+    """Return the distribution that pip installed; skip the test if it did not."""
     site_packages = [sysconfig.get_path('purelib')]  # not the source tree, which has metadata too
     for installed in metadata.distributions(name='armid_ros', path=site_packages):
         return installed
@@ -29,5 +29,5 @@ def distribution():
 
 @pytest.fixture(scope='session')
 def prefix(distribution):
-    """Return the prefix that armid_ros is installed in."""
+    """Return the prefix of the installation of armid_ros."""
     return Path(sys.prefix)

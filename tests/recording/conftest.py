@@ -1,6 +1,6 @@
 # Copyright 2026 The armid_ros developers
 # SPDX-License-Identifier: Apache-2.0
-"""A swinging arm's recording, and bags made message by message."""
+"""A recording of a swinging arm, and bags made message by message."""
 
 import sqlite3
 
@@ -16,7 +16,7 @@ PERIOD_NS = 1_000_000
 
 
 def swing(samples=500, joints=JOINTS, period_ns=PERIOD_NS, start_ns=START_NS):
-    """Return a recording of joints that swing, each at a rate of its own."""
+    """Return a recording of joints that swing at different rates."""
     t = np.arange(samples) * period_ns * 1e-9
     rates = 2.0 + np.arange(len(joints))
     return Recording(
@@ -30,7 +30,7 @@ def swing(samples=500, joints=JOINTS, period_ns=PERIOD_NS, start_ns=START_NS):
 
 
 def sqlite_bag(path, messages, columns=', offered_qos_profiles TEXT'):
-    """Write messages of one topic into a database as rosbag2 does; return it open."""
+    """Write messages of one topic into a database as rosbag2 does; return the open database."""
     database = sqlite3.connect(path)
     database.executescript(
         'CREATE TABLE topics(id INTEGER PRIMARY KEY, name TEXT, type TEXT, '
@@ -106,7 +106,7 @@ def messages_of():
 
 @pytest.fixture
 def assert_same():
-    """Return a function that compares two recordings, of the second only some samples."""
+    """Return a function that compares a recording with some samples of another one."""
 
     def compare(got, expected, samples=slice(None), joints=None):
         columns = [expected.joints.index(name) for name in joints or expected.joints]

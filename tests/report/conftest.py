@@ -1,6 +1,6 @@
 # Copyright 2026 The armid_ros developers
 # SPDX-License-Identifier: Apache-2.0
-"""A headless Chromium, and an identification to report on."""
+"""A headless Chromium, and an identification for reports."""
 
 from dataclasses import dataclass
 
@@ -21,7 +21,7 @@ RATE = 100.0
 
 @pytest.fixture(scope='session')
 def browser(tmp_path_factory):
-    """Start a headless Chromium; skip where there is none."""
+    """Start a headless Chromium; skip the test if none is installed."""
     command = find_browser()
     if command is None:
         pytest.skip(f'no browser to look at reports with: none of {", ".join(BROWSERS)}')
@@ -39,7 +39,7 @@ DRAWN = (
 
 @pytest.fixture
 def charts_drawn(browser, tmp_path):
-    """Return a function that opens a page, all of it, and counts the charts that are drawn."""
+    """Return a function that opens a page with all its details, and counts drawn charts."""
 
     def count(html, width, dark):
         path = tmp_path / 'report.html'
@@ -59,7 +59,7 @@ def charts_drawn(browser, tmp_path):
 
 @dataclass(frozen=True)
 class Case:
-    """An identification with everything it came from."""
+    """An identification with its true arm, description, motion and recordings."""
 
     truth: ArmModel
     description: ArmModel
@@ -71,7 +71,7 @@ class Case:
 
 @pytest.fixture(scope='session')
 def case(tmp_path_factory):
-    """Identify the simulated humanoid arm on the moon from one run, and hold out another."""
+    """Identify the simulated humanoid arm on the moon from one run; another one is held out."""
     rng = np.random.default_rng(5)
     robot = load_robot('humanoid_arm', gravity='moon')
     truth = description = ArmModel(robot)

@@ -1,6 +1,6 @@
 # Copyright 2026 The armid_ros developers
 # SPDX-License-Identifier: Apache-2.0
-"""One ROS context and executor a test, on a domain of its own, spun by hand."""
+"""A ROS context and an executor for each test, on a separate domain, spun by hand."""
 
 from __future__ import annotations
 
@@ -26,21 +26,21 @@ from std_srvs.srv import Trigger
 
 AnyNode = TypeVar('AnyNode', bound=Node)
 
-#: Only reached when something is broken; nothing is asserted about how long things take.
+#: Longest wait for a condition [s]; only broken code reaches it.
 PATIENCE = 60.0
-#: A message published within this process is delivered at once; this is a thousand times more [s].
+#: Time without callbacks after which nothing is left to do [s]; delivery takes a thousandth.
 QUIET = 0.02
-#: Time after which a call is made again [s].
+#: Time after which a call is repeated [s].
 REPEAT = 5.0
 
 
 def busy(real_time: RealTime, monkeypatch: pytest.MonkeyPatch, seconds: float = 10.0) -> None:
-    """Let the computer have done something else for so long."""
+    """Let a clock appear some seconds late, as on a busy computer."""
     monkeypatch.setattr(real_time, '_clock', lambda: time.monotonic() + seconds)
 
 
 class Bench:
-    """A test bench: nodes under test, and a probe node to talk to them."""
+    """A test bench: nodes under test, and a probe node that communicates with them."""
 
     def __init__(self, context: Context) -> None:
         self.context = context
@@ -49,7 +49,7 @@ class Bench:
         self._clock = self.probe.create_publisher(Clock, '/clock', 10)
 
     def add(self, make: Callable[..., AnyNode], *args: Any, **parameters: Any) -> AnyNode:
-        """Make a node on the bench; keywords are parameters, but for names and cli_args."""
+        """Make a node on the bench; keywords are its parameters, except names and cli_args."""
         names = ('node_name', 'namespace', 'cli_args')
         ros = {k: parameters.pop(k) for k in names if k in parameters}
         node = make(
@@ -63,7 +63,7 @@ class Bench:
         return node
 
     def spin_until(self, predicate: Callable[[], object], what: str = 'the condition') -> None:
-        """Work until something holds."""
+        """Spin until a condition holds."""
         deadline = time.monotonic() + PATIENCE
         while not predicate():
             if time.monotonic() > deadline:
@@ -71,7 +71,7 @@ class Bench:
             self.executor.spin_once(timeout_sec=0.05)
 
     def settle(self) -> None:
-        """Work until nothing is left to do; a timer that is always due is a fault of the test."""
+        """Spin until no callback is ready; fail if that never happens."""
         deadline = time.monotonic() + PATIENCE
         while time.monotonic() < deadline:
             try:
@@ -86,7 +86,7 @@ class Bench:
     def listen(
         self, message_type: type[Any], topic: str, qos: QoSProfile | int = 1000
     ) -> list[Any]:
-        """Return a list that fills with the messages of a topic."""
+        """Return a list to which the messages of a topic are appended."""
         messages: list[Any] = []
         self.probe.create_subscription(message_type, topic, messages.append, qos)
         return messages
@@ -94,7 +94,7 @@ class Bench:
     def matched_publisher(
         self, message_type: type[Any], topic: str, qos: QoSProfile | int = 1000, readers: int = 1
     ) -> Any:
-        """Return a publisher that a node listens to."""
+        """Return a publisher to whose topic a node has subscribed."""
         publisher = self.probe.create_publisher(message_type, topic, qos)
         self.spin_until(lambda: publisher.get_subscription_count() >= readers, topic)
         return publisher
@@ -112,7 +112,7 @@ class Bench:
         )
 
     def stop_clock(self) -> None:
-        """Publish /clock no more."""
+        """Stop the publishing of /clock."""
         self.probe.destroy_publisher(self._clock)
 
     def call(self, service: str) -> Trigger.Response:
@@ -136,12 +136,12 @@ class Bench:
         return next(future.result() for future in futures if future.done())
 
     def rosout(self) -> list[Log]:
-        """Return a list that fills with what is logged from now on."""
+        """Return a list to which new log messages are appended."""
         messages = self.listen(Log, '/rosout', LATCHED)
         return messages
 
     def diagnose(self, node: Any, diagnostics: list[DiagnosticArray]) -> DiagnosticStatus:
-        """Let a node publish its diagnostics, and return them; they are in the list, too."""
+        """Let a node publish its diagnostics, and return them from the list of diagnostics."""
         self.settle()
         count = len(diagnostics)
         node.publish_diagnostics()
@@ -149,18 +149,18 @@ class Bench:
         return diagnostics[-1].status[0]
 
     def diagnostics(self) -> list[DiagnosticArray]:
-        """Return a list that fills with diagnostics."""
+        """Return a list to which diagnostics are appended."""
         return self.listen(DiagnosticArray, '/diagnostics')
 
 
 @pytest.fixture
 def bench() -> Iterator[Bench]:
-    """Return a test bench on a domain of its own."""
+    """Return a test bench on a separate domain."""
     with private_context() as context:
         bench = Bench(context)
         yield bench
         for node in list(bench.executor.get_nodes()):
-            # a callback that fails ends no node, but is an error of the node all the same
+            # a failing callback does not end a node, but is an error of the node
             complaints = getattr(node, 'complaints', None)
             assert complaints is None or complaints.defects == 0, complaints.latest
             bench.executor.remove_node(node)

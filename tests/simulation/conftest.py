@@ -1,6 +1,6 @@
 # Copyright 2026 The armid_ros developers
 # SPDX-License-Identifier: Apache-2.0
-"""Small machines with closed-form motion, and the robots that others made."""
+"""Small machines with closed-form motion."""
 
 from collections.abc import Callable
 
@@ -9,7 +9,7 @@ import pytest
 
 
 def link(name, com, mass):
-    """Write a link."""
+    """Return the URDF of a link."""
     return (
         f'<link name="{name}"><inertial><origin xyz="{com}"/><mass value="{mass}"/>'
         '<inertia ixx="0.01" iyy="0.01" izz="0.01" ixy="0" ixz="0" iyz="0"/></inertial></link>'
@@ -17,7 +17,7 @@ def link(name, com, mass):
 
 
 def joint(name, kind, links, origin, axis, reach, effort):
-    """Write a joint between two links that moves by its reach to either side."""
+    """Return the URDF of a joint between two links, with a reach to either side."""
     return (
         f'<joint name="{name}" type="{kind}"><parent link="{links[0]}"/><child link="{links[1]}"/>'
         f'<origin xyz="{origin}"/><axis xyz="{axis}"/>'
@@ -40,7 +40,7 @@ def slider() -> Callable[..., Robot]:
 @pytest.fixture(scope='session')
 def pendulum() -> Callable[..., Robot]:
     """
-    Return a maker of chains that hang down: 1 kg at 0.4 m of each link of 0.5 m.
+    Return a maker of hanging chains: links of 0.5 m, each with 1 kg at 0.4 m.
 
     The inertia of a link about its centre of mass is 0.01 kg m^2.
 

@@ -1,6 +1,6 @@
 # Copyright 2026 The armid_ros developers
 # SPDX-License-Identifier: Apache-2.0
-"""What the tests of the viewing nodes have in common."""
+"""Fixtures of the tests of the viewing nodes."""
 
 from tests.ros.conftest import bench
 

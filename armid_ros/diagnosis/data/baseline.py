@@ -3,11 +3,11 @@
 """
 Prior knowledge of an arm: from recordings of a baseline, and from its description.
 
-The misfit is the residual that a model leaves of recordings in which nothing was wrong: no real
-arm agrees with its model to within the noise. The residual of recordings that a model was
-identified from is smaller than that of others, so each fold is also predicted with parameters
-fitted to the other folds. Parameters that those do not determine stay as in the model, as far as
-a description can be believed: a joint may have been moved in one recording alone.
+The misfit is the residual of a model in recordings in which nothing was wrong: no real arm agrees
+with its model to within the noise. The residual is smaller in recordings that the model was
+identified from, so each fold is also predicted with parameters fitted to the other folds. The
+description is their prior, for parameters that the other folds do not determine: a joint may have
+moved in one recording only.
 
 """
 
@@ -34,7 +34,7 @@ from armid_ros.recording import Recording
 import numpy as np
 import scipy.linalg
 
-#: A column of which the other free columns leave less than this share of its length is grouped.
+#: Share of its length below which the part of a column beyond the other columns counts as zero.
 EXCITED = 1e-4
 
 
@@ -63,10 +63,10 @@ def described_precision(
     """
     Return the prior precision of the base parameters by the description, shape (r, r).
 
-    The description is believed to a factor or so: data decide what they determine, and what they
-    hardly determine stays where it predicts other motions well. A value of zero of an effect is
-    no description, but for what the effect knows of its size. One of infinite variance leaves
-    what it does not act on: a precision of zero along its column of the grouping.
+    The prior standard deviation is about the described value: data decide what they determine, and
+    the rest keeps values that predict other motions well. An effect with a value of zero has its
+    largest expected value as standard deviation. A parameter of infinite variance gives zero
+    precision along its column of the grouping.
 
     Parameters
     ----------
@@ -75,7 +75,7 @@ def described_precision(
     arm : ArmModel
         The arm as described.
     known : ndarray, shape (P, P), optional
-        Information on its first parameters by recordings that are not there any more.
+        Information on its first parameters, from recordings that are no longer available.
 
     """
     spread = _described_spread(arm)
@@ -94,7 +94,7 @@ def described_precision(
 def refitted(
     arm: ArmModel, base: BaseParameters, data: Sequence[Trajectory], sigma: Sequence[FloatArray]
 ) -> ArmModel:
-    """Return an arm with base parameters fitted to data with noise (n,) [N m] each."""
+    """Return an arm with base parameters fitted to trajectories with noise (n,) [N m] each."""
     columns = [part.base_columns(arm, arm.effects, base.independent) for part in data]
     weight = row_weights(data, sigma)
     x = (np.concatenate(columns) * weight[:, :, np.newaxis]).reshape(-1, base.rank)
@@ -126,11 +126,11 @@ class Baseline:
     residual : tuple of ndarray, each (M, n)
         Residual of the model [N m].
     misfit : ndarray, shape (n,)
-        Geometric mean of the root mean square residuals of the model as given, and of folds
-        predicted from the other folds [N m].
+        Geometric mean of two rms residuals: of the model as given, and of folds predicted from
+        the other folds [N m].
     varies : ndarray, shape (n,)
-        Mean square residual of the fold that is predicted worst, over that of all folds: the
-        misfit varies from motion to motion.
+        Mean square residual of the worst predicted fold over that of all folds, as the misfit
+        varies from motion to motion.
 
     """
 
@@ -141,14 +141,14 @@ class Baseline:
 
     @classmethod
     def of(cls, arm: ArmModel, data: Sequence[Trajectory], rng: np.random.Generator) -> Baseline:
-        """Measure the misfit of a model."""
+        """Measure the misfit of a model in recordings of a baseline."""
         residual = [part.residual(arm) for part in data]
         base, columns = excited(arm, arm.base_parameters(rng), data)
         held = described_precision(base, arm)
         informative = np.concatenate([part.informative for part in data])
         rest = np.concatenate(residual)
         w = np.concatenate(columns)
-        informative[:, ~informative.any(axis=0)] = True  # of a joint that never moved, all rows
+        informative[:, ~informative.any(axis=0)] = True  # use all rows of a joint that never moved
         scale = np.sqrt(np.mean(rest**2, axis=0, where=informative))
         weight = informative / np.maximum(scale, 1e-12)
         rows = w * weight[:, :, np.newaxis]
@@ -179,7 +179,7 @@ class Baseline:
         """
         Return the relative rms error of the model: of the whole arm, and of each joint, (n,).
 
-        Root mean square, where a joint moves: friction holds one at rest with any torque.
+        Only rows in which a joint moves count: at rest, friction can have any torque.
 
         """
         rows = Evidence.over_noise(self.data, [np.ones_like(self.misfit)] * len(self.data))
@@ -196,21 +196,21 @@ def known_misfit(
     held_out: Sequence[Recording] = (),
 ) -> Misfit:
     """
-    Measure what a model leaves of recordings in which nothing is wrong, for later diagnoses.
+    Measure the misfit of a model in recordings in which nothing is wrong, for later diagnoses.
 
-    Rows in which a joint rests or turns round do not count: a diagnosis learns nothing from the
-    friction there, of which a model gets most wrong.
+    Rows in which a joint rests or reverses do not count: friction there is the largest error of a
+    model, and a diagnosis does not use it.
 
     Parameters
     ----------
     arm : ArmModel
         The model.
     recordings : sequence of Recording
-        What it was fitted to.
+        Recordings that the model was fitted to.
     used : Conditioning
         Filters; the narrower the band, the less noise.
     held_out : sequence of Recording
-        What it was not fitted to, which counts alone where there is any.
+        Recordings that the model was not fitted to; if there are any, only these count.
 
     Raises
     ------

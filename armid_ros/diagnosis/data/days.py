@@ -1,6 +1,6 @@
 # Copyright 2026 The armid_ros developers
 # SPDX-License-Identifier: Apache-2.0
-"""The recordings of two days in weighted rows, joint by joint."""
+"""Recordings of the baseline (first day) and of the day in question, in weighted rows."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from armid_ros.motion import FloatArray
 import numpy as np
 import numpy.typing as npt
 
-#: Share of a torque that the unit of its rows is at the least.
+#: Smallest unit of the rows of a joint, over its rms torque.
 _LEAST = 1e-4
 
 
@@ -26,13 +26,13 @@ class Rows:
     Attributes
     ----------
     data : tuple of Trajectory
-        Of the first day and of the day in question, recordings numbered through.
+        Trajectories of the first day, then of the day in question; `fold` counts through both.
     sigma : tuple of ndarray, each (n,)
         Unit of each trajectory [N m].
     before : int
         Number of recordings of the first day.
     amplitude : tuple of ndarray, each (n,)
-        What discrepancies of each recording are measured in [N m].
+        Unit of the discrepancies of each recording [N m].
     unseen : bool
         Whether the amplitude is the misfit of a first day without recordings.
 
@@ -52,7 +52,7 @@ class Rows:
         return cls(evidence.data, evidence.sigma, 0, amplitude).not_below_rounding()
 
     def not_below_rounding(self) -> Rows:
-        """Raise units to the rounding error of the torque where they are smaller."""
+        """Return the rows with units of at least the rounding error of the torque."""
         least = _LEAST * self.torque
         return replace(
             self,
@@ -68,7 +68,7 @@ class Rows:
 
     @cached_property
     def today(self) -> npt.NDArray[np.bool_]:
-        """Return which recordings are of the day in question."""
+        """Return whether each recording is of the day in question, (K,)."""
         return np.arange(max(part.fold for part in self.data) + 1) >= self.before
 
     @property
@@ -78,7 +78,7 @@ class Rows:
 
     @cached_property
     def in_question(self) -> list[int]:
-        """Return the trajectories of the day in question."""
+        """Return the indices of the trajectories of the day in question."""
         return [k for k, part in enumerate(self.data) if self.today[part.fold]]
 
     @cached_property
@@ -95,7 +95,7 @@ class Rows:
         return np.asarray(np.maximum(rms, 1e-3 * rms.max()))
 
     def weighted(self, columns: Sequence[FloatArray], joints: Sequence[int]) -> list[FloatArray]:
-        """Weight columns (M, n, p) of trajectories; return them per recording, (joints, M, p)."""
+        """Return weighted columns of each recording, (joints, M, p), from columns (M, n, p)."""
         index = list(joints)
         rows = [
             (own[:, index] * weight[:, index, np.newaxis]).swapaxes(0, 1)

@@ -3,12 +3,11 @@
 """
 Model discrepancy: the part of a misfit that is the same in every motion.
 
-Measured torque is that of a model, and a function of the state that the model lacks, and noise
-(Kennedy and O'Hagan, Bayesian calibration of computer models, 2001). The function belongs to the
-arm: it was there before and is there now, so that other motions, which visit other states, have
-another misfit without anything having changed. Here it is a function of position plus one of
-velocity plus friction that nobody asked for, which goes with the load, in each joint, fitted to
-the recordings of both days jointly with whatever is tried.
+Measured torque is the sum of the torque of the model, a function of the state that the model
+lacks, and noise (Kennedy and O'Hagan, Bayesian calibration of computer models, 2001). The function
+belongs to the arm and does not change. Other motions visit other states, so their misfit differs
+although nothing has changed. In each joint it is a function of position, plus one of velocity,
+plus load-dependent friction, fitted to the recordings of both days together with each cause.
 
 """
 
@@ -41,12 +40,12 @@ def discrepancy_columns(data: Sequence[Trajectory], arm: Arm) -> list[FloatArray
     data : sequence of Trajectory
         The recordings of both days, whose motions give the knots.
     arm : Arm
-        Gives the load that friction goes with.
+        Arm whose load the load-dependent friction is proportional to.
 
     Returns
     -------
     list of ndarray, each (M, n, n f)
-        Of each trajectory, the f functions of one joint after the other.
+        Columns of each trajectory: the f functions of one joint after the other.
 
     """
     motions = [part.at_rows for part in data]
@@ -75,7 +74,7 @@ def discrepancy_columns(data: Sequence[Trajectory], arm: Arm) -> list[FloatArray
 
 
 def _unasked_friction(motion: Motion, arm: Arm) -> FloatArray:
-    """Return the columns of each nuisance friction law that is not usual, (N, n, L)."""
+    """Return the columns of each friction law that no joint has by default, (N, n, L)."""
     laws = [kind(motion.joints).columns(motion, arm) for kind in UNASKED_FRICTION]
     return np.stack([np.diagonal(columns, axis1=1, axis2=2) for columns in laws], axis=2)
 

@@ -1,13 +1,12 @@
 # Copyright 2026 The armid_ros developers
 # SPDX-License-Identifier: Apache-2.0
 """
-The data in the unit of the gap: their noise, or the model's own misfit.
+The data in the unit of the gap: their noise, or the misfit of the model.
 
-The noise is measured by the difference of two equal periods of one trajectory. The difference is
-taken of the residual of a model, evaluated in each period at its own measured positions: it
-includes the noise of the encoders as it propagates through the model, and whatever depends on the
-motion alone cancels. Where nothing repeats, the noise is assumed, from how rows differ from their
-neighbours, and reported as assumed.
+The noise is the difference between the residuals of two equal periods of one trajectory. Each
+residual is evaluated at the positions measured in its period, so the difference includes encoder
+noise as it propagates through the model. Torques that depend on the motion alone cancel. Without
+equal periods the noise is assumed from differences between neighbouring rows, and reported so.
 
 """
 
@@ -30,12 +29,11 @@ from scipy import signal, stats
 _LAGS = 20
 #: Where fewer informative rows than this remain, all rows are used.
 _FEW = 20
-#: Noise of torques is coloured: white noise with the same second differences is smaller by up to
-#: this factor in 95 % of the joints of 48 recordings of which two periods measure the noise.
+#: Ratio of the noise of torques, which is coloured, to white noise with the same second
+#: differences: at most this in 95 % of the joints of 48 recordings with two equal periods.
 _COLOUR = 1.4
-#: What people, loose parts and machines nearby do is slow, below the first frequency; in the band
-#: above, noise of torques is as strong, and noise of positions stronger [Hz]. Window of the
-#: spectra [s].
+#: Upper frequency of disturbances by people, loose parts and nearby machines [Hz]; a band in which
+#: noise of torques is as strong, and noise of positions stronger [Hz]; window of spectra [s].
 _SLOW_HZ, _FAST_HZ, _WINDOW = 4.0, (6.0, 12.0), 2.5
 
 
@@ -49,12 +47,11 @@ class Evidence:
     data : tuple of Trajectory
         The data.
     sigma : tuple of ndarray, each (n,)
-        The unit of each trajectory: its noise, or the model's own misfit where that is larger
-        [N m].
+        Unit of each trajectory: the larger of its noise and the misfit of the model [N m].
     noise : tuple of ndarray, each (n,)
         The noise of each trajectory [N m].
     varies : ndarray, shape (n,), or None
-        Factor by which the squares of the misfit vary from motion to motion; None counts as one.
+        Factor by which the squared misfit varies from motion to motion; None counts as one.
 
     """
 
@@ -106,7 +103,7 @@ class Evidence:
         return [part.residual(arm) for part in self.data]
 
     def block_squares(self, residual: Sequence[FloatArray]) -> FloatArray:
-        """Return the squares of the weighted residual (M, n) by block and joint, (B, n)."""
+        """Return the sum of squares of the weighted residual in each block and joint, (B, n)."""
         block, _ = block_rows(self.data)
         rows = np.concatenate(residual) * row_weights(self.data, self.sigma)
         return np.column_stack([np.bincount(block, column) for column in rows.T**2])
@@ -120,10 +117,9 @@ class Evidence:
         """
         Return the largest loss of each joint that counts as no gap, shape (n,).
 
-        Noise measured by two periods has as many degrees of freedom as there are independent
-        rows, and so have the rows that are compared with it: the ratio of the two has Fisher's
-        distribution. A misfit varies from motion to motion, and noise that is assumed is no more
-        certain than that. A loss that does not matter to the user is added.
+        The noise and the residual each have one degree of freedom per independent row, so the
+        ratio of their squares has an F distribution. A misfit, or assumed noise, may be larger by
+        the factor `same_fit` from motion to motion. The loss that is not material is added.
 
         """
         thresholds = settings.thresholds
@@ -136,12 +132,12 @@ class Evidence:
         return np.where(misfit, self.as_good(settings), noise) + self.matters(settings)
 
     def as_good(self, settings: DiagnosisSettings) -> FloatArray:
-        """Return the largest loss of each joint that another motion explains, (n,)."""
+        """Return the largest loss of each joint that the misfit of another motion has, (n,)."""
         varies = np.ones_like(self.count) if self.varies is None else self.varies
         return np.asarray(settings.thresholds.same_fit * np.maximum(varies, 1.0))
 
     def matters(self, settings: DiagnosisSettings) -> FloatArray:
-        """Return the smallest loss of each joint that matters to the user, (n,)."""
+        """Return the loss of a residual of just material size in each joint, (n,)."""
         sigma = np.mean([own**2 for own in self.sigma], axis=0)
         return np.asarray((settings.material * self.torque_rms) ** 2 / sigma)
 
@@ -198,7 +194,7 @@ def noise_floor(trajectory: Trajectory, arm: ArmModel) -> NoiseFloor:
     trajectory : Trajectory
         The data.
     arm : ArmModel
-        A model with parameters near to those of the data; effects that it lacks cancel.
+        A model close to the data; effects that it lacks cancel in the difference of periods.
 
     """
     motion = trajectory.motion
@@ -246,8 +242,8 @@ def _difference(
     """
     Return the difference of two equal periods in one joint, and its informative samples.
 
-    A drift with time, by itself or in proportion to the velocity, is regressed out: it is an
-    effect of its own.
+    A drift of the offset or of viscous friction over time is regressed out, as it is an effect and
+    no noise.
 
     """
     motion = trajectory.motion
@@ -277,8 +273,8 @@ def _assumed(trajectory: Trajectory, smooth: FloatArray) -> FloatArray:
     """
     Return an upper estimate of the noise from second differences of rows, shape (n,) [N m].
 
-    The noise is taken as white in the band that rows keep. What a model lacks changes little from
-    row to row. Friction that it lacks jumps at reversals; rows next to those do not count.
+    The noise is taken as white in the band of the rows. The torque that a model lacks changes
+    little from row to row, except for friction at reversals; rows next to reversals do not count.
 
     """
     rows, informative = smooth[trajectory.rows], trajectory.informative
@@ -292,7 +288,7 @@ def _assumed(trajectory: Trajectory, smooth: FloatArray) -> FloatArray:
 
 
 def _least(trajectory: Trajectory, arm: ArmModel) -> FloatArray:
-    """Return the smallest noise that a torque is given, shape (n,) [N m]."""
+    """Return the lower limit of the noise of each torque, shape (n,) [N m]."""
     assert trajectory.motion.tau is not None
     size = np.sqrt(np.mean(trajectory.motion.tau**2, axis=0))
     least = np.maximum(TORQUE_RESOLUTION * np.maximum(size, 1e-2 * size.max()), 1e-12)

@@ -3,8 +3,8 @@
 """
 Recordings as rows: measured torques and columns of a model, filtered alike and decimated.
 
-A trajectory is one unbroken stretch of a recording. Its motion stays at a higher rate, at which
-columns are computed; torques and columns are compared in rows, which are decimated.
+A trajectory is one unbroken stretch of a recording. Columns are computed at the higher rate of its
+motion; torques and columns are compared in decimated rows.
 
 """
 
@@ -35,21 +35,21 @@ import numpy as np
 import numpy.typing as npt
 from scipy import signal
 
-#: Columns are computed at this many times the rate of the rows: enough for signs and hysteresis.
+#: Rate of the columns over that of the rows: enough for signs of velocity and for hysteresis.
 _OVERSAMPLING = 8
-#: A joint slower than this share of its top speed for this long [s] is at rest.
+#: Share of its top speed below which a joint is at rest, and shortest time of a rest [s].
 _REST_SPEED, REST_TIME = 0.02, 0.2
-#: Below this share of the top speed, or so many standard deviations of its noise, the sign of a
-#: velocity is uncertain, and with it dry friction.
+#: Share of the top speed, and standard deviations of its noise, below which the sign of a velocity
+#: is uncertain, and with it dry friction.
 _REVERSAL_SPEED, _REVERSAL_NOISE = 0.004, 3.0
-#: Share of a row in which that sign may be uncertain in any case; in three rows next to a reversal
-#: the share is larger.
+#: Smallest limit of the share of an informative row with an uncertain sign of velocity; the three
+#: rows next to a reversal exceed it.
 UNSURE = 0.003
-#: Folds of the data at the least, and two of each recording: what one fast recording alone shows
-#: can be learned from half of it.
+#: Least number of folds of all data. Each recording has two or more, so that an effect that only
+#: one fast recording shows is fitted to one half of it and predicted in the other.
 PARTS = 6
-#: Blocks of each fold, of a second or two, which is longer than any correlation of noise; a block
-#: has this many rows at the least.
+#: Blocks of each fold, of a second or two, which is longer than any correlation of noise; least
+#: number of rows of a block.
 BLOCKS, _LEAST_ROWS = 6, 8
 
 
@@ -75,9 +75,9 @@ class Trajectory:
     allowed : ndarray, shape (n,)
         The largest such share of an informative row.
     period_recorded : float
-        Time between its samples as they were recorded [s].
+        Sampling period of the recording [s].
     sensors : SensorNoise or None
-        Effect of sensor noise on an arm tied to another machine; None where there is none.
+        Effect of sensor noise on an arm tied to another machine; None for an arm alone.
 
     """
 
@@ -107,7 +107,7 @@ class Trajectory:
 
     @property
     def stretch(self) -> Stretch:
-        """Return the rows as the checks of data take them."""
+        """Return the rows in the form that the checks of data take."""
         return Stretch(self.source, self.at_rows.with_torque(self.torque), self.informative)
 
     @cached_property
@@ -141,7 +141,7 @@ class Trajectory:
         Parameters
         ----------
         arm : ArmModel
-            Where the columns are taken.
+            Arm whose columns are computed.
         effects : sequence of Effect
             Effects whose parameters come after the rigid ones.
         chosen : ndarray of int, shape (r,)
@@ -177,8 +177,7 @@ def trajectories(
 
     The largest uncertain share of an informative row is `allowed`, (n,); see `Trajectory`.
 
-    Where another machine was recorded beside the arm, the effect of the noise of angles on the
-    tied arm is included.
+    If another machine was recorded with the arm, the effect of its sensor noise is included.
 
     Raises
     ------
@@ -205,10 +204,9 @@ def trajectories(
 
 def thinnable(used: Conditioning) -> Conditioning:
     """
-    Lower the decimation to a multiple of the factor at which columns are computed.
+    Lower the decimation of rows to a multiple of the decimation of columns.
 
-    The rate of columns divides that of the recording and is a multiple of that of rows: at most an
-    eighth more rows are kept.
+    Each row then spans a whole number of columns' samples; at most an eighth more rows are kept.
 
     """
     widest = _widest(used)
@@ -219,8 +217,8 @@ def _widest(used: Conditioning) -> int:
     """
     Return the largest decimation of a motion before its columns are computed.
 
-    Columns contain squares of velocities, which reach to twice the cut-off: half of the rate has
-    to be more than that.
+    Columns contain squares of velocities, whose band is twice the cut-off: the rate has to be four
+    times the cut-off.
 
     """
     fast_enough = int(used.rate_hz / (4.0 * used.cutoff_hz))
@@ -245,7 +243,7 @@ def _trajectory(
 
 
 def _at_rest(motion: Motion) -> npt.NDArray[np.bool_]:
-    """Return where joints stand still, shape (N, n)."""
+    """Return whether each joint is at rest in each sample, shape (N, n)."""
     rest = np.zeros(motion.q.shape, dtype=bool)
     shortest = REST_TIME / float(motion.t[1] - motion.t[0])
     for joint in range(motion.n_joints):
@@ -289,12 +287,12 @@ def row_weights(data: Sequence[Trajectory], sigma: Sequence[FloatArray]) -> Floa
 
 
 def count_recordings(data: Sequence[Trajectory]) -> int:
-    """Return the number of recordings that trajectories are stretches of."""
+    """Return the number of recordings to which trajectories belong."""
     return len({part.fold for part in data})
 
 
 def not_shown(data: Sequence[Trajectory], joints: Sequence[str]) -> tuple[str, ...]:
-    """Return the joints that are at rest throughout, or of which no row is informative."""
+    """Return the joints that are at rest throughout, or have no informative row."""
     if not data:
         return ()
     shown = moving(part.motion for part in data)
@@ -303,7 +301,7 @@ def not_shown(data: Sequence[Trajectory], joints: Sequence[str]) -> tuple[str, .
 
 
 def fold_rows(data: Sequence[Trajectory]) -> npt.NDArray[np.intp]:
-    """Return the fold of every row, a stretch of a recording."""
+    """Return the number of the fold of every row; a fold is a stretch of one recording."""
     pieces = max(2, -(-PARTS // max(count_recordings(data), 1)))
     rows = []
     for part in data:

@@ -3,8 +3,8 @@
 """
 Which effects a planned motion shows, and which it cannot distinguish.
 
-The model of the arm counts as known. Columns of an effect are weighted by the noise, so that the
-angle between two effects is all that matters (Basseville and Nikiforov 1993, isolability).
+The model of the arm counts as known. Columns of effects are divided by the noise; two effects are
+distinguishable if the angle between their columns is large (Basseville and Nikiforov 1993).
 
 """
 
@@ -23,8 +23,8 @@ from armid_ros.motion import FloatArray, Motion
 import numpy as np
 import numpy.typing as npt
 
-#: Share of its torque by which an effect has to differ from another one: the other then needs ten
-#: times the size at which the effect itself is seen.
+#: Least share of the torque of an effect that a distinguishable other one cannot reproduce: the
+#: effect then has to be ten times its detectable size for the difference to be detectable.
 DISTINCT = 0.1
 #: A joint slower than this share of its top speed is not informative: dry friction is arbitrary.
 _SLOW = 0.02
@@ -33,7 +33,7 @@ _SLOW = 0.02
 @dataclass(frozen=True)
 class Isolability:
     """
-    Smallest detectable effects of a motion, and how far they differ.
+    Smallest detectable effects of a motion, and their differences.
 
     Attributes
     ----------
@@ -49,7 +49,7 @@ class Isolability:
 
     @property
     def seen(self) -> npt.NDArray[np.bool_]:
-        """Which effects the motion shows at a size that they can have, shape (E,)."""
+        """Whether the motion shows each effect at a possible size, shape (E,)."""
         return np.array([np.isfinite(one.size) for one in self.effects])
 
     def rivals(self, k: int) -> list[Detectable]:
@@ -59,7 +59,7 @@ class Isolability:
         return [self.effects[j] for j in near]
 
     def __str__(self) -> str:
-        """Return how many effects are visible and distinguishable."""
+        """Return a sentence with the numbers of detectable and of distinguishable effects."""
         kinds, apart = self.of_kinds()
         alone = int(np.sum(np.all(apart + np.eye(len(kinds)) >= DISTINCT, axis=1)))
         total = len({one.name for one in self.effects})
@@ -69,7 +69,7 @@ class Isolability:
         )
 
     def document(self) -> list[dict[str, Any]]:
-        """Return the rows of excitation.json."""
+        """Return the rows of the effects in excitation.json."""
         return [
             {
                 'name': one.name,
@@ -85,7 +85,7 @@ class Isolability:
         ]
 
     def of_kinds(self) -> tuple[tuple[str, ...], FloatArray]:
-        """Return the names of visible effects, and the least of `apart` over places, (K, K)."""
+        """Return the names of visible effects, and the minimum of `apart` over places, (K, K)."""
         names = [one.name for one in self.effects]
         kinds = tuple(dict.fromkeys(np.array(names)[self.seen].tolist()))
         places = [np.flatnonzero(self.seen & (np.array(names) == kind)) for kind in kinds]
@@ -96,12 +96,12 @@ class Isolability:
 
 def isolability(arm: ArmModel, motion: Motion, noise: FloatArray, samples: float) -> Isolability:
     """
-    Predict what a recording of a motion shows of every effect of the catalogue.
+    Predict which effects of the catalogue a recording of a motion would show.
 
     Parameters
     ----------
     arm : ArmModel
-        The arm, with what is known of it.
+        The arm with its known effects.
     motion : Motion
         The planned motion.
     noise : ndarray, shape (n,)

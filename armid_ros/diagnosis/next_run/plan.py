@@ -1,15 +1,15 @@
 # Copyright 2026 The armid_ros developers
 # SPDX-License-Identifier: Apache-2.0
 """
-The next run: of many motions that the arm can make, the one that separates names best.
+The next run: of many possible motions, the one that best separates named effects from rivals.
 
-T-optimality (Atkinson and Fedorov 1975): with the named effect in the arm, a motion is worth the
-squares of the torque, over the unit of the gap, that the rival, fitted jointly with the nuisance
-parameters, cannot explain.
+T-optimality (Atkinson and Fedorov 1975): the value of a motion is the squared torque of the named
+effect, over the unit of the gap, that the rival, fitted jointly with the nuisance parameters,
+cannot explain.
 
-Each motion shows something else: slow and fast motion of all joints, motion of single joints,
-reversals so small that dry friction does not break away, shaking; and the same with a known
-payload, which alone separates a gain of the drives from the masses.
+The motions are slow and fast motion of all joints, motion of single joints, reversals so small
+that dry friction does not break away, and shaking. Each is also tried with a known payload, which
+alone separates a gain of the drives from the masses.
 
 """
 
@@ -35,14 +35,13 @@ from armid_ros.excitation.templates import CLEARANCE, Template, templates
 from armid_ros.robots import collision_model, CollisionModel
 import numpy as np
 
-#: The file that a run is written to.
+#: File in which a run is stored.
 EXPERIMENT_FILE = 'experiment.yaml'
-#: Names are separated beyond doubt at this many standard deviations: no payload is asked for
-#: where a motion alone does it.
+#: Standard deviations of a sure separation: a motion that reaches it needs no payload.
 _SURE = 5.0
-#: Standard deviations above which their number means nothing: noise is not known so well.
+#: Largest number of standard deviations that is stated: the noise is not known well enough.
 _CERTAIN = 30.0
-#: Pairs of names in a sentence.
+#: Largest number of pairs of names in a sentence.
 _SAID = 3
 
 
@@ -54,13 +53,13 @@ class NextRun:
     Attributes
     ----------
     excitation : Excitation
-        From rest to rest within all limits, clear of the arm itself; two equal periods.
+        Motion of two equal periods from rest to rest, within all limits and without collisions.
     template : str
-        What kind of motion it is, in words.
+        Kind of the motion, in words.
     load : Load or None
-        Load to be fixed to the last link in a second run of the same motion; None: one run.
+        Load to fix to the last link in a second run of the same motion; None if one run suffices.
     separations : tuple of Separation
-        How far it separates each pair of names.
+        Separation of each pair of names.
 
     """
 
@@ -76,7 +75,7 @@ class NextRun:
 
     @property
     def sentence(self) -> str:
-        """Describe the run and what it would show; the least separated pair comes first."""
+        """Describe the run and the pairs that it separates, the least separated pair first."""
         separated = sorted((s for s in self.separations if s.distinct), key=lambda one: one.z)
         parts = [
             f'{one.name} from {one.rival} by {_many(one.z)} standard deviations'
@@ -94,7 +93,7 @@ class NextRun:
         )
 
     def document(self) -> dict[str, Any]:
-        """Return the run as diagnosis.json holds it."""
+        """Return the entry of the run in diagnosis.json."""
         return {
             'file': EXPERIMENT_FILE,
             'motion': self.template,
@@ -109,7 +108,7 @@ class NextRun:
 
 
 def _many(deviations: float) -> str:
-    """Format a z-score; above the largest that the noise is known well for, "more than"."""
+    """Format a z-score, from `_CERTAIN` on as "more than"."""
     return f'{deviations:.0f}' if deviations < _CERTAIN else f'more than {_CERTAIN:.0f}'
 
 
@@ -120,7 +119,7 @@ def next_run(
     collision: CollisionModel | None = None,
 ) -> NextRun | None:
     """
-    Choose a motion that separates names in doubt from their rivals.
+    Choose a motion that separates named effects from their rivals.
 
     Parameters
     ----------
@@ -139,8 +138,7 @@ def next_run(
     Raises
     ------
     TrajectoryError
-        If the arm cannot make any of the motions, or none separates any of the names; says what
-        prevents it.
+        If the arm cannot make any of the motions, or none separates any names; gives the reason.
 
     """
     doubts = _doubts(diagnosis)
@@ -185,7 +183,7 @@ def next_run(
 
 @dataclass(frozen=True)
 class _Run:
-    """A motion and the separations that it would show."""
+    """A motion and its predicted separation of each pair of names."""
 
     template: Template
     trajectory: FourierTrajectory
@@ -194,7 +192,7 @@ class _Run:
 
     @property
     def worth(self) -> float:
-        """Sum of log(1 + D_T): all pairs count; one that no motion separates decides nothing."""
+        """Sum of log(1 + D_T) over pairs; inseparable pairs add nothing."""
         return float(sum(np.log1p(pair.power) for pair in self.separations))
 
 
@@ -208,7 +206,7 @@ def _in_order(runs: Sequence[_Run]) -> list[_Run]:
 
 
 def _doubts(diagnosis: Diagnosis) -> tuple[Doubt, ...]:
-    """Return pairs of a name and a rival."""
+    """Return the pairs of a named effect and a rival."""
     explanation = diagnosis.explanation
     if explanation is None:
         return ()

@@ -1,7 +1,7 @@
 # Copyright 2026 The armid_ros developers
 # SPDX-License-Identifier: Apache-2.0
 """
-How far a motion separates two names.
+The separation of a named effect from a rival by a motion.
 
     D_T = min over the rival's values of |f_A - f_B|^2 / sigma^2
 
@@ -24,17 +24,18 @@ from armid_ros.robots import Robot
 import numpy as np
 import pinocchio as pin
 
-#: A run does not tell names apart by less than so many standard deviations.
+#: Standard deviations below which a run does not separate two effects.
 NOTHING = 1.0
-#: Samples per second at which a motion is evaluated [Hz]; its noise is that of the rows.
+#: Rate at which a motion is evaluated [Hz]; the noise is scaled from the rate of rows.
 _RATE = 50.0
-#: Periods that are recorded.
+#: Number of recorded periods.
 _PERIODS = 2
 #: A joint slower than this share of its top speed is not informative: dry friction is arbitrary.
 _SLOW = 0.02
-#: Torque of a known payload over the torque that a joint can give, or gives in the motion.
+#: Largest torque of a known payload over the usable torque of a joint: its limit, or twice its
+#: largest torque in the motion if that is smaller.
 _LOAD = 0.15
-#: A frame nearer than this to the last joint counts as at it [m].
+#: Distance below which a frame counts as at the last joint [m].
 _NEAR = 0.01
 #: Singular values of columns below this share of the largest count as zero.
 _DEPENDENT = 1e-7
@@ -43,7 +44,7 @@ _DEPENDENT = 1e-7
 @dataclass(frozen=True)
 class Doubt:
     """
-    A name and a rival.
+    A named effect and a rival.
 
     Attributes
     ----------
@@ -59,7 +60,7 @@ class Doubt:
 
     @property
     def joints(self) -> tuple[str, ...]:
-        """Return the joints on which either acts; none if one of them acts on the whole arm."""
+        """Return the joints on which either acts; empty if one of them acts on the whole arm."""
         if not self.named.effect.joints or not self.rival.joints:
             return ()
         return tuple(dict.fromkeys((*self.named.effect.joints, *self.rival.joints)))
@@ -68,14 +69,14 @@ class Doubt:
 @dataclass(frozen=True)
 class Separation:
     """
-    How far a motion separates a name from a rival.
+    Predicted separation of a named effect from a rival by a motion.
 
     Attributes
     ----------
     name, rival : str
-        The two effects.
+        Names of the two effects.
     power : float
-        D_T of the run.
+        Squared separation D_T of the run [-].
 
     """
 
@@ -90,7 +91,7 @@ class Separation:
 
     @property
     def distinct(self) -> bool:
-        """Whether the run tells the two apart at all."""
+        """Whether the run separates the two effects at all."""
         return self.z >= NOTHING
 
     @staticmethod
@@ -98,14 +99,14 @@ class Separation:
         diagnosis: Diagnosis, doubt: Doubt, trajectory: FourierTrajectory, load: Load | None = None
     ) -> Separation:
         """
-        Predict how far a run separates two names.
+        Predict the separation of two effects by a run.
 
         Parameters
         ----------
         diagnosis : Diagnosis
-            Gives the arm, its nuisance parameters, and the unit of its gap.
+            Diagnosis with the arm, its nuisance parameters, and the unit of its gap.
         doubt : Doubt
-            The two names.
+            The two effects.
         trajectory : FourierTrajectory
             The motion; two periods of it are recorded.
         load : Load, optional
@@ -140,9 +141,9 @@ class Load:
     Attributes
     ----------
     mass : float
-        [kg].
+        Mass of the load [kg].
     frame : str
-        Frame of the last link that it is fixed to, the one farthest out.
+        Frame of the last link that is farthest from the last joint; the load is fixed there.
 
     """
 
@@ -151,7 +152,7 @@ class Load:
 
     @staticmethod
     def along(arm: ArmModel, trajectory: FourierTrajectory) -> Load:
-        """Return a load that takes at most `_LOAD` of any joint torque along a motion."""
+        """Return a load whose torque is at most `_LOAD` of the usable torque of each joint."""
         motion = trajectory.one_period(int(trajectory.period * _RATE))
         frame = _tip(arm.robot)
         unit = np.abs(arm.rigid_columns(motion)[:, :, -10:] @ _point(arm.robot, frame)).max(axis=0)
@@ -175,7 +176,7 @@ def _tip(robot: Robot) -> str:
 
 
 def _point(robot: Robot, frame: str) -> FloatArray:
-    """Return the parameters of 1 kg at a frame; at the centre of mass if that is the joint."""
+    """Return the parameters of 1 kg at a frame, or at the centre of mass if it is at the joint."""
     place = robot.model.frames[robot.model.getFrameId(frame)].placement.translation
     if np.linalg.norm(place) < _NEAR:
         place = robot.model.inertias[robot.model.njoints - 1].lever
@@ -187,8 +188,8 @@ def _weight(diagnosis: Diagnosis, motion: Motion) -> FloatArray:
     """
     Return the weight of each sample: sqrt(rows per sample) / sigma, shape (N, n).
 
-    The noise is white over rows: a higher rate of samples adds no information. A unit that is a
-    misfit is taken to be the same in the next run.
+    The noise is white over rows: a higher rate of samples adds no information. The unit of the gap
+    is taken to be the same in the next run.
 
     """
     assert diagnosis.explanation is not None
@@ -200,7 +201,7 @@ def _weight(diagnosis: Diagnosis, motion: Motion) -> FloatArray:
 
 
 def _stack(columns: list[FloatArray], weight: FloatArray) -> FloatArray:
-    """Return columns of one run or two (N, n, p), weighted and stacked, shape (rows, p)."""
+    """Return weighted and stacked columns (N, n, p) of one or two runs, shape (rows, p)."""
     blocks = [block * weight[:, :, np.newaxis] for block in columns]
     return np.concatenate(
         [block.reshape(block.shape[0] * block.shape[1], block.shape[2]) for block in blocks]
@@ -208,7 +209,7 @@ def _stack(columns: list[FloatArray], weight: FloatArray) -> FloatArray:
 
 
 def _free(diagnosis: Diagnosis, arm: ArmModel, named: Effect, motion: Motion) -> FloatArray:
-    """Return the columns that are fitted with either name, shape (N, n, f)."""
+    """Return the nuisance columns, fitted with either of two effects, shape (N, n, f)."""
     assert diagnosis.explanation is not None
     given = diagnosis.explanation.given
     known = zip(given.effects, given.values, strict=True)

@@ -1,10 +1,9 @@
 # Copyright 2026 The armid_ros developers
 # SPDX-License-Identifier: Apache-2.0
 """
-What to do after a diagnosis: go and look at the robot, then record what tells names apart.
+What to do after a diagnosis: inspect the robot, then record motion that separates rivals.
 
-A planned run and the experiments that show effects best are one piece of advice: an experiment is
-asked for only where no planned motion tells the two names.
+An experiment is advised only for effects that the planned run does not separate.
 
 """
 
@@ -18,7 +17,7 @@ from armid_ros.diagnosis.verdict.finding import Diagnosis, Finding, Rival
 from armid_ros.effects import CATALOGUE
 from armid_ros.identification.fitting.identifiability import excludes_zero, HALF_WIDTH
 
-#: The patched model, as one finds it who reads a page.
+#: Place of the patched model, for readers of the report.
 MODEL = 'model.yaml in the folder of this diagnosis'
 _ANEW = 'Identify the arm anew before the model is used in simulation or control.'
 
@@ -31,20 +30,20 @@ def next_steps(
     worse: Sequence[str] = (),
 ) -> list[str]:
     """
-    Return the next steps for a person, as sentences in order.
+    Return sentences on the next steps of the user, in order.
 
     Parameters
     ----------
     diagnosis : Diagnosis
-        What was found.
+        The diagnosis.
     run : NextRun or None
-        The run that was planned.
+        The planned run.
     no_run : str
-        Why none was, if one was wanted.
+        Reason why no run was planned, if one was requested.
     model : str
-        Where the patched model is.
+        Place of the patched model, in words.
     worse : sequence of str
-        Joints that a simulation with the patched model is farther off in.
+        Joints in which a simulation with the patched model has a larger error than before.
 
     """
     findings, verdict = diagnosis.findings, diagnosis.verdict
@@ -77,7 +76,7 @@ def next_steps(
 
 
 def _use_of_model(diagnosis: Diagnosis, model: str, worse: Sequence[str]) -> list[str]:
-    """Return sentences on which model may be used, or what to do before."""
+    """Return sentences on the model to use, or on steps before its use."""
     if diagnosis.not_checked:
         return [f'Move {", ".join(diagnosis.not_checked)} as well, and record again.']
     if worse:
@@ -95,7 +94,7 @@ def _use_of_model(diagnosis: Diagnosis, model: str, worse: Sequence[str]) -> lis
 
 
 def _looks(finding: Finding, diagnosis: Diagnosis) -> list[str]:
-    """Return what to inspect on the robot, for a cause and for each of its rivals."""
+    """Return sentences on parts to inspect, for a cause and for each of its rivals."""
     steps = []
     own = Rival(finding.name, finding.joints)
     for one in (own, *finding.rivals):
@@ -128,9 +127,10 @@ def _centre(finding: Finding) -> str:
 
 def _look_at(name: str, diagnosis: Diagnosis) -> str:
     """
-    Return an effect's hint on what to inspect; also for effects outside the catalogue.
+    Return an effect's hint on parts to inspect; also for effects outside the catalogue.
 
-    What nearly every arm has is nothing to look at where the model was given without it.
+    It is empty for usual effects, such as friction, that the given model lacks: nearly every arm
+    has them.
 
     """
     if name not in CATALOGUE:

@@ -34,13 +34,13 @@ from armid_ros.robots import Robot
 import numpy as np
 from scipy import optimize
 
-#: Most combinations of shape values that a search starts from.
+#: Largest number of combinations of shape values that a search starts from.
 _MOST_SHAPES = 12
-#: Distance from a peak of a spectrum at which its side lobes may be, and its half width [1/rev].
+#: Largest distance of side lobes from a peak of a spectrum, and half width of the peak [1/rev].
 _LOBES, _PEAK = 3.0, 0.2
-#: Most evaluations of one line search.
+#: Largest number of evaluations of one line search.
 _EVALUATIONS = 9
-#: Values of a body over its mass that are as large as such values get: first moments and inertia.
+#: Largest mass, first moments [m] and inertias [m^2] of a body, over its mass.
 _BODY = np.array([1.0, *3 * [0.1], *6 * [0.01]])
 
 
@@ -52,15 +52,15 @@ class Causes:
     Attributes
     ----------
     kinds : tuple of Kind
-        Effects to look for.
+        Classes of effects that may be named.
     nuisance : Nuisance
-        Data and columns that causes are compared with, none of them accepted.
+        Data and nuisance columns, without accepted causes.
     changed : bool
-        Whether what has changed is asked, and not what was always there.
+        Whether causes are changes since a baseline, and not permanent errors of the model.
     fitted : frozenset of (str, tuple of str)
-        Names and joints of what is among the nuisance parameters.
+        Names and joints of the effects among the nuisance parameters.
     prior : mapping of str to str
-        How often effects happen, as a user says it; see `HOW_OFTEN`.
+        Frequency of effects, chosen by the user; see `HOW_OFTEN`.
 
     """
 
@@ -101,9 +101,9 @@ class Causes:
         self, singles: Sequence[Cause], nuisance: Nuisance, under: Marginal
     ) -> Iterator[Cause]:
         """
-        Yield one law in the joints of the largest evidence, if these are several.
+        Yield one law of friction in those joints that maximise its evidence, if two or more do.
 
-        Values of joints are independent under a common prior; any number of joints is as likely.
+        Values of joints are independent under a common prior; each number of joints is as likely.
 
         """
         first, count = singles[0].effect, len(singles)
@@ -137,7 +137,7 @@ class Causes:
             yield from (one for one in members if (one.name, one.joints) not in self.fitted)
 
     def _divided(self, effect: Effect, singles: Sequence[Effect]) -> Iterator[Cause]:
-        """Yield the causes that an effect consists of; its columns are computed at once."""
+        """Yield a cause for each single effect; the columns of all are computed at once."""
         robot, start = self.nuisance.arm.robot, 0
         places: list[tuple[Effect, tuple[int, ...], list[int]]] = []
         for one in singles:
@@ -206,7 +206,7 @@ def _torque_of(columns: Sequence[FloatArray], rows: Rows) -> FloatArray:
 
 
 def _unit(own: SelectedEffect, torque: FloatArray, rows: Rows, robot: Robot) -> FloatArray:
-    """Return the scale of each value: that of the joint torque, or the largest plausible value."""
+    """Return values whose torque is that of the joint, at most the largest plausible ones."""
     effect, kept = own.effect, list(own.kept)
     spread = effect.spread(robot)[kept]
     if effect.adds_to(robot):  # a load and an error of a link are bodies alike
@@ -218,7 +218,7 @@ def _unit(own: SelectedEffect, torque: FloatArray, rows: Rows, robot: Robot) -> 
 def value_unit(
     nuisance: Nuisance, own: SelectedEffect, columns: Sequence[FloatArray]
 ) -> FloatArray:
-    """Return the scale of the values of an effect, (p,), from its columns (M, n, p)."""
+    """Return the unit of the values of an effect, (p,), from its columns (M, n, p)."""
     rows = nuisance.rows
     return _unit(own, _torque_of(columns, rows), rows, nuisance.arm.robot)
 
@@ -232,7 +232,7 @@ def cause_of(
     torque: FloatArray | None = None,
 ) -> Cause:
     """
-    Return a cause with the products of its columns with those of the nuisance parameters.
+    Return a cause with the products of its columns and the nuisance columns.
 
     Parameters
     ----------
@@ -303,7 +303,7 @@ def _unexplained(nuisance: Nuisance, under: Marginal) -> Unexplained:
 def candidate_effects(
     robot: Robot, kinds: Sequence[Kind]
 ) -> Iterator[tuple[Effect, list[Effect]]]:
-    """Yield effects to compute at once, each with the candidates that it combines."""
+    """Yield effects whose columns are computed at once, each with its candidates per joint."""
     for kind in with_exact_vector(kinds):
         try:
             places = kind.places(robot)

@@ -25,15 +25,15 @@ class Cause:
     kept : tuple of int
         Its parameters that are fitted; the others are zero.
     unit : ndarray, shape (p,)
-        Values whose torque is that of the joint, or that are as large as such values get.
+        Unit of each value: has the torque of the joint, or is the largest plausible value if less.
     prior : float
         Log odds before any data.
     joints : tuple of int
-        The t joints in whose rows it shows.
+        The t joints on which the cause acts.
     columns : tuple of ndarray, each (t, M, p)
         Weighted columns in each recording.
     products, own, aim : tuple of ndarray, each (q, p), (p, p), (p,)
-        Products of these with the nuisance columns, with each other, and with the residual.
+        Products of `columns` with the nuisance columns, with themselves, and with the residual.
     torque : ndarray, shape (n, p)
         Torque of a unit of each value on the day in question, root mean square [N m].
     shapes : int
@@ -55,11 +55,11 @@ class Cause:
 
     @property
     def key(self) -> tuple[str, tuple[str, ...], tuple[int, ...]]:
-        """Identity of the cause whatever its shape: name, joints and quantities."""
+        """Identity of the cause in any shape: name, joints and quantities."""
         return self.effect.name, self.effect.joints, self.kept
 
     def among(self, effect: Effect, values: npt.NDArray[np.intp], shapes: int) -> Cause:
-        """Return the cause with some of its values, all those of an effect on fewer joints."""
+        """Return the cause with some of its values, which belong to an effect on fewer joints."""
         return replace(
             self,
             effect=effect,
@@ -94,7 +94,7 @@ class Cause:
 @dataclass(frozen=True)
 class SelectedEffect:
     """
-    A named effect, as it is fitted.
+    A named effect with the choice of its fitted parameters.
 
     Attributes
     ----------

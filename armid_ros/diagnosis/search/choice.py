@@ -1,10 +1,10 @@
 # Copyright 2026 The armid_ros developers
 # SPDX-License-Identifier: Apache-2.0
 """
-Which explanation is given: of what has changed, or of what a model lacks.
+The explanation of a gap, with a baseline, with a stored misfit, or with the model alone.
 
-The comparison of causes is the same; a baseline, a misfit that was written down, or the model
-alone differ in what is known of discrepancy and noise.
+The comparison of causes is the same in the three cases. They differ in the prior knowledge of
+discrepancy and noise.
 
 """
 
@@ -47,12 +47,12 @@ import numpy as np
 Progress = Callable[[float, str], None]
 OWN_MISFIT = 'the error of the model before'
 WRITTEN_MISFIT = 'the error of the model when it was identified'
-#: Note where nothing is known of how well a model was identified.
+#: Note on a model without covariance of its identification.
 _AS_EXACT = (
     'values of the model are taken as exact, for want of its identification.json: intervals do '
     'not include their errors'
 )
-#: What would tell a change from a misfit, where there are no or too few recordings.
+#: Recordings that would separate a change from a misfit, if there are none or one a day.
 _NO_BASELINE = (
     'Without a baseline, an error of the model in this motion is not excluded: give recordings '
     'from before (--baseline).'
@@ -66,7 +66,7 @@ _ONE_EACH = (
 @dataclass(frozen=True)
 class Explainer:
     """
-    Finds the explanation of a gap among the effects of a library.
+    Search for the explanation of a gap among the effects of the catalogue.
 
     Attributes
     ----------
@@ -77,15 +77,15 @@ class Explainer:
     baseline : Baseline or None
         Recordings from when nothing was wrong.
     rng : numpy.random.Generator
-        Draws the states from which base parameters are found.
+        Draws the random states from which base parameters are found.
     tell : callable
-        Called with the share that is done and what is being done.
+        Called with the share of the work that is done, and the name of the present step.
     settings : DiagnosisSettings
-        Library and thresholds.
+        Catalogue and thresholds.
     misfit : Misfit or None
-        What the model left when it was identified.
+        Misfit of the model when it was identified.
     unseen : sequence of Trajectory
-        Further data of the day in question, which nothing is fitted to.
+        Held-out data of the day in question.
 
     """
 
@@ -132,7 +132,7 @@ class Explainer:
 
     def _beside(self, written: Misfit) -> Chosen:
         """
-        Explain the change since identification, whose misfit is known in size only.
+        Explain the change since identification, of whose misfit only the size is known.
 
         Without the recordings, its form is unknown: any cause may be a part of it. See `odds`.
 
@@ -181,7 +181,7 @@ class Explainer:
         """
         Return the rows of both days, held-out recordings included.
 
-        What a model gets wrong grows with what the arm does: with its torque, and its speed.
+        The misfit of the model grows with the torque or the speed, whichever grew more.
 
         """
         today, more = self.prepared.data, self.unseen
@@ -215,9 +215,9 @@ class Explainer:
         rows : Rows
             The data.
         grid : sequence of Setting or None
-            Amplitudes that are compared; None with a baseline.
+            Amplitudes of discrepancy and noise to compare; None with a baseline.
         known : ndarray, shape (P, P), optional
-            Information on the parameters of the arm, which adds to its description.
+            Information on the parameters of the arm, added to that of its description.
 
         """
         arm, settings = self.arm, self.settings
@@ -245,8 +245,8 @@ def _noise_within(
     """
     Return the noise of each trajectory where the misfit contains some noise already, (n,).
 
-    What periods differ by is more where something happens in one of them, which is a gap. So the
-    noise is at most what its differences from row to row have beyond that of the misfit.
+    An event in one of two periods increases their difference, and belongs to the gap. So the noise
+    is limited to the misfit plus the excess of row-to-row differences over those in the misfit.
 
     """
     more = [np.maximum(floor.rough**2 - contained**2, 0.0) for floor in prepared.floors]

@@ -1,11 +1,10 @@
 # Copyright 2026 The armid_ros developers
 # SPDX-License-Identifier: Apache-2.0
 """
-The comparison of causes: the best is accepted while anything is beyond doubt.
+The comparison of causes: the best cause is accepted, until no cause is significant.
 
 Whether anything has changed is decided with the spread of values between recordings. Which cause
-it was is decided by the torque that causes explain, of which two in a hundred are no difference:
-the law of a cause is inexact.
+it was is decided by the explained torque. A difference of 2 % does not count, as laws are inexact.
 
 """
 
@@ -34,17 +33,17 @@ from armid_ros.effects import Effect
 from armid_ros.motion import FloatArray
 import numpy as np
 
-#: Amplitudes that are tried over the misfit: of d0, of d_k, and of the noise.
+#: Amplitudes of the discrepancies d0 and d_k that are tried with a baseline, over the misfit.
 _SHARED, _OWN = (0.1, 0.2, 0.4, 0.8, 1.6, 3.2, 6.4), (0.2, 0.4, 0.8)
-#: Of the noise over the misfit, which contains it.
+#: Amplitudes of the noise that are tried with a baseline, over the misfit, which contains noise.
 _NOISE = (0.15, 0.3, 0.5, 0.8, 1.1)
-#: Without a baseline: of d0 and d_k over the torque, and the logarithms of their prior odds.
+#: Amplitudes of d0 and d_k that are tried without a baseline, over the torque; log prior odds.
 _SHARES = ((0.0, 0.0), (0.02, -1.0), (0.06, -2.0), (0.15, -3.0))
-#: The same of the noise over that of two equal periods.
+#: Amplitudes of the noise without a baseline, over that of two equal periods; log prior odds.
 _FACTORS = ((1.0, 0.0), (1.3, -1.0), (2.0, -3.0), (4.0, -5.0))
-#: Causes whose shapes are refined, that are compared in the end, and that are accepted.
+#: Number of causes whose shapes are refined, of causes compared at last, most accepted causes.
 _REFINED, _COMPARED, _MOST = 5, 14, 5
-#: Of how many causes one is used for the usual spread.
+#: Every eighth cause is used to estimate the usual spread.
 _SAMPLED = 8
 
 
@@ -58,9 +57,9 @@ class Accepted:
     best : Ranked
         The cause.
     tied : tuple of Ranked
-        Those within the odds of a tie, the likeliest first.
+        Rivals: causes within the odds of a tie, the likeliest first.
     look : Look
-        The look in which it was found.
+        The comparison of all causes in which it was found.
 
     """
 
@@ -79,13 +78,13 @@ class Result:
     accepted : tuple of Accepted
         The causes, in the order in which they were found.
     nuisance : Nuisance
-        What is fitted with them, and they themselves.
+        Nuisance parameters, and the accepted causes among them.
     under : Marginal
-        The same under the likeliest setting.
+        Fit of the nuisance parameters under the likeliest setting.
     first : Look
-        The first look.
+        Comparison of all causes before any was accepted.
     effects : tuple of Effect
-        Every effect in every place that was looked for.
+        Every candidate effect in every place.
 
     """
 
@@ -104,13 +103,13 @@ class CauseComparison:
     Attributes
     ----------
     nuisance : Nuisance
-        The data and what causes are compared with.
+        The data and the nuisance columns.
     catalogue : Causes
         The causes.
     thresholds : Thresholds
         Odds that decide.
     grid : tuple of Setting
-        Amplitudes; see `settings_of_baseline`.
+        Amplitudes of discrepancy and noise; see `settings_of_baseline`.
 
     """
 
@@ -136,7 +135,7 @@ class CauseComparison:
         return Result((), self.nuisance, look.under, look, effects)
 
     def found(self) -> Result:
-        """Accept the best cause while one is significant; drop those that no longer are."""
+        """Accept the best cause until none is significant; drop causes that became redundant."""
         accepted, nuisance = list[Accepted](), self.nuisance
         result = self.first()
         look = result.first
@@ -165,7 +164,7 @@ class CauseComparison:
             return None
         winner = min(able, key=lambda one: able[0].ahead(one, levels))
         others = [one for one in able if one is not winner]
-        # One that is ahead is not beyond doubt itself: it is as likely as the winner at the most.
+        # A cause with larger evidence and lower total odds counts as likely as the winner at most.
         behind = np.array([min(-winner.ahead(one, levels), 0.0) for one in others])
         total = np.logaddexp.reduce(np.append(behind, 0.0)) + np.logaddexp(0.0, -winner.odds)
         total -= np.log1p(-UNLISTED)
@@ -176,7 +175,7 @@ class CauseComparison:
         return Accepted(rated[0], tuple(rated[1:]), look)
 
     def _settings(self, nuisance: Nuisance) -> list[Marginal]:
-        """Return the nuisance parameters under all settings."""
+        """Return the fit of the nuisance parameters under each setting."""
         if id(nuisance) not in self._marginals:
             self._marginals[id(nuisance)] = nuisance, [nuisance.marginal(x) for x in self.grid]
         return self._marginals[id(nuisance)][1]
@@ -219,7 +218,7 @@ class CauseComparison:
         return Look(ranking, others, nuisance, likeliest, self.usual)
 
     def ranked(self, cause: Cause, nuisance: Nuisance) -> Ranked:
-        """Compare a cause with no cause, over all settings."""
+        """Compare the models with and without a cause, averaged over all settings."""
         settings = self._settings(nuisance)
         fits = [(odds(cause, nuisance, one), one) for one in settings]
         nothing = np.logaddexp.reduce([under.evidence for _, under in fits])
@@ -234,7 +233,7 @@ class CauseComparison:
         return Ranked(cause, fit, data, there, under)
 
     def _in_best_shape(self, cause: Cause, nuisance: Nuisance, under: Marginal) -> Cause:
-        """Refine the shape of a cause to maximise what it explains."""
+        """Refine the shape of a cause to maximise its evidence."""
         best = [(odds(cause, nuisance, under).factor, cause)]
 
         def gain(shape: FloatArray) -> float:
@@ -304,7 +303,7 @@ def settings_of_misfit(free: bool) -> tuple[Setting, ...]:
 
 
 def _leading(settings: Sequence[Marginal]) -> list[Marginal]:
-    """Return the best settings with a fixed and with a free body, and those with noise alone."""
+    """Return the best setting and that of noise alone, each with a fixed and a free body."""
     found = []
     for free in (False, True):
         own = [one for one in settings if one.setting.free is free]

@@ -1,6 +1,6 @@
 # Copyright 2026 The armid_ros developers
 # SPDX-License-Identifier: Apache-2.0
-"""From a comparison of causes to an explanation: the causes that matter, fitted in an arm."""
+"""From a comparison of causes to an explanation: the material causes, fitted in an arm."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ from armid_ros.effects import Effect
 from armid_ros.motion import FloatArray
 import numpy as np
 
-#: Precision of a value of which nothing is known before.
+#: Prior precision of a value without prior knowledge.
 _UNKNOWN = 1e-12
 
 
@@ -31,20 +31,20 @@ def explain(
     known: tuple[Fitted, Sequence[Trial]] | None = None,
 ) -> Explanation:
     """
-    Fit the causes that matter.
+    Fit the material causes.
 
     Parameters
     ----------
     problem : JointFit
-        What values are fitted in.
+        Data and model in which the values are fitted.
     evidence : Evidence
-        The data.
+        The data in the unit of the gap.
     result : Result
-        What the comparison found.
+        Result of the comparison of causes.
     settings : DiagnosisSettings
-        Which share of a torque matters.
+        Thresholds, and the share of a torque that is material.
     unknown : sequence of Effect
-        Friction and offsets without given values, which are named where they are there.
+        Friction and offsets without given values, which are named if significant.
     known : (Fitted, sequence of Trial), optional
         Causes that were named before, with their values.
 
@@ -70,7 +70,7 @@ def explain(
         steps.append(trial)
     there = [trial for trial in _open(result, unknown, settings) if trial.odds > alarm]
     large = {t.effect.name for t in there if np.any(np.abs(t.values) >= t.least)}
-    for trial in there:  # left out where it is small, it would be in the values of others
+    for trial in there:  # without it in all joints, its torque would bias the other values
         if trial.effect.name in large:
             named.append(trial.named)
             values.append(trial.values)
@@ -102,8 +102,8 @@ def _open(
     """
     Yield friction and offsets without given values; they are fitted with every cause.
 
-    The odds that one is not zero are those of its prior and its posterior at zero (Dickey, The
-    weighted likelihood ratio, 1971).
+    The odds of a nonzero value are the prior density at zero over the posterior density at zero
+    (Dickey, The weighted likelihood ratio, 1971).
 
     """
     nuisance = result.nuisance

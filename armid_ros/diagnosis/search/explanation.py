@@ -1,11 +1,10 @@
 # Copyright 2026 The armid_ros developers
 # SPDX-License-Identifier: Apache-2.0
 """
-An explanation of a gap: the names, and the arm with them.
+An explanation of a gap: the named effects, and the arm with them.
 
-A fit of base parameters gives standard parameters that no body may have. What the data determine
-stays: of all physically consistent links that fit as well, those nearest to the description are
-used, so that the arm can be simulated.
+A fit of base parameters may give links that are not physically consistent. They are replaced by
+the consistent links nearest to the description that fit as well, so that the arm can be simulated.
 
 """
 
@@ -27,9 +26,9 @@ from armid_ros.motion import FloatArray
 import numpy as np
 
 NOISE, ESTIMATED = 'noise', 'an estimate of the error of such a model'
-#: Weights of the description that are tried; the largest that fits as well is used.
+#: Weights of the description that are tried; the largest with as good a fit is used.
 _WEIGHTS = (1e-3, 1e-5, 1e-7)
-#: Physically consistent links fit as well if they leave at most this many times the squares.
+#: Largest ratio of squared residuals at which physically consistent links fit as well.
 _ALIKE = 1.05
 
 
@@ -45,17 +44,17 @@ class Explanation:
     fitted : Fitted
         The arm with all named effects.
     reference : Fitted
-        The same without them.
+        The arm without named effects.
     steps : tuple of Trial
-        The names, in the order of those in ``fitted``.
+        The named causes, in the order of those in ``fitted``.
     survey : Survey or None
-        The first look at all candidates.
+        The first comparison of all candidates.
     evidence : Evidence
-        The data.
+        The data in the unit of the gap.
     minor : tuple of Trial
-        Causes that are there and do not matter, for the small print.
+        Causes that are significant and not material.
     problem : JointFit or None
-        What values are fitted in; None where that is not needed any more.
+        Data and model in which the values are fitted; None in a finished diagnosis.
     refitted : bool
         Whether the rigid body was fitted anew.
 
@@ -72,12 +71,12 @@ class Explanation:
     refitted: bool = False
 
     def without(self, name: int) -> Explanation:
-        """Return the explanation without one of its names, the others fitted anew."""
+        """Return the explanation without one of its causes, the others fitted anew."""
         fewer = self.only([k for k in range(len(self.steps)) if k != name])
         return replace(fewer, minor=(*self.minor, self.steps[name]))
 
     def only(self, keep: Sequence[int]) -> Explanation:
-        """Return the explanation with some of its names, in this order, fitted anew."""
+        """Return the explanation with some of its causes, in this order, fitted anew."""
         assert self.problem is not None
         own = self.fitted
         named, values = [own.named[k] for k in keep], [own.values[k] for k in keep]
@@ -85,12 +84,12 @@ class Explanation:
         return replace(self, fitted=fitted, steps=tuple(self.steps[k] for k in keep))
 
     def with_nothing_named(self) -> Explanation:
-        """Return the explanation with all of its names in the small print."""
+        """Return the explanation with all of its causes as minor ones."""
         minor = *self.steps, *self.minor
         return replace(self, fitted=self.reference, steps=(), minor=minor)
 
     def forgetting(self) -> Explanation:
-        """Return the explanation without what it was computed from."""
+        """Return the explanation without the data and caches of its computation."""
         return replace(
             self,
             given=plain_arm(self.given),
@@ -101,7 +100,7 @@ class Explanation:
 
     @cached_property
     def residual(self) -> list[FloatArray]:
-        """Residual of the arm with the names, (M, n) of each trajectory [N m]."""
+        """Residual of the arm with the named effects, (M, n) of each trajectory [N m]."""
         return self.evidence.residuals(self.fitted.arm)
 
     @property
@@ -113,23 +112,23 @@ class Explanation:
 @dataclass(frozen=True)
 class Chosen:
     """
-    The chosen explanation.
+    The chosen explanation of a gap, with the unit of the gap.
 
     Attributes
     ----------
     explanation : Explanation
         The explanation.
     misfit : ndarray, shape (n,)
-        Misfit that the unit of the gap contains; zero where that is noise alone [N m].
+        Misfit that the unit of the gap contains; zero if the unit is noise alone [N m].
     floor_in_words : str
-        What the floor of the gap is.
+        Name of the floor of the gap, a noise or a misfit.
     notes : tuple of str
-        What a reader should know.
+        Notes for the reader of the report.
     untested : str
-        What would separate a change from another motion's misfit, a sentence; empty if the
-        recordings do. Where they do not, names have to take most of the gap.
+        Sentence on the recordings that would separate a change from the misfit of another motion.
+        If it is not empty, named causes have to explain most of the gap.
     look : Look or None
-        What all causes were worth at first.
+        The first comparison of all causes.
 
     """
 
@@ -142,7 +141,7 @@ class Chosen:
 
     @property
     def measured(self) -> bool:
-        """Whether the floor is noise or an estimated misfit, and no misfit that is known."""
+        """Whether the floor is noise or an estimated misfit, and not a known misfit."""
         return self.floor_in_words in (NOISE, ESTIMATED)
 
 
@@ -153,7 +152,7 @@ def at_floor(explanation: Explanation, settings: DiagnosisSettings) -> bool:
 
 
 def as_bodies(explanation: Explanation) -> tuple[Explanation, tuple[str, ...]]:
-    """Make links physically consistent if that fits as well; return explanation and note."""
+    """Return the explanation with physically consistent links, or unchanged with a note."""
     problem, fitted = explanation.problem, explanation.fitted
     if problem is None or not problem.refits_body:
         return explanation, ()
@@ -173,8 +172,8 @@ def as_bodies(explanation: Explanation) -> tuple[Explanation, tuple[str, ...]]:
         if np.all(bodily.chi2_per_row <= np.maximum(_ALIKE * explanation.chi2_per_row, 1.0)):
             return bodily, ()
     return explanation, (
-        'no links that are bodies explain the data as well: what was named, or not found, is in '
-        'the inertias; the patched model may not be simulable',
+        'no physically consistent links fit the data as well: the inertias contain other effects, '
+        'named or not found; the patched model may not be simulable',
     )
 
 

@@ -1,7 +1,7 @@
 # Copyright 2026 The armid_ros developers
 # SPDX-License-Identifier: Apache-2.0
 """
-What causes are compared with: body, friction, and the discrepancy of the model.
+The nuisance parameters of a comparison: body, friction, and the discrepancy of the model.
 
 For recording k, in weighted rows, in each joint
 
@@ -32,12 +32,12 @@ import numpy as np
 import numpy.typing as npt
 from scipy import linalg
 
-#: Share of a column's squares that its prior is at the least, so that all can be solved for.
+#: Least prior precision over the squares of a column, so that the equations can be solved.
 _HELD = 1e-12
-#: Share by which a described value of an effect, or a torque where a model was never tried, may be
-#: off. Values of the laboratory are off by up to 0.1, friction of an arm by 0.2 in a day.
+#: Relative prior error of a described value of an effect, or of a torque in unvisited states.
+#: Errors of values in the laboratory reach 0.1, and friction of an arm changes by 0.2 in a day.
 _DESCRIBED = 0.25
-#: Fewest rows of a correlation, the largest that is none, and the largest lag [rows].
+#: Fewest rows for a correlation, correlation that counts as zero, and largest lag [rows].
 _FEW, _UNCORRELATED, _LAGS = 60, 0.05, 20
 
 
@@ -53,7 +53,7 @@ class CauseTerm:
     size : float
         Standard deviation of the prior of its values, over their unit.
     acts : ndarray of bool, shape (K,)
-        In which recordings it acts.
+        Whether it acts in each recording.
 
     """
 
@@ -65,22 +65,22 @@ class CauseTerm:
 @dataclass(frozen=True)
 class Nuisance:
     """
-    Columns of body, friction and discrepancy, in coordinates in which they are apart.
+    Columns of body, friction and discrepancy, in coordinates with orthonormal body columns.
 
     Attributes
     ----------
     rows : Rows
         The data.
     arm : ArmModel
-        The model, with friction also in joints for which none is given.
+        The model, with friction in all joints, given or not.
     base : BaseParameters
-        Parameters b of its body and friction, r.
+        The r parameters b of its body and friction.
     turn : ndarray, shape (r, r)
-        Parameters of the columns, b = turn x.
+        Matrix from the coordinates x of the body columns to b, b = turn x.
     described : ndarray, shape (r, r)
         Prior precision of b.
     open : ndarray of bool, shape (r,)
-        Which of b have no given value.
+        Whether each of b has no given value.
     columns : tuple of ndarray, each (n, M, q)
         Weighted columns of each recording: body, and the discrepancy of one joint after the other.
     residual : tuple of ndarray, each (n, M)
@@ -88,7 +88,7 @@ class Nuisance:
     fixed : tuple of (ndarray, shape (q, q), ndarray, shape (q,))
         Products of these columns with each other and with the residual.
     accepted : tuple of CauseTerm
-        Causes that were found.
+        Accepted causes.
 
     """
 
@@ -113,7 +113,7 @@ class Nuisance:
         held: Sequence[int] = (),
     ) -> Nuisance:
         """
-        Compute the columns.
+        Compute the nuisance columns of the data.
 
         Parameters
         ----------
@@ -122,11 +122,11 @@ class Nuisance:
         arm : ArmModel
             The model.
         rng : numpy.random.Generator
-            Draws the states from which base parameters are found.
+            Draws the random states from which base parameters are found.
         known : ndarray, shape (P, P), optional
-            Information on the first parameters of the arm, which adds to the description.
+            Information on the first parameters of the arm, added to that of its description.
         held : sequence of int
-            Parameters of the arm that stay as they are, as a change of them is a cause.
+            Parameters of the arm that are not fitted, as an accepted cause changes them.
 
         """
         free = np.setdiff1d(np.arange(len(arm.parameters)), held)
@@ -182,7 +182,7 @@ class Nuisance:
 
     @cached_property
     def square(self) -> list[FloatArray]:
-        """Products of the columns of each recording, those of accepted causes last."""
+        """Products of the columns of each recording; columns of accepted causes are last."""
         found = []
         for k, (fixed, _) in enumerate(self.fixed):
             parts = [float(one.acts[k]) * one.cause.products[k] for one in self.accepted]
@@ -194,7 +194,7 @@ class Nuisance:
 
     @cached_property
     def cross(self) -> list[FloatArray]:
-        """Products of the same columns with the residual."""
+        """Products of the columns of each recording with its residual, (q + a,) each."""
         found = []
         for k, (_, fixed) in enumerate(self.fixed):
             aims = [one.cause.aim[k] * one.acts[k] for one in self.accepted]
@@ -215,16 +215,16 @@ class Nuisance:
     def and_cause(
         self, cause: Cause, size: float, acts: npt.NDArray[np.bool_] | None = None
     ) -> Nuisance:
-        """Return the same with one more cause, which acts on the day in question by default."""
+        """Return the nuisance with one more cause, acting on the day in question by default."""
         term = CauseTerm(cause, size, self.rows.today if acts is None else acts)
         return replace(self, accepted=(*self.accepted, term))
 
     def without(self, name: int) -> Nuisance:
-        """Return the same without one of the accepted causes."""
+        """Return the nuisance without one of the accepted causes."""
         return replace(self, accepted=(*self.accepted[:name], *self.accepted[name + 1 :]))
 
     def with_residual(self, residual: Sequence[FloatArray]) -> Nuisance:
-        """Return the same with another weighted residual, (n, M) of each recording."""
+        """Return the nuisance with another weighted residual, (n, M) of each recording."""
         pairs = zip(self.fixed, self.columns, residual, strict=True)
         fixed = tuple((own, x.reshape(-1, x.shape[2]).T @ y.ravel()) for (own, _), x, y in pairs)
         accepted = [replace(one, cause=one.cause.aimed_at(residual)) for one in self.accepted]
@@ -232,7 +232,7 @@ class Nuisance:
 
     @property
     def spans(self) -> list[slice]:
-        """Return where the values of each accepted cause are among all parameters."""
+        """Return the positions of the values of each accepted cause among all parameters."""
         size = self.columns[0].shape[2]
         counts = [len(one.cause.unit) for one in self.accepted]
         stops = size + np.cumsum(counts, dtype=int)
@@ -243,7 +243,7 @@ class Nuisance:
         """
         Return the factor of the discrepancy in states that the first day did not visit, (n, f).
 
-        A misfit says what a model gets wrong where it was measured. Elsewhere that is a share of
+        The misfit limits the discrepancy in visited states only. In others it may be a share of
         the torque.
 
         """
@@ -296,11 +296,11 @@ class Nuisance:
         Parameters
         ----------
         setting : Setting
-            Amplitudes.
+            Amplitudes of discrepancy and noise.
         among : sequence of int, optional
-            The recordings that count; all by default.
+            The recordings that are fitted; all by default.
         less : (int, ndarray, shape (S, q + a), ndarray, shape (S,)), optional
-            Rows of a recording that do not count, with their residual.
+            A recording, with columns and residual of those of its rows that are left out.
 
         """
         whole, kept = self._precision(setting)
@@ -355,20 +355,20 @@ class Nuisance:
         )
 
     def whole(self, under: Marginal) -> tuple[FloatArray, FloatArray]:
-        """Return all values under a setting and their covariance; both zero where not fitted."""
+        """Return the means of all parameters and their covariance; zero where not fitted."""
         size = len(self.cross[0])
         covariance = np.zeros((size, size))
         covariance[np.ix_(under.used, under.used)] = under.root.T @ under.root
         return self.means(under), covariance
 
     def means(self, under: Marginal) -> FloatArray:
-        """Return all values under a setting; zero where not fitted."""
+        """Return the means of all parameters under a setting; zero where not fitted."""
         values = np.zeros(len(self.cross[0]))
         values[under.used] = under.values
         return values
 
     def rest(self, values: FloatArray, k: int) -> FloatArray:
-        """Return the weighted residual of a recording for given values, d_k in it, (n, M)."""
+        """Return the weighted residual of a recording, which includes d_k, (n, M)."""
         columns = self.columns[k]
         rest = self.residual[k] - columns @ values[: columns.shape[2]]
         for one, span in zip(self.accepted, self.spans, strict=True):
@@ -377,7 +377,7 @@ class Nuisance:
         return rest
 
     def unexplained(self, values: FloatArray, setting: Setting, k: int) -> FloatArray:
-        """Return the weighted residual of a recording without its discrepancy d_k, (n, M)."""
+        """Return the weighted residual of a recording, its fitted d_k subtracted, (n, M)."""
         rest = self.rest(values, k)
         if not setting.own:
             return rest
@@ -391,7 +391,7 @@ class Nuisance:
         return rest
 
     def body_change(self, values: FloatArray) -> FloatArray:
-        """Return the change of the base parameters, (r,), of all values."""
+        """Return the change of the base parameters, (r,), from the means of all parameters."""
         return np.asarray(self.turn @ values[: self.rank])
 
     def lasting(self, under: Marginal, recordings: Sequence[int], least: float) -> float:

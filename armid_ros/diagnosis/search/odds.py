@@ -1,11 +1,11 @@
 # Copyright 2026 The armid_ros developers
 # SPDX-License-Identifier: Apache-2.0
 """
-The odds of one cause: how much likelier the data are with it than without.
+The odds of one cause: the likelihood ratio of the data with and without it.
 
-A cause may have been there before (g0), and its values differ from recording to recording (u_k),
-as what follows a misfit does: that spread is the usual one of all causes in the baseline, and that
-of the cause itself (Smyth, Linear models and empirical Bayes methods, 2004).
+A cause may have acted before the change (g0), and its values differ between recordings (u_k), as
+they follow the misfit. The spread of these differences is that of the cause, shrunk towards that
+of all causes in the baseline (Smyth, Linear models and empirical Bayes methods, 2004).
 
 """
 
@@ -24,16 +24,16 @@ import numpy as np
 import numpy.typing as npt
 from scipy import stats
 
-#: Spreads of values between recordings over their variance for white noise: equal values, those
-#: that are tried of a cause, and those that are tried of all causes of a baseline.
+#: Spreads: variances of values between recordings over those for white noise. Equal values,
+#: spreads that are tried for a cause, and spreads that are tried for all causes in a baseline.
 EQUAL = np.zeros(1)
 OWN_SPREADS = np.array([0.0, 1.0, 3.0, 10.0, 30.0, 100.0])
 _USUAL_SPREADS = np.array([0.0, 0.5, 1.0, 2.0, 4.0, 8.0, 16.0, 32.0, 64.0, 128.0])
-#: The usual spread without a baseline: the median of 72 arms.
+#: Usual spread with fewer than two recordings in the baseline: the median of 72 arms.
 POPULATION_SPREAD = 1.0
-#: Log odds of values that cannot be.
+#: Log odds of physically impossible values.
 IMPOSSIBLE = -1e6
-#: Share of a column's squares that is left at the least of it: rounding.
+#: Relative rounding error of the squares of a column, added to the part beyond nuisance columns.
 _ROUNDING = 1e-7
 
 
@@ -47,9 +47,9 @@ class CauseFit:
     factor : float
         Log Bayes factor.
     explained : float
-        Part of it that is what the values explain; the rest is what their freedom costs.
+        Part of `factor` from the squares that the values explain; the rest penalises their number.
     size : float
-        Standard deviation of the prior of its values, over its unit.
+        Standard deviation of the prior of the values, over their unit.
     values, std : ndarray, shape (p,)
         Values and their standard deviations.
     resolution : ndarray, shape (p,)
@@ -78,9 +78,9 @@ class CauseInformation:
     vector : ndarray, shape (G p,)
         Matrix times mean.
     today : ndarray of bool, shape (G,)
-        Which groups are of the day in question.
+        Whether each group is of the day in question.
     visible : float
-        Share of the length of its columns that the nuisance columns cannot reproduce.
+        Share of the length of the columns that the nuisance columns cannot reproduce.
 
     """
 
@@ -93,7 +93,7 @@ class CauseInformation:
     def of(
         cls, cause: Cause, nuisance: Nuisance, under: Marginal, by_day: bool = False
     ) -> CauseInformation:
-        """Integrate out the nuisance parameters; groups are recordings, or days."""
+        """Return the information per recording or day; nuisance parameters are integrated out."""
         today = nuisance.rows.today
         groups = [[k] for k in range(len(today))]
         if by_day:
@@ -134,7 +134,7 @@ class CauseInformation:
 
     @property
     def size(self) -> int:
-        """Return the number of values."""
+        """Return the number of values of the cause."""
         return len(self.vector) // len(self.today)
 
     def of_day(self, today: bool) -> CauseInformation:
@@ -145,12 +145,12 @@ class CauseInformation:
         return replace(self, matrix=matrix, vector=self.vector[kept], today=self.today[of_it])
 
     def among(self, values: npt.NDArray[np.intp]) -> CauseInformation:
-        """Return the information where only some of the values are not zero."""
+        """Return the information on some of the values, while the others are zero."""
         kept = np.add.outer(self.size * np.arange(len(self.today)), values).ravel()
         return replace(self, matrix=self.matrix[np.ix_(kept, kept)], vector=self.vector[kept])
 
     def apart(self, spread: float) -> list[FloatArray]:
-        """Return a root of the covariance of differences between recordings; empty if none."""
+        """Return a root of the prior covariance of differences u_k, in a list; empty if none."""
         if not spread:
             return []
         p, groups = self.size, len(self.today)
@@ -161,7 +161,7 @@ class CauseInformation:
         return [np.kron(np.eye(groups), axes * np.sqrt(np.minimum(spread / size, THERE**2)))]
 
     def there(self) -> FloatArray:
-        """Return the root of the covariance of values that act on both days."""
+        """Return a root of the prior covariance of values that act on both days (g0)."""
         return np.tile(THERE * np.eye(self.size), (len(self.today), 1))
 
 
@@ -181,15 +181,15 @@ def odds(
     cause : Cause
         The cause.
     nuisance : Nuisance
-        What it is compared with.
+        Nuisance parameters of the comparison.
     under : Marginal or CauseInformation
-        The same under one setting, or what recordings tell of the cause.
+        Fit of the nuisance parameters under one setting, or the information on the cause.
     usual : float
         The usual spread of values between recordings.
     spreads : ndarray, shape (k,)
-        Spreads that are averaged over.
+        Spreads to average over.
     bounded : bool
-        Whether values that cannot be count against the cause; see `allowed`.
+        Whether physically impossible values count against the cause; see `allowed`.
 
     """
     known = under
@@ -224,7 +224,7 @@ def odds(
                 0.5 * np.sum(along / wide, axis=1),
             )
     assert best is not None
-    # All values of a cause follow one misfit: recordings are what is independent.
+    # All values of a cause follow one misfit, so only recordings are independent.
     weight = prior + (changed - prior) / p
     weight -= np.logaddexp.reduce(weight)
     factor = -float(np.logaddexp.reduce(weight + nothing - changed))
@@ -265,7 +265,7 @@ def usual_spread(causes: Sequence[Cause], nuisance: Nuisance, under: Marginal) -
     """
     Return the spread of values between recordings of the baseline: the geometric mean of causes.
 
-    One recording shows nothing of it.
+    With fewer than two recordings it is `POPULATION_SPREAD`.
 
     """
     if nuisance.rows.before < 2:
@@ -289,7 +289,7 @@ def usual_spread(causes: Sequence[Cause], nuisance: Nuisance, under: Marginal) -
 def without(
     square: FloatArray, aim: FloatArray, root: FloatArray
 ) -> tuple[FloatArray, FloatArray, float]:
-    """Integrate out values of covariance R R'; return what is left, and the log evidence."""
+    """Integrate out values of covariance R R'; return the reduced equations and log evidence."""
     border = square @ root
     inner = root.T @ border
     lower = np.linalg.inv(np.linalg.cholesky(0.5 * (inner + inner.T) + np.eye(len(inner))))

@@ -1,6 +1,6 @@
 # Copyright 2026 The armid_ros developers
 # SPDX-License-Identifier: Apache-2.0
-"""An arm with the named effects, as the point at which a fit has arrived."""
+"""An arm with named effects: the state of a Gauss-Newton fit of their values and shapes."""
 
 from __future__ import annotations
 
@@ -53,7 +53,7 @@ class Patch:
 
     @property
     def places(self) -> tuple[tuple[range, range], ...]:
-        """Positions among the fitted parameters of the values of each name, and of its shapes."""
+        """Positions of values and of shapes of each named effect among the fitted parameters."""
         places, start = [], 0
         for own in self.named:
             shapes = start + len(own.kept)
@@ -81,7 +81,7 @@ class Patch:
         return Patch(self.arm, tuple(named), tuple(values))
 
     def parameters(self) -> tuple[tuple[ParameterName, ...], FloatArray]:
-        """Name the fitted parameters of the named effects, shapes behind quantities."""
+        """Return names and values of the fitted parameters of each effect, its shapes last."""
         names: list[ParameterName] = []
         numbers: list[float] = []
         for own, values in zip(self.named, self.values, strict=True):
@@ -94,7 +94,7 @@ class Patch:
 
 
 def room(effect: Effect, arm: ArmModel) -> tuple[FloatArray, FloatArray]:
-    """Return the bounds of the change of values, given what the arm already has, each (P,)."""
+    """Return the bounds of values that are added to those of the arm, each (P,)."""
     lower, upper = effect.bounds()
     there = {
         name: value
@@ -129,7 +129,7 @@ def patch_columns(state: Patch, part: Trajectory) -> list[FloatArray]:
 
 
 def _shape_columns(model: ArmModel, position: int, motion: Motion) -> FloatArray:
-    """Differentiate the torque of an effect by its shape with finite differences, (N, n, S)."""
+    """Return the finite-difference Jacobian of the torque by the shape, (N, n, S)."""
     effect = model.effects[position]
     low, high, step = _shape_bounds(effect)
     shape = np.array(effect.shape)
@@ -145,7 +145,7 @@ def _shape_columns(model: ArmModel, position: int, motion: Motion) -> FloatArray
 
 
 def _torque_with(model: ArmModel, position: int, effect: Effect, motion: Motion) -> FloatArray:
-    """Return the torque with another shape of an effect, without what does not depend on it."""
+    """Return a torque with another shape of an effect, up to a part independent of the shape."""
     if effect.linear and not isinstance(effect, TorqueReading):
         return np.asarray(model.columns_of(effect, motion) @ model.values[position])
     effects = (*model.effects[:position], effect, *model.effects[position + 1 :])

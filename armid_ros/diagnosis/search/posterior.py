@@ -3,10 +3,10 @@
 """
 Values of the named effects: the mean and the covariance of their posterior.
 
-They are those of the model in which causes are compared (`Nuisance`), with body, friction and
-discrepancy integrated out, and with values that were there before. Encoder offsets, delays and
-elasticities are linear to the first order only, and so are shapes: the columns are computed anew
-at each mean (Gauss-Newton), and values stay within their physical bounds.
+The model is that of the comparison of causes (`Nuisance`), with body, friction, discrepancy and
+earlier values of the cause integrated out. Encoder offsets, delays, elasticities and shapes are
+linear to first order only: the columns are computed anew at each mean (Gauss-Newton), and values
+stay within their physical bounds.
 
 """
 
@@ -28,19 +28,19 @@ from armid_ros.estimate import Estimate
 from armid_ros.motion import FloatArray
 import numpy as np
 
-#: Most Gauss-Newton steps; shapes are near already.
+#: Largest number of Gauss-Newton steps; the comparison has refined the shapes already.
 _MOST_ROUNDS = 4
 #: Shares of a step that are tried until the loss falls.
 _SHARES = (1.0, 0.5, 0.2)
-#: Relative change of the loss that is none.
+#: Relative change of the loss at which the fit has converged.
 _SETTLED = 1e-4
-#: Standard deviation of a shape before, over its value: the comparison has refined it already.
+#: Prior standard deviation of a shape over its value, small as the comparison has refined it.
 _SHAPE = 0.3
-#: Size of a shape without a default, such as a position that was held [rad or m].
+#: Size of a shape without a default, such as a rest position [rad or m].
 _NO_DEFAULT = 0.1
-#: Least size that a value had before, over its unit.
+#: Least prior standard deviation of an earlier value, over its unit.
 _LEAST = 1e-3
-#: Least share of the variance of a value that data have to take away for it to be determined.
+#: Share by which data have to reduce the prior variance of a value that counts as determined.
 _DETERMINED = 0.5
 
 
@@ -58,8 +58,8 @@ class Fitted:
     values : tuple of ndarray
         All values of each named effect.
     estimate : Estimate
-        Of the fitted parameters of the named effects, shapes included; a variance is infinite
-        where data do not determine a value.
+        Estimate of the fitted parameters of the named effects, shapes included; the variance of a
+        value that data do not determine is infinite.
     means : ndarray, shape (q,)
         Means of the nuisance parameters.
 
@@ -73,7 +73,7 @@ class Fitted:
 
     @property
     def places(self) -> tuple[tuple[range, range], ...]:
-        """Positions in the estimate of the values of each name, and of its shapes."""
+        """Positions of values and of shapes of each named effect in the estimate."""
         return Patch(self.arm, self.named, self.values).places
 
 
@@ -85,17 +85,17 @@ class JointFit:
     Attributes
     ----------
     arm : ArmModel
-        The arm without names.
+        The arm without named effects.
     nuisance : Nuisance
-        Data and nuisance columns, no cause among them.
+        Data and nuisance columns, without accepted causes.
     setting : Setting
-        Amplitudes.
+        Amplitudes of discrepancy and noise.
     recordings : tuple of int
         Recordings that are fitted.
     stated : bool
-        Whether the change of body and friction is part of the arm, and not only allowed for.
+        Whether the fitted arm includes the fitted change of body and friction.
     spread : float
-        Variance of values between recordings, over that of the mean for white noise.
+        Variance of values between recordings, over their variance for white noise.
 
     """
 
@@ -115,7 +115,7 @@ class JointFit:
         known: FloatArray | None = None,
     ) -> JointFit:
         """
-        Set up the fit where the residual is noise alone; the body is refitted.
+        Return a fit in which the body is free and the residual is noise alone.
 
         Parameters
         ----------
@@ -124,9 +124,9 @@ class JointFit:
         evidence : Evidence
             Data and their noise.
         rng : numpy.random.Generator
-            Draws the states from which base parameters are found.
+            Draws the random states from which base parameters are found.
         known : ndarray, shape (P, P), optional
-            Information on its parameters, which adds to the description.
+            Information on the parameters of the arm, added to that of its description.
 
         """
         nuisance = Nuisance.of(Rows.over_noise(evidence), memoized_arm(arm), rng, known)
@@ -150,7 +150,7 @@ class JointFit:
         named : sequence of SelectedEffect
             The effects.
         values : sequence of ndarray
-            All values of each, to begin at.
+            Initial values of all parameters of each effect.
 
         """
         state = Patch(self.arm, tuple(named), tuple(values))
@@ -236,7 +236,7 @@ class JointFit:
         return found
 
     def _weighted(self, model: ArmModel) -> list[FloatArray]:
-        """Return the weighted residual of each recording, (n, M), for the arm of today."""
+        """Return the weighted residual of each recording, (n, M), with a model of today."""
         rows = self.nuisance.rows
         rest = [
             part.residual(model) if rows.today[part.fold] else np.zeros_like(part.unsure)
@@ -252,7 +252,7 @@ class JointFit:
         ]
 
     def _loss(self, state: Patch) -> float:
-        """Return minus the log likelihood of values, the nuisance parameters integrated out."""
+        """Return the negative log likelihood, the nuisance parameters integrated out."""
         there = self.nuisance.with_residual(self._weighted(state.model))
         return there.marginal(self.setting, self.recordings).loss
 
@@ -260,8 +260,8 @@ class JointFit:
         """
         Return the change of the values if the cause had acted on the first day as well.
 
-        No value is expected to have been larger than now: its present size is the standard
-        deviation of its prior, about zero.
+        The prior of a value on the first day has zero mean, and the present value as standard
+        deviation.
 
         """
         size, both = self.nuisance.columns[0].shape[2], linear

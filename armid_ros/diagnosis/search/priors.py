@@ -8,26 +8,27 @@ from armid_ros.effects import CATALOGUE, Effect
 from armid_ros.robots import Robot
 import numpy as np
 
-#: How often an effect happens to an arm, as its user says it: log odds over the usual ones.
+#: Log odds of an effect by its frequency, which the user may choose, relative to the usual odds.
 HOW_OFTEN = {'often': 2.0, 'usual': 0.0, 'seldom': -3.0, 'never': -30.0}
-#: Log odds of what never happens between two days: a link does not change.
+#: Log odds of a changed link between two days, which practically never happens.
 NEVER = -5.0
-#: Of a load of an inner link, between two days.
+#: Log odds of a load on an inner link, between two days.
 INNER = -2.0
-#: Of another unusual place: a delay of one joint, a lag of the whole arm.
+#: Log odds of another unusual place: a delay of one joint, a lag of the whole arm.
 ELSEWHERE = -1.5
-#: Of what acts from outside of the arm: it can pull in any way.
+#: Log odds of causes outside of the arm, which can pull in any direction.
 OUTSIDE = -4.0
-#: Of each place in the catalogue, which goes from the common to the rare.
+#: Log odds per position in the catalogue, whose order is from common to rare effects.
 RARER = -0.05
 #: Probability that a law outside of the catalogue acts and resembles the best cause: 6 of 70
 #: names of development arms.
 UNLISTED = 0.09
-#: Of each shape that the data choose.
+#: Log odds of each shape parameter that the data choose.
 SHAPE = -3.0
-#: Standard deviations of values over the unit of a cause, all as likely.
+#: Prior standard deviations of the values over the unit of a cause, equally likely.
 SIZES = np.array([0.01, 0.03, 0.1, 0.3, 1.0])
-#: That of values that were there before, and the most that values differ by between recordings.
+#: Prior standard deviation of earlier values, and largest one of differences between recordings,
+#: both over the unit of a cause.
 THERE = 0.3
 
 

@@ -1,6 +1,6 @@
 # Copyright 2026 The armid_ros developers
 # SPDX-License-Identifier: Apache-2.0
-"""Amplitudes of discrepancy and noise, and the nuisance parameters that they give."""
+"""Amplitudes of discrepancy and noise, and the fit of the nuisance parameters for each."""
 
 from __future__ import annotations
 
@@ -10,25 +10,25 @@ from armid_ros.motion import FloatArray
 import numpy as np
 import numpy.typing as npt
 
-#: Rows of one independent row without a baseline.
+#: Correlated rows that count as one independent row, without a baseline.
 LASTING = 2.0
 
 
 @dataclass(frozen=True)
 class Setting:
     """
-    Whether the body is free, and the amplitudes of discrepancy and noise.
+    Amplitudes of discrepancy and noise, with a fixed or a free body.
 
     Attributes
     ----------
     free : bool
-        Whether the body is fitted anew; what has no given values always is.
+        Whether the body is fitted anew; parameters without given values always are.
     shared, own : float
-        Standard deviations of d0 and d_k.
+        Standard deviations of d0 and d_k, over their unit.
     noise : float
-        That of e_k, over the unit of the rows.
+        Standard deviation of e_k, over the unit of the rows.
     lasting : float
-        Rows that make one independent row.
+        Number of correlated rows that count as one independent row.
     prior : float
         Log prior probability.
 
@@ -59,24 +59,24 @@ class MotionDiscrepancy:
 @dataclass(frozen=True)
 class Marginal:
     """
-    The nuisance parameters under one setting.
+    Posterior of the nuisance parameters under one setting.
 
     Attributes
     ----------
     setting : Setting
         The setting.
     used : ndarray of int, shape (u,)
-        Which parameters are fitted.
+        Indices of the fitted parameters.
     root : ndarray, shape (u, u)
-        R of their covariance R'R.
+        Matrix R of the covariance R'R of the fitted parameters.
     values : ndarray, shape (u,)
-        Their means.
+        Means of the fitted parameters.
     evidence : float
         Log evidence.
     loss : float
-        Half of the weighted squares that are left.
+        Half of the remaining weighted squares.
     motions : mapping of int to MotionDiscrepancy
-        The discrepancy of each recording.
+        The marginalised discrepancy d_k of each recording.
 
     """
 

@@ -27,9 +27,9 @@ import numpy.typing as npt
 
 #: Time between change points that are tried [s], and the shortest span [s].
 _STEP, _SHORTEST = 0.25, 3.0
-#: Change points of the first pass, passes in which each is moved, and causes for which it is.
+#: Change points of the coarse pass, refining passes, and number of causes that are refined.
 _COARSE, _PASSES, _REFINED = 9, 2, 3
-#: First and last edge of the span of each recording.
+#: First and last change point of the span of each recording.
 Spans: TypeAlias = Mapping[int, tuple[int, int]]
 
 
@@ -43,9 +43,9 @@ class Span:
     source : str
         The recording.
     start, stop : float
-        First and last second [s]; none if it does not act there.
+        Beginning and end of the span [s]; equal if the cause does not act in this recording.
     whole : bool
-        Whether it acts throughout.
+        Whether the cause acts throughout.
 
     """
 
@@ -85,7 +85,7 @@ class _Timed:
 
     @cached_property
     def _sums(self) -> dict[int, tuple[FloatArray, FloatArray, FloatArray]]:
-        """Products of the columns with nuisance columns, themselves and residual, up to edges."""
+        """Products with nuisance columns, columns and residual, summed up to each edge."""
         nuisance, cause = self.look.nuisance, self.ranked.cause
         joints = list(cause.joints)
         found = dict[int, tuple[FloatArray, FloatArray, FloatArray]]()
@@ -114,7 +114,7 @@ class _Timed:
             if b - a < count - 1:
                 tried += float(np.log(0.5 * count * (count - 1)))
         timed: Cause = replace(cause, products=tuple(products), own=tuple(own), aim=tuple(aim))
-        # What was there before acts throughout: spans are compared with one and the same null.
+        # Earlier values act throughout, so that all spans are compared with the same null model.
         known = CauseInformation.of(timed, nuisance, self.ranked.under, by_day=True)
         fit = odds(timed, nuisance, known.of_day(today=True))
         return replace(self.ranked, cause=timed, fit=fit, data=fit.factor - tried)
@@ -137,7 +137,7 @@ class _Timed:
         return found, spans
 
     def refined(self, found: Ranked, spans: Spans) -> tuple[Ranked, Spans]:
-        """Return spans with each edge moved to where the cause is likeliest."""
+        """Return spans after each edge is moved to the likeliest change point."""
         for _ in range(_PASSES):
             for k, edges in self.edges.items():
                 near = (len(edges) - 1) // (_COARSE - 1)
@@ -178,15 +178,15 @@ def acting_spans(look: Look, thresholds: Thresholds) -> tuple[Span, ...]:
     Parameters
     ----------
     look : Look
-        What causes that act throughout explain.
+        Comparison of causes that act throughout.
     thresholds : Thresholds
-        By how much a cause has to be likelier if it acts for a part of the time, and than that
-        its values differ between recordings only.
+        Log odds (`alarm`) required over causes that act throughout, and over mere differences of
+        values between recordings.
 
     Returns
     -------
     tuple of Span
-        One for each recording of the day in question; none if no cause is likelier so.
+        One for each recording of the day in question; empty if no span reaches these odds.
 
     """
     if not look.ranking:

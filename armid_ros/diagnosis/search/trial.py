@@ -1,6 +1,6 @@
 # Copyright 2026 The armid_ros developers
 # SPDX-License-Identifier: Apache-2.0
-"""What a cause is worth, how it was found, and what a look at all causes showed."""
+"""A cause with its evidence (trial, ranked), and the comparison of all causes (look, survey)."""
 
 from __future__ import annotations
 
@@ -35,21 +35,21 @@ class Trial:
     resolution : ndarray, shape (p,)
         One where the data determine a value, zero where only the prior does.
     least : ndarray, shape (p,)
-        Size of each value whose torque matters.
+        Smallest material size of each value.
     visible : float
         Share of the length of its columns that the nuisance columns cannot reproduce.
     gain : float
         Twice the log Bayes factor of the torque that it explains.
     odds : float
-        Log odds that it is there, or has changed.
+        Log odds that the cause is there, or has changed.
     share : float
-        Share of the squares of the residual that its torque has.
+        Squares of the torque of the cause over those of the residual.
     replicated : int
-        Number of recordings that it explains more of than nothing does.
+        Number of recordings whose residual the cause reduces.
     probability : float
-        Among all explanations; zero of one that was not named.
+        Probability among all explanations; zero of a cause that was not named.
     rivals : tuple of Trial
-        Causes that the data do not exclude in its place, the likeliest first.
+        Other causes that the data do not exclude, the likeliest first.
 
     """
 
@@ -68,17 +68,17 @@ class Trial:
 
     @property
     def effect(self) -> Effect:
-        """Return the effect."""
+        """Return the effect of the cause."""
         return self.named.effect
 
     @property
     def key(self) -> Key:
-        """Name, joints and quantities."""
+        """Identity of the cause in any shape: name, joints and quantities."""
         return self.effect.name, self.effect.joints, self.named.kept
 
     @property
     def p(self) -> float:
-        """Probability that it is not there, or has not changed."""
+        """Probability that the cause is not there, or has not changed."""
         return float(np.exp(-np.logaddexp(0.0, self.odds)))
 
 
@@ -92,15 +92,15 @@ class Ranked:
     cause : Cause
         The cause, in its best shape.
     fit : CauseFit
-        Its values.
+        Posterior of its values.
     data : float
         Log Bayes factor of the torque that it explains.
     odds : float
-        Log odds that it is there, or has changed.
+        Log odds that the cause is there, or has changed.
     under : Marginal
-        What it was compared with, under its likeliest setting.
+        Nuisance parameters under the likeliest setting with this cause.
     probability : float
-        Among all explanations.
+        Probability among all explanations.
 
     """
 
@@ -118,16 +118,16 @@ class Ranked:
 
     @property
     def left(self) -> float:
-        """Half of the weighted residual squares that remain."""
+        """Half of the remaining squares of the weighted residual."""
         return self.under.loss - self.fit.explained
 
     def ahead(self, other: Ranked, levels: Thresholds) -> float:
         """
         Return the log odds over another cause; positive if this one is likelier.
 
-        A lead of a share of what is explained is none, as laws are inexact, unless one leaves so
-        little that the other is no fit then. Then what freedom costs and what is commoner
-        decide.
+        As laws are inexact, a lead does not count below the share `inexact` of the explained part,
+        and below the share `same_fit` - 1 of the smaller residual. Number of values and prior odds
+        then decide.
 
         """
         lead = self.fit.explained - other.fit.explained
@@ -149,11 +149,11 @@ class Look:
     ranking : tuple of Ranked
         The best causes in their best shape, the likeliest first.
     others : tuple of Cause
-        All other causes in the best shape of those that a search starts from.
+        All other causes, each in its best starting shape.
     nuisance : Nuisance
-        What they were compared with.
+        Data and nuisance parameters of the comparison.
     under : Marginal
-        The same under the likeliest setting.
+        Fit of the nuisance parameters under the likeliest setting.
     usual : float
         Usual spread of values between recordings.
 
@@ -166,13 +166,13 @@ class Look:
     usual: float
 
     def worth(self, one: Ranked, material: float) -> Trial:
-        """Return a ranked cause as a trial, with its own odds and probability."""
+        """Return a ranked cause as a trial, with the odds and probability of its ranking."""
         own = self.trial(one.cause, material, one.under)
         return replace(own, gain=2.0 * one.data, odds=one.odds, probability=one.probability)
 
     def trial(self, cause: Cause, material: float, under: Marginal | None = None) -> Trial:
         """
-        Evaluate any cause.
+        Return any cause as a trial, with its values, visibility and evidence.
 
         Parameters
         ----------
@@ -181,7 +181,7 @@ class Look:
         material : float
             Share of the torque of a joint that matters.
         under : Marginal, optional
-            What it is compared with; under the likeliest setting by default.
+            Fit of the nuisance parameters; that of the likeliest setting by default.
 
         """
         nuisance = self.nuisance
@@ -214,7 +214,7 @@ class Look:
 
     @cached_property
     def _left(self) -> float:
-        """Squares of the residual of the day in question."""
+        """Sum of squares of the weighted residual of the day in question."""
         values = self.nuisance.means(self.under)
         today = np.flatnonzero(self.nuisance.rows.today).tolist()
         return max(float(sum(np.sum(self.nuisance.rest(values, k) ** 2) for k in today)), 1e-300)
@@ -239,5 +239,5 @@ class Survey:
 
     @property
     def hidden(self) -> set[str]:
-        """Names of effects of which no cause is visible."""
+        """Names of effects that are not visible in any place."""
         return {name for name, _ in self.unseen} - {one.effect.said_as for one in self.ranking}

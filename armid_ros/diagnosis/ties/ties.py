@@ -1,12 +1,11 @@
 # Copyright 2026 The armid_ros developers
 # SPDX-License-Identifier: Apache-2.0
 """
-What an arm lacks that is tied to another moving machine: the ties first, then other causes.
+Diagnosis of an arm tied to another moving machine: the ties first, then other causes.
 
-The places of possible ties are known, so all ties are identified at once, as by ``armid exo``,
-which models the noise of angles: one by one they imitate each other and half of the catalogue, and
-least squares make springs too soft. Significant ties stay, and only the residual that they leave
-is searched for other causes.
+The places of possible ties are known. All are identified at once, as by ``armid exo``, which
+models the noise of angles. One by one, ties resemble each other and half of the catalogue, and
+least squares underestimate their stiffness. Other causes are searched in the remaining residual.
 
 """
 
@@ -37,10 +36,10 @@ from armid_ros.motion import FloatArray, Motion
 from armid_ros.recording import Recording
 import numpy as np
 
-#: Reduction of squares over noise that slack has to bring: z > 5.
+#: Least reduction of the squares over noise by slack: z > 5.
 _LEAST_GAIN = 25.0
-#: Squares over noise that each fitted inertia has to explain for the description to be wrong: one
-#: by chance, two where filters correlate neighbouring rows.
+#: Squares over noise that each fitted inertia has to explain to reject the description. It is one
+#: by chance, or two if filters correlate neighbouring rows.
 _TOLD = 5.0
 
 
@@ -48,13 +47,13 @@ def diagnose_ties(
     explainer: Explainer, recordings: Sequence[Recording], partner: Partner
 ) -> Chosen | None:
     """
-    Explain a gap by ties to another machine, and by causes of the residual that they leave.
+    Explain a gap by ties to another machine, and by causes of the remaining residual.
 
     Returns
     -------
     Chosen or None
-        With the ties as its first names, or the given arm if it leaves no more than noise; None if
-        there is no tie, and still a gap.
+        The explanation with the ties as its first names; without names if the residual is noise;
+        None if there is a gap and no tie.
 
     """
     arm, prepared, settings = explainer.arm, explainer.prepared, explainer.settings
@@ -70,7 +69,7 @@ def diagnose_ties(
         )
         return Chosen(found, nothing, NOISE) if at_floor(found, settings) else None
     evidence = Evidence.over_noise(prepared.data, prepared.sigma)
-    for _ in range(2):  # the noise of angles on springs shows beside the tied arm alone
+    for _ in range(2):  # noise of angles in the springs is measured only with the ties fitted
         problem = JointFit.over_noise(arm, evidence, explainer.rng)
         fitted = problem.fit(named, values)
         sigma = [noise_floor(part, fitted.arm).sigma for part in prepared.data]
@@ -99,9 +98,9 @@ class _Ties:
     explainer : Explainer
         The arm without ties, and its data.
     recordings : tuple of Recording
-        Of the arm, with the motion of the other machine.
+        Recordings of the arm, with the motion of the other machine.
     partner : Partner
-        Where there may be ties.
+        The other machine with the places of possible ties.
 
     """
 
@@ -145,7 +144,7 @@ class _Ties:
         """
         Replace the springs of an explanation by those of the unbiased regression.
 
-        The body is as described where that explains the torques as well as a fitted one.
+        The described body is kept if it explains the torques as well as a fitted one.
 
         """
         named = [own.effect for own in found.fitted.named]
@@ -173,7 +172,7 @@ class _Ties:
         return replace(found, fitted=_with_springs(found, fitted))
 
     def _springs(self, bare: ArmModel, inertias: Inertias, joints: set[str]) -> Interaction | None:
-        """Identify the springs of some joints after subtracting the effects of a bare arm."""
+        """Identify the springs of some joints; other effects of the arm are subtracted."""
         try:
             problem = self._problem(bare, inertias)
             kept = [k for k, joint in enumerate(problem.spring_joints) if joint in joints]
@@ -184,7 +183,7 @@ class _Ties:
     def _problem(
         self, bare: ArmModel, inertias: Inertias, slack: float = 0.0
     ) -> InteractionProblem:
-        """Set up the regression of all ties after subtracting the effects of a bare arm."""
+        """Return the regression of all ties; other effects of the arm are subtracted."""
 
         def rest(motion: Motion) -> FloatArray:
             return np.asarray(bare.torque(motion) - inverse_dynamics(bare.robot, motion))
@@ -211,10 +210,10 @@ class _Ties:
 
 def _with_springs(explanation: Explanation, found: Interaction) -> Fitted:
     """
-    Return the fitted arm with these springs, its base parameters refitted to them.
+    Return the fitted arm with given springs, and with base parameters refitted.
 
-    Names other than ties that were fitted jointly may make springs less certain: deviations are
-    the larger ones then.
+    If other effects were fitted jointly, the standard deviations of the springs are the larger
+    ones of both fits.
 
     """
     fitted, problem = explanation.fitted, explanation.problem
@@ -242,7 +241,7 @@ def _with_springs(explanation: Explanation, found: Interaction) -> Fitted:
 def _as_one_cause(
     explainer: Explainer, evidence: Evidence, partner: Partner, fitted: Fitted
 ) -> tuple[Trial, Survey]:
-    """Compare all ties, as one cause, with the library; return their trial and the survey."""
+    """Compare all ties, as one cause, with the catalogue; return their trial and the survey."""
     settings, robot = explainer.settings, explainer.arm.robot
     free = [one for one in settings_alone() if one.free]
     comparison = explainer.comparison(Rows.over_noise(evidence), free)

@@ -4,8 +4,8 @@
 The share of the gap that each cause explains of held-out data, and which causes are the headline.
 
 The gap is the sum of squares of the weighted residual of the model. Causes are added one by one,
-the one with the largest gain first; intervals come from resampled blocks (bootstrap). The headline
-has the causes whose share is large enough.
+in order of gain; intervals come from resampled blocks (bootstrap). The headline lists the causes
+with a large enough share, the others are minor.
 
 """
 
@@ -24,23 +24,23 @@ from armid_ros.diagnosis.settings import DiagnosisSettings
 from armid_ros.motion import FloatArray
 import numpy as np
 
-#: Resamplings of the blocks: the ends of a 95 % interval are accurate to a tenth of it.
+#: Resamplings of the blocks: enough for ends of a 95 % interval accurate to a tenth of its width.
 _RESAMPLINGS = 500
 
 
 @dataclass(frozen=True)
 class Attribution:
     """
-    The gap and the gain of each name, per block of rows.
+    The gap, and the gain (reduction of the gap) of each named cause, per block of rows.
 
     Attributes
     ----------
     order : tuple of int
-        The names of the explanation in the order in which they are added, largest gain first.
+        Indices of the named causes in the order in which they are added, largest gain first.
     whole : ndarray, shape (B,)
-        The gap: held-out squares without any name.
+        The gap: squared held-out residual without named causes.
     taken : ndarray, shape (K, B)
-        Gain of each name, in the order of the explanation.
+        Gain of each named cause, in the order of the explanation.
 
     """
 
@@ -49,12 +49,12 @@ class Attribution:
     taken: FloatArray
 
     def share(self, names: Sequence[int]) -> float:
-        """Return the share of the gap that some names explain together, at most 1."""
+        """Return the share of the gap that some causes explain together, at most 1."""
         share = self.taken[list(names)].sum() / max(float(self.whole.sum()), 1e-300)
         return min(float(share), 1.0)
 
     def interval(self, names: Sequence[int], rng: np.random.Generator) -> tuple[float, float]:
-        """Return the 95 % interval of that share."""
+        """Return the 95 % interval of the share that some causes explain together."""
         drawn = rng.integers(len(self.whole), size=(_RESAMPLINGS, len(self.whole)))
         taken = self.taken[list(names)].sum(axis=0)[drawn].sum(axis=1)
         shares = taken / np.maximum(self.whole[drawn].sum(axis=1), 1e-300)
@@ -66,19 +66,19 @@ def headline(
     explanation: Explanation, least: float, settings: DiagnosisSettings
 ) -> tuple[Explanation, Attribution]:
     """
-    Move names of a small share to the small print; return the shares of the others.
+    Move causes of a small share to the minor ones; return the shares of the others.
 
-    A name is small print if it takes less than a share of the gap, each fold being predicted from
-    the others, and no gap opens in any joint without it.
+    A cause is minor if its cross-validated share of the gap is below `least`, and no joint has a
+    gap without it.
 
     Parameters
     ----------
     explanation : Explanation
-        The names, fitted.
+        The fitted causes.
     least : float
-        The least share of a headline.
+        Smallest share of a cause in the headline.
     settings : DiagnosisSettings
-        Which residual is no gap.
+        Limits of a residual without gap.
 
     """
     shares = left_out(explanation)
@@ -97,9 +97,9 @@ def predicted(
     explanation: Explanation, order: Sequence[int], unseen: Evidence
 ) -> tuple[Explanation, Attribution]:
     """
-    Measure on held-out data what each further name explains, in a given order.
+    Return the gain of each cause on held-out data; causes are added in a given order.
 
-    A name that makes the prediction of these data worse becomes small print.
+    A cause that makes the prediction of these data worse becomes small print.
 
     """
     fewer = [explanation.only(order[:count]) for count in range(1, len(order))]
@@ -118,7 +118,7 @@ def predicted(
 
 
 def left_out(explanation: Explanation) -> Attribution:
-    """Cross-validate: add the name with the largest gain, one at a time."""
+    """Return the cross-validated gain of each cause, added in order of gain."""
     assert explanation.problem is not None
     problem, own = explanation.problem, explanation.fitted
     linear = problem.linear(Patch(problem.arm, own.named, own.values))
@@ -136,7 +136,7 @@ def left_out(explanation: Explanation) -> Attribution:
 
 
 def _left(problem: JointFit, linear: Nuisance, names: Sequence[int]) -> FloatArray:
-    """Return the squares that some names leave of each block, predicted from other folds."""
+    """Return the squared residual of each block, predicted from other folds with some causes."""
     fewer = replace(linear, accepted=tuple(linear.accepted[k] for k in names))
     rows = linear.rows
     said = np.zeros(len(fewer.cross[0]), dtype=bool)

@@ -3,7 +3,7 @@
 """
 diagnosis.json, schema armid/diagnosis/1.
 
-It also holds the smallest detectable size of each effect: what it is worth that none is named.
+It includes the smallest detectable size of each effect: smaller ones may be there unnamed.
 
 """
 
@@ -25,27 +25,27 @@ from armid_ros.robots import Robot
 import numpy as np
 
 SCHEMA = 'armid/diagnosis/1'
-#: Candidates that are listed.
+#: Largest number of listed candidates.
 _MOST_CANDIDATES = 20
-#: Standard deviations of a value from which on it is detectable. On a two-link arm, effects of one
-#: to four times the resulting size were named, of half of it none.
+#: Detectable size of a value, in its standard deviations. On a two-link arm, effects of one to
+#: four times this size were named, and none of half of it.
 SHOWS = 5.0
-#: Least resolution of an identifiable value: two that data do not separate have a half or less.
+#: Least resolution of an identifiable value; of two inseparable values, both are at most 0.5.
 _IDENTIFIABLE = 0.9
-#: Relative difference of squares below which it is rounding.
+#: Largest detectable size over the largest typical value; beyond, the torque is rounding error.
 _ROUNDING = 1e-6
 
 
 def diagnosis_document(diagnosis: Diagnosis, model: str = 'model.yaml') -> dict[str, Any]:
     """
-    Return a diagnosis as the document that diagnosis.json holds.
+    Return the content of diagnosis.json.
 
     Parameters
     ----------
     diagnosis : Diagnosis
         The diagnosis.
     model : str
-        File of the patched model, as seen from the document.
+        Path of the patched model, relative to the document.
 
     """
     return {
@@ -189,13 +189,13 @@ class Detectable:
     Attributes
     ----------
     name : str
-        Effect.
+        Name of the effect.
     joints : tuple of str
-        Where; none for the whole arm.
+        Joints on which it acts; empty for the whole arm.
     parameter : ParameterName or None
-        Parameter whose size it is; None where no size is detectable.
+        Parameter to which `size` belongs; None if no size is detectable.
     size : float
-        Smallest detectable size, its other parameters being fitted jointly; inf if there is none.
+        Smallest detectable size while other parameters are fitted jointly; inf if there is none.
     visible : float
         Share of its torque that the nuisance parameters cannot reproduce.
 
@@ -212,7 +212,7 @@ def smallest_size(trial: Trial, robot: Robot) -> tuple[int, float]:
     """
     Return the first identifiable parameter of a cause, and its smallest detectable size.
 
-    It differs from noise, and matters. It is inf where it is larger than the parameter can be.
+    A detectable size is significant and material. It is inf if the parameter cannot be so large.
 
     """
     return next(_sizes(trial, robot), (trial.named.kept[0], float('inf')))
@@ -231,7 +231,7 @@ def _said_size(trial: Trial, arm: ArmModel) -> tuple[ParameterName, float]:
     """
     Return a parameter of the effect as named, with its smallest detectable size.
 
-    It is inf where no size that the effect can have is detectable.
+    The size is inf if no possible size of the effect is detectable.
 
     """
     effect = trial.effect
@@ -252,10 +252,10 @@ def _said_size(trial: Trial, arm: ArmModel) -> tuple[ParameterName, float]:
 
 def is_possible(effect: Effect, index: int, size: float, robot: Robot) -> bool:
     """
-    Return whether a parameter can be as large as a size.
+    Return whether a parameter of an effect can have a size on a robot.
 
-    It cannot be larger than its quantity is. Where the largest value that arms have would show
-    less than rounding errors do, the motion does not show the effect at all.
+    The size must not exceed the largest value of its quantity. A size of a million typical values
+    means that the motion excites the effect less than rounding errors do.
 
     """
     owner, which = divmod(index, len(effect.quantities))

@@ -25,7 +25,7 @@ from armid_ros.motion import FloatArray
 import numpy as np
 import scipy.linalg
 
-#: Smallest share of the gap that a sentence gives as a number.
+#: Smallest share of the gap of a minor cause that a sentence mentions.
 SAID = 0.01
 
 
@@ -41,44 +41,44 @@ class Rival:
 @dataclass(frozen=True)
 class Finding:
     """
-    One named effect.
+    One effect that the diagnosis names.
 
     Attributes
     ----------
     name : str
-        Its name in the catalogue.
+        Name of the effect in the catalogue.
     joints : tuple of str
-        The joints it is on; none for the whole arm.
+        Joints on which it acts; empty for the whole arm.
     parameters : tuple of ParameterName
         Its parameters, shapes included.
     values, std : tuple of float
-        Their values and standard deviations; nan where the data do not determine them.
+        Values and standard deviations of the parameters; nan where data do not determine them.
     share : float
-        Share of the held-out gap that it explains, 0 to 1.
+        Share of the held-out gap that the effect explains, 0 to 1.
     share_interval : tuple of float
-        Its 95 % interval.
+        The 95 % interval of the share.
     p : float
-        Probability that it is not there, or has not changed.
+        Probability that the effect is not there, or has not changed.
     rivals : tuple of Rival
-        Names that the data do not exclude in its place, the likeliest first.
+        Other effects that the data do not exclude, the likeliest first.
     gain : float
-        Reduction of the held-out squares; twice the log Bayes factor in the small print.
+        Reduction of the squared held-out residual; twice the log Bayes factor of a minor cause.
     sign : str
-        What a positive value means, where the name does not say it.
+        Meaning of a positive value, if the name does not express it.
     ties : tuple of Tie
-        Where it holds the arm, in the order of its joints, if it is tied to another machine.
+        Ties of the arm to another machine, in the order of the joints; empty for other effects.
     weighs : bool
-        Whether it is described by a mass, its first value.
+        Whether its first value is a mass.
     together : tuple of str
-        Names that are one cause with it and have the share in common: a gravity of another
-        direction and another size.
+        Other effects of the same cause, with a common share: gravity of another direction is also
+        gravity of another size.
     added_to : tuple of float
-        Values of the same parameters in the given model, which its values are added to; empty
-        where none is known.
+        Values of the same parameters in the given model, to which `values` are added; empty
+        if none is known.
     look_at : str
-        What to look at for the one cause that several names stand for, instead of what each says.
+        Part of the robot to inspect, if several effects have one cause; else empty.
     probability : float
-        Among all explanations.
+        Probability among all explanations.
 
     """
 
@@ -102,12 +102,12 @@ class Finding:
 
     @property
     def had(self) -> tuple[float, ...]:
-        """Return the value that each change is added to; zero where none is known."""
+        """Return the value of the given model for each parameter; zero where none is known."""
         return self.added_to or (0.0,) * len(self.values)
 
     @property
     def ambiguous_with(self) -> tuple[str, ...]:
-        """Names of the rivals."""
+        """Names of the effects that are rivals."""
         return tuple(rival.name for rival in self.rivals)
 
     @property
@@ -115,7 +115,7 @@ class Finding:
         """
         Return the experiment that separates it from its likeliest rival; empty without rival.
 
-        No motion separates a payload from the link that carries it: it has to be taken off.
+        No motion separates a payload from the link that carries it: the payload has to be weighed.
 
         """
         if not self.rivals:
@@ -141,7 +141,7 @@ class Finding:
         return f'To tell {names}, record {best}.'
 
     def place_of(self, joint: str) -> str:
-        """Return where the parameters of a joint act: its tied segment, or the joint itself."""
+        """Return the name of the tied segment of a joint, or of the joint without a tie."""
         return next((tie.name for tie in self.ties if tie.joint == joint), joint)
 
     def values_of(self, joint: str) -> list[tuple[ParameterName, float, float]]:
@@ -153,16 +153,16 @@ class Finding:
 @dataclass(frozen=True)
 class Overlay:
     """
-    Torques of one trajectory, filtered alike.
+    Measured and predicted torques of one trajectory, filtered alike.
 
     Attributes
     ----------
     source : str
         The recording.
     trajectory : Trajectory
-        Its motion.
+        Motion of the recording.
     measured, before, after : ndarray, shape (M, n)
-        Measured torque, and predictions of the model without and with the names [N m].
+        Measured torque, and predictions of the model without and with the named effects [N m].
     sigma : ndarray, shape (n,)
         Unit of the gap [N m].
 
@@ -179,20 +179,19 @@ class Overlay:
 @dataclass(frozen=True)
 class Gap:
     """
-    The gap in numbers.
+    Size of the gap, without and with the named effects.
 
     Attributes
     ----------
     before, after, floor : ndarray, shape (n,)
-        Root mean square residual of each joint without and with the names, and root mean square
-        unit of the gap [N m].
+        Root mean square residual of each joint without and with the named effects, and root mean
+        square unit of the gap [N m].
     chi2_before : ndarray, shape (n,)
-        Mean square of the weighted residual without the names.
+        Mean square of the weighted residual without the named effects.
     closed : float
-        Share of the excess over the floor that the names explain, 0 to 1, in joints that had a
-        gap.
+        Share of the gap, without its noise, that the named effects explain, 0 to 1.
     predicted : bool
-        Whether it was measured on held-out recordings.
+        Whether the gap was measured on held-out recordings.
     overlays : tuple of Overlay
         Torques of each trajectory.
 
@@ -208,7 +207,7 @@ class Gap:
 
     @property
     def data(self) -> str:
-        """Return the data that it was measured on, in words."""
+        """Return the kind of data on which the gap was measured, in words."""
         return 'held-out' if self.predicted else 'the data it was found in'
 
 
@@ -222,38 +221,38 @@ class Diagnosis:
     verdict : str
         consistent, named, ambiguous, partial, unknown, not_repeatable or bad_data.
     summary : str
-        The same in a sentence or two.
+        The verdict in a sentence or two.
     findings : tuple of Finding
         The headline: named effects with share, parameters, rivals and the experiment that would
         separate them.
     minor : tuple of Finding
-        The small print: causes that are significant and do not matter.
+        Causes that are significant and not material.
     where : tuple of Where
-        Where the model without the names has a gap.
+        Joints in which the model without the named effects has a gap.
     left : tuple of Where
-        Where the model with the names still has a gap.
+        Joints in which the model with the named effects still has a gap.
     gap : Gap or None
-        Residuals before and after, and the floor; None where the data are bad.
+        Residuals without and with the named effects, and the floor; None if the data are bad.
     explanation : Explanation or None
-        The names with their fits and trials; None where the data are bad.
+        The named effects with their fits and trials; None if the data are bad.
     arm : ArmModel
-        The patched model; the given one where nothing was named or a patch would harm.
+        The patched model; the given one if nothing was named or a patch would make it worse.
     data : tuple of Trajectory
         The recordings in question.
     not_visible : tuple of str
-        Names of the catalogue that these data cannot show.
+        Effects of the catalogue that these data cannot show.
     refitted : bool
         Whether the rigid body was fitted anew.
     notes : tuple of str
-        What a reader should know.
+        Notes for the reader of the report.
     baseline : str
-        The floor of the gap in words: the noise, the model's own misfit, or an estimate of it.
+        The floor of the gap in words: the noise, the misfit of the model, or an estimate of it.
     harmful : bool
-        Whether the model is not patched, as the names would make it worse in some joint.
+        Whether the model is not patched, as the named effects would make it worse in some joint.
     doubt : str
-        Why the model itself may be wrong, a sentence; empty if it need not be.
+        Sentence on the reasons why the given model may be wrong; empty without reasons.
     spans : tuple of Span
-        Seconds of each recording in which the findings act; none if they act throughout.
+        Seconds of each recording in which the findings act; empty if they act throughout.
 
     """
 
@@ -276,14 +275,14 @@ class Diagnosis:
     spans: tuple[Span, ...] = ()
 
     def acting_in(self, spans: Sequence[Span]) -> Diagnosis:
-        """Return the diagnosis with the time spans in which its causes act."""
+        """Return the diagnosis with the spans of time in which its causes act."""
         seconds = [f'{one.source} from {one.start:.1f} to {one.stop:.1f} s' for one in spans]
         summary = f'In {", ".join(seconds)}: {self.summary} Other seconds were not diagnosed.'
         return replace(self, summary=summary, spans=tuple(spans))
 
     @property
     def estimate(self) -> Estimate | None:
-        """Estimate of the fit, followed by the named causes in terms of the catalogue."""
+        """Estimate of the fit, followed by the parameters of the findings."""
         if self.explanation is None:
             return None
         fit = self.explanation.fitted.estimate

@@ -1,6 +1,6 @@
 # Copyright 2026 The armid_ros developers
 # SPDX-License-Identifier: Apache-2.0
-"""The gap between model and measurement, before and after, and what does not repeat."""
+"""The gap between model and measurement, and joints whose equal periods differ."""
 
 from __future__ import annotations
 
@@ -13,10 +13,9 @@ from armid_ros.diagnosis.verdict.finding import Gap, Overlay
 from armid_ros.motion import FloatArray
 import numpy as np
 
-#: A joint has a gap where its squares exceed the floor by this share of it.
+#: Relative excess of squared residual over squared floor above which a joint has a gap.
 _A_GAP = 0.2
-#: From so many recordings on, slow differences of periods that are small in each are tested in
-#: their mean.
+#: Number of recordings from which the mean of slow differences of periods is tested as well.
 _SEVERAL = 3
 
 
@@ -27,9 +26,9 @@ def measure_gap(explanation: Explanation, unseen: Evidence | None) -> Gap:
     Parameters
     ----------
     explanation : Explanation
-        The names, fitted.
+        The fitted causes.
     unseen : Evidence or None
-        Held-out data; their unit is the residual of a perfect model.
+        Held-out data, in the unit of the gap.
 
     """
     before, after = explanation.reference.arm, explanation.fitted.arm
@@ -70,9 +69,9 @@ def not_repeating(
     floors : sequence of NoiseFloor
         Noise of the recordings.
     thresholds : Thresholds
-        From which power at low frequency, over that at high frequency, periods do not repeat.
+        Power ratios (low over high frequency) above which periods do not repeat.
     least : ndarray, shape (n,)
-        Torque of each joint that matters [N m].
+        Smallest material torque of each joint [N m].
 
     """
     known = [

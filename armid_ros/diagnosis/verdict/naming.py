@@ -1,6 +1,6 @@
 # Copyright 2026 The armid_ros developers
 # SPDX-License-Identifier: Apache-2.0
-"""From the names of an explanation to effects of the catalogue, and their values."""
+"""From the fitted causes of an explanation to effects of the catalogue, and their values."""
 
 from __future__ import annotations
 
@@ -22,15 +22,15 @@ from armid_ros.model.spring_ties import Tie
 from armid_ros.motion import FloatArray
 import numpy as np
 
-#: Slope above which a translated value depends on one that the data do not determine.
+#: Slope above which a translated value depends on a fitted value that data do not determine.
 _ALONG = 1e-6
-#: Most rivals that are listed for a name: more than two help nobody.
+#: Largest number of listed rivals of a cause: longer lists do not help.
 _RIVALS = 2
 
 
 @dataclass(frozen=True)
 class _NamedEffect:
-    """One name of an explanation as an effect of the catalogue."""
+    """A fitted cause of an explanation as an effect of the catalogue."""
 
     effect: Effect
     parameters: tuple[ParameterName, ...]
@@ -45,9 +45,9 @@ def findings(
     rng: np.random.Generator,
 ) -> tuple[Finding, ...]:
     """
-    Return the findings: effects of one name together, the largest share of the gap first.
+    Return the findings, one for each name of an effect, the largest share of the gap first.
 
-    Names that one cause stands for have the share of all causes of theirs in common.
+    Findings of the same cause get the common share of all their causes.
 
     """
     said = _in_words(explanation, arm)
@@ -96,7 +96,7 @@ def findings(
 
 
 def _rows(parts: Sequence[_NamedEffect]) -> list[tuple[ParameterName, float, float]]:
-    """Return each parameter of one name once, with its summed value and standard deviation."""
+    """Return each parameter once, with the sum and standard deviation of its values."""
     rows: dict[ParameterName, tuple[float, float]] = {}
     for part in parts:
         for parameter, value, std in zip(part.parameters, part.values, part.std, strict=True):
@@ -108,10 +108,10 @@ def _rows(parts: Sequence[_NamedEffect]) -> list[tuple[ParameterName, float, flo
 
 def small_print(explanation: Explanation) -> tuple[Finding, ...]:
     """
-    Return findings of causes that are significant and do not matter, the likeliest first.
+    Return findings of causes that are significant and not material, the likeliest first.
 
-    A comparison lets values be beyond a bound by what noise makes; there is nothing to say of
-    those that exclude zero.
+    Causes with a significant value beyond its bound, which a comparison permits within noise, are
+    left out.
 
     """
     arm, result = explanation.given, []
@@ -142,7 +142,7 @@ def small_print(explanation: Explanation) -> tuple[Finding, ...]:
 
 
 def _in_words(explanation: Explanation, arm: ArmModel) -> list[list[_NamedEffect]]:
-    """Translate each name of an explanation into effects of the catalogue."""
+    """Translate each fitted cause of an explanation into effects of the catalogue."""
     fitted = explanation.fitted
     covariance = fitted.estimate.covariance
     result = []
@@ -169,7 +169,7 @@ def _in_words(explanation: Explanation, arm: ArmModel) -> list[list[_NamedEffect
 def _translated(
     own: SelectedEffect, values: FloatArray, covariance: FloatArray, arm: ArmModel
 ) -> list[_NamedEffect]:
-    """Translate an effect into others of the catalogue; standard deviations propagate linearly."""
+    """Translate an effect into others of the catalogue, with propagated standard deviations."""
     effect, kept, parts = own.effect, list(own.kept), []
     inside = np.zeros((len(values), len(values)))
     inside[np.ix_(kept, kept)] = covariance[: len(kept), : len(kept)]
@@ -215,9 +215,9 @@ def _rivals(
     trials: Sequence[Trial], own: Rival, others: set[str], arm: ArmModel
 ) -> tuple[Rival, ...]:
     """
-    Return the likeliest rivals of a name in its joints (`own`), with their joints.
+    Return the likeliest rivals of an effect in its joints (`own`), with their joints.
 
-    The same name in another joint is a rival as well; the names of other findings are none.
+    The same effect in another joint is a rival as well; effects of other findings are not.
 
     """
     best: dict[str, list[Trial]] = {}

@@ -1,11 +1,11 @@
 # Copyright 2026 The armid_ros developers
 # SPDX-License-Identifier: Apache-2.0
 """
-What names leave of the data, over what they may leave: the posterior predictive check.
+The posterior predictive check: residual with the named effects over its largest usual value.
 
-A misfit varies from motion to motion. Dry friction holds a joint at rest or in a reversal
-with any torque up to its own: such rows do not determine a model, and a residual beyond friction
-comes from a stop, a brake, or a contact.
+The usual value is larger in other motions, as a misfit varies. At rest and in a reversal, dry
+friction can have any torque up to its limit, so these rows are checked separately: a residual
+beyond friction comes from a stop, a brake, or a contact.
 
 """
 
@@ -25,12 +25,12 @@ from armid_ros.motion import FloatArray
 import numpy as np
 from scipy.ndimage import uniform_filter1d
 
-#: Increase of the squares of a joint, as a share, that does not count as worse.
+#: Relative increase of the squared residual of a joint that does not count as worse.
 _SLIGHTLY = 0.05
-#: Multiple of dry friction by which a joint at rest may be held: twice that of motion until it
-#: breaks away, and once that of the model, whose direction is arbitrary at rest.
+#: Largest residual at rest over dry friction in motion: breakaway friction is twice as large, and
+#: the friction of the model, whose direction is arbitrary at rest, adds one.
 _HELD = 3.0
-#: Words for a joint that is held, for a table, and for the beginning and the end of a sentence.
+#: Words on a joint that is held: for a table, within a sentence, and at its end.
 _WHERE = 'at rest or turning round, and more than friction: a stop, a brake or a contact'
 _TURNING = 'where it stands still or turns round'
 _BESIDE = ' in addition to friction: a stop, a brake or a contact does that'
@@ -46,7 +46,7 @@ class RemainingMisfit:
     chosen : Chosen
         The explanation, and the unit of its gap.
     unseen : Evidence or None
-        Recordings that nothing was fitted to.
+        Held-out recordings.
     before : Baseline or None
         Recordings from when nothing was wrong.
     given : ArmModel
@@ -64,11 +64,10 @@ class RemainingMisfit:
 
     def beside(self, explanation: Explanation) -> list[Excess]:
         """
-        Return the excess that the named causes leave, for each set of data.
+        Return the excess of the residual with the named causes, for each set of data.
 
-        Where the model stays as given, it is what they leave beside the body, friction and
-        discrepancy of both days: another motion visits other states, in which a model has another
-        misfit.
+        If the model is kept as given, body, friction and discrepancy fitted to both days are
+        subtracted: another motion visits other states, in which a model has another misfit.
 
         """
         problem, parts = explanation.problem, self._parts(explanation)
@@ -91,8 +90,8 @@ class RemainingMisfit:
         """
         Return the joints in which the patched model is worse than the given one.
 
-        In no joint, in the data it was found in or in others, may its residual exceed that of the
-        given one by more than blocks of the data differ, unless it is no gap.
+        A joint is worse if its residual, in fitted or held-out data, grows by more than blocks of
+        the data differ, and is a gap.
 
         """
         worse = np.zeros(self.given.robot.n_joints, dtype=bool)
@@ -111,7 +110,7 @@ class RemainingMisfit:
         return tuple(j for j, bad in zip(self.given.robot.joints, worse, strict=True) if bad)
 
     def _parts(self, explanation: Explanation) -> list[Evidence]:
-        """Return the data, in units of noise if the misfit is only estimated."""
+        """Return fitted and held-out data, in units of noise if the misfit is only estimated."""
         both = self._data(explanation)
         if self.chosen.floor_in_words != ESTIMATED:
             return both
@@ -121,7 +120,7 @@ class RemainingMisfit:
         """Return the data with the largest excess."""
         worst = max(range(len(left)), key=lambda k: float(left[k].ratio.max()))
         data = self._data(explanation)
-        return data[worst % len(data)]  # each kind of excess is there once for each of them
+        return data[worst % len(data)]  # `left` has one excess of each kind for each set of data
 
     def _data(self, explanation: Explanation) -> list[Evidence]:
         return [explanation.evidence, *([] if self.unseen is None else [self.unseen])]
@@ -145,7 +144,7 @@ class RemainingMisfit:
         for part in self._data(explanation):
             arm = explanation.fitted.arm
             excess = standing(arm, part, part.residuals(arm), surely)
-            if before is not None:  # what held a joint then, such as a brake, still does
+            if before is not None:  # subtract what held the joint before, such as a brake
                 unit = (before.misfit,) * len(before.data)
                 rows = Evidence.over_noise(before.data, unit)
                 then = standing(self.given, rows, before.residual, surely)
@@ -155,7 +154,7 @@ class RemainingMisfit:
 
 
 def places_held(arm: ArmModel, excesses: Sequence[Excess]) -> tuple[Where, ...]:
-    """Return the joints that something holds at rest, the worst first."""
+    """Return joints with a torque beyond friction at rest, the largest excess first."""
     excess = np.max([np.zeros(arm.robot.n_joints), *(one.ratio for one in excesses)], axis=0)
     beyond = np.where(excess > 1.0, excess, 0.0)
     order = np.argsort(-beyond)[: np.count_nonzero(beyond)]
@@ -172,11 +171,11 @@ def standing(
     """
     Return the squared ratio of the residual at rest and in reversals to friction, (n,).
 
-    So many units of noise and misfit (`surely`) are added to friction, in proportion to the torque
-    that the model predicts: a joint accelerates most in a reversal, and the error of a model grows
-    with its torque. The residual is averaged over the time of the filter of positions, over which
-    its response to a jerk cancels, and over no less than a rest lasts, as what is shorter may be
-    chance. Zero where friction is not exceeded, and where no dry friction is known.
+    `surely` units of noise and misfit are added to friction, scaled by the predicted torque over
+    its rms: the error of a model grows with its torque, which is large in a reversal. The residual
+    is averaged over the response time of the position filter, whose response to a jerk cancels,
+    and at least over `REST_TIME`, as shorter peaks may be chance. The ratio is zero where friction
+    is not exceeded, or no dry friction is known.
 
     """
     friction = arm.action().dry_friction

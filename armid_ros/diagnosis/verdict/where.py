@@ -1,6 +1,6 @@
 # Copyright 2026 The armid_ros developers
 # SPDX-License-Identifier: Apache-2.0
-"""Where a residual is large: in which joint, and with which quantity it varies."""
+"""The joints in which a residual is large, and the quantities with which it varies."""
 
 from __future__ import annotations
 
@@ -17,9 +17,9 @@ import numpy as np
 
 #: Bins of a quantity over which the residual is averaged.
 _BINS = 16
-#: A quantity is named if the means of its bins hold this share of the residual's power.
+#: Least share of the mean square residual in the means of bins of a quantity that is named.
 _TELLING = 0.15
-#: Means whose squares are off a constant, or a line through zero, by less than this are one.
+#: Relative squared deviation of the means up to which they count as constant, or proportional.
 _CURVED = 0.15
 
 
@@ -31,11 +31,11 @@ class Axis:
     Attributes
     ----------
     name, unit : str
-        The quantity.
+        Name and unit of the quantity.
     centres, means : ndarray, shape (B,)
-        Mean of the quantity in each bin, and of the residual [N m or N].
+        Mean of the quantity, and mean of the residual [N m or N], in each bin.
     share : float
-        Share of the residual's power that the means hold.
+        Mean square of `means` over that of the residual.
 
     """
 
@@ -56,17 +56,17 @@ class Where:
     joint : str
         The joint.
     share_of_gap : float
-        Its share of the gap of all joints, 0 to 1.
+        Share of the joint in the gap of all joints, 0 to 1.
     signature : str
-        In words, the quantity with which the residual varies.
+        The quantity with which the residual varies, in words.
     axes : tuple of Axis
         All quantities, the largest share first.
     unit : str
-        Of the residual.
+        Unit of the residual.
     mean : float
-        Of the residual, which every quantity shows alike [N m or N].
+        Mean of the residual [N m or N].
     mean_share : float
-        Share of the residual's power that it holds.
+        Square of `mean` over the mean square of the residual.
 
     """
 
@@ -87,11 +87,11 @@ class Excess:
     Attributes
     ----------
     ratio : ndarray, shape (n,)
-        Loss over the loss up to which there is no gap; above one there is a gap.
+        Loss over the largest loss without gap; above one there is a gap.
     where : str
-        The data that show it, for a sentence.
+        Words on the data with the excess, within a sentence.
     more : str
-        What ends the sentence: when it is there, or what it is compared with as well.
+        End of that sentence: further terms of the limit.
 
     """
 
@@ -104,10 +104,10 @@ def where_it_is(
     explanation: Explanation, shown: Evidence, settings: DiagnosisSettings
 ) -> tuple[Where, ...]:
     """
-    Locate the gap in the data that it is measured on.
+    Locate the gap in the data on which it is measured.
 
-    Where something is named it is what the names take: a model may leave more of other joints, on
-    either day.
+    If causes are named, their explained part of the gap is located: the misfit of the model may be
+    larger in other joints.
 
     """
     reference, fitted = explanation.reference.arm, explanation.fitted.arm
@@ -138,9 +138,9 @@ def locate(
     Parameters
     ----------
     arm : ArmModel
-        Gives the load.
+        Arm whose loads are computed.
     evidence : Evidence
-        Motion, and the unit of the gap.
+        The data in the unit of the gap.
     residual : sequence of ndarray, shape (M, n)
         Residual of each trajectory [N m or N].
     gap : ndarray, shape (n,)

@@ -1,6 +1,6 @@
 # Copyright 2026 The armid_ros developers
 # SPDX-License-Identifier: Apache-2.0
-"""From findings to a verdict: a word and a sentence that the evidence supports."""
+"""From findings to a verdict: its word, and its sentence with the evidence."""
 
 from __future__ import annotations
 
@@ -20,21 +20,21 @@ import numpy as np
 Word = Literal[
     'consistent', 'named', 'ambiguous', 'partial', 'unknown', 'not_repeatable', 'bad_data'
 ]
-#: A sentence with more joints than this only counts them; tables have the rest.
+#: Largest number of joints that a sentence lists; more are only counted.
 _JOINTS_SAID = 3
 
 
 @dataclass(frozen=True)
 class Verdict:
     """
-    The word and the sentence.
+    The verdict of a diagnosis.
 
     Attributes
     ----------
     word : str
-        See ``Word``.
+        One of ``Word``.
     summary : str
-        A sentence or two.
+        The verdict in a sentence or two.
 
     """
 
@@ -52,24 +52,24 @@ def decide(
     minor: Sequence[Finding] = (),
 ) -> Verdict:
     """
-    Decide the verdict.
+    Return the verdict: word and sentence.
 
     Parameters
     ----------
     findings : sequence of Finding
-        The headline.
+        Findings of the headline.
     strange : sequence of str
-        Joints that do not repeat in equal periods; see `not_repeating`.
+        Joints whose equal periods differ; see `not_repeating`.
     left : sequence of Excess
-        Losses of the model with the names over their limits, for each set of data.
+        Losses of the model with the named effects over their limits, for each set of data.
     arm : ArmModel
-        Gives the joints.
+        Arm with the names of the joints.
     floor_in_words : str
         The floor of the gap: noise, or a misfit.
     as_it_is : Excess or None
-        The same with the rigid body as given, where ``left`` is with one that was fitted.
+        Losses with the rigid body as given, if ``left`` is with a refitted one.
     minor : sequence of Finding
-        The small print, the most important first.
+        Minor findings, the most important first.
 
     """
     worst = max(left, key=lambda one: float(one.ratio.max()))
@@ -111,7 +111,7 @@ def _rivals_in_words(findings: Sequence[Finding]) -> str:
 
 
 def _refit(as_it_is: Excess | None, robot: Robot, floor_in_words: str) -> str:
-    """Return a sentence on the refit: how far off body and friction were as given."""
+    """Return a sentence on the refit, with the error of body and friction as given."""
     if as_it_is is None or as_it_is.ratio.max() <= 1.0:
         return ''
     joint = robot.joints[int(np.argmax(as_it_is.ratio))]
@@ -123,19 +123,19 @@ def _refit(as_it_is: Excess | None, robot: Robot, floor_in_words: str) -> str:
 
 
 def larger(ratio: float) -> str:
-    """Format how much larger an error is than another."""
+    """Format the ratio of two errors."""
     if ratio < 1.05:
         return 'a little larger than'
     return f'{ratio:.0f} times as large as' if ratio >= 100.0 else f'{ratio:.1f} times as large as'
 
 
 def sentence(finding: Finding, of: str = 'the gap') -> str:
-    """Return a sentence: what the cause is and how much it explains, by default of the gap."""
+    """Return a sentence: the cause and the share that it explains, by default of the gap."""
     return f'{_subject(finding)} explains {percent(finding.share)} of {of}.'
 
 
 def share_interval_in_words(finding: Finding) -> str:
-    """Return the 95 % interval of a share in brackets; empty where both ends print alike."""
+    """Return the 95 % interval of a share in brackets; empty if both ends have the same text."""
     low, high = (percent(end) for end in finding.share_interval)
     return f' ({low} to {high})' if low != high else ''
 
@@ -152,7 +152,7 @@ def percent(share: float) -> str:
 
 
 def _sentences(findings: Sequence[Finding]) -> str:
-    """Return a sentence for each cause; names that are one cause share it."""
+    """Return a sentence for each cause; findings of one cause have one sentence."""
     found: list[str] = []
     for group in by_cause(findings):
         first, *others = (_subject(one) for one in group)
@@ -163,7 +163,7 @@ def _sentences(findings: Sequence[Finding]) -> str:
 
 
 def names_and_places(group: Sequence[Finding]) -> str:
-    """Return what names that are one cause are, and where."""
+    """Return the names and joints of findings of one cause."""
     joints = dict.fromkeys(joint for one in group for joint in one.joints)
     names = ' and '.join(name_in_words(one.name) for one in group)
     where = ', '.join(joints) if len(joints) <= _JOINTS_SAID else f'{len(joints)} joints'
@@ -171,7 +171,7 @@ def names_and_places(group: Sequence[Finding]) -> str:
 
 
 def by_cause(findings: Sequence[Finding]) -> list[list[Finding]]:
-    """Group the findings that are one cause and share their share of the gap."""
+    """Return groups of findings that have the same cause and the same share of the gap."""
     groups: list[list[Finding]] = []
     done: set[str] = set()
     for one in findings:
@@ -183,7 +183,7 @@ def by_cause(findings: Sequence[Finding]) -> list[list[Finding]]:
 
 
 def _subject(finding: Finding) -> str:
-    """Return what a cause is, where, and its values."""
+    """Return name, joints and values of a cause, as the subject of a sentence."""
     words = name_in_words(finding.name)
     subject = words[:1].upper() + words[1:]
     places = [finding.place_of(joint) for joint in finding.joints]
@@ -208,8 +208,8 @@ def _values(finding: Finding) -> Iterator[str]:
     """
     Yield the formatted values of a cause; repeated parameter names are left out.
 
-    Values whose interval includes zero are left to the table, unless all do. So is what the model
-    had before, where it is smaller than the interval.
+    Values whose interval includes zero are left out, unless all do. So are values of the given
+    model that are smaller than the interval.
 
     """
     before = ''
@@ -224,7 +224,7 @@ def _values(finding: Finding) -> Iterator[str]:
 
 
 def vague(finding: Finding, parameter: ParameterName, value: float, std: float) -> bool:
-    """Return whether the data do not determine a value of a cause: its digits mean nothing."""
+    """Return whether the data do not determine a value of a cause."""
     shapes = CATALOGUE[finding.name].shapes if finding.name in CATALOGUE else ()
     for shape in shapes:
         if shape.name == parameter.name:

@@ -58,7 +58,7 @@ class ResidualMarkersNode(ListeningNode):
     )
 
     def __init__(self, **kwargs: Any) -> None:
-        """Take the keyword arguments of rclpy's Node."""
+        """Make the node with keyword arguments of rclpy's Node."""
         super().__init__('residual_markers', **kwargs)
         self._told = ''
         self._markers = self.create_publisher(MarkerArray, '~/markers', STREAM)

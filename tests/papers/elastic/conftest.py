@@ -1,6 +1,6 @@
 # Copyright 2026 The armid_ros developers
 # SPDX-License-Identifier: Apache-2.0
-"""Recorded experiments with the two-link arm, from MuJoCo, so that no code tests itself."""
+"""Experiments with the two-link arm, recorded in MuJoCo for independent tests."""
 
 from armid_ros.motion import ElasticRun
 from armid_ros.papers.elastic.plant.signals import WEAK
@@ -17,7 +17,7 @@ __all__ = ['browser', 'charts_drawn']
 
 @pytest.fixture(scope='session')
 def truth() -> TwoLinkParameters:
-    """Return the parameters of the arm that was recorded."""
+    """Return the true parameters of the recorded arm."""
     return two_link_set('after').parameters
 
 

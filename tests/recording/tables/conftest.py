@@ -1,6 +1,6 @@
 # Copyright 2026 The armid_ros developers
 # SPDX-License-Identifier: Apache-2.0
-"""A motion of two joints, to be written into files of every kind."""
+"""A motion of two joints, for files of every format."""
 
 import numpy as np
 import pytest
@@ -18,7 +18,7 @@ def motion():
 
 
 def assert_holds(recording, motion, velocity=True):
-    """Check that a recording is the motion."""
+    """Check that a recording equals the motion."""
     t, q, dq, tau = motion
     np.testing.assert_allclose(recording.t, t - t[0], atol=1e-6)
     np.testing.assert_allclose(recording.q, q, atol=1e-6)
