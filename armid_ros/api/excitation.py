@@ -183,6 +183,7 @@ class ExcitationResult(Shown):
             self.fitness,
             robot=origin.of(self.arm.robot).robot,
             scene=self.scene,
+            step=self.next_step(origin),
             provenance=origin.provenance,
         )
 

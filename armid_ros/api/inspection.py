@@ -88,7 +88,12 @@ class InspectionResult(Shown):
         """Return inspection.html with all curves."""
         from armid_ros.report.inspection_report import inspection_report
 
-        return inspection_report(self.core, robot=origin.robot, provenance=origin.provenance)
+        return inspection_report(
+            self.core,
+            robot=origin.robot,
+            step=self.next_step(origin),
+            provenance=origin.provenance,
+        )
 
     def summary(self) -> Summary:
         """Return verdict, table of joints, remarks and sampling."""
@@ -239,8 +244,8 @@ class CheckResult(Shown):
         """Return report.html with a table of the links."""
         from armid_ros.report.inspection_report import description_check_report
 
-        name = origin.of(self.robot).robot
-        return description_check_report(name, self.remarks, self.links, origin.provenance)
+        name, step = origin.of(self.robot).robot, self.next_step(origin)
+        return description_check_report(name, self.remarks, self.links, step, origin.provenance)
 
     def summary(self) -> Summary:
         """Return the finding, and the links: what was measured where any of them is wrong."""

@@ -103,12 +103,15 @@ class ResultOrigin:
         How model.yaml refers to its description; by default the same.
     provenance : Provenance or None
         Files, versions and settings that the report names.
+    step : str
+        Command that follows, for the report; by default without arguments.
 
     """
 
     robot: str = ''
     source: str = ''
     provenance: Provenance | None = None
+    step: str = ''
 
     def of(self, robot: Robot) -> ResultOrigin:
         """Fill in defaults."""
@@ -160,6 +163,10 @@ class Shown(ABC):
     @abstractmethod
     def summary(self) -> Summary:
         """Return a summary."""
+
+    def next_step(self, origin: ResultOrigin) -> str:
+        """Return the command that follows, as the report shows it."""
+        return origin.step or f'armid {self.summary().then}'
 
     @abstractmethod
     def document(self, origin: ResultOrigin = DEFAULT_ORIGIN) -> dict[str, Any]:

@@ -100,7 +100,13 @@ def _arm_page(found: Watch, arm: WatchedArm, diagnoses: Diagnoses) -> str:
         sentences = [lead + stop.rstrip(), *filter(None, [more]), *sentences]
     if len(texts) > 1:
         sentences.append(f'{counted(len(texts) - 1, "more parameter")} changed; see below.')
-    step = '' if diagnosis or not arm.named else f'armid fleet diagnose --arm {arm.arm}.'
+    step = 'Record more bags' if arm.health == 'too few bags' else 'After the next recordings'
+    step += ', run armid fleet identify and armid fleet watch again.'
+    if arm.named or diagnosed:
+        step = f'armid fleet diagnose --arm {arm.arm}'
+        step = (
+            'Read the report of the diagnosis: it states what to inspect.' if diagnosis else step
+        )
     sections: list[Section] = [VerdictSection(diagnosed or arm.health, tone, sentences, step=step)]
     if diagnosis is not None:
         report = f'../{quote(diagnosis["report"])}' if diagnosis['report'] else ''

@@ -62,6 +62,7 @@ def excitation_report(
     *,
     robot: str,
     scene: CollisionScene,
+    step: str = '',
     provenance: Provenance | None = None,
 ) -> str:
     """
@@ -81,6 +82,8 @@ def excitation_report(
         Shipped name or path of the description.
     scene : CollisionScene
         Bodies of the arm, its floor, and what stands around it.
+    step : str
+        What to do next.
     provenance : Provenance, optional
         Files, versions, settings, seed.
 
@@ -118,7 +121,7 @@ def excitation_report(
     if any(colour == OBSTACLE for _, colour in poses.bodies):
         colours.append(('line', ', '.join(obstacle.name for obstacle in obstacles)))
     sections: list[Section] = [
-        _verdict(design, arm.robot.links, shares, checked, collision.notes),
+        replace(_verdict(design, arm.robot.links, shares, checked, collision.notes), step=step),
         ContentSection('Poses', [poses, Legend(colours)]),
         _foreseen_section(design, arm.robot.links),
         _motion_section(limits, motion, shares),
