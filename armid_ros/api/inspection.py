@@ -105,7 +105,8 @@ class InspectionResult(Shown):
         )
 
         heads, found = joint_heads(self.core), self.core
-        trial = None if found.trial is None or found.trial.refused else found.trial
+        refused, trial = bool(found.trial and found.trial.refused), found.trial
+        good = trial and not refused and trial.grade != 'unusable'
         topics = [
             f'{one.name}: {one.count} x {one.type_name}'
             + ' (read)' * (one.name == found.recording.topic)
@@ -121,7 +122,8 @@ class InspectionResult(Shown):
                 *(f'{name}: {value}' for name, value in recording_facts(found)),
                 *topics,
             ),
-            then='identify' if trial and trial.grade != 'unusable' else 'inspect',
+            steps=['Correct that, and inspect the recording again.'] if refused else (),
+            then='' if refused else 'identify' if good else 'inspect',
         )
 
 

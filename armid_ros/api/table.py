@@ -165,8 +165,9 @@ class Shown(ABC):
         """Return a summary."""
 
     def next_step(self, origin: ResultOrigin) -> str:
-        """Return the command that follows, as the report shows it."""
-        return origin.step or f'armid {self.summary().then}'
+        """Return what to do next, as the report shows it: a sentence or the command."""
+        shown = self.summary()
+        return origin.step or ''.join(shown.steps[:1]) or f'armid {shown.then}'
 
     @abstractmethod
     def document(self, origin: ResultOrigin = DEFAULT_ORIGIN) -> dict[str, Any]:

@@ -62,9 +62,8 @@ def doubt_of_names(findings: Sequence[Finding]) -> str:
     for one in findings:
         if one.name in CATALOGUE and CATALOGUE[one.name].traits.corrects:
             return (
-                f'Links do not change between two days: unless that of {" and ".join(one.joints)} '
-                'was exchanged or something was bolted to it, what is not in the catalogue acts '
-                'like it.'
+                f'Links do not change between two days. Unless that of {" and ".join(one.joints)} '
+                'was exchanged or carries a new part, an effect outside the catalogue acts.'
             )
     return ''
 

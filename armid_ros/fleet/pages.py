@@ -103,7 +103,7 @@ def _arm_page(found: Watch, arm: WatchedArm, diagnoses: Diagnoses) -> str:
     step = 'Record more bags' if arm.health == 'too few bags' else 'After the next recordings'
     step += ', run armid fleet identify and armid fleet watch again.'
     if arm.named or diagnosed:
-        step = f'armid fleet diagnose --arm {arm.arm}'
+        step = f'armid fleet diagnose --arm {arm.arm} --out RESULTS'
         step = (
             'Read the report of the diagnosis: it states what to inspect.' if diagnosis else step
         )

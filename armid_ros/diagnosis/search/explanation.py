@@ -173,8 +173,8 @@ def as_bodies(explanation: Explanation) -> tuple[Explanation, tuple[str, ...]]:
         if np.all(bodily.chi2_per_row <= np.maximum(_ALIKE * explanation.chi2_per_row, 1.0)):
             return bodily, ()
     return explanation, (
-        'no links that are bodies explain the data as well: what was named, or not found, is in '
-        'the inertias; the patched model may not be simulable',
+        'no physically consistent links explain the data as well: the inertias hold a part of the '
+        'cause, and the patched model may not be simulable',
     )
 
 
