@@ -22,7 +22,6 @@ from armid_ros.identification.fitting.identifiability import excludes_zero, HALF
 
 #: The patched model, as one finds it who reads a page.
 MODEL = 'model.yaml in the folder of this diagnosis'
-_ANEW = 'Identify the arm anew before the model is used in simulation or control.'
 
 
 def next_steps(
@@ -97,7 +96,7 @@ def _use_of_model(diagnosis: Diagnosis, model: str, worse: Sequence[str]) -> lis
     if diagnosis.verdict not in ('named', 'consistent'):
         return []
     if diagnosis.doubt or diagnosis.harmful:
-        return [_ANEW]
+        return ['Identify the arm anew before the model is used in simulation or control.']
     which = 'the patched model' if diagnosis.findings else 'a copy of the given model'
     return [f'Use {model}, {which}, in simulation and control; keep these bags to compare with.']
 
