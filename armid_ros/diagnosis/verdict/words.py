@@ -253,12 +253,13 @@ def _alternatives(finding: Finding) -> str:
     """List a name and its rivals with probabilities, and with joints that are not the same."""
     every = (Rival(finding.name, finding.joints, finding.probability), *finding.rivals)
     elsewhere = len({frozenset(one.joints) for one in every}) > 1
-    return ' or '.join(
+    words = ' or '.join(
         name_in_words(one.name)
         + (f' of {", ".join(one.joints)}' if elsewhere and one.joints else '')
         + f' ({percent(one.probability)})'
         for one in every
     )
+    return words.replace('(', '(probability ', 1)
 
 
 def as_sure(value: float, std: float) -> str:
