@@ -57,7 +57,8 @@ class ParameterName:
 
 def name_in_words(name: str) -> str:
     """Return the name of an effect or parameter in words: 'Coulomb friction'."""
-    return name.replace('_', ' ').replace('coulomb', 'Coulomb')
+    words = name.replace('_', ' ')
+    return words.replace('coulomb', 'Coulomb').replace('stribeck', 'Stribeck')
 
 
 def symbol_in_words(symbol: str) -> str:

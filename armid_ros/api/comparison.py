@@ -65,7 +65,7 @@ class ComparisonResult(Shown):
         """Return report.html."""
         from armid_ros.report.compare_report import compare_report
 
-        return compare_report(self.core, origin.provenance)
+        return compare_report(self.core, origin.provenance, self.next_step(origin))
 
     def summary(self) -> Summary:
         """Return the changes, most significant first."""

@@ -294,11 +294,13 @@ class DiagnosisResult(ShownModel):
         )
 
     def _then(self) -> str:
-        """Return the command that follows."""
+        """Return the command that follows; none where a person has to separate names."""
         if self.verdict in ('bad_data', 'not_repeatable'):
             return 'inspect'
         if self.verdict in OPEN and self.residual is None:
             return 'diagnose'
+        if self.verdict == 'ambiguous' and self.extras.next_run is None:
+            return ''
         anew = self.core.doubt or self.core.harmful or self.verdict in OPEN
         return 'identify' if anew else 'simulate'
 

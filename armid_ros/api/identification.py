@@ -278,7 +278,7 @@ class IdentificationResult(ShownModel):
         shown = [fit for fits in self.validation.values() for fit in fits] or core.training
         known = int(np.sum(excludes_zero(estimate.values, estimate.std)))
         count = f'{known} of {counted(len(estimate.parameters), "parameter")} differ from zero'
-        unseen = sum(one.parameter not in estimate.parameters for one in core.unidentified)
+        unseen = core.theory.rank - core.base.rank
         if unseen:
             count += f'; {unseen} more cannot be identified from this motion'
         read = [*self.recordings, *self.held_out]

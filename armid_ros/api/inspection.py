@@ -88,7 +88,12 @@ class InspectionResult(Shown):
         """Return inspection.html with all curves."""
         from armid_ros.report.inspection_report import inspection_report
 
-        return inspection_report(self.core, robot=origin.robot, provenance=origin.provenance)
+        return inspection_report(
+            self.core,
+            robot=origin.robot,
+            step=self.next_step(origin),
+            provenance=origin.provenance,
+        )
 
     def summary(self) -> Summary:
         """Return verdict, table of joints, remarks and sampling."""
@@ -100,7 +105,8 @@ class InspectionResult(Shown):
         )
 
         heads, found = joint_heads(self.core), self.core
-        trial = None if found.trial is None or found.trial.refused else found.trial
+        refused, trial = bool(found.trial and found.trial.refused), found.trial
+        good = trial and not refused and trial.grade != 'unusable'
         topics = [
             f'{one.name}: {one.count} x {one.type_name}'
             + ' (read)' * (one.name == found.recording.topic)
@@ -116,7 +122,8 @@ class InspectionResult(Shown):
                 *(f'{name}: {value}' for name, value in recording_facts(found)),
                 *topics,
             ),
-            then='identify' if trial and trial.grade != 'unusable' else 'inspect',
+            steps=['Correct that, and inspect the recording again.'] if refused else (),
+            then='' if refused else 'identify' if good else 'inspect',
         )
 
 
@@ -239,8 +246,8 @@ class CheckResult(Shown):
         """Return report.html with a table of the links."""
         from armid_ros.report.inspection_report import description_check_report
 
-        name = origin.of(self.robot).robot
-        return description_check_report(name, self.remarks, self.links, origin.provenance)
+        name, step = origin.of(self.robot).robot, self.next_step(origin)
+        return description_check_report(name, self.remarks, self.links, step, origin.provenance)
 
     def summary(self) -> Summary:
         """Return the finding, and the links: what was measured where any of them is wrong."""

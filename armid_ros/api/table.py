@@ -103,12 +103,15 @@ class ResultOrigin:
         How model.yaml refers to its description; by default the same.
     provenance : Provenance or None
         Files, versions and settings that the report names.
+    step : str
+        Command that follows, for the report; by default without arguments.
 
     """
 
     robot: str = ''
     source: str = ''
     provenance: Provenance | None = None
+    step: str = ''
 
     def of(self, robot: Robot) -> ResultOrigin:
         """Fill in defaults."""
@@ -160,6 +163,11 @@ class Shown(ABC):
     @abstractmethod
     def summary(self) -> Summary:
         """Return a summary."""
+
+    def next_step(self, origin: ResultOrigin) -> str:
+        """Return what to do next, as the report shows it: a sentence or the command."""
+        shown = self.summary()
+        return origin.step or ''.join(shown.steps[:1]) or f'armid {shown.then}'
 
     @abstractmethod
     def document(self, origin: ResultOrigin = DEFAULT_ORIGIN) -> dict[str, Any]:

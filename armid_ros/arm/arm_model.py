@@ -317,7 +317,7 @@ class ArmModel:
             Derivative of ``torque`` at the present values of the arm.
 
         """
-        columns = effect.columns(motion, self)
+        columns = effect.checked_columns(motion, self)
         if effect.changes_body:
             columns = self.with_load_friction(motion, columns)
         return self._as_read(motion, columns, effect)

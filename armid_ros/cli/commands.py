@@ -179,7 +179,7 @@ def main() -> None:
     """
     Identify a robot arm: excite, record, identify, and find what the model lacks.
 
-    Exit codes: 0 done, 1 a defect of the program, 2 bad input or data, 3 a result not to be used
-    (--strict of identify and diagnose), 130 interrupted.
+    Exit codes: 0 done, 1 a defect of the program, 2 bad input or data, 130 interrupted. With
+    --strict of identify and diagnose, 3 is a result not to be used.
 
     """

@@ -96,7 +96,7 @@ def _table(
 
 def _bag(path: Path, out: Path | None) -> None:
     from armid_ros.cli import options
-    from armid_ros.recording.bag import is_ros1
+    from armid_ros.recording.bag import is_ros1, topics
     from armid_ros.recording.columns import refuse_columns
     from armid_ros.recording.copying import copy_bag
 
@@ -105,6 +105,7 @@ def _bag(path: Path, out: Path | None) -> None:
     if out is None:
         raise RecordingError(f'{path}: --dry-run is for tables; armid inspect shows a bag')
     if not is_ros1(path) and not said.rename:
+        topics(path)  # refuses what is no bag
         raise RecordingError(
             f'{path}: nothing to do: a bag of ROS 2 stays as it is without --rename'
         )

@@ -34,7 +34,7 @@ _OUT = {
 #: Commands that take no recordings.
 _ALONE = ('excite', 'simulate')
 #: Options that only this run has.
-_OWN = {'robot_source', 'out', 'as_json', 'strict', 'every'}
+_OWN = {'robot_source', 'out', 'as_json', 'strict', 'every', 'no_baseline'}
 
 
 def following(then: str, result: Shown) -> str:
@@ -57,7 +57,7 @@ def following(then: str, result: Shown) -> str:
         then = 'check'
     robot, bags, more = _subject(then, result, given)
     if isinstance(result, DiagnosisResult) and then == 'diagnose':
-        more = ['--residual', 'gp']
+        more = ['--residual', 'gp'] if result.baseline else ['--baseline', 'BAG']
     if then == 'excite' and own != 'check':
         more = ['--seed', given['seed'] + 1]
     if then in _OUT:

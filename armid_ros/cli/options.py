@@ -5,6 +5,7 @@
 from __future__ import annotations
 
 from collections.abc import Collection, Sequence
+from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -112,18 +113,18 @@ def deliver(
         What is printed; by default that of the result.
 
     """
-    document = None
+    document, shown = None, summary or result.summary()
+    step = following(shown.then, result) if shown.then else ''
     if staged is not None:
-        document = result.fill(staged.folder, origin)
+        document = result.fill(staged.folder, replace(origin, step=step))
         staged.keep()
     if as_json:
         click.echo(json_text(document or result.document(origin)))
         return
-    shown = summary or result.summary()
     files = [] if staged is None else [f'{staged.out}: {", ".join(result.files)}']
     show(shown, *files)
-    if shown.then:
-        say(f'next: {following(shown.then, result)}')
+    if step:
+        say(f'next: {step}')
 
 
 def show(summary: Summary, *below: str) -> None:
@@ -140,7 +141,8 @@ def show_verdict(
 ) -> None:
     """Print the verdict of a page, and a table."""
     first, *others = verdict.sentences
-    show(Summary(first, verdict.grade, heads, rows, [*others, *verdict.beware]), *below)
+    lines, steps = [*others, *verdict.beware], [verdict.step] if verdict.step else []
+    show(Summary(first, verdict.grade, heads, rows, lines, steps), *below)
 
 
 def read_settings() -> ReadSettings:

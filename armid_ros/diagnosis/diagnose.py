@@ -33,6 +33,7 @@ from armid_ros.diagnosis.verdict.remaining_misfit import places_held, RemainingM
 from armid_ros.diagnosis.verdict.where import where_it_is, where_left
 from armid_ros.diagnosis.verdict.words import decide, Verdict
 from armid_ros.errors import IdentificationError
+from armid_ros.estimate import name_in_words
 from armid_ros.identification.assess.data_faults import check_data, mistaken_recordings
 from armid_ros.identification.assess.grade_limits import LIMITS
 from armid_ros.identification.rows.signals import Conditioning
@@ -289,9 +290,10 @@ def _said(
     hidden = set() if explanation.survey is None else explanation.survey.hidden
     hidden -= {finding.name for finding in found}
     explainer.tell(1.0, word.word)
+    remarks = _remarks(found, worse, chosen, word, doubt, explainer)
     return Diagnosis(
         verdict=word.word,
-        summary=' '.join([word.summary, *_remarks(found, worse, chosen, word, doubt, explainer)]),
+        summary=' '.join([word.summary, *remarks]),
         findings=found,
         minor=minor,
         where=places or places_held(arm, resting),
@@ -302,7 +304,7 @@ def _said(
         data=tuple(evidence.data),
         not_visible=tuple(kind.name for kind in settings.kinds if kind.name in hidden),
         refitted=explanation.refitted,
-        notes=tuple(notes),
+        notes=tuple(note for note in notes if note not in remarks),
         baseline=chosen.floor_in_words,
         harmful=bool(found and worse),
         doubt=doubt,
@@ -319,7 +321,7 @@ def _remarks(
 ) -> list[str]:
     """Return remarks: why the model is not patched or in doubt, and which joints are unchecked."""
     still = ', '.join(not_shown(explainer.prepared.data, explainer.arm.robot.joints))
-    names = ' and '.join(one.name.replace('_', ' ') for one in found)
+    names = ' and '.join(name_in_words(one.name) for one in found)
     remarks = {
         f'The model is not patched: {names} would make it worse in {", ".join(worse)}.': worse,
         chosen.untested: verdict.word == 'unknown',

@@ -292,6 +292,17 @@ class Effect(ABC):
 
         """
 
+    def checked_columns(self, motion: Motion, arm: Arm) -> FloatArray:
+        """Return `columns`; ModelError if their shape is not (N, n, P)."""
+        columns = self.columns(motion, arm)
+        wanted = (*motion.q.shape, len(self.owners) * len(self.quantities))
+        if np.shape(columns) != wanted:
+            raise ModelError(
+                f"effect '{self.name}': columns() returned the shape {np.shape(columns)} instead "
+                f'of {wanted}: samples, joints of the arm, parameters'
+            )
+        return columns
+
     def action(self, values: FloatArray, arm: Arm) -> Action:
         """
         Return how the effect acts on the plant with given parameter values.
@@ -313,7 +324,7 @@ class Effect(ABC):
             rows = np.reshape(q, (-1, len(joints)))
             times = np.broadcast_to(np.ravel(t), (len(rows),))
             motion = Motion(joints, times, rows, np.reshape(dq, rows.shape), np.zeros_like(rows))
-            return np.asarray((self.columns(motion, arm) @ values).reshape(np.shape(q)))
+            return np.asarray((self.checked_columns(motion, arm) @ values).reshape(np.shape(q)))
 
         return Action(link_torque=torque if np.any(values) else None)
 

@@ -195,18 +195,19 @@ def parse_effect(text: str, robot: Robot) -> tuple[Effect, FloatArray]:
     shape_values = effect.shape_values
     for assignment in filter(None, assignments.split(',')):
         key, _, number = (part.strip() for part in assignment.partition('='))
+        if number and key not in quantities + shapes:
+            place = f'; a joint is named as {effect.name}@JOINT' if key.startswith('joint') else ''
+            raise ModelError(
+                f"{effect.name} has no '{key}'; it has {', '.join(quantities + shapes)}"
+                f'{meant(key, quantities + shapes)}{place}'
+            )
         value = _number(text, effect, key, number)
         if key in quantities:
             index = quantities.index(key)
             _require_possible(effect.name, effect.quantities[index], value)
             values[:, index] = value
-        elif key in shapes:
-            shape_values[:, shapes.index(key)] = value
         else:
-            raise ModelError(
-                f"{effect.name} has no '{key}'; it has {', '.join(quantities + shapes)}"
-                f'{meant(key, quantities + shapes)}'
-            )
+            shape_values[:, shapes.index(key)] = value
     return effect.with_shape(shape_values), values.ravel()
 
 

@@ -100,8 +100,8 @@ def _arm_page(found: Watch, arm: WatchedArm, diagnoses: Diagnoses) -> str:
         sentences = [lead + stop.rstrip(), *filter(None, [more]), *sentences]
     if len(texts) > 1:
         sentences.append(f'{counted(len(texts) - 1, "more parameter")} changed; see below.')
-    step = '' if diagnosis or not arm.named else f'armid fleet diagnose --arm {arm.arm}.'
-    sections: list[Section] = [VerdictSection(diagnosed or arm.health, tone, sentences, step=step)]
+    word, step = diagnosed or arm.health, _step(arm, bool(diagnosis), diagnosed)
+    sections: list[Section] = [VerdictSection(word, tone, sentences, step=step)]
     if diagnosis is not None:
         report = f'../{quote(diagnosis["report"])}' if diagnosis['report'] else ''
         cells = (
@@ -142,6 +142,16 @@ def _arm_page(found: Watch, arm: WatchedArm, diagnoses: Diagnoses) -> str:
         sections.append(_refused(arm.refused))
     subtitle = f'{counted(len(arm.bags), "bag")} · false discovery rate {found.alpha:g}'
     return Page(arm.arm, subtitle, sections, charts=False).html()
+
+
+def _step(arm: WatchedArm, is_diagnosed: bool, fault: str) -> str:
+    """Return what to do next about an arm."""
+    if not (arm.named or fault):
+        first = 'Record more' if arm.health == 'too few bags' else 'After the next'
+        return f'{first} recordings, run armid fleet identify and armid fleet watch again.'
+    if is_diagnosed:
+        return 'Read the report of the diagnosis: it states what to inspect.'
+    return f'armid fleet diagnose --arm {arm.arm} --out RESULTS'
 
 
 def _verdict(found: Watch, diagnoses: Diagnoses) -> VerdictSection:

@@ -143,7 +143,7 @@ def inspect(
         units = None if robot is None else robot.position_units
         found += [Remark('bad', one.text) for one in encoder_faults(recording, units)]
     if trial is not None and trial.refused:
-        found.insert(0, Remark('bad', f'refused by `armid identify`: {trial.refused}'))
+        found.insert(0, Remark('bad', trial.refused.removeprefix(f'{recording.source}: ')))
     elif trial is not None:
         found += _of_fit(trial, [remark.text for remark in found])
         found += [Remark('doubt', text) for text in trial.elsewhere]

@@ -319,8 +319,8 @@ class BagPlayerNode(ArmidNode):
             return self._guard.objection(message.cdr)
         if self.count_publishers(self._states) > 1:
             return (
-                f'trajectory: the bag is a recording with {self._states} of its own, and somebody '
-                'else publishes them too: an arm that is not where the recorded one was'
+                f'trajectory: the bag has {self._states} of its own, and another node publishes '
+                'them too: an arm that is not where the recorded one was'
             )
         return ''
 

@@ -13,6 +13,7 @@ from armid_ros.api.arguments import source_of
 from armid_ros.arm.model_file import model_text
 from armid_ros.diagnosis import Finding
 from armid_ros.errors import ArmidError, IdentificationError
+from armid_ros.estimate import name_in_words
 from armid_ros.files.own import refuse_replacing
 from armid_ros.live import Answer, Assistant, LiveDiagnosis, StreamWatch
 from armid_ros.live.assistant import Done, Helper, Plan, Save
@@ -320,7 +321,7 @@ def _rows(finding: Finding) -> list[tuple[object, float, float]]:
 
 def _in_words(live: LiveDiagnosis) -> str:
     return '; '.join(
-        ' of '.join(filter(None, (name.replace('_', ' '), ', '.join(joints))))
+        ' of '.join(filter(None, (name_in_words(name), ', '.join(joints))))
         for name, joints in live.belief.named
     )
 

@@ -233,7 +233,8 @@ def _files_of(path: Path) -> BagMetadata:
     if not path.is_dir():
         if not is_bag_file(path):
             raise RecordingError(
-                f'{path}: not a bag; give a rosbag2 directory, or a file .mcap, .db3 or .bag'
+                f'{path}: no recording; give a rosbag2 directory, a file .mcap, .db3 or .bag, or '
+                'a table .csv, .tsv, .txt, .dat, .npy, .npz, .mat, .h5, .hdf5 or .parquet'
             )
         return BagMetadata((path,))
     if os.path.lexists(path / FILE_NAME):

@@ -174,8 +174,8 @@ def refuse_columns(path: str | Path, settings: ColumnSettings, *, copied: bool =
     """
     reasons = dict.fromkeys(
         _WHERE,
-        'is for tables, and this is a bag, whose messages have stamps and names; leave it out, or '
-        'make a bag of the tables with armid convert',
+        'is for tables, and this is a bag; leave it out, or make a bag of the tables with armid '
+        'convert',
     )
     if copied:
         reason = 'changes no bag that is copied; give it to the command that reads the bag'

@@ -43,7 +43,7 @@ _WHY = {
 }
 
 
-def compare_report(comparison: Comparison, provenance: Provenance | None) -> str:
+def compare_report(comparison: Comparison, provenance: Provenance | None, step: str = '') -> str:
     """
     Return the page of a comparison.
 
@@ -53,6 +53,8 @@ def compare_report(comparison: Comparison, provenance: Provenance | None) -> str
         Two identifications.
     provenance : Provenance or None
         Files, versions.
+    step : str
+        What to do next.
 
     Returns
     -------
@@ -67,7 +69,7 @@ def compare_report(comparison: Comparison, provenance: Provenance | None) -> str
         facts.append((heading, f'{side.source}: {robot_label(side.robot)}{said}'))
     rows = change_rows(comparison)
     sections: list[Section] = [
-        VerdictSection(*verdict(comparison), tell(comparison), _beware(comparison)),
+        VerdictSection(*verdict(comparison), tell(comparison), _beware(comparison), step=step),
         *([ContentSection('What changed', [DataTable(HEADS, rows, kind='both')])] if rows else []),
         changes_section(comparison),
         ContentSection('Input', [FactList(facts)]),
@@ -119,7 +121,8 @@ def tell(comparison: Comparison) -> tuple[str, ...]:
         *(_unusable(one) for one in comparison.unusable),
         *([] if comparison.load is None else _load(comparison)),
         _sum(comparison),
-        *(_residual(one, comparison) for one in comparison.changed_residuals),
+        *(_residual(one) for one in comparison.changed_residuals),
+        *([_why_left(comparison)] if comparison.changed_residuals else []),
         *_tell_not_compared(comparison),
         *_details(comparison),
     )
@@ -181,7 +184,7 @@ def _unusable(one: ParameterFile) -> str:
     return f'{one.source} is unusable: {reason}. Run armid diagnose to find what the model lacks.'
 
 
-def _residual(change: ResidualChange, comparison: Comparison) -> str:
+def _residual(change: ResidualChange) -> str:
     errors = change.before_error, change.after_error
     ranks = ('second', 'first') if change.ratio > 1.0 else ('first', 'second')
     times = change.ratio if change.ratio > 1.0 else 1.0 / change.ratio if change.ratio else inf
@@ -190,16 +193,15 @@ def _residual(change: ResidualChange, comparison: Comparison) -> str:
         said = f' ({digits(errors[0])} and {digits(errors[1])} % of the torque)'
     return (
         f'{change.joint}: the residual of the {ranks[0]} model is {digits(times)} times that of '
-        f'the {ranks[1]}{said}. {_why_left(comparison)}.'
+        f'the {ranks[1]}{said}.'
     )
 
 
 def _why_left(comparison: Comparison) -> str:
-    """Return possible reasons of a residual that differs."""
+    """Return the possible reason of residuals that differ."""
     if any(one.why == 'effect' for one in comparison.not_compared):
-        return 'The models have different effects, which may be the reason'
-    ask = '' if comparison.unusable else ': run armid diagnose'
-    return f'No parameter of either explains that{ask}'
+        return 'The models have different effects, which may be the reason.'
+    return 'No parameter of either model explains that.'
 
 
 def _load(comparison: Comparison) -> tuple[str, str]:

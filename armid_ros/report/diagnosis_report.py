@@ -125,7 +125,8 @@ class Extras:
 
     def steps(self, diagnosis: Diagnosis, model: str = MODEL) -> list[str]:
         """Return what to do next, for the page and the terminal, and where the model is."""
-        return next_steps(diagnosis, self.next_run, self.no_run, model, self.worse)
+        learned = self.residual is not None
+        return next_steps(diagnosis, self.next_run, self.no_run, model, self.worse, learned)
 
     def sentences(self, diagnosis: Diagnosis) -> list[str]:
         """Return sentences on shares, minor effects, consequences and notes."""

@@ -64,7 +64,11 @@ def excitation_report(
     *,
     robot: str,
     scene: CollisionScene,
+<<<<<<< HEAD
     isolability: Isolability | None = None,
+=======
+    step: str = '',
+>>>>>>> x/face
     provenance: Provenance | None = None,
 ) -> str:
     """
@@ -84,8 +88,13 @@ def excitation_report(
         Shipped name or path of the description.
     scene : CollisionScene
         Bodies of the arm, its floor, and what stands around it.
+<<<<<<< HEAD
     isolability : Isolability, optional
         What it shows of the effects of the catalogue.
+=======
+    step : str
+        What to do next.
+>>>>>>> x/face
     provenance : Provenance, optional
         Files, versions, settings, seed.
 
@@ -123,7 +132,7 @@ def excitation_report(
     if any(colour == OBSTACLE for _, colour in poses.bodies):
         colours.append(('line', ', '.join(obstacle.name for obstacle in obstacles)))
     sections: list[Section] = [
-        _verdict(design, arm.robot.links, shares, checked, collision.notes),
+        replace(_verdict(design, arm.robot.links, shares, checked, collision.notes), step=step),
         ContentSection('Poses', [poses, Legend(colours)]),
         _foreseen_section(design, arm.robot.links),
         *([] if isolability is None else [isolability_section(isolability)]),

@@ -48,7 +48,7 @@ _FINEST = 1e-7
 
 
 def inspection_report(
-    found: Inspection, *, robot: str = '', provenance: Provenance | None = None
+    found: Inspection, *, robot: str = '', step: str = '', provenance: Provenance | None = None
 ) -> str:
     """
     Return the page of an inspection, with all curves.
@@ -59,6 +59,8 @@ def inspection_report(
         What was found.
     robot : str
         Name or path of the description.
+    step : str
+        What to do next.
     provenance : Provenance, optional
         Files, versions.
 
@@ -75,7 +77,7 @@ def inspection_report(
     texts.insert(first - 1, found.verdict)  # below the worst remark
     sentences = [text[0].upper() + text[1:].replace('`', '').rstrip('.') + '.' for text in texts]
     sections: list[Section] = [
-        VerdictSection(grade, _TONES[grade], sentences[:first], sentences[first:]),
+        VerdictSection(grade, _TONES[grade], sentences[:first], sentences[first:], step=step),
         _contents_section(found),
         _joints_section(found),
         _curves_section(found),
@@ -129,6 +131,8 @@ def headline(remarks: Sequence[Remark], found: LinkCheck | None) -> tuple[str, .
             known.append(f'has a wrong mass distribution at {" and ".join(others)}')
         rivals = ''.join(f' or {found.joints[k]}' for k in found.rivals)
         first = f'The URDF {" and ".join(known)}{rivals}, if the other links are right.'
+    if found.wrong and not (count['doubt'] or count['bad']):
+        return first, errors
     return first, errors, values
 
 
@@ -170,13 +174,14 @@ def description_check_report(
     robot: str,
     remarks: Sequence[Remark],
     links: LinkCheck | None,
+    step: str = '',
     provenance: Provenance | None = None,
 ) -> str:
     """Return the page of a check, one HTML file that loads nothing."""
     first, *others = headline(remarks, links)
     grade, texts = check_word(remarks, links), [one.text for one in remarks]
     sections: list[Section] = [
-        VerdictSection(grade, _TONES[grade], [first, ' '.join(others)], texts)
+        VerdictSection(grade, _TONES[grade], [first, *others], texts, step=step)
     ]
     if links is not None:
         said = (

@@ -290,8 +290,8 @@ def _inertia_notes(robot: Robot) -> tuple[str, ...]:
         moved = np.maximum(moved, np.abs(np.diag(mass_matrix)))
     # kg m^2 or kg; the smallest motor rotor is five orders above
     return tuple(
-        f"link '{link}', moved by joint '{joint}', has no <inertial>, nor has any link beyond it: "
-        'its inertia can be identified, but simulating the arm needs a rough one'
+        f"link '{link}', moved by joint '{joint}', has no <inertial>, nor has any link beyond it. "
+        'Its inertia can be identified, but a simulation needs a rough one'
         for joint, link, inertia in zip(robot.joints, robot.links, moved, strict=True)
         if inertia < 1e-12
     )

@@ -103,12 +103,15 @@ def test_names_that_are_one_cause_have_one_share(bench):
     [
         ((('link_inertia', 'elbow'),), 'link inertia'),
         ((('link_inertia', 'shoulder'),), 'inertia of shoulder'),
-        ((('link_inertia', 'elbow'), ('payload', 'shoulder')), 'elbow or payload'),
-        ((('torque_offset', 'shoulder'),), 'one of shoulder'),
+        ((('link_inertia', 'elbow'), ('payload', 'shoulder')), 'elbow (40 %) or payload'),
+        (
+            (('torque_offset', 'shoulder'),),
+            '(probability 0 %) or torque offset of shoulder (40 %)',
+        ),
     ],
 )
 def test_a_rival_in_another_joint_is_stated_with_it(bench, rivals, stated):
-    others = tuple(Rival(name, (joint,)) for name, joint in rivals)
+    others = tuple(Rival(name, (joint,), 0.4) for name, joint in rivals)
     found = verdict(bench, finding(bench, 0.9, 'torque_offset', rivals=others))
     assert found.word == 'ambiguous' and stated in found.summary
 

@@ -117,6 +117,13 @@ def test_breaches_of_the_contract_are_named(kind, breach):
         check_effect(kind)
 
 
+def test_columns_of_another_shape_are_refused_with_both_shapes():
+    robot = ar.load_robot('two_link_elastic')
+    arm = ar.ArmModel(robot).with_effect(Wide.on(robot), [1.0, 1.0])
+    with pytest.raises(ar.ArmidError, match=r"'hose'.*\(\d+, 2, 4\).*\(\d+, 2, 2\)"):
+        ar.simulate(arm)
+
+
 def test_typical_sizes_out_of_order_are_named_with_their_quantity():
     with pytest.raises(AssertionError, match='hose_stiffness'):
         check_effect(Untold)

@@ -109,7 +109,7 @@ def test_what_is_wrong_is_said_without_a_robot(spoil, said, clean):
 
 
 @pytest.mark.parametrize(
-    ('factor', 'said'), [(1e3, 'refused'), (-1.0, 'refused'), (12.0, 'kgf cm'), (4.0, 'currents')]
+    ('factor', 'said'), [(1e3, 'N mm'), (-1.0, 'opposite'), (12.0, 'kgf cm'), (4.0, 'currents')]
 )
 def test_units_of_efforts_are_seen_against_the_description(factor, said, clean, robot):
     wrong = replace(clean, tau=factor * clean.tau)

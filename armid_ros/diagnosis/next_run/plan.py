@@ -23,6 +23,7 @@ from armid_ros.diagnosis.next_run.separation import Doubt, Load, NOTHING, Separa
 from armid_ros.diagnosis.verdict.finding import Diagnosis
 from armid_ros.effects.tied import Tied
 from armid_ros.errors import TrajectoryError
+from armid_ros.estimate import name_in_words
 from armid_ros.excitation import (
     ClearanceModel,
     DesignProblem,
@@ -88,8 +89,8 @@ class NextRun:
             again = f', then again with {self.load.mass:g} kg fixed to {self.load.frame}'
         return (
             f'Run {EXPERIMENT_FILE} ({self.template}, {self.excitation.duration:.0f} s){again}, '
-            'and diagnose all recordings together: it should tell '
-            f'{", ".join(parts).replace("_", " ")}.'
+            'and diagnose all recordings together: it should separate '
+            f'{name_in_words(", ".join(parts))}.'
         )
 
     def document(self) -> dict[str, Any]:
@@ -162,7 +163,7 @@ def next_run(
     telling = [run for run in runs if any(one.distinct for one in run.separations)]
     if runs and not telling:
         names = ', '.join(f'{one.name} from {one.rival}' for one in runs[0].separations)
-        raise TrajectoryError(f'none of the planned motions tells {names}'.replace('_', ' '))
+        raise TrajectoryError(f'none of the planned motions separates {name_in_words(names)}')
     for run in _in_order(telling):
         kind = run.template
         settings = DesignSettings(

@@ -13,13 +13,14 @@ from collections.abc import Sequence
 from math import hypot
 
 from armid_ros.diagnosis.next_run.plan import NextRun
+from armid_ros.diagnosis.search.choice import OWN_MISFIT
 from armid_ros.diagnosis.verdict.finding import Diagnosis, Finding, Rival
 from armid_ros.effects import CATALOGUE
+from armid_ros.estimate import name_in_words
 from armid_ros.identification.fitting.identifiability import excludes_zero, HALF_WIDTH
 
 #: Place of the patched model, for readers of the report.
 MODEL = 'model.yaml in the folder of this diagnosis'
-_ANEW = 'Identify the arm anew before the model is used in simulation or control.'
 
 
 def next_steps(
@@ -28,6 +29,7 @@ def next_steps(
     no_run: str = '',
     model: str = MODEL,
     worse: Sequence[str] = (),
+    learned: bool = False,
 ) -> list[str]:
     """
     Return sentences on the next steps of the user, in order.
@@ -43,34 +45,43 @@ def next_steps(
     model : str
         Place of the patched model, in words.
     worse : sequence of str
+<<<<<<< HEAD
         Joints in which a simulation with the patched model has a larger error than before.
+=======
+        Joints that a simulation with the patched model is farther off in.
+    learned : bool
+        Whether the unexplained torque has been learned.
+>>>>>>> x/face
 
     """
     findings, verdict = diagnosis.findings, diagnosis.verdict
     looks = [text for finding in findings for text in _looks(finding, diagnosis)]
     steps = list(dict.fromkeys(looks))
-    if steps:
+    if steps and verdict != 'ambiguous':
         head, _, what = steps[0].rpartition(':')
         steps[0] = f'{head} first:{what}'
     if verdict == 'bad_data':
         steps.append('Correct the data, or the description, and diagnose again.')
     if verdict in ('unknown', 'partial'):
-        steps += [f'Look at {w.joint}: what is left is {w.signature}.' for w in diagnosis.left]
+        steps += [f'Unexplained at {w.joint}: {w.signature}.' for w in diagnosis.left]
+        option = '' if learned else '--residual gp, which learns that torque as a map'
+        if diagnosis.baseline != OWN_MISFIT:
+            option = '--baseline BAG, a recording from before'
+        if option:
+            steps[-1:] = [f'{" ".join(steps[-1:])} Run armid diagnose with {option}.'.lstrip()]
     if verdict == 'not_repeatable':
         steps.append('Keep people and loose parts away from the arm, and record again.')
-    if run is not None:
-        steps.append(run.sentence)
-    elif no_run:
-        steps.append(f'{no_run[0].upper()}{no_run[1:]}.')
+    motions = [run.sentence] if run else [f'{no_run[0].upper()}{no_run[1:]}.'] if no_run else []
     told = () if run is None else [(s.name, s.rival) for s in run.separations if s.distinct]
-    steps += [
+    motions += [
         one.experiment
         for one in findings
         if one.rivals and (one.name, one.rivals[0].name) not in told
     ]
+    steps = [*motions, *steps] if verdict == 'ambiguous' else [*steps, *motions]
     steps += _use_of_model(diagnosis, model, worse)
     if diagnosis.not_visible:
-        hidden = ', '.join(name.replace('_', ' ') for name in diagnosis.not_visible)
+        hidden = ', '.join(name_in_words(name) for name in diagnosis.not_visible)
         steps.append(f'These data cannot show: {hidden}. Other motions, or known values, can.')
     return steps
 
@@ -88,9 +99,9 @@ def _use_of_model(diagnosis: Diagnosis, model: str, worse: Sequence[str]) -> lis
     if diagnosis.verdict not in ('named', 'consistent'):
         return []
     if diagnosis.doubt or diagnosis.harmful:
-        return [_ANEW]
-    which = f'the patched model, {model},' if diagnosis.findings else 'the model that was given'
-    return [f'Use {which} in simulation and control; keep these bags to compare with.']
+        return ['Identify the arm anew before the model is used in simulation or control.']
+    which = 'the patched model' if diagnosis.findings else 'a copy of the given model'
+    return [f'Use {model}, {which}, in simulation and control; keep these bags to compare with.']
 
 
 def _looks(finding: Finding, diagnosis: Diagnosis) -> list[str]:
@@ -102,7 +113,7 @@ def _looks(finding: Finding, diagnosis: Diagnosis) -> list[str]:
         if not what:
             continue
         where = ', '.join(one.joints) or 'the whole arm'
-        name = one.name.replace('_', ' ')
+        name = name_in_words(one.name)
         if one.name == finding.name and one is not own:
             name = f'that of {where}'
         head = f'Look at {where}' if one is own else f'If it is {name}, look at {where}'

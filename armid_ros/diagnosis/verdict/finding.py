@@ -18,8 +18,12 @@ from armid_ros.diagnosis.search.explanation import Explanation
 from armid_ros.diagnosis.search.spans import Span
 from armid_ros.diagnosis.verdict.where import Where
 from armid_ros.effects import CATALOGUE, Effect
+<<<<<<< HEAD
 from armid_ros.errors import IdentificationError
 from armid_ros.estimate import Estimate, ParameterName
+=======
+from armid_ros.estimate import Estimate, name_in_words, ParameterName
+>>>>>>> x/face
 from armid_ros.model.spring_ties import Tie
 from armid_ros.motion import FloatArray
 import numpy as np
@@ -128,17 +132,17 @@ class Finding:
         own, other = (
             f' of {", ".join(where)}' if where else '' for where in (self.joints, rival.joints)
         )
-        first, second = (name.replace('_', ' ') for name in (self.name, rival.name))
+        first, second = map(name_in_words, (self.name, rival.name))
         names = f'{first}{"" if own == other else own} from {second}{other}'
         one_body = bodies and bool(carried) and alike and bool(self.joints)
         shown = [kind.traits.shown_by for kind in (carried if one_body else kinds)]
         best = '. Or record '.join(dict.fromkeys(shown or [Effect.traits.shown_by]))
         if one_body:
             return (
-                f'No motion tells {names}, as they move as one body. Weigh what the link carries, '
-                f'or record {best}.'
+                f'No motion separates {names}, as they move as one body. Weigh what the link '
+                f'carries, or record {best}.'
             )
-        return f'To tell {names}, record {best}.'
+        return f'To separate {names}, record {best}.'
 
     def place_of(self, joint: str) -> str:
         """Return the name of the tied segment of a joint, or of the joint without a tie."""

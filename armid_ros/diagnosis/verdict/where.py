@@ -58,7 +58,11 @@ class Where:
     share_of_gap : float
         Share of the joint in the gap of all joints, 0 to 1.
     signature : str
+<<<<<<< HEAD
         The quantity with which the residual varies, in words.
+=======
+        In words, the residual and the quantity with which it varies.
+>>>>>>> x/face
     axes : tuple of Axis
         All quantities, the largest share first.
     unit : str
@@ -174,7 +178,8 @@ def locate(
         own = stacked[use, joint]
         mean = float(own.mean()) if len(own) else 0.0
         constant = mean**2 / max(float(np.mean(own**2)), 1e-300) if len(own) else 0.0
-        result.append(Where(name, share, _in_words(axes), tuple(axes), torque, mean, constant))
+        words = _in_words(axes, torque, own)
+        result.append(Where(name, share, words, tuple(axes), torque, mean, constant))
     return tuple(result)
 
 
@@ -205,17 +210,20 @@ def _axis(name: str, unit: str, x: FloatArray, residual: FloatArray) -> Axis:
     return Axis(name, unit, read_only(centres[filled]), read_only(means[filled]), share)
 
 
-def _in_words(axes: Sequence[Axis]) -> str:
-    """Describe the residual as a function of one quantity, such as velocity."""
+def _in_words(axes: Sequence[Axis], unit: str, residual: FloatArray) -> str:
+    """Describe the residual of a joint as a function of one quantity, such as velocity."""
     best = axes[0]
     if best.share < _TELLING:
-        return 'no function of one quantity of the joint: fast in time, or of several joints'
-    share = f'{100 * best.share:.0f} % of its mean square'
+        rms = float(np.sqrt(np.mean(residual**2)))
+        return f'a torque of {rms:.2g} {unit} rms that follows no single quantity of the joint'
+    name = 'load times direction of motion' if ' ' in best.name else best.name
+    largest = int(np.argmax(np.abs(best.means)))
+    most = f'{abs(best.means[largest]):.2g} {unit}'
     size = _CURVED * float(np.sum(best.means**2))
     slope = float(best.centres @ best.means) / max(float(best.centres @ best.centres), 1e-300)
     if np.sum((best.means - best.means.mean()) ** 2) < size:
-        return f'constant ({share})'
+        return f'constant torque of {best.means.mean():.2g} {unit}'
     if np.sum((best.means - slope * best.centres) ** 2) < size:
-        return f'in proportion to {best.name} ({share})'
-    peak = best.centres[int(np.argmax(np.abs(best.means)))]
-    return f'a function of {best.name}, largest at {peak:.3g} {best.unit} ({share})'
+        return f'torque in proportion to {name}, up to {most}'
+    peak = best.centres[largest]
+    return f'torque that varies with {name}, up to {most} at {peak:.3g} {best.unit}'

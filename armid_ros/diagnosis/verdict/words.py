@@ -9,7 +9,7 @@ from dataclasses import dataclass
 from typing import Literal
 
 from armid_ros.arm import ArmModel
-from armid_ros.diagnosis.verdict.finding import Finding, SAID
+from armid_ros.diagnosis.verdict.finding import Finding, Rival, SAID
 from armid_ros.diagnosis.verdict.where import Excess
 from armid_ros.effects import CATALOGUE
 from armid_ros.estimate import name_in_words, ParameterName
@@ -86,7 +86,7 @@ def decide(
     if not findings:
         if open_gap:
             text = f'No effect in the catalogue explains {error}: it is {size}.'
-            text += f' At best, {small[0].lower()}{small[1:]}' if small else ''
+            text += f' Best candidate: {small}' if small else ''
             return Verdict('unknown', f'{text} {refit}'.rstrip())
         text = f'The model explains the recordings: the remaining error {no_larger}'
         text += f', or too small to matter. {small}' if small else '.'
@@ -101,13 +101,12 @@ def decide(
 
 
 def _rivals_in_words(findings: Sequence[Finding]) -> str:
-    """Return a sentence on rivals; empty without rivals."""
-    pairs = [
-        f'the {name_in_words(one.name)} from {others_in_words(one)}'
+    """Return a sentence for each name with rivals; empty without rivals."""
+    return ' '.join(
+        f'Either {_alternatives(one)}: these data cannot separate them.'
         for one in findings
         if one.rivals
-    ]
-    return f'These data cannot tell {", nor ".join(pairs)}.' if pairs else ''
+    )
 
 
 def _refit(as_it_is: Excess | None, robot: Robot, floor_in_words: str) -> str:
@@ -250,15 +249,17 @@ def _strange(joints: Sequence[str], findings: Sequence[Finding]) -> str:
     return text + 'No effect of the arm is named.'
 
 
-def others_in_words(finding: Finding) -> str:
-    """List the rivals of a name, with joints if any rival has other joints."""
-    elsewhere = any(set(rival.joints) != set(finding.joints) for rival in finding.rivals)
-    words = []
-    for rival in finding.rivals:
-        place = f' of {", ".join(rival.joints)}' if elsewhere and rival.joints else ''
-        name = 'one' if rival.name == finding.name else name_in_words(rival.name)
-        words.append(name + place)
-    return ' or '.join(words)
+def _alternatives(finding: Finding) -> str:
+    """List a name and its rivals with probabilities, and with joints that are not the same."""
+    every = (Rival(finding.name, finding.joints, finding.probability), *finding.rivals)
+    elsewhere = len({frozenset(one.joints) for one in every}) > 1
+    words = ' or '.join(
+        name_in_words(one.name)
+        + (f' of {", ".join(one.joints)}' if elsewhere and one.joints else '')
+        + f' ({percent(one.probability)})'
+        for one in every
+    )
+    return words.replace('(', '(probability ', 1)
 
 
 def as_sure(value: float, std: float) -> str:

@@ -9,7 +9,7 @@ from dataclasses import dataclass
 
 from armid_ros.arm import ArmModel
 from armid_ros.effects import CATALOGUE
-from armid_ros.estimate import Estimate, ParameterName
+from armid_ros.estimate import Estimate, name_in_words, ParameterName
 from armid_ros.model import BaseParameters
 from armid_ros.motion import FloatArray, read_only
 import numpy as np
@@ -58,7 +58,7 @@ class ChangeCandidate:
     @property
     def label(self) -> str:
         """Return what changed where, such as 'payload at hand'."""
-        text = self.name.replace('_', ' ')
+        text = name_in_words(self.name)
         return f'{text} at {self.joint}' if self.joint else text
 
     def includes(self, other: ChangeCandidate) -> bool:

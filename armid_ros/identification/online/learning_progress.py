@@ -9,7 +9,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 from armid_ros.arm import ArmModel
-from armid_ros.estimate import Estimate, ParameterName
+from armid_ros.estimate import Estimate, name_in_words, ParameterName
 from armid_ros.model import BaseParameters, inverse_dynamics, random_motion
 from armid_ros.motion import FloatArray
 import numpy as np
@@ -142,4 +142,4 @@ def too_little_motion(unlearned: Sequence[Unlearned]) -> str:
 def _word(parameter: ParameterName) -> str:
     words = {'viscous_coefficient': 'viscous friction', 'coulomb_torque': 'Coulomb friction'}
     rigid = _WORDS.get(parameter.unit) if parameter.name[:1] in 'Im' else None
-    return rigid or words.get(parameter.name, parameter.name.replace('_', ' '))
+    return rigid or words.get(parameter.name, name_in_words(parameter.name))

@@ -217,8 +217,8 @@ def _heavy(robot: Robot, rigid: FloatArray) -> tuple[str, ...]:
     if not named:
         return ()
     return (
-        f'more than {HEAVY:g} times as heavy as described: {"; ".join(named)}; look for what is '
-        'not the links, such as rotors, springs or a load, or correct the masses',
+        f'more than {HEAVY:g} times as heavy as described: {"; ".join(named)}; correct the '
+        'masses, or add what is missing, such as rotors, springs or a load',
     )
 
 

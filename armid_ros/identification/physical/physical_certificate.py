@@ -86,8 +86,7 @@ class PhysicalCertificate:
         if self.held_out_ratio > DEAR:
             said.append(
                 f'constraints cost {100.0 * (self.held_out_ratio - 1.0):.1f} % of torque error on '
-                'blocks left out: a mass or box that was given is not that of the arm, or the '
-                'model lacks an effect'
+                'blocks left out: a given mass or box is wrong, or the model lacks an effect'
             )
         if self.active:
             said.append(

@@ -171,8 +171,7 @@ def check_torque(
         if np.all(factors < 0.0):
             raise IdentificationError(
                 f'{source}: torques of {joints} have the opposite sign of what the description '
-                'takes; effort has to be positive along the URDF joint axis: negate it '
-                '(--effort-scale -1)'
+                'takes. Negate them (--effort-scale -1): positive is along the URDF joint axis'
             )
         for unit, factor in TORQUE_UNITS.items():
             if np.all((factors > 0.5 * factor) & (factors < 2.0 * factor)):
@@ -194,8 +193,8 @@ def check_torque(
 def wrong_sign(joints: Sequence[str]) -> str:
     """Return the error on joints with negative friction power."""
     return (
-        f'the torque of {", ".join(joints)} has the opposite sign of friction: negate it, as '
-        'effort has to be positive along the URDF joint axis; or somebody moved the arm'
+        f'the torque of {", ".join(joints)} has the opposite sign of friction. Negate it '
+        '(positive is along the URDF joint axis), or somebody moved the arm'
     )
 
 

@@ -120,6 +120,5 @@ class StampDifference:
             return ''
         return (
             f'stamps of {topic} are {abs(self._late):.0f} s {self._side(self._late)}, and so are '
-            'those of what is made of them: set the clocks, or use_sim_time on all nodes or on '
-            'none'
+            'all results. Set the clocks, or use_sim_time on all nodes or on none'
         )

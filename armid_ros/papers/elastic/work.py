@@ -13,6 +13,7 @@ from armid_ros.cli import options
 from armid_ros.cli.origin import provenance
 from armid_ros.cli.terminal import progress, Tick
 from armid_ros.errors import RecordingError, RobotError
+from armid_ros.estimate import name_in_words
 from armid_ros.files import json_text, Staged, write_file
 from armid_ros.motion import FloatArray
 from armid_ros.papers.elastic.identification.files import read_runs
@@ -226,7 +227,7 @@ def _resonances(document: dict[str, Any]) -> Table:
 
 
 def _values(document: dict[str, Any]) -> Table:
-    words = {name: field.replace('_', ' ') for field, name, _ in PER_JOINT}
+    words = {name: name_in_words(field) for field, name, _ in PER_JOINT}
     return ('parameter', 'joint', 'value', 'std', 'unit'), [
         (
             f'{words[row["name"]]} ({row["name"]})' if row['name'] in words else row['name'],

@@ -195,7 +195,7 @@ def _walk(found: FileMap) -> tuple[list[tuple[int, int, int]], int | None, int |
     behind = size - position - len(MAGIC)
     if found.finished and behind > 0:
         found.damage.add(
-            f'{behind} bytes follow the end of the file, as of another file that was appended: '
+            f'{behind} bytes follow the end of the file, perhaps of an appended file: '
             f'only what is before byte {position + len(MAGIC)} is read; cut the file there'
         )
     return definitions, data_end, footer, position

@@ -51,7 +51,7 @@ class InteractionSettings:
         if not (self.memory >= 3.0 and 0.0 < self.period <= self.memory and self.slack_period > 0):
             raise IdentificationError(
                 f'a memory of {self.memory:g} s and estimates every {self.period:g} s: the memory '
-                'has to be at least 3 s and no shorter than the time between estimates'
+                'has to be at least 3 s and that time'
             )
 
 
