@@ -196,11 +196,8 @@ class ExcitationResult(Shown):
             self.fitness,
             robot=origin.of(self.arm.robot).robot,
             scene=self.scene,
-<<<<<<< HEAD
             isolability=self.isolability if self.with_isolability else None,
-=======
             step=self.next_step(origin),
->>>>>>> x/face
             provenance=origin.provenance,
         )
 

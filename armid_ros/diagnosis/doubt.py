@@ -62,14 +62,9 @@ def doubt_of_names(findings: Sequence[Finding]) -> str:
     for one in findings:
         if one.name in CATALOGUE and CATALOGUE[one.name].traits.corrects:
             return (
-<<<<<<< HEAD
                 'Links do not change between two days. Unless the link of '
                 f'{" and ".join(one.joints)} was exchanged or something was bolted to it, a cause '
                 'outside of the catalogue resembles this change.'
-=======
-                f'Links do not change between two days. Unless that of {" and ".join(one.joints)} '
-                'was exchanged or carries a new part, an effect outside the catalogue acts.'
->>>>>>> x/face
             )
     return ''
 

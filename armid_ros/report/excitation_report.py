@@ -64,11 +64,8 @@ def excitation_report(
     *,
     robot: str,
     scene: CollisionScene,
-<<<<<<< HEAD
     isolability: Isolability | None = None,
-=======
     step: str = '',
->>>>>>> x/face
     provenance: Provenance | None = None,
 ) -> str:
     """
@@ -88,13 +85,10 @@ def excitation_report(
         Shipped name or path of the description.
     scene : CollisionScene
         Bodies of the arm, its floor, and what stands around it.
-<<<<<<< HEAD
     isolability : Isolability, optional
         What it shows of the effects of the catalogue.
-=======
     step : str
         What to do next.
->>>>>>> x/face
     provenance : Provenance, optional
         Files, versions, settings, seed.
 

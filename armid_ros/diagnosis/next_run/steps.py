@@ -45,13 +45,9 @@ def next_steps(
     model : str
         Place of the patched model, in words.
     worse : sequence of str
-<<<<<<< HEAD
         Joints in which a simulation with the patched model has a larger error than before.
-=======
-        Joints that a simulation with the patched model is farther off in.
     learned : bool
         Whether the unexplained torque has been learned.
->>>>>>> x/face
 
     """
     findings, verdict = diagnosis.findings, diagnosis.verdict

@@ -172,13 +172,8 @@ def as_bodies(explanation: Explanation) -> tuple[Explanation, tuple[str, ...]]:
         if np.all(bodily.chi2_per_row <= np.maximum(_ALIKE * explanation.chi2_per_row, 1.0)):
             return bodily, ()
     return explanation, (
-<<<<<<< HEAD
-        'no physically consistent links fit the data as well: the inertias contain other effects, '
-        'named or not found; the patched model may not be simulable',
-=======
         'no physically consistent links explain the data as well: the inertias hold a part of the '
         'cause, and the patched model may not be simulable',
->>>>>>> x/face
     )
 
 

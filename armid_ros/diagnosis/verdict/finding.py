@@ -18,12 +18,8 @@ from armid_ros.diagnosis.search.explanation import Explanation
 from armid_ros.diagnosis.search.spans import Span
 from armid_ros.diagnosis.verdict.where import Where
 from armid_ros.effects import CATALOGUE, Effect
-<<<<<<< HEAD
 from armid_ros.errors import IdentificationError
-from armid_ros.estimate import Estimate, ParameterName
-=======
 from armid_ros.estimate import Estimate, name_in_words, ParameterName
->>>>>>> x/face
 from armid_ros.model.spring_ties import Tie
 from armid_ros.motion import FloatArray
 import numpy as np

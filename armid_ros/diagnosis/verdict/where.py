@@ -58,11 +58,7 @@ class Where:
     share_of_gap : float
         Share of the joint in the gap of all joints, 0 to 1.
     signature : str
-<<<<<<< HEAD
-        The quantity with which the residual varies, in words.
-=======
         In words, the residual and the quantity with which it varies.
->>>>>>> x/face
     axes : tuple of Axis
         All quantities, the largest share first.
     unit : str
