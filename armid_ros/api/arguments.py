@@ -22,7 +22,7 @@ from armid_ros.recording.anything import is_table, read_anything, read_tables, S
 from armid_ros.recording.columns import ColumnSettings, numbers
 from armid_ros.recording.message_types import JOINT_STATE
 from armid_ros.recording.reader import bag_contents
-from armid_ros.recording.settings import DEFAULT
+from armid_ros.recording.source import DEFAULT
 from armid_ros.robots import joints_beside_arms, load_robot, Robot, shipped_robots
 from armid_ros.robots.shipped import shipped_path
 import numpy as np

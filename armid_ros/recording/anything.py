@@ -21,7 +21,7 @@ from armid_ros.recording.columns import (
 )
 from armid_ros.recording.reader import read_recording
 from armid_ros.recording.recording import Recording
-from armid_ros.recording.settings import DEFAULT, ReadSettings
+from armid_ros.recording.source import DEFAULT, ReadSettings
 
 if TYPE_CHECKING:
     from armid_ros.recording.tables import TablePlan

@@ -19,8 +19,15 @@ from armid_ros.files import open_regular, reading
 from armid_ros.recording.compression import message_content, unpacked, ZSTD
 from armid_ros.recording.mcap.source import McapSource
 from armid_ros.recording.metadata import BagMetadata, FILE_NAME, read_metadata
-from armid_ros.recording.settings import DEFAULT, ReadSettings
-from armid_ros.recording.source import Damage, MessageBlock, RawMessage, Source, Topic
+from armid_ros.recording.source import (
+    Damage,
+    DEFAULT,
+    MessageBlock,
+    RawMessage,
+    ReadSettings,
+    Source,
+    Topic,
+)
 from armid_ros.recording.sqlite_source import SqliteSource
 
 

@@ -14,8 +14,7 @@ from armid_ros.motion import ElasticRun, FloatArray
 from armid_ros.recording.bag import Bag
 from armid_ros.recording.joint_state.encoder import write_joint_states
 from armid_ros.recording.message_types import BYTE_ORDERS
-from armid_ros.recording.settings import DEFAULT, ReadSettings
-from armid_ros.recording.source import IntArray
+from armid_ros.recording.source import DEFAULT, IntArray, ReadSettings
 from armid_ros.recording.writer import BagWriter, whole_bag
 from armid_ros.robots import Robot
 import numpy as np

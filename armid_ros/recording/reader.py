@@ -18,8 +18,7 @@ from armid_ros.recording.joint_state.decoder import JointSamples, JointStateDeco
 from armid_ros.recording.message_types import BYTE_ORDERS, JOINT_STATE, STRING
 from armid_ros.recording.recording import PositionRange, Recording
 from armid_ros.recording.series import assemble
-from armid_ros.recording.settings import DEFAULT, ReadSettings
-from armid_ros.recording.source import Topic
+from armid_ros.recording.source import DEFAULT, ReadSettings, Topic
 import numpy as np
 
 

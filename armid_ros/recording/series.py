@@ -21,7 +21,6 @@ from armid_ros.recording.joint_state.decoder import JointSamples
 from armid_ros.recording.message_types import QUANTITIES
 from armid_ros.recording.recording import Clock, GAP_PERIODS, gaps, ReadReport, Recording
 from armid_ros.recording.source import IntArray
-from armid_ros.recording.turns import unwrapped
 import numpy as np
 import numpy.typing as npt
 from scipy.ndimage import median_filter
@@ -300,6 +299,54 @@ def _finite(
     counts['nan'] += dropped
     samples = JointSamples(joints, series.stamps, tuple(quantities))
     return (samples.select(~bad) if dropped else samples), tuple(absent), tuple(culprits)
+
+
+def unwrapped(q: FloatArray) -> tuple[FloatArray, list[int]]:
+    """
+    Undo jumps by a whole turn.
+
+    A joint is wrapped if its positions stay within one turn and each step of more than half a turn
+    is about a whole turn. The tolerance depends on the other steps of the joint.
+
+    Parameters
+    ----------
+    q : ndarray, shape (N, n)
+        Positions [rad or degrees].
+
+    Returns
+    -------
+    q : ndarray, shape (N, n)
+        Continuous positions, shifted by whole turns to be near zero; the same object if no joint
+        was wrapped.
+    joints : list of int
+        Indices of the wrapped joints.
+
+    """
+    turns = (2.0 * np.pi, 360.0)  # a turn in each unit of positions [rad, degrees]
+    off_a_turn = 0.15  # largest deviation of a jump from a whole turn, as a share of the turn
+    steps = np.diff(q, axis=0)
+    found: list[int] = []
+    largest = np.max(np.abs(steps), axis=0, initial=0.0)
+    for joint in np.flatnonzero(largest > (1.0 - off_a_turn) * turns[0]).tolist():
+        step = steps[:, joint]
+        for turn in turns:
+            far = np.abs(step) > 0.5 * turn
+            off = np.abs(np.abs(step[far]) - turn)
+            usual = np.max(np.abs(step[~far]), initial=0.0)
+            within = np.ptp(q[:, joint]) <= turn * (1.0 + 1e-3)
+            if (
+                far.any()
+                and within
+                and np.all(off < min(off_a_turn * turn, 3.0 * usual + 1e-3 * turn))
+            ):
+                whole = q[:, joint].copy()
+                whole[1:] -= turn * np.cumsum(np.where(far, np.sign(step), 0.0))
+                whole -= turn * np.round(0.5 * (whole.min() + whole.max()) / turn)
+                q = q.copy() if not found else q
+                q[:, joint] = whole
+                found.append(joint)
+                break
+    return q, found
 
 
 def assemble(

@@ -16,7 +16,7 @@ from armid_ros.recording.bag import Bag
 from armid_ros.recording.joint_state.encoder import Measured
 from armid_ros.recording.message_types import JOINT_TRAJECTORY, store_for
 from armid_ros.recording.qos import LATCHED
-from armid_ros.recording.settings import DEFAULT, ReadSettings
+from armid_ros.recording.source import DEFAULT, ReadSettings
 from armid_ros.recording.writer import whole_bag
 import numpy as np
 from rosbags.serde import SerdeError

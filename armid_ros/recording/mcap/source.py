@@ -22,12 +22,13 @@ from armid_ros.recording.mcap.content import Gathered, heads, message_block, til
 from armid_ros.recording.mcap.records import add_definition, Chunk, FileMap, map_file
 from armid_ros.recording.message_types import MessageType
 from armid_ros.recording.qos import parse_qos
-from armid_ros.recording.settings import DEFAULT, ReadSettings
 from armid_ros.recording.source import (
     BLOCK_MESSAGES,
+    DEFAULT,
     IntArray,
     MessageBlock,
     RawMessage,
+    ReadSettings,
     Source,
     Topic,
 )

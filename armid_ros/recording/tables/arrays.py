@@ -12,7 +12,7 @@ from typing import Any
 import zipfile
 
 from armid_ros.errors import RecordingError
-from armid_ros.recording.settings import DEFAULT
+from armid_ros.recording.source import DEFAULT
 from armid_ros.recording.tables.table import imported, read_content, Table, table_of_arrays
 import numpy as np
 import numpy.typing as npt

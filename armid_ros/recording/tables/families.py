@@ -12,21 +12,52 @@ from __future__ import annotations
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 import re
+from typing import Literal
 
 from armid_ros.errors import RecordingError
 from armid_ros.files.cells import listed
 from armid_ros.recording.columns import renamed, Rules
 from armid_ros.recording.tables.table import Table, TableColumn
-from armid_ros.recording.tables.words import (
-    is_quantity,
-    MEASURED,
-    OTHERWISE,
-    QuantityName,
-    TIMES,
-    WORDS,
-    words_of,
-)
 import numpy as np
+
+QuantityName = Literal['position', 'velocity', 'effort']
+
+#: Words for a current, which a gain converts to a torque.
+CURRENTS = ('current', 'currents', 'curr', 'cur', 'i', 'iq', 'amp', 'amps', 'ampere', 'amperes')
+WORDS: dict[QuantityName, dict[str, float]] = {
+    'position': dict.fromkeys(('position', 'positions', 'pos', 'q', 'qpos', 'jpos'), 3.0)
+    | dict.fromkeys(('angle', 'angles', 'ang', 'theta', 'qm'), 2.5)
+    | {'state': 1.5, 'joint': 1.0, 'joints': 1.0},
+    'velocity': dict.fromkeys(('velocity', 'velocities', 'vel', 'dq', 'qvel', 'qdot', 'jvel'), 3.0)
+    | dict.fromkeys(('qd', 'speed', 'speeds', 'spd', 'dtheta', 'thetadot', 'dqm'), 2.5)
+    | {'omega': 2.0},
+    'effort': dict.fromkeys(('torque', 'torques', 'tau', 'effort', 'efforts'), 3.0)
+    | dict.fromkeys(('trq', 'torq', 'eff', 'jtau', 'jeff'), 3.0)
+    | dict.fromkeys(('tq', *CURRENTS), 2.5)
+    | {'force': 2.0, 'load': 1.5, 'loads': 1.5, 'moment': 1.5, 'mom': 1.5},
+}
+TIMES = dict.fromkeys(('time', 't', 'timestamp', 'timestamps'), 3.0) | dict.fromkeys(
+    ('secs', 'seconds', 'elapsed', 'date', 'datetime'), 2.0
+)
+#: Words for the time of measurement, preferred to the time of reception.
+TIMES |= {'stamp': 3.5}
+#: Words for measured quantities.
+MEASURED = dict.fromkeys(
+    ('meas', 'measured', 'act', 'actual', 'fb', 'feedback', 'observation'), 1.0
+)
+_COMMANDED = (
+    'cmd command commanded des desired target ref reference con goal set setpoint ctrl control '
+    'action ff feedforward traj leader'
+)
+_OF_OTHER_THINGS = (
+    'err error ext external fric friction pert model pred predicted residual limit min max std '
+    'temp temperature tcp ee cart cartesian acc ddq imu rel init gravity kin dyn'
+)
+#: Words for quantities that were not measured or are not of joints; with less weight, words for
+#: processed quantities.
+OTHERWISE = dict.fromkeys((_COMMANDED + ' ' + _OF_OTHER_THINGS).split(), -2.0) | dict.fromkeys(
+    ('filt', 'filtered', 'est', 'estimated', 'se', 'disc', 'mot', 'motor'), -0.3
+)
 
 _RANGE = re.compile(r'([\[{])(\d+)\.\.(\d+)[\]}]')
 _NUMBER = re.compile(r'\d+')
@@ -318,3 +349,15 @@ def _score(pattern: str, quantity: QuantityName) -> float:
         return 0.0
     said = sum(MEASURED.get(word, 0.0) + OTHERWISE.get(word, 0.0) for word in words)
     return own + said - 0.01 * len(words)
+
+
+def words_of(name: str) -> list[str]:
+    """Return the words of a name in small letters: 'actualQ_{}' is actual, q."""
+    apart = re.sub(r'(?<=[a-z])(?=[A-Z])', ' ', name)
+    apart = re.sub(r'\d+', ' ', apart)
+    return [word.lower() for word in re.split(r'[^A-Za-z0-9]+', apart) if word]
+
+
+def is_quantity(word: str) -> bool:
+    """Return whether a word says position, velocity or effort."""
+    return any(word.lower() in words for words in WORDS.values())

@@ -11,9 +11,17 @@ import textwrap
 from armid_ros.errors import RecordingError
 from armid_ros.motion import FloatArray
 from armid_ros.recording.columns import ColumnSettings, per_joint, TIME_UNITS
-from armid_ros.recording.tables.families import choose, Family, guess, guess_time, incomplete
+from armid_ros.recording.tables.families import (
+    choose,
+    CURRENTS,
+    Family,
+    guess,
+    guess_time,
+    incomplete,
+    QuantityName,
+    words_of,
+)
 from armid_ros.recording.tables.table import Table, TableColumn
-from armid_ros.recording.tables.words import CURRENTS, QuantityName, words_of
 import numpy as np
 import numpy.typing as npt
 

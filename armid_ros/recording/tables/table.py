@@ -19,7 +19,7 @@ from armid_ros.errors import RecordingError
 from armid_ros.files import open_regular
 from armid_ros.files.documents import LARGEST
 from armid_ros.motion import FloatArray, read_only
-from armid_ros.recording.settings import DEFAULT
+from armid_ros.recording.source import DEFAULT
 import numpy as np
 import numpy.typing as npt
 
