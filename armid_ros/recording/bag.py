@@ -4,7 +4,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 import contextlib
 from dataclasses import replace
 import heapq
@@ -30,18 +30,7 @@ from armid_ros.recording.source import (
 )
 from armid_ros.recording.sqlite_source import SqliteSource
 
-
-def _ros1(path: Path, settings: ReadSettings) -> Source:
-    # this import takes as long as reading a bag
-    from armid_ros.recording.ros1_source import Ros1Source
-
-    return Ros1Source(path, settings)
-
-
-_STORAGES: dict[str, Callable[[Path, ReadSettings], Source]] = {
-    '.mcap': McapSource,
-    '.db3': SqliteSource,
-}
+_STORAGES: dict[str, type[Source]] = {'.mcap': McapSource, '.db3': SqliteSource}
 _COMPRESSED = ('.zstd', '.zst')
 
 
@@ -186,7 +175,9 @@ class Bag(Source):
 
     def _open(self, file: Path) -> Source:
         """Open one file."""
-        storage = _STORAGES.get(_storage_suffix(file), _ros1)
+        storage = _STORAGES.get(_storage_suffix(file))
+        if storage is None:  # the import of the other one takes as long as reading a bag
+            from armid_ros.recording.ros1_source import Ros1Source as storage
         with reading(file, RecordingError):
             plain = self._unpacked(file) if file.suffix in _COMPRESSED else file
             source: Source = storage(plain, self._settings)

@@ -60,7 +60,6 @@ OTHERWISE = dict.fromkeys((_COMMANDED + ' ' + _OF_OTHER_THINGS).split(), -2.0) |
 )
 
 _RANGE = re.compile(r'([\[{])(\d+)\.\.(\d+)[\]}]')
-_NUMBER = re.compile(r'\d+')
 
 
 @dataclass(frozen=True, eq=False)
@@ -265,7 +264,15 @@ def _matching(table: Table, pattern: str) -> list[tuple[str, TableColumn]]:
         whole = [(number, column) for number, column in found if column is not None]
         return whole if len(whole) == len(found) else []
     if '{}' in pattern:
-        return _by_placeholder(table, pattern)
+        before, _, after = pattern.partition('{}')
+        expression = re.compile(f'{re.escape(before)}(.+){re.escape(after)}')
+        fits = (
+            (expression.fullmatch(one.bare_name) or expression.fullmatch(one.name), one)
+            for one in table.columns
+        )
+        labelled = [(match[1].strip('[]'), one) for match, one in fits if match]
+        numbered = [one for one in labelled if one[0].isdigit()]
+        return sorted(numbered, key=lambda one: _by_number(one[0])) or labelled
     members = [column for column in table.columns if column.array and column.array == pattern]
     if members:
         return [(column.name[len(pattern) + 1 : -1], column) for column in members]
@@ -278,18 +285,6 @@ def _matching(table: Table, pattern: str) -> list[tuple[str, TableColumn]]:
             )
         listed_columns.append((part, column))
     return listed_columns
-
-
-def _by_placeholder(table: Table, pattern: str) -> list[tuple[str, TableColumn]]:
-    before, _, after = pattern.partition('{}')
-    expression = re.compile(f'{re.escape(before)}(.+){re.escape(after)}')
-    found = []
-    for column in table.columns:
-        match = expression.fullmatch(column.bare_name) or expression.fullmatch(column.name)
-        if match:
-            found.append((match[1].strip('[]'), column))
-    numbered = [one for one in found if one[0].isdigit()]
-    return sorted(numbered, key=lambda one: _by_number(one[0])) or found
 
 
 def _groups(
@@ -319,16 +314,14 @@ def _readings(
         for called in {joint, *(old + joint[len(new) :] for old, new in rename)}:
             if renamed(called, rename) == joint and called in name:
                 yield name.replace(called, '{}', 1), called
-    for match in _NUMBER.finditer(name):
-        yield f'{name[: match.start()]}{{}}{name[match.end() :]}', match[0]
+    yield from (
+        (f'{name[: match.start()]}{{}}{name[match.end() :]}', match[0])
+        for match in re.finditer(r'\d+', name)
+    )
     if joints is None or len(joints) == 1:
         yield name, '1'
-    if joints is None:
-        yield from _named(name)
-
-
-def _named(name: str) -> Iterator[tuple[str, str]]:
-    """Split a column name into joint and quantity, in either order: 'elbow/position'."""
+    if joints is not None:
+        return
     behind = re.fullmatch(r'(.*[/.])?([^/.]+)([/._ ])([A-Za-z]+)', name)
     if behind and is_quantity(behind[4]) and not behind[2].isdigit():
         yield f'{behind[1] or ""}{{}}{behind[3]}{behind[4]}', behind[2]
