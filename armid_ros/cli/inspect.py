@@ -47,13 +47,14 @@ def inspect(
     a robot whether identify takes it. Without --out it is printed only.
 
     """
-    from armid_ros.api.arguments import read_all_joints, topics_of
+    from armid_ros.api.arguments import topics_of
     from armid_ros.api.inspection import inspect as run
     from armid_ros.api.inspection import InspectionResult
     from armid_ros.api.table import ResultOrigin
     from armid_ros.cli import options
     from armid_ros.cli.origin import provenance
     from armid_ros.files.cells import listed
+    from armid_ros.recording.anything import read_anything
 
     staged = (
         None if out is None else options.stage(out, InspectionResult.schema, robot_source or '')
@@ -64,9 +65,9 @@ def inspect(
     topics = topics_of(bag, options.read_settings())
     with progress('reading') as tick:
         if robot is None:
-            recording = read_all_joints(
+            recording = read_anything(
                 bag,
-                topics,
+                topics=topics,
                 joints=listed(joints) if joints else None,
                 topic=topic,
                 columns=columns.settings(),

@@ -330,8 +330,7 @@ def unwrapped(q: FloatArray) -> tuple[FloatArray, list[int]]:
                 and within
                 and np.all(off < min(off_a_turn * turn, 3.0 * usual + 1e-3 * turn))
             ):
-                whole = q[:, joint].copy()
-                whole[1:] -= turn * np.cumsum(np.where(far, np.sign(step), 0.0))
+                whole = np.unwrap(q[:, joint], period=turn)
                 whole -= turn * np.round(0.5 * (whole.min() + whole.max()) / turn)
                 q = q.copy() if not found else q
                 q[:, joint] = whole

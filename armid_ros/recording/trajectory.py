@@ -7,13 +7,12 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any, Protocol
+from typing import Any
 
 from armid_ros.errors import RecordingError, TrajectoryError
 from armid_ros.files import reading
-from armid_ros.motion import FloatArray
+from armid_ros.motion import FloatArray, Motion
 from armid_ros.recording.bag import Bag
-from armid_ros.recording.joint_state.encoder import Measured
 from armid_ros.recording.message_types import JOINT_TRAJECTORY, store_for
 from armid_ros.recording.qos import LATCHED
 from armid_ros.recording.source import DEFAULT, ReadSettings
@@ -23,17 +22,9 @@ from rosbags.serde import SerdeError
 from rosbags.typesys import get_typestore, Stores
 
 
-class Waypoints(Measured, Protocol):
-    """Contents of a JointTrajectory: a `Motion`, or a subset of its fields."""
-
-    @property
-    def ddq(self) -> FloatArray | None:
-        """Accelerations, shape (N, n)."""
-
-
 @dataclass(frozen=True)
 class ReadWaypoints:
-    """Waypoints read from a message; see `Waypoints`."""
+    """Waypoints of a message, as of a `Motion`; rates and efforts are None where it has none."""
 
     joints: tuple[str, ...]
     t: FloatArray
@@ -43,34 +34,27 @@ class ReadWaypoints:
     tau: FloatArray | None
 
 
-#: Topic and log time [ns] of the message in a bag.
-_TOPIC, _LOG_TIME = '/joint_trajectory', 10**9
-
-
-def joint_trajectory_cdr(motion: Waypoints) -> bytes:
+def joint_trajectory_cdr(motion: Motion) -> bytes:
     """
     Serialise a motion as one trajectory_msgs/JointTrajectory.
 
     Parameters
     ----------
-    motion : Motion or other Waypoints
+    motion : Motion
         Motion to serialise. Its times become time_from_start; the stamp 0 means now.
 
     """
     store = get_typestore(Stores.ROS2_JAZZY)
     types = store.types
-    nothing = np.empty((len(motion.t), 0))
-    dq, ddq, tau = (
-        nothing if values is None else values for values in (motion.dq, motion.ddq, motion.tau)
-    )
+    tau = np.empty((len(motion.t), 0)) if motion.tau is None else motion.tau
     points: list[Any] = []
     for sample, time in enumerate(np.rint(motion.t * 1e9).astype(np.int64).tolist()):
         seconds, nanoseconds = divmod(time, 10**9)
         points.append(
             types['trajectory_msgs/msg/JointTrajectoryPoint'](
                 positions=motion.q[sample],
-                velocities=dq[sample],
-                accelerations=ddq[sample],
+                velocities=motion.dq[sample],
+                accelerations=motion.ddq[sample],
                 effort=tau[sample],
                 time_from_start=types['builtin_interfaces/msg/Duration'](
                     sec=seconds, nanosec=nanoseconds
@@ -90,7 +74,7 @@ def joint_trajectory_cdr(motion: Waypoints) -> bytes:
 
 def write_joint_trajectory(
     path: str | Path,
-    motion: Waypoints,
+    motion: Motion,
     *,
     robot_description: str | None = None,
 ) -> None:
@@ -101,7 +85,7 @@ def write_joint_trajectory(
     ----------
     path : str or Path
         Bag directory to create; it must not exist.
-    motion : Motion or other Waypoints
+    motion : Motion
         Motion to write. Its torque, if any, is a feedforward effort.
     robot_description : str, optional
         URDF to be written to /robot_description.
@@ -112,11 +96,12 @@ def write_joint_trajectory(
         If the bag exists.
 
     """
+    topic, log_time = '/joint_trajectory', 10**9  # [ns]
     with whole_bag(path) as writer:
         if robot_description is not None:
-            writer.write_description(robot_description, _LOG_TIME)
-        writer.add_topic(_TOPIC, JOINT_TRAJECTORY, qos=[LATCHED])
-        writer.write(_TOPIC, joint_trajectory_cdr(motion), _LOG_TIME)
+            writer.write_description(robot_description, log_time)
+        writer.add_topic(topic, JOINT_TRAJECTORY, qos=[LATCHED])
+        writer.write(topic, joint_trajectory_cdr(motion), log_time)
 
 
 def read_waypoints(
