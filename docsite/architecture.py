@@ -15,7 +15,7 @@ import re
 #: The command of each job, by its module and name.
 JOBS = {
     'identify': ('armid_ros.cli.identify', 'identify'),
-    'diagnose': ('armid_ros.cli.diagnose.command', 'diagnose'),
+    'diagnose': ('armid_ros.cli.diagnose', 'diagnose'),
     'excite': ('armid_ros.cli.excite.command', 'excite'),
     'compare': ('armid_ros.cli.compare', 'compare'),
 }

@@ -32,7 +32,7 @@ COMMANDS = {
     'simulate': 'record',
     'call': 'call',
     'identify': 'identify',
-    'diagnose': 'diagnose.command',
+    'diagnose': 'diagnose',
     'compare': 'compare',
     'recover': 'record',
     'layout': 'layout',
@@ -84,9 +84,15 @@ class Commands(click.Group):
         return name, command, rest
 
     def format_commands(self, ctx: click.Context, formatter: click.HelpFormatter) -> None:
-        """List the commands with the first sentence of their help, whole."""
+        """List the commands with the first sentence of their help, whole; or with their error."""
+        rows = []
+        for name in self.list_commands(ctx):
+            try:
+                rows.append((name, _imported(name).get_short_help_str(1000)))
+            except (ArmidError, ModuleNotFoundError) as error:
+                rows.append((name, str(error)))
         with formatter.section('Commands'):
-            formatter.write_dl([(name, _summary(name)) for name in self.list_commands(ctx)])
+            formatter.write_dl(rows)
 
     def shell_complete(self, ctx: click.Context, incomplete: str) -> list[CompletionItem]:
         """Complete a command without importing all of them, or an option."""
@@ -141,14 +147,6 @@ def _imported(name: str) -> click.Command:
         command = load_plug_in(plug_ins('commands')[name])
     _refuse_infinite(command)
     return command
-
-
-def _summary(name: str) -> str:
-    """Return the first sentence of the help of a command; of one that is broken, its error."""
-    try:
-        return _imported(name).get_short_help_str(1000)
-    except (ArmidError, ModuleNotFoundError) as error:
-        return str(error)
 
 
 def _refuse_infinite(command: click.Command) -> None:

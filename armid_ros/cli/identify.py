@@ -69,10 +69,7 @@ import click
 @click.option('--strict', is_flag=True, help='End with code 3 if the result is unusable.')
 @columns.options
 @parameters.topic
-@parameters.gravity
-@parameters.joints
-@parameters.seed
-@parameters.reading
+@parameters.setting
 @parameters.as_json
 def identify(
     bags: tuple[Path, ...],

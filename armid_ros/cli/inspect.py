@@ -25,10 +25,7 @@ import click
 @parameters.force
 @columns.options
 @parameters.topic
-@parameters.gravity
-@parameters.joints
-@parameters.seed
-@parameters.reading
+@parameters.setting
 @parameters.as_json
 def inspect(
     bag: Path,
@@ -101,10 +98,7 @@ def inspect(
 @click.option('--strict', is_flag=True, help='End with code 3 if something is wrong.')
 @columns.options
 @parameters.topic
-@parameters.gravity
-@parameters.joints
-@parameters.seed
-@parameters.reading
+@parameters.setting
 @parameters.as_json
 def check(
     arguments: tuple[str, ...],
@@ -127,6 +121,7 @@ def check(
     one: mass and centre of each link as described and as measured.
 
     """
+    from armid_ros.api.arguments import describes_robot
     from armid_ros.api.inspection import check as run
     from armid_ros.api.inspection import CheckResult
     from armid_ros.api.table import ResultOrigin
@@ -134,30 +129,23 @@ def check(
     from armid_ros.cli.origin import provenance
 
     context = click.get_current_context()
-    robot_source, bags = _parted(context, robot_source, arguments)
+    origin = context.get_parameter_source('robot_source')
+    typed = origin is click.core.ParameterSource.COMMANDLINE
+    if arguments and not typed and (robot_source is None or describes_robot(arguments[0])):
+        robot_source, *others = arguments
+        arguments = tuple(others)
+    if robot_source is None:
+        raise click.UsageError("Missing argument 'R', the description.")
+    robot_source = parameters.with_packages(context, robot_source) or ''
+    bags = tuple(map(Path, arguments))
     context.params |= {'robot_source': robot_source, 'bags': bags}
     staged = None if out is None else options.stage(out, CheckResult.schema, robot_source)
     robot = options.open_robot(robot_source, gravity, joints, bags, tell=False)
     with progress('checking'):
         found = run(robot, options.read(bags, robot, topic), rng=seed)
     source = [path for path in (Path(robot_source), *bags) if path.exists()]
-    origin = ResultOrigin(robot_source, '', provenance(source, seed=seed))
-    options.deliver(found, staged, origin, as_json)
+    options.deliver(
+        found, staged, ResultOrigin(robot_source, '', provenance(source, seed=seed)), as_json
+    )
     if strict and found.wrong:
         context.exit(3)
-
-
-def _parted(
-    context: click.Context, robot: str | None, arguments: tuple[str, ...]
-) -> tuple[str, tuple[Path, ...]]:
-    """Return the description and the recordings; that of armid.toml where none is typed."""
-    from armid_ros.api.arguments import describes_robot
-
-    typed = context.get_parameter_source('robot_source') is click.core.ParameterSource.COMMANDLINE
-    if arguments and not typed and (robot is None or describes_robot(arguments[0])):
-        robot, *others = arguments
-        arguments = tuple(others)
-    if robot is None:
-        raise click.UsageError("Missing argument 'R', the description.")
-    source = parameters.with_packages(context, robot)
-    return source or '', tuple(map(Path, arguments))

@@ -168,7 +168,21 @@ def open_robot(
 ) -> Robot:
     """Load the robot of --robot, --gravity and --joints; warn of doubtful values."""
     named = listed(joints) if isinstance(joints, str) else joints
-    robot = _loaded(source, gravity, named or None, bags)
+    if source != '-':
+        robot = load_robot(source, gravity=gravity, joints=named or None)
+    else:
+        texts = (
+            (path, None if is_table(path) else read_robot_description(path, read_settings()))
+            for path in bags
+        )
+        held = next(((path, text) for path, text in texts if text is not None), None)
+        if held is None:
+            raise RobotError(
+                f'no /robot_description in {", ".join(map(str, bags)) or "any bag"}; '
+                'name the URDF with --robot'
+            )
+        path, text = held
+        robot = robot_from_urdf(text, gravity=gravity, joints=named or None, source=str(path))
     lines = driven_in_words(robot) if joints is None else ()
     if tell:
         notes = click.get_current_context().meta.setdefault(NOTES, [])
@@ -176,21 +190,6 @@ def open_robot(
         found = [visible(f'note: {line}') for line in (*lines, *doubts)]
         notes += [line for line in found if line not in notes]
     return robot
-
-
-def _loaded(
-    source: str, gravity: str, chosen: Sequence[str] | None, bags: Sequence[Path]
-) -> Robot:
-    if source != '-':
-        return load_robot(source, gravity=gravity, joints=chosen)
-    for path in bags:
-        text = None if is_table(path) else read_robot_description(path, read_settings())
-        if text is not None:
-            return robot_from_urdf(text, gravity=gravity, joints=chosen, source=str(path))
-    raise RobotError(
-        f'no /robot_description in {", ".join(map(str, bags)) or "any bag"}; '
-        'name the URDF with --robot'
-    )
 
 
 def model_of(path: Path, robot: Robot | None) -> ArmModel:

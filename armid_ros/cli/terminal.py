@@ -115,7 +115,6 @@ class ProgressLines:
 def print_rows(
     rows: Sequence[dict[str, Any]],
     as_json: bool,
-    right: Sequence[str] = (),
 ) -> None:
     """
     Print rows as a table, or as JSON.
@@ -126,8 +125,6 @@ def print_rows(
         Cells by the heads of their columns.
     as_json : bool
         Whether for programs, with all columns.
-    right : sequence of str
-        Columns of numbers, which are never broken.
 
     """
     from armid_ros.files import json_text
@@ -144,14 +141,10 @@ def print_rows(
     for head in heads:
         table.add_column(
             Text(head),
-            justify='right' if head in right else 'left',
-            no_wrap=head in ('name', 'joint', *right),
+            no_wrap=head == 'name',
             overflow='fold',
         )
     for row in rows:
-        table.add_row(*(Text(_cell(row[head])) for head in heads))
+        cells = [', '.join(one) if isinstance(one, list) else one for one in row.values()]
+        table.add_row(*(Text(visible(cell)) for cell in cells))
     console.print(table)
-
-
-def _cell(value: Any) -> str:
-    return visible(', '.join(map(str, value)) if isinstance(value, list) else str(value))

@@ -23,7 +23,6 @@ from armid_ros.errors import TrajectoryError
 import click
 
 if TYPE_CHECKING:
-    from armid_ros.arm import ArmModel
     from armid_ros.files import Staged
     from armid_ros.robots import Robot
 
@@ -186,10 +185,7 @@ class Speed(click.ParamType[str | float]):
     type=click.FloatRange(min=0.0),
     help='Limit of processor time for the search [s]; default 120, 25 above 20 joints.',
 )
-@parameters.gravity
-@parameters.joints
-@parameters.seed
-@parameters.reading
+@parameters.setting
 @parameters.as_json
 def excite(
     robot_source: str,
@@ -221,6 +217,7 @@ def excite(
     from armid_ros.api.design import design_excitation
     from armid_ros.api.excitation import ExcitationResult
     from armid_ros.api.table import ResultOrigin
+    from armid_ros.arm import ArmModel
     from armid_ros.cli import options
     from armid_ros.cli.excite.springs import (
         refuse_other_options,
@@ -228,6 +225,7 @@ def excite(
         write_course,
     )
     from armid_ros.cli.origin import provenance
+    from armid_ros.effects import parse_effect
     from armid_ros.excitation import CollisionScene, with_joint_limits
     from armid_ros.excitation.search.local import INTERRUPTED
     from armid_ros.files.cells import parted
@@ -240,7 +238,12 @@ def excite(
     if kind in COURSES:
         write_course(kind, scene, duration, share, seed, out)
         return
-    arm, other = _arms(robot, model, effects, focus, texts, rival)
+    arm = ArmModel(robot) if model is None else options.model_of(model, robot)
+    arm = options.with_effects(arm, effects)
+    other = None if rival is None else options.with_effects(arm, rival.removesuffix('none'))
+    arm = options.with_effects(arm, focus)
+    for text in texts:
+        arm = arm.with_effect(*parse_effect(text, robot))
     if acceleration is not None:
         limits = options.per_joint(acceleration, robot, '--acceleration')
     require_free(out)
@@ -285,28 +288,6 @@ def _driven(source: str, gravity: str, joints: str | None, bags: tuple[Path, ...
         drives = f'{", ".join(others)}; --joints A,B,... drives them'
         say(f'not driven, as they belong to no arm: {drives}', 'yellow')
     return robot
-
-
-def _arms(
-    robot: Robot,
-    model: Path | None,
-    effects: str,
-    focus: str,
-    texts: tuple[str, ...],
-    rival: str | None,
-) -> tuple[ArmModel, ArmModel | None]:
-    """Return the prior model, and the one to tell it from."""
-    from armid_ros.arm import ArmModel
-    from armid_ros.cli import options
-    from armid_ros.effects import parse_effect
-
-    arm = ArmModel(robot) if model is None else options.model_of(model, robot)
-    arm = options.with_effects(arm, effects)
-    other = None if rival is None else options.with_effects(arm, rival.removesuffix('none'))
-    arm = options.with_effects(arm, focus)
-    for text in texts:
-        arm = arm.with_effect(*parse_effect(text, robot))
-    return arm, other
 
 
 @contextmanager
