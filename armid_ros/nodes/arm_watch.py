@@ -24,8 +24,6 @@ from sensor_msgs.msg import JointState
 
 #: Time for which an arm must be at rest before a run starts [s].
 _REST = 0.25
-#: A larger step of a simulated clock means that the clock was set, as in simulated_arm [s].
-_CLOCK_STEP = 60.0
 
 
 class ArmWatch:
@@ -68,7 +66,7 @@ class ArmWatch:
         self._stepped_ns = 0
         self._jumps = node.get_clock().create_jump_callback(
             JumpThreshold(
-                min_forward=Duration(seconds=_CLOCK_STEP),
+                min_forward=Duration(seconds=60.0),  # as in simulated_arm: the clock was set
                 min_backward=Duration(nanoseconds=-1),
                 on_clock_change=False,
             ),

@@ -34,13 +34,6 @@ from sensor_msgs.msg import JointState
 from std_msgs.msg import String
 from trajectory_msgs.msg import JointTrajectory
 
-#: How often due messages are published [s].
-_TICK = 0.001
-#: Messages published per timer call; services are answered between calls.
-_BURST = 1000
-#: Longest wait at the end of the node for trajectories to arrive [s].
-_FAREWELL = 1.0
-
 
 class _JumpGuard:
     """Compares the first waypoint of a trajectory with the measured joint positions."""
@@ -196,7 +189,7 @@ class BagPlayerNode(ArmidNode):
         self._keep_clock()
         pace = self.get_clock() if self._lock_step else Clock(clock_type=ClockType.STEADY_TIME)
         self._pace = pace
-        self._timer = self.create_timer(_TICK, self.play, clock=pace)
+        self._timer = self.create_timer(0.001, self.play, clock=pace)
 
     @property
     def finished(self) -> bool:
@@ -230,7 +223,7 @@ class BagPlayerNode(ArmidNode):
             self._anchor = now
         self._position += round((now - self._anchor) * rate)
         self._anchor = now
-        for _ in range(_BURST):
+        for _ in range(1000):  # services are answered between the calls of the timer
             if self._next is None or self._next.log_time_ns > self._position:
                 break
             self._publish(self._next)
@@ -239,7 +232,11 @@ class BagPlayerNode(ArmidNode):
                 self._messages = self._from_start()
                 self._next = next(self._messages, None)
                 self._position = self._clock_due = self._begin
-        self._publish_clock()
+        if self._clock_publisher is not None and self._clock_period:
+            if self._position >= self._clock_due:
+                stamp = Time(nanoseconds=self._position).to_msg()
+                self._clock_publisher.publish(ClockMessage(clock=stamp))
+                self._clock_due = self._position + self._clock_period
         if self.finished:
             self._timer.cancel()
 
@@ -276,7 +273,7 @@ class BagPlayerNode(ArmidNode):
         self._bag.close()
         if self._guard is not None and self.context.ok():
             for topic in self._trajectories:
-                self._topics[topic].wait_for_all_acked(Duration(seconds=_FAREWELL))
+                self._topics[topic].wait_for_all_acked(Duration(seconds=1.0))
 
     def _make_publishers(self) -> dict[str, Publisher]:
         topics = {self.resolve_topic_name(t.name): t for t in self._bag.topics()}
@@ -311,19 +308,6 @@ class BagPlayerNode(ArmidNode):
             return None
         return _JumpGuard(self, self.value('start_tolerance'), self.value('state_timeout'))
 
-    def _objection(self, message: RawMessage) -> str:
-        """Return why a message must not be published; empty if it may."""
-        if self._guard is None or message.topic not in self._trajectories:
-            return ''
-        if not self._has_states:
-            return self._guard.objection(message.cdr)
-        if self.count_publishers(self._states) > 1:
-            return (
-                f'trajectory: the bag is a recording with {self._states} of its own, and somebody '
-                'else publishes them too: an arm that is not where the recorded one was'
-            )
-        return ''
-
     def _from_start(self) -> Iterator[RawMessage]:
         return (m for m in self._bag.messages() if m.topic in self._topics)
 
@@ -334,30 +318,31 @@ class BagPlayerNode(ArmidNode):
         return everyone or time.monotonic() > self._made + self.value('subscriber_timeout')
 
     def _publish(self, message: RawMessage) -> None:
-        topic = self._topics[message.topic]
-        if self._guard is not None and message.topic in self._descriptions:
-            self._guard.describe(message.cdr)
-        if message.log_time_ns >= self._begin:
-            self._refused = self._objection(message) or self._refused
-            if self._refused and message.topic in self._trajectories:
+        guard = self._guard
+        if guard is not None and message.topic in self._descriptions:
+            guard.describe(message.cdr)
+        if message.log_time_ns < self._begin:
+            return
+        if guard is not None and message.topic in self._trajectories:
+            if not self._has_states:
+                self._refused = guard.objection(message.cdr) or self._refused
+            elif self.count_publishers(self._states) > 1:
+                self._refused = (
+                    f'trajectory: the bag is a recording with {self._states} of its own, and '
+                    'somebody else publishes them too: an arm that is not where the recorded one '
+                    'was'
+                )
+            if self._refused:
                 self.complaints.say('trajectory', self._refused)
                 return
-            topic.publish(message.cdr)
-            self.published[message.topic] += 1
+        self._topics[message.topic].publish(message.cdr)
+        self.published[message.topic] += 1
 
     def _take(self) -> None:
         """Read the next message; at the end of the bag, log its damage."""
         self._next = next(self._messages, None)
         if self._next is None and self._bag.damage:
             self.complaints.say('damage', f'{self.value("bag")}: {self._bag.damage}')
-
-    def _publish_clock(self) -> None:
-        due = self._clock_period and self._position >= self._clock_due
-        if self._clock_publisher is None or not due:
-            return
-        stamp = Time(nanoseconds=self._position).to_msg()
-        self._clock_publisher.publish(ClockMessage(clock=stamp))
-        self._clock_due = self._position + self._clock_period
 
 
 main = partial(run, BagPlayerNode)

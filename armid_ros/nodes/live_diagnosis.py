@@ -15,7 +15,7 @@ from armid_ros.diagnosis import Finding
 from armid_ros.errors import ArmidError, IdentificationError
 from armid_ros.files.own import refuse_replacing
 from armid_ros.live import Answer, Assistant, LiveDiagnosis, StreamWatch
-from armid_ros.live.assistant import Done, Helper, Plan, Save
+from armid_ros.live.assistant import Helper, Plan, Save
 from armid_ros.nodes.base import key_values
 from armid_ros.nodes.listening import ListeningNode
 from armid_ros.nodes.messages.joint_states import disturbance, JointSample
@@ -151,8 +151,12 @@ class LiveDiagnosisNode(ListeningNode):
             return False
         if isinstance(result, Answer):
             self._take(result)
-        else:
-            self._note(result)
+        elif not result.success:
+            self.complaints.say('diagnosis', result.text)
+        else:  # of saving or planning
+            self.tell(result.text)
+            if result.excitation:
+                self._runs.publish(String(data=result.excitation))
         if self._waiting and not self._helper.busy:
             self._helper.ask(self._waiting.pop(0))
         return True
@@ -226,15 +230,6 @@ class LiveDiagnosisNode(ListeningNode):
         if answer.named != self._said:
             self._said = answer.named
             self.get_logger().warning(said) if answer.named else self.get_logger().info(said)
-
-    def _note(self, done: Done) -> None:
-        """Log the result of saving or planning."""
-        if not done.success:
-            self.complaints.say('diagnosis', done.text)
-            return
-        self.tell(done.text)
-        if done.excitation:
-            self._runs.publish(String(data=done.excitation))
 
     def _require_diagnosis(self) -> None:
         if self._require().latest is None:

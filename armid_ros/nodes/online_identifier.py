@@ -47,8 +47,6 @@ from std_msgs.msg import String
 
 #: Default folder of ~/save.
 _FOLDER = 'online_identification'
-#: Number of update times kept for diagnostics.
-_TIMED = 2000
 
 
 class OnlineIdentifierNode(ListeningNode):
@@ -87,7 +85,7 @@ class OnlineIdentifierNode(ListeningNode):
         """Make the node; the identifier is by default made from the parameters."""
         super().__init__('online_identifier', **kwargs)
         self.identifier: OnlineIdentifier | None = None
-        self.update_times: deque[float] = deque(maxlen=_TIMED)
+        self.update_times: deque[float] = deque(maxlen=2000)
         self._published = -1
         self._disturbed: Counter[str] = Counter()
         if self.value('save_to'):  # check before the identification, not at its end
@@ -161,7 +159,16 @@ class OnlineIdentifierNode(ListeningNode):
             values |= {'update_p50_us': float(p50), 'update_p99_us': float(p99)}
         values |= {f'left out {reason}': n for reason, n in identifier.rejected.items()}
         values |= {f'restarted {reason}': n for reason, n in identifier.restarts.items()}
-        self._say_what_was_left_out(identifier)
+        counted = Counter(identifier.rejected) + Counter(identifier.restarts)
+        counted['missing'] = identifier.missing
+        news = counted - self._disturbed
+        several = self.joint_states.several if news else ''
+        for reason in news.keys() & DISTURBANCES.keys():
+            self.complaints.say(reason, disturbance(reason, several))
+        for joint, signal in identifier.spikes if news['spike'] else ():
+            text = f"the {signal} of '{joint}' jumps for single samples: left out"
+            self.complaints.say('spike', disturbance('spike', several, text))
+        self._disturbed = counted
         self._begin_statistics()
         return self._trouble(identifier), values
 
@@ -208,19 +215,6 @@ class OnlineIdentifierNode(ListeningNode):
         failed = self.identifier is not None and bool(self.identifier.error)
         stopped = self.freshness.stopped
         return DiagnosticStatus.ERROR if failed and not stopped else super().level(troubled)
-
-    def _say_what_was_left_out(self, identifier: OnlineIdentifier) -> None:
-        counted = Counter(identifier.rejected) + Counter(identifier.restarts)
-        counted['missing'] = identifier.missing
-        news = counted - self._disturbed
-        several = self.joint_states.several if news else ''
-        for reason in news.keys() & DISTURBANCES.keys():
-            self.complaints.say(reason, disturbance(reason, several))
-        if news['spike']:
-            for joint, signal in identifier.spikes:
-                text = f"the {signal} of '{joint}' jumps for single samples: left out"
-                self.complaints.say('spike', disturbance('spike', several, text))
-        self._disturbed = counted
 
     def _trouble(self, identifier: OnlineIdentifier) -> str:
         if self.awaited:

@@ -176,8 +176,10 @@ class Bag(Source):
     def _open(self, file: Path) -> Source:
         """Open one file."""
         storage = _STORAGES.get(_storage_suffix(file))
-        if storage is None:  # the import of the other one takes as long as reading a bag
-            from armid_ros.recording.ros1_source import Ros1Source as storage
+        if storage is None:  # this import takes as long as reading a bag
+            from armid_ros.recording.ros1_source import Ros1Source
+
+            storage = Ros1Source
         with reading(file, RecordingError):
             plain = self._unpacked(file) if file.suffix in _COMPRESSED else file
             source: Source = storage(plain, self._settings)

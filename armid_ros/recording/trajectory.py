@@ -7,12 +7,13 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
+from typing import Any, Protocol
 
 from armid_ros.errors import RecordingError, TrajectoryError
 from armid_ros.files import reading
-from armid_ros.motion import FloatArray, Motion
+from armid_ros.motion import FloatArray
 from armid_ros.recording.bag import Bag
+from armid_ros.recording.joint_state.encoder import Measured
 from armid_ros.recording.message_types import JOINT_TRAJECTORY, store_for
 from armid_ros.recording.qos import LATCHED
 from armid_ros.recording.source import DEFAULT, ReadSettings
@@ -22,9 +23,17 @@ from rosbags.serde import SerdeError
 from rosbags.typesys import get_typestore, Stores
 
 
+class Waypoints(Measured, Protocol):
+    """Contents of a JointTrajectory: a `Motion`, or a subset of its fields."""
+
+    @property
+    def ddq(self) -> FloatArray | None:
+        """Accelerations, shape (N, n)."""
+
+
 @dataclass(frozen=True)
 class ReadWaypoints:
-    """Waypoints of a message, as of a `Motion`; rates and efforts are None where it has none."""
+    """Waypoints read from a message; see `Waypoints`."""
 
     joints: tuple[str, ...]
     t: FloatArray
@@ -34,27 +43,30 @@ class ReadWaypoints:
     tau: FloatArray | None
 
 
-def joint_trajectory_cdr(motion: Motion) -> bytes:
+def joint_trajectory_cdr(motion: Waypoints) -> bytes:
     """
     Serialise a motion as one trajectory_msgs/JointTrajectory.
 
     Parameters
     ----------
-    motion : Motion
+    motion : Motion or other Waypoints
         Motion to serialise. Its times become time_from_start; the stamp 0 means now.
 
     """
     store = get_typestore(Stores.ROS2_JAZZY)
     types = store.types
-    tau = np.empty((len(motion.t), 0)) if motion.tau is None else motion.tau
+    nothing = np.empty((len(motion.t), 0))
+    dq, ddq, tau = (
+        nothing if values is None else values for values in (motion.dq, motion.ddq, motion.tau)
+    )
     points: list[Any] = []
     for sample, time in enumerate(np.rint(motion.t * 1e9).astype(np.int64).tolist()):
         seconds, nanoseconds = divmod(time, 10**9)
         points.append(
             types['trajectory_msgs/msg/JointTrajectoryPoint'](
                 positions=motion.q[sample],
-                velocities=motion.dq[sample],
-                accelerations=motion.ddq[sample],
+                velocities=dq[sample],
+                accelerations=ddq[sample],
                 effort=tau[sample],
                 time_from_start=types['builtin_interfaces/msg/Duration'](
                     sec=seconds, nanosec=nanoseconds
@@ -74,7 +86,7 @@ def joint_trajectory_cdr(motion: Motion) -> bytes:
 
 def write_joint_trajectory(
     path: str | Path,
-    motion: Motion,
+    motion: Waypoints,
     *,
     robot_description: str | None = None,
 ) -> None:
@@ -85,7 +97,7 @@ def write_joint_trajectory(
     ----------
     path : str or Path
         Bag directory to create; it must not exist.
-    motion : Motion
+    motion : Motion or other Waypoints
         Motion to write. Its torque, if any, is a feedforward effort.
     robot_description : str, optional
         URDF to be written to /robot_description.

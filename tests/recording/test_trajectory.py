@@ -2,8 +2,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """Reference motions in bags."""
 
-from dataclasses import replace
-
 from armid_ros.errors import RecordingError
 from armid_ros.motion import Motion
 from armid_ros.recording import (
@@ -16,6 +14,7 @@ from armid_ros.recording import (
     write_recording,
 )
 from armid_ros.recording.message_types import JOINT_TRAJECTORY
+from armid_ros.recording.trajectory import ReadWaypoints
 import numpy as np
 import pytest
 from rosbags.typesys import get_typestore, Stores
@@ -44,14 +43,8 @@ def test_a_trajectory_is_read_back_exactly_in_the_order_asked(motion, tmp_path):
 
 
 def test_efforts_are_written_and_what_is_not_known_is_left_out(motion, tmp_path):
-    store = get_typestore(Stores.ROS2_JAZZY)
-    pushed = joint_trajectory_cdr(replace(motion, tau=5.0 * motion.q))
-    message = store.deserialize_cdr(pushed, JOINT_TRAJECTORY)
-    for point in message.points:
-        point.velocities = point.accelerations = np.empty(0)
-    with BagWriter(tmp_path / 'bag') as writer:
-        writer.add_topic('/goal', JOINT_TRAJECTORY)
-        writer.write('/goal', bytes(store.serialize_cdr(message, JOINT_TRAJECTORY)), 1)
+    waypoints = ReadWaypoints(('a', 'b'), motion.t, motion.q, None, None, 5.0 * motion.q)
+    write_joint_trajectory(tmp_path / 'bag', waypoints)
     back = read_waypoints(tmp_path / 'bag', ('b', 'a'))
     assert back.dq is None and back.ddq is None
     np.testing.assert_array_equal(back.tau, 5.0 * motion.q[:, [1, 0]])

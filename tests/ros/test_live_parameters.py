@@ -113,12 +113,13 @@ def test_noise_and_rate_of_the_simulated_arm_change_while_it_runs(bench):
     states = bench.listen(JointState, 'joint_states')
     first = node.step()
     assert node.step() - first == 10_000_000
-    quiet = list(node.joint_state.effort)
+    bench.spin_until(lambda: len(states) >= 2, 'joint states')
+    quiet = list(states[-1].effort)
     node.set_parameters([Parameter('rate', value=500), Parameter('torque_noise', value=[1])])
     second = node.stamp_ns
     assert node.step() - second == 2_000_000
-    assert np.max(np.abs(np.subtract(node.joint_state.effort, quiet))) > 0.1
     bench.spin_until(lambda: len(states) >= 3, 'joint states')
+    assert np.max(np.abs(np.subtract(states[-1].effort, quiet))) > 0.1
     (result,) = node.set_parameters([Parameter('torque_noise', value=[1.0, 2.0])])
     assert not result.successful and '2 values' in result.reason
     (result,) = node.set_parameters([Parameter('rate', value=333.0)])

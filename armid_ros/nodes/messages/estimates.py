@@ -22,8 +22,6 @@ import yaml
 SCHEMA = 'armid/estimate/1'
 #: Written files: the estimate, the model with the estimate, and its robot.
 FILES = ('estimate.yaml', 'model.yaml', 'robot.urdf')
-#: Time for which a change is shown as a warning [s].
-RECENT = 60.0
 
 
 def estimate_message(
@@ -123,7 +121,7 @@ def change_status(name: str, changes: Sequence[Change], now: float) -> Diagnosti
     if changes:
         latest = changes[-1]
         age = now - latest.t
-        if age < RECENT:
+        if age < 60.0:
             status.level = DiagnosticStatus.WARN
         status.message = f'{latest}, {age:.0f} s ago'
         values |= _values(latest.size)

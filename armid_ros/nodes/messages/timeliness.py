@@ -9,16 +9,6 @@ import time
 
 from rclpy.clock import ROSClock
 
-#: Time without messages after which a topic counts as stopped [s]. Joint states slower than 2 Hz
-#: are not usable for identification.
-STOPPED = 0.5
-#: Largest difference of stamps and clock for results [s]: tf2 keeps ten seconds, so that RViz
-#: cannot draw older results. The messages that wait in the queue of a busy node, at most 1000, are
-#: younger.
-SHOWN = 10.0
-#: Number of messages of which the shortest delay gives the difference of the clocks.
-_RECENT = 20
-
 
 class Freshness:
     """
@@ -48,7 +38,7 @@ class Freshness:
     @property
     def stopped(self) -> bool:
         """Return whether messages have stopped after the first one."""
-        return self.silence > STOPPED
+        return self.silence > 0.5  # joint states below 2 Hz are not usable for identification
 
     def trouble(self) -> str:
         """Return a text if messages have stopped; empty otherwise."""
@@ -69,7 +59,7 @@ class StampDifference:
     def __init__(self, clock: ROSClock) -> None:
         self._clock = clock
         self._late = 0.0
-        self._recent: deque[float] = deque(maxlen=_RECENT)
+        self._recent: deque[float] = deque(maxlen=20)
 
     @property
     def late(self) -> float:
@@ -116,7 +106,9 @@ class StampDifference:
 
     def of_results(self, topic: str) -> str:
         """Return a text if the stamps of results are far from the clock; empty otherwise."""
-        if abs(self._late) <= SHOWN:
+        # tf2 keeps ten seconds, so that RViz cannot draw older results; the messages that wait in
+        # the queue of a busy node, at most 1000, are younger
+        if abs(self._late) <= 10.0:
             return ''
         return (
             f'stamps of {topic} are {abs(self._late):.0f} s {self._side(self._late)}, and so are '

@@ -11,13 +11,11 @@ import re
 import textwrap
 
 from armid_ros.nodes.base import ArmidNode, COMMON
-from armid_ros.nodes.parameters.table import NodeParameter
 from rclpy.utilities import remove_ros_args
 
 #: Syntax of ROS arguments.
 _WRITTEN = {'-p': '-p NAME:=VALUE', '-r': '-r NAME:=OTHER_NAME'}
 _FILE = '--params-file'
-_WIDTH = 99
 
 
 def unreadable(error: Exception) -> str:
@@ -92,24 +90,22 @@ def usage(node: type[ArmidNode]) -> str:
     """
     program = Path(inspect.getfile(node)).stem
     purpose = inspect.getdoc(node) or ''
+    lines = []
+    for parameter in (*node.table, *COMMON):
+        value, text = parameter.default, parameter.text()
+        if parameter.limits is not None:
+            text += f' {parameter.limits[0]:g} to {parameter.limits[1]:g}.'
+        written = str(value).lower() if isinstance(value, bool) else str(value)
+        lines.append(
+            f"  {parameter.name}:='{value}'"
+            if isinstance(value, str)
+            else f'  {parameter.name}:={written}'
+        )
+        lines += textwrap.wrap(text, 99, initial_indent=' ' * 6, subsequent_indent=' ' * 6)
     parts = [
         f'Usage: {program} --ros-args -p NAME:=VALUE ... -r TOPIC:=OTHER_TOPIC ...',
         purpose.partition('\nAttributes\n')[0].strip(),
         'Parameters, with their defaults:',
-        '\n'.join(_line(parameter) for parameter in (*node.table, *COMMON)),
+        '\n'.join(lines),
     ]
     return '\n\n'.join(parts)
-
-
-def _line(parameter: NodeParameter) -> str:
-    limits = ''
-    if parameter.limits is not None:
-        limits = f' {parameter.limits[0]:g} to {parameter.limits[1]:g}.'
-    text = textwrap.fill(
-        f'{parameter.text()}{limits}', _WIDTH, initial_indent=' ' * 6, subsequent_indent=' ' * 6
-    )
-    value = parameter.default
-    written = str(value).lower() if isinstance(value, bool) else str(value)
-    if isinstance(value, str):
-        written = f"'{value}'"
-    return f'  {parameter.name}:={written}\n{text}'

@@ -27,8 +27,6 @@ from threadpoolctl import threadpool_limits
 
 #: Timeout of the shutdown of DDS [s].
 LEAVING = 20.0
-#: Period of the check for signals [s].
-_LOOK_PERIOD = 0.1
 
 
 def make_executor(kind: str, context: Context | None = None) -> Executor:
@@ -137,7 +135,7 @@ def run(make_node: Callable[[], ArmidNode], args: Sequence[str] | None = None) -
         ending.with_parent = node.value('end_with_parent')
         with steady():
             while rclpy.ok() and not (node.finished or ending.due):
-                executor.spin_once(timeout_sec=_LOOK_PERIOD)  # the events executor hangs otherwise
+                executor.spin_once(timeout_sec=0.1)  # the events executor hangs otherwise
     except (_EndedAtOnce, ExternalShutdownException):
         pass
     except RCLError:  # the context was shut down between the check and the wait

@@ -13,9 +13,6 @@ from armid_ros.nodes.trajectory.action import ANYWHERE, beside, TrajectoryAction
 from rclpy.duration import Duration
 from trajectory_msgs.msg import JointTrajectory
 
-#: Longest time of the discovery of an action [s].
-_DISCOVERY = 1.0
-
 
 class TrajectorySenders:
     """
@@ -104,7 +101,7 @@ class TrajectorySenders:
         """
         self.look()
         if self.action is not None and self._offered:
-            self.action.wait(_DISCOVERY)
+            self.action.wait(1.0)  # longest time of the discovery of an action [s]
         if self.missing:
             raise TrajectoryError(f'{self.missing}; the arm is not started')
         self._by_action = self._has_action
