@@ -168,9 +168,7 @@ class BagPlayerNode(ArmidNode):
             raise RecordingError("parameter 'bag' is empty: give a bag, -p bag:=PATH")
         self._bag = Bag(self.value('bag'))
         self._lock_step = bool(self.value('use_sim_time'))
-        trouble = self.objection({'clock_rate': self.value('clock_rate')})
-        if trouble:
-            raise RecordingError(trouble)
+        self.check({'clock_rate': self.value('clock_rate')})
         self._wanted = {self.resolve_topic_name(name) for name in names(self, 'topics')}
         self._refused = ''
         self._topics = self._make_publishers()
@@ -240,11 +238,12 @@ class BagPlayerNode(ArmidNode):
         if self.finished:
             self._timer.cancel()
 
-    def objection(self, values: Mapping[str, Any]) -> str:
-        """Return an error if the node would publish the /clock that it follows."""
+    def check(self, values: Mapping[str, Any]) -> None:
+        """Raise a RecordingError if the node would publish the /clock that it follows."""
         if self.value('use_sim_time') and values.get('clock_rate'):
-            return 'use_sim_time follows /clock; it cannot publish it too: clock_rate'
-        return ''
+            raise RecordingError(
+                'use_sim_time follows /clock; it cannot publish it too: clock_rate'
+            )
 
     def changed(self, names: frozenset[str]) -> None:
         """Apply changed parameters for /clock and for the check of jumps."""

@@ -193,9 +193,9 @@ class ArmidNode(Node):
         """Return further statuses for /diagnostics."""
         return ()
 
-    def objection(self, values: Mapping[str, Any]) -> str:
+    def check(self, values: Mapping[str, Any]) -> None:
         """
-        Return why parameters cannot take new values at run time; empty if they can.
+        Raise an ArmidError if parameters cannot take new values at run time.
 
         Parameters
         ----------
@@ -203,7 +203,6 @@ class ArmidNode(Node):
             New values, which are set together; types and ranges are already checked.
 
         """
-        return ''
 
     def changed(self, names: frozenset[str]) -> None:
         """
@@ -307,8 +306,11 @@ class ArmidNode(Node):
         self.complaints.settle()
 
     def _validate(self, parameters: list[Parameter]) -> SetParametersResult:
-        reason = self.objection({p.name: p.value for p in parameters})
-        return SetParametersResult(successful=not reason, reason=reason)
+        try:
+            self.check({p.name: p.value for p in parameters})
+        except ArmidError as error:
+            return SetParametersResult(successful=False, reason=str(error))
+        return SetParametersResult(successful=True)
 
     def _apply(self, parameters: list[Parameter]) -> None:
         names = frozenset(p.name for p in parameters)

@@ -23,6 +23,7 @@ from armid_ros.excitation import (
 )
 from armid_ros.excitation.files import load_excitation, read_excitation
 from armid_ros.excitation.supervision import HANDOVER
+from armid_ros.files import reading
 from armid_ros.nodes.arm_watch import ArmWatch
 from armid_ros.nodes.base import ArmidNode
 from armid_ros.nodes.parameters.excitation import (
@@ -271,17 +272,14 @@ class ExcitationPublisherNode(ArmidNode):
             waiting = 'the controller does not report the end of the run; ~/stop ends the run'
         return self._trouble or waiting or self._rehearsed, values
 
-    def objection(self, values: Mapping[str, Any]) -> str:
-        """Return why a new excitation file cannot be used; empty if it can."""
+    def check(self, values: Mapping[str, Any]) -> None:
+        """Raise a TrajectoryError if a new excitation file cannot be used."""
         if 'file' not in values:
-            return ''
-        if self.elapsed is not None:
-            return "parameter 'file': an excitation is under way; ~/stop ends it"
-        try:
+            return
+        with reading("parameter 'file'", TrajectoryError):
+            if self.elapsed is not None:
+                raise TrajectoryError('an excitation is under way; ~/stop ends it')
             self._loaded(values['file'])
-        except ArmidError as error:
-            return f"parameter 'file': {error}"
-        return ''
 
     def changed(self, names: frozenset[str]) -> None:
         """Load the excitation of a changed parameter file."""

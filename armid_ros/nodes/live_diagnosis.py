@@ -12,7 +12,7 @@ from armid_msgs.msg import Diagnosis
 from armid_ros.api.arguments import source_of
 from armid_ros.arm.model_file import model_text
 from armid_ros.diagnosis import Finding
-from armid_ros.errors import ArmidError, IdentificationError
+from armid_ros.errors import IdentificationError
 from armid_ros.files.own import refuse_replacing
 from armid_ros.live import Answer, Assistant, LiveDiagnosis, StreamWatch
 from armid_ros.live.assistant import Helper, Plan, Save
@@ -193,13 +193,9 @@ class LiveDiagnosisNode(ListeningNode):
         name = f'{self.get_fully_qualified_name()[1:]}: diagnosis'
         return (_status(name, self.hardware, self.live.latest),)
 
-    def objection(self, values: Mapping[str, Any]) -> str:
-        """Return why settings do not fit each other; empty if they fit."""
-        try:
-            settings_of(lambda name: values.get(name, self.value(name)))
-        except ArmidError as error:
-            return str(error)
-        return ''
+    def check(self, values: Mapping[str, Any]) -> None:
+        """Raise an IdentificationError if settings do not fit each other."""
+        settings_of(lambda name: values.get(name, self.value(name)))
 
     def changed(self, names: frozenset[str]) -> None:
         """Apply changed settings."""

@@ -187,15 +187,10 @@ class OnlineIdentifierNode(ListeningNode):
             status.hardware_id = self.hardware
         return statuses
 
-    def objection(self, values: Mapping[str, Any]) -> str:
-        """Return why settings cannot change at run time; empty if they can."""
-        if self.identifier is None:
-            return ''
-        try:
+    def check(self, values: Mapping[str, Any]) -> None:
+        """Raise an ArmidError if settings cannot change at run time."""
+        if self.identifier is not None:
             self.identifier.check(self._settings(values))
-        except ArmidError as error:
-            return str(error)
-        return ''
 
     def changed(self, names: frozenset[str]) -> None:
         """Apply changed settings."""

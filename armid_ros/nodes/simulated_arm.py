@@ -12,6 +12,7 @@ from typing import Any
 from armid_ros.arm import ArmModel
 from armid_ros.arm.model_file import read_model
 from armid_ros.errors import ArmidError, ModelError, TrajectoryError
+from armid_ros.files import reading
 from armid_ros.nodes.base import ArmidNode
 from armid_ros.nodes.parameters.arm import (
     ARM_PARAMETERS,
@@ -279,16 +280,13 @@ class SimulatedArmNode(ArmidNode):
             'skipped_real_time': self.real_time.given_up,
         }
 
-    def objection(self, values: Mapping[str, Any]) -> str:
-        """Return why effects, noise or rates do not fit the arm; empty if they fit."""
-        try:
+    def check(self, values: Mapping[str, Any]) -> None:
+        """Raise an ArmidError if effects, noise or rates do not fit the arm."""
+        with reading(f'parameter {", ".join(map(repr, values))}', ArmidError):
             sensors_of(lambda name: values.get(name, self.value(name)), self._arm.joints)
             self._steps_at(values.get('rate', self.value('rate')))
             if 'effects' in values:
                 self._arm.successor(self._with_effects(values['effects']))
-        except ArmidError as error:
-            return f'parameter {", ".join(map(repr, values))}: {error}'
-        return ''
 
     def changed(self, names: frozenset[str]) -> None:
         """Apply changed effects, rates and sensors to the moving arm."""
