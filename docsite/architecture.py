@@ -16,7 +16,7 @@ import re
 JOBS = {
     'identify': ('armid_ros.cli.identify', 'identify'),
     'diagnose': ('armid_ros.cli.diagnose', 'diagnose'),
-    'excite': ('armid_ros.cli.excite.command', 'excite'),
+    'excite': ('armid_ros.cli.excite', 'excite'),
     'compare': ('armid_ros.cli.compare', 'compare'),
 }
 #: Whose calls are listed as well: the workflow of a job, and the function that it is named for.

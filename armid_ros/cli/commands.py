@@ -28,7 +28,7 @@ COMMANDS = {
     'convert': 'convert',
     'check': 'inspect',
     'inspect': 'inspect',
-    'excite': 'excite.command',
+    'excite': 'excite',
     'simulate': 'record',
     'call': 'call',
     'identify': 'identify',

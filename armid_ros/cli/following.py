@@ -61,7 +61,9 @@ def following(then: str, result: Shown) -> str:
     if then == 'excite' and own != 'check':
         more = ['--seed', given['seed'] + 1]
     if then in _OUT:
-        more += ['--out', _free(Path(given.get('out') or '').parent / _OUT[then])]
+        path = Path(given.get('out') or '').parent / _OUT[then]
+        others = (path.with_name(f'{path.name}_{number}') for number in count(2))
+        more += ['--out', next(one for one in chain([path], others) if not one.exists())]
     words = ['--robot', robot] if then in _ALONE else [*bags, '--robot', robot]
     words = [robot, *bags] if then == 'check' else words
     kept = {'gravity', 'joints'}
@@ -124,9 +126,3 @@ def _typed(context: click.Context, kept: Iterable[str]) -> Iterator[str]:
             value = [] if option.is_flag or '=' in word else [next(words)]
             if option.name in kept:
                 yield from (word, *value)
-
-
-def _free(path: Path) -> Path:
-    """Return a path at which nothing is yet."""
-    others = (path.with_name(f'{path.name}_{number}') for number in count(2))
-    return next(one for one in chain([path], others) if not one.exists())

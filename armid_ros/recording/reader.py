@@ -201,19 +201,13 @@ def choose_topics(bag: Bag, joints: Sequence[str], wanted: str | None) -> tuple[
     available = ', '.join(f'{topic.name} ({topic.count} messages)' for topic in candidates)
     if wanted is not None:
         name = '/' + wanted.lstrip('/')
-        for topic in topics:
-            if '/' + topic.name.lstrip('/') != name:
-                continue
-            if not holds_joint_state(topic):
-                raise RecordingError(
-                    f'{bag.path}: {topic.name} is a topic of {topic.type_name}, not of '
-                    f'{JOINT_STATE}; of that type there are: {available or "none"}'
-                )
-            return (topic,)
-        raise RecordingError(
-            f'{bag.path}: there is no topic {wanted}; topics of {JOINT_STATE}: '
-            f'{available or "none"}'
-        )
+        named = [topic for topic in topics if '/' + topic.name.lstrip('/') == name]
+        if not named or not holds_joint_state(named[0]):
+            what = f'is a topic of {named[0].type_name}' if named else 'does not exist'
+            raise RecordingError(
+                f'{bag.path}: {wanted} {what}; topics of {JOINT_STATE}: {available or "none"}'
+            )
+        return (named[0],)
     if not candidates:
         others = ', '.join(f'{topic.name} ({topic.type_name})' for topic in topics)
         damage = f' ({bag.damage})' if bag.damage else ''
@@ -222,18 +216,18 @@ def choose_topics(bag: Bag, joints: Sequence[str], wanted: str | None) -> tuple[
         )
     if len(candidates) == 1:
         return (candidates[0],)
-    named = {topic.name: named_joints(bag, topic) for topic in candidates}
-    complete = [topic for topic in candidates if set(joints) <= set(named[topic.name])]
+    names = {topic.name: named_joints(bag, topic) for topic in candidates}
+    complete = [topic for topic in candidates if set(joints) <= set(names[topic.name])]
     if len(complete) > 1:
         plain = [topic for topic in complete if topic.name.split('/')[-1] == 'joint_states']
         complete = plain if len(plain) == 1 else complete
     if len(complete) == 1:
         return (complete[0],)
-    parts = tuple(one for one in candidates if set(joints) & set(named[one.name]))
-    between = [name for one in parts for name in named[one.name]]
+    parts = tuple(one for one in candidates if set(joints) & set(names[one.name]))
+    between = [name for one in parts for name in names[one.name]]
     if not complete and set(joints) <= set(between) and len(between) == len(set(between)):
         return parts
-    listed = '; '.join(f'{name} names {", ".join(n) or "none"}' for name, n in named.items())
+    listed = '; '.join(f'{name} names {", ".join(n) or "none"}' for name, n in names.items())
     which = 'several topics name' if complete else 'no topic names'
     raise RecordingError(
         f'{bag.path}: {which} all of {", ".join(joints)}; say which topic to read: {listed}'

@@ -7,7 +7,7 @@ from __future__ import annotations
 import json
 
 from armid_ros.arm import ArmModel
-from armid_ros.cli.excite.command import excite
+from armid_ros.cli.excite import excite
 from armid_ros.errors import ArmidError
 from armid_ros.excitation import (
     Excitation,

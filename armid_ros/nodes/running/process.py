@@ -79,7 +79,7 @@ class _Ending:
             signal.signal(number, self._on_signal)
         # ignored signals stay ignored, as under nohup
         if signal.getsignal(signal.SIGHUP) is not signal.SIG_IGN:
-            signal.signal(signal.SIGHUP, self._on_hang_up)
+            signal.signal(signal.SIGHUP, self._on_signal)
 
     @property
     def due(self) -> bool:
@@ -96,10 +96,10 @@ class _Ending:
         finally:
             self._at_once = False
 
-    def _on_hang_up(self, *_: object) -> None:
-        self.hung_up = True
-
-    def _on_signal(self, *_: object) -> None:
+    def _on_signal(self, number: int, _: object) -> None:
+        if number == signal.SIGHUP:
+            self.hung_up = True
+            return
         self._asked = True
         if self._at_once:
             self._at_once = False  # `ros2 launch` sends a second one

@@ -6,6 +6,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from contextlib import contextmanager
+import os
 from pathlib import Path
 from typing import Any, TYPE_CHECKING
 
@@ -19,12 +20,21 @@ from armid_ros.cli.choices import (
     TARGETS,
 )
 from armid_ros.cli.terminal import progress, say
-from armid_ros.errors import TrajectoryError
+from armid_ros.errors import RecordingError, TrajectoryError
 import click
 
 if TYPE_CHECKING:
+    from armid_ros.excitation import CollisionScene
     from armid_ros.files import Staged
+    from armid_ros.motion import FloatArray
     from armid_ros.robots import Robot
+
+
+#: Options that both a course, for elastic joints, and a design take; a course takes --share too.
+_SHARED = {
+    'robot_source', 'out', 'kind', 'duration', 'clearance', 'environment', 'floor', 'gravity',
+    'joints', 'seed', 'force', 'crc', 'memory_limit',
+}  # fmt: skip
 
 
 class Speed(click.ParamType[str | float]):
@@ -219,18 +229,18 @@ def excite(
     from armid_ros.api.table import ResultOrigin
     from armid_ros.arm import ArmModel
     from armid_ros.cli import options
-    from armid_ros.cli.excite.springs import (
-        refuse_other_options,
-        require_free,
-        write_course,
-    )
     from armid_ros.cli.origin import provenance
     from armid_ros.effects import parse_effect
     from armid_ros.excitation import CollisionScene, with_joint_limits
     from armid_ros.excitation.search.local import INTERRUPTED
     from armid_ros.files.cells import parted
 
-    refuse_other_options(click.get_current_context())
+    context, default = click.get_current_context(), click.core.ParameterSource.DEFAULT
+    for option in context.command.params:
+        name = str(option.name)
+        fits = name in _SHARED or (name == 'share') == (kind in COURSES)
+        if not fits and context.get_parameter_source(name) is not default:
+            raise click.UsageError(f'{option.opts[0]} does not go with --kind {kind}')
     robot = _driven(robot_source, gravity, joints, after)
     robot, limits = with_joint_limits(robot, joint_limits, velocity)
     with progress('reading meshes') as tick:
@@ -303,3 +313,52 @@ def _kept_design(staged: Staged) -> Iterator[None]:
         raise TrajectoryError(
             f'{held}, but there is no trajectory: {error}; take another --start, or another --seed'
         ) from error
+
+
+def require_free(folder: Path) -> None:
+    """Raise a RecordingError if the recording exists, before the design begins."""
+    from armid_ros.api.excitation import BAG
+    from armid_ros.files.own import is_plan
+
+    if any(folder.glob('*.mcap')) or (folder / 'metadata.yaml').exists():
+        raise RecordingError(f'{folder} is a recording; name another --out')
+    if os.path.lexists(folder / BAG) and not is_plan(folder / BAG):
+        raise RecordingError(
+            f'{folder / BAG}: is no trajectory of armid excite; name another --out, or move it '
+            'away'
+        )
+
+
+def write_course(
+    kind: str, space: CollisionScene, duration: float, share: float, seed: int, out: Path
+) -> None:
+    """Write the trajectory that shows elastic joints as a bag."""
+    from armid_ros.api.excitation import BAG, ExcitationResult
+    from armid_ros.cli import options
+    from armid_ros.excitation import ClearanceModel, Limits
+    from armid_ros.recording import write_joint_trajectory
+    from armid_ros.simulation.elastic.courses import multisine_course, step_course
+    import numpy as np
+
+    robot = space.collision.robot
+    require_free(out)
+    staged = options.stage(out, ExcitationResult.schema, robot.name)
+    bodies, margin = ClearanceModel.of(space.bodies), space.clearance
+
+    def clear(q: FloatArray) -> bool:
+        inside = np.all((q >= robot.lower) & (q <= robot.upper))
+        return bool(inside) and float(bodies.smallest(q, margin).min()) >= margin
+
+    rng = np.random.default_rng(seed)
+    make = multisine_course if kind == 'multisine' else step_course
+    course = make(robot, duration, share, rng, clear)
+    write_joint_trajectory(staged.folder / BAG, course, robot_description=robot.urdf)
+    staged.keep()
+    say(f'{out / BAG}: {len(course.t)} waypoints, {course.duration:.1f} s')
+    first = ', '.join(
+        f'{joint} {q:.3g} {unit}'
+        for joint, q, unit in zip(robot.joints, course.q[0], robot.position_units, strict=True)
+    )
+    say(f'starts at rest in the middle of the ranges, {first}: bring the arm there first')
+    for missing in space.not_checked(Limits.of(robot)):
+        say(f'not checked: {missing}', 'yellow')
