@@ -132,7 +132,17 @@ class ArmWatch:
         if len(senders) > self.monitor.sources:
             names = ', '.join(sorted(s.node_name for s in senders))
             return f'{topic}: {len(senders)} publishers for the same joints ({names}): stop one'
-        return self.stamps.of_start(topic, difference, simulated)
+        late, clock = self.stamps.late, self._node.get_clock().now().nanoseconds * 1e-9
+        if not abs(late) > difference:
+            return ''
+        # a controller with another clock begins the trajectory late, or skips its beginning
+        remedy = 'set the clocks, or zero_stamp:=true'
+        if simulated:
+            remedy = 'use_sim_time on both nodes or on neither'
+        return (
+            f'stamps of {topic} are {abs(late):.3g} s {self.stamps.side(late)} '
+            f'({clock - late:.3f} s and {clock:.3f} s), more than {difference:.3g} s: {remedy}'
+        )
 
     def _on_clock_step(self, jump: Any) -> None:
         self._stepped_ns += jump.delta.nanoseconds

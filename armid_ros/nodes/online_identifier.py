@@ -14,22 +14,18 @@ import time
 from typing import Any
 
 from armid_msgs.msg import ParameterEstimate
-from armid_ros.arm.model_file import read_model
+from armid_ros.arm.model_file import parameter_table, read_model, save_model
 from armid_ros.effects import Effect
-from armid_ros.errors import ArmidError, IdentificationError
+from armid_ros.errors import ArmidError, IdentificationError, ModelError
 from armid_ros.estimate import Estimate
+from armid_ros.files import write_file
 from armid_ros.files.own import refuse_replacing
 from armid_ros.identification.online.identifier import OnlineIdentifier, OnlineSettings
 from armid_ros.identification.online.learning_progress import LearningProgress, too_little_motion
 from armid_ros.motion import FloatArray
+from armid_ros.nodes.base import key_values
 from armid_ros.nodes.listening import ListeningNode
-from armid_ros.nodes.messages.estimates import (
-    change_status,
-    estimate_message,
-    FILES,
-    parameter_status,
-    save_identification,
-)
+from armid_ros.nodes.messages.estimates import estimate_message, estimate_values
 from armid_ros.nodes.messages.joint_states import disturbance, DISTURBANCES, JointSample
 from armid_ros.nodes.parameters.identifier import (
     IDENTIFIER_PARAMETERS,
@@ -44,7 +40,10 @@ import numpy as np
 from rclpy.publisher import Publisher
 from sensor_msgs.msg import JointState
 from std_msgs.msg import String
+import yaml
 
+#: Files of ~/save: the estimate, the model with the estimate, and its robot.
+FILES = ('estimate.yaml', 'model.yaml', 'robot.urdf')
 #: Default folder of ~/save.
 _FOLDER = 'online_identification'
 
@@ -115,11 +114,31 @@ class OnlineIdentifierNode(ListeningNode):
         return 'the estimate begins anew'
 
     def save(self) -> str:
-        """Write the estimate to files."""
-        if not self._require().samples:
+        """Write the estimate, an arm model with it, and the robot of the model to files."""
+        identifier = self._require()
+        if not identifier.samples:
             raise IdentificationError('nothing has been learned so far, so nothing is written')
         folder = Path(self.value('save_to') or _FOLDER).expanduser()
-        paths = save_identification(folder, self._require())
+        refuse_replacing(folder, FILES)
+        robot, estimate = identifier.arm.robot, identifier.estimate()
+        document = {
+            'schema': 'armid/estimate/1',
+            'robot': robot.name,
+            'gravity': [float(g) for g in robot.gravity],
+            'samples': identifier.samples,
+            'condition_number': identifier.condition_number,
+            'parameters': parameter_table(
+                estimate.parameters, estimate.values, [float(s) for s in estimate.std]
+            ),
+        }
+        estimated, model, urdf = paths = tuple(folder / name for name in FILES)
+        try:
+            folder.mkdir(parents=True, exist_ok=True)
+            write_file(urdf, robot.urdf)
+            save_model(model, identifier.model(), urdf.name, estimate)
+            write_file(estimated, yaml.safe_dump(document, sort_keys=False, width=99))
+        except OSError as error:
+            raise ModelError(f'{folder}: cannot be written: {error.strerror}') from error
         return f'wrote {", ".join(map(str, paths))}'
 
     def close(self) -> None:
@@ -177,15 +196,24 @@ class OnlineIdentifierNode(ListeningNode):
         identifier, prefix = self.identifier, self.get_fully_qualified_name()[1:]
         if identifier is None:
             return ()
-        statuses = (
-            parameter_status(
-                f'{prefix}: parameters', identifier.estimate() if identifier.samples else None
-            ),
-            change_status(f'{prefix}: changes', identifier.changes, self._last_sample),
-        )
-        for status in statuses:
-            status.hardware_id = self.hardware
-        return statuses
+        common = {'level': DiagnosticStatus.OK, 'hardware_id': self.hardware}
+        learned = DiagnosticStatus(name=f'{prefix}: parameters', **common)
+        learned.message = 'nothing learned so far'
+        if identifier.samples:
+            learned.message = 'value, lower and upper end of the 95 % interval'
+            learned.values = key_values(estimate_values(identifier.estimate()))
+        changed = DiagnosticStatus(name=f'{prefix}: changes', **common)
+        changed.message = 'no change seen'
+        values: dict[str, object] = {'changes': len(identifier.changes)}
+        if identifier.changes:
+            latest = identifier.changes[-1]
+            age = self._last_sample - latest.t
+            if age < 60.0:
+                changed.level = DiagnosticStatus.WARN
+            changed.message = f'{latest}, {age:.0f} s ago'
+            values |= estimate_values(latest.size)
+        changed.values = key_values(values)
+        return learned, changed
 
     def check(self, values: Mapping[str, Any]) -> None:
         """Raise an ArmidError if settings cannot change at run time."""

@@ -89,9 +89,27 @@ def assembled(
     decoder: JointStateDecoder,
     damage: str,
 ) -> Recording:
-    """Assemble a recording from decoded messages, and free their memory."""
+    """Assemble a recording of joints that messages name, and free the memory of the messages."""
     where = f'{path}: {topic}'
-    check_joints(where, decoder, joints)
+    if not decoder.messages:
+        raise RecordingError(f'{where} has no messages')
+    missing = [joint for joint in joints if joint not in decoder.names_seen]
+    if missing and not decoder.names_seen:
+        raise RecordingError(
+            f'{where}: none of {decoder.messages} messages names a joint; '
+            f'{decoder.first_problem or "the names are empty"}'
+        )
+    if missing:
+        listed = ', '.join(f"'{name}'" for name in missing)
+        found = nearest(missing[0], [name for name in decoder.names_seen if name not in joints])
+        present = ','.join(name for name in joints if name in decoder.names_seen)
+        hint = f'; --joints {present} reads the others' if present else ''
+        if found:
+            hint = f"; if '{found}' is '{missing[0]}', use --rename {found}:{missing[0]}{hint}"
+        raise RecordingError(
+            f'{where} does not name {"joint" if len(missing) == 1 else "joints"} {listed}; '
+            f'its joints are {", ".join(decoder.names_seen)}{hint}'
+        )
     if damage:
         damage = f'of a damaged bag {decoder.messages} messages could be read: {damage}'
     with reading(where, RecordingError):
@@ -260,30 +278,6 @@ def bag_contents(path: str | Path, settings: ReadSettings = DEFAULT) -> tuple[To
             replace(topic, joints=named_joints(bag, topic)) if holds_joint_state(topic) else topic
             for topic in bag.topics()
         )
-
-
-def check_joints(where: str, decoder: JointStateDecoder, joints: Sequence[str]) -> None:
-    """Raise a RecordingError if a topic has no messages or does not name all joints."""
-    if not decoder.messages:
-        raise RecordingError(f'{where} has no messages')
-    missing = [joint for joint in joints if joint not in decoder.names_seen]
-    if not missing:
-        return
-    if not decoder.names_seen:
-        raise RecordingError(
-            f'{where}: none of {decoder.messages} messages names a joint; '
-            f'{decoder.first_problem or "the names are empty"}'
-        )
-    listed = ', '.join(f"'{name}'" for name in missing)
-    found = nearest(missing[0], [name for name in decoder.names_seen if name not in joints])
-    present = ','.join(name for name in joints if name in decoder.names_seen)
-    hint = f'; --joints {present} reads the others' if present else ''
-    if found:
-        hint = f"; if '{found}' is '{missing[0]}', use --rename {found}:{missing[0]}{hint}"
-    raise RecordingError(
-        f'{where} does not name {"joint" if len(missing) == 1 else "joints"} {listed}; '
-        f'its joints are {", ".join(decoder.names_seen)}{hint}'
-    )
 
 
 def read_robot_description(path: str | Path, settings: ReadSettings = DEFAULT) -> str | None:

@@ -72,35 +72,8 @@ class StampDifference:
         self._late = (now - stamp_ns) * 1e-9 if stamp_ns and now else 0.0
         self._recent.append(self._late)
 
-    def of_start(self, topic: str, allowed: float, simulated: bool) -> str:
-        """
-        Return why a trajectory stamped by this node must not be sent; empty if it may.
-
-        A controller with another clock begins the trajectory late, or skips its beginning. A small
-        difference is compensated.
-
-        Parameters
-        ----------
-        topic : str
-            Topic of the stamps.
-        allowed : float
-            Largest permitted difference of stamps and clock [s].
-        simulated : bool
-            Whether the arm is.
-
-        """
-        late, now = self.late, self._clock.now().nanoseconds * 1e-9
-        if not abs(late) > allowed:
-            return ''
-        advice = 'set the clocks, or zero_stamp:=true'
-        if simulated:
-            advice = 'use_sim_time on both nodes or on neither'
-        return (
-            f'stamps of {topic} are {abs(late):.3g} s {self._side(late)} ({now - late:.3f} s and '
-            f'{now:.3f} s), more than {allowed:.3g} s: {advice}'
-        )
-
-    def _side(self, late: float) -> str:
+    def side(self, late: float) -> str:
+        """Return on which side of the clock stamps with a delay [s] are."""
         clock = '/clock' if self._clock.ros_time_is_active else "this computer's clock"
         return f'{"behind" if late > 0.0 else "ahead of"} {clock}'
 
@@ -111,7 +84,7 @@ class StampDifference:
         if abs(self._late) <= 10.0:
             return ''
         return (
-            f'stamps of {topic} are {abs(self._late):.0f} s {self._side(self._late)}, and so are '
+            f'stamps of {topic} are {abs(self._late):.0f} s {self.side(self._late)}, and so are '
             'those of what is made of them: set the clocks, or use_sim_time on all nodes or on '
             'none'
         )
