@@ -221,9 +221,11 @@ def choose_topics(bag: Bag, joints: Sequence[str], wanted: str | None) -> tuple[
         name = '/' + wanted.lstrip('/')
         named = [topic for topic in topics if '/' + topic.name.lstrip('/') == name]
         if not named or not holds_joint_state(named[0]):
-            what = f'is a topic of {named[0].type_name}' if named else 'does not exist'
+            what = f'there is no topic {wanted}'
+            if named:
+                what = f'{named[0].name} is a topic of {named[0].type_name}'
             raise RecordingError(
-                f'{bag.path}: {wanted} {what}; topics of {JOINT_STATE}: {available or "none"}'
+                f'{bag.path}: {what}; topics of {JOINT_STATE}: {available or "none"}'
             )
         return (named[0],)
     if not candidates:

@@ -172,7 +172,17 @@ class McapSource(Source):
         """Return the content of a chunk, and begin and heads of its messages."""
         content, begin, end = unpacked
         if chunk.indexes and chunk.whole and end > begin:
-            offsets = self._indexed(chunk) + begin
+            # Offsets beyond the content are set to its end, where no message can begin.
+            parts = [
+                np.minimum(
+                    np.frombuffer(self._found.data, '<u8', 2 * count, at)[1::2], chunk.size
+                ).astype(np.int64)
+                for at, count in chunk.indexes.values()
+            ]
+            offsets = parts[0] if len(parts) == 1 else np.concatenate(parts)
+            if len(parts) > 1 or not (np.diff(offsets) > 0).all():
+                offsets = np.sort(offsets, kind='stable')
+            offsets += begin
             rows = tiled(content, offsets, begin, end)
             if rows is not None:
                 return content, offsets, rows
@@ -183,20 +193,6 @@ class McapSource(Source):
                 f'some messages {self._found.span(chunk)} are lost'
             )
         return content, offsets, heads(content, offsets)
-
-    def _indexed(self, chunk: Chunk) -> IntArray:
-        """Return the begin of the messages in a chunk by its index."""
-        # Offsets beyond the content are set to its end, where no message can begin.
-        parts = [
-            np.minimum(
-                np.frombuffer(self._found.data, '<u8', 2 * count, at)[1::2], chunk.size
-            ).astype(np.int64)
-            for at, count in chunk.indexes.values()
-        ]
-        if len(parts) == 1:
-            offsets = parts[0]
-            return offsets if (np.diff(offsets) > 0).all() else np.sort(offsets)
-        return np.sort(np.concatenate(parts), kind='stable')
 
     def _possible(self, offsets: IntArray, rows: _Rows, wanted: Sequence[int]) -> IntArray:
         """Return the messages that are of some channels and have a valid time."""

@@ -70,7 +70,13 @@ class TableColumn:
         with np.errstate(invalid='ignore'):  # ignore warnings for signalling NaN
             values = np.where(np.abs(self.values) <= LARGEST, self.values, np.nan)
         object.__setattr__(self, 'values', read_only(values))
-        unit = _normal_unit(self.unit) or _unit_of(self.array or self.name)
+        name = self.array or self.name
+        unit, bracket = _normal_unit(self.unit), _BRACKETS.search(name)
+        if bracket and not unit:
+            unit = _normal_unit(bracket[1])
+        elif not unit:  # as in act_pos_deg[3]
+            plain = re.sub(r'\[\d+\]$', '', name).rstrip('0123456789_').lower()
+            unit = next((_UNITS[end] for end in _ENDINGS if plain.endswith(f'_{end}')), '')
         object.__setattr__(self, 'unit', unit)
 
     @property
@@ -193,15 +199,6 @@ def _normal_unit(text: str) -> str:
     """Return the standard spelling of a unit: 'deg', 'rad/s', 'N m', 'ms'."""
     text = text.strip().strip('[]()').replace('°', 'deg').replace('\u00b5', 'u')
     return _UNITS.get(text.lower(), text)
-
-
-def _unit_of(name: str) -> str:
-    """Return the unit in a name: 'deg' of 'q1 [deg]' and of 'act_pos_deg[3]'."""
-    bracket = _BRACKETS.search(name)
-    if bracket:
-        return _normal_unit(bracket[1])
-    plain = re.sub(r'\[\d+\]$', '', name).rstrip('0123456789_').lower()
-    return next((_UNITS[end] for end in _ENDINGS if plain.endswith(f'_{end}')), '')
 
 
 def table_of_arrays(
