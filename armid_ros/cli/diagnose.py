@@ -165,7 +165,6 @@ def diagnose(
     from armid_ros.api.table import ResultOrigin
     from armid_ros.arm import ArmModel
     from armid_ros.cli import options
-    from armid_ros.cli.origin import provenance
     from armid_ros.identification.parameters_file import read_misfit
 
     if residual is not None:
@@ -202,7 +201,7 @@ def diagnose(
         )
         source = options.kept_source(robot_source, robot, staged.folder)
         origin = ResultOrigin(
-            robot_source, source, provenance([*bags, *validate, *baseline], seed=seed)
+            robot_source, source, options.provenance([*bags, *validate, *baseline], seed=seed)
         )
         result.fill(staged.folder, origin)
         staged.keep()

@@ -229,7 +229,6 @@ def excite(
     from armid_ros.api.table import ResultOrigin
     from armid_ros.arm import ArmModel
     from armid_ros.cli import options
-    from armid_ros.cli.origin import provenance
     from armid_ros.effects import parse_effect
     from armid_ros.excitation import CollisionScene, with_joint_limits
     from armid_ros.excitation.search.local import INTERRUPTED
@@ -277,7 +276,7 @@ def excite(
             **{name: value for name, value in settings.items() if value is not None},
         )
         tick(1.0, 'writing')
-        origin = ResultOrigin(robot_source, provenance=provenance(read, seed=seed))
+        origin = ResultOrigin(robot_source, provenance=options.provenance(read, seed=seed))
         with _kept_design(staged):
             options.deliver(result, staged, origin, as_json)
     if result.core.stopped == INTERRUPTED:

@@ -82,7 +82,13 @@ def _subject(
     bags = list(given.get('bags') or filter(None, [given.get('bag')]))
     more: list[Any] = []
     if isinstance(result, ComparisonResult):
-        return _compared(result, then)
+        before, after = (Path(one.source) for one in (result.core.before, result.core.after))
+        model = before.with_name('model.yaml')
+        more = ['--model', model] if then == 'diagnose' and model.exists() else []
+        for source in [after] if more else [before, after]:
+            with suppress(ModelError):  # it does not name its recordings
+                bags += identified_from(source)
+        return result.core.after.robot, list(dict.fromkeys(bags)) or [Path('BAG')], more
     if isinstance(result, ExcitationResult):
         more = ['--trajectory', out / 'excitation.yaml']
     elif isinstance(result, DiagnosisResult) and then == 'simulate':
@@ -96,18 +102,6 @@ def _subject(
     if robot == '-' and then in _ALONE:
         robot = out / 'robot.urdf'
     return robot or '', bags[:1] if then == 'inspect' else bags, more
-
-
-def _compared(result: ComparisonResult, then: str) -> tuple[str | Path, list[Path], list[Any]]:
-    """Return robot, recordings and options of what follows a comparison."""
-    before, after = (Path(one.source) for one in (result.core.before, result.core.after))
-    model = before.with_name('model.yaml')
-    more = ['--model', model] if then == 'diagnose' and model.exists() else []
-    bags: list[Path] = []
-    for source in [after] if more else [before, after]:
-        with suppress(ModelError):  # it does not name its recordings
-            bags += identified_from(source)
-    return result.core.after.robot, list(dict.fromkeys(bags)) or [Path('BAG')], more
 
 
 def _each(option: str, values: Iterable[Any]) -> Iterator[Any]:

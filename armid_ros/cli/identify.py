@@ -97,7 +97,6 @@ def identify(
     from armid_ros.api.table import ResultOrigin
     from armid_ros.arm import ArmModel
     from armid_ros.cli import options
-    from armid_ros.cli.origin import provenance
     from armid_ros.errors import IdentificationError
     from armid_ros.identification import PhysicalSettings
 
@@ -122,7 +121,7 @@ def identify(
         origin = ResultOrigin(
             robot_source,
             options.kept_source(robot_source, robot, staged.folder),
-            provenance([*bags, *validate], result.document()['settings'], seed),
+            options.provenance([*bags, *validate], result.document()['settings'], seed),
         )
         told = None if as_json else result.summary(every)
         options.deliver(result, staged, origin, as_json, told)

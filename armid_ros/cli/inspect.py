@@ -49,7 +49,6 @@ def inspect(
     from armid_ros.api.inspection import InspectionResult
     from armid_ros.api.table import ResultOrigin
     from armid_ros.cli import options
-    from armid_ros.cli.origin import provenance
     from armid_ros.files.cells import listed
     from armid_ros.recording.anything import read_anything
 
@@ -75,7 +74,7 @@ def inspect(
             (recording,) = options.read([bag], robot, topic)
         tick(0.5, 'trying to identify' if robot else 'looking')
         found = run(robot, recording, topics=topics, rng=seed)
-    origin = ResultOrigin(robot_source or '', provenance=provenance([bag], seed=seed))
+    origin = ResultOrigin(robot_source or '', provenance=options.provenance([bag], seed=seed))
     options.deliver(found, staged, origin, as_json)
 
 
@@ -126,11 +125,10 @@ def check(
     from armid_ros.api.inspection import CheckResult
     from armid_ros.api.table import ResultOrigin
     from armid_ros.cli import options
-    from armid_ros.cli.origin import provenance
 
     context = click.get_current_context()
-    origin = context.get_parameter_source('robot_source')
-    typed = origin is click.core.ParameterSource.COMMANDLINE
+    given = context.get_parameter_source('robot_source')
+    typed = given is click.core.ParameterSource.COMMANDLINE
     if arguments and not typed and (robot_source is None or describes_robot(arguments[0])):
         robot_source, *others = arguments
         arguments = tuple(others)
@@ -144,8 +142,7 @@ def check(
     with progress('checking'):
         found = run(robot, options.read(bags, robot, topic), rng=seed)
     source = [path for path in (Path(robot_source), *bags) if path.exists()]
-    options.deliver(
-        found, staged, ResultOrigin(robot_source, '', provenance(source, seed=seed)), as_json
-    )
+    origin = ResultOrigin(robot_source, '', options.provenance(source, seed=seed))
+    options.deliver(found, staged, origin, as_json)
     if strict and found.wrong:
         context.exit(3)

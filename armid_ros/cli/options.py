@@ -4,9 +4,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Collection, Sequence
+from collections.abc import Collection, Iterable, Mapping, Sequence
+from datetime import datetime
 from pathlib import Path
-from typing import TYPE_CHECKING
+import shlex
+import sys
+from typing import Any, TYPE_CHECKING
 
 from armid_ros.api.table import ResultOrigin, Shown, Summary
 from armid_ros.arm import ArmModel, load_model
@@ -30,6 +33,7 @@ from armid_ros.files.own import written_by
 from armid_ros.motion import FloatArray
 from armid_ros.recording import read_robot_description, ReadSettings, Recording
 from armid_ros.recording.anything import is_table, read_anything
+from armid_ros.report.provenance import hash_files, Provenance, versions
 from armid_ros.report.sections.frame import VerdictSection
 from armid_ros.robots import (
     driven_in_words,
@@ -141,6 +145,38 @@ def show_verdict(
     """Print the verdict of a page, and a table."""
     first, *others = verdict.sentences
     show(Summary(first, verdict.grade, heads, rows, [*others, *verdict.beware]), *below)
+
+
+def provenance(
+    paths: Iterable[Path], settings: Mapping[str, Any] | None = None, seed: int | None = None
+) -> Provenance:
+    """
+    Return the provenance of the running command.
+
+    Parameters
+    ----------
+    paths : iterable of Path
+        What it reads; files and folders.
+    settings : mapping of str to object, optional
+        What it uses.
+    seed : int, optional
+        Of its random numbers.
+
+    """
+
+    def text(value: Any) -> str:
+        if isinstance(value, list):
+            return ', '.join(map(text, value))
+        return f'{value:.6g}' if isinstance(value, float) else str(value)
+
+    return Provenance(
+        files=hash_files(paths),
+        versions=versions(),
+        settings={name: text(value) for name, value in (settings or {}).items()},
+        seed=seed,
+        command=shlex.join(['armid', *sys.argv[1:]]),
+        created=datetime.now().astimezone().isoformat(' ', 'seconds'),
+    )
 
 
 def read_settings() -> ReadSettings:

@@ -172,7 +172,15 @@ class BagPlayerNode(ArmidNode):
         self._wanted = {self.resolve_topic_name(name) for name in names(self, 'topics')}
         self._refused = ''
         self._topics = self._make_publishers()
-        self._guard = self._make_guard()
+        types = {t.name: t.type_name for t in self._bag.topics() if t.name in self._topics}
+        self._trajectories = {n for n, kind in types.items() if kind == JOINT_TRAJECTORY}
+        self._descriptions = {n for n in types if n.endswith('robot_description')}
+        self._states = self.resolve_topic_name('joint_states')
+        self._has_states = any(self.resolve_topic_name(n) == self._states for n in types)
+        self._guard: _JumpGuard | None = None
+        if self._trajectories:
+            limits = self.value('start_tolerance'), self.value('state_timeout')
+            self._guard = _JumpGuard(self, *limits)
         self._messages = self._from_start()
         self._next: RawMessage | None = None
         self._take()
@@ -295,17 +303,6 @@ class BagPlayerNode(ArmidNode):
         if not publishers:
             raise RecordingError(f'{self._bag.path}: nothing to play')
         return publishers
-
-    def _make_guard(self) -> _JumpGuard | None:
-        """Return a guard that subscribes to joint_states; None without a trajectory to play."""
-        types = {t.name: t.type_name for t in self._bag.topics() if t.name in self._topics}
-        self._trajectories = {n for n, kind in types.items() if kind == JOINT_TRAJECTORY}
-        self._descriptions = {n for n in types if n.endswith('robot_description')}
-        self._states = self.resolve_topic_name('joint_states')
-        self._has_states = any(self.resolve_topic_name(n) == self._states for n in types)
-        if not self._trajectories:
-            return None
-        return _JumpGuard(self, self.value('start_tolerance'), self.value('state_timeout'))
 
     def _from_start(self) -> Iterator[RawMessage]:
         return (m for m in self._bag.messages() if m.topic in self._topics)

@@ -21,9 +21,6 @@ from rclpy.subscription import Subscription
 from rclpy.timer import Timer
 from std_srvs.srv import Trigger
 
-#: Time without /clock or awaited messages after which a warning is logged [s].
-_PATIENCE = 5.0
-
 #: Period of the check for new publishers and answers [s].
 LOOK_PERIOD = 0.1
 
@@ -81,8 +78,8 @@ class ArmidNode(Node):
         self.add_post_set_parameters_callback(self._apply)
         self._diagnostics = self.create_publisher(DiagnosticArray, '/diagnostics', 10)
         self.create_timer(1.0, self.publish_diagnostics)
-        self.look_every(_PATIENCE, self.look_for_clock)
-        self.look_every(_PATIENCE, self.look_for_trouble)
+        # time without /clock or awaited messages after which it is logged
+        self.look_every(5.0, self.look_for_trouble)
 
     def parameters(self) -> Sequence[NodeParameter]:
         """Return the parameters to declare."""
@@ -131,16 +128,13 @@ class ArmidNode(Node):
             return f'simulated time, but no time has come on {topic}: let the simulation run'
         return ''
 
-    def look_for_clock(self) -> None:
-        """Log once that simulated time is missing, since /diagnostics needs it."""
+    def look_for_trouble(self) -> None:
+        """Log once that simulated time is missing, or the problem that /diagnostics shows."""
         missing = self.missing_clock
-        if missing and not self._clock_missed:
+        if missing and not self._clock_missed:  # /diagnostics needs it
             self.get_logger().warning(f'{missing}; until then the node waits')
         self._clock_missed = bool(missing)
-
-    def look_for_trouble(self) -> None:
-        """Log once the problem that /diagnostics shows."""
-        trouble = '' if self.missing_clock else self.condition()[0]
+        trouble = '' if missing else self.condition()[0]
         if trouble and not self._trouble_said and not self.complaints.has_logged(trouble):
             self.get_logger().info(trouble)
         self._trouble_said = bool(trouble)

@@ -4,7 +4,6 @@
 
 from __future__ import annotations
 
-from collections import Counter
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import replace
 from pathlib import Path
@@ -117,7 +116,6 @@ def assembled(
             where,
             joints,
             pieces,
-            Counter(),
             {
                 'messages': decoder.messages,
                 'malformed': decoder.malformed,

@@ -343,7 +343,6 @@ def assemble(
     where: str,
     joints: tuple[str, ...],
     pieces: list[JointSamples],
-    counts: Counter[str],
     met: Mapping[str, Any],
     **about: Any,
 ) -> Recording:
@@ -358,10 +357,8 @@ def assemble(
         In the order of the recording.
     pieces : list of JointSamples
         Samples in the order of storage. The list is emptied to free its memory.
-    counts : Counter
-        Counts so far, by attribute of the report.
     met : mapping of str to value
-        Other attributes of the report, with the number of messages among them.
+        Attributes of the report so far, with the number of messages among them.
     **about
         Other attributes of the recording.
 
@@ -371,7 +368,7 @@ def assemble(
         If no clock is usable, or fewer than two samples remain.
 
     """
-    gathered = gather(pieces)
+    gathered, counts = gather(pieces), Counter(unstamped=met.get('unstamped', 0))
     pieces.clear()
     problems = (clock_problem(one.stamps, one.values[0], one.receive) for one in gathered)
     note = next((f'header stamps {problem}' for problem in problems if problem), '')
@@ -400,7 +397,7 @@ def assemble(
     for array in (t, q, dq, tau):
         if array is not None:
             array.setflags(write=False)  # a read-only array is not copied by Recording
-    found = {'not_finite': culprits, 'absent': absent, 'clock_note': note, **counts, **met}
+    found = {'not_finite': culprits, 'absent': absent, 'clock_note': note, **met, **counts}
     report = ReadReport(
         **found,
         samples=len(samples),

@@ -4,7 +4,6 @@
 
 from __future__ import annotations
 
-from collections import Counter
 from dataclasses import replace
 
 from armid_ros.errors import RecordingError
@@ -69,8 +68,8 @@ def measured(plan: TablePlan) -> Recording:
         where,
         plan.joints,
         [samples],
-        Counter(unstamped=int(np.sum(~stamped))),
         {
+            'unstamped': int(np.sum(~stamped)),
             'messages': len(table),
             'absent': plan.absent,
             'damage': '; '.join(note for note in table.notes if 'cut off' in note),
