@@ -23,6 +23,7 @@ from armid_ros.errors import ModelError, RecordingError, RobotError, visible
 from armid_ros.files import (
     default_memory_limit,
     json_text,
+    reading,
     result_folder,
     Staged,
     staged,
@@ -33,6 +34,8 @@ from armid_ros.files.own import written_by
 from armid_ros.motion import FloatArray
 from armid_ros.recording import read_robot_description, ReadSettings, Recording
 from armid_ros.recording.anything import is_table, read_anything
+from armid_ros.recording.columns import numbers
+from armid_ros.recording.columns import per_joint as values_per_joint
 from armid_ros.report.provenance import hash_files, Provenance, versions
 from armid_ros.report.sections.frame import VerdictSection
 from armid_ros.robots import (
@@ -277,18 +280,8 @@ def box(text: str, robot: Robot) -> tuple[str, Corners]:
 
 def per_joint(text: str | None, robot: Robot, option: str) -> FloatArray | None:
     """Parse one number for all joints, or one for each; None without text."""
-    if text is None:
-        return None
-    try:
-        values = np.array([float(part) for part in text.split(',')])
-    except ValueError:
-        values = np.empty(0)
-    if len(values) not in (1, robot.n_joints) or not np.all(np.isfinite(values)):
-        raise RobotError(
-            f'{option} takes a number, or {robot.n_joints} with commas for '
-            f"{', '.join(robot.joints)}; not '{text}'"
-        )
-    return np.broadcast_to(values, robot.n_joints).copy()
+    with reading(option, RobotError):
+        return None if text is None else values_per_joint(numbers(text), robot.joints, repr(text))
 
 
 def read(paths: Sequence[Path], robot: Robot, topic: str | None) -> list[Recording]:

@@ -44,6 +44,8 @@ AnyNode = TypeVar('AnyNode', bound=ArmidNode)
 PATIENCE = 20.0
 #: First time of the clock [ns]; zero would mean no stamp.
 EPOCH_NS = 1_000 * 10**9
+#: Time for which the arm rests before the run, as the publisher requires [s].
+_SEEN = 0.26
 #: Recorded topics, and further topics with an online identifier.
 _TOPICS = ('joint_states', 'robot_description', 'joint_trajectory')
 _LEARNED = ('online_identifier/estimate',)
@@ -59,22 +61,20 @@ class Progress:
     ----------
     t, duration : float
         Simulated time since the start, and total simulated time [s].
+    real_time_factor : float
+        Simulated time per real time so far.
 
     """
 
     def __init__(self, duration: float, tell: OnProgress | None) -> None:
         self._tell, self._due = tell, 1.0
         self._begun = time.monotonic()
-        self.duration, self.t = duration, 0.0
-
-    @property
-    def real_time_factor(self) -> float:
-        """Simulated time per real time so far."""
-        return self.t / max(time.monotonic() - self._begun, 1e-9)
+        self.duration, self.t, self.real_time_factor = duration, 0.0, 0.0
 
     def see(self, now_ns: int) -> None:
         """Take the time of the clock [ns], and report every second of it."""
         self.t = (now_ns - EPOCH_NS) * 1e-9
+        self.real_time_factor = self.t / max(time.monotonic() - self._begun, 1e-9)
         if self.t >= self._due:
             self._due += 1.0
             if self._tell is not None:
@@ -168,14 +168,13 @@ def run_lockstep(
             return stamp
 
         stage.spin_until(connected, 'discovery')
-        # the arm rests before the run, as the publisher requires
-        for _ in range(max(math.ceil(0.26 * rate), AGREEING) + 1):
+        for _ in range(max(math.ceil(_SEEN * rate), AGREEING) + 1):
             begun = step()
             stage.spin_until(lambda begun=begun: publisher.last_stamp_ns == begun, 'joint_states')
         publisher.start()
         stage.spin_until(lambda: plant.moving or plant.complaints.counts, 'joint_trajectory')
-        # after the run the filters settle for 0.5 s
-        run = Progress(publisher.duration + (begun - EPOCH_NS) * 1e-9 + 0.5, on_progress)
+        settling = 0.5  # of the filters, after the run [s]
+        run = Progress(publisher.duration + (begun - EPOCH_NS) * 1e-9 + settling, on_progress)
         while run.t < run.duration:
             run.see(step())
         return run
