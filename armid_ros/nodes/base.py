@@ -71,7 +71,6 @@ class ArmidNode(Node):
         """Make the node with keyword arguments of rclpy's Node, such as context or namespace."""
         super().__init__(name, **kwargs)
         self.complaints = Complaints(self.get_logger())
-        self._paced: dict[str, tuple[Callable[[], None], Timer]] = {}
         self._clock_missed = self._trouble_said = False
         declare(self, self.parameters())
         self.add_on_set_parameters_callback(self._validate)
@@ -103,14 +102,6 @@ class ArmidNode(Node):
     def look_every(self, seconds: float, callback: Callable[[], None]) -> Timer:
         """Call a function periodically in real time, independent of /clock."""
         return self.create_timer(seconds, callback, clock=Clock(clock_type=ClockType.STEADY_TIME))
-
-    def pace(self, parameter: str, callback: Callable[[], None]) -> None:
-        """Call a function at the rate of a parameter [Hz], also after the parameter changes."""
-        # a changed period of a timer takes effect only after the old one
-        if parameter in self._paced:
-            self.destroy_timer(self._paced[parameter][1])
-        timer = self.create_timer(1.0 / self.value(parameter), callback)
-        self._paced[parameter] = callback, timer
 
     @property
     def missing_clock(self) -> str:
@@ -307,11 +298,8 @@ class ArmidNode(Node):
         return SetParametersResult(successful=True)
 
     def _apply(self, parameters: list[Parameter]) -> None:
-        names = frozenset(p.name for p in parameters)
-        for name in names & self._paced.keys():
-            self.pace(name, self._paced[name][0])
         try:
-            self.changed(names)
+            self.changed(frozenset(p.name for p in parameters))
         except ArmidError as error:
             self.complaints.say('parameter', str(error))
 

@@ -30,9 +30,10 @@ from armid_ros.nodes.online_identifier import OnlineIdentifierNode
 from armid_ros.nodes.qos import STREAM
 from armid_ros.nodes.recorder import RecorderNode
 from armid_ros.nodes.running.domains import private_context
-from armid_ros.nodes.running.process import make_executor, steady
+from armid_ros.nodes.running.process import steady
 from armid_ros.nodes.simulated_arm import SimulatedArmNode
 from armid_ros.simulation import SimulatedArm
+from rclpy.experimental import EventsExecutor
 from rclpy.logging import LoggingSeverity
 from rclpy.parameter import Parameter
 from rclpy.time import Time
@@ -243,7 +244,7 @@ class Stage:
         with ExitStack() as stack:
             self._context = stack.enter_context(private_context(int(domain) if domain else None))
             stack.enter_context(steady())
-            self._executor = make_executor('events', self._context)
+            self._executor = EventsExecutor(context=self._context)
             stack.callback(self._executor.shutdown)
             self._scope = stack.pop_all()
         return self

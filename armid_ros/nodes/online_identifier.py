@@ -38,6 +38,7 @@ from armid_ros.nodes.running.process import run
 from diagnostic_msgs.msg import DiagnosticStatus
 import numpy as np
 from rclpy.publisher import Publisher
+from rclpy.timer import Timer
 from sensor_msgs.msg import JointState
 from std_msgs.msg import String
 import yaml
@@ -101,7 +102,14 @@ class OnlineIdentifierNode(ListeningNode):
         self.listen()
         self.offer('~/reset', self.reset)
         self.offer('~/save', self.save)
-        self.pace('estimate_rate', self.publish_estimate)
+        self._timer: Timer | None = None
+        self._keep_pace()
+
+    def _keep_pace(self) -> None:
+        # a changed period of a timer takes effect only after the old one
+        if self._timer is not None:
+            self.destroy_timer(self._timer)
+        self._timer = self.create_timer(1.0 / self.value('estimate_rate'), self.publish_estimate)
 
     def reset(self) -> str:
         """Delete the estimate, and start again."""
@@ -222,6 +230,8 @@ class OnlineIdentifierNode(ListeningNode):
 
     def changed(self, names: frozenset[str]) -> None:
         """Apply changed settings."""
+        if 'estimate_rate' in names:
+            self._keep_pace()
         if self.identifier is not None:
             self.identifier.use(self._settings({}))
 

@@ -16,7 +16,7 @@ from typing import Any, NoReturn
 from armid_ros.errors import ArmidError, RecordingEnded, RecordingError
 from armid_ros.files import size_text
 from armid_ros.nodes.base import ArmidNode, LOOK_PERIOD
-from armid_ros.nodes.messages.classes import is_stamped, message_class
+from armid_ros.nodes.messages.classes import message_class
 from armid_ros.nodes.parameters.table import names, NodeParameter
 from armid_ros.nodes.qos import MatchedSubscription, recorded
 from armid_ros.nodes.running.process import run
@@ -241,7 +241,9 @@ class RecorderNode(ArmidNode):
             self._refused[topic] = types
             return
         self._refused.pop(topic, None)
-        take = partial(self._on_message, topic, is_stamped(message_type))
+        fields = message_type.get_fields_and_field_types()
+        stamped = next(iter(fields.items()), None) == ('header', 'std_msgs/Header')
+        take = partial(self._on_message, topic, stamped)
         self._subscriptions_by_topic[topic] = MatchedSubscription(
             self, message_type, topic, take, raw=True
         )

@@ -21,8 +21,7 @@ from armid_ros.nodes.base import ArmidNode, COMMON
 from armid_ros.nodes.parameters.table import ParameterError
 import rclpy
 from rclpy._rclpy_pybind11 import RCLError, RCLInvalidROSArgsError, UnknownROSArgsError
-from rclpy.context import Context
-from rclpy.executors import Executor, ExternalShutdownException, SingleThreadedExecutor
+from rclpy.executors import ExternalShutdownException, SingleThreadedExecutor
 from rclpy.experimental import EventsExecutor
 from rclpy.signals import SignalHandlerOptions
 from rclpy.utilities import remove_ros_args
@@ -33,24 +32,6 @@ _WRITTEN = {'-p': '-p NAME:=VALUE', '-r': '-r NAME:=OTHER_NAME'}
 _FILE = '--params-file'
 #: Timeout of the shutdown of DDS [s].
 LEAVING = 20.0
-
-
-def make_executor(kind: str, context: Context | None = None) -> Executor:
-    """
-    Make an executor. The multi-threaded one is not used: it delays topics above 100 Hz.
-
-    Parameters
-    ----------
-    kind : {'single', 'events'}
-        The events executor needs a fifth to a half of the processor time, but is experimental in
-        Jazzy.
-    context : Context, optional
-        Default context if omitted.
-
-    """
-    if kind == 'events':
-        return EventsExecutor(context=context)
-    return SingleThreadedExecutor(context=context)
 
 
 @contextmanager
@@ -138,7 +119,9 @@ def run(make_node: Callable[[], ArmidNode], args: Sequence[str] | None = None) -
     try:
         with ending.at_once():
             node = _made(make_node, args)
-        executor = make_executor(node.value('executor'))
+        # not the multi-threaded one, which delays topics above 100 Hz
+        kinds = {'events': EventsExecutor, 'single': SingleThreadedExecutor}
+        executor = kinds[node.value('executor')]()
         executor.add_node(node)
         ending.with_parent = node.value('end_with_parent')
         with steady():

@@ -105,12 +105,6 @@ class TrajectoryAction:
         """Return whether a controller accepts goals."""
         return bool(self._client.server_is_ready())
 
-    def wait(self, patience: float) -> None:
-        """Wait for a controller that offers the action, with a timeout [s]."""
-        deadline = time.monotonic() + patience
-        while not self.ready and time.monotonic() < deadline:
-            time.sleep(0.005)
-
     @property
     def under_way(self) -> bool:
         """Return whether a goal was sent that the controller has not ended."""

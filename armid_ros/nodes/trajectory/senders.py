@@ -5,6 +5,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+import time
 from typing import Any
 
 from armid_ros.errors import TrajectoryError
@@ -101,7 +102,9 @@ class TrajectorySenders:
         """
         self.look()
         if self.action is not None and self._offered:
-            self.action.wait(1.0)  # longest time of the discovery of an action [s]
+            deadline = time.monotonic() + 1.0  # the discovery of an action takes no longer
+            while not self.action.ready and time.monotonic() < deadline:
+                time.sleep(0.005)
         if self.missing:
             raise TrajectoryError(f'{self.missing}; the arm is not started')
         self._by_action = self._has_action
