@@ -6,7 +6,6 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
-import textwrap
 import threading
 import time
 from typing import Any
@@ -21,18 +20,6 @@ def say(text: str, colour: str | None = None) -> None:
     """Print a line, coloured on a terminal."""
     shown = visible(text)
     click.echo(shown if colour is None else click.style(shown, fg=colour))
-
-
-def wrapped(text: str, first: str = '', others: str = '') -> str:
-    """Wrap a text at blanks to 80 columns, indented."""
-    return textwrap.fill(
-        text,
-        80,
-        initial_indent=first,
-        subsequent_indent=others,
-        break_long_words=False,
-        break_on_hyphens=False,
-    )
 
 
 @contextmanager

@@ -50,7 +50,7 @@ def measured(plan: TablePlan) -> Recording:
         (read['position'], read.get('velocity'), read.get('effort')),
     )
     topic = 'the table'
-    if plan.source('effort') is None and plan.unread:
+    if 'effort' not in read and plan.unread:
         topic += f' (--effort names columns of it; not read are {plan.unread})'
     others: list[PositionRange] = []
     position, settings = plan.sources[0], plan.settings

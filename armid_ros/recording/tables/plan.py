@@ -115,10 +115,6 @@ class TablePlan:
         """Whether any column or unit was guessed."""
         return self.time_guessed or any(source.guessed for source in self.sources)
 
-    def source(self, quantity: QuantityName) -> QuantitySource | None:
-        """Return the source of a quantity; None if it is not read."""
-        return next((one for one in self.sources if one.quantity == quantity), None)
-
     @property
     def absent(self) -> tuple[str, ...]:
         """Return texts on missing quantities, such as 'effort of wrist'."""

@@ -189,8 +189,9 @@ class Table:
         return text
 
 
-def _at_most(names: Sequence[str], most: int = 40) -> str:
+def _at_most(names: Sequence[str]) -> str:
     """Format the first names of a list, and the number of further ones."""
+    most = 40
     more = f' and {len(names) - most} more' if len(names) > most else ''
     return ', '.join(names[:most]) + more
 
