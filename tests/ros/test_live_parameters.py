@@ -86,11 +86,11 @@ def test_every_number_has_a_range_and_every_live_one_can_be_set_at_both_ends(
 def test_a_rate_is_followed_from_the_moment_it_is_set(bench):
     """A timer that is told another period waits for the end of the one it has."""
     node = bench.add(OnlineIdentifierNode, robot='humanoid_arm', estimate_rate=0.1)
-    node.pace('estimate_rate', calls := Mock(__name__='calls'))
+    node.publish_estimate = calls = Mock(__name__='calls')
     bench.settle()
-    assert node._paced['estimate_rate'][1].time_until_next_call() > 1e9
+    assert node._timer.time_until_next_call() > 1e9
     node.set_parameters([Parameter('estimate_rate', value=1000.0)])
-    assert node._paced['estimate_rate'][1].time_until_next_call() <= 1e6
+    assert node._timer.time_until_next_call() <= 1e6
     bench.spin_until(lambda: calls.call_count > 3, 'calls')
 
 
