@@ -7,6 +7,7 @@ from __future__ import annotations
 from collections.abc import Callable
 from typing import Any, TYPE_CHECKING
 
+from armid_ros.cli import parameters
 from armid_ros.cli.choices import TIME_UNITS
 from armid_ros.cli.parameters import together
 from armid_ros.errors import RecordingError
@@ -130,6 +131,9 @@ options = together(
     ),
     _option('--episode', type=int, metavar='N', help='Episode of a LeRobot dataset.'),
 )
+
+#: How recordings are read, and how the result is printed.
+recordings = together(options, parameters.topic, parameters.setting, parameters.as_json)
 
 
 def settings() -> ColumnSettings:

@@ -227,15 +227,7 @@ def _identified_from(model: Path, asked: list[Path]) -> tuple[Path, ...]:
 
 
 def _model_of(path: Path, robot: Robot) -> ArmModel:
-    """
-    Read a model of an arm.
-
-    Raises
-    ------
-    ArmidError
-        If the description that it was made with is still there, and is of another arm.
-
-    """
+    """Read a model; ArmidError if its description is still there, and is of another arm."""
     from armid_ros.arm import load_model
     from armid_ros.cli import options
     from armid_ros.identification.description import kinematics_digest

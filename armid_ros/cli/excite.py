@@ -4,8 +4,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
-from contextlib import contextmanager
 import os
 from pathlib import Path
 from typing import Any, TYPE_CHECKING
@@ -25,7 +23,6 @@ import click
 
 if TYPE_CHECKING:
     from armid_ros.excitation import CollisionScene
-    from armid_ros.files import Staged
     from armid_ros.motion import FloatArray
     from armid_ros.robots import Robot
 
@@ -277,8 +274,17 @@ def excite(
         )
         tick(1.0, 'writing')
         origin = ResultOrigin(robot_source, provenance=options.provenance(read, seed=seed))
-        with _kept_design(staged):
+        try:
             options.deliver(result, staged, origin, as_json)
+        except TrajectoryError as error:  # a design without a way to it is kept, in a new folder
+            held = f'{staged.out}: stays as it was'
+            if staged.alone:
+                staged.keep()
+                held = f'{staged.out / "excitation.yaml"} holds the design'
+            raise TrajectoryError(
+                f'{held}, but there is no trajectory: {error}; take another --start, or another '
+                '--seed'
+            ) from error
     if result.core.stopped == INTERRUPTED:
         raise KeyboardInterrupt
 
@@ -297,21 +303,6 @@ def _driven(source: str, gravity: str, joints: str | None, bags: tuple[Path, ...
         drives = f'{", ".join(others)}; --joints A,B,... drives them'
         say(f'not driven, as they belong to no arm: {drives}', 'yellow')
     return robot
-
-
-@contextmanager
-def _kept_design(staged: Staged) -> Iterator[None]:
-    """Save a design without approach if its folder has no other files; then raise."""
-    try:
-        yield
-    except TrajectoryError as error:
-        held = f'{staged.out}: stays as it was'
-        if staged.alone:
-            staged.keep()
-            held = f'{staged.out / "excitation.yaml"} holds the design'
-        raise TrajectoryError(
-            f'{held}, but there is no trajectory: {error}; take another --start, or another --seed'
-        ) from error
 
 
 def require_free(folder: Path) -> None:

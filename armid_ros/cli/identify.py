@@ -67,10 +67,7 @@ import click
 )
 @parameters.every
 @click.option('--strict', is_flag=True, help='End with code 3 if the result is unusable.')
-@columns.options
-@parameters.topic
-@parameters.setting
-@parameters.as_json
+@columns.recordings
 def identify(
     bags: tuple[Path, ...],
     robot_source: str,

@@ -23,10 +23,7 @@ import click
     help='Folder to put inspection.html, with all curves, and inspection.json into.',
 )
 @parameters.force
-@columns.options
-@parameters.topic
-@parameters.setting
-@parameters.as_json
+@columns.recordings
 def inspect(
     bag: Path,
     robot_source: str | None,
@@ -95,10 +92,7 @@ def inspect(
 )
 @parameters.force
 @click.option('--strict', is_flag=True, help='End with code 3 if something is wrong.')
-@columns.options
-@parameters.topic
-@parameters.setting
-@parameters.as_json
+@columns.recordings
 def check(
     arguments: tuple[str, ...],
     robot_source: str | None,
