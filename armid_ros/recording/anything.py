@@ -140,9 +140,9 @@ def read_anything(
             there = [one for one in there if one.name.lstrip('/') == topic.lstrip('/')]
         if not there:
             known = ', '.join(f'{t.name} ({t.type_name}, {t.count} messages)' for t in topics)
-            asked = f'{topic} of ' if topic else 'topic of '
+            which = f'{topic} of ' if topic else 'topic of '
             raise RecordingError(
-                f'{path}: no {asked}{JOINT_STATE}; there are {known or "no topics"}'
+                f'{path}: no {which}{JOINT_STATE}; there are {known or "no topics"}'
             )
         fullest = max(there, key=lambda one: one.count)
         topic, joints = fullest.name, fullest.joints
