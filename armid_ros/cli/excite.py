@@ -231,12 +231,7 @@ def excite(
     from armid_ros.excitation.search.local import INTERRUPTED
     from armid_ros.files.cells import parted
 
-    context, default = click.get_current_context(), click.core.ParameterSource.DEFAULT
-    for option in context.command.params:
-        name = str(option.name)
-        fits = name in _SHARED or (name == 'share') == (kind in COURSES)
-        if not fits and context.get_parameter_source(name) is not default:
-            raise click.UsageError(f'{option.opts[0]} does not go with --kind {kind}')
+    _refuse_other_options(click.get_current_context(), kind)
     robot = _driven(robot_source, gravity, joints, after)
     robot, limits = with_joint_limits(robot, joint_limits, velocity)
     with progress('reading meshes') as tick:
@@ -287,6 +282,16 @@ def excite(
             ) from error
     if result.core.stopped == INTERRUPTED:
         raise KeyboardInterrupt
+
+
+def _refuse_other_options(context: click.Context, kind: str) -> None:
+    """Raise a UsageError for an option that does not go with the kind."""
+    for option in context.command.params:
+        name = str(option.name)
+        fits = name in _SHARED or (name == 'share') == (kind in COURSES)
+        given = context.get_parameter_source(name) is not click.core.ParameterSource.DEFAULT
+        if given and not fits:
+            raise click.UsageError(f'{option.opts[0]} does not go with --kind {kind}')
 
 
 def _driven(source: str, gravity: str, joints: str | None, bags: tuple[Path, ...]) -> Robot:
