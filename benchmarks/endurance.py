@@ -25,9 +25,9 @@ import time
 
 from armid_ros.errors import ArmidError
 from armid_ros.nodes.running.domains import private_context
-from armid_ros.nodes.running.process import make_executor
 from armid_ros.recording import read_recording, Recording, write_recording
 import numpy as np
+from rclpy.experimental import EventsExecutor
 from rclpy.node import Node
 from sensor_msgs.msg import JointState
 
@@ -52,7 +52,7 @@ def verdict(reached: bool) -> str:
 def killed_recorder(bag: Path, seconds: float) -> tuple[float, int]:
     """Kill a recorder after some seconds; return lost time [s] and number of kept messages."""
     with private_context() as context:
-        executor = make_executor('events', context)
+        executor = EventsExecutor(context=context)
         node = Node('source', context=context, use_global_arguments=False)
         executor.add_node(node)
         topics = [f'arm{k}/joint_states' for k in range(TOPICS)]

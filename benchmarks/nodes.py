@@ -27,11 +27,12 @@ from armid_ros.nodes.lockstep import run_lockstep
 from armid_ros.nodes.online_identifier import OnlineIdentifierNode
 from armid_ros.nodes.qos import SAMPLES
 from armid_ros.nodes.running.domains import private_context
-from armid_ros.nodes.running.process import make_executor, steady
+from armid_ros.nodes.running.process import steady
 from armid_ros.recording import read_recording
 from armid_ros.robots import load_robot
 from armid_ros.simulation import Reference, SimulatedArm
 import numpy as np
+from rclpy.experimental import EventsExecutor
 from rclpy.node import Node
 from sensor_msgs.msg import JointState
 
@@ -96,7 +97,7 @@ def at_one_kilohertz(seconds, folder):
     robot = load_robot(panda())
     save_excitation(short_run(robot, 8.0, max(1, int(seconds / 8.0))), folder / 'run.yaml')
     with private_context() as context, steady():
-        executor = make_executor('events', context)
+        executor = EventsExecutor(context=context)
         identifier = OnlineIdentifier(with_friction(robot), rng=np.random.default_rng(0))
         node = OnlineIdentifierNode(identifier, context=context, use_global_arguments=False)
         node.update_times = deque()
@@ -162,7 +163,7 @@ def bare_step(steps=4000):
     # a joint state that recorder, publisher and identifier take as bytes
     names = ('plant', 'recorder', 'publisher', 'identifier')
     with private_context() as context:
-        executor = make_executor('events', context)
+        executor = EventsExecutor(context=context)
         nodes = [Node(name, context=context, use_global_arguments=False) for name in names]
         states = nodes[0].create_publisher(JointState, 'joint_states', SAMPLES)
         heard = []

@@ -15,8 +15,8 @@ import re
 #: The command of each job, by its module and name.
 JOBS = {
     'identify': ('armid_ros.cli.identify', 'identify'),
-    'diagnose': ('armid_ros.cli.diagnose.command', 'diagnose'),
-    'excite': ('armid_ros.cli.excite.command', 'excite'),
+    'diagnose': ('armid_ros.cli.diagnose', 'diagnose'),
+    'excite': ('armid_ros.cli.excite', 'excite'),
     'compare': ('armid_ros.cli.compare', 'compare'),
 }
 #: Whose calls are listed as well: the workflow of a job, and the function that it is named for.

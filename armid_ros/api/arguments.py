@@ -18,11 +18,10 @@ from armid_ros.identification import SignalSettings
 from armid_ros.identification.rows.signals import conditioning, no_stretch, segments
 from armid_ros.motion import Motion
 from armid_ros.recording import ReadSettings, Recording, Topic
-from armid_ros.recording.anything import is_table, read_anything, read_tables, Show
+from armid_ros.recording.anything import is_table, read_anything
 from armid_ros.recording.columns import ColumnSettings, numbers
-from armid_ros.recording.message_types import JOINT_STATE
 from armid_ros.recording.reader import bag_contents
-from armid_ros.recording.settings import DEFAULT
+from armid_ros.recording.source import DEFAULT
 from armid_ros.robots import joints_beside_arms, load_robot, Robot, shipped_robots
 from armid_ros.robots.shipped import shipped_path
 import numpy as np
@@ -280,7 +279,7 @@ def read_recording(
             raise RecordingError(
                 f'{path}: topics of JointState: {", ".join(named)}; give one as topic'
             )
-        return read_all_joints(Path(path), topics, topic=topic, columns=said)
+        return read_anything(path, topics=topics, topic=topic, columns=said)
     if isinstance(robot, (Robot, ArmModel, str, Path)):
         described = robot_of(robot)
         slides = [bool(one) for one in described.prismatic]
@@ -293,55 +292,6 @@ def read_recording(
 def topics_of(path: Path, settings: ReadSettings = DEFAULT) -> tuple[Topic, ...]:
     """Return the topics of a bag; of a table none."""
     return () if is_table(path) else bag_contents(path, settings)
-
-
-def read_all_joints(
-    path: Path,
-    topics: tuple[Topic, ...],
-    *,
-    joints: Sequence[str] | None = None,
-    topic: str | None = None,
-    columns: ColumnSettings | None = None,
-    show: Show | None = None,
-    settings: ReadSettings = DEFAULT,
-) -> Recording:
-    """
-    Read a recording without a robot.
-
-    Parameters
-    ----------
-    path : Path
-        A bag or a table.
-    topics : tuple of Topic
-        Topics of the bag.
-    joints, topic : optional
-        Which joints, by default all of the topic or table; and which topic, by default the one
-        with the most messages.
-    columns, show, settings : optional
-        What is known of a table and of units; is given how a table is read; how a bag is read.
-
-    Raises
-    ------
-    RecordingError
-        There is no such topic, or joints have to be named.
-
-    """
-    said = columns or ColumnSettings()
-    if is_table(path):
-        return read_tables([path], said, joints, show=show)
-    if joints is None:
-        there = [one for one in topics if one.joints]
-        if topic is not None:
-            there = [one for one in there if one.name.lstrip('/') == topic.lstrip('/')]
-        if not there:
-            known = ', '.join(f'{t.name} ({t.type_name}, {t.count} messages)' for t in topics)
-            named = f'{topic} of ' if topic else 'topic of '
-            raise RecordingError(
-                f'{path}: no {named}{JOINT_STATE}; there are {known or "no topics"}'
-            )
-        chosen = max(there, key=lambda one: one.count)
-        topic, joints = chosen.name, chosen.joints
-    return read_anything(path, joints=list(joints), topic=topic, columns=said, settings=settings)
 
 
 def _numbers(given: _Numbers) -> tuple[float, ...]:

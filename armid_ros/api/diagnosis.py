@@ -278,6 +278,15 @@ class DiagnosisResult(ShownModel):
         most = 6  # rows without --all
         if not every and len(rows) > most + 1:
             rows[most:] = [(f'... and {len(rows) - most} more: --all, or report.html',)]
+        if self.verdict in ('bad_data', 'not_repeatable'):
+            then = 'inspect'
+        elif self.verdict in OPEN and self.residual is None:
+            then = 'diagnose'
+        elif self.verdict == 'ambiguous' and self.extras.next_run is None:
+            then = ''  # a person has to separate the names
+        else:
+            anew = self.core.doubt or self.core.harmful or self.verdict in OPEN
+            then = 'identify' if anew else 'simulate'
         lines = self.extras.sentences(self.core)
         if self.baseline:
             lines.insert(0, f'baseline: {", ".join(one.source for one in self.baseline)}')
@@ -290,19 +299,8 @@ class DiagnosisResult(ShownModel):
             rows,
             lines,
             list(map(pretty, self.extras.steps(self.core, model))),
-            self._then(),
+            then,
         )
-
-    def _then(self) -> str:
-        """Return the command that follows; none where a person has to separate names."""
-        if self.verdict in ('bad_data', 'not_repeatable'):
-            return 'inspect'
-        if self.verdict in OPEN and self.residual is None:
-            return 'diagnose'
-        if self.verdict == 'ambiguous' and self.extras.next_run is None:
-            return ''
-        anew = self.core.doubt or self.core.harmful or self.verdict in OPEN
-        return 'identify' if anew else 'simulate'
 
 
 @spelled

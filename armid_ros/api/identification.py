@@ -284,6 +284,18 @@ class IdentificationResult(ShownModel):
         read = [*self.recordings, *self.held_out]
         damaged = [one for one in read if one.report.unwrapped or not one.report.unharmed]
         steps = judge(core, self.validation, read, self.verification).next_steps
+        then = 'inspect'
+        if self.grade != 'unusable':  # of a good model, that of its links
+            named = (
+                name for name in ('diagnose', 'excite') if f'armid {name}' in ''.join(steps[:1])
+            )
+            then = next(named, 'check')
+        bodies = []
+        if core.bodies_cost is not None:
+            grows = f'(torque error {100.0 * max(core.bodies_cost, 0.0):.2g} % larger)'
+            bodies = [f'no links that are bodies fit as well {grows}: --physical']
+            if self.exports:
+                bodies = [f'links are bodies {grows}; {", ".join(self.exports)}']
         columns = joint_columns(core, self.description, self.held_out_score)
         return Summary(
             self.graded.reasons[0],
@@ -296,19 +308,12 @@ class IdentificationResult(ShownModel):
                 *(self.gains.sentences() if self.gains else ()),
                 *(f'{one.source}: {one.report.describe()}' for one in damaged),
                 f'{count}; condition number {plain(core.condition_number)}',
-                *self._bodies(),
+                *bodies,
                 *(self._parameters() if every else ()),
             ),
             steps[:1],
-            self._then(steps[:1]),
+            then,
         )
-
-    def _then(self, steps: Sequence[str]) -> str:
-        """Return the command that the next step names; of a good model that of its links."""
-        if self.grade == 'unusable':
-            return 'inspect'
-        named = (name for name in ('diagnose', 'excite') if f'armid {name}' in ''.join(steps))
-        return next(named, 'check')
 
     def _parameters(self) -> list[str]:
         """Return all parameters beside those of the description, a line each."""
@@ -325,16 +330,6 @@ class IdentificationResult(ShownModel):
             text = f'{number} ± {reach} {pretty(name.unit)}'
             rows.append((full_label(name, links), text, digits(float(before))))
         return aligned(('parameter', 'value, 95 %', 'described'), rows)
-
-    def _bodies(self) -> list[str]:
-        """State whether links are physically consistent, which simulators need."""
-        cost = self.core.bodies_cost
-        if cost is None:
-            return []
-        grows = f'{100.0 * max(cost, 0.0):.2g} %'
-        if self.exports:
-            return [f'links are bodies (torque error {grows} larger); {", ".join(self.exports)}']
-        return [f'no links that are bodies fit as well (torque error {grows} larger): --physical']
 
 
 @spelled

@@ -11,7 +11,6 @@ from typing import Any, TYPE_CHECKING
 
 from armid_ros.api.arguments import (
     describes_robot,
-    read_all_joints,
     RecordingLike,
     recordings_of,
     Rng,
@@ -35,6 +34,7 @@ from armid_ros.inspection import (
 from armid_ros.inspection import inspect as look
 from armid_ros.inspection.inspect import SCHEMA
 from armid_ros.recording import Recording, Topic
+from armid_ros.recording.anything import read_anything
 from armid_ros.robots import Robot
 import numpy as np
 
@@ -179,7 +179,7 @@ def inspect(
         read = recording
     else:
         topics = topics_of(Path(recording)) if topics is None else topics
-        read = read_all_joints(Path(recording), topics)
+        read = read_anything(recording, topics=topics)
     found = look(read, described, topics=topics or (), rng=np.random.default_rng(rng))
     return InspectionResult(found)
 

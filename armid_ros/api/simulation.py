@@ -12,7 +12,7 @@ from armid_ros.arm import ArmModel
 from armid_ros.excitation import design, DesignSettings, Excitation, load_excitation
 from armid_ros.motion import Motion
 from armid_ros.recording import read_waypoints, ReadReport, ReadSettings, Recording
-from armid_ros.recording.settings import DEFAULT
+from armid_ros.recording.source import DEFAULT
 from armid_ros.robots import collision_model, Robot
 from armid_ros.simulation import Reference, Sensors
 from armid_ros.simulation import simulate as run

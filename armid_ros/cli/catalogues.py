@@ -4,8 +4,10 @@
 
 from __future__ import annotations
 
+import textwrap
+
 from armid_ros.cli import parameters
-from armid_ros.cli.terminal import print_rows, say, wrapped
+from armid_ros.cli.terminal import print_rows, say
 import click
 
 #: Stands for a blank at which no line ends.
@@ -40,12 +42,15 @@ def effects(as_json: bool) -> None:
     if as_json:
         print_rows(rows, as_json)
         return
+    lines = textwrap.TextWrapper(80, '', '    ', break_long_words=False, break_on_hyphens=False)
     for row in rows:
-        say(wrapped(f'{row["name"]}: {row["what it is"]}', others='    '))
+        lines.initial_indent = ''
+        say(lines.fill(f'{row["name"]}: {row["what it is"]}'))
+        lines.initial_indent = '    '
         for kind, head in (('parameters', ''), ('shapes', 'shape: ')):
             names = ', '.join(name.replace(' ', _JOINED) for name in row[kind])
             if names:
-                say(wrapped(head + names, '    ', '    ').replace(_JOINED, ' '))
+                say(lines.fill(head + names).replace(_JOINED, ' '))
 
 
 def _with_unit(name: str, unit: str) -> str:

@@ -7,7 +7,9 @@ from __future__ import annotations
 from collections.abc import Callable
 from typing import Any, TYPE_CHECKING
 
+from armid_ros.cli import parameters
 from armid_ros.cli.choices import TIME_UNITS
+from armid_ros.cli.parameters import together
 from armid_ros.errors import RecordingError
 from armid_ros.files.cells import listed
 import click
@@ -54,7 +56,8 @@ def _numbers(ctx: click.Context, parameter: click.Parameter, value: str | None) 
     return _kept(ctx, parameter, ())
 
 
-_OPTIONS = (
+#: The options; `settings` returns their values.
+options = together(
     _option('--time', metavar='C', help='Column of time of a table; guessed by default.'),
     _option(
         '--position',
@@ -129,12 +132,8 @@ _OPTIONS = (
     _option('--episode', type=int, metavar='N', help='Episode of a LeRobot dataset.'),
 )
 
-
-def options(command: Any) -> Any:
-    """Add the options to a command; `settings` returns their values."""
-    for option in reversed(_OPTIONS):
-        command = option(command)
-    return command
+#: How recordings are read, and how the result is printed.
+recordings = together(options, parameters.topic, parameters.setting, parameters.as_json)
 
 
 def settings() -> ColumnSettings:

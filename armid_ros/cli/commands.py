@@ -4,18 +4,20 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterable, Sequence
 import errno
 from functools import cache, partial
 from importlib import import_module
 import math
 import os
+from pathlib import Path
 import sys
+import tomllib
 from typing import Any
 
 from armid_ros.cli.node import lacking
-from armid_ros.cli.project import project_options
 from armid_ros.errors import ArmidError, meant, visible
+from armid_ros.files import read_text
 from armid_ros.plug_ins import load_plug_in, plug_ins
 from armid_ros.version import __version__
 import click
@@ -28,11 +30,11 @@ COMMANDS = {
     'convert': 'convert',
     'check': 'inspect',
     'inspect': 'inspect',
-    'excite': 'excite.command',
+    'excite': 'excite',
     'simulate': 'record',
     'call': 'call',
     'identify': 'identify',
-    'diagnose': 'diagnose.command',
+    'diagnose': 'diagnose',
     'compare': 'compare',
     'recover': 'record',
     'layout': 'layout',
@@ -41,6 +43,8 @@ COMMANDS = {
 }
 
 
+#: Defaults of options, in the current folder.
+FILE = 'armid.toml'
 #: Exit code after Ctrl-C: 128 and the number of SIGINT.
 INTERRUPTED = 130
 #: Where the context keeps what is said on stderr when the work was done: an error is one line.
@@ -84,9 +88,15 @@ class Commands(click.Group):
         return name, command, rest
 
     def format_commands(self, ctx: click.Context, formatter: click.HelpFormatter) -> None:
-        """List the commands with the first sentence of their help, whole."""
+        """List the commands with the first sentence of their help, whole; or with their error."""
+        rows = []
+        for name in self.list_commands(ctx):
+            try:
+                rows.append((name, _imported(name).get_short_help_str(1000)))
+            except (ArmidError, ModuleNotFoundError) as error:
+                rows.append((name, str(error)))
         with formatter.section('Commands'):
-            formatter.write_dl([(name, _summary(name)) for name in self.list_commands(ctx)])
+            formatter.write_dl(rows)
 
     def shell_complete(self, ctx: click.Context, incomplete: str) -> list[CompletionItem]:
         """Complete a command without importing all of them, or an option."""
@@ -143,14 +153,6 @@ def _imported(name: str) -> click.Command:
     return command
 
 
-def _summary(name: str) -> str:
-    """Return the first sentence of the help of a command; of one that is broken, its error."""
-    try:
-        return _imported(name).get_short_help_str(1000)
-    except (ArmidError, ModuleNotFoundError) as error:
-        return str(error)
-
-
 def _refuse_infinite(command: click.Command) -> None:
     """Make a command and its subcommands refuse numbers that are not finite."""
     for below in command.commands.values() if isinstance(command, click.Group) else ():
@@ -171,6 +173,78 @@ def _finite(
         if number is not None and not math.isfinite(number):
             raise click.BadParameter(f'{number} is not a finite number', context, parameter)
     return value if callback is None else callback(context, parameter, value)
+
+
+def project_options(
+    name: str,
+    command: click.Command,
+    typed: Sequence[str],
+    others: Callable[[], Iterable[click.Command]],
+) -> dict[str, Any]:
+    """
+    Return the defaults of a command from armid.toml, and print them on stderr.
+
+    A key outside of a table is for every command that has an option of this name; a key in the
+    table of a command is for that one.
+
+    Parameters
+    ----------
+    name : str
+        Of the command; of one in a group with that before it, and its table below the group's.
+    command : click.Command
+        The command.
+    typed : sequence of str
+        Its arguments as they were typed: an option among them is not looked up.
+    others : callable
+        Returns all commands; called where a key is no option of this one.
+
+    Raises
+    ------
+    ArmidError
+        If the file is no TOML, the table of the command has a key that is none of its options, or
+        a key outside of a table is an option of no command.
+
+    """
+    if isinstance(command, click.Group):
+        below = next((word for word in typed if word in command.commands), '')
+        inner = command.commands.get(below)
+        return {below: project_options(f'{name} {below}', inner, typed, others)} if inner else {}
+    if not Path(FILE).is_file():
+        return {}
+    try:
+        project = tomllib.loads(read_text(Path(FILE), ArmidError))
+    except tomllib.TOMLDecodeError as error:
+        raise ArmidError(f'{FILE}: {error}') from None
+    own: dict[str, Any] = project
+    for part in name.split():
+        own = own[part] if isinstance(own.get(part), dict) else {}
+    given = {key: value for key, value in project.items() if not isinstance(value, dict)} | own
+    options = _options(command)
+    for key in own.keys() - options.keys():
+        raise ArmidError(f"{FILE}: armid {name} has no option '{key}'{meant(key, options)}")
+    foreign = given.keys() - options.keys()
+    every = {key for one in others() for key in _options(one)} if foreign else set()
+    for key in sorted(foreign - every):
+        raise ArmidError(f"{FILE}: no command has an option '{key}'{meant(key, every)}")
+    words = {text.split('=')[0] for text in typed}
+    found = {}
+    for key, value in given.items():
+        option = options.get(key)
+        if option is None or option.name is None or words & {*option.opts, *option.secondary_opts}:
+            continue
+        values = value if isinstance(value, list) else [value]
+        text = ','.join(map(str, values))
+        found[option.name] = values if option.multiple else text if value is values else value
+        click.echo(f'{FILE}: --{key} {text}', err=True)
+    return found
+
+
+def _options(command: click.Command) -> dict[str, click.Option]:
+    """Return the options of a command, and of those in a group, by their long names."""
+    inner = command.commands.values() if isinstance(command, click.Group) else ()
+    own = [one for one in command.params if isinstance(one, click.Option)]
+    found = {text.lstrip('-'): one for one in own for text in one.opts}
+    return {key: one for below in inner for key, one in _options(below).items()} | found
 
 
 @click.group(cls=Commands, context_settings={'help_option_names': ['-h', '--help']})

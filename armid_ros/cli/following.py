@@ -61,7 +61,9 @@ def following(then: str, result: Shown) -> str:
     if then == 'excite' and own != 'check':
         more = ['--seed', given['seed'] + 1]
     if then in _OUT:
-        more += ['--out', _free(Path(given.get('out') or '').parent / _OUT[then])]
+        path = Path(given.get('out') or '').parent / _OUT[then]
+        others = (path.with_name(f'{path.name}_{number}') for number in count(2))
+        more += ['--out', next(one for one in chain([path], others) if not one.exists())]
     words = ['--robot', robot] if then in _ALONE else [*bags, '--robot', robot]
     words = [robot, *bags] if then == 'check' else words
     kept = {'gravity', 'joints'}
@@ -80,7 +82,13 @@ def _subject(
     bags = list(given.get('bags') or filter(None, [given.get('bag')]))
     more: list[Any] = []
     if isinstance(result, ComparisonResult):
-        return _compared(result, then)
+        before, after = (Path(one.source) for one in (result.core.before, result.core.after))
+        model = before.with_name('model.yaml')
+        more = ['--model', model] if then == 'diagnose' and model.exists() else []
+        for source in [after] if more else [before, after]:
+            with suppress(ModelError):  # it does not name its recordings
+                bags += identified_from(source)
+        return result.core.after.robot, list(dict.fromkeys(bags)) or [Path('BAG')], more
     if isinstance(result, ExcitationResult):
         more = ['--trajectory', out / 'excitation.yaml']
     elif isinstance(result, DiagnosisResult) and then == 'simulate':
@@ -94,18 +102,6 @@ def _subject(
     if robot == '-' and then in _ALONE:
         robot = out / 'robot.urdf'
     return robot or '', bags[:1] if then == 'inspect' else bags, more
-
-
-def _compared(result: ComparisonResult, then: str) -> tuple[str | Path, list[Path], list[Any]]:
-    """Return robot, recordings and options of what follows a comparison."""
-    before, after = (Path(one.source) for one in (result.core.before, result.core.after))
-    model = before.with_name('model.yaml')
-    more = ['--model', model] if then == 'diagnose' and model.exists() else []
-    bags: list[Path] = []
-    for source in [after] if more else [before, after]:
-        with suppress(ModelError):  # it does not name its recordings
-            bags += identified_from(source)
-    return result.core.after.robot, list(dict.fromkeys(bags)) or [Path('BAG')], more
 
 
 def _each(option: str, values: Iterable[Any]) -> Iterator[Any]:
@@ -124,9 +120,3 @@ def _typed(context: click.Context, kept: Iterable[str]) -> Iterator[str]:
             value = [] if option.is_flag or '=' in word else [next(words)]
             if option.name in kept:
                 yield from (word, *value)
-
-
-def _free(path: Path) -> Path:
-    """Return a path at which nothing is yet."""
-    others = (path.with_name(f'{path.name}_{number}') for number in count(2))
-    return next(one for one in chain([path], others) if not one.exists())

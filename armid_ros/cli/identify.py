@@ -67,13 +67,7 @@ import click
 )
 @parameters.every
 @click.option('--strict', is_flag=True, help='End with code 3 if the result is unusable.')
-@columns.options
-@parameters.topic
-@parameters.gravity
-@parameters.joints
-@parameters.seed
-@parameters.reading
-@parameters.as_json
+@columns.recordings
 def identify(
     bags: tuple[Path, ...],
     robot_source: str,
@@ -100,7 +94,6 @@ def identify(
     from armid_ros.api.table import ResultOrigin
     from armid_ros.arm import ArmModel
     from armid_ros.cli import options
-    from armid_ros.cli.origin import provenance
     from armid_ros.errors import IdentificationError
     from armid_ros.identification import PhysicalSettings
 
@@ -125,7 +118,7 @@ def identify(
         origin = ResultOrigin(
             robot_source,
             options.kept_source(robot_source, robot, staged.folder),
-            provenance([*bags, *validate], result.document()['settings'], seed),
+            options.provenance([*bags, *validate], result.document()['settings'], seed),
         )
         told = None if as_json else result.summary(every)
         options.deliver(result, staged, origin, as_json, told)

@@ -23,13 +23,7 @@ import click
     help='Folder to put inspection.html, with all curves, and inspection.json into.',
 )
 @parameters.force
-@columns.options
-@parameters.topic
-@parameters.gravity
-@parameters.joints
-@parameters.seed
-@parameters.reading
-@parameters.as_json
+@columns.recordings
 def inspect(
     bag: Path,
     robot_source: str | None,
@@ -47,13 +41,13 @@ def inspect(
     a robot whether identify takes it. Without --out it is printed only.
 
     """
-    from armid_ros.api.arguments import read_all_joints, topics_of
+    from armid_ros.api.arguments import topics_of
     from armid_ros.api.inspection import inspect as run
     from armid_ros.api.inspection import InspectionResult
     from armid_ros.api.table import ResultOrigin
     from armid_ros.cli import options
-    from armid_ros.cli.origin import provenance
     from armid_ros.files.cells import listed
+    from armid_ros.recording.anything import read_anything
 
     staged = (
         None if out is None else options.stage(out, InspectionResult.schema, robot_source or '')
@@ -64,9 +58,9 @@ def inspect(
     topics = topics_of(bag, options.read_settings())
     with progress('reading') as tick:
         if robot is None:
-            recording = read_all_joints(
+            recording = read_anything(
                 bag,
-                topics,
+                topics=topics,
                 joints=listed(joints) if joints else None,
                 topic=topic,
                 columns=columns.settings(),
@@ -77,7 +71,7 @@ def inspect(
             (recording,) = options.read([bag], robot, topic)
         tick(0.5, 'trying to identify' if robot else 'looking')
         found = run(robot, recording, topics=topics, rng=seed)
-    origin = ResultOrigin(robot_source or '', provenance=provenance([bag], seed=seed))
+    origin = ResultOrigin(robot_source or '', provenance=options.provenance([bag], seed=seed))
     options.deliver(found, staged, origin, as_json)
 
 
@@ -98,13 +92,7 @@ def inspect(
 )
 @parameters.force
 @click.option('--strict', is_flag=True, help='End with code 3 if something is wrong.')
-@columns.options
-@parameters.topic
-@parameters.gravity
-@parameters.joints
-@parameters.seed
-@parameters.reading
-@parameters.as_json
+@columns.recordings
 def check(
     arguments: tuple[str, ...],
     robot_source: str | None,
@@ -126,37 +114,29 @@ def check(
     one: mass and centre of each link as described and as measured.
 
     """
+    from armid_ros.api.arguments import describes_robot
     from armid_ros.api.inspection import check as run
     from armid_ros.api.inspection import CheckResult
     from armid_ros.api.table import ResultOrigin
     from armid_ros.cli import options
-    from armid_ros.cli.origin import provenance
 
     context = click.get_current_context()
-    robot_source, bags = _parted(context, robot_source, arguments)
+    given = context.get_parameter_source('robot_source')
+    typed = given is click.core.ParameterSource.COMMANDLINE
+    if arguments and not typed and (robot_source is None or describes_robot(arguments[0])):
+        robot_source, *others = arguments
+        arguments = tuple(others)
+    if robot_source is None:
+        raise click.UsageError("Missing argument 'R', the description.")
+    robot_source = parameters.with_packages(context, robot_source) or ''
+    bags = tuple(map(Path, arguments))
     context.params |= {'robot_source': robot_source, 'bags': bags}
     staged = None if out is None else options.stage(out, CheckResult.schema, robot_source)
     robot = options.open_robot(robot_source, gravity, joints, bags, tell=False)
     with progress('checking'):
         found = run(robot, options.read(bags, robot, topic), rng=seed)
     source = [path for path in (Path(robot_source), *bags) if path.exists()]
-    origin = ResultOrigin(robot_source, '', provenance(source, seed=seed))
+    origin = ResultOrigin(robot_source, '', options.provenance(source, seed=seed))
     options.deliver(found, staged, origin, as_json)
     if strict and found.wrong:
         context.exit(3)
-
-
-def _parted(
-    context: click.Context, robot: str | None, arguments: tuple[str, ...]
-) -> tuple[str, tuple[Path, ...]]:
-    """Return the description and the recordings; that of armid.toml where none is typed."""
-    from armid_ros.api.arguments import describes_robot
-
-    typed = context.get_parameter_source('robot_source') is click.core.ParameterSource.COMMANDLINE
-    if arguments and not typed and (robot is None or describes_robot(arguments[0])):
-        robot, *others = arguments
-        arguments = tuple(others)
-    if robot is None:
-        raise click.UsageError("Missing argument 'R', the description.")
-    source = parameters.with_packages(context, robot)
-    return source or '', tuple(map(Path, arguments))

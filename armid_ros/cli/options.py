@@ -4,10 +4,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Collection, Sequence
+from collections.abc import Collection, Iterable, Mapping, Sequence
 from dataclasses import replace
+from datetime import datetime
 from pathlib import Path
-from typing import TYPE_CHECKING
+import shlex
+import sys
+from typing import Any, TYPE_CHECKING
 
 from armid_ros.api.table import ResultOrigin, Shown, Summary
 from armid_ros.arm import ArmModel, load_model
@@ -21,6 +24,7 @@ from armid_ros.errors import ModelError, RecordingError, RobotError, visible
 from armid_ros.files import (
     default_memory_limit,
     json_text,
+    reading,
     result_folder,
     Staged,
     staged,
@@ -31,6 +35,9 @@ from armid_ros.files.own import written_by
 from armid_ros.motion import FloatArray
 from armid_ros.recording import read_robot_description, ReadSettings, Recording
 from armid_ros.recording.anything import is_table, read_anything
+from armid_ros.recording.columns import numbers
+from armid_ros.recording.columns import per_joint as values_per_joint
+from armid_ros.report.provenance import hash_files, Provenance, versions
 from armid_ros.report.sections.frame import VerdictSection
 from armid_ros.robots import (
     driven_in_words,
@@ -145,6 +152,38 @@ def show_verdict(
     show(Summary(first, verdict.grade, heads, rows, lines, steps), *below)
 
 
+def provenance(
+    paths: Iterable[Path], settings: Mapping[str, Any] | None = None, seed: int | None = None
+) -> Provenance:
+    """
+    Return the provenance of the running command.
+
+    Parameters
+    ----------
+    paths : iterable of Path
+        What it reads; files and folders.
+    settings : mapping of str to object, optional
+        What it uses.
+    seed : int, optional
+        Of its random numbers.
+
+    """
+
+    def text(value: Any) -> str:
+        if isinstance(value, list):
+            return ', '.join(map(text, value))
+        return f'{value:.6g}' if isinstance(value, float) else str(value)
+
+    return Provenance(
+        files=hash_files(paths),
+        versions=versions(),
+        settings={name: text(value) for name, value in (settings or {}).items()},
+        seed=seed,
+        command=shlex.join(['armid', *sys.argv[1:]]),
+        created=datetime.now().astimezone().isoformat(' ', 'seconds'),
+    )
+
+
 def read_settings() -> ReadSettings:
     """Return how this command is to read bags."""
     meta = click.get_current_context().meta
@@ -170,7 +209,21 @@ def open_robot(
 ) -> Robot:
     """Load the robot of --robot, --gravity and --joints; warn of doubtful values."""
     named = listed(joints) if isinstance(joints, str) else joints
-    robot = _loaded(source, gravity, named or None, bags)
+    if source != '-':
+        robot = load_robot(source, gravity=gravity, joints=named or None)
+    else:
+        texts = (
+            (path, None if is_table(path) else read_robot_description(path, read_settings()))
+            for path in bags
+        )
+        held = next(((path, text) for path, text in texts if text is not None), None)
+        if held is None:
+            raise RobotError(
+                f'no /robot_description in {", ".join(map(str, bags)) or "any bag"}; '
+                'name the URDF with --robot'
+            )
+        path, text = held
+        robot = robot_from_urdf(text, gravity=gravity, joints=named or None, source=str(path))
     lines = driven_in_words(robot) if joints is None else ()
     if tell:
         notes = click.get_current_context().meta.setdefault(NOTES, [])
@@ -178,21 +231,6 @@ def open_robot(
         found = [visible(f'note: {line}') for line in (*lines, *doubts)]
         notes += [line for line in found if line not in notes]
     return robot
-
-
-def _loaded(
-    source: str, gravity: str, chosen: Sequence[str] | None, bags: Sequence[Path]
-) -> Robot:
-    if source != '-':
-        return load_robot(source, gravity=gravity, joints=chosen)
-    for path in bags:
-        text = None if is_table(path) else read_robot_description(path, read_settings())
-        if text is not None:
-            return robot_from_urdf(text, gravity=gravity, joints=chosen, source=str(path))
-    raise RobotError(
-        f'no /robot_description in {", ".join(map(str, bags)) or "any bag"}; '
-        'name the URDF with --robot'
-    )
 
 
 def model_of(path: Path, robot: Robot | None) -> ArmModel:
@@ -244,18 +282,8 @@ def box(text: str, robot: Robot) -> tuple[str, Corners]:
 
 def per_joint(text: str | None, robot: Robot, option: str) -> FloatArray | None:
     """Parse one number for all joints, or one for each; None without text."""
-    if text is None:
-        return None
-    try:
-        values = np.array([float(part) for part in text.split(',')])
-    except ValueError:
-        values = np.empty(0)
-    if len(values) not in (1, robot.n_joints) or not np.all(np.isfinite(values)):
-        raise RobotError(
-            f'{option} takes a number, or {robot.n_joints} with commas for '
-            f"{', '.join(robot.joints)}; not '{text}'"
-        )
-    return np.broadcast_to(values, robot.n_joints).copy()
+    with reading(option, RobotError):
+        return None if text is None else values_per_joint(numbers(text), robot.joints, repr(text))
 
 
 def read(paths: Sequence[Path], robot: Robot, topic: str | None) -> list[Recording]:

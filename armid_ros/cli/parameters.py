@@ -19,6 +19,17 @@ FORCE, CRC, MEMORY = 'armid.force', 'armid.crc', 'armid.memory'
 PACKAGES = 'armid.packages'
 
 
+def together(*options: Callable[[Any], Any]) -> Callable[[_Command], _Command]:
+    """Return a decorator that adds several options to a command, in this order of the help."""
+
+    def add(command: Any) -> Any:
+        for option in reversed(options):
+            command = option(command)
+        return command
+
+    return add
+
+
 class OutPath(click.Path):
     """A path to write to: an empty one, which would be the current folder, is refused."""
 
@@ -66,15 +77,22 @@ effects = click.option(
     shell_complete=completed,
     help="Effects added to the rigid body; 'E@joint+joint' for some joints only.",
 )
-_out = click.option(
-    '--out', required=True, type=OutPath(file_okay=False, path_type=Path), help='Folder to fill.'
-)
 force = click.option(
     '--force',
     is_flag=True,
     expose_value=False,
     callback=lambda context, _, value: context.meta.update({FORCE: value}),
     help='Write over results of another kind or robot, and over files of others.',
+)
+#: A folder of results, and leave to write over others.
+folder = together(
+    click.option(
+        '--out',
+        required=True,
+        type=OutPath(file_okay=False, path_type=Path),
+        help='Folder to fill.',
+    ),
+    force,
 )
 _crc = click.option(
     '--crc/--no-crc',
@@ -92,6 +110,8 @@ _memory = click.option(
     callback=lambda context, _, value: context.meta.update({MEMORY: value}),
     help='Memory limit for reading bags [MB]; a quarter of the memory by default.',
 )
+#: How bags are read.
+reading = together(_crc, _memory)
 bag = click.option(
     '--out', required=True, type=OutPath(path_type=Path), help='Bag to write; must not exist.'
 )
@@ -115,6 +135,8 @@ seed = click.option(
     show_default=True,
     help='Random seed.',
 )
+#: Where the arm is, what is driven, and how recordings of it are read.
+setting = together(gravity, joints, seed, reading)
 every = click.option('--all', 'every', is_flag=True, help='Print all values.')
 as_json = click.option('--json', 'as_json', is_flag=True, help='Print the result as JSON.')
 
@@ -140,7 +162,7 @@ def robot_described(**values: Any) -> Callable[[_Command], _Command]:
         callback=lambda context, _, source: with_packages(context, source),
         **values,
     )
-    return lambda command: source(packages(command))
+    return together(source, packages)
 
 
 def with_packages(context: click.Context, source: str | None) -> str | None:
@@ -163,13 +185,3 @@ robot = robot_described(
     'arguments), or - for the /robot_description in the bag. '
     'A xacro is a program, which can read any file: name only one that you trust.',
 )
-
-
-def folder(command: _Command) -> _Command:
-    """Add --out, a folder of results, and --force, to write over others."""
-    return _out(force(command))
-
-
-def reading(command: _Command) -> _Command:
-    """Add the options that say how bags are read."""
-    return _crc(_memory(command))

@@ -55,10 +55,7 @@ if TYPE_CHECKING:
     help='Noise (std) of accelerometers on links with springs [m/s^2].',
 )
 @click.option('--resolution', default=0.0, help='Encoder resolution [rad or m]; default 0, none.')
-@parameters.gravity
-@parameters.joints
-@parameters.seed
-@parameters.reading
+@parameters.setting
 def simulate(
     robot_source: str,
     gravity: str,

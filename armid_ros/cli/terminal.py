@@ -6,7 +6,6 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
-import textwrap
 import threading
 import time
 from typing import Any
@@ -21,18 +20,6 @@ def say(text: str, colour: str | None = None) -> None:
     """Print a line, coloured on a terminal."""
     shown = visible(text)
     click.echo(shown if colour is None else click.style(shown, fg=colour))
-
-
-def wrapped(text: str, first: str = '', others: str = '') -> str:
-    """Wrap a text at blanks to 80 columns, indented."""
-    return textwrap.fill(
-        text,
-        80,
-        initial_indent=first,
-        subsequent_indent=others,
-        break_long_words=False,
-        break_on_hyphens=False,
-    )
 
 
 @contextmanager
@@ -115,7 +102,6 @@ class ProgressLines:
 def print_rows(
     rows: Sequence[dict[str, Any]],
     as_json: bool,
-    right: Sequence[str] = (),
 ) -> None:
     """
     Print rows as a table, or as JSON.
@@ -126,8 +112,6 @@ def print_rows(
         Cells by the heads of their columns.
     as_json : bool
         Whether for programs, with all columns.
-    right : sequence of str
-        Columns of numbers, which are never broken.
 
     """
     from armid_ros.files import json_text
@@ -144,14 +128,10 @@ def print_rows(
     for head in heads:
         table.add_column(
             Text(head),
-            justify='right' if head in right else 'left',
-            no_wrap=head in ('name', 'joint', *right),
+            no_wrap=head == 'name',
             overflow='fold',
         )
     for row in rows:
-        table.add_row(*(Text(_cell(row[head])) for head in heads))
+        cells = [', '.join(one) if isinstance(one, list) else one for one in row.values()]
+        table.add_row(*(Text(visible(cell)) for cell in cells))
     console.print(table)
-
-
-def _cell(value: Any) -> str:
-    return visible(', '.join(map(str, value)) if isinstance(value, list) else str(value))

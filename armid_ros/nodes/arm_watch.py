@@ -24,8 +24,6 @@ from sensor_msgs.msg import JointState
 
 #: Time for which an arm must be at rest before a run starts [s].
 _REST = 0.25
-#: A larger step of a simulated clock means that the clock was set, as in simulated_arm [s].
-_CLOCK_STEP = 60.0
 
 
 class ArmWatch:
@@ -68,7 +66,7 @@ class ArmWatch:
         self._stepped_ns = 0
         self._jumps = node.get_clock().create_jump_callback(
             JumpThreshold(
-                min_forward=Duration(seconds=_CLOCK_STEP),
+                min_forward=Duration(seconds=60.0),  # as in simulated_arm: the clock was set
                 min_backward=Duration(nanoseconds=-1),
                 on_clock_change=False,
             ),
@@ -134,7 +132,17 @@ class ArmWatch:
         if len(senders) > self.monitor.sources:
             names = ', '.join(sorted(s.node_name for s in senders))
             return f'{topic}: {len(senders)} publishers for the same joints ({names}): stop one'
-        return self.stamps.of_start(topic, difference, simulated)
+        late, clock = self.stamps.late, self._node.get_clock().now().nanoseconds * 1e-9
+        if not abs(late) > difference:
+            return ''
+        # a controller with another clock begins the trajectory late, or skips its beginning
+        remedy = 'set the clocks, or zero_stamp:=true'
+        if simulated:
+            remedy = 'use_sim_time on both nodes or on neither'
+        return (
+            f'stamps of {topic} are {abs(late):.3g} s {self.stamps.side(late)} '
+            f'({clock - late:.3f} s and {clock:.3f} s), more than {difference:.3g} s: {remedy}'
+        )
 
     def _on_clock_step(self, jump: Any) -> None:
         self._stepped_ns += jump.delta.nanoseconds

@@ -34,13 +34,6 @@ from sensor_msgs.msg import JointState
 from std_msgs.msg import String
 from trajectory_msgs.msg import JointTrajectory
 
-#: How often due messages are published [s].
-_TICK = 0.001
-#: Messages published per timer call; services are answered between calls.
-_BURST = 1000
-#: Longest wait at the end of the node for trajectories to arrive [s].
-_FAREWELL = 1.0
-
 
 class _JumpGuard:
     """Compares the first waypoint of a trajectory with the measured joint positions."""
@@ -175,13 +168,19 @@ class BagPlayerNode(ArmidNode):
             raise RecordingError("parameter 'bag' is empty: give a bag, -p bag:=PATH")
         self._bag = Bag(self.value('bag'))
         self._lock_step = bool(self.value('use_sim_time'))
-        trouble = self.objection({'clock_rate': self.value('clock_rate')})
-        if trouble:
-            raise RecordingError(trouble)
+        self.check({'clock_rate': self.value('clock_rate')})
         self._wanted = {self.resolve_topic_name(name) for name in names(self, 'topics')}
         self._refused = ''
         self._topics = self._make_publishers()
-        self._guard = self._make_guard()
+        types = {t.name: t.type_name for t in self._bag.topics() if t.name in self._topics}
+        self._trajectories = {n for n, kind in types.items() if kind == JOINT_TRAJECTORY}
+        self._descriptions = {n for n in types if n.endswith('robot_description')}
+        self._states = self.resolve_topic_name('joint_states')
+        self._has_states = any(self.resolve_topic_name(n) == self._states for n in types)
+        self._guard: _JumpGuard | None = None
+        if self._trajectories:
+            limits = self.value('start_tolerance'), self.value('state_timeout')
+            self._guard = _JumpGuard(self, *limits)
         self._messages = self._from_start()
         self._next: RawMessage | None = None
         self._take()
@@ -196,7 +195,7 @@ class BagPlayerNode(ArmidNode):
         self._keep_clock()
         pace = self.get_clock() if self._lock_step else Clock(clock_type=ClockType.STEADY_TIME)
         self._pace = pace
-        self._timer = self.create_timer(_TICK, self.play, clock=pace)
+        self._timer = self.create_timer(0.001, self.play, clock=pace)
 
     @property
     def finished(self) -> bool:
@@ -230,7 +229,7 @@ class BagPlayerNode(ArmidNode):
             self._anchor = now
         self._position += round((now - self._anchor) * rate)
         self._anchor = now
-        for _ in range(_BURST):
+        for _ in range(1000):  # services are answered between the calls of the timer
             if self._next is None or self._next.log_time_ns > self._position:
                 break
             self._publish(self._next)
@@ -239,15 +238,20 @@ class BagPlayerNode(ArmidNode):
                 self._messages = self._from_start()
                 self._next = next(self._messages, None)
                 self._position = self._clock_due = self._begin
-        self._publish_clock()
+        if self._clock_publisher is not None and self._clock_period:
+            if self._position >= self._clock_due:
+                stamp = Time(nanoseconds=self._position).to_msg()
+                self._clock_publisher.publish(ClockMessage(clock=stamp))
+                self._clock_due = self._position + self._clock_period
         if self.finished:
             self._timer.cancel()
 
-    def objection(self, values: Mapping[str, Any]) -> str:
-        """Return an error if the node would publish the /clock that it follows."""
+    def check(self, values: Mapping[str, Any]) -> None:
+        """Raise a RecordingError if the node would publish the /clock that it follows."""
         if self.value('use_sim_time') and values.get('clock_rate'):
-            return 'use_sim_time follows /clock; it cannot publish it too: clock_rate'
-        return ''
+            raise RecordingError(
+                'use_sim_time follows /clock; it cannot publish it too: clock_rate'
+            )
 
     def changed(self, names: frozenset[str]) -> None:
         """Apply changed parameters for /clock and for the check of jumps."""
@@ -276,7 +280,7 @@ class BagPlayerNode(ArmidNode):
         self._bag.close()
         if self._guard is not None and self.context.ok():
             for topic in self._trajectories:
-                self._topics[topic].wait_for_all_acked(Duration(seconds=_FAREWELL))
+                self._topics[topic].wait_for_all_acked(Duration(seconds=1.0))
 
     def _make_publishers(self) -> dict[str, Publisher]:
         topics = {self.resolve_topic_name(t.name): t for t in self._bag.topics()}
@@ -300,30 +304,6 @@ class BagPlayerNode(ArmidNode):
             raise RecordingError(f'{self._bag.path}: nothing to play')
         return publishers
 
-    def _make_guard(self) -> _JumpGuard | None:
-        """Return a guard that subscribes to joint_states; None without a trajectory to play."""
-        types = {t.name: t.type_name for t in self._bag.topics() if t.name in self._topics}
-        self._trajectories = {n for n, kind in types.items() if kind == JOINT_TRAJECTORY}
-        self._descriptions = {n for n in types if n.endswith('robot_description')}
-        self._states = self.resolve_topic_name('joint_states')
-        self._has_states = any(self.resolve_topic_name(n) == self._states for n in types)
-        if not self._trajectories:
-            return None
-        return _JumpGuard(self, self.value('start_tolerance'), self.value('state_timeout'))
-
-    def _objection(self, message: RawMessage) -> str:
-        """Return why a message must not be published; empty if it may."""
-        if self._guard is None or message.topic not in self._trajectories:
-            return ''
-        if not self._has_states:
-            return self._guard.objection(message.cdr)
-        if self.count_publishers(self._states) > 1:
-            return (
-                f'trajectory: the bag has {self._states} of its own, and another node publishes '
-                'them too: an arm that is not where the recorded one was'
-            )
-        return ''
-
     def _from_start(self) -> Iterator[RawMessage]:
         return (m for m in self._bag.messages() if m.topic in self._topics)
 
@@ -334,30 +314,30 @@ class BagPlayerNode(ArmidNode):
         return everyone or time.monotonic() > self._made + self.value('subscriber_timeout')
 
     def _publish(self, message: RawMessage) -> None:
-        topic = self._topics[message.topic]
-        if self._guard is not None and message.topic in self._descriptions:
-            self._guard.describe(message.cdr)
-        if message.log_time_ns >= self._begin:
-            self._refused = self._objection(message) or self._refused
-            if self._refused and message.topic in self._trajectories:
+        guard = self._guard
+        if guard is not None and message.topic in self._descriptions:
+            guard.describe(message.cdr)
+        if message.log_time_ns < self._begin:
+            return
+        if guard is not None and message.topic in self._trajectories:
+            if not self._has_states:
+                self._refused = guard.objection(message.cdr) or self._refused
+            elif self.count_publishers(self._states) > 1:
+                self._refused = (
+                    f'trajectory: the bag has {self._states} of its own, and another node '
+                    'publishes them too: an arm that is not where the recorded one was'
+                )
+            if self._refused:
                 self.complaints.say('trajectory', self._refused)
                 return
-            topic.publish(message.cdr)
-            self.published[message.topic] += 1
+        self._topics[message.topic].publish(message.cdr)
+        self.published[message.topic] += 1
 
     def _take(self) -> None:
         """Read the next message; at the end of the bag, log its damage."""
         self._next = next(self._messages, None)
         if self._next is None and self._bag.damage:
             self.complaints.say('damage', f'{self.value("bag")}: {self._bag.damage}')
-
-    def _publish_clock(self) -> None:
-        due = self._clock_period and self._position >= self._clock_due
-        if self._clock_publisher is None or not due:
-            return
-        stamp = Time(nanoseconds=self._position).to_msg()
-        self._clock_publisher.publish(ClockMessage(clock=stamp))
-        self._clock_due = self._position + self._clock_period
 
 
 main = partial(run, BagPlayerNode)

@@ -21,9 +21,6 @@ from rclpy.subscription import Subscription
 from rclpy.timer import Timer
 from std_srvs.srv import Trigger
 
-#: Time without /clock or awaited messages after which a warning is logged [s].
-_PATIENCE = 5.0
-
 #: Period of the check for new publishers and answers [s].
 LOOK_PERIOD = 0.1
 
@@ -74,15 +71,14 @@ class ArmidNode(Node):
         """Make the node with keyword arguments of rclpy's Node, such as context or namespace."""
         super().__init__(name, **kwargs)
         self.complaints = Complaints(self.get_logger())
-        self._paced: dict[str, tuple[Callable[[], None], Timer]] = {}
         self._clock_missed = self._trouble_said = False
         declare(self, self.parameters())
         self.add_on_set_parameters_callback(self._validate)
         self.add_post_set_parameters_callback(self._apply)
         self._diagnostics = self.create_publisher(DiagnosticArray, '/diagnostics', 10)
         self.create_timer(1.0, self.publish_diagnostics)
-        self.look_every(_PATIENCE, self.look_for_clock)
-        self.look_every(_PATIENCE, self.look_for_trouble)
+        # time without /clock or awaited messages after which it is logged
+        self.look_every(5.0, self.look_for_trouble)
 
     def parameters(self) -> Sequence[NodeParameter]:
         """Return the parameters to declare."""
@@ -107,14 +103,6 @@ class ArmidNode(Node):
         """Call a function periodically in real time, independent of /clock."""
         return self.create_timer(seconds, callback, clock=Clock(clock_type=ClockType.STEADY_TIME))
 
-    def pace(self, parameter: str, callback: Callable[[], None]) -> None:
-        """Call a function at the rate of a parameter [Hz], also after the parameter changes."""
-        # a changed period of a timer takes effect only after the old one
-        if parameter in self._paced:
-            self.destroy_timer(self._paced[parameter][1])
-        timer = self.create_timer(1.0 / self.value(parameter), callback)
-        self._paced[parameter] = callback, timer
-
     @property
     def missing_clock(self) -> str:
         """Return why simulated time is missing; empty if it is available or not used."""
@@ -131,16 +119,13 @@ class ArmidNode(Node):
             return f'simulated time, but no time has come on {topic}: let the simulation run'
         return ''
 
-    def look_for_clock(self) -> None:
-        """Log once that simulated time is missing, since /diagnostics needs it."""
+    def look_for_trouble(self) -> None:
+        """Log once that simulated time is missing, or the problem that /diagnostics shows."""
         missing = self.missing_clock
-        if missing and not self._clock_missed:
+        if missing and not self._clock_missed:  # /diagnostics needs it
             self.get_logger().warning(f'{missing}; until then the node waits')
         self._clock_missed = bool(missing)
-
-    def look_for_trouble(self) -> None:
-        """Log once the problem that /diagnostics shows."""
-        trouble = '' if self.missing_clock else self.condition()[0]
+        trouble = '' if missing else self.condition()[0]
         if trouble and not self._trouble_said and not self.complaints.has_logged(trouble):
             self.get_logger().info(trouble)
         self._trouble_said = bool(trouble)
@@ -193,9 +178,9 @@ class ArmidNode(Node):
         """Return further statuses for /diagnostics."""
         return ()
 
-    def objection(self, values: Mapping[str, Any]) -> str:
+    def check(self, values: Mapping[str, Any]) -> None:
         """
-        Return why parameters cannot take new values at run time; empty if they can.
+        Raise an ArmidError if parameters cannot take new values at run time.
 
         Parameters
         ----------
@@ -203,7 +188,6 @@ class ArmidNode(Node):
             New values, which are set together; types and ranges are already checked.
 
         """
-        return ''
 
     def changed(self, names: frozenset[str]) -> None:
         """
@@ -307,15 +291,15 @@ class ArmidNode(Node):
         self.complaints.settle()
 
     def _validate(self, parameters: list[Parameter]) -> SetParametersResult:
-        reason = self.objection({p.name: p.value for p in parameters})
-        return SetParametersResult(successful=not reason, reason=reason)
+        try:
+            self.check({p.name: p.value for p in parameters})
+        except ArmidError as error:
+            return SetParametersResult(successful=False, reason=str(error))
+        return SetParametersResult(successful=True)
 
     def _apply(self, parameters: list[Parameter]) -> None:
-        names = frozenset(p.name for p in parameters)
-        for name in names & self._paced.keys():
-            self.pace(name, self._paced[name][0])
         try:
-            self.changed(names)
+            self.changed(frozenset(p.name for p in parameters))
         except ArmidError as error:
             self.complaints.say('parameter', str(error))
 

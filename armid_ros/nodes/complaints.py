@@ -13,8 +13,6 @@ from typing import Any
 from armid_ros.errors import ArmidError, RecordingEnded
 from rclpy.impl.rcutils_logger import RcutilsLogger
 
-#: Largest number of different texts logged per kind, so that the log does not overflow.
-_TEXTS_PER_KIND = 10
 #: Errors that end a node, such as a full disk during recording.
 FATAL = (OSError, MemoryError, RecordingEnded)
 
@@ -51,7 +49,7 @@ class Complaints:
         self.latest = text
         self.fresh = True
         said = self._said.setdefault(kind, set())
-        if text not in said and len(said) < _TEXTS_PER_KIND:
+        if text not in said and len(said) < 10:  # so that the log does not overflow
             said.add(text)
             self._logger.warning(text)
 

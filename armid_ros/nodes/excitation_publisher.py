@@ -23,6 +23,7 @@ from armid_ros.excitation import (
 )
 from armid_ros.excitation.files import load_excitation, read_excitation
 from armid_ros.excitation.supervision import HANDOVER
+from armid_ros.files import reading
 from armid_ros.nodes.arm_watch import ArmWatch
 from armid_ros.nodes.base import ArmidNode
 from armid_ros.nodes.parameters.excitation import (
@@ -39,15 +40,6 @@ from armid_ros.nodes.trajectory.messages import write_trajectory
 from armid_ros.nodes.trajectory.senders import TrajectorySenders
 import numpy as np
 from std_msgs.msg import String
-
-#: Period of the checks for subscribers and joint states [s].
-_LOOK_PERIOD = 0.05
-#: Shortest period of the comparison of arm and run [s].
-_TRACKING_PERIOD = 0.005
-#: Number of too large efforts in a row that count as a collision.
-_OVERLOADS = 3
-#: Longest wait at the end of the node for the last message to arrive [s].
-_FAREWELL = 1.0
 
 
 class ExcitationPublisherNode(ArmidNode):
@@ -116,7 +108,7 @@ class ExcitationPublisherNode(ArmidNode):
         self.offer('~/start', self.start)
         self.offer('~/rehearse', self.rehearse)
         self.offer('~/stop', self.stop)
-        self._timer = self.look_every(_LOOK_PERIOD, self.look)
+        self._timer = self.look_every(0.05, self.look)
 
     def parameters(self) -> Sequence[NodeParameter]:
         """Return the parameters; for a simulation some defaults differ."""
@@ -280,17 +272,14 @@ class ExcitationPublisherNode(ArmidNode):
             waiting = 'the controller does not report the end of the run; ~/stop ends the run'
         return self._trouble or waiting or self._rehearsed, values
 
-    def objection(self, values: Mapping[str, Any]) -> str:
-        """Return why a new excitation file cannot be used; empty if it can."""
+    def check(self, values: Mapping[str, Any]) -> None:
+        """Raise a TrajectoryError if a new excitation file cannot be used."""
         if 'file' not in values:
-            return ''
-        if self.elapsed is not None:
-            return "parameter 'file': an excitation is under way; ~/stop ends it"
-        try:
+            return
+        with reading("parameter 'file'", TrajectoryError):
+            if self.elapsed is not None:
+                raise TrajectoryError('an excitation is under way; ~/stop ends it')
             self._loaded(values['file'])
-        except ArmidError as error:
-            return f"parameter 'file': {error}"
-        return ''
 
     def changed(self, names: frozenset[str]) -> None:
         """Load the excitation of a changed parameter file."""
@@ -307,7 +296,7 @@ class ExcitationPublisherNode(ArmidNode):
         sent = self._gate is not None or (self._ending is not None and self._ending.last)
         if sent and self.context.ok():
             self.stop()
-            self._controller.settle(_FAREWELL)
+            self._controller.settle(1.0)
 
     def destroy_node(self) -> None:
         """Stop the arm, then destroy the node."""
@@ -333,7 +322,7 @@ class ExcitationPublisherNode(ArmidNode):
 
     def _on_state(self, now: float) -> None:
         """Compare the measured position and effort with the run."""
-        if 0.0 <= now - self._tracked < _TRACKING_PERIOD:
+        if 0.0 <= now - self._tracked < 0.005:  # often enough
             return
         self._tracked = now
         if self._ending is not None:
@@ -356,7 +345,7 @@ class ExcitationPublisherNode(ArmidNode):
         contradiction = monitor.contradiction(now)
         overload = self._gate.overload(effort, self.value('effort_factor'))
         self._overloads = self._overloads + 1 if overload else 0
-        if contradiction or fault or self._overloads >= _OVERLOADS:
+        if contradiction or fault or self._overloads >= 3:
             self._give_up(contradiction or fault or overload, blocked=not contradiction)
 
     def _look_for_partners(self) -> None:

@@ -26,12 +26,6 @@ from rclpy.client import Client
 from rclpy.task import Future
 from std_srvs.srv import Trigger
 
-#: Period of the check for progress [s].
-_LOOK_PERIOD = 0.05
-#: Time for a program to end after SIGTERM [s].
-_FAREWELL = 5.0
-#: Timeout of the answer of a node that is stopped [s]; the node may have ended already.
-_PARTING = 1.0
 #: Result document of each command, and the keys that are reported.
 _SAID = {
     'identify': ('identification.json', ('grade',)),
@@ -109,7 +103,14 @@ class IdentificationRunNode(ArmidNode):
 
         """
         super().__init__('identification_run', **kwargs)
-        self._require_input()
+        joints, effects = names(self, 'joints') or None, ','.join(names(self, 'effects'))
+        ArmModel.of(
+            self.value('robot'), effects=effects, gravity=self.value('gravity'), joints=joints
+        )
+        folder = self.folder('save_to')
+        for subfolder, schema in _FOLDERS.items():
+            if (folder / subfolder).is_dir():
+                refuse_foreign(folder / subfolder, schema)
         self._start = start
         self._begun: list[str] = []
         self._farewells: list[Future] = []
@@ -125,7 +126,7 @@ class IdentificationRunNode(ArmidNode):
         self.create_subscription(DiagnosticArray, '/diagnostics', self._on_diagnostics, 100)
         self._script = self._steps()
         self._wait: Wait = ('begins', lambda: True)
-        self.look_every(_LOOK_PERIOD, self.look)
+        self.look_every(0.05, self.look)
 
     @property
     def finished(self) -> bool:
@@ -165,25 +166,14 @@ class IdentificationRunNode(ArmidNode):
         """Stop the run, the recording and the program that this node began."""
         self._stop_all()
         for future in self._farewells:
-            if self.executor is not None:
-                self.executor.spin_until_future_complete(future, timeout_sec=_PARTING)
+            if self.executor is not None:  # the node that is stopped may have ended already
+                self.executor.spin_until_future_complete(future, timeout_sec=1.0)
         if self._program is not None and self._program.poll() is None:
             self._program.terminate()
             try:
-                self._program.wait(_FAREWELL)
+                self._program.wait(5.0)
             except subprocess.TimeoutExpired:
                 self._program.kill()
-
-    def _require_input(self) -> None:
-        """Raise an ArmidError for invalid input, before the arm moves."""
-        joints, effects = names(self, 'joints') or None, ','.join(names(self, 'effects'))
-        ArmModel.of(
-            self.value('robot'), effects=effects, gravity=self.value('gravity'), joints=joints
-        )
-        folder = self.folder('save_to')
-        for name, schema in _FOLDERS.items():
-            if (folder / name).is_dir():
-                refuse_foreign(folder / name, schema)
 
     def _stop_all(self) -> None:
         """Stop the run and the recording that this node began, the arm first."""
@@ -218,11 +208,32 @@ class IdentificationRunNode(ArmidNode):
             yield from self._ended('diagnose', folder / 'diagnosis', bags, *model)
 
     def _excited(self, service: str, what: str = 'rehearsal') -> Iterator[Wait]:
-        """Start a run, and wait until it ends."""
+        """Start a run, again until it starts or the timeout has passed; wait until it ends."""
         before = int(self._state.get('runs', 0))
-        yield from self._started(service, what)
+        deadline = time.monotonic() + self.value('patience')
+        while True:
+            future = self._call('publisher', service)
+            yield f'{what} is planned', future.done
+            answer = future.result()
+            self._refused = '' if answer.success else f'{what}: {answer.message}'
+            if answer.success:
+                break
+            self.complaints.say('start', self._refused)
+            self.publish_diagnostics()
+            if time.monotonic() > deadline:
+                raise TrajectoryError(self._refused)
+            later = time.monotonic() + 1.0
+            yield f'{what} is planned', lambda later=later: time.monotonic() > later
+
+        def over() -> bool:
+            state = self._state
+            if int(state.get('runs', 0)) <= before or state['run'] == 'under way':
+                return False
+            rehearsed = state['run'] == 'stopped' or 'rehearsed' in state['message']
+            return rehearsed or service != 'rehearse'
+
         self._begun.append('publisher')
-        yield f'{what} is under way', lambda: self._over(before, service == 'rehearse')
+        yield f'{what} is under way', over
         self._begun.remove('publisher')
         if self._state['run'] != 'complete':
             raise TrajectoryError(f'{what}: {self._state["message"]}')
@@ -231,30 +242,6 @@ class IdentificationRunNode(ArmidNode):
             self.get_logger().info(said)
             if 'look into it' in said:
                 raise TrajectoryError(said)
-
-    def _over(self, before: int, rehearsed: bool) -> bool:
-        """Return whether a run after the first ``before`` runs has ended."""
-        state = self._state
-        if int(state.get('runs', 0)) <= before or state['run'] == 'under way':
-            return False
-        return not rehearsed or state['run'] == 'stopped' or 'rehearsed' in state['message']
-
-    def _started(self, service: str, what: str) -> Iterator[Wait]:
-        """Call the service again until the run starts or the timeout has passed."""
-        deadline = time.monotonic() + self.value('patience')
-        while True:
-            future = self._call('publisher', service)
-            yield f'{what} is planned', future.done
-            answer = future.result()
-            self._refused = '' if answer.success else f'{what}: {answer.message}'
-            if answer.success:
-                return
-            self.complaints.say('start', self._refused)
-            self.publish_diagnostics()
-            if time.monotonic() > deadline:
-                raise TrajectoryError(self._refused)
-            later = time.monotonic() + 1.0
-            yield f'{what} is planned', lambda later=later: time.monotonic() > later
 
     def _asked(self, node: str, service: str) -> Any:
         """Call a service, and return its answer."""

@@ -98,7 +98,12 @@ class JointStateMergerNode(ArmidNode):
         if names(self, 'joints'):
             self._adopt(names(self, 'joints'))
         else:
-            self.create_subscription(String, 'robot_description', self._on_description, LATCHED)
+            self.create_subscription(
+                String,
+                'robot_description',
+                lambda message: self._adopt(robot_from_urdf(message.data).joints),
+                LATCHED,
+            )
         self.look_every(LOOK_PERIOD, self.look)
 
     def look(self) -> None:
@@ -137,9 +142,6 @@ class JointStateMergerNode(ArmidNode):
             if joints
         ]
         return '; '.join(told) or 'the senders do not share their time', values
-
-    def _on_description(self, message: String) -> None:
-        self._adopt(robot_from_urdf(message.data).joints)
 
     def _adopt(self, joints: Sequence[str]) -> None:
         if tuple(joints) == self.joints:
@@ -181,33 +183,29 @@ class JointStateMergerNode(ArmidNode):
         header = getattr(message, 'header', None)
         now = self.get_clock().now().nanoseconds - self._lag_ns
         stamp = now if header is None else self._stamp(header.stamp)
-        self._take_efforts(stamp, self._torques(message), self._effort_names)
-
-    def _torques(self, message: Any) -> Mapping[str, float]:
-        """Return the torques or currents in a message, by joint name."""
-        if isinstance(message, JointState):
-            names, values = message.name, message.effort
-        elif hasattr(message, 'interface_values'):
+        if hasattr(message, 'interface_values'):
             interface, parts = self.value('effort_interface'), message.interface_values
-            found = {
+            known = {
                 joint: part.values[list(part.interface_names).index(interface)]
                 for joint, part in zip(message.joint_names, parts, strict=False)
                 if interface in part.interface_names
             }
-            if not found:
+            if not known:
                 there = sorted({name for part in parts for name in part.interface_names})
                 raise RecordingError(
                     f"efforts: no joint has the interface '{interface}'; there are "
                     f'{", ".join(there)}'
                 )
-            return found
         else:
-            names, values = self._effort_names, message.data
-        if len(values) != len(names):
-            raise RecordingError(
-                f'efforts: {len(values)} values for {len(names)} names ({", ".join(names)})'
-            )
-        return dict(zip(names, values, strict=True))
+            names, values = self._effort_names, getattr(message, 'data', None)
+            if isinstance(message, JointState):
+                names, values = message.name, message.effort
+            if len(values) != len(names):
+                raise RecordingError(
+                    f'efforts: {len(values)} values for {len(names)} names ({", ".join(names)})'
+                )
+            known = dict(zip(names, values, strict=True))
+        self._take_efforts(stamp, known, self._effort_names)
 
     def _take_efforts(self, stamp: int, known: Mapping[str, float], called: Sequence[str]) -> None:
         n = len(self.joints)

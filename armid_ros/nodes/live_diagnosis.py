@@ -12,11 +12,11 @@ from armid_msgs.msg import Diagnosis
 from armid_ros.api.arguments import source_of
 from armid_ros.arm.model_file import model_text
 from armid_ros.diagnosis import Finding
-from armid_ros.errors import ArmidError, IdentificationError
+from armid_ros.errors import IdentificationError
 from armid_ros.estimate import name_in_words
 from armid_ros.files.own import refuse_replacing
 from armid_ros.live import Answer, Assistant, LiveDiagnosis, StreamWatch
-from armid_ros.live.assistant import Done, Helper, Plan, Save
+from armid_ros.live.assistant import Helper, Plan, Save
 from armid_ros.nodes.base import key_values
 from armid_ros.nodes.listening import ListeningNode
 from armid_ros.nodes.messages.joint_states import disturbance, JointSample
@@ -152,8 +152,12 @@ class LiveDiagnosisNode(ListeningNode):
             return False
         if isinstance(result, Answer):
             self._take(result)
-        else:
-            self._note(result)
+        elif not result.success:
+            self.complaints.say('diagnosis', result.text)
+        else:  # of saving or planning
+            self.tell(result.text)
+            if result.excitation:
+                self._runs.publish(String(data=result.excitation))
         if self._waiting and not self._helper.busy:
             self._helper.ask(self._waiting.pop(0))
         return True
@@ -188,15 +192,32 @@ class LiveDiagnosisNode(ListeningNode):
         if self.live is None:
             return ()
         name = f'{self.get_fully_qualified_name()[1:]}: diagnosis'
-        return (_status(name, self.hardware, self.live.latest),)
+        answer = self.live.latest
+        status = DiagnosticStatus(
+            name=name, hardware_id=self.hardware, message='nothing diagnosed so far'
+        )
+        status.level = DiagnosticStatus.OK
+        if answer is None:
+            return (status,)
+        status.level = _LEVELS.get(answer.verdict, DiagnosticStatus.WARN)
+        status.message = f'{answer.verdict.replace("_", " ")}: {answer.summary}'
+        numbers = {'processor seconds': answer.seconds, 'window': answer.window.duration}
+        for row in answer.gap:
+            numbers |= {
+                f'gap before {row.joint} [N m]': row.before,
+                f'gap after {row.joint} [N m]': row.after,
+                f'floor {row.joint} [N m]': row.floor,
+            }
+        for finding in answer.findings:
+            for parameter, value, std in _rows(finding):
+                what = ' '.join(filter(None, (finding.name, parameter.joint, parameter.name)))
+                numbers |= {f'{what} [{parameter.unit}]': value, f'{what} std': std}
+        status.values = key_values(numbers)
+        return (status,)
 
-    def objection(self, values: Mapping[str, Any]) -> str:
-        """Return why settings do not fit each other; empty if they fit."""
-        try:
-            settings_of(lambda name: values.get(name, self.value(name)))
-        except ArmidError as error:
-            return str(error)
-        return ''
+    def check(self, values: Mapping[str, Any]) -> None:
+        """Raise an IdentificationError if settings do not fit each other."""
+        settings_of(lambda name: values.get(name, self.value(name)))
 
     def changed(self, names: frozenset[str]) -> None:
         """Apply changed settings."""
@@ -220,22 +241,35 @@ class LiveDiagnosisNode(ListeningNode):
             self._publish_model()
         if live.latest is latest:
             return
-        message = _message(answer, self.hardware, live.confirmed)
+        message = Diagnosis(
+            robot=self.hardware,
+            verdict=answer.verdict,
+            summary=answer.summary,
+            window=float(answer.window.duration),
+            confirmed=live.confirmed,
+            effect=[finding.name for finding in answer.findings],
+            effect_joints=[','.join(finding.joints) for finding in answer.findings],
+            share=[float(finding.share) for finding in answer.findings],
+            rivals=[','.join(finding.ambiguous_with) for finding in answer.findings],
+            gap_joint=[row.joint for row in answer.gap],
+            gap_before=[row.before for row in answer.gap],
+            gap_after=[row.after for row in answer.gap],
+            gap_floor=[row.floor for row in answer.gap],
+        )
+        for number, finding in enumerate(answer.findings):
+            for parameter, value, std in _rows(finding):
+                message.name.append(parameter.name)
+                message.joint.append(parameter.joint)
+                message.unit.append(parameter.unit)
+                message.value.append(float(value))
+                message.std_dev.append(float(std))
+                message.of_effect.append(number)
         message.header.stamp = self.reader.stamp(answer.end).to_msg()
         self._diagnoses.publish(message)
         said = f'{answer.verdict.replace("_", " ")}: {answer.summary}'
         if answer.named != self._said:
             self._said = answer.named
             self.get_logger().warning(said) if answer.named else self.get_logger().info(said)
-
-    def _note(self, done: Done) -> None:
-        """Log the result of saving or planning."""
-        if not done.success:
-            self.complaints.say('diagnosis', done.text)
-            return
-        self.tell(done.text)
-        if done.excitation:
-            self._runs.publish(String(data=done.excitation))
 
     def _require_diagnosis(self) -> None:
         if self._require().latest is None:
@@ -262,57 +296,6 @@ class LiveDiagnosisNode(ListeningNode):
         if self.live is None:
             raise IdentificationError('no robot is known: robot_description was not received')
         return self.live
-
-
-def _message(answer: Answer, robot: str, confirmed: bool) -> Diagnosis:
-    """Convert an answer to a message without a stamp."""
-    message = Diagnosis(
-        robot=robot,
-        verdict=answer.verdict,
-        summary=answer.summary,
-        window=float(answer.window.duration),
-        confirmed=confirmed,
-        effect=[finding.name for finding in answer.findings],
-        effect_joints=[','.join(finding.joints) for finding in answer.findings],
-        share=[float(finding.share) for finding in answer.findings],
-        rivals=[','.join(finding.ambiguous_with) for finding in answer.findings],
-        gap_joint=[row.joint for row in answer.gap],
-        gap_before=[row.before for row in answer.gap],
-        gap_after=[row.after for row in answer.gap],
-        gap_floor=[row.floor for row in answer.gap],
-    )
-    for number, finding in enumerate(answer.findings):
-        for parameter, value, std in _rows(finding):
-            message.name.append(parameter.name)
-            message.joint.append(parameter.joint)
-            message.unit.append(parameter.unit)
-            message.value.append(float(value))
-            message.std_dev.append(float(std))
-            message.of_effect.append(number)
-    return message
-
-
-def _status(name: str, robot: str, answer: Answer | None) -> DiagnosticStatus:
-    """Return the /diagnostics status of the last answer, with numbers to plot."""
-    status = DiagnosticStatus(name=name, hardware_id=robot, message='nothing diagnosed so far')
-    status.level = DiagnosticStatus.OK
-    if answer is None:
-        return status
-    status.level = _LEVELS.get(answer.verdict, DiagnosticStatus.WARN)
-    status.message = f'{answer.verdict.replace("_", " ")}: {answer.summary}'
-    numbers = {'processor seconds': answer.seconds, 'window': answer.window.duration}
-    for row in answer.gap:
-        numbers |= {
-            f'gap before {row.joint} [N m]': row.before,
-            f'gap after {row.joint} [N m]': row.after,
-            f'floor {row.joint} [N m]': row.floor,
-        }
-    for finding in answer.findings:
-        for parameter, value, std in _rows(finding):
-            what = ' '.join(filter(None, (finding.name, parameter.joint, parameter.name)))
-            numbers |= {f'{what} [{parameter.unit}]': value, f'{what} std': std}
-    status.values = key_values(numbers)
-    return status
 
 
 def _rows(finding: Finding) -> list[tuple[object, float, float]]:

@@ -12,7 +12,6 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from contextlib import ExitStack
-from dataclasses import dataclass
 import math
 import os
 from pathlib import Path
@@ -31,9 +30,10 @@ from armid_ros.nodes.online_identifier import OnlineIdentifierNode
 from armid_ros.nodes.qos import STREAM
 from armid_ros.nodes.recorder import RecorderNode
 from armid_ros.nodes.running.domains import private_context
-from armid_ros.nodes.running.process import make_executor, steady
+from armid_ros.nodes.running.process import steady
 from armid_ros.nodes.simulated_arm import SimulatedArmNode
 from armid_ros.simulation import SimulatedArm
+from rclpy.experimental import EventsExecutor
 from rclpy.logging import LoggingSeverity
 from rclpy.parameter import Parameter
 from rclpy.time import Time
@@ -43,8 +43,6 @@ AnyNode = TypeVar('AnyNode', bound=ArmidNode)
 
 #: Timeout of a message [s]; discovery takes up to 3 s.
 PATIENCE = 20.0
-#: Time for which the arm rests after the run, so that filters settle [s].
-_REST = 0.5
 #: First time of the clock [ns]; zero would mean no stamp.
 EPOCH_NS = 1_000 * 10**9
 #: Time for which the arm rests before the run, as the publisher requires [s].
@@ -54,11 +52,8 @@ _TOPICS = ('joint_states', 'robot_description', 'joint_trajectory')
 _LEARNED = ('online_identifier/estimate',)
 #: Step of the clock of a replay [ns].
 _TICK_NS = 2_000_000
-#: Simulated time between two reports of progress [s].
-_PERIOD = 1.0
 
 
-@dataclass(frozen=True)
 class Progress:
     """
     Progress of a run.
@@ -72,9 +67,19 @@ class Progress:
 
     """
 
-    t: float
-    duration: float
-    real_time_factor: float
+    def __init__(self, duration: float, tell: OnProgress | None) -> None:
+        self._tell, self._due = tell, 1.0
+        self._begun = time.monotonic()
+        self.duration, self.t, self.real_time_factor = duration, 0.0, 0.0
+
+    def see(self, now_ns: int) -> None:
+        """Take the time of the clock [ns], and report every second of it."""
+        self.t = (now_ns - EPOCH_NS) * 1e-9
+        self.real_time_factor = self.t / max(time.monotonic() - self._begun, 1e-9)
+        if self.t >= self._due:
+            self._due += 1.0
+            if self._tell is not None:
+                self._tell(self)
 
 
 OnProgress = Callable[[Progress], None]
@@ -169,10 +174,11 @@ def run_lockstep(
             stage.spin_until(lambda begun=begun: publisher.last_stamp_ns == begun, 'joint_states')
         publisher.start()
         stage.spin_until(lambda: plant.moving or plant.complaints.counts, 'joint_trajectory')
-        watch = _Watch(publisher.duration + (begun - EPOCH_NS) * 1e-9 + _REST, on_progress)
-        while watch.t < watch.duration:
-            watch.see(step())
-        return watch.progress()
+        settling = 0.5  # of the filters, after the run [s]
+        run = Progress(publisher.duration + (begun - EPOCH_NS) * 1e-9 + settling, on_progress)
+        while run.t < run.duration:
+            run.see(step())
+        return run
 
 
 def replay_lockstep(
@@ -215,8 +221,8 @@ def replay_lockstep(
         stage.spin_until(
             lambda: clock.get_subscription_count() >= 2 and _matched(learner), full_topic
         )
-        watch, now = _Watch(duration, on_progress), EPOCH_NS
-        while watch.t < duration and not player.finished:
+        played, now = Progress(duration, on_progress), EPOCH_NS
+        while played.t < duration and not player.finished:
             now += _TICK_NS
             clock.publish(Clock(clock=Time(nanoseconds=now).to_msg()))
             due = (now - EPOCH_NS - _TICK_NS - 1) * 1e-9
@@ -225,8 +231,8 @@ def replay_lockstep(
             )
             count = player.published[full_topic]
             stage.spin_until(lambda count=count: learner.received >= count, full_topic)
-            watch.see(now)
-        return watch.progress()
+            played.see(now)
+        return played
 
 
 class Stage:
@@ -238,7 +244,7 @@ class Stage:
         with ExitStack() as stack:
             self._context = stack.enter_context(private_context(int(domain) if domain else None))
             stack.enter_context(steady())
-            self._executor = make_executor('events', self._context)
+            self._executor = EventsExecutor(context=self._context)
             stack.callback(self._executor.shutdown)
             self._scope = stack.pop_all()
         return self
@@ -274,26 +280,6 @@ class Stage:
                     'blocked?'
                 )
             self._executor.spin_once(timeout_sec=0.1)
-
-
-class _Watch:
-    """Reports the progress of a run."""
-
-    def __init__(self, duration: float, tell: OnProgress | None) -> None:
-        self._tell, self._due = tell, _PERIOD
-        self._begun = time.monotonic()
-        self.duration, self.t = duration, 0.0
-
-    def see(self, now_ns: int) -> None:
-        self.t = (now_ns - EPOCH_NS) * 1e-9
-        if self.t >= self._due:
-            self._due += _PERIOD
-            if self._tell is not None:
-                self._tell(self.progress())
-
-    def progress(self) -> Progress:
-        factor = self.t / max(time.monotonic() - self._begun, 1e-9)
-        return Progress(self.t, self.duration, factor)
 
 
 def _matched(learner: OnlineIdentifierNode) -> bool:

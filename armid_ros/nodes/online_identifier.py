@@ -14,22 +14,18 @@ import time
 from typing import Any
 
 from armid_msgs.msg import ParameterEstimate
-from armid_ros.arm.model_file import read_model
+from armid_ros.arm.model_file import parameter_table, read_model, save_model
 from armid_ros.effects import Effect
-from armid_ros.errors import ArmidError, IdentificationError
+from armid_ros.errors import ArmidError, IdentificationError, ModelError
 from armid_ros.estimate import Estimate
+from armid_ros.files import write_file
 from armid_ros.files.own import refuse_replacing
 from armid_ros.identification.online.identifier import OnlineIdentifier, OnlineSettings
 from armid_ros.identification.online.learning_progress import LearningProgress, too_little_motion
 from armid_ros.motion import FloatArray
+from armid_ros.nodes.base import key_values
 from armid_ros.nodes.listening import ListeningNode
-from armid_ros.nodes.messages.estimates import (
-    change_status,
-    estimate_message,
-    FILES,
-    parameter_status,
-    save_identification,
-)
+from armid_ros.nodes.messages.estimates import estimate_message, estimate_values
 from armid_ros.nodes.messages.joint_states import disturbance, DISTURBANCES, JointSample
 from armid_ros.nodes.parameters.identifier import (
     IDENTIFIER_PARAMETERS,
@@ -42,13 +38,15 @@ from armid_ros.nodes.running.process import run
 from diagnostic_msgs.msg import DiagnosticStatus
 import numpy as np
 from rclpy.publisher import Publisher
+from rclpy.timer import Timer
 from sensor_msgs.msg import JointState
 from std_msgs.msg import String
+import yaml
 
+#: Files of ~/save: the estimate, the model with the estimate, and its robot.
+FILES = ('estimate.yaml', 'model.yaml', 'robot.urdf')
 #: Default folder of ~/save.
 _FOLDER = 'online_identification'
-#: Number of update times kept for diagnostics.
-_TIMED = 2000
 
 
 class OnlineIdentifierNode(ListeningNode):
@@ -87,7 +85,7 @@ class OnlineIdentifierNode(ListeningNode):
         """Make the node; the identifier is by default made from the parameters."""
         super().__init__('online_identifier', **kwargs)
         self.identifier: OnlineIdentifier | None = None
-        self.update_times: deque[float] = deque(maxlen=_TIMED)
+        self.update_times: deque[float] = deque(maxlen=2000)
         self._published = -1
         self._disturbed: Counter[str] = Counter()
         if self.value('save_to'):  # check before the identification, not at its end
@@ -104,7 +102,14 @@ class OnlineIdentifierNode(ListeningNode):
         self.listen()
         self.offer('~/reset', self.reset)
         self.offer('~/save', self.save)
-        self.pace('estimate_rate', self.publish_estimate)
+        self._timer: Timer | None = None
+        self._keep_pace()
+
+    def _keep_pace(self) -> None:
+        # a changed period of a timer takes effect only after the old one
+        if self._timer is not None:
+            self.destroy_timer(self._timer)
+        self._timer = self.create_timer(1.0 / self.value('estimate_rate'), self.publish_estimate)
 
     def reset(self) -> str:
         """Delete the estimate, and start again."""
@@ -117,11 +122,31 @@ class OnlineIdentifierNode(ListeningNode):
         return 'the estimate begins anew'
 
     def save(self) -> str:
-        """Write the estimate to files."""
-        if not self._require().samples:
+        """Write the estimate, an arm model with it, and the robot of the model to files."""
+        identifier = self._require()
+        if not identifier.samples:
             raise IdentificationError('nothing has been learned so far, so nothing is written')
         folder = Path(self.value('save_to') or _FOLDER).expanduser()
-        paths = save_identification(folder, self._require())
+        refuse_replacing(folder, FILES)
+        robot, estimate = identifier.arm.robot, identifier.estimate()
+        document = {
+            'schema': 'armid/estimate/1',
+            'robot': robot.name,
+            'gravity': [float(g) for g in robot.gravity],
+            'samples': identifier.samples,
+            'condition_number': identifier.condition_number,
+            'parameters': parameter_table(
+                estimate.parameters, estimate.values, [float(s) for s in estimate.std]
+            ),
+        }
+        estimated, model, urdf = paths = tuple(folder / name for name in FILES)
+        try:
+            folder.mkdir(parents=True, exist_ok=True)
+            write_file(urdf, robot.urdf)
+            save_model(model, identifier.model(), urdf.name, estimate)
+            write_file(estimated, yaml.safe_dump(document, sort_keys=False, width=99))
+        except OSError as error:
+            raise ModelError(f'{folder}: cannot be written: {error.strerror}') from error
         return f'wrote {", ".join(map(str, paths))}'
 
     def close(self) -> None:
@@ -161,7 +186,16 @@ class OnlineIdentifierNode(ListeningNode):
             values |= {'update_p50_us': float(p50), 'update_p99_us': float(p99)}
         values |= {f'left out {reason}': n for reason, n in identifier.rejected.items()}
         values |= {f'restarted {reason}': n for reason, n in identifier.restarts.items()}
-        self._say_what_was_left_out(identifier)
+        counted = Counter(identifier.rejected) + Counter(identifier.restarts)
+        counted['missing'] = identifier.missing
+        news = counted - self._disturbed
+        several = self.joint_states.several if news else ''
+        for reason in news.keys() & DISTURBANCES.keys():
+            self.complaints.say(reason, disturbance(reason, several))
+        for joint, signal in identifier.spikes if news['spike'] else ():
+            text = f"the {signal} of '{joint}' jumps for single samples: left out"
+            self.complaints.say('spike', disturbance('spike', several, text))
+        self._disturbed = counted
         self._begin_statistics()
         return self._trouble(identifier), values
 
@@ -170,28 +204,34 @@ class OnlineIdentifierNode(ListeningNode):
         identifier, prefix = self.identifier, self.get_fully_qualified_name()[1:]
         if identifier is None:
             return ()
-        statuses = (
-            parameter_status(
-                f'{prefix}: parameters', identifier.estimate() if identifier.samples else None
-            ),
-            change_status(f'{prefix}: changes', identifier.changes, self._last_sample),
-        )
-        for status in statuses:
-            status.hardware_id = self.hardware
-        return statuses
+        common = {'level': DiagnosticStatus.OK, 'hardware_id': self.hardware}
+        learned = DiagnosticStatus(name=f'{prefix}: parameters', **common)
+        learned.message = 'nothing learned so far'
+        if identifier.samples:
+            learned.message = 'value, lower and upper end of the 95 % interval'
+            learned.values = key_values(estimate_values(identifier.estimate()))
+        changed = DiagnosticStatus(name=f'{prefix}: changes', **common)
+        changed.message = 'no change seen'
+        values: dict[str, object] = {'changes': len(identifier.changes)}
+        if identifier.changes:
+            latest = identifier.changes[-1]
+            age = self._last_sample - latest.t
+            if age < 60.0:
+                changed.level = DiagnosticStatus.WARN
+            changed.message = f'{latest}, {age:.0f} s ago'
+            values |= estimate_values(latest.size)
+        changed.values = key_values(values)
+        return learned, changed
 
-    def objection(self, values: Mapping[str, Any]) -> str:
-        """Return why settings cannot change at run time; empty if they can."""
-        if self.identifier is None:
-            return ''
-        try:
+    def check(self, values: Mapping[str, Any]) -> None:
+        """Raise an ArmidError if settings cannot change at run time."""
+        if self.identifier is not None:
             self.identifier.check(self._settings(values))
-        except ArmidError as error:
-            return str(error)
-        return ''
 
     def changed(self, names: frozenset[str]) -> None:
         """Apply changed settings."""
+        if 'estimate_rate' in names:
+            self._keep_pace()
         if self.identifier is not None:
             self.identifier.use(self._settings({}))
 
@@ -208,19 +248,6 @@ class OnlineIdentifierNode(ListeningNode):
         failed = self.identifier is not None and bool(self.identifier.error)
         stopped = self.freshness.stopped
         return DiagnosticStatus.ERROR if failed and not stopped else super().level(troubled)
-
-    def _say_what_was_left_out(self, identifier: OnlineIdentifier) -> None:
-        counted = Counter(identifier.rejected) + Counter(identifier.restarts)
-        counted['missing'] = identifier.missing
-        news = counted - self._disturbed
-        several = self.joint_states.several if news else ''
-        for reason in news.keys() & DISTURBANCES.keys():
-            self.complaints.say(reason, disturbance(reason, several))
-        if news['spike']:
-            for joint, signal in identifier.spikes:
-                text = f"the {signal} of '{joint}' jumps for single samples: left out"
-                self.complaints.say('spike', disturbance('spike', several, text))
-        self._disturbed = counted
 
     def _trouble(self, identifier: OnlineIdentifier) -> str:
         if self.awaited:

@@ -16,21 +16,15 @@ from typing import Any, NoReturn
 from armid_ros.errors import ArmidError, RecordingEnded, RecordingError
 from armid_ros.files import size_text
 from armid_ros.nodes.base import ArmidNode, LOOK_PERIOD
-from armid_ros.nodes.messages.classes import is_stamped, message_class
+from armid_ros.nodes.messages.classes import message_class
 from armid_ros.nodes.parameters.table import names, NodeParameter
 from armid_ros.nodes.qos import MatchedSubscription, recorded
 from armid_ros.nodes.running.process import run
 from armid_ros.recording import BagWriter
 from armid_ros.recording.message_types import header_stamp
 
-#: Period of writing messages in memory to the file [s]; limits the loss after a kill.
-_FLUSH_PERIOD = 0.1
 #: Period of the check of the disk [s].
 _WATCH_PERIOD = 1.0
-#: A warning is logged if the disk will be full within this time [s].
-_WARNED = 60.0
-#: Largest number of messages kept until simulated time begins.
-_HELD = 1000
 
 
 class RecorderNode(ArmidNode):
@@ -102,7 +96,7 @@ class RecorderNode(ArmidNode):
         self.offer('~/start', self.start)
         self.offer('~/stop', self.stop)
         self.look_every(LOOK_PERIOD, self.look)
-        self.look_every(_FLUSH_PERIOD, self._flush)
+        self.look_every(0.1, self._flush)  # limits the loss after a kill
         self.look_every(_WATCH_PERIOD, self.watch)
         if self.value('record'):
             self.start()
@@ -191,10 +185,9 @@ class RecorderNode(ArmidNode):
         if free < least:
             self._give_up(f'{writer.path}: {size_text(free)} are left on the disk')
         rate = writer.size / max(time.monotonic() - self._begun, _WATCH_PERIOD)
-        if free - least < _WARNED * rate:
-            self.complaints.say(
-                'disk', f'the disk of {writer.path} will be full in less than {_WARNED:.0f} s'
-            )
+        if free - least < 60.0 * rate:
+            text = f'the disk of {writer.path} will be full in less than 60 s'
+            self.complaints.say('disk', text)
 
     def changed(self, names: frozenset[str]) -> None:
         """Apply changed topics, bag name and chunk age."""
@@ -248,7 +241,9 @@ class RecorderNode(ArmidNode):
             self._refused[topic] = types
             return
         self._refused.pop(topic, None)
-        take = partial(self._on_message, topic, is_stamped(message_type))
+        fields = message_type.get_fields_and_field_types()
+        stamped = next(iter(fields.items()), None) == ('header', 'std_msgs/Header')
+        take = partial(self._on_message, topic, stamped)
         self._subscriptions_by_topic[topic] = MatchedSubscription(
             self, message_type, topic, take, raw=True
         )
@@ -259,7 +254,7 @@ class RecorderNode(ArmidNode):
             return
         now = self.get_clock().now().nanoseconds
         if now == 0:  # before the first /clock
-            if len(self._held) < _HELD:
+            if len(self._held) < 1000:
                 self._held.append((topic, stamped, data))
             else:
                 self.complaints.say('message', 'messages are lost: /clock has not begun')

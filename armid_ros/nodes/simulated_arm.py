@@ -12,6 +12,7 @@ from typing import Any
 from armid_ros.arm import ArmModel
 from armid_ros.arm.model_file import read_model
 from armid_ros.errors import ArmidError, ModelError, TrajectoryError
+from armid_ros.files import reading
 from armid_ros.nodes.base import ArmidNode
 from armid_ros.nodes.parameters.arm import (
     ARM_PARAMETERS,
@@ -41,15 +42,8 @@ from sensor_msgs.msg import Imu, JointState
 from std_msgs.msg import String
 from trajectory_msgs.msg import JointTrajectory
 
-#: Largest delay and lead of the start of a trajectory [s]; otherwise the clocks differ.
-LATEST = 1.0
-EARLIEST = 60.0
 #: Longest trajectory [s]; all its steps are checked against the limits at its start.
 LONGEST = 3600.0
-#: A larger step of the clock means that it was set; the arm does not catch up [ns].
-LONGEST_NS = 60 * 10**9
-#: Shortest period of a timer [s].
-_SHORTEST_PERIOD = 0.0005
 
 
 def _samples(node: Node, kind: type, topic: str) -> Publisher:
@@ -194,18 +188,13 @@ class SimulatedArmNode(ArmidNode):
         if self._follows:
             self._timer = self.create_timer(1.0 / rate, self.follow)
         elif self._factor:
-            period = max(1.0 / (rate * self._factor), _SHORTEST_PERIOD)
+            period = max(1.0 / (rate * self._factor), 0.0005)
             self._timer = self.look_every(period, self.catch_up)
 
     @property
     def stamp_ns(self) -> int:
         """Return the stamp of the present state of the arm [ns]."""
         return (self._origin_ns or 0) + self._arm.state.steps * self._dt_ns
-
-    @property
-    def joint_state(self) -> JointState:
-        """Return the last published joint state."""
-        return self._message
 
     @property
     def moving(self) -> bool:
@@ -226,7 +215,13 @@ class SimulatedArmNode(ArmidNode):
         """Simulate until the next sample, publish the sample, and return its stamp [ns]."""
         if self._pending is not None and self._pending[0] <= self.stamp_ns:
             (start_ns, reference), self._pending = self._pending, None
-            self._begin(reference.remaining((self.stamp_ns - start_ns) * 1e-9))
+            reference = reference.remaining((self.stamp_ns - start_ns) * 1e-9)
+            try:
+                self._arm.set_trajectory(reference)
+            except TrajectoryError as error:
+                self._refuse(error)
+            else:
+                self.get_logger().info(f'follows a trajectory of {reference.duration:g} s')
         sample = self._arm.advance(self._stride)
         message, stamp_ns = self._message, self.stamp_ns
         stamp = message.header.stamp
@@ -251,7 +246,8 @@ class SimulatedArmNode(ArmidNode):
     def follow(self) -> None:
         """Simulate until the present time of /clock."""
         now = self.get_clock().now().nanoseconds
-        if self._origin_ns is None or not 0 <= now - self.stamp_ns <= LONGEST_NS:
+        # a larger step of the clock means that it was set; the arm does not catch up
+        if self._origin_ns is None or not 0 <= now - self.stamp_ns <= 60 * 10**9:
             self._origin_ns = now - self._arm.state.steps * self._dt_ns
         while self.stamp_ns + self._stride * self._dt_ns <= now:
             self.step()
@@ -284,16 +280,13 @@ class SimulatedArmNode(ArmidNode):
             'skipped_real_time': self.real_time.given_up,
         }
 
-    def objection(self, values: Mapping[str, Any]) -> str:
-        """Return why effects, noise or rates do not fit the arm; empty if they fit."""
-        try:
+    def check(self, values: Mapping[str, Any]) -> None:
+        """Raise an ArmidError if effects, noise or rates do not fit the arm."""
+        with reading(f'parameter {", ".join(map(repr, values))}', ArmidError):
             sensors_of(lambda name: values.get(name, self.value(name)), self._arm.joints)
             self._steps_at(values.get('rate', self.value('rate')))
             if 'effects' in values:
                 self._arm.successor(self._with_effects(values['effects']))
-        except ArmidError as error:
-            return f'parameter {", ".join(map(repr, values))}: {error}'
-        return ''
 
     def changed(self, names: frozenset[str]) -> None:
         """Apply changed effects, rates and sensors to the moving arm."""
@@ -333,7 +326,7 @@ class SimulatedArmNode(ArmidNode):
             stamp = message.header.stamp
             start_ns = stamp.sec * 10**9 + stamp.nanosec or self.stamp_ns
             delay = (start_ns - self.stamp_ns) * 1e-9
-            if not -LATEST <= delay <= EARLIEST:
+            if not -1.0 <= delay <= 60.0:  # the clocks differ
                 when = f'{delay:.3g} s from now' if delay > 0 else f'{-delay:.3g} s ago'
                 raise TrajectoryError(
                     f'trajectory: it was to begin {when}; a sender and an arm in different times '
@@ -343,14 +336,6 @@ class SimulatedArmNode(ArmidNode):
             self._refuse(error)
             return
         self._pending = (start_ns, reference)
-
-    def _begin(self, reference: Reference) -> None:
-        try:
-            self._arm.set_trajectory(reference)
-        except TrajectoryError as error:
-            self._refuse(error)
-            return
-        self.get_logger().info(f'follows a trajectory of {reference.duration:g} s')
 
     def _refuse(self, error: TrajectoryError) -> None:
         goes_on = 'goes on with the one before' if self.moving else 'stays where it is'

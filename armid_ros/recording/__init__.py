@@ -27,8 +27,7 @@ from armid_ros.recording.recording import (
     Recording,
     TimeGap,
 )
-from armid_ros.recording.settings import ReadSettings
-from armid_ros.recording.source import RawMessage, Topic
+from armid_ros.recording.source import RawMessage, ReadSettings, Topic
 from armid_ros.recording.trajectory import (
     joint_trajectory_cdr,
     read_waypoints,

@@ -19,9 +19,10 @@ from armid_ros.recording.columns import (
     refuse_columns,
     renamed,
 )
-from armid_ros.recording.reader import read_recording
+from armid_ros.recording.message_types import JOINT_STATE
+from armid_ros.recording.reader import bag_contents, read_recording
 from armid_ros.recording.recording import Recording
-from armid_ros.recording.settings import DEFAULT, ReadSettings
+from armid_ros.recording.source import DEFAULT, ReadSettings, Topic
 
 if TYPE_CHECKING:
     from armid_ros.recording.tables import TablePlan
@@ -87,8 +88,9 @@ def read_tables(
 def read_anything(
     path: str | Path,
     *,
-    joints: Sequence[str],
+    joints: Sequence[str] | None = None,
     slides: Sequence[bool] | None = None,
+    topics: Sequence[Topic] | None = None,
     topic: str | None = None,
     columns: ColumnSettings | None = None,
     show: Show | None = None,
@@ -102,12 +104,15 @@ def read_anything(
     path : str or Path
         A bag that ``read_recording`` reads, or a table: CSV, NPZ, MAT, Parquet, or the folder of a
         LeRobot dataset.
-    joints : sequence of str
-        Joints to read, in this order.
+    joints : sequence of str, optional
+        Joints to read, in this order; by default all of the table or topic.
     slides : sequence of bool, optional
         Whether each joint is prismatic. Positions of prismatic joints are never in degrees.
+    topics : sequence of Topic, optional
+        Topics of the bag with their joints, if known, for the default of ``joints``.
     topic : str, optional
-        Topic of the bag. Needed if the bag has several topics of JointState.
+        Topic of the bag. Needed if the bag has several topics of JointState; without ``joints``
+        by default the one with the most messages.
     columns : ColumnSettings, optional
         Which columns of a table hold which quantity, in which unit. Missing settings are guessed
         from the file. Names, units, zeros and gears apply to bags too; columns and rate do not.
@@ -128,6 +133,19 @@ def read_anything(
     if is_table(path):
         return read_tables([path], columns, joints, slides, show)
     refuse_columns(path, columns)
+    if joints is None:
+        topics = bag_contents(path, settings) if topics is None else topics
+        there = [one for one in topics if one.joints]
+        if topic is not None:
+            there = [one for one in there if one.name.lstrip('/') == topic.lstrip('/')]
+        if not there:
+            known = ', '.join(f'{t.name} ({t.type_name}, {t.count} messages)' for t in topics)
+            which = f'{topic} of ' if topic else 'topic of '
+            raise RecordingError(
+                f'{path}: no {which}{JOINT_STATE}; there are {known or "no topics"}'
+            )
+        fullest = max(there, key=lambda one: one.count)
+        topic, joints = fullest.name, fullest.joints
     called = [name_in_file(joint, columns.rename) for joint in joints]
     recording = read_recording(path, joints=called, topic=topic, settings=settings)
     others = tuple(

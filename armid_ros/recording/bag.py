@@ -4,7 +4,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 import contextlib
 from dataclasses import replace
 import heapq
@@ -19,22 +19,18 @@ from armid_ros.files import open_regular, reading
 from armid_ros.recording.compression import message_content, unpacked, ZSTD
 from armid_ros.recording.mcap.source import McapSource
 from armid_ros.recording.metadata import BagMetadata, FILE_NAME, read_metadata
-from armid_ros.recording.settings import DEFAULT, ReadSettings
-from armid_ros.recording.source import Damage, MessageBlock, RawMessage, Source, Topic
+from armid_ros.recording.source import (
+    Damage,
+    DEFAULT,
+    MessageBlock,
+    RawMessage,
+    ReadSettings,
+    Source,
+    Topic,
+)
 from armid_ros.recording.sqlite_source import SqliteSource
 
-
-def _ros1(path: Path, settings: ReadSettings) -> Source:
-    # this import takes as long as reading a bag
-    from armid_ros.recording.ros1_source import Ros1Source
-
-    return Ros1Source(path, settings)
-
-
-_STORAGES: dict[str, Callable[[Path, ReadSettings], Source]] = {
-    '.mcap': McapSource,
-    '.db3': SqliteSource,
-}
+_STORAGES: dict[str, type[Source]] = {'.mcap': McapSource, '.db3': SqliteSource}
 _COMPRESSED = ('.zstd', '.zst')
 
 
@@ -179,7 +175,11 @@ class Bag(Source):
 
     def _open(self, file: Path) -> Source:
         """Open one file."""
-        storage = _STORAGES.get(_storage_suffix(file), _ros1)
+        storage = _STORAGES.get(_storage_suffix(file))
+        if storage is None:  # this import takes as long as reading a bag
+            from armid_ros.recording.ros1_source import Ros1Source
+
+            storage = Ros1Source
         with reading(file, RecordingError):
             plain = self._unpacked(file) if file.suffix in _COMPRESSED else file
             source: Source = storage(plain, self._settings)

@@ -139,6 +139,8 @@ def number(text: str) -> float:
             minus = -1.0 if piece.startswith('-') else 1.0
             factor = math.pi if piece.lstrip('+-') == 'pi' else abs(float(piece))
             value *= (minus * factor) ** sign
+        if not math.isfinite(value):
+            raise ValueError(text)
     except (ValueError, ZeroDivisionError):
         raise RecordingError(f"'{text}' is no number; write 0.5, 1798/7 or -pi/2") from None
     return value

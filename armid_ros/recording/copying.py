@@ -18,8 +18,7 @@ from armid_ros.recording.columns import renamed
 from armid_ros.recording.joint_state.conversion import is_plain
 from armid_ros.recording.mcap.source import McapSource
 from armid_ros.recording.message_types import JOINT_STATE
-from armid_ros.recording.settings import DEFAULT, ReadSettings
-from armid_ros.recording.source import Topic, UNREADABLE
+from armid_ros.recording.source import DEFAULT, ReadSettings, Topic, UNREADABLE
 from armid_ros.recording.writer import BagWriter, whole_bag
 from rosbags.typesys import get_typestore, Stores
 

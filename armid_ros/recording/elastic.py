@@ -14,9 +14,8 @@ from armid_ros.motion import ElasticRun, FloatArray
 from armid_ros.recording.bag import Bag
 from armid_ros.recording.joint_state.encoder import write_joint_states
 from armid_ros.recording.message_types import BYTE_ORDERS
-from armid_ros.recording.settings import DEFAULT, ReadSettings
-from armid_ros.recording.source import IntArray
-from armid_ros.recording.writer import BagWriter, whole_bag
+from armid_ros.recording.source import DEFAULT, IntArray, ReadSettings
+from armid_ros.recording.writer import whole_bag
 from armid_ros.robots import Robot
 import numpy as np
 
@@ -27,10 +26,9 @@ if TYPE_CHECKING:
 #: references of the control loops.
 MOTOR, LINK, REFERENCE = '/joint_states', '/link/joint_states', '/reference/joint_states'
 IMU = 'sensor_msgs/msg/Imu'
-#: Count of numbers in an Imu message: orientation, angular velocity and linear acceleration, each
-#: with a covariance.
-_NUMBERS = 37
-_ORIENTATION_COVARIANCE, _RATE_COVARIANCE, _ACCELERATION = 4, 16, slice(25, 28)
+#: Linear acceleration among the 37 numbers of an Imu message: orientation, angular velocity and
+#: linear acceleration, each with a covariance.
+_ACCELERATION = slice(25, 28)
 
 
 def write_runs(
@@ -60,26 +58,18 @@ def write_runs(
             write_joint_states(writer, REFERENCE, joints, stamps, asked, run.reference)
             felt = sensors.readings(link) if run.felt is None else run.felt
             for name, values in zip(robot.links, felt, strict=True):
-                _write_accelerations(writer, imu_topic(name), name, stamps, values)
+                topic, frame = imu_topic(name), name.encode()
+                layout = _layout(len(frame) + 1, '<')
+                rows = np.zeros(len(stamps), layout)
+                rows['encapsulation'] = (0, 1, 0, 0)
+                rows['sec'], rows['nanosec'] = np.divmod(stamps, 10**9)
+                rows['length'], rows['frame'] = len(frame) + 1, frame
+                # a covariance of -1: orientation and angular velocity are not measured
+                rows['numbers'][:, [4, 16]] = -1.0
+                rows['numbers'][:, _ACCELERATION] = values
+                writer.add_topic(topic, IMU)
+                writer.write_many(topic, rows.view(np.dtype((np.void, layout.itemsize))), stamps)
             start = int(stamps[-1]) + pause
-
-
-def _write_accelerations(
-    writer: BagWriter, topic: str, frame_id: str, stamps: IntArray, acceleration: FloatArray
-) -> None:
-    """Write specific forces, shape (N, 3) [m/s^2], to a topic of a bag, logged at stamps [ns]."""
-    layout = _layout(len(frame_id.encode()) + 1, '<')
-    rows = np.zeros(len(stamps), layout)
-    rows['encapsulation'] = (0, 1, 0, 0)
-    rows['sec'], rows['nanosec'] = np.divmod(stamps, 10**9)
-    rows['length'] = len(frame_id.encode()) + 1
-    rows['frame'] = frame_id.encode()
-    # a covariance of -1 marks a quantity that is not measured
-    rows['numbers'][:, _ORIENTATION_COVARIANCE] = -1.0
-    rows['numbers'][:, _RATE_COVARIANCE] = -1.0
-    rows['numbers'][:, _ACCELERATION] = acceleration
-    writer.add_topic(topic, IMU)
-    writer.write_many(topic, rows.view(np.dtype((np.void, layout.itemsize))), stamps)
 
 
 def read_accelerations(
@@ -134,10 +124,10 @@ def _layout(frame_length: int, order: str) -> np.dtype[np.void]:
                 order + 'u4',
                 order + 'u4',
                 f'S{frame_length}',
-                (order + 'f8', (_NUMBERS,)),
+                (order + 'f8', (37,)),
             ],
             'offsets': [0, 4, 8, 12, 16, 4 + padded],
-            'itemsize': 4 + padded + 8 * _NUMBERS,
+            'itemsize': 4 + padded + 8 * 37,
         }
     )
 

@@ -4,7 +4,6 @@
 
 from __future__ import annotations
 
-from collections import Counter
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import replace
 from pathlib import Path
@@ -18,8 +17,7 @@ from armid_ros.recording.joint_state.decoder import JointSamples, JointStateDeco
 from armid_ros.recording.message_types import BYTE_ORDERS, JOINT_STATE, STRING
 from armid_ros.recording.recording import PositionRange, Recording
 from armid_ros.recording.series import assemble
-from armid_ros.recording.settings import DEFAULT, ReadSettings
-from armid_ros.recording.source import Topic
+from armid_ros.recording.source import DEFAULT, ReadSettings, Topic
 import numpy as np
 
 
@@ -90,9 +88,27 @@ def assembled(
     decoder: JointStateDecoder,
     damage: str,
 ) -> Recording:
-    """Assemble a recording from decoded messages, and free their memory."""
+    """Assemble a recording of joints that messages name, and free the memory of the messages."""
     where = f'{path}: {topic}'
-    check_joints(where, decoder, joints)
+    if not decoder.messages:
+        raise RecordingError(f'{where} has no messages')
+    missing = [joint for joint in joints if joint not in decoder.names_seen]
+    if missing and not decoder.names_seen:
+        raise RecordingError(
+            f'{where}: none of {decoder.messages} messages names a joint; '
+            f'{decoder.first_problem or "the names are empty"}'
+        )
+    if missing:
+        listed = ', '.join(f"'{name}'" for name in missing)
+        found = nearest(missing[0], [name for name in decoder.names_seen if name not in joints])
+        present = ','.join(name for name in joints if name in decoder.names_seen)
+        hint = f'; --joints {present} reads the others' if present else ''
+        if found:
+            hint = f"; if '{found}' is '{missing[0]}', use --rename {found}:{missing[0]}{hint}"
+        raise RecordingError(
+            f'{where} does not name {"joint" if len(missing) == 1 else "joints"} {listed}; '
+            f'its joints are {", ".join(decoder.names_seen)}{hint}'
+        )
     if damage:
         damage = f'of a damaged bag {decoder.messages} messages could be read: {damage}'
     with reading(where, RecordingError):
@@ -100,7 +116,6 @@ def assembled(
             where,
             joints,
             pieces,
-            Counter(),
             {
                 'messages': decoder.messages,
                 'malformed': decoder.malformed,
@@ -202,19 +217,15 @@ def choose_topics(bag: Bag, joints: Sequence[str], wanted: str | None) -> tuple[
     available = ', '.join(f'{topic.name} ({topic.count} messages)' for topic in candidates)
     if wanted is not None:
         name = '/' + wanted.lstrip('/')
-        for topic in topics:
-            if '/' + topic.name.lstrip('/') != name:
-                continue
-            if not holds_joint_state(topic):
-                raise RecordingError(
-                    f'{bag.path}: {topic.name} is a topic of {topic.type_name}, not of '
-                    f'{JOINT_STATE}; of that type there are: {available or "none"}'
-                )
-            return (topic,)
-        raise RecordingError(
-            f'{bag.path}: there is no topic {wanted}; topics of {JOINT_STATE}: '
-            f'{available or "none"}'
-        )
+        named = [topic for topic in topics if '/' + topic.name.lstrip('/') == name]
+        if not named or not holds_joint_state(named[0]):
+            what = f'there is no topic {wanted}'
+            if named:
+                what = f'{named[0].name} is a topic of {named[0].type_name}'
+            raise RecordingError(
+                f'{bag.path}: {what}; topics of {JOINT_STATE}: {available or "none"}'
+            )
+        return (named[0],)
     if not candidates:
         others = ', '.join(f'{topic.name} ({topic.type_name})' for topic in topics)
         damage = f' ({bag.damage})' if bag.damage else ''
@@ -223,18 +234,18 @@ def choose_topics(bag: Bag, joints: Sequence[str], wanted: str | None) -> tuple[
         )
     if len(candidates) == 1:
         return (candidates[0],)
-    named = {topic.name: named_joints(bag, topic) for topic in candidates}
-    complete = [topic for topic in candidates if set(joints) <= set(named[topic.name])]
+    names = {topic.name: named_joints(bag, topic) for topic in candidates}
+    complete = [topic for topic in candidates if set(joints) <= set(names[topic.name])]
     if len(complete) > 1:
         plain = [topic for topic in complete if topic.name.split('/')[-1] == 'joint_states']
         complete = plain if len(plain) == 1 else complete
     if len(complete) == 1:
         return (complete[0],)
-    parts = tuple(one for one in candidates if set(joints) & set(named[one.name]))
-    between = [name for one in parts for name in named[one.name]]
+    parts = tuple(one for one in candidates if set(joints) & set(names[one.name]))
+    between = [name for one in parts for name in names[one.name]]
     if not complete and set(joints) <= set(between) and len(between) == len(set(between)):
         return parts
-    listed = '; '.join(f'{name} names {", ".join(n) or "none"}' for name, n in named.items())
+    listed = '; '.join(f'{name} names {", ".join(n) or "none"}' for name, n in names.items())
     which = 'several topics name' if complete else 'no topic names'
     raise RecordingError(
         f'{bag.path}: {which} all of {", ".join(joints)}; say which topic to read: {listed}'
@@ -267,30 +278,6 @@ def bag_contents(path: str | Path, settings: ReadSettings = DEFAULT) -> tuple[To
             replace(topic, joints=named_joints(bag, topic)) if holds_joint_state(topic) else topic
             for topic in bag.topics()
         )
-
-
-def check_joints(where: str, decoder: JointStateDecoder, joints: Sequence[str]) -> None:
-    """Raise a RecordingError if a topic has no messages or does not name all joints."""
-    if not decoder.messages:
-        raise RecordingError(f'{where} has no messages')
-    missing = [joint for joint in joints if joint not in decoder.names_seen]
-    if not missing:
-        return
-    if not decoder.names_seen:
-        raise RecordingError(
-            f'{where}: none of {decoder.messages} messages names a joint; '
-            f'{decoder.first_problem or "the names are empty"}'
-        )
-    listed = ', '.join(f"'{name}'" for name in missing)
-    found = nearest(missing[0], [name for name in decoder.names_seen if name not in joints])
-    present = ','.join(name for name in joints if name in decoder.names_seen)
-    hint = f'; --joints {present} reads the others' if present else ''
-    if found:
-        hint = f"; if '{found}' is '{missing[0]}', use --rename {found}:{missing[0]}{hint}"
-    raise RecordingError(
-        f'{where} does not name {"joint" if len(missing) == 1 else "joints"} {listed}; '
-        f'its joints are {", ".join(decoder.names_seen)}{hint}'
-    )
 
 
 def read_robot_description(path: str | Path, settings: ReadSettings = DEFAULT) -> str | None:

@@ -21,11 +21,6 @@ if TYPE_CHECKING:
     from armid_ros.model.spring_ties import Tie
 
 Clock = Literal['header', 'receive']
-_LABELS = {
-    'q': 'position [rad or m]',
-    'dq': 'velocity [rad/s or m/s]',
-    'tau': 'torque [N m or N]',
-}
 
 #: A stretch without samples is a gap when it is longer than this many sampling periods.
 GAP_PERIODS = 5.0
@@ -341,7 +336,12 @@ class Recording:
         values = getattr(self, quantity)
         if values is None:
             raise RecordingError(f'{self.source or "recording"}: {quantity} was not recorded')
-        return draw_joints(self.joints, {'measured': (self.t, values)}, _LABELS[quantity])
+        labels = {
+            'q': 'position [rad or m]',
+            'dq': 'velocity [rad/s or m/s]',
+            'tau': 'torque [N m or N]',
+        }
+        return draw_joints(self.joints, {'measured': (self.t, values)}, labels[quantity])
 
     def motion(self, cutoff: float | None = None) -> Motion:
         """

@@ -12,11 +12,12 @@ from pathlib import Path
 
 from armid_ros.errors import RecordingError
 from armid_ros.recording.message_types import message_type, MessageType
-from armid_ros.recording.settings import DEFAULT, ReadSettings
 from armid_ros.recording.source import (
     BLOCK_MESSAGES,
+    DEFAULT,
     MessageBlock,
     RawMessage,
+    ReadSettings,
     Source,
     Topic,
     UNREADABLE,

@@ -21,7 +21,6 @@ from armid_ros.recording.joint_state.decoder import JointSamples
 from armid_ros.recording.message_types import QUANTITIES
 from armid_ros.recording.recording import Clock, GAP_PERIODS, gaps, ReadReport, Recording
 from armid_ros.recording.source import IntArray
-from armid_ros.recording.turns import unwrapped
 import numpy as np
 import numpy.typing as npt
 from scipy.ndimage import median_filter
@@ -29,21 +28,10 @@ from scipy.ndimage import median_filter
 # A backward step of the clock of more than this is a restart (a simulation reset, a bag played in
 # a loop), not a late message.
 RESTART_NS = 10**9
-# Window of the median that checks a stamp [messages]; fewer than half of them may be wrong.
-_AROUND = 5
-# Number of successive messages with earlier stamps that show a clock that was set back.
-_FEWEST_AGAIN = 10
-# Limit of positions, velocities and torques; uninitialised memory can exceed it.
-LARGEST = 1e15
 # A torque with less variation is not a measurement but uninitialised memory [N m].
 NOTHING = 1e-9
 #: Largest share of samples that may be not finite.
 MAX_NOT_FINITE = 0.2
-# Header stamps are rejected if more than these shares of them are faulty.
-_MAX_ZERO = 0.01
-_MAX_REPEATED = 0.5
-_MAX_BACKWARD = 0.1
-_MAX_SPAN_RATIO = 1000.0
 
 
 def gather(pieces: Sequence[JointSamples]) -> list[JointSamples]:
@@ -66,11 +54,11 @@ def clock_problem(
 ) -> str:
     """Return why stamps are not usable; empty if they are."""
     first = int(np.argmax(stamps != 0))
-    if first and np.count_nonzero(stamps[first:] == 0) <= _MAX_ZERO * len(stamps):
+    if first and np.count_nonzero(stamps[first:] == 0) <= 0.01 * len(stamps):
         stamps = stamps[first:]  # simulated time is zero until the first /clock
         position = None if position is None else position[first:]
     zero = int((stamps == 0).sum())
-    if zero > _MAX_ZERO * len(stamps):
+    if zero > 0.01 * len(stamps):
         return 'are zero' if zero == len(stamps) else f'are zero in {zero} of {len(stamps)}'
     steps = np.diff(stamps[stamps != 0] if zero else stamps)
     if len(steps) == 0:
@@ -80,15 +68,15 @@ def clock_problem(
         # A message recorded twice also repeats its values; it is no fault of the clock.
         at = np.flatnonzero(repeated)
         repeated[at] = (position[at] != position[at + 1]).any(axis=1)
-    if repeated.mean() > _MAX_REPEATED:
+    if repeated.mean() > 0.5:
         return 'do not advance'
-    if (steps < 0).mean() > _MAX_BACKWARD:
+    if (steps < 0).mean() > 0.1:
         return 'jump back and forth'
     if receive is not None and len(receive) > 2:
         span, received = (
             float(np.ptp(times[times != 0])) if times.any() else 0.0 for times in (stamps, receive)
         )
-        if received > 0 and not received / _MAX_SPAN_RATIO < span < received * _MAX_SPAN_RATIO:
+        if received > 0 and not 1e-3 * received < span < 1e3 * received:
             return f'span {span * 1e-9:.3g} s where reception took {received * 1e-9:.3g} s'
     return ''
 
@@ -100,9 +88,9 @@ def ordered(series: JointSamples, clock: Clock, counts: Counter[str]) -> JointSa
         series = replace(series, stamps=series.receive)
     stray = series.stamps == 0
     steps = np.abs(np.diff(series.stamps[~stray]))
-    if len(steps) >= _AROUND - 1 and (steps > RESTART_NS).any():
+    if len(steps) >= 4 and (steps > RESTART_NS).any():
         stamps = series.stamps[~stray]
-        around = median_filter(stamps, _AROUND, mode='mirror')
+        around = median_filter(stamps, 5, mode='mirror')  # fewer than half of them may be wrong
         stray[~stray] = np.abs(stamps - around) > RESTART_NS + 2 * np.median(steps)
     if stray.any():
         counts['unstamped'] += int(stray.sum())
@@ -226,7 +214,7 @@ def _runs_again(stamps: IntArray, back: int) -> bool:
     before = int(np.count_nonzero(stamps[: back + 1] >= first))
     after = int(np.argmax(np.append(stamps[back + 1 :], last + 1) > last))
     expected = float(last - first) / period + 1.0
-    return after >= _FEWEST_AGAIN and before + after > 1.5 * expected
+    return after >= 10 and before + after > 1.5 * expected
 
 
 def _sorted(series: JointSamples, counts: Counter[str]) -> JointSamples:
@@ -287,7 +275,8 @@ def _finite(
         raise RecordingError(f'{where} has no {absent[0]}')
     bad, culprits = np.zeros(len(series), np.bool_), []
     for name, values in zip(QUANTITIES, quantities, strict=True):
-        wrong = None if values is None else ~(np.abs(values) < LARGEST)
+        # uninitialised memory can hold any number
+        wrong = None if values is None else ~(np.abs(values) < 1e15)
         if wrong is not None and wrong.any():
             bad |= wrong.any(axis=1)
             numbers = zip(joints, wrong.sum(axis=0).tolist(), strict=True)
@@ -302,11 +291,57 @@ def _finite(
     return (samples.select(~bad) if dropped else samples), tuple(absent), tuple(culprits)
 
 
+def unwrapped(q: FloatArray) -> tuple[FloatArray, list[int]]:
+    """
+    Undo jumps by a whole turn.
+
+    A joint is wrapped if its positions stay within one turn and each step of more than half a turn
+    is about a whole turn. The tolerance depends on the other steps of the joint.
+
+    Parameters
+    ----------
+    q : ndarray, shape (N, n)
+        Positions [rad or degrees].
+
+    Returns
+    -------
+    q : ndarray, shape (N, n)
+        Continuous positions, shifted by whole turns to be near zero; the same object if no joint
+        was wrapped.
+    joints : list of int
+        Indices of the wrapped joints.
+
+    """
+    turns = (2.0 * np.pi, 360.0)  # a turn in each unit of positions [rad, degrees]
+    off_a_turn = 0.15  # largest deviation of a jump from a whole turn, as a share of the turn
+    steps = np.diff(q, axis=0)
+    found: list[int] = []
+    largest = np.max(np.abs(steps), axis=0, initial=0.0)
+    for joint in np.flatnonzero(largest > (1.0 - off_a_turn) * turns[0]).tolist():
+        step = steps[:, joint]
+        for turn in turns:
+            far = np.abs(step) > 0.5 * turn
+            off = np.abs(np.abs(step[far]) - turn)
+            usual = np.max(np.abs(step[~far]), initial=0.0)
+            within = np.ptp(q[:, joint]) <= turn * (1.0 + 1e-3)
+            if (
+                far.any()
+                and within
+                and np.all(off < min(off_a_turn * turn, 3.0 * usual + 1e-3 * turn))
+            ):
+                whole = np.unwrap(q[:, joint], period=turn)
+                whole -= turn * np.round(0.5 * (whole.min() + whole.max()) / turn)
+                q = q.copy() if not found else q
+                q[:, joint] = whole
+                found.append(joint)
+                break
+    return q, found
+
+
 def assemble(
     where: str,
     joints: tuple[str, ...],
     pieces: list[JointSamples],
-    counts: Counter[str],
     met: Mapping[str, Any],
     **about: Any,
 ) -> Recording:
@@ -321,10 +356,8 @@ def assemble(
         In the order of the recording.
     pieces : list of JointSamples
         Samples in the order of storage. The list is emptied to free its memory.
-    counts : Counter
-        Counts so far, by attribute of the report.
     met : mapping of str to value
-        Other attributes of the report, with the number of messages among them.
+        Attributes of the report so far, with the number of messages among them.
     **about
         Other attributes of the recording.
 
@@ -334,7 +367,7 @@ def assemble(
         If no clock is usable, or fewer than two samples remain.
 
     """
-    gathered = gather(pieces)
+    gathered, counts = gather(pieces), Counter(unstamped=met.get('unstamped', 0))
     pieces.clear()
     problems = (clock_problem(one.stamps, one.values[0], one.receive) for one in gathered)
     note = next((f'header stamps {problem}' for problem in problems if problem), '')
@@ -363,7 +396,7 @@ def assemble(
     for array in (t, q, dq, tau):
         if array is not None:
             array.setflags(write=False)  # a read-only array is not copied by Recording
-    found = {'not_finite': culprits, 'absent': absent, 'clock_note': note, **counts, **met}
+    found = {'not_finite': culprits, 'absent': absent, 'clock_note': note, **met, **counts}
     report = ReadReport(
         **found,
         samples=len(samples),

@@ -6,15 +6,14 @@ from __future__ import annotations
 
 from abc import ABC, abstractmethod
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 import mmap
 from pathlib import Path
 from typing import NamedTuple
 
 from armid_ros.errors import RecordingError
-from armid_ros.files import open_regular
+from armid_ros.files import default_memory_limit, open_regular, size_text
 from armid_ros.recording.message_types import MessageType
-from armid_ros.recording.settings import DEFAULT, ReadSettings
 import numpy as np
 import numpy.typing as npt
 from rosbags.interfaces import Qos
@@ -24,6 +23,57 @@ IntArray = npt.NDArray[np.int64]
 UNREADABLE = 'unreadable'
 #: Messages of a block.
 BLOCK_MESSAGES = 4096
+
+
+@dataclass(frozen=True)
+class ReadSettings:
+    """
+    Settings for reading a bag.
+
+    Attributes
+    ----------
+    check_crc : bool
+        Whether checksums are compared and damaged parts are skipped. Reading takes about a tenth
+        longer.
+    memory_limit : int
+        Memory limit for the messages of one bag, one chunk, or one unpacked file [bytes]; by
+        default a quarter of the memory.
+
+    """
+
+    check_crc: bool = True
+    memory_limit: int = field(default_factory=default_memory_limit)
+
+    def __post_init__(self) -> None:
+        """Check the limit."""
+        if self.memory_limit <= 0:
+            raise RecordingError(f'memory_limit has to be positive, not {self.memory_limit}')
+
+    def require(self, size: int, what: str) -> None:
+        """
+        Raise a RecordingError if an object exceeds the memory limit.
+
+        Parameters
+        ----------
+        size : int
+            Size of the object [bytes].
+        what : str
+            Name of the object, the beginning of the error message.
+
+        Raises
+        ------
+        RecordingError
+            If the size exceeds the limit.
+
+        """
+        if size > self.memory_limit:
+            raise RecordingError(
+                f'{what} takes {size_text(size)}, more than the memory_limit of '
+                f'{size_text(self.memory_limit)}; raise it if the file is to be trusted'
+            )
+
+
+DEFAULT = ReadSettings()
 
 
 @dataclass(frozen=True)

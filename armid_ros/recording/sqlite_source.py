@@ -20,8 +20,15 @@ from armid_ros.errors import RecordingError
 from armid_ros.files import is_file
 from armid_ros.recording.message_types import MessageType
 from armid_ros.recording.qos import parse_qos
-from armid_ros.recording.settings import DEFAULT, ReadSettings
-from armid_ros.recording.source import BLOCK_MESSAGES, MessageBlock, RawMessage, Source, Topic
+from armid_ros.recording.source import (
+    BLOCK_MESSAGES,
+    DEFAULT,
+    MessageBlock,
+    RawMessage,
+    ReadSettings,
+    Source,
+    Topic,
+)
 import numpy as np
 
 _JOURNALS = ('-wal', '-journal')

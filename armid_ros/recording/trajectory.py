@@ -16,7 +16,7 @@ from armid_ros.recording.bag import Bag
 from armid_ros.recording.joint_state.encoder import Measured
 from armid_ros.recording.message_types import JOINT_TRAJECTORY, store_for
 from armid_ros.recording.qos import LATCHED
-from armid_ros.recording.settings import DEFAULT, ReadSettings
+from armid_ros.recording.source import DEFAULT, ReadSettings
 from armid_ros.recording.writer import whole_bag
 import numpy as np
 from rosbags.serde import SerdeError
@@ -41,10 +41,6 @@ class ReadWaypoints:
     dq: FloatArray | None
     ddq: FloatArray | None
     tau: FloatArray | None
-
-
-#: Topic and log time [ns] of the message in a bag.
-_TOPIC, _LOG_TIME = '/joint_trajectory', 10**9
 
 
 def joint_trajectory_cdr(motion: Waypoints) -> bytes:
@@ -112,11 +108,12 @@ def write_joint_trajectory(
         If the bag exists.
 
     """
+    topic, log_time = '/joint_trajectory', 10**9  # [ns]
     with whole_bag(path) as writer:
         if robot_description is not None:
-            writer.write_description(robot_description, _LOG_TIME)
-        writer.add_topic(_TOPIC, JOINT_TRAJECTORY, qos=[LATCHED])
-        writer.write(_TOPIC, joint_trajectory_cdr(motion), _LOG_TIME)
+            writer.write_description(robot_description, log_time)
+        writer.add_topic(topic, JOINT_TRAJECTORY, qos=[LATCHED])
+        writer.write(topic, joint_trajectory_cdr(motion), log_time)
 
 
 def read_waypoints(

@@ -30,11 +30,17 @@ def given_twice(fitted: Sequence[Recording], held_out: Sequence[Recording] = ())
         Names of the repeated recordings and of their originals; empty if there are none.
 
     """
+
+    def same(a: Recording, b: Recording) -> bool:
+        if a.tau is None or b.tau is None:
+            return a.tau is b.tau and np.array_equal(a.q, b.q)
+        return np.array_equal(a.q, b.q) and np.array_equal(a.tau, b.tau)
+
     again = [
         a.source if a.source == b.source else f'{a.source} (is {b.source})'
         for k, a in enumerate([*fitted, *held_out])
         for b in fitted[:k]
-        if _same(a, b)
+        if same(a, b)
     ]
     return f'given twice, or in two roles: {", ".join(dict.fromkeys(again))}' if again else ''
 
@@ -44,9 +50,3 @@ def require_once(fitted: Sequence[Recording], held_out: Sequence[Recording] = ()
     said = given_twice(fitted, held_out)
     if said:
         raise RecordingError(f'{said}; give each recording once')
-
-
-def _same(a: Recording, b: Recording) -> bool:
-    if a.tau is None or b.tau is None:
-        return a.tau is b.tau and np.array_equal(a.q, b.q)
-    return np.array_equal(a.q, b.q) and np.array_equal(a.tau, b.tau)

@@ -163,16 +163,16 @@ class BagWriter:
     @property
     def topics(self) -> tuple[Topic, ...]:
         """Return the topics, with the number of messages in the file."""
-        counts = self._mcap.counts
+        counts = self._mcap.committed.counts
         return tuple(
-            replace(topic, count=counts[self._channels[name]])
+            replace(topic, count=counts.get(self._channels[name], 0))
             for name, topic in self._topics.items()
         )
 
     @property
     def size(self) -> int:
         """Return the number of bytes in the file."""
-        return self._mcap.size
+        return self._mcap.committed.position
 
     @property
     def in_place(self) -> bool:
@@ -182,7 +182,7 @@ class BagWriter:
     @property
     def time_range(self) -> tuple[int, int]:
         """Log times of the first and the last message in the file [ns]."""
-        return self._mcap.time_range
+        return self._mcap.committed.time_range
 
     def add_topic(
         self,
@@ -410,8 +410,8 @@ class BagWriter:
         """Return the records of the next chunk."""
         # flush() does not empty the list, since it may be interrupted after writing. Records carry
         # the number of their chunk, and are dropped once that chunk is in the file.
-        if self._open.number != self._mcap.chunk_count:
-            self._open = _OpenChunk(self._mcap.chunk_count, [])
+        if self._open.number != self._mcap.committed.chunks:
+            self._open = _OpenChunk(self._mcap.committed.chunks, [])
         return self._open.records
 
     def _information(self, file_name: str | None) -> dict[str, object]:

@@ -10,7 +10,6 @@ import sys
 
 from armid_ros.cli import choices
 from armid_ros.cli.commands import main
-from armid_ros.cli.excite.springs import COURSES
 from armid_ros.diagnosis.search.priors import HOW_OFTEN
 from armid_ros.effects import CATALOGUE, USUAL_EFFECTS
 from armid_ros.effects.catalogue import EXAMPLES
@@ -99,7 +98,6 @@ sys.exit(', '.join(sys.modules.keys() & set({HEAVY!r})) or 0)
         (choices.SPEED_CLASSES, tuple(SPEED_CLASSES)),
         (choices.CRITERIA, CRITERIA),
         (choices.TARGETS, TARGETS),
-        (choices.COURSES, tuple(COURSES)),
     ],
 )
 def test_help_offers_what_the_packages_have(shown, offered):

@@ -7,7 +7,7 @@ import re
 import shutil
 
 from armid_ros.arm import load_model, save_model
-from armid_ros.cli.diagnose.command import Percent
+from armid_ros.cli.diagnose import Percent
 from armid_ros.diagnosis import Diagnosis
 from armid_ros.model import inverse_dynamics
 from armid_ros.recording import write_recording

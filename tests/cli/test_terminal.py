@@ -4,27 +4,10 @@
 
 import re
 
-from armid_ros.cli.terminal import print_rows, ProgressLines, say
+from armid_ros.cli.terminal import ProgressLines, say
 import click
 from click.testing import CliRunner
 import pytest
-
-VALUE = '0.20003 ± 0.00011 kg m²'
-ROW = {
-    'joint': 'a_joint_of_a_long_name',
-    'from [rad]': '-1.22',
-    'to': '0.0396',
-    'value, 95 %': VALUE,
-    'note': 'words that may be broken where there is no room for all of them',
-}
-
-
-def test_tables_say_their_units_and_break_no_number(capsys, monkeypatch):
-    monkeypatch.setenv('COLUMNS', '80')
-    print_rows([ROW], as_json=False, right=('from [rad]', 'to', 'value, 95 %'))
-    lines = capsys.readouterr().out.splitlines()
-    assert max(map(len, lines)) <= 80
-    assert '[rad]' in lines[0] and VALUE in lines[1]
 
 
 def test_progress_without_a_terminal_is_a_line_every_ten_seconds():

@@ -4,7 +4,7 @@
 
 from armid_ros.arm import ArmModel
 from armid_ros.cli.columns import _coupling
-from armid_ros.cli.diagnose.partner import _tie
+from armid_ros.cli.diagnose import _tie
 from armid_ros.cli.options import box
 from armid_ros.effects import make_effect, parse_effect
 from armid_ros.files.cells import listed, parted

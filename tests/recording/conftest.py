@@ -6,7 +6,7 @@ import sqlite3
 
 from armid_ros.recording import Bag, BagWriter, joint_state_cdr, Recording
 from armid_ros.recording.message_types import JOINT_STATE
-from armid_ros.recording.settings import DEFAULT
+from armid_ros.recording.source import DEFAULT
 import numpy as np
 import pytest
 

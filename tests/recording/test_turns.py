@@ -6,7 +6,7 @@ from armid_ros.errors import RecordingError
 from armid_ros.recording import Recording, write_recording
 from armid_ros.recording.anything import read_anything
 from armid_ros.recording.columns import ColumnSettings
-from armid_ros.recording.turns import unwrapped
+from armid_ros.recording.series import unwrapped
 import numpy as np
 import pytest
 

@@ -10,14 +10,13 @@ from typing import Any, TypeVar
 
 from armid_ros.nodes.qos import LATCHED
 from armid_ros.nodes.running.domains import private_context
-from armid_ros.nodes.running.process import make_executor
 from armid_ros.nodes.running.real_time import RealTime
 from builtin_interfaces.msg import Time
 from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus
 import pytest
 from rcl_interfaces.msg import Log
 from rclpy.context import Context
-from rclpy.executors import TimeoutException
+from rclpy.executors import SingleThreadedExecutor, TimeoutException
 from rclpy.node import Node
 from rclpy.parameter import Parameter
 from rclpy.qos import QoSProfile
@@ -44,7 +43,7 @@ class Bench:
 
     def __init__(self, context: Context) -> None:
         self.context = context
-        self.executor = make_executor('single', context)
+        self.executor = SingleThreadedExecutor(context=context)
         self.probe = self.add(Node, node_name='probe')
         self._clock = self.probe.create_publisher(Clock, '/clock', 10)
 

@@ -6,7 +6,7 @@ from __future__ import annotations
 
 import re
 
-from armid_ros.nodes.running.arguments import stray, unreadable
+from armid_ros.nodes.running.process import stray, unreadable
 import pytest
 from rclpy._rclpy_pybind11 import RCLError, UnknownROSArgsError
 from rclpy.context import Context

@@ -7,7 +7,7 @@ from __future__ import annotations
 import json
 
 from armid_ros.arm import ArmModel
-from armid_ros.cli.excite.command import excite
+from armid_ros.cli.excite import excite
 from armid_ros.errors import ArmidError
 from armid_ros.excitation import (
     Excitation,
@@ -183,7 +183,7 @@ def test_without_a_clock_it_does_not_start(bench, arm, excitation, service, publ
         bench.stop_clock()
         bench.spin_until(lambda: not node.count_publishers('/clock'), 'the end of /clock')
         for _ in range(3):
-            node.look_for_clock()
+            node.look_for_trouble()
         bench.spin_until(lambda: logged, 'the warning')
         bench.settle()
         assert sum('/clock' in entry.msg for entry in logged) == 1

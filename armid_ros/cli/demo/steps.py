@@ -98,16 +98,6 @@ class HiddenChange:
     effect: Effect
     values: FloatArray
 
-    def sentence(self, arm: ArmModel) -> str:
-        """Return effect, joint and the first values that are not zero."""
-        shown = [
-            f'{name.name.replace("_", " ")} {digits(float(value), 3)} {pretty(name.unit)}'.rstrip()
-            for name, value in zip(self.effect.parameters(arm.robot), self.values, strict=True)
-            if value
-        ]
-        where = ', '.join(self.effect.joints) or 'the whole arm'
-        return f'{self.effect.name.replace("_", " ")} in {where} ({", ".join(shown[:4])})'
-
     def found_by(self, diagnosis: Diagnosis) -> bool:
         """Return whether the first name is that of the effect, and its joint."""
         first = diagnosis.findings[:1]
@@ -116,8 +106,16 @@ class HiddenChange:
 
     def outcome(self, diagnosis: Diagnosis) -> str:
         """Return a sentence: what was hidden, and whether it was found."""
+        parameters = self.effect.parameters(diagnosis.arm.robot)
+        shown = [
+            f'{name.name.replace("_", " ")} {digits(float(value), 3)} {pretty(name.unit)}'.rstrip()
+            for name, value in zip(parameters, self.values, strict=True)
+            if value
+        ]
+        where = ', '.join(self.effect.joints) or 'the whole arm'
+        hidden = f'{self.effect.name.replace("_", " ")} in {where} ({", ".join(shown[:4])})'
         rank = 'found it' if self.found_by(diagnosis) else 'did not rank it first'
-        return f'Hidden was: {self.sentence(diagnosis.arm)}. The diagnosis {rank}.'
+        return f'Hidden was: {hidden}. The diagnosis {rank}.'
 
     def document(self, diagnosis: Diagnosis) -> dict[str, Any]:
         """Return the hidden effect, the verdict and whether it was found, for JSON."""

@@ -31,9 +31,3 @@ def message_class(type_name: str) -> type[Any]:
             f"'{package}'"
         ) from error
     return message_type
-
-
-def is_stamped(message_type: type[Any]) -> bool:
-    """Return whether messages of a class begin with a std_msgs/Header."""
-    fields: dict[str, str] = message_type.get_fields_and_field_types()
-    return next(iter(fields.items()), None) == ('header', 'std_msgs/Header')

@@ -19,8 +19,6 @@ import numpy.typing as npt
 from rclpy.clock import Clock
 from rclpy.time import Time
 
-#: Messages with some of the joints after which missing joints are reported.
-_PATIENCE = 100
 #: Texts about faulty sequences of joint states, by reason.
 DISTURBANCES = {
     'out_of_order': 'joint states whose stamp is not after that of the one before are left out',
@@ -142,7 +140,7 @@ class JointStateReader:
             for t, x in self._merger.take(self._some, stamp, np.stack(parts))
         ]
         self._alone = 0 if found else self._alone + 1
-        if self._alone > _PATIENCE:
+        if self._alone > 100:  # messages
             missing = [self._joints[k] for k in self._merger.missing]
             self._complaints.say(
                 'joint_states',

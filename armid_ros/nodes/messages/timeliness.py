@@ -9,16 +9,6 @@ import time
 
 from rclpy.clock import ROSClock
 
-#: Time without messages after which a topic counts as stopped [s]. Joint states slower than 2 Hz
-#: are not usable for identification.
-STOPPED = 0.5
-#: Largest difference of stamps and clock for results [s]: tf2 keeps ten seconds, so that RViz
-#: cannot draw older results. The messages that wait in the queue of a busy node, at most 1000, are
-#: younger.
-SHOWN = 10.0
-#: Number of messages of which the shortest delay gives the difference of the clocks.
-_RECENT = 20
-
 
 class Freshness:
     """
@@ -48,7 +38,7 @@ class Freshness:
     @property
     def stopped(self) -> bool:
         """Return whether messages have stopped after the first one."""
-        return self.silence > STOPPED
+        return self.silence > 0.5  # joint states below 2 Hz are not usable for identification
 
     def trouble(self) -> str:
         """Return a text if messages have stopped; empty otherwise."""
@@ -69,7 +59,7 @@ class StampDifference:
     def __init__(self, clock: ROSClock) -> None:
         self._clock = clock
         self._late = 0.0
-        self._recent: deque[float] = deque(maxlen=_RECENT)
+        self._recent: deque[float] = deque(maxlen=20)
 
     @property
     def late(self) -> float:
@@ -82,43 +72,18 @@ class StampDifference:
         self._late = (now - stamp_ns) * 1e-9 if stamp_ns and now else 0.0
         self._recent.append(self._late)
 
-    def of_start(self, topic: str, allowed: float, simulated: bool) -> str:
-        """
-        Return why a trajectory stamped by this node must not be sent; empty if it may.
-
-        A controller with another clock begins the trajectory late, or skips its beginning. A small
-        difference is compensated.
-
-        Parameters
-        ----------
-        topic : str
-            Topic of the stamps.
-        allowed : float
-            Largest permitted difference of stamps and clock [s].
-        simulated : bool
-            Whether the arm is.
-
-        """
-        late, now = self.late, self._clock.now().nanoseconds * 1e-9
-        if not abs(late) > allowed:
-            return ''
-        advice = 'set the clocks, or zero_stamp:=true'
-        if simulated:
-            advice = 'use_sim_time on both nodes or on neither'
-        return (
-            f'stamps of {topic} are {abs(late):.3g} s {self._side(late)} ({now - late:.3f} s and '
-            f'{now:.3f} s), more than {allowed:.3g} s: {advice}'
-        )
-
-    def _side(self, late: float) -> str:
+    def side(self, late: float) -> str:
+        """Return on which side of the clock stamps with a delay [s] are."""
         clock = '/clock' if self._clock.ros_time_is_active else "this computer's clock"
         return f'{"behind" if late > 0.0 else "ahead of"} {clock}'
 
     def of_results(self, topic: str) -> str:
         """Return a text if the stamps of results are far from the clock; empty otherwise."""
-        if abs(self._late) <= SHOWN:
+        # tf2 keeps ten seconds, so that RViz cannot draw older results; the messages that wait in
+        # the queue of a busy node, at most 1000, are younger
+        if abs(self._late) <= 10.0:
             return ''
         return (
-            f'stamps of {topic} are {abs(self._late):.0f} s {self._side(self._late)}, and so are '
+            f'stamps of {topic} are {abs(self._late):.0f} s {self.side(self._late)}, and so are '
             'all results. Set the clocks, or use_sim_time on all nodes or on none'
         )

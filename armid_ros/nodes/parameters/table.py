@@ -124,8 +124,11 @@ def declare(node: Node, table: Iterable[NodeParameter]) -> None:
     node.add_on_set_parameters_callback(validate)
     given = overrides(node)
     for entry in entries.values():
-        nothing = entry.name in given and not _has_type(given[entry.name])
-        default = _none_of(entry) if nothing else entry.default
+        nothing, default = entry.name in given and not _has_type(given[entry.name]), entry.default
+        if nothing:
+            if not (isinstance(default, list) and all(isinstance(one, str) for one in default)):
+                raise ParameterError(f"parameter '{entry.name}' is empty; {_instead(entry)}")
+            default = ['']
         try:
             node.declare_parameter(
                 entry.name, default, entry.descriptor(), ignore_override=nothing
@@ -185,13 +188,6 @@ def names(node: Node, parameter: str) -> tuple[str, ...]:
 def _has_type(parameter: Parameter) -> bool:
     """Return whether the type of a value is known; that of an empty list is not."""
     return parameter.type_ is not Parameter.Type.NOT_SET and parameter.value != []
-
-
-def _none_of(entry: NodeParameter) -> Value:
-    """Return the value for an empty list of names; ParameterError for other parameters."""
-    if isinstance(entry.default, list) and all(isinstance(one, str) for one in entry.default):
-        return ['']
-    raise ParameterError(f"parameter '{entry.name}' is empty; {_instead(entry)}")
 
 
 def _instead(entry: NodeParameter) -> str:

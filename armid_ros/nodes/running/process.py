@@ -8,45 +8,30 @@ from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager, suppress
 import faulthandler
 import gc
+import inspect
 import os
 from pathlib import Path
+import re
 import signal
 import sys
+import textwrap
 
 from armid_ros.errors import ArmidError
-from armid_ros.nodes.base import ArmidNode
+from armid_ros.nodes.base import ArmidNode, COMMON
 from armid_ros.nodes.parameters.table import ParameterError
-from armid_ros.nodes.running.arguments import is_asked_for, stray, unreadable, usage
 import rclpy
 from rclpy._rclpy_pybind11 import RCLError, RCLInvalidROSArgsError, UnknownROSArgsError
-from rclpy.context import Context
-from rclpy.executors import Executor, ExternalShutdownException, SingleThreadedExecutor
+from rclpy.executors import ExternalShutdownException, SingleThreadedExecutor
 from rclpy.experimental import EventsExecutor
 from rclpy.signals import SignalHandlerOptions
+from rclpy.utilities import remove_ros_args
 from threadpoolctl import threadpool_limits
 
+#: Syntax of ROS arguments.
+_WRITTEN = {'-p': '-p NAME:=VALUE', '-r': '-r NAME:=OTHER_NAME'}
+_FILE = '--params-file'
 #: Timeout of the shutdown of DDS [s].
 LEAVING = 20.0
-#: Period of the check for signals [s].
-_LOOK_PERIOD = 0.1
-
-
-def make_executor(kind: str, context: Context | None = None) -> Executor:
-    """
-    Make an executor. The multi-threaded one is not used: it delays topics above 100 Hz.
-
-    Parameters
-    ----------
-    kind : {'single', 'events'}
-        The events executor needs a fifth to a half of the processor time, but is experimental in
-        Jazzy.
-    context : Context, optional
-        Default context if omitted.
-
-    """
-    if kind == 'events':
-        return EventsExecutor(context=context)
-    return SingleThreadedExecutor(context=context)
 
 
 @contextmanager
@@ -81,7 +66,7 @@ class _Ending:
             signal.signal(number, self._on_signal)
         # ignored signals stay ignored, as under nohup
         if signal.getsignal(signal.SIGHUP) is not signal.SIG_IGN:
-            signal.signal(signal.SIGHUP, self._on_hang_up)
+            signal.signal(signal.SIGHUP, self._on_signal)
 
     @property
     def due(self) -> bool:
@@ -98,10 +83,10 @@ class _Ending:
         finally:
             self._at_once = False
 
-    def _on_hang_up(self, *_: object) -> None:
-        self.hung_up = True
-
-    def _on_signal(self, *_: object) -> None:
+    def _on_signal(self, number: int, _: object) -> None:
+        if number == signal.SIGHUP:
+            self.hung_up = True
+            return
         self._asked = True
         if self._at_once:
             self._at_once = False  # `ros2 launch` sends a second one
@@ -123,7 +108,9 @@ def run(make_node: Callable[[], ArmidNode], args: Sequence[str] | None = None) -
         status 1 after a fatal error or SIGHUP.
 
     """
-    if isinstance(make_node, type) and is_asked_for(sys.argv[1:] if args is None else args):
+    given = list(sys.argv[1:] if args is None else args)
+    own = given[: given.index('--ros-args')] if '--ros-args' in given else given
+    if isinstance(make_node, type) and {'-h', '--help'} & set(own):
         print(usage(make_node))
         return
     node: ArmidNode | None = None
@@ -132,12 +119,14 @@ def run(make_node: Callable[[], ArmidNode], args: Sequence[str] | None = None) -
     try:
         with ending.at_once():
             node = _made(make_node, args)
-        executor = make_executor(node.value('executor'))
+        # not the multi-threaded one, which delays topics above 100 Hz
+        kinds = {'events': EventsExecutor, 'single': SingleThreadedExecutor}
+        executor = kinds[node.value('executor')]()
         executor.add_node(node)
         ending.with_parent = node.value('end_with_parent')
         with steady():
             while rclpy.ok() and not (node.finished or ending.due):
-                executor.spin_once(timeout_sec=_LOOK_PERIOD)  # the events executor hangs otherwise
+                executor.spin_once(timeout_sec=0.1)  # the events executor hangs otherwise
     except (_EndedAtOnce, ExternalShutdownException):
         pass
     except RCLError:  # the context was shut down between the check and the wait
@@ -191,3 +180,90 @@ def _leave(node: ArmidNode | None) -> list[str]:
     rclpy.try_shutdown()
     faulthandler.cancel_dump_traceback_later()
     return trouble
+
+
+def unreadable(error: Exception) -> str:
+    """
+    Return a text that names the argument ROS cannot read, with its syntax.
+
+    Parameters
+    ----------
+    error : Exception
+        Exception that rclpy raised for the arguments.
+
+    """
+    text = re.sub(r',? at /\S+:\d+', '', str(error)).removeprefix('failed to initialize rcl: ')
+    text = ' '.join(text.split())
+    rule = re.search(r"Couldn't parse [\w ]+: '(.*)'\. Error: (.*)", text)
+    if rule:
+        flag, _, value = rule[1].partition(' ')
+        if flag == _FILE:
+            if not Path(value).exists():
+                return f'{value}: there is no such file ({_FILE})'
+            detail = rule[2].strip('. ')
+            return f'{value}: cannot be read as a file of parameters ({_FILE}): {detail}'
+        how = _WRITTEN.get(flag)
+        return f'{rule[1]}: {f"write {how}" if how else rule[2]}'
+    alone = re.search(r"Couldn't parse trailing (\S+) flag", text)
+    if alone:
+        return (
+            f'{alone[1]}: nothing follows it; write {_WRITTEN.get(alone[1], f"{alone[1]} VALUE")}'
+        )
+    unknown = re.findall(r"'([^']*)'", text)
+    if text.startswith('[') and unknown:
+        return f'{" ".join(unknown)}: unknown after --ros-args; see --help'
+    return text
+
+
+def stray(args: Sequence[str], program: str) -> str:
+    """
+    Return a text that names arguments that are not ROS arguments; empty if none.
+
+    Parameters
+    ----------
+    args : sequence of str
+        All arguments without the name of the program; the ROS arguments are valid.
+    program : str
+        Name of the program.
+
+    """
+    others = remove_ros_args([program, *args])[1:]
+    if not others:
+        return ''
+    return (
+        f'{" ".join(others)}: {program} takes only ROS arguments; write parameters as '
+        '--ros-args -p NAME:=VALUE, and see --help'
+    )
+
+
+def usage(node: type[ArmidNode]) -> str:
+    """
+    Format the help of a node: its purpose and parameters.
+
+    Parameters
+    ----------
+    node : type
+        Class of the node; its module has the name of the executable.
+
+    """
+    program = Path(inspect.getfile(node)).stem
+    purpose = inspect.getdoc(node) or ''
+    lines = []
+    for parameter in (*node.table, *COMMON):
+        value, text = parameter.default, parameter.text()
+        if parameter.limits is not None:
+            text += f' {parameter.limits[0]:g} to {parameter.limits[1]:g}.'
+        written = str(value).lower() if isinstance(value, bool) else str(value)
+        lines.append(
+            f"  {parameter.name}:='{value}'"
+            if isinstance(value, str)
+            else f'  {parameter.name}:={written}'
+        )
+        lines += textwrap.wrap(text, 99, initial_indent=' ' * 6, subsequent_indent=' ' * 6)
+    parts = [
+        f'Usage: {program} --ros-args -p NAME:=VALUE ... -r TOPIC:=OTHER_TOPIC ...',
+        purpose.partition('\nAttributes\n')[0].strip(),
+        'Parameters, with their defaults:',
+        '\n'.join(lines),
+    ]
+    return '\n\n'.join(parts)

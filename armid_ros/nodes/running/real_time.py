@@ -7,12 +7,6 @@ from __future__ import annotations
 from collections.abc import Callable
 import time
 
-#: Longest work before services are answered, and backlog above which time is skipped [s].
-_BURST = 0.005
-_BACKLOG = 0.2
-#: Skipped time above which a warning is given [s]; a start may take as long.
-_BEHIND = 0.5
-
 
 class RealTime:
     """
@@ -60,14 +54,15 @@ class RealTime:
         """
         now = self._clock()
         due = self._anchor[1] + (now - self._anchor[0]) * factor
-        while self._elapsed() + period <= due and self._clock() - now < _BURST:
+        # services are answered after 5 ms of work
+        while self._elapsed() + period <= due and self._clock() - now < 0.005:
             before = self._elapsed()
             self._step()
             if self._elapsed() <= before:
                 self.begin()
                 return 0.0
         behind = (due - self._elapsed()) / factor
-        if behind <= _BACKLOG:
+        if behind <= 0.2:
             return 0.0
         self.given_up += behind
         self.begin()
@@ -75,6 +70,6 @@ class RealTime:
 
     def trouble(self, advice: str) -> str:
         """Return a text with the skipped time and the remedy; empty if none was skipped."""
-        if self.given_up <= _BEHIND:
+        if self.given_up <= 0.5:  # a start may take as long
             return ''
         return f'{self.given_up:.1f} s of real time were skipped: {advice}'

@@ -24,8 +24,6 @@ from unique_identifier_msgs.msg import UUID
 
 #: Tolerance that permits any joint position; zero means the default of the controller.
 ANYWHERE = -1.0
-#: Period of the check for a controller [s].
-_GLANCE = 0.005
 #: Timeout of the answer to a goal [s]; a controller first checks every waypoint.
 _ANSWER = 5.0
 #: Error code of an accepted goal that another goal replaced.
@@ -106,12 +104,6 @@ class TrajectoryAction:
     def ready(self) -> bool:
         """Return whether a controller accepts goals."""
         return bool(self._client.server_is_ready())
-
-    def wait(self, patience: float) -> None:
-        """Wait for a controller that offers the action, with a timeout [s]."""
-        deadline = time.monotonic() + patience
-        while not self.ready and time.monotonic() < deadline:
-            time.sleep(_GLANCE)
 
     @property
     def under_way(self) -> bool:

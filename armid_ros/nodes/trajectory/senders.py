@@ -5,6 +5,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+import time
 from typing import Any
 
 from armid_ros.errors import TrajectoryError
@@ -12,9 +13,6 @@ from armid_ros.nodes.qos import STREAM
 from armid_ros.nodes.trajectory.action import ANYWHERE, beside, TrajectoryAction
 from rclpy.duration import Duration
 from trajectory_msgs.msg import JointTrajectory
-
-#: Longest time of the discovery of an action [s].
-_DISCOVERY = 1.0
 
 
 class TrajectorySenders:
@@ -104,7 +102,9 @@ class TrajectorySenders:
         """
         self.look()
         if self.action is not None and self._offered:
-            self.action.wait(_DISCOVERY)
+            deadline = time.monotonic() + 1.0  # the discovery of an action takes no longer
+            while not self.action.ready and time.monotonic() < deadline:
+                time.sleep(0.005)
         if self.missing:
             raise TrajectoryError(f'{self.missing}; the arm is not started')
         self._by_action = self._has_action

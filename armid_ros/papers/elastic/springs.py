@@ -8,7 +8,7 @@ from collections.abc import Sequence
 from pathlib import Path
 
 from armid_ros.cli import options
-from armid_ros.cli.origin import provenance
+from armid_ros.cli.options import provenance
 from armid_ros.cli.terminal import progress
 from armid_ros.errors import RecordingError
 from armid_ros.files import json_text, write_file

@@ -10,7 +10,7 @@ from pathlib import Path
 from typing import Any
 
 from armid_ros.cli import options
-from armid_ros.cli.origin import provenance
+from armid_ros.cli.options import provenance
 from armid_ros.cli.terminal import progress, Tick
 from armid_ros.errors import ModelError
 from armid_ros.files import json_text, settled, write_file

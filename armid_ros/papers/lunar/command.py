@@ -27,7 +27,7 @@ _HEADS = {
 def lunar(out: Path, seed: int, every: bool, as_json: bool) -> None:
     """Repeat the lunar paper: tables, gravity parameters and torques, with its figures."""
     from armid_ros.cli import options
-    from armid_ros.cli.origin import provenance
+    from armid_ros.cli.options import provenance
     from armid_ros.cli.terminal import progress
     from armid_ros.files import json_text, write_file
     from armid_ros.identification import write_document

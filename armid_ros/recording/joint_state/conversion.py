@@ -17,7 +17,6 @@ import numpy as np
 from rosbags.typesys import get_typestore, Stores
 
 _INSIDE = re.compile(r'^\s*sensor_msgs/(?:msg/)?JointState\s+(\w+)', re.MULTILINE)
-Convert = Callable[[bytes], Any]
 
 
 def holds_joint_state(topic: Topic) -> bool:
@@ -41,13 +40,30 @@ def joint_state_blocks(bag: Bag, topic: Topic) -> Iterator[MessageBlock]:
         If the schema in the bag lacks header, names or positions, or messages are not in CDR.
 
     """
-    where = f'{bag.path}: {topic.name}'
-    convert = _converter(where, topic)
+    convert = _converter(f'{bag.path}: {topic.name}', topic)
+    if convert is None:
+        yield from bag.blocks(topic.name)
+        return
+    store = get_typestore(Stores.ROS2_JAZZY)
+    types = store.types
     for block in bag.blocks(topic.name):
-        yield block if convert is None else _converted(block, convert)
+        messages = []
+        for at in range(len(block)):
+            try:
+                found = convert(block.message(at))
+                stamp = found.header.stamp
+                header = types['std_msgs/msg/Header'](
+                    types['builtin_interfaces/msg/Time'](stamp.sec, stamp.nanosec), ''
+                )
+                values = [np.array(getattr(found, name, []), np.float64) for name in QUANTITIES]
+                state = types[JOINT_STATE](header, list(found.name), *values)
+                messages.append(bytes(store.serialize_cdr(state, JOINT_STATE)))
+            except Exception:  # the decoder counts it as malformed
+                messages.append(bytes(4))
+        yield MessageBlock.joined(messages, block.log_time, block.publish_time)
 
 
-def _converter(where: str, topic: Topic) -> Convert | None:
+def _converter(where: str, topic: Topic) -> Callable[[bytes], Any] | None:
     """Return a function that decodes a JointState; None if no conversion is needed."""
     described = topic.message_type
     if topic.encoding != 'cdr':
@@ -69,25 +85,6 @@ def _converter(where: str, topic: Topic) -> Convert | None:
         return lambda data: store.deserialize_cdr(data, JOINT_STATE)
     inside = _inside(described)
     return lambda data: getattr(store.deserialize_cdr(data, described.name), inside)
-
-
-def _converted(block: MessageBlock, convert: Convert) -> MessageBlock:
-    """Convert the messages of a block; unreadable messages become invalid CDR."""
-    store = get_typestore(Stores.ROS2_JAZZY)
-    types, messages = store.types, []
-    for at in range(len(block)):
-        try:
-            found = convert(block.message(at))
-            stamp = found.header.stamp
-            header = types['std_msgs/msg/Header'](
-                types['builtin_interfaces/msg/Time'](stamp.sec, stamp.nanosec), ''
-            )
-            values = [np.array(getattr(found, name, []), np.float64) for name in QUANTITIES]
-            state = types[JOINT_STATE](header, list(found.name), *values)
-            messages.append(bytes(store.serialize_cdr(state, JOINT_STATE)))
-        except Exception:  # the decoder counts it as malformed
-            messages.append(bytes(4))
-    return MessageBlock.joined(messages, block.log_time, block.publish_time)
 
 
 def _inside(described: MessageType) -> str:

@@ -70,7 +70,19 @@ class JointStateLayout:
         counts: list[int] = []
         try:
             (frame_length,) = struct.unpack_from(order + 'I', cdr, _FRAME)
-            names = _read_names(cdr, order, _align(_FRAME + 4 + frame_length, 4))
+            position = _align(_FRAME + 4 + frame_length, 4)
+            (count,) = struct.unpack_from(order + 'I', cdr, position)
+            if count > len(cdr):
+                raise MalformedMessage(f'{count} joint names in {len(cdr)} bytes')
+            position += 4
+            names: tuple[str, ...] = ()
+            for _ in range(count):
+                position = _align(position, 4)
+                (length,) = struct.unpack_from(order + 'I', cdr, position)
+                position += 4 + length
+                if not length or position > len(cdr):
+                    raise MalformedMessage('a joint name does not end within the message')
+                names += (cdr[position - length : position - 1].decode(),)
             for field in range(3):
                 layout = cls(order, frame_length, names, (*counts, *[0] * (3 - field)))
                 counts += struct.unpack_from(order + 'I', cdr, layout.places[field][0])
@@ -176,23 +188,6 @@ class JointStateLayout:
         for name, count in zip(QUANTITIES, self.counts, strict=True):
             same &= rows['n_' + name] == count
         return np.asarray(same)
-
-
-def _read_names(cdr: bytes, order: str, position: int) -> tuple[str, ...]:
-    """Return the joint names, of which the count is at a position."""
-    (count,) = struct.unpack_from(order + 'I', cdr, position)
-    position += 4
-    if count > len(cdr):
-        raise MalformedMessage(f'{count} joint names in {len(cdr)} bytes')
-    names = []
-    for _ in range(count):
-        position = _align(position, 4)
-        (length,) = struct.unpack_from(order + 'I', cdr, position)
-        position += 4 + length
-        if not length or position > len(cdr):
-            raise MalformedMessage('a joint name does not end within the message')
-        names.append(cdr[position - length : position - 1].decode())
-    return tuple(names)
 
 
 def _align(position: int, size: int) -> int:

@@ -15,7 +15,7 @@ import zlib
 from armid_ros.errors import RecordingError
 from armid_ros.recording.compression import CORRUPT, decompressed, partly_decompressed, stated_size
 from armid_ros.recording.mcap.records import Chunk, FileMap
-from armid_ros.recording.settings import ReadSettings
+from armid_ros.recording.source import ReadSettings
 
 _COMPRESSIONS = ('', 'zstd', 'lz4')
 #: Threads that decompress chunks ahead of the reader. Decompression and checksums release the GIL.

@@ -150,7 +150,13 @@ def map_file(data: bytes | mmap.mmap, path: Path, *, check: bool = True) -> File
             f'{position} of {len(data)}'
         )
     if check and footer is not None:
-        definitions = _believed(found, definitions, footer)
+        start, _, crc = _FOOTER.unpack_from(data, footer)
+        end = footer + _FOOTER.size - 4
+        right = start <= end and zlib.crc32(memoryview(data)[start:end]) == crc
+        if crc and start and not right:
+            found.finished = False
+            found.damage.add('the checksum of the index at the end is wrong; it is not used')
+            definitions = [entry for entry in definitions if entry[1] < start]
     for opcode, begin, end in definitions:
         add_definition(found, opcode, data[begin:end])
     if (
@@ -265,18 +271,3 @@ _NOTED: dict[int, Callable[[FileMap, int, int], None]] = {
     Opcode.MESSAGE_INDEX: _add_index,
     Opcode.MESSAGE: _add_loose,
 }
-
-
-def _believed(
-    found: FileMap, definitions: list[tuple[int, int, int]], footer: int
-) -> list[tuple[int, int, int]]:
-    """Return the definitions, without those of a summary with a wrong checksum."""
-    start, _, crc = _FOOTER.unpack_from(found.data, footer)
-    end = footer + _FOOTER.size - 4
-    if not crc or not start:
-        return definitions
-    if start <= end and zlib.crc32(memoryview(found.data)[start:end]) == crc:
-        return definitions
-    found.finished = False
-    found.damage.add('the checksum of the index at the end is wrong; it is not used')
-    return [entry for entry in definitions if entry[1] < start]

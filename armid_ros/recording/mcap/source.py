@@ -22,16 +22,16 @@ from armid_ros.recording.mcap.content import Gathered, heads, message_block, til
 from armid_ros.recording.mcap.records import add_definition, Chunk, FileMap, map_file
 from armid_ros.recording.message_types import MessageType
 from armid_ros.recording.qos import parse_qos
-from armid_ros.recording.settings import DEFAULT, ReadSettings
 from armid_ros.recording.source import (
     BLOCK_MESSAGES,
+    DEFAULT,
     IntArray,
     MessageBlock,
     RawMessage,
+    ReadSettings,
     Source,
     Topic,
 )
-from mcap.records import Channel
 import numpy as np
 import numpy.typing as npt
 
@@ -63,9 +63,21 @@ class McapSource(Source):
         described: dict[str, Topic] = {}
         counts: dict[str, int] = {}
         for channel in self._found.channels.values():
-            name = channel.topic
-            counts[name] = counts.get(name, 0) + message_counts.get(channel.id, 0)
-            described[name] = self._describe(channel, counts[name])
+            schema = self._found.schemas.get(channel.schema_id)
+            name = schema.name if schema else ''
+            package, _, rest = name.partition('/')
+            if rest and '/' not in rest:  # some writers omit the namespace
+                name = f'{package}/msg/{rest}'
+            kind = MessageType(
+                name=name,
+                definition=schema.data.decode('utf-8', 'replace') if schema else '',
+                encoding=schema.encoding if schema else '',
+                type_hash=channel.metadata.get('topic_type_hash', ''),
+            )
+            topic, encoding = channel.topic, channel.message_encoding
+            counts[topic] = counts.get(topic, 0) + message_counts.get(channel.id, 0)
+            qos = parse_qos(channel.metadata.get('offered_qos_profiles'))
+            described[topic] = Topic(topic, kind, qos, counts[topic], encoding)
         return tuple(described.values())
 
     def blocks(self, topic: str) -> Iterator[MessageBlock]:
@@ -73,7 +85,14 @@ class McapSource(Source):
         found = self._found
         wanted = sorted(c.id for c in found.channels.values() if c.topic == topic)
         gathered, count = Gathered(found.data), 0
-        read = [chunk for chunk in found.chunks if not self._is_without(chunk, wanted)]
+        # The message count reveals a damaged index; unfinished files have no count.
+        counted = found.finished and found.statistics
+        read = [
+            chunk
+            for chunk in found.chunks
+            if not (counted and chunk.whole and chunk.indexes)
+            or any(channel in chunk.indexes for channel in wanted)
+        ]
         for _, content, offsets in self._pieces(read, wanted):
             count += len(offsets)
             yield from gathered.add(content, offsets)
@@ -135,35 +154,17 @@ class McapSource(Source):
             self._counts = dict(summary.channel_message_counts)
             return self._counts
         counts: dict[int, int] = {}
-        inside = (
-            self._channels_in(unpacked)
-            for _, unpacked in contents(found, found.chunks, self._settings)
-        )
-        loose = heads(found.data, np.array(found.loose, np.int64))['channel']
-        for rows in (loose, *inside):
+        channels = [heads(found.data, np.array(found.loose, np.int64))['channel']]
+        for _, (content, begin, end) in contents(found, found.chunks, self._settings):
+            offsets, definitions, _ = walk(content, begin, end)
+            for opcode, start, stop in definitions:
+                add_definition(found, opcode, content[start:stop])
+            channels.append(heads(content, offsets)['channel'].copy())
+        for rows in channels:
             for channel, count in zip(*np.unique(rows, return_counts=True), strict=True):
                 counts[int(channel)] = counts.get(int(channel), 0) + int(count)
         self._counts = counts
         return self._counts
-
-    def _channels_in(self, unpacked: Content) -> npt.NDArray[np.uint16]:
-        """Return the channel of each message in a chunk, and note its definitions."""
-        content, begin, end = unpacked
-        offsets, definitions, _ = walk(content, begin, end)
-        for opcode, start, stop in definitions:
-            add_definition(self._found, opcode, content[start:stop])
-        return heads(content, offsets)['channel'].copy()
-
-    def _is_without(self, chunk: Chunk, wanted: Collection[int]) -> bool:
-        """Return whether a chunk has no message of some channels, by its checked index."""
-        # The message count reveals a damaged index; unfinished files have no count.
-        return bool(
-            self._found.finished
-            and self._found.statistics
-            and chunk.whole
-            and chunk.indexes
-            and not any(channel in chunk.indexes for channel in wanted)
-        )
 
     def _messages_in(
         self, chunk: Chunk, unpacked: Content
@@ -171,7 +172,17 @@ class McapSource(Source):
         """Return the content of a chunk, and begin and heads of its messages."""
         content, begin, end = unpacked
         if chunk.indexes and chunk.whole and end > begin:
-            offsets = self._indexed(chunk) + begin
+            # Offsets beyond the content are set to its end, where no message can begin.
+            parts = [
+                np.minimum(
+                    np.frombuffer(self._found.data, '<u8', 2 * count, at)[1::2], chunk.size
+                ).astype(np.int64)
+                for at, count in chunk.indexes.values()
+            ]
+            offsets = parts[0] if len(parts) == 1 else np.concatenate(parts)
+            if len(parts) > 1 or not (np.diff(offsets) > 0).all():
+                offsets = np.sort(offsets, kind='stable')
+            offsets += begin
             rows = tiled(content, offsets, begin, end)
             if rows is not None:
                 return content, offsets, rows
@@ -182,20 +193,6 @@ class McapSource(Source):
                 f'some messages {self._found.span(chunk)} are lost'
             )
         return content, offsets, heads(content, offsets)
-
-    def _indexed(self, chunk: Chunk) -> IntArray:
-        """Return the begin of the messages in a chunk by its index."""
-        # Offsets beyond the content are set to its end, where no message can begin.
-        parts = [
-            np.minimum(
-                np.frombuffer(self._found.data, '<u8', 2 * count, at)[1::2], chunk.size
-            ).astype(np.int64)
-            for at, count in chunk.indexes.values()
-        ]
-        if len(parts) == 1:
-            offsets = parts[0]
-            return offsets if (np.diff(offsets) > 0).all() else np.sort(offsets)
-        return np.sort(np.concatenate(parts), kind='stable')
 
     def _possible(self, offsets: IntArray, rows: _Rows, wanted: Sequence[int]) -> IntArray:
         """Return the messages that are of some channels and have a valid time."""
@@ -220,19 +217,3 @@ class McapSource(Source):
             self._found.damage.add(
                 f'{count} messages of {what}, but the writer counted {expected}'
             )
-
-    def _describe(self, channel: Channel, count: int) -> Topic:
-        """Describe the topic of a channel."""
-        schema = self._found.schemas.get(channel.schema_id)
-        name = schema.name if schema else ''
-        package, _, rest = name.partition('/')
-        if rest and '/' not in rest:  # some writers omit the namespace
-            name = f'{package}/msg/{rest}'
-        described = MessageType(
-            name=name,
-            definition=schema.data.decode('utf-8', 'replace') if schema else '',
-            encoding=schema.encoding if schema else '',
-            type_hash=channel.metadata.get('topic_type_hash', ''),
-        )
-        qos = parse_qos(channel.metadata.get('offered_qos_profiles'))
-        return Topic(channel.topic, described, qos, count, channel.message_encoding)

@@ -56,8 +56,8 @@ _COMPRESSORS: dict[str, Callable[[bytes], bytes]] = {
 _MESSAGE_HEAD = struct.Struct('<BQHIQQ')
 
 
-class _Committed(NamedTuple):
-    """Committed state of the file."""
+class Committed(NamedTuple):
+    """Committed state of a file: sizes [bytes], numbers of records, and log times [ns]."""
 
     position: int = 0
     chunks: int = 0
@@ -68,7 +68,15 @@ class _Committed(NamedTuple):
 
 
 class McapWriter:
-    """An MCAP file of chunks with indexes."""
+    """
+    An MCAP file of chunks with indexes.
+
+    Attributes
+    ----------
+    committed : Committed
+        What is in the file.
+
+    """
 
     def __init__(self, path: Path, *, compression: Compression, library: str) -> None:
         """
@@ -90,7 +98,7 @@ class McapWriter:
         self._schemas: list[Schema] = []
         self._channels: list[Channel] = []
         self._metadata: list[MetadataIndex] = []
-        self._done = _Committed()
+        self.committed = Committed()
         try:
             self._stream = path.open('xb', buffering=0)
             # The indexes are kept in a temporary file: long recordings have millions of chunks.
@@ -98,17 +106,12 @@ class McapWriter:
         except OSError as error:
             raise RecordingError(f'{path}: cannot be written: {error.strerror}') from error
         head = MAGIC + _record(Header('ros2', library))
-        self._done = _Committed(self._append(head))
+        self.committed = Committed(self._append(head))
 
     @property
     def finished(self) -> bool:
         """Whether the file has its summary and is closed."""
         return self._stream.closed
-
-    @property
-    def size(self) -> int:
-        """Return the number of committed bytes."""
-        return self._done.position
 
     @property
     def in_place(self) -> bool:
@@ -118,21 +121,6 @@ class McapWriter:
         except (OSError, ValueError):
             return False
         return os.path.samestat(there, here)
-
-    @property
-    def chunk_count(self) -> int:
-        """Return the number of chunks in the file."""
-        return self._done.chunks
-
-    @property
-    def counts(self) -> Counter[int]:
-        """Return the number of messages of each channel in the file."""
-        return Counter(self._done.counts)
-
-    @property
-    def time_range(self) -> tuple[int, int]:
-        """Log time of the first and the last message [ns], zeros when there is none."""
-        return self._done.time_range
 
     def add_schema(self, name: str, encoding: str, data: bytes) -> tuple[int, bytes]:
         """Add a schema; return its number, and its record for the next chunk."""
@@ -183,7 +171,7 @@ class McapWriter:
             name,
             len(stored),
         )
-        position = self._done.position
+        position = self.committed.position
         indexes_begin = position + len(chunk) + len(stored)
         counts: Counter[int] = Counter()
         index_offsets: dict[int, int] = {}
@@ -210,11 +198,11 @@ class McapWriter:
             compressed_size=len(stored),
             uncompressed_size=len(content),
         )
-        done = self._done
+        done = self.committed
         index_size = self._note(_record(index))
         end_position = self._append(b''.join(parts))
         first, last = done.time_range if done.counts else (start, end)
-        self._done = done._replace(
+        self.committed = done._replace(
             position=end_position,
             chunks=done.chunks + 1,
             index_size=index_size,
@@ -225,10 +213,10 @@ class McapWriter:
     def write_metadata(self, name: str, values: dict[str, str]) -> None:
         """Write a metadata record."""
         record = _record(Metadata(name, values))
-        del self._metadata[self._done.metadata :]
-        self._metadata.append(MetadataIndex(self._done.position, len(record), name))
+        del self._metadata[self.committed.metadata :]
+        self._metadata.append(MetadataIndex(self.committed.position, len(record), name))
         end = self._append(record)
-        self._done = self._done._replace(position=end, metadata=len(self._metadata))
+        self.committed = self.committed._replace(position=end, metadata=len(self._metadata))
 
     def finish(self) -> None:
         """Write the summary and close the file; may be repeated after an interruption."""
@@ -240,25 +228,29 @@ class McapWriter:
     def _tail(self) -> bytes:
         """Return the summary and the footer, which follow the last chunk."""
         data_end = _record(DataEnd(0))
-        begin = self._done.position + len(data_end)
-        start, end = self.time_range
+        begin = self.committed.position + len(data_end)
+        counts, (start, end) = self.committed.counts, self.committed.time_range
         statistics = Statistics(
             attachment_count=0,
             channel_count=len(self._channels),
-            channel_message_counts=dict(self.counts),
-            chunk_count=self._done.chunks,
-            message_count=self.counts.total(),
+            channel_message_counts=dict(counts),
+            chunk_count=self.committed.chunks,
+            message_count=sum(counts.values()),
             message_start_time=start,
             message_end_time=end,
-            metadata_count=self._done.metadata,
+            metadata_count=self.committed.metadata,
             schema_count=len(self._schemas),
         )
+        index = b''
+        while len(index) < self.committed.index_size:
+            missing = self.committed.index_size - len(index)
+            index += os.pread(self._index.fileno(), missing, len(index))
         groups: list[tuple[Opcode, bytes]] = [
             (Opcode.SCHEMA, _records(self._schemas)),
             (Opcode.CHANNEL, _records(self._channels)),
             (Opcode.STATISTICS, _record(statistics)),
-            (Opcode.CHUNK_INDEX, self._noted()),
-            (Opcode.METADATA_INDEX, _records(self._metadata[: self._done.metadata])),
+            (Opcode.CHUNK_INDEX, index),
+            (Opcode.METADATA_INDEX, _records(self._metadata[: self.committed.metadata])),
         ]
         summary, offsets = b'', b''
         for opcode, group in groups:
@@ -277,7 +269,7 @@ class McapWriter:
 
     def _note(self, record: bytes) -> int:
         """Append the index of a chunk to the index file, and return its end."""
-        position, rest = self._done.index_size, memoryview(record)
+        position, rest = self.committed.index_size, memoryview(record)
         try:
             while len(rest):
                 count = os.pwrite(self._index.fileno(), rest, position)
@@ -286,17 +278,9 @@ class McapWriter:
             raise RecordingError(f'{self._path}: cannot be written: {error.strerror}') from error
         return position
 
-    def _noted(self) -> bytes:
-        """Return the indexes of all committed chunks."""
-        content = b''
-        while len(content) < self._done.index_size:
-            missing = self._done.index_size - len(content)
-            content += os.pread(self._index.fileno(), missing, len(content))
-        return content
-
     def _append(self, data: bytes) -> int:
         """Write data after the committed data, and return their end."""
-        position = self._done.position
+        position = self.committed.position
         try:
             if self._stream.tell() != position:
                 self._stream.seek(position)

@@ -12,13 +12,10 @@ from typing import Any
 import zipfile
 
 from armid_ros.errors import RecordingError
-from armid_ros.recording.settings import DEFAULT
+from armid_ros.recording.source import DEFAULT
 from armid_ros.recording.tables.table import imported, read_content, Table, table_of_arrays
 import numpy as np
 import numpy.typing as npt
-
-#: First bytes of an HDF5 file; in MATLAB files they follow 512 other bytes.
-HDF5 = b'\x89HDF'
 
 Arrays = dict[str, npt.NDArray[np.generic]]
 
@@ -49,7 +46,7 @@ def read_matlab(path: Path) -> Table:
     from scipy.io import loadmat, whosmat
 
     raw = read_content(path)
-    if HDF5 in raw[:1024]:
+    if b'\x89HDF' in raw[:1024]:  # first bytes of HDF5, after 512 other bytes
         return read_hdf5(path)
     for name, shape, _ in whosmat(io.BytesIO(raw)):
         _require_packed(f'{path}: {name[:40]!r}', 8 * math.prod(shape), len(raw))

@@ -12,24 +12,54 @@ from __future__ import annotations
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 import re
+from typing import Literal
 
 from armid_ros.errors import RecordingError
 from armid_ros.files.cells import listed
 from armid_ros.recording.columns import renamed, Rules
 from armid_ros.recording.tables.table import Table, TableColumn
-from armid_ros.recording.tables.words import (
-    is_quantity,
-    MEASURED,
-    OTHERWISE,
-    QuantityName,
-    TIMES,
-    WORDS,
-    words_of,
-)
 import numpy as np
 
+QuantityName = Literal['position', 'velocity', 'effort']
+
+#: Words for a current, which a gain converts to a torque.
+CURRENTS = ('current', 'currents', 'curr', 'cur', 'i', 'iq', 'amp', 'amps', 'ampere', 'amperes')
+WORDS: dict[QuantityName, dict[str, float]] = {
+    'position': dict.fromkeys(('position', 'positions', 'pos', 'q', 'qpos', 'jpos'), 3.0)
+    | dict.fromkeys(('angle', 'angles', 'ang', 'theta', 'qm'), 2.5)
+    | {'state': 1.5, 'joint': 1.0, 'joints': 1.0},
+    'velocity': dict.fromkeys(('velocity', 'velocities', 'vel', 'dq', 'qvel', 'qdot', 'jvel'), 3.0)
+    | dict.fromkeys(('qd', 'speed', 'speeds', 'spd', 'dtheta', 'thetadot', 'dqm'), 2.5)
+    | {'omega': 2.0},
+    'effort': dict.fromkeys(('torque', 'torques', 'tau', 'effort', 'efforts'), 3.0)
+    | dict.fromkeys(('trq', 'torq', 'eff', 'jtau', 'jeff'), 3.0)
+    | dict.fromkeys(('tq', *CURRENTS), 2.5)
+    | {'force': 2.0, 'load': 1.5, 'loads': 1.5, 'moment': 1.5, 'mom': 1.5},
+}
+TIMES = dict.fromkeys(('time', 't', 'timestamp', 'timestamps'), 3.0) | dict.fromkeys(
+    ('secs', 'seconds', 'elapsed', 'date', 'datetime'), 2.0
+)
+#: Words for the time of measurement, preferred to the time of reception.
+TIMES |= {'stamp': 3.5}
+#: Words for measured quantities.
+MEASURED = dict.fromkeys(
+    ('meas', 'measured', 'act', 'actual', 'fb', 'feedback', 'observation'), 1.0
+)
+_COMMANDED = (
+    'cmd command commanded des desired target ref reference con goal set setpoint ctrl control '
+    'action ff feedforward traj leader'
+)
+_OF_OTHER_THINGS = (
+    'err error ext external fric friction pert model pred predicted residual limit min max std '
+    'temp temperature tcp ee cart cartesian acc ddq imu rel init gravity kin dyn'
+)
+#: Words for quantities that were not measured or are not of joints; with less weight, words for
+#: processed quantities.
+OTHERWISE = dict.fromkeys((_COMMANDED + ' ' + _OF_OTHER_THINGS).split(), -2.0) | dict.fromkeys(
+    ('filt', 'filtered', 'est', 'estimated', 'se', 'disc', 'mot', 'motor'), -0.3
+)
+
 _RANGE = re.compile(r'([\[{])(\d+)\.\.(\d+)[\]}]')
-_NUMBER = re.compile(r'\d+')
 
 
 @dataclass(frozen=True, eq=False)
@@ -234,7 +264,15 @@ def _matching(table: Table, pattern: str) -> list[tuple[str, TableColumn]]:
         whole = [(number, column) for number, column in found if column is not None]
         return whole if len(whole) == len(found) else []
     if '{}' in pattern:
-        return _by_placeholder(table, pattern)
+        before, _, after = pattern.partition('{}')
+        expression = re.compile(f'{re.escape(before)}(.+){re.escape(after)}')
+        fits = (
+            (expression.fullmatch(one.bare_name) or expression.fullmatch(one.name), one)
+            for one in table.columns
+        )
+        labelled = [(match[1].strip('[]'), one) for match, one in fits if match]
+        numbered = [one for one in labelled if one[0].isdigit()]
+        return sorted(numbered, key=lambda one: _by_number(one[0])) or labelled
     members = [column for column in table.columns if column.array and column.array == pattern]
     if members:
         return [(column.name[len(pattern) + 1 : -1], column) for column in members]
@@ -247,18 +285,6 @@ def _matching(table: Table, pattern: str) -> list[tuple[str, TableColumn]]:
             )
         listed_columns.append((part, column))
     return listed_columns
-
-
-def _by_placeholder(table: Table, pattern: str) -> list[tuple[str, TableColumn]]:
-    before, _, after = pattern.partition('{}')
-    expression = re.compile(f'{re.escape(before)}(.+){re.escape(after)}')
-    found = []
-    for column in table.columns:
-        match = expression.fullmatch(column.bare_name) or expression.fullmatch(column.name)
-        if match:
-            found.append((match[1].strip('[]'), column))
-    numbered = [one for one in found if one[0].isdigit()]
-    return sorted(numbered, key=lambda one: _by_number(one[0])) or found
 
 
 def _groups(
@@ -288,16 +314,14 @@ def _readings(
         for called in {joint, *(old + joint[len(new) :] for old, new in rename)}:
             if renamed(called, rename) == joint and called in name:
                 yield name.replace(called, '{}', 1), called
-    for match in _NUMBER.finditer(name):
-        yield f'{name[: match.start()]}{{}}{name[match.end() :]}', match[0]
+    yield from (
+        (f'{name[: match.start()]}{{}}{name[match.end() :]}', match[0])
+        for match in re.finditer(r'\d+', name)
+    )
     if joints is None or len(joints) == 1:
         yield name, '1'
-    if joints is None:
-        yield from _named(name)
-
-
-def _named(name: str) -> Iterator[tuple[str, str]]:
-    """Split a column name into joint and quantity, in either order: 'elbow/position'."""
+    if joints is not None:
+        return
     behind = re.fullmatch(r'(.*[/.])?([^/.]+)([/._ ])([A-Za-z]+)', name)
     if behind and is_quantity(behind[4]) and not behind[2].isdigit():
         yield f'{behind[1] or ""}{{}}{behind[3]}{behind[4]}', behind[2]
@@ -318,3 +342,15 @@ def _score(pattern: str, quantity: QuantityName) -> float:
         return 0.0
     said = sum(MEASURED.get(word, 0.0) + OTHERWISE.get(word, 0.0) for word in words)
     return own + said - 0.01 * len(words)
+
+
+def words_of(name: str) -> list[str]:
+    """Return the words of a name in small letters: 'actualQ_{}' is actual, q."""
+    apart = re.sub(r'(?<=[a-z])(?=[A-Z])', ' ', name)
+    apart = re.sub(r'\d+', ' ', apart)
+    return [word.lower() for word in re.split(r'[^A-Za-z0-9]+', apart) if word]
+
+
+def is_quantity(word: str) -> bool:
+    """Return whether a word says position, velocity or effort."""
+    return any(word.lower() in words for words in WORDS.values())

@@ -4,8 +4,6 @@
 
 from __future__ import annotations
 
-from collections import Counter
-from collections.abc import Iterator
 from dataclasses import replace
 
 from armid_ros.errors import RecordingError
@@ -52,8 +50,17 @@ def measured(plan: TablePlan) -> Recording:
         (read['position'], read.get('velocity'), read.get('effort')),
     )
     topic = 'the table'
-    if plan.source('effort') is None and plan.unread:
+    if 'effort' not in read and plan.unread:
         topic += f' (--effort names columns of it; not read are {plan.unread})'
+    others: list[PositionRange] = []
+    position, settings = plan.sources[0], plan.settings
+    # of joints that were not requested, if their unit is known
+    if not (settings.gear or settings.zero) and len(set(position.factor)) == 1:
+        for label, column in position.chosen.rest.items():
+            values = column.finite * position.factor[0]
+            if len(values):
+                joint = renamed(label, settings.rename)
+                others.append(PositionRange(joint, float(values.min()), float(values.max())))
     where = table.source
     if plan.time is not None:
         where += f': column {plan.time.name}'
@@ -61,17 +68,17 @@ def measured(plan: TablePlan) -> Recording:
         where,
         plan.joints,
         [samples],
-        Counter(unstamped=int(np.sum(~stamped))),
         {
+            'unstamped': int(np.sum(~stamped)),
             'messages': len(table),
             'absent': plan.absent,
             'damage': '; '.join(note for note in table.notes if 'cut off' in note),
         },
         source=table.source,
         topic=topic,
-        others=tuple(_others(plan)),
+        others=tuple(others),
     )
-    sides = replace(plan.settings, degrees=False, position_scale=(), effort_scale=())
+    sides = replace(settings, degrees=False, position_scale=(), effort_scale=())
     return in_si(recording, sides)  # units are converted by the plan
 
 
@@ -93,15 +100,3 @@ def _times(plan: TablePlan) -> tuple[FloatArray, int]:
     epoch = origin * scale > 1e8  # later times are counted from 1970
     # Differences first: counted from 1970, nanoseconds do not fit into a float.
     return (values - origin) * scale, int(origin * scale * 1e9) if epoch else 10**9
-
-
-def _others(plan: TablePlan) -> Iterator[PositionRange]:
-    """Yield the position ranges of joints not requested, if their unit is known."""
-    source, settings = plan.sources[0], plan.settings
-    if settings.gear or settings.zero or len(set(source.factor)) != 1:
-        return
-    for label, column in source.chosen.rest.items():
-        values = column.finite * source.factor[0]
-        if len(values):
-            joint = renamed(label, settings.rename)
-            yield PositionRange(joint, float(values.min()), float(values.max()))

@@ -10,7 +10,7 @@ from typing import Any
 
 from armid_ros.errors import RecordingError
 from armid_ros.files import finite, load_json, read_text, reading
-from armid_ros.recording.settings import DEFAULT
+from armid_ros.recording.source import DEFAULT
 from armid_ros.recording.tables.table import imported, Table, TableColumn
 import numpy as np
 

@@ -11,9 +11,17 @@ import textwrap
 from armid_ros.errors import RecordingError
 from armid_ros.motion import FloatArray
 from armid_ros.recording.columns import ColumnSettings, per_joint, TIME_UNITS
-from armid_ros.recording.tables.families import choose, Family, guess, guess_time, incomplete
+from armid_ros.recording.tables.families import (
+    choose,
+    CURRENTS,
+    Family,
+    guess,
+    guess_time,
+    incomplete,
+    QuantityName,
+    words_of,
+)
 from armid_ros.recording.tables.table import Table, TableColumn
-from armid_ros.recording.tables.words import CURRENTS, QuantityName, words_of
 import numpy as np
 import numpy.typing as npt
 
@@ -23,10 +31,6 @@ _SI = {'position': 'rad', 'velocity': 'rad/s', 'effort': 'N m'}
 _FACTORS = {'deg': np.pi / 180, 'deg/s': np.pi / 180, 'mN m': 1e-3, 'N mm': 1e-3, 'mA': 1e-3}
 _FACTORS |= {'mrad': 1e-3, 'kN m': 1e3, 'rpm': 2 * np.pi / 60, 'mm': 1e-3, 'mm/s': 1e-3}
 _TURNS = ('deg', 'deg/s', 'rpm', 'mrad')
-#: Sampling periods that identify the unit of time [s].
-_STEP = (2e-5, 0.5)
-#: Positions beyond this are probably not in rad or m.
-_FAR = 4.5 * np.pi
 
 
 @dataclass(frozen=True)
@@ -110,10 +114,6 @@ class TablePlan:
     def guessed(self) -> bool:
         """Whether any column or unit was guessed."""
         return self.time_guessed or any(source.guessed for source in self.sources)
-
-    def source(self, quantity: QuantityName) -> QuantitySource | None:
-        """Return the source of a quantity; None if it is not read."""
-        return next((one for one in self.sources if one.quantity == quantity), None)
 
     @property
     def absent(self) -> tuple[str, ...]:
@@ -304,14 +304,15 @@ def _far(
     if position.unit != 'rad' or settings.gear or settings.position_scale:
         return
     reach = np.fmax.reduce(np.abs(position.values()))
-    turned, slid = (reach > _FAR) & ~slides, (reach > _FAR) & slides
+    far = reach > 4.5 * np.pi  # probably not in rad or m
+    turned, slid = far & ~slides, far & slides
     if turned.any() and not settings.degrees:
         yield f'positions reach {reach[turned].max():.4g}: --degrees, or motor angles (--gear)?'
     if slid.any():
         others = 'pi/180' if settings.degrees else '1'
         scale = ','.join('0.001' if one else others for one in slides)
-        far = f'{reach[slid].max():.4g}'
-        yield f'positions that slide reach {far} m: --position-scale {scale} if in mm?'
+        most = f'{reach[slid].max():.4g}'
+        yield f'positions that slide reach {most} m: --position-scale {scale} if in mm?'
 
 
 def _time(table: Table, settings: ColumnSettings) -> tuple[TableColumn | None, str, float | None]:
@@ -355,7 +356,8 @@ def _time_unit(table: Table, column: TableColumn, said: str | None) -> str:
     if not len(steps):
         raise RecordingError(f'{where} does not increase')
     step = float(np.median(steps))
-    fitting = [u for u, scale in TIME_UNITS.items() if _STEP[0] <= step * scale <= _STEP[1]]
+    # sampling periods of 20 us to 0.5 s
+    fitting = [unit for unit, scale in TIME_UNITS.items() if 2e-5 <= step * scale <= 0.5]
     count = step == 1.0 and np.all(steps == np.rint(steps))  # noqa: RUF069 - 1, 2, 3
     if count or not fitting:
         raise RecordingError(

@@ -19,7 +19,7 @@ from armid_ros.errors import RecordingError
 from armid_ros.files import open_regular
 from armid_ros.files.documents import LARGEST
 from armid_ros.motion import FloatArray, read_only
-from armid_ros.recording.settings import DEFAULT
+from armid_ros.recording.source import DEFAULT
 import numpy as np
 import numpy.typing as npt
 
@@ -70,7 +70,13 @@ class TableColumn:
         with np.errstate(invalid='ignore'):  # ignore warnings for signalling NaN
             values = np.where(np.abs(self.values) <= LARGEST, self.values, np.nan)
         object.__setattr__(self, 'values', read_only(values))
-        unit = _normal_unit(self.unit) or _unit_of(self.array or self.name)
+        name = self.array or self.name
+        unit, bracket = _normal_unit(self.unit), _BRACKETS.search(name)
+        if bracket and not unit:
+            unit = _normal_unit(bracket[1])
+        elif not unit:  # as in act_pos_deg[3]
+            plain = re.sub(r'\[\d+\]$', '', name).rstrip('0123456789_').lower()
+            unit = next((_UNITS[end] for end in _ENDINGS if plain.endswith(f'_{end}')), '')
         object.__setattr__(self, 'unit', unit)
 
     @property
@@ -183,8 +189,9 @@ class Table:
         return text
 
 
-def _at_most(names: Sequence[str], most: int = 40) -> str:
+def _at_most(names: Sequence[str]) -> str:
     """Format the first names of a list, and the number of further ones."""
+    most = 40
     more = f' and {len(names) - most} more' if len(names) > most else ''
     return ', '.join(names[:most]) + more
 
@@ -193,15 +200,6 @@ def _normal_unit(text: str) -> str:
     """Return the standard spelling of a unit: 'deg', 'rad/s', 'N m', 'ms'."""
     text = text.strip().strip('[]()').replace('°', 'deg').replace('\u00b5', 'u')
     return _UNITS.get(text.lower(), text)
-
-
-def _unit_of(name: str) -> str:
-    """Return the unit in a name: 'deg' of 'q1 [deg]' and of 'act_pos_deg[3]'."""
-    bracket = _BRACKETS.search(name)
-    if bracket:
-        return _normal_unit(bracket[1])
-    plain = re.sub(r'\[\d+\]$', '', name).rstrip('0123456789_').lower()
-    return next((_UNITS[end] for end in _ENDINGS if plain.endswith(f'_{end}')), '')
 
 
 def table_of_arrays(

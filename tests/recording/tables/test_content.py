@@ -6,7 +6,7 @@ from dataclasses import replace
 import gzip
 
 from armid_ros.errors import RecordingError
-from armid_ros.recording.settings import DEFAULT
+from armid_ros.recording.source import DEFAULT
 from armid_ros.recording.tables import open_table, table
 import pytest
 

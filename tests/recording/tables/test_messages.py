@@ -143,7 +143,7 @@ def test_two_columns_of_one_name_are_refused_where_they_differ(tmp_path, columns
             with pytest.raises(RecordingError, match='tau1'):
                 plan(open_table(path), ColumnSettings(**asked))
         elif not asked:
-            assert plan(open_table(path), ColumnSettings()).source('effort') is not None
+            assert 'effort' not in plan(open_table(path), ColumnSettings()).missing
 
 
 def test_what_is_not_read_is_listed_with_the_words_in_it(tmp_path):
@@ -161,5 +161,6 @@ def test_abbreviations_of_efforts_are_known(tmp_path, word):
     text += ''.join(f'{0.01 * k},{k},{k},{2 * k},{3 * k}\n' for k in range(50))
     (tmp_path / 'run.csv').write_text(text)
     found = plan(open_table(tmp_path / 'run.csv'), ColumnSettings())
-    assert found.source('effort').chosen.pattern == f'{word}_J{{}}'
+    (effort,) = [one for one in found.sources if one.quantity == 'effort']
+    assert effort.chosen.pattern == f'{word}_J{{}}'
     assert any('currents' in note for note in found.notes) == (word in ('cur', 'i', 'load'))

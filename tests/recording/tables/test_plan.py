@@ -119,7 +119,7 @@ def test_joints_are_called_as_the_columns_where_no_robot_says_otherwise():
     columns = ramps('fer_a/position', 'fer_b/position', 'fer_a/effort', 'fer_b/effort')
     settled = plan(columns, ColumnSettings(rename=(('fer_', 'panda_'),)))
     assert settled.joints == ('panda_a', 'panda_b')
-    assert settled.source('effort') is not None
+    assert [one.quantity for one in settled.sources][-1] == 'effort'
 
 
 def test_ratios_are_written_as_people_do():

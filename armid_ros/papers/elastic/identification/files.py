@@ -21,7 +21,7 @@ from armid_ros.errors import RecordingError
 from armid_ros.motion import ElasticRun, FloatArray, Motion
 from armid_ros.recording import read_recording, Recording, topics
 from armid_ros.recording.elastic import imu_topic, LINK, MOTOR, read_accelerations, REFERENCE
-from armid_ros.recording.settings import DEFAULT, ReadSettings
+from armid_ros.recording.source import DEFAULT, ReadSettings
 from armid_ros.robots import Robot
 import numpy as np
 import numpy.typing as npt

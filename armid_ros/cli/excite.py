@@ -4,9 +4,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
-from contextlib import contextmanager
 from dataclasses import replace
+import os
 from pathlib import Path
 from typing import Any, TYPE_CHECKING
 
@@ -20,13 +19,20 @@ from armid_ros.cli.choices import (
     TARGETS,
 )
 from armid_ros.cli.terminal import progress, say
-from armid_ros.errors import TrajectoryError
+from armid_ros.errors import RecordingError, TrajectoryError
 import click
 
 if TYPE_CHECKING:
-    from armid_ros.arm import ArmModel
-    from armid_ros.files import Staged
+    from armid_ros.excitation import CollisionScene
+    from armid_ros.motion import FloatArray
     from armid_ros.robots import Robot
+
+
+#: Options that both a course, for elastic joints, and a design take; a course takes --share too.
+_SHARED = {
+    'robot_source', 'out', 'kind', 'duration', 'clearance', 'environment', 'floor', 'gravity',
+    'joints', 'seed', 'force', 'crc', 'memory_limit',
+}  # fmt: skip
 
 
 class Speed(click.ParamType[str | float]):
@@ -193,10 +199,7 @@ class Speed(click.ParamType[str | float]):
     help='Add to report.html and excitation.json which effects of the catalogue the run shows, '
     'from which size, and which it cannot distinguish.',
 )
-@parameters.gravity
-@parameters.joints
-@parameters.seed
-@parameters.reading
+@parameters.setting
 @parameters.as_json
 def excite(
     robot_source: str,
@@ -229,18 +232,14 @@ def excite(
     from armid_ros.api.design import design_excitation
     from armid_ros.api.excitation import ExcitationResult
     from armid_ros.api.table import ResultOrigin
+    from armid_ros.arm import ArmModel
     from armid_ros.cli import options
-    from armid_ros.cli.excite.springs import (
-        refuse_other_options,
-        require_free,
-        write_course,
-    )
-    from armid_ros.cli.origin import provenance
+    from armid_ros.effects import parse_effect
     from armid_ros.excitation import CollisionScene, with_joint_limits
     from armid_ros.excitation.search.local import INTERRUPTED
     from armid_ros.files.cells import parted
 
-    refuse_other_options(click.get_current_context())
+    _refuse_other_options(click.get_current_context(), kind)
     robot = _driven(robot_source, gravity, joints, after)
     robot, limits = with_joint_limits(robot, joint_limits, velocity)
     with progress('reading meshes') as tick:
@@ -248,7 +247,12 @@ def excite(
     if kind in COURSES:
         write_course(kind, scene, duration, share, seed, out)
         return
-    arm, other = _arms(robot, model, effects, focus, texts, rival)
+    arm = ArmModel(robot) if model is None else options.model_of(model, robot)
+    arm = options.with_effects(arm, effects)
+    other = None if rival is None else options.with_effects(arm, rival.removesuffix('none'))
+    arm = options.with_effects(arm, focus)
+    for text in texts:
+        arm = arm.with_effect(*parse_effect(text, robot))
     if acceleration is not None:
         limits = options.per_joint(acceleration, robot, '--acceleration')
     require_free(out)
@@ -273,11 +277,30 @@ def excite(
         )
         result = replace(result, with_isolability=show_isolability)
         tick(1.0, 'writing')
-        origin = ResultOrigin(robot_source, provenance=provenance(read, seed=seed))
-        with _kept_design(staged):
+        origin = ResultOrigin(robot_source, provenance=options.provenance(read, seed=seed))
+        try:
             options.deliver(result, staged, origin, as_json)
+        except TrajectoryError as error:  # a design without a way to it is kept, in a new folder
+            held = f'{staged.out}: stays as it was'
+            if staged.alone:
+                staged.keep()
+                held = f'{staged.out / "excitation.yaml"} holds the design'
+            raise TrajectoryError(
+                f'{held}, but there is no trajectory: {error}; take another --start, or another '
+                '--seed'
+            ) from error
     if result.core.stopped == INTERRUPTED:
         raise KeyboardInterrupt
+
+
+def _refuse_other_options(context: click.Context, kind: str) -> None:
+    """Raise a UsageError for an option that does not go with the kind."""
+    for option in context.command.params:
+        name = str(option.name)
+        fits = name in _SHARED or (name == 'share') == (kind in COURSES)
+        given = context.get_parameter_source(name) is not click.core.ParameterSource.DEFAULT
+        if given and not fits:
+            raise click.UsageError(f'{option.opts[0]} does not go with --kind {kind}')
 
 
 def _driven(source: str, gravity: str, joints: str | None, bags: tuple[Path, ...]) -> Robot:
@@ -296,38 +319,50 @@ def _driven(source: str, gravity: str, joints: str | None, bags: tuple[Path, ...
     return robot
 
 
-def _arms(
-    robot: Robot,
-    model: Path | None,
-    effects: str,
-    focus: str,
-    texts: tuple[str, ...],
-    rival: str | None,
-) -> tuple[ArmModel, ArmModel | None]:
-    """Return the prior model, and the one to tell it from."""
-    from armid_ros.arm import ArmModel
+def require_free(folder: Path) -> None:
+    """Raise a RecordingError if the recording exists, before the design begins."""
+    from armid_ros.api.excitation import BAG
+    from armid_ros.files.own import is_plan
+
+    if any(folder.glob('*.mcap')) or (folder / 'metadata.yaml').exists():
+        raise RecordingError(f'{folder} is a recording; name another --out')
+    if os.path.lexists(folder / BAG) and not is_plan(folder / BAG):
+        raise RecordingError(
+            f'{folder / BAG}: is no trajectory of armid excite; name another --out, or move it '
+            'away'
+        )
+
+
+def write_course(
+    kind: str, space: CollisionScene, duration: float, share: float, seed: int, out: Path
+) -> None:
+    """Write the trajectory that shows elastic joints as a bag."""
+    from armid_ros.api.excitation import BAG, ExcitationResult
     from armid_ros.cli import options
-    from armid_ros.effects import parse_effect
+    from armid_ros.excitation import ClearanceModel, Limits
+    from armid_ros.recording import write_joint_trajectory
+    from armid_ros.simulation.elastic.courses import multisine_course, step_course
+    import numpy as np
 
-    arm = ArmModel(robot) if model is None else options.model_of(model, robot)
-    arm = options.with_effects(arm, effects)
-    other = None if rival is None else options.with_effects(arm, rival.removesuffix('none'))
-    arm = options.with_effects(arm, focus)
-    for text in texts:
-        arm = arm.with_effect(*parse_effect(text, robot))
-    return arm, other
+    robot = space.collision.robot
+    require_free(out)
+    staged = options.stage(out, ExcitationResult.schema, robot.name)
+    bodies, margin = ClearanceModel.of(space.bodies), space.clearance
 
+    def clear(q: FloatArray) -> bool:
+        inside = np.all((q >= robot.lower) & (q <= robot.upper))
+        return bool(inside) and float(bodies.smallest(q, margin).min()) >= margin
 
-@contextmanager
-def _kept_design(staged: Staged) -> Iterator[None]:
-    """Save a design without approach if its folder has no other files; then raise."""
-    try:
-        yield
-    except TrajectoryError as error:
-        held = f'{staged.out}: stays as it was'
-        if staged.alone:
-            staged.keep()
-            held = f'{staged.out / "excitation.yaml"} holds the design'
-        raise TrajectoryError(
-            f'{held}, but there is no trajectory: {error}; take another --start, or another --seed'
-        ) from error
+    rng = np.random.default_rng(seed)
+    make = multisine_course if kind == 'multisine' else step_course
+    course = make(robot, duration, share, rng, clear)
+    write_joint_trajectory(staged.folder / BAG, course, robot_description=robot.urdf)
+    staged.keep()
+    say(f'{out / BAG}: {len(course.t)} waypoints, {course.duration:.1f} s')
+    first = ', '.join(
+        f'{joint} {q:.3g} {unit}'
+        for joint, q, unit in zip(robot.joints, course.q[0], robot.position_units, strict=True)
+    )
+    say(f'starts at rest in the middle of the ranges, {first}: bring the arm there first')
+    for missing in space.not_checked(Limits.of(robot)):
+        say(f'not checked: {missing}', 'yellow')

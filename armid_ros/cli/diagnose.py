@@ -4,18 +4,23 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+from dataclasses import replace
 import math
 from pathlib import Path
 from typing import Any, TYPE_CHECKING
 
 from armid_ros.cli import columns, parameters
-from armid_ros.cli.diagnose import partner as partner_options
 from armid_ros.cli.terminal import progress
-from armid_ros.errors import ArmidError
+from armid_ros.errors import ArmidError, ModelError
+from armid_ros.files.cells import listed, parted
 import click
 
 if TYPE_CHECKING:
     from armid_ros.arm import ArmModel
+    from armid_ros.effects.tied import Partner
+    from armid_ros.model.spring_ties import Tie
+    from armid_ros.recording import Recording
     from armid_ros.robots import Robot
 
 
@@ -37,6 +42,25 @@ class Percent(click.ParamType):  # type: ignore[type-arg]
         if not 0.0 <= share < 1.0:
             self.fail(f"'{value}' is not a percentage from 0% to 100%", param, ctx)
         return share
+
+
+_partner_options = parameters.together(
+    click.option(
+        '--partner',
+        metavar='R',
+        help='Shipped name, URDF or xacro of a machine or person in the same bags that the arm '
+        'may be tied to.',
+    ),
+    click.option('--partner-topic', help="The partner's JointState topic, where several name it."),
+    click.option(
+        '--tie',
+        'ties',
+        multiple=True,
+        metavar='JOINT=JOINT',
+        help='Where they may be tied: a joint of the arm and one of the partner. JOINT@X,Y,Z sets '
+        'a point of the link [m]; the centroid by default. By default links of equal number.',
+    ),
+)
 
 
 @click.command(epilog='Example: armid diagnose slow.mcap fast.mcap --robot ur10.urdf --out found')
@@ -114,11 +138,8 @@ class Percent(click.ParamType):  # type: ignore[type-arg]
 @parameters.decimation
 @columns.options
 @parameters.topic
-@partner_options.options
-@parameters.gravity
-@parameters.joints
-@parameters.seed
-@parameters.reading
+@_partner_options
+@parameters.setting
 @parameters.every
 @parameters.as_json
 def diagnose(
@@ -155,7 +176,6 @@ def diagnose(
     from armid_ros.api.table import ResultOrigin
     from armid_ros.arm import ArmModel
     from armid_ros.cli import options
-    from armid_ros.cli.origin import provenance
     from armid_ros.identification.parameters_file import read_misfit
 
     if residual is not None:
@@ -164,7 +184,7 @@ def diagnose(
     robot = options.open_robot(robot_source, gravity, joints, bags)
     arm = ArmModel(robot) if model is None else _model_of(model, robot)
     arm = options.with_effects(arm, effects)
-    beside = partner_options.open_partner(partner, ties, robot, gravity)
+    beside = open_partner(partner, ties, robot, gravity)
     misfit = None if model is None else read_misfit(model, arm)
     if model is not None and beside is None and not (baseline or no_baseline):
         baseline = _identified_from(model, [*bags, *validate])
@@ -175,7 +195,7 @@ def diagnose(
         options.tell_damage(*recordings, *held_out, *before, *simulated)
         if beside is not None:
             recordings, held_out = (
-                partner_options.read_together(named, some, beside, partner_topic)
+                read_together(named, some, beside, partner_topic)
                 for named, some in ((bags, recordings), (validate, held_out))
             )
         result = run(
@@ -194,7 +214,9 @@ def diagnose(
         )
         source = options.kept_source(robot_source, robot, staged.folder)
         origin = ResultOrigin(
-            robot_source, source, provenance([*bags, *validate, *baseline, *against], seed=seed)
+            robot_source,
+            source,
+            options.provenance([*bags, *validate, *baseline, *against], seed=seed),
         )
         result.fill(staged.folder, origin)
         staged.keep()
@@ -220,15 +242,7 @@ def _identified_from(model: Path, asked: list[Path]) -> tuple[Path, ...]:
 
 
 def _model_of(path: Path, robot: Robot) -> ArmModel:
-    """
-    Read a model of an arm.
-
-    Raises
-    ------
-    ArmidError
-        If the description that it was made with is still there, and is of another arm.
-
-    """
+    """Read a model; ArmidError if its description is still there, and is of another arm."""
     from armid_ros.arm import load_model
     from armid_ros.cli import options
     from armid_ros.identification.description import kinematics_digest
@@ -244,3 +258,83 @@ def _model_of(path: Path, robot: Robot) -> ArmModel:
             f'{robot.name}; give --robot the one that it names, or identify this arm'
         )
     return arm
+
+
+def open_partner(
+    source: str | None, ties: Sequence[str], robot: Robot, gravity: str
+) -> Partner | None:
+    """
+    Load the partner of --partner and --tie; None without partner.
+
+    Raises
+    ------
+    ModelError
+        If it is not clear where the two may be tied, or a tie names no joint.
+
+    """
+    from armid_ros.effects.tied import Partner
+    from armid_ros.model.spring_ties import centroid_ties, leg_ties
+    from armid_ros.robots import load_robot
+
+    if source is None:
+        if ties:
+            raise ModelError('give both --tie, where the arm is tied, and --partner, to what')
+        return None
+    other = load_robot(source, gravity=gravity)
+    kept = str(Path(source).resolve()) if Path(source).is_file() else source
+    if ties:
+        found = [_tie(text, robot, other) for text in ties]
+    elif (robot.name, other.name) == ('exoskeleton_legs', 'human_legs'):
+        found = list(leg_ties(robot, other))
+    elif robot.n_joints != other.n_joints:
+        raise ModelError(
+            f'{robot.name} has {robot.n_joints} joints and {other.name} {other.n_joints}: say '
+            f'where they may be tied with --tie JOINT=JOINT; joints of {robot.name} are '
+            f'{", ".join(robot.joints)}, of {other.name} {", ".join(other.joints)}'
+        )
+    else:
+        pairs = list(zip(robot.joints, other.joints, strict=True))
+        found = centroid_ties(robot, other, pairs)
+    return Partner(other, tuple(found), kept)
+
+
+def read_together(
+    bags: Sequence[Path],
+    recordings: Sequence[Recording],
+    partner: Partner,
+    topic: str | None,
+) -> list[Recording]:
+    """Add the motion of the partner, from the same bags, to recordings of the arm."""
+    from armid_ros.cli import options
+    from armid_ros.recording import read_recording, recorded_together
+
+    joints, how = partner.robot.joints, options.read_settings()
+    others = [read_recording(bag, joints=joints, topic=topic, settings=how) for bag in bags]
+    options.tell_damage(*others)
+    return [
+        recorded_together(recording, other, partner.robot, partner.ties)
+        for recording, other in zip(recordings, others, strict=True)
+    ]
+
+
+def _tie(text: str, robot: Robot, other: Robot) -> Tie:
+    from armid_ros.model.spring_ties import centroid_ties
+
+    ends = [[*listed(end, '@'), ''] for end in parted(text, '=')]
+    if len(ends) != 2:
+        raise ModelError(f"--tie '{text}' has to be JOINT=JOINT, of the arm and of its partner")
+    (joint, point, *_), (far, far_point, *_) = ends
+    (tie,) = centroid_ties(robot, other, [(joint, far)])
+    return replace(
+        tie,
+        point=_point(text, point) if point else tie.point,
+        other_point=_point(text, far_point) if far_point else tie.other_point,
+    )
+
+
+def _point(text: str, numbers: str) -> tuple[float, float, float]:
+    try:
+        x, y, z = (float(number) for number in numbers.split(','))
+    except ValueError:
+        raise ModelError(f"--tie '{text}': a point is X,Y,Z in the joint's frame [m]") from None
+    return x, y, z
