@@ -1,6 +1,6 @@
 # Copyright 2026 The armid_ros developers
 # SPDX-License-Identifier: Apache-2.0
-"""One test for all changes: a quadratic form, its tail probability, and corrections for many."""
+"""Test for changes: a quadratic form, its tail probability, and multiple-test corrections."""
 
 from __future__ import annotations
 
@@ -71,7 +71,7 @@ def tail(
 
 def limits(chance: float, rank: FloatArray, freedom: FloatArray) -> FloatArray:
     """Return the thresholds of quadratic forms for a false alarm probability."""
-    # Fisher's distribution as that of a share, for scipy.stats takes ten times as long
+    # Fisher's distribution by the beta distribution, as scipy.stats takes ten times as long
     share = special.betaincinv(0.5 * freedom, 0.5 * rank, chance)
     return np.asarray(freedom * (1.0 - share) / share)
 
