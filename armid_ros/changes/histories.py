@@ -5,7 +5,7 @@ Tests for steps and trends in series of estimates, with control of false discove
 
 A change that all siblings share on a day is no change of an arm and is subtracted. Other scatter
 between bags is learned from all arms (`scatter`). A bag further from the median of its neighbours
-than noise is an outlier, not a change, and is moved to the edge of the noise (the identifier of
+than noise is an outlier, not a change. It is moved to the edge of the noise (the identifier of
 Hampel 1974). In a lasting change, neighbours agree.
 
 The largest step and the trend of every series of an arm are tested, with Bonferroni's factor for
@@ -72,7 +72,7 @@ class HistoryChange:
 @dataclass(frozen=True)
 class Judged:
     """
-    The test of an arm.
+    Test result of an arm.
 
     Attributes
     ----------
@@ -128,7 +128,7 @@ def judge(
 
 
 def named(judged: Judged, alpha: float) -> tuple[HistoryChange, ...]:
-    """Return the changes that are significant by themselves."""
+    """Return the significant changes of an arm at a false discovery rate alpha."""
     if judged.adjusted > alpha or not judged.changes:
         return ()
     limit = alpha * judged.p / judged.adjusted / len(judged.changes)

@@ -5,8 +5,8 @@ Scatter of estimates of healthy arms between bags, learned from all arms of a ki
 
 A value of a series is theta + c + e. The effect of the day, c, is shared by all siblings, for
 example by the temperature of a hall; it is estimated by a median polish (Tukey 1977). The part e
-has the variance s^2 + t^2, where s is the deviation stated in the bag and t is the scatter between
-bags beyond that. It follows from the median of squared differences of neighbours, which a step or
+has the variance s^2 + t^2: s is the deviation stated in the bag, t the scatter between bags beyond
+that. The scatter follows from the median of squared differences of neighbours, which a step or
 slow trend does not change.
 Three further properties are learned as well:
 
@@ -95,8 +95,8 @@ class Spread:
     alike : float
         Prior degrees of freedom of the variances of arms; large if arms do not differ.
     steps, trends : float
-        Factors by which steps and trends of healthy arms exceed those predicted from
-        differences of neighbours, in standard deviations.
+        Ratios of the steps and trends of healthy arms to those predicted from differences of
+        neighbours, in standard deviations.
 
     """
 
@@ -330,7 +330,7 @@ def _lasting(
 
 
 def line(days: FloatArray, x: FloatArray, weights: FloatArray) -> tuple[float, float, float]:
-    """Return slope, its standard deviation, and the value at the beginning."""
+    """Return slope, its standard deviation and start value of a weighted straight line."""
     total = weights.sum()
     middle, mean = weights @ days / total, weights @ x / total
     away = days - middle

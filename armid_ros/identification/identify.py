@@ -292,7 +292,7 @@ def _bodies(
     settings: IdentificationSettings,
     rng: np.random.Generator,
 ) -> _Bodies | None:
-    """Fit physically consistent links; None if not requested and impossible."""
+    """Fit physically consistent links; None if impossible and not required."""
     if settings.method == 'iv':
         return None
     known = settings.physical or PhysicalSettings()
@@ -364,7 +364,7 @@ def _remarks(fit: FittedValues, theory: BaseParameters) -> tuple[str, ...]:
     remarks = []
     if fit.base.rank < theory.rank:
         remarks.append(
-            f'the motion tells {fit.base.rank} of {theory.rank} parameters apart; '
+            f'the motion identifies {fit.base.rank} of {theory.rank} parameters; '
             'the others are grouped, or stay as described'
         )
     if fit.solution.outliers:
@@ -372,6 +372,6 @@ def _remarks(fit: FittedValues, theory: BaseParameters) -> tuple[str, ...]:
     if not fit.settled:
         remarks.append(
             f'the fit has not settled after {fit.passes} linearisations: the effects '
-            'change one another too much in these data; leave some out, or record more'
+            'affect each other too much in these data; leave some out, or record more'
         )
     return tuple(remarks)

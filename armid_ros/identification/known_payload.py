@@ -123,7 +123,7 @@ def payloads_of(
 
 def parse_payload(text: str) -> tuple[str, str, pin.Inertia]:
     """
-    Read 'BAG=KG@LINK' or 'BAG=KG@LINK:X,Y,Z'.
+    Parse a payload, 'BAG=KG@LINK' or 'BAG=KG@LINK:X,Y,Z'.
 
     Returns
     -------
@@ -225,7 +225,7 @@ def drive_gains(
     if not np.any(np.isfinite(std)):
         raise IdentificationError(
             '--payload: no gain is determined; it needs the same motion with and without the '
-            'payload, and a payload that the joints feel'
+            'payload, and a payload that is heavy enough'
         )
     return DriveGains(arm.robot.joints, values, std, width)
 

@@ -312,7 +312,7 @@ def parameters_of(source: str, document: dict[str, Any]) -> ParameterFile:
         error = finite(told['relative_error_percent'], 'relative_error_percent')
     scatter = [[finite(v, 'a scatter') for v in row] for row in document.get('scatter', ())]
     if any(len(row) != len(values) for row in scatter):
-        raise ValueError(f'a scatter whose rows are not of {len(values)} values')
+        raise ValueError(f'the scatter has to have rows of {len(values)} values')
     about = document.get('description', {})
     return ParameterFile(
         source,
@@ -343,7 +343,7 @@ def _covariance(rows: list[list[float]] | None, size: int) -> FloatArray | None:
     if rows is None:
         return None
     if [len(row) for row in rows] != list(range(1, size + 1)):
-        raise ValueError(f'a covariance that is no triangle of {size} rows')
+        raise ValueError(f'covariance: it has to be a triangle of {size} rows')
     matrix = np.zeros((size, size))
     for index, row in enumerate(rows):
         matrix[index, : index + 1] = matrix[: index + 1, index] = row

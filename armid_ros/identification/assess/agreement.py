@@ -83,7 +83,7 @@ class Agreement:
         )
 
     def document(self) -> dict[str, Any]:
-        """Return the numbers as a document."""
+        """Return the numbers of the comparison as a document."""
         return {
             'within_two_deviations': self.within,
             'expected_within_two_deviations': self.expected,

@@ -16,9 +16,9 @@ strongly correlated parameters can differ significantly together and none of the
 residuals of the two models in each joint are compared (Fisher's F), as a change that neither
 model describes is in no parameter.
 
-A body that is fixed to link k adds its ten parameters to those of the link, and base parameters
-change by G_k p, with the factors G_k that group the parameters of link k in them. Ten numbers p
-that explain dozens of changes, to their uncertainty, are a load; its mass is the first of them.
+A body that is fixed to link k adds its ten parameters p to those of the link. Base parameters then
+change by G_k p, with the factors G_k of the parameters of link k in them. Ten numbers p that
+explain dozens of changes, to their uncertainty, are a load; its mass is the first of them.
 
 """
 
@@ -139,7 +139,7 @@ def _require_two_of_one_robot(before: ParameterFile, after: ParameterFile) -> No
         how = (
             f'only one of them has {", ".join(sorted(apart))}'
             if apart
-            else 'their joints are of the same names, and in other places'
+            else 'their joints have the same names, but other positions'
         )
         raise ModelError(
             f'{before.source} and {after.source} are of different robots, {before.robot} and '
@@ -149,7 +149,7 @@ def _require_two_of_one_robot(before: ParameterFile, after: ParameterFile) -> No
     if same and (before.values or before.without_std):
         copy = '' if before.source == after.source else f' (is {before.source})'
         raise ModelError(
-            f'given twice: {after.source}{copy}; name two results, of recordings of their own'
+            f'given twice: {after.source}{copy}; name results of two different recordings'
         )
 
 
@@ -163,7 +163,7 @@ def _nothing_shared(before: ParameterFile, after: ParameterFile) -> str:
             )
     return (
         f'{before.source} and {after.source} have no identified parameter in common; '
-        'are they of one robot, in one gravity?'
+        'are they of one robot, with one gravity?'
     )
 
 
@@ -281,7 +281,7 @@ def _find_load(
 
 
 def _load(link: int, columns: FloatArray, white: FloatArray) -> LoadChange | None:
-    """Fit the load of one link to changes of unit covariance."""
+    """Fit the load of one link to whitened changes of base parameters; None if rejected."""
     lengths = np.linalg.norm(columns, axis=0)
     scale = np.where(lengths > 0.0, lengths, 1.0)
     left, sizes, right = np.linalg.svd(columns / scale, full_matrices=False)

@@ -25,7 +25,7 @@ _CLEAR, _FEWEST, _MOST = 5.0, 4, 0.8
 @dataclass(frozen=True)
 class ParameterChange:
     """
-    One shared parameter: both values, standard deviations, and significance of the change.
+    A parameter of both results: values, standard deviations, and significance of the change.
 
     Attributes
     ----------
@@ -146,7 +146,7 @@ class ResidualChange:
     changed: bool = False
 
     def document(self) -> dict[str, Any]:
-        """Return the document for JSON."""
+        """Return the residuals as a document."""
         return asdict(self) | {'ratio': self.ratio if isfinite(self.ratio) else None}
 
 
@@ -169,7 +169,7 @@ class NotCompared:
     why: Literal['deviation', 'motion', 'effect', 'grouping']
 
     def document(self) -> dict[str, str]:
-        """Return the document for JSON."""
+        """Return the parameter and the reason as a document."""
         return {'name': self.parameter.name, 'joint': self.parameter.joint, 'why': self.why}
 
 

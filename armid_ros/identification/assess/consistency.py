@@ -107,7 +107,7 @@ class NoiseCheck:
         found += ' that encoder noise biases the parameters'
         if self.harmless and not self.consistent:
             found = (
-                'a fit with instruments differs, by more than the noise of the encoders makes; an '
+                'a fit with instruments differs by more than encoder noise explains; an '
                 'effect that the model lacks is the likelier cause'
             )
         worst = int(np.argmax(np.abs(self.relative_bias)))

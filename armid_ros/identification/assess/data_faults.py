@@ -50,7 +50,7 @@ def check_data(
     before: Sequence[Recording] = (),
 ) -> tuple[list[str], list[str]]:
     """
-    Check the data for faults.
+    Check recordings for faults of the data before a diagnosis.
 
     Parameters
     ----------

@@ -160,7 +160,7 @@ def _errors(
     """Yield the reason of the worst joint, and joints whose torque is hardly predicted."""
     use = {
         'good': '',
-        'poor': ', too much to compute torques with',
+        'poor': ', too large to compute torques with the model',
         'unusable': ': the model does not describe this motion',
     }
     for bag, one in worst.items():
@@ -180,7 +180,7 @@ def _errors(
         named = ', '.join(
             f'{result.arm.robot.joints[j]} ({every[j]:.0f} %)' for j in np.flatnonzero(noisy)
         )
-        text = f'the torque is hardly predicted of {named}, where it is noise or friction at rest'
+        text = f'torque of mostly noise or friction at rest, hardly predicted: {named}'
         yield Fault(text, 'good')
 
 
@@ -240,12 +240,12 @@ def _resting(result: Identification, validation: Mapping[str, Sequence[Fit]]) ->
         )
     if np.any(fitted & ~checked):
         names = ', '.join(joints[fitted & ~checked])
-        yield Fault(f'not checked, as they do not move in what was held out: {names}', 'good')
+        yield Fault(f'not checked, as they do not move in held-out data: {names}', 'good')
 
 
 def beyond_noise(errors: FloatArray, fits: Sequence[Fit], used: Conditioning) -> FloatArray:
     """
-    Return the errors of joints without the share of torque noise.
+    Return the relative torque errors of joints without the share of torque noise.
 
     Noise counts twice: in a row, and in its prediction if that is as uncertain as a measurement
     (leverage of one, Hoaglin and Welsch 1978). A model is not at fault if its error is no larger

@@ -268,7 +268,7 @@ def _other_scale(robot: Robot, factor: float, motions: Sequence[Motion]) -> Hypo
         shown = zip(factors, known, strict=True)
         gains = ','.join(f'{1.0 / one:.3g}' if clear else '?' for one, clear in shown)
         hidden = ', '.join(robot.joints[k] for k in np.flatnonzero(~known))
-        text += f'; for currents give --current-gain {gains}, as exact as those masses'
+        text += f'; for currents give --current-gain {gains}, as accurate as those masses'
         text += f'; that of {hidden} is not determined' if hidden else ''
     scaled = _times('torque', slice(None), 1.0 / factor)
     return Hypothesis('scale', text, scaled, of_data=bool(unit))

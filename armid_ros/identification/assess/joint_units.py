@@ -5,7 +5,7 @@ Detection of torques in another unit than N m where the described body does not 
 
 A joint whose torque is mostly friction, such as a wrist, fits as well in any unit, as its friction
 is fitted; see `mistakes`. The unit follows from the limit of its drive, from a model with its
-friction, or from a baseline, where wrong masses of a model are wrong on both days.
+friction, or from a baseline. Wrong masses of a model are wrong on both days and cancel.
 
 """
 

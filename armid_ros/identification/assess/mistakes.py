@@ -197,7 +197,7 @@ def _error(
 
 
 def _first(rows: Sequence[_Row], ratio: str, before: PredictionError) -> Mistake:
-    """Return the hypothesis with the largest ratio, and its equals of other kinds."""
+    """Return the mistake with the largest ratio, and equally likely ones of other kinds."""
     value = attrgetter(ratio)
     first, *others = sorted(rows, key=value, reverse=True)
     likely = {first.hypothesis.kind: first.hypothesis}

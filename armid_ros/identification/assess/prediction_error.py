@@ -72,12 +72,12 @@ class PredictionError:
         return float(np.prod(before / after))
 
     def least(self, other: PredictionError) -> PredictionError:
-        """Return the smaller error of every joint."""
+        """Return the smaller one of two errors for every joint."""
         return replace(self, joints=np.minimum(self.joints, other.joints))
 
 
 def thinned(stretches: Sequence[Motion], rows: int) -> Motion | None:
-    """Concatenate stretches with torques, and thin them to about a number of samples."""
+    """Concatenate stretches with torques, and keep about `rows` evenly spaced samples."""
     parts = [motion for motion in stretches if motion.tau is not None and len(motion) > 2]
     if not parts:
         return None
@@ -173,7 +173,7 @@ def common_values(motion: Motion, fixed: FloatArray, columns: FloatArray) -> Flo
 
 def beside(own: FloatArray, shared: FloatArray) -> FloatArray:
     """
-    Project the own columns of each joint out of others (Frisch and Waugh 1933).
+    Project the own columns of each joint out of shared columns (Frisch and Waugh 1933).
 
     Parameters
     ----------

@@ -38,8 +38,8 @@ _WALK = 3.0
 #: Largest error of the integral of a constant speed, as a share of the distance. Errors of clocks
 #: and units are smaller, and a reversal of the joint makes half of the distance.
 _WAY = 0.1
-#: A torque channel is dead if it is constant for this time [s] while the joint moves by this share
-#: of its range, and the load varies by this share of weight or inertia; if passive, these cancel.
+#: Least time [s], and least share of the joint's range, over which a constant channel is dead.
+#: Least change of its load over weight or inertia, which cancel in a passive joint.
 _LONG, _FAR, _TAKEN = 1.0, 0.2, 0.5
 #: Longest piece over which velocities are integrated [s], above a usual period: integrated noise
 #: is a random walk. Largest RMS distance of a position from a line at constant speed [rad or m].
@@ -117,7 +117,7 @@ def sensor_faults(
         if one.report.restarted:
             yield Fault(
                 f'the clock jumped back; {one.report.restarted} of {one.report.messages} '
-                'messages, on the shorter side of it, are left out',
+                'messages, on the shorter side of the jump, are left out',
                 'good',
                 one.source,
             )
@@ -306,7 +306,7 @@ def velocity_faults(recording: Recording) -> Iterator[Fault]:
     if not known and np.all(np.abs(plain / factor - 1.0) <= _ALIKE):
         yield Fault(
             f'velocities of all joints that move are {factor:.3g} times what positions do in the '
-            f'recorded time. Either time stamps run {factor:.3g} times as long as it took, and '
+            f'recorded time. Either time stamps run {factor:.3g} times the true time, and '
             'inertias are off by the square of that, or velocities are in another unit. Correct '
             'which it is',
             'poor',
@@ -378,6 +378,6 @@ def _elsewhere(joint: HeldJoint, lowest: float, highest: float, moves: bool, mak
     remedy = 'drive it as well (--joints), or hold it still where its torque is not measured'
     return (
         f'joint {name} is not driven, but moves from {lowest:.3g} to {highest:.3g} '
-        f'{unit}{carries}; {model}; where it is makes up to {makes}; '
+        f'{unit}{carries}; {model}; its position makes up to {makes}; '
         f'{"leave out where it moves" if joint.follows else remedy}'
     )

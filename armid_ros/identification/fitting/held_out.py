@@ -96,8 +96,8 @@ def halves_error(
     halves = slice(0, middle), slice(middle, None)
     left = np.zeros_like(tau)
     for fitted, predicted in (halves, halves[::-1]):
-        # a Bayesian estimate in units of the residual. Its prior are changes as large as the
-        # expected errors of the description, or as the torque; without a prior, parameters that
+        # a Bayesian estimate in units of the residual. Its prior allows changes as large as the
+        # expected errors of the description, or as the torque. Without a prior, parameters that
         # a half does not determine would be arbitrary. With a residual near zero, these
         # parameters stay as described
         own = weight[fitted]
@@ -128,9 +128,9 @@ def cutoff_of_torques(
     """
     Lower the cut-off of positions while that improves held-out torque prediction.
 
-    The highest cut-off is chosen whose held-out loss is within a tenth, or one standard error, of
-    the least (Breiman et al., Classification and Regression Trees, 1984). So clean data keep their
-    cut-off.
+    The chosen cut-off is the highest with a held-out loss within a tenth, or one standard error,
+    of the least. So clean data keep their cut-off. Source of the standard error: Breiman et al.,
+    Classification and Regression Trees, 1984.
 
     Parameters
     ----------
@@ -175,7 +175,7 @@ def cutoff_of_torques(
 
 
 def _windows(recordings: Sequence[Recording], samples: int) -> list[Recording]:
-    """Return about a number of samples of longer recordings, in evenly spread windows."""
+    """Return evenly spread windows of recordings, with about `samples` samples in total."""
     total, size = sum(len(recording) for recording in recordings), samples // _WINDOWS
     if total <= samples:
         return list(recordings)
@@ -212,7 +212,7 @@ def _as_good(losses: FloatArray, best: FloatArray) -> bool:
 
 
 def _losses(problem: Sequence[Regression]) -> FloatArray:
-    """Return the mean log rms error of each stretch, predicted from the others, (S,)."""
+    """Return the held-out loss of each stretch, the mean log rms error of its joints, (S,)."""
     # odd stretches are predicted from even ones, and vice versa. Every joint counts by the ratio
     # of its errors: a light joint, whose torque is mostly noise, gains by a low cut-off and must
     # not hide that a heavy one loses
@@ -246,14 +246,14 @@ def _fit(
 
 
 def _step(problem: Sequence[Regression], most: int) -> int:
-    """Return the stride that leaves about a number of rows."""
+    """Return the stride that keeps about `most` rows."""
     return max(1, sum(len(part.tau) for part in problem) // most)
 
 
 def _some_rows(
     problem: Sequence[Regression], most: int
 ) -> tuple[FloatArray, FloatArray, FloatArray, npt.NDArray[np.bool_]]:
-    """Thin to about a number of rows: columns (N, n, r), torque, target, informative."""
+    """Return columns (N, n, r), torque, target and informative mask of about `most` rows."""
     step = _step(problem, most)
     columns, tau, target = (
         np.concatenate([getattr(part, name) for part in problem])[::step]

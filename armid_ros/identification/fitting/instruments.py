@@ -75,7 +75,7 @@ def fit_by_instruments(
     fit: FittedValues, recordings: Sequence[Recording], used: Conditioning
 ) -> FittedValues:
     """
-    Fit by instrumental variables from the smoothed motion, from a weighted start.
+    Fit by instrumental variables from the smoothed motion, starting at a weighted fit.
 
     Parameters
     ----------
@@ -112,7 +112,7 @@ def by_instruments(
     limits: tuple[FloatArray, FloatArray] | None = None,
 ) -> Instrumented:
     """
-    Solve Z' (tau - W theta) = 0.
+    Estimate theta by the instrumental-variable equation Z' (tau - W theta) = 0.
 
     Parameters
     ----------
@@ -144,7 +144,7 @@ def by_instruments(
     except scipy.linalg.LinAlgError:
         raise IdentificationError(
             'the smoothed motion does not correlate with the recorded one in every parameter: '
-            'use wls, or record a motion that shows more'
+            'use wls, or record a richer motion'
         ) from None
     free = values = by_z @ (z.T @ target)
     if limits is not None:

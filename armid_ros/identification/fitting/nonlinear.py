@@ -186,7 +186,7 @@ def curved(before: ArmModel, after: ArmModel, motions: Sequence[Motion]) -> bool
 
 def moved(arm: ArmModel, base: BaseParameters, values: FloatArray, free: FloatArray) -> ArmModel:
     """
-    Return the arm with other base parameters.
+    Return the arm with given values of its base parameters.
 
     In unidentifiable directions, effects keep their values and rigid parameters change as little
     as possible: directions of rigid parameters alone are unidentifiable for any effects.
@@ -330,7 +330,7 @@ class _State:
         self._weights = self._used / np.maximum(rms, _EXACT * max(rms.max(), 1e-100))
 
     def gain(self, predicted: Torques) -> float:
-        """Return the decrease of the cost by torques; zero if there is no residual."""
+        """Return the decrease of the cost with predicted torques; zero without a residual."""
         if np.linalg.norm(self._used * self._left) <= _FINE * np.linalg.norm(
             self._used * self._tau
         ):
@@ -338,7 +338,7 @@ class _State:
         return self.cost() - self.cost(predicted)
 
     def damped(self, damping: float, limits: tuple[FloatArray, FloatArray]) -> FloatArray:
-        """Return the values after a step of Levenberg and Marquardt, within limits."""
+        """Return the values after a Levenberg-Marquardt step, within limits."""
         w, _ = weighted_rows(self.problem, self._weights)
         size = np.linalg.norm(w, axis=0)
         scaled = w / np.where(size > 0.0, size, 1.0)

@@ -118,14 +118,14 @@ class NormalEquations:
         return np.asarray(np.sqrt(freedom * self.squares(values) / counts))
 
     def packed(self) -> FloatArray:
-        """Return all numbers in one row: joints, counts and the upper triangles."""
+        """Return all numbers in one array: number of joints, counts and upper triangles."""
         upper = np.triu_indices(self.rank + 1)
         numbers = self.products[:, upper[0], upper[1]].ravel()
         return np.concatenate([[len(self.counts)], self.counts, numbers])
 
     @classmethod
     def unpacked(cls, numbers: FloatArray) -> NormalEquations:
-        """Unpack normal equations."""
+        """Return normal equations from the numbers of `packed`."""
         joints = int(numbers[0])
         triangles = numbers[1 + joints :].reshape(joints, -1)
         size = int(np.sqrt(2 * triangles.shape[1]))
@@ -138,7 +138,7 @@ class NormalEquations:
 @dataclass(frozen=True, eq=False)
 class WeightedFit:
     """
-    Weighted least squares.
+    Solution of weighted least squares.
 
     Attributes
     ----------

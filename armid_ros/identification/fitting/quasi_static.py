@@ -80,7 +80,7 @@ def with_uncertain_inertia(
             else f'at {speed:.2g} times the speed it would not matter'
         )
         notes = (
-            'too fast for quasi-static: the inertia of the description is taken off, and what it '
-            f'may be wrong by is in the intervals; {slower}',
+            'too fast for quasi-static: the described inertia is subtracted, and its possible '
+            f'error widens the intervals; {slower}',
         )
     return replace(fit, solution=solution), notes

@@ -24,7 +24,7 @@ _INDEPENDENT = 1e-6
 @dataclass(frozen=True, eq=False)
 class ChangeCandidate:
     """
-    A candidate change.
+    A change of the arm that may be detected.
 
     Attributes
     ----------
@@ -151,7 +151,7 @@ def _candidate(
     added_to: Sequence[int],
     names: Sequence[ParameterName] = (),
 ) -> ChangeCandidate:
-    """Return a candidate of standard parameters, or of an effect that adds to them."""
+    """Return the candidate of an effect, or of a body whose parameters add to a link's."""
     columns = base.grouping[:, added_to]
     independent = _independent(columns)
     kept = [k for k in independent if not names or k < _REPORTED]

@@ -124,7 +124,7 @@ class ChangeSearch:
     Attributes
     ----------
     directions : ndarray, shape (P, Q)
-        The argument `directions`.
+        Same as the parameter `directions`.
 
     """
 
@@ -225,7 +225,7 @@ class ChangeSearch:
         return ratios
 
     def _judge(self, residual_scale: float) -> Pieces[FoundChange | None]:
-        """Locate and classify the change once it is clear or overdue."""
+        """Return onset and cause of the change, or None while they are not clear."""
         rows = []
         for k in range(len(self._blocks) - 1):
             window = yield from self._window(k, residual_scale)

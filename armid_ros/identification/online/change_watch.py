@@ -160,7 +160,7 @@ class ChangeWatch:
         self._estimator.update(*row.sample)
 
     def _among_all(self, directions: FloatArray) -> FloatArray:
-        """Map directions in the parameters to the wider parameter vector."""
+        """Extend directions by zeros for the nuisance parameters."""
         more = len(self._wider.parameters) - self._own
         return np.vstack([directions, np.zeros((more, directions.shape[1]))])
 
@@ -268,7 +268,7 @@ class ChangeWatch:
         )
 
     def _learn_again(self, found: FoundChange, reopened: FloatArray) -> Job:
-        """Restore an earlier state, reopen changed directions, and learn later samples again."""
+        """Restore the state before a change, reopen directions, and learn later samples again."""
         last = found.blocks[found.before]
         since = [sample for block in found.blocks[found.after :] for sample in block.samples]
         stretches = (*self._unseen, *([self._open] if self._open else ()))

@@ -129,8 +129,8 @@ class OnlineIdentifier:
         for effect in arm.effects:
             if not effect.instantaneous:
                 raise IdentificationError(
-                    f'{effect.name} depends on the motion before, which single samples do not '
-                    'show; identify it from a recording'
+                    f'{effect.name} depends on earlier motion, which single samples do not '
+                    'contain; identify it from a recording'
                 )
         self.arm = arm
         self.settings = settings
@@ -180,7 +180,7 @@ class OnlineIdentifier:
         self, t: float, q: npt.ArrayLike, dq: npt.ArrayLike | None, tau: npt.ArrayLike
     ) -> OnlineSample | None:
         """
-        Take in one joint state.
+        Update the estimate with one joint state.
 
         Parameters
         ----------
@@ -273,11 +273,11 @@ class OnlineIdentifier:
             same = getattr(settings, part.name) == getattr(self.settings, part.name)
             if part.name not in self.CHANGEABLE and not same:
                 raise IdentificationError(
-                    f'{part.name} cannot change while samples are learned from: begin anew'
+                    f'{part.name} cannot change during identification: restart it'
                 )
         if not self._learner.watches and settings.changes is not None:
             raise IdentificationError(
-                'changes of the arm were not looked for from the beginning: begin anew'
+                'change detection was off from the start: restart the identification'
             )
         check_forgetting(settings.forgetting)
         check_gap(settings.max_gap)

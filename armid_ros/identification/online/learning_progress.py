@@ -95,7 +95,7 @@ class LearningProgress:
 
     def look(self, t: float, estimate: Estimate) -> tuple[Unlearned, ...]:
         """
-        Return the unidentified quantities without progress for ten seconds, per joint.
+        Return the unidentified quantities of each joint that made no progress for ten seconds.
 
         Parameters
         ----------
@@ -131,7 +131,7 @@ class LearningProgress:
 
 
 def too_little_motion(unlearned: Sequence[Unlearned]) -> str:
-    """Return a line on what the motion does not identify; empty if nothing."""
+    """Return a message on parameters that the motion does not identify; empty if none."""
     if not unlearned:
         return ''
     rest = len(unlearned) - _NAMED

@@ -5,9 +5,9 @@ Friction that the model lacks, as nuisance parameters.
 
 Friction that a model lacks biases the identified parameters, and the bias varies with the motion.
 A search for changes would mistake this for a change, or for a part of its size. The friction law
-does not vary, so it is estimated too: viscous and Coulomb friction, if the model lacks them,
-friction in proportion to the load, and a curve over velocity, which is a sum of humps at low
-velocities.
+does not vary, so it is estimated too: viscous and Coulomb friction, if the model lacks them, and
+friction in proportion to the load. A sum of humps at low velocities is added as a curve over
+velocity.
 
 """
 

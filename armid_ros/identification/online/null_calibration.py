@@ -51,7 +51,7 @@ _FEWEST_BLOCKS = 16
 
 class History:
     """
-    Buffer of the last rows of numbers.
+    Buffer of the latest rows of numbers.
 
     Parameters
     ----------
@@ -211,7 +211,7 @@ class NullCalibration:
 
     def excess(self, ratios: FloatArray, strength: FloatArray, chance: float) -> FloatArray:
         """
-        Return statistics over their critical values; 0 before calibration.
+        Return the ratios of statistics to their critical values; 0 before calibration.
 
         Model discrepancy has biased the parameters, so the critical values are larger for motion
         that is stronger than usual.

@@ -3,9 +3,9 @@
 """
 Recursive least squares in square-root information form.
 
-The state is the triangle R and the vector z of the QR factorisation of all weighted rows so far,
-so without forgetting the estimate equals the batch solution at any number of samples, and the
-covariance R^-1 R^-T cannot lose its symmetry or become negative (Bierman 1977, chapter V).
+The state is the triangle R and the vector z of the QR factorisation of all weighted rows so far.
+Without forgetting, the estimate equals the batch solution at any number of samples. The covariance
+R^-1 R^-T cannot lose its symmetry or become negative (Bierman 1977, chapter V).
 
 Forgetting is directional (Kulhavy and Karny 1984): old information is given up only where a new
 sample brings information, and never more than the sample brings. So the covariance never grows,

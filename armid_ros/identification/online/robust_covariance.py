@@ -51,7 +51,7 @@ class _Bands:
 
     @property
     def information(self) -> FloatArray:
-        """M of all joints and bands, shape (P, P)."""
+        """Return the information M, summed over joints and bands, shape (P, P)."""
         return np.asarray(self.products.sum(axis=(0, 1))[:-1, :-1])
 
 
@@ -111,7 +111,7 @@ class RobustCovariance:
 
     def reopen(self, directions: FloatArray, values: FloatArray) -> None:
         """
-        Allow for an unknown change of the parameters before now.
+        Allow for an unknown change of the parameters between earlier and later rows.
 
         The last window, in which they may have changed, is left out. The torque of the change that
         fits best is subtracted from the torques of all earlier rows.
@@ -198,7 +198,7 @@ class RobustCovariance:
 
 
 def _sum(some: _Bands, more: _Bands) -> Pieces[_Bands]:
-    """Return the sums of products, joint by joint."""
+    """Return the sums of two sets of products, in pieces."""
     products = np.empty_like(some.products)
     for place, first, second in zip(products, some.products, more.products, strict=True):
         np.add(first, second, out=place)

@@ -97,7 +97,7 @@ def step_along(root: FloatArray, gradient: FloatArray) -> FloatArray:
 
 def reopened(root: FloatArray, directions: FloatArray) -> FloatArray:
     """
-    Return R without its information on the values along some directions (P, k).
+    Return R without its information on parameters along some directions (P, k).
 
     The parameters become theta + directions delta, where nothing is known of delta: R theta = z
     is stacked with delta = 0 within PRIOR_STD, and delta is eliminated by reflections.

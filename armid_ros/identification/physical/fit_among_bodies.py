@@ -51,7 +51,7 @@ TOLERANCE = 1e-3
 @dataclass(frozen=True)
 class PhysicalSettings:
     """
-    Prior knowledge, in addition to the recordings.
+    Prior knowledge of masses and shapes, in addition to the recordings.
 
     Attributes
     ----------
@@ -94,7 +94,7 @@ def fit_to_bodies(
     rng: np.random.Generator,
 ) -> tuple[FittedValues, PhysicalCertificate]:
     """
-    Fit physically consistent links after a free fit.
+    Fit physically consistent links, starting at an unconstrained fit.
 
     Parameters
     ----------
@@ -217,8 +217,8 @@ def _heavy(robot: Robot, rigid: FloatArray) -> tuple[str, ...]:
     if not named:
         return ()
     return (
-        f'more than {HEAVY:g} times as heavy as described: {"; ".join(named)}; look for what is '
-        'not the links, such as rotors, springs or a load, or correct the masses',
+        f'more than {HEAVY:g} times as heavy as described: {"; ".join(named)}; look for other '
+        'causes, such as rotors, springs or a load, or correct the masses',
     )
 
 
@@ -243,7 +243,7 @@ def physical_program(
 
 def bodily_prior(arm: ArmModel) -> tuple[FloatArray, tuple[str, ...]]:
     """
-    Return standard parameters with bodies for links without inertia.
+    Return standard parameters of the description, with physical values for impossible links.
 
     A link without mass becomes a ball of the mean mass of the others. A link that is a point, or
     whose moments are impossible, is given the smallest second moments of a body of that mass.
@@ -270,7 +270,7 @@ def bodily_prior(arm: ArmModel) -> tuple[FloatArray, tuple[str, ...]]:
             theta[part] = link_parameters(ball)
             notes.append(
                 f"link '{link}': the description has no mass; a ball of {typical:.3g} kg is the "
-                'prior where the data say nothing'
+                'prior where the data do not determine it'
             )
             continue
         center = matrix[:3, 3] / mass
@@ -284,7 +284,7 @@ def bodily_prior(arm: ArmModel) -> tuple[FloatArray, tuple[str, ...]]:
             matrix[:3, :3] = second + mass * np.outer(center, center)
             theta[part] = link_parameters(matrix)
             notes.append(
-                f"link '{link}': the description's inertia is hardly that of a body; the prior "
+                f"link '{link}': the described inertia is hardly possible; the prior "
                 f'has a radius of gyration of {1e3 * np.sqrt(least / mass):.2g} mm at least'
             )
     return theta, tuple(notes)

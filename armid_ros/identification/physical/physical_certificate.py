@@ -24,7 +24,7 @@ DEAR = 1.03
 @dataclass(frozen=True)
 class PhysicalCertificate:
     """
-    Certificate of physical consistency, with the increase of the error.
+    Evidence of physical consistency, and increase of the torque error by the constraints.
 
     Attributes
     ----------
@@ -80,7 +80,7 @@ class PhysicalCertificate:
 
     @property
     def activity(self) -> tuple[str, ...]:
-        """Return notes on active constraints and the harm they do; empty if none applies."""
+        """Return notes on active constraints and their cost; empty if none is active."""
         said = []
         if self.held_out_ratio > DEAR:
             said.append(

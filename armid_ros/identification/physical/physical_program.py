@@ -11,8 +11,8 @@ log-determinant,
 
     D(P || P0) = log det P0 - log det P + tr(P0^-1 P) - 4,
 
-which is convex in the parameters. It does not depend on frames or units, so kilograms need not be
-weighed against kilogram metres squared, and it grows without bounds towards impossible inertias.
+which is convex in the parameters and grows without bounds towards impossible inertias. It does not
+depend on frames or units, so kilograms need not be weighed against kilogram metres squared.
 Source: Lee, Wensing and Park 2020, section IV; the pseudo-inertia, Wensing, Kim and Slotine 2018.
 The solver is an interior-point method in coordinates in which every P0 is the identity.
 
@@ -47,7 +47,7 @@ Box = tuple[FloatArray, FloatArray]
 @dataclass(frozen=True)
 class PhysicalProgram:
     """
-    Conic program, set up once for all data and weights.
+    Conic program of the constraints and priors, for any data and weight of the prior.
 
     Attributes
     ----------
@@ -85,7 +85,7 @@ class PhysicalProgram:
 
     def solve(self, products: FloatArray, count: float, weight: float) -> FloatArray:
         """
-        Find the parameters.
+        Return the standard parameters that minimise the cost under the constraints.
 
         Parameters
         ----------

@@ -288,9 +288,9 @@ class CausalFilter:
         return CausalMotion(t, value[:n], dq[:n], ddq[:n], value[-n:])
 
     def _missing(self, t: float, dt: float, signal: FloatArray) -> list[FloatArray]:
-        """Interpolate the samples missing before one."""
+        """Return interpolated samples for a gap before a sample."""
         # A straight line has no acceleration, so the rows would lack the acceleration in the gap.
-        # A cubic goes through the sample after the gap and three before it, at distances equal to
+        # A cubic goes through the sample after the gap and three before it. Their distances equal
         # the gap, so that the cubic has hardly more noise than the samples.
         assert self.period is not None
         count = round(dt / self.period) if dt > _GAP * self.period else 1
@@ -306,7 +306,7 @@ class CausalFilter:
         return list(np.vander(inside, len(place)) @ factors)
 
     def _learn_period(self, dt: float) -> None:
-        """Add an interval; create the filter once there are enough."""
+        """Add an interval; create the filter after enough intervals."""
         if dt > 0.0:
             self._intervals.append(dt)
         if len(self._intervals) < 20:  # too few for a median
@@ -315,9 +315,9 @@ class CausalFilter:
         fastest = _FASTEST_POLE / period * _CUTOFF_OF_POLE / (2.0 * np.pi)
         self._lag = TripleLag(min(MOTION_FILTER_RATIO * self._cutoff, fastest))
         pole = self._lag.pole
-        # gain of the lag for a second derivative of 1: the signal is straight between samples, so
-        # its curvature is at the samples, and the output has the sum of the impulse response
-        # p^3 t^2 / 2 exp(-p t) in place of its integral
+        # Gain of the lag for a second derivative of 1. The signal is straight between samples, so
+        # its curvature is at the samples. The output has the sum of the impulse response
+        # p^3 t^2 / 2 exp(-p t) in place of its integral.
         decay, relative = math.exp(-pole * period), pole * period
         gain = 0.5 * relative**3 * decay * (1.0 + decay) / (1.0 - decay) ** 3
         curvature = pole * pole / gain

@@ -91,7 +91,7 @@ def check_motion(
         if recording.duration < SHORTEST:
             raise IdentificationError(
                 f'{recording.source}: {recording.duration:.2f} s in {len(recording)} samples is '
-                'too short; record a movement of several seconds, or of a table see '
+                'too short; record a movement of several seconds; for a table, check '
                 '--time-unit and --rate'
             )
         if used is not None and not any(True for _ in segments(recording, used)):
@@ -135,7 +135,9 @@ def resting(robot: Robot, source: str, ranges: FloatArray) -> tuple[str, ...]:
             'record the arm while it follows an excitation'
         )
     if names:
-        return (f'at rest throughout: {", ".join(names)}; nothing of their own is identified',)
+        return (
+            f'at rest throughout: {", ".join(names)}; their own parameters are not identified',
+        )
     return ()
 
 
@@ -143,7 +145,7 @@ def check_torque(
     arm: ArmModel, recordings: Sequence[Recording], problem: Sequence[Regression]
 ) -> tuple[str, ...]:
     """
-    Raise an error for absent torques, wrong signs or units, or mere commands.
+    Raise an error for absent torques, wrong signs or units, or torques of a controller.
 
     Sign and unit show against the rigid body of the description, if all the joints that follow it
     agree; the sign of the others shows in their friction.

@@ -41,7 +41,7 @@ REST_TIME = 0.2
 @dataclass(frozen=True)
 class Stretch:
     """
-    One unbroken stretch of a recording in rows, filtered and decimated.
+    Rows of one unbroken stretch of a recording, filtered and decimated.
 
     Attributes
     ----------
@@ -102,13 +102,13 @@ class Regression(Stretch):
         return np.asarray(self.target - self.columns @ values)
 
     def restrict(self, columns: Sequence[int] | npt.NDArray[np.intp]) -> Regression:
-        """Return the problem in some of its columns; itself if that is all of them in order."""
+        """Return the problem with some of its columns; itself for all columns in order."""
         if np.array_equal(columns, np.arange(self.columns.shape[2])):
             return self
         return replace(self, columns=self.columns[:, :, columns])
 
     def select(self, rows: npt.NDArray[np.intp]) -> Regression:
-        """Return the problem in some of its rows."""
+        """Return the problem with some of its rows."""
         return replace(
             self,
             motion=self.motion.select(rows),
@@ -215,7 +215,7 @@ class Score:
 
     @staticmethod
     def of(fits: Sequence[Fit]) -> Score:
-        """Score one or more stretches together."""
+        """Return the score of one or more stretches together."""
         used = np.concatenate([fit.informative for fit in fits])
         residual = used * np.concatenate([fit.residual for fit in fits])
         tau = used * np.concatenate([fit.tau for fit in fits])
@@ -239,7 +239,7 @@ def weighted_rows(
 
 
 def by_stretch(problem: Sequence[Stretch], rows: FloatArray) -> list[FloatArray]:
-    """Split rows of all stretches, (N, ...), into those of each."""
+    """Split rows of all stretches, (N, ...), into one array per stretch."""
     return np.split(rows, np.cumsum([len(part.motion) for part in problem])[:-1])
 
 
@@ -369,7 +369,7 @@ def _filtered(
                 )
         first = rows.stop
         tick(stop - start)
-    result.setflags(write=False)  # a frozen result needs no copy of it
+    result.setflags(write=False)  # a read-only array is frozen without a copy
     return result
 
 

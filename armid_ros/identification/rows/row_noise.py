@@ -24,9 +24,9 @@ class RowNoise:
     """
     White noise behind the filters.
 
-    The noise of a sample, of standard deviation s and density s^2 T, leaves a filter H with the
-    variance s^2 T B, where B is the integral of |H|^2 over all frequencies; rows that are `step`
-    apart hold step B independent observations each.
+    Noise of samples, of standard deviation s and density s^2 T, has the variance s^2 T B behind a
+    filter H. Its bandwidth B is the integral of |H|^2 over all frequencies. Rows at intervals of
+    `step` hold step B independent observations each.
 
     Attributes
     ----------
@@ -62,7 +62,7 @@ class RowNoise:
         return cls(bandwidth, gain, gain / (period * peak))
 
     def independent(self, step: float) -> float:
-        """Return how many independent observations a row holds, `step` [s] after the last."""
+        """Return the number of independent observations in a row, `step` [s] after the last."""
         return min(1.0, self.bandwidth * step)
 
 

@@ -93,7 +93,7 @@ class SignalSettings:
 @dataclass(frozen=True)
 class Conditioning:
     """
-    Settings as they are used on recordings of one rate.
+    Filters for recordings of one sampling rate.
 
     Attributes
     ----------
@@ -152,10 +152,10 @@ def conditioning(recordings: list[Recording], settings: SignalSettings) -> Condi
     Choose the cut-off and the decimation for recordings of one kind.
 
     The cut-off of positions is where their spectrum meets their noise. It is at most a fifth of
-    the rate, as higher derivatives are only noise, and at most five times the band of torque and
-    regressor, which contain hardly anything above it.
-    Torque and regressor keep ten times the band of the motion, the frequency below which 99 % of
-    the velocities' power lies, and are decimated to 2.5 samples per period of that.
+    the rate, as derivatives above it are only noise. It is at most five times the band of torque
+    and regressor, which hardly depend on higher frequencies.
+    The band of the motion contains 99 % of the velocities' power. Torque and regressor keep ten
+    times this band, and are decimated to 2.5 samples per period of the upper end.
 
     """
     for recording in recordings:
@@ -198,8 +198,8 @@ def velocity_error(recording: Recording, used: Conditioning) -> FloatArray:
     """
     Return the error of velocities that are computed from filtered positions.
 
-    The error consists of white noise of the positions up to the cut-off, times the square of its
-    frequency, and of the motion above the cut-off, which the filter removes.
+    One part is white noise of the positions up to the cut-off, times the square of its frequency.
+    The other part is the motion above the cut-off, which the filter removes.
 
     Returns
     -------
@@ -228,7 +228,7 @@ def _require_rate(recording: Recording) -> None:
     ]
     raise IdentificationError(
         f'{recording.source}: {len(recording)} samples in {recording.duration:.4g} s, one every '
-        f'{1.0 / rate:.4g} s, follow no motion' + (likely[0] if likely else '')
+        f'{1.0 / rate:.4g} s: too slow for a motion' + (likely[0] if likely else '')
     )
 
 
@@ -340,7 +340,7 @@ def decimated_samples(n_samples: int, used: Conditioning) -> range:
 
 
 def _even(t: FloatArray, period: float, *signals: FloatArray) -> tuple[FloatArray, ...]:
-    """Return even times, and signals there; a cubic through the stamps where they jitter."""
+    """Return even times and signals there, by a cubic spline if the stamps jitter."""
     grid = np.linspace(t[0], t[-1], round((t[-1] - t[0]) / period) + 1)
     if len(grid) == len(t) and np.max(np.abs(grid - t)) < JITTER_TOLERANCE * period:
         return grid, *signals

@@ -96,9 +96,9 @@ def two_senders(recording: Recording) -> str:
     """
     Return a message on positions that jump to and fro between two tracks; empty otherwise.
 
-    A message has another sender than its neighbours if it is far from both in some joint, the
-    neighbours are near each other, and the step is faster than usual motion of the joint. Such
-    messages form a track of their own, whereas values of a faulty encoder are scattered.
+    A message has another sender than its neighbours if some joint is far from both, the two are
+    near each other, and the step is faster than usual motion. Such messages form a track of their
+    own, whereas values of a faulty encoder are scattered.
 
     """
     t, q = recording.t, recording.q

@@ -4,9 +4,9 @@
 Rows of a recording that may be larger than the memory, in pieces.
 
 Pieces overlap, so that effects of the filters at their ends have decayed. A piece begins at the
-time of a row of the previous piece, so the rows are those of the whole recording, each from one
-piece. Two things differ per piece: the even time base of jittering stamps, and the top speed by
-which a joint counts as at rest.
+time of a row of the previous piece, so the rows are those of the whole recording. Each row comes
+from one piece. Two things differ per piece: the even time base of jittering stamps, and the top
+speed by which a joint counts as at rest.
 
 """
 

@@ -81,7 +81,7 @@ class NoiseLevel:
         self.usual = usual
 
     def forget(self) -> None:
-        """Measure the noise anew with the next `begin`."""
+        """Clear the measured noise; the next `begin` measures it again."""
         self._sizes[:] = 0.0
         self._seen = 0
 
@@ -146,12 +146,12 @@ class NoiseLevel:
 
 class LineErrors(NamedTuple):
     """
-    Errors of the straight lines through the two samples before each.
+    Errors of samples against the straight line through the two samples before.
 
     Attributes
     ----------
     stretch : ndarray of int, shape (N,)
-        First sample of the stretch without a long gap that contains a sample.
+        First sample of the stretch that contains a sample; long gaps separate stretches.
     off : ndarray, shape (N, m)
         Error of each sample, if a smooth signal keeps its curvature, over the largest allowed
         error; 0 for the first samples of a stretch.

@@ -113,7 +113,7 @@ class SpikeGate:
         self.reset()
 
     def reset(self) -> None:
-        """Forget everything."""
+        """Clear samples, counters and noise levels."""
         self.spikes: Counter[int] = Counter()
         self.rejected: Counter[str] = Counter()
         self.left_out: list[Excursion] = []
@@ -197,8 +197,8 @@ class SpikeGate:
         """
         Return whether the arm itself may have caused an excursion of a signal.
 
-        A position cannot jump and return. A torque can: when free play is crossed, it exceeds its
-        usual range from `lowest` to `highest`, but by no more than the width of that range, as an
+        A position cannot jump and return. A torque can exceed its usual range, from `lowest` to
+        `highest`, when free play is crossed, but by no more than the width of that range: an
         impact is of the order of the driving torque.
 
         """

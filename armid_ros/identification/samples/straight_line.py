@@ -50,7 +50,7 @@ class StreamSample:
 @dataclass(frozen=True, eq=False)
 class Excursion:
     """
-    Samples that leave the predicted line, and later samples return to it.
+    Samples off the predicted line, to which later samples return.
 
     Attributes
     ----------

@@ -36,9 +36,9 @@ _STEP = 1e-5
 _LAGS = 6
 
 Inertias = Literal['known', 'free']
-#: Arrays of a problem whose first axis are its samples.
+#: Arrays of a problem with one row per sample.
 STACKED = ('tau', 'known', 'columns', 'known_by_motion', 'columns_by_motion')
-#: Arrays of a problem without an axis of samples.
+#: Arrays of a problem that do not depend on its samples.
 _ALIKE = ('motion_lags', 'torque_lags', 'torque_noise', 'described', 'precision')
 
 
@@ -200,7 +200,7 @@ def interaction_problem(
     """
     robot, other, ties = machines.robot, machines.other, machines.ties
     if motion.tau is None:
-        raise IdentificationError(f'{robot.name}: no torques; the stiffness is in them alone')
+        raise IdentificationError(f'{robot.name}: no torques, which the stiffness needs')
     if len(motion) != len(other_motion) or np.max(np.abs(motion.t - other_motion.t)) > 1e-6:
         raise IdentificationError(
             f'{robot.name} and {other.name}: their motions have to be on one time base'
@@ -340,7 +340,7 @@ def _regressor_by_motion(robot: Robot, motion: Motion, kept: npt.NDArray[np.intp
 
 
 def _placed(by_own: FloatArray, count: int) -> FloatArray:
-    """Spread derivatives by the machine's motion, shape (..., 3, n), over both: (..., 3 J)."""
+    """Extend derivatives by one machine's motion, (..., 3, n), by zeros to (..., 3 J)."""
     result = np.zeros((*by_own.shape[:-1], count))
     result[..., : by_own.shape[-1]] = by_own
     return result.reshape((*by_own.shape[:-2], 3 * count))

@@ -164,7 +164,7 @@ def _most_likely(
     )
     if not np.max(np.abs(found.jac)) < 10.0 * _CONVERGED:
         raise IdentificationError(
-            'the stiffness does not settle: the angles are too noisy for ways of '
+            'the stiffness does not converge: the angles are too noisy for extensions of '
             f'{1e3 * problem.typical_way:.2g} mm; filter them, or move more'
         )
     return np.asarray(theta + unit @ found.x)
@@ -176,7 +176,7 @@ def _least_squares(problem: InteractionProblem, columns: FloatArray) -> FloatArr
     springs = scale[: columns.shape[2] - len(problem.rigid)]
     if not np.all(springs > _DRAWN_OUT * np.sqrt(len(w))):
         name = problem.segments[int(np.argmin(springs))]
-        raise IdentificationError(f'{name}: its spring is never drawn out, so nothing shows it')
+        raise IdentificationError(f'{name}: its spring is never extended, so nothing shows it')
     y = problem.tau - problem.known
     return np.asarray(np.linalg.lstsq(w / scale, y.ravel(), rcond=None)[0] / scale)
 
