@@ -26,7 +26,7 @@ def quadratic_form(
     score : ndarray, shape (..., p)
         Scores s.
     information : ndarray, shape (..., p, p)
-        Their covariance S, symmetric.
+        Covariance S of the scores, symmetric.
     tolerance : float
         Share of the largest eigenvalue below which an eigenvalue counts as zero.
 
@@ -58,7 +58,7 @@ def tail(
     square : array_like
         Quadratic form in units of the noise.
     rank : array_like
-        Its degrees of freedom.
+        Degrees of freedom of the quadratic form.
     freedom : array_like
         Degrees of freedom of the noise; infinite where its size is known: chi-square.
 

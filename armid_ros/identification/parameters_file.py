@@ -128,7 +128,7 @@ class ParameterFile:
 
     def regrouped_as(self, other: ParameterFile) -> ParameterFile:
         """
-        Return the values, plus those of another grouping that follow from them.
+        Return the values, and values of another grouping as far as they follow from these.
 
         A motion that identifies less groups more parameters; its values are combinations of those
         of a richer motion.

@@ -29,7 +29,7 @@ import numpy as np
 
 #: Possible errors of the zero of a joint [degrees]: of an encoder, an axis or a drawing.
 TURNS = (-135.0, -90.0, -45.0, 45.0, 90.0, 135.0, 180.0)
-#: Largest difference of a gravity vector from a known one that replaces it, as a share of that.
+#: Largest difference of a gravity vector from a known one that replaces it, over the known length.
 _KNOWN = 0.3
 #: Correlation from which the factor of a joint is known: the residual is 15 % of torque or less.
 _CLEAR = 0.989

@@ -66,7 +66,7 @@ def score_products(scores: Sequence[FloatArray], lags: int) -> FloatArray:
 
 
 def widened(covariance: FloatArray, bread: FloatArray, middle: FloatArray) -> FloatArray:
-    """Widen a covariance, (p, p), to at least the deviations of the sandwich of a middle."""
+    """Widen a covariance, (p, p), to at least the deviations of the sandwich of `middle`."""
     ratio = np.diag(bread @ middle @ bread) / np.diag(covariance)
     factor = np.sqrt(np.maximum(ratio, 1.0))
     return np.asarray(covariance * np.outer(factor, factor))

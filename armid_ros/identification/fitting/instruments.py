@@ -57,7 +57,7 @@ class Instrumented:
     values : ndarray, shape (r,)
         Parameters.
     covariance : ndarray, shape (r, r)
-        Their covariance, correlation of the residuals included.
+        Covariance of the parameters, correlation of the residuals included.
     difference : ndarray, shape (r,)
         Values by instruments minus those of least squares, both without bounds.
     spread : ndarray, shape (r, r)

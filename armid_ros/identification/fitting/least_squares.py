@@ -57,7 +57,7 @@ class Solution:
     values : ndarray, shape (r,)
         Parameters.
     covariance : ndarray, shape (r, r)
-        Their covariance, correlation of the residuals included.
+        Covariance of the parameters, correlation of the residuals included.
     joint_std : ndarray, shape (n,)
         Standard deviation of the residual of every joint [N m].
     condition_number : float

@@ -57,7 +57,7 @@ class ChangeCandidate:
 
     @property
     def label(self) -> str:
-        """Return what changed where, such as 'payload at hand'."""
+        """Return name and joint of the change as text, such as 'payload at hand'."""
         text = self.name.replace('_', ' ')
         return f'{text} at {self.joint}' if self.joint else text
 
@@ -99,7 +99,7 @@ class Change:
         return np.asarray(left[:, size > _INDEPENDENT * size[0]])
 
     def __str__(self) -> str:
-        """Return a sentence: what changed, by how much, and rivals."""
+        """Return a sentence on the change: candidate, sizes and rivals."""
         sizes = ', '.join(
             f'{p.name} by {value:+.3g} {p.unit} ({lower:.3g} to {upper:.3g})'
             if 0.0 < upper - lower < np.inf
@@ -121,7 +121,7 @@ def change_candidates(arm: ArmModel, base: BaseParameters) -> tuple[ChangeCandid
     arm : ArmModel
         The arm to identify.
     base : BaseParameters
-        Its base parameters.
+        Base parameters of the arm.
 
     """
     found, first = [], len(arm.robot.rigid_parameters)

@@ -75,7 +75,7 @@ class LearningProgress:
     arm : ArmModel
         The arm to identify.
     base : BaseParameters
-        Its base parameters.
+        Base parameters of the arm.
     rng : numpy.random.Generator
         Generator of random states.
 

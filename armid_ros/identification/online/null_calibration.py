@@ -90,7 +90,7 @@ class History:
 
 class NullCalibration:
     """
-    Calibration of test statistics against those of white noise.
+    Calibration of test statistics by factors over their size in white noise.
 
     The factor of a statistic is its mean over that in white noise, with the largest 5 % limited to
     their quantile. The mean covers the later three quarters of at most ten minutes, so that early

@@ -60,7 +60,7 @@ def replaced(root: FloatArray, rows: FloatArray, forgetting: float) -> FloatArra
     In the directions b of U = rows R^-1 = A diag(s) B^T the old information, 1, becomes
     1 - f + s^2 with f = min(s^2, level). It never falls, so the new triangle is the old one
     with rows A^T rows, shortened, annihilated. The level is such that the losses add up to
-    what exponential forgetting takes from all P directions, if the sample brings that much.
+    the loss of exponential forgetting in all P directions, if the sample brings that much.
 
     Parameters
     ----------

@@ -24,7 +24,7 @@ from armid_ros.motion import FloatArray
 import numpy as np
 import numpy.typing as npt
 
-#: Cut-off frequency [Hz] (-3 dB) of three equal lags over that of one of them.
+#: Cut-off frequency (-3 dB) of three equal lags in series, over the cut-off of a single lag.
 _CUTOFF_OF_POLE = float(np.sqrt(2.0 ** (1.0 / 3.0) - 1.0))
 #: Largest pole of G times the sampling period; beyond, the signal between samples matters.
 _FASTEST_POLE = 1.0
@@ -73,7 +73,7 @@ class TripleLag:
         return 3.0 / self.pole
 
     def reset(self) -> None:
-        """Forget everything; the next sample starts at rest."""
+        """Clear the state; the next sample starts at rest."""
         self._state = None
 
     def update(self, dt: float, signal: FloatArray) -> FloatArray:
@@ -161,7 +161,7 @@ class CausalFilter:
         Missing samples that are interpolated across.
     measured_velocity : bool
         Differentiate the measured velocity instead of the position. Better with coarse encoders,
-        worse with drives that filter or delay what they report.
+        worse with drives that filter or delay the velocity.
 
     Raises
     ------

@@ -133,7 +133,7 @@ def regressions(
     arm : ArmModel
         Rigid body and effects.
     columns : ndarray of int, shape (r,)
-        Which of ``arm.parameters`` to keep, such as the independent ones.
+        Indices of the columns to keep, as in ``arm.parameters``, such as the independent ones.
     recordings : sequence of Recording
         Data with torques.
     used : Conditioning
@@ -294,7 +294,7 @@ def filtered_columns(
     arm : ArmModel
         Rigid body and effects.
     columns : ndarray of int, shape (r,)
-        Which of ``arm.parameters`` to keep.
+        Indices of the columns to keep, as in ``arm.parameters``.
     motion : Motion
         The stretch at the full rate.
     used : Conditioning

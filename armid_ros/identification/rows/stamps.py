@@ -64,7 +64,7 @@ def rounded_stamps(recording: Recording) -> str:
     """
     Return a message on rounded time stamps that samples share; empty otherwise.
 
-    Of samples with equal stamps one is kept, and stamps are wrong by up to half of the step.
+    One of several samples with equal stamps is kept; stamps are wrong by up to half of the step.
 
     """
     report, steps = recording.report, np.diff(recording.t)

@@ -67,7 +67,7 @@ def streamed(
     arm : ArmModel
         Rigid body and effects.
     columns : ndarray of int, shape (r,)
-        Which of ``arm.parameters`` to keep.
+        Indices of the columns to keep, as in ``arm.parameters``.
     choose : callable
         Function that returns the filters for the first piece.
     samples : int

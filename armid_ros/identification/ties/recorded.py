@@ -59,15 +59,15 @@ def recorded_interaction_problem(
     Parameters
     ----------
     machines : TiedMachines
-        Both, and where the springs are.
+        Both machines, with the positions of the springs.
     recording, other_recording : Recording
         Recordings of both machines, with overlapping stamps.
     inertias : {'known', 'free'}
-        Whether the machine's inertias are those of its description or are estimated as well.
+        Whether the machine's inertias are taken from its description or estimated as well.
     separate : bool
-        Whether every spring has a stiffness of its own, or all have one.
+        Whether every spring has its own stiffness, or all have the same.
     slack : float or ndarray, shape (S,)
-        Way that the springs give before they pull [m].
+        Slack of the springs before they pull [m].
 
     Raises
     ------
