@@ -1,17 +1,16 @@
 # Copyright 2026 The armid_ros developers
 # SPDX-License-Identifier: Apache-2.0
 """
-Steps and trends in series of estimates, and how many arms of a fleet may be named for them.
+Tests for steps and trends in series of estimates, with control of false discoveries in a fleet.
 
-What all siblings do on a day is no change of an arm, and is subtracted; how much else differs from
-bag to bag is learned from all arms (`scatter`). A bag further from the median of its neighbours
-than noise is an odd bag, not a change, and moved to the edge of the noise (the identifier of
-Hampel 1974); what lasts has neighbours that agree with it.
+A change that all siblings share on a day is no change of an arm and is subtracted. Other scatter
+between bags is learned from all arms (`scatter`). A bag further from the median of its neighbours
+than noise is an outlier, not a change. It is moved to the edge of the noise (the identifier of
+Hampel 1974). In a lasting change, neighbours agree.
 
-Of every series the largest step and the trend are tested, of every arm all its series, with
-Bonferroni's factor for as many as were tried. Over arms the false discovery rate is controlled
-(Benjamini and Hochberg 1995): of the arms that are named, no more than a share alpha is healthy
-in the long run.
+The largest step and the trend of every series of an arm are tested, with Bonferroni's factor for
+the number of tests. Over arms, the false discovery rate is controlled (Benjamini and Hochberg
+1995): in the long run, at most a share alpha of the named arms is healthy.
 
 """
 
@@ -35,7 +34,7 @@ from scipy import stats
 
 Kind = Literal['step', 'trend']
 
-#: Days of a month.
+#: Mean length of a month [days].
 MONTH = 365.25 / 12.0
 
 
@@ -47,17 +46,17 @@ class HistoryChange:
     Attributes
     ----------
     series : ParameterHistory
-        Which one.
+        Series with the change.
     kind : {'step', 'trend'}
-        A change from one bag to the next, or one that goes on.
+        Sudden change between two bags, or continuing change.
     index : int
         First bag after a step; 0 for a trend.
     size, std : float
-        How large a step is, or a trend in a month, and its standard deviation.
+        Size of the step, or of the trend per month, and its standard deviation.
     level : float
-        Mean before a step, or at the beginning of a trend.
+        Mean before a step, or value at the beginning of a trend.
     p : float
-        Of this series alone, with the factor for all steps that were tried.
+        P-value within this series, corrected for the number of tested steps.
 
     """
 
@@ -73,18 +72,18 @@ class HistoryChange:
 @dataclass(frozen=True)
 class Judged:
     """
-    The test of an arm.
+    Test result of an arm.
 
     Attributes
     ----------
     arm : str
-        Which one.
+        Name of the arm.
     changes : tuple of HistoryChange
-        Of all series that were tested, the least probable first.
+        Changes of all tested series, the most significant first.
     p : float
-        Of the first, with the factor for all series of the arm.
+        P-value of the first change, corrected for the number of series of the arm.
     adjusted : float
-        The smallest false discovery rate at which the arm is named.
+        Smallest false discovery rate at which the arm is named.
 
     """
 
@@ -103,13 +102,13 @@ def judge(
     Parameters
     ----------
     kinds : sequence of (sequence of ParameterHistory, mapping)
-        Of each kind of arm all parameters of all arms, without what siblings share on a day, and
-        their spreads, as of ``spreads``.
+        For each kind of arm: the series of all parameters of all arms, without effects of days,
+        and their spreads; see ``without_days`` and ``spreads``.
 
     Returns
     -------
     list of Judged
-        One an arm, the least probable first.
+        Results, one per arm, the most significant first.
 
     """
     arms = []
@@ -129,7 +128,7 @@ def judge(
 
 
 def named(judged: Judged, alpha: float) -> tuple[HistoryChange, ...]:
-    """Return the changes that are significant by themselves."""
+    """Return the significant changes of an arm at a false discovery rate alpha."""
     if judged.adjusted > alpha or not judged.changes:
         return ()
     limit = alpha * judged.p / judged.adjusted / len(judged.changes)
@@ -141,7 +140,7 @@ def largest_change(series: ParameterHistory, spread: Spread) -> HistoryChange:
     cut, count = splits(series, spread), len(series.values)
     scores, trend = cut.scores / spread.steps, cut.trend / spread.trends
     at = int(np.argmax(scores))
-    # a step has a place that was searched for, a trend has none
+    # the position of a step was searched for, which costs log(count); a trend has no position
     if trend**2 + np.log(count) >= scores[at] ** 2:
         p = _p(trend, cut.freedom, count)
         std = cut.slope_std * spread.trends * MONTH
@@ -158,5 +157,5 @@ def wear(series: ParameterHistory, spread: Spread) -> tuple[float, float]:
 
 
 def _p(score: float, freedom: float, tried: int) -> float:
-    # no probability is less: that of larger scores is no number any more
+    # lower bound of the p-value, which underflows for larger scores
     return min(1.0, tried * max(float(tail(score**2, 1, freedom)), 1e-300))

@@ -1,21 +1,21 @@
 # Copyright 2026 The armid_ros developers
 # SPDX-License-Identifier: Apache-2.0
 """
-How much estimates of healthy arms differ from bag to bag, learned from all arms of a kind.
+Scatter of estimates of healthy arms between bags, learned from all arms of a kind.
 
-A value of a series is theta + c + e. The part c is that of the day, which all siblings share, as
-by the temperature of a hall; it is the day's effect of a median polish (Tukey 1977). The part e
-has the variance s^2 + t^2: s is the deviation that the bag states, t how much bags differ beyond
-that, from the median of squared differences of neighbours, which a step or a slow trend does not
-change.
-Three things are not as simple, and are learned as well:
+A value of a series is theta + c + e. The effect of the day, c, is shared by all siblings, for
+example by the temperature of a hall; it is estimated by a median polish (Tukey 1977). The part e
+has the variance s^2 + t^2: s is the deviation stated in the bag, t the scatter between bags beyond
+that. The scatter follows from the median of squared differences of neighbours, which a step or
+slow trend does not change.
+Three further properties are learned as well:
 
-- Arms differ in their scatter. The variance of an arm is its own, moderated by that of all arms as
-  far as these agree (Smyth 2004).
-- Scatter lasts for days. Steps and trends of healthy arms are then larger than by neighbours, by
-  a factor that is the median of their squares over that of chi squared (genomic control; Devlin
-  and Roeder 1999). Most arms have to be healthy for that, no more.
-- Few series know these factors only roughly; they are then drawn towards one.
+- Arms differ in their scatter. The variance of an arm is shrunk towards that of all arms as far
+  as these agree (Smyth 2004).
+- Scatter is correlated over days. Steps and trends of healthy arms then exceed what differences
+  of neighbours predict. Their factor is the median of their squares over that of chi squared
+  (genomic control; Devlin and Roeder 1999), which only needs most arms to be healthy.
+- Few series determine these factors only roughly; they are then shrunk towards one.
 
 """
 
@@ -31,21 +31,21 @@ import numpy as np
 import numpy.typing as npt
 from scipy import optimize, special
 
-#: Bags below which a series is not tested.
+#: Smallest number of bags of a tested series.
 FEWEST = 4
-#: Bags that one is compared with, itself among them, and how many deviations make it an odd one.
+#: Number of neighbouring bags for the median, itself included, and z-score of an outlier.
 _WINDOW, _ODD = 5, 3.0
 #: Degrees of freedom of a variance from the median of n squares, over n.
 _EFFICIENCY = 0.37
-#: Siblings with a bag on a day, of which the day's effect is taken.
+#: Smallest number of siblings with a bag on a day for an effect of that day.
 _SIBLINGS = 8
-#: Standard error of a variance by the median of n absolute deviations, over it and times sqrt(n).
+#: Relative standard error of a variance from the median of n absolute deviations, times sqrt(n).
 _ERROR = 2.33
-#: Rounds of the median polish.
+#: Number of rounds of the median polish.
 _ROUNDS = 4
-#: Series that count as much as the expectation that scatter does not last.
+#: Number of series with the same weight as the prior that scatter is not correlated over days.
 _EXPECTED = 10.0
-#: Degrees of freedom of what arms have in common, where they do not differ.
+#: Prior degrees of freedom of the variances of arms if these do not differ.
 _ALIKE = 1e6
 
 
@@ -57,13 +57,13 @@ class ParameterHistory:
     Attributes
     ----------
     arm : str
-        Whose.
+        Name of the arm.
     name, joint, unit : str
-        What.
+        Name, joint and unit of the parameter.
     days : ndarray, shape (K,)
-        When, in days of the epoch, increasing.
+        Times of the bags, increasing [days since the epoch].
     values, std : ndarray, shape (K,)
-        Estimates and stated deviations.
+        Estimates and their stated standard deviations.
 
     """
 
@@ -89,14 +89,14 @@ class Spread:
     Attributes
     ----------
     std : float
-        Its standard deviation.
+        Standard deviation between bags.
     freedom : float
-        Degrees of freedom of that.
+        Degrees of freedom of `std`.
     alike : float
-        Degrees of freedom of what the variances of arms have in common.
+        Prior degrees of freedom of the variances of arms; large if arms do not differ.
     steps, trends : float
-        By how much steps and trends of healthy arms are larger than by
-        differences of neighbours, in deviations.
+        Ratios of the steps and trends of healthy arms to those predicted from differences of
+        neighbours, in standard deviations.
 
     """
 
@@ -110,15 +110,15 @@ class Spread:
 @dataclass(frozen=True, eq=False)
 class Splits:
     """
-    A series cut in two at every place, and the straight line through it.
+    Means of a series before and after every possible step, and its straight line.
 
     Attributes
     ----------
     low, high, std : ndarray, shape (K - 1,)
         Means before and after, and the standard deviation of their difference.
     slope, slope_std, start : float
-        Of the line in a day, and its value at the beginning; the deviation is infinite where all
-        bags are of one day.
+        Slope of the line per day, its standard deviation, and value at the beginning; the
+        deviation is infinite if all bags are of one day.
     freedom : float
         Degrees of freedom of the variance.
 
@@ -147,7 +147,7 @@ def splits(series: ParameterHistory, spread: Spread) -> Splits:
     """Return the steps and the trend of a series, in standard deviations of neighbours."""
     variance, freedom = variances(series, spread)
     std = np.sqrt(variance)
-    # values that are odd among their neighbours are moved to the edge of the noise
+    # outliers among their neighbours are moved to the edge of the noise
     windows = np.lib.stride_tricks.sliding_window_view(
         series.values, min(_WINDOW, len(series.values))
     )
@@ -175,10 +175,10 @@ def spreads(series: Sequence[ParameterHistory]) -> dict[tuple[str, str], Spread]
 
 def without_days(series: Sequence[ParameterHistory]) -> list[ParameterHistory]:
     """
-    Subtract the effect of each day that all siblings share.
+    Subtract the effect of each day, which all siblings share.
 
-    That goes with the size of the parameter, as of friction that is so much less in the heat.
-    Days on which few siblings have bags are left as they are.
+    The effect is proportional to the size of the parameter, as for friction that falls with
+    temperature. Days on which few siblings have bags are unchanged.
 
     """
     changed: dict[int, ParameterHistory] = {}
@@ -199,7 +199,7 @@ def by_parameter(
 
 
 def _polished(group: Sequence[ParameterHistory]) -> list[FloatArray]:
-    """Subtract the effects of days by a median polish with the arms' levels."""
+    """Return values without the effects of days, by a median polish with the arms' levels."""
     days = np.concatenate([np.floor(one.days) for one in group])
     arm = np.repeat(np.arange(len(group)), [len(one.days) for one in group])
     values = np.concatenate([one.values for one in group])
@@ -250,9 +250,9 @@ def _alike(group: Sequence[ParameterHistory], found: Mapping[tuple[str, str], Sp
     """
     Return the prior degrees of freedom of the variances of arms (empirical Bayes).
 
-    The logarithms of their ratios scatter by trigamma(d_a / 2) + trigamma(d_0 / 2); the former is
-    that of one series, the latter is solved for d_0. Arms are taken to differ by what exceeds one
-    standard error of the scatter.
+    The logarithms of variance ratios have the variance trigamma(d_a / 2) + trigamma(d_0 / 2). The
+    degrees d_a are those of one series, and the equation is solved for d_0. Arms differ only by
+    the scatter beyond one standard error.
 
     """
     tested = [one for one in group if len(one.values) >= FEWEST]
@@ -274,7 +274,7 @@ def _ratio(series: ParameterHistory, spread: Spread) -> float:
 
 @cache
 def _freedom(bags: int) -> float:
-    """Return the degrees of freedom of the variance of so many bags, from white noise."""
+    """Return the degrees of freedom of the variance of a number of bags, from white noise."""
     noise = np.random.default_rng(0).normal(size=(4000, bags))  # series of white noise
     medians = np.median(np.diff(noise, axis=1) ** 2, axis=1)
     return _inverse_trigamma(_robust_scale(np.log(medians)) ** 2)
@@ -289,7 +289,7 @@ def _trigamma(x: float) -> float:
 
 
 def _inverse_trigamma(value: float) -> float:
-    """Return 2 x with trigamma(x) = value, between 1 and that of arms that do not differ."""
+    """Return 2 x with trigamma(x) = value, between 1 and `_ALIKE`."""
     if value <= _trigamma(0.5 * _ALIKE):
         return _ALIKE
     if value >= _trigamma(0.5):
@@ -310,7 +310,7 @@ def variances(series: ParameterHistory, spread: Spread) -> tuple[FloatArray, flo
 def _lasting(
     group: Sequence[ParameterHistory], found: dict[tuple[str, str], Spread]
 ) -> tuple[float, float]:
-    """Return the factors, in deviations, of steps and trends over neighbours; 1 or more."""
+    """Return `steps` and `trends` of a `Spread`, each 1 or more."""
     steps, trends = [], []
     for one in group:
         if len(one.values) < FEWEST:
@@ -330,7 +330,7 @@ def _lasting(
 
 
 def line(days: FloatArray, x: FloatArray, weights: FloatArray) -> tuple[float, float, float]:
-    """Return slope, its standard deviation, and the value at the beginning."""
+    """Return slope, its standard deviation and start value of a weighted straight line."""
     total = weights.sum()
     middle, mean = weights @ days / total, weights @ x / total
     away = days - middle

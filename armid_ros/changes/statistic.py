@@ -1,6 +1,6 @@
 # Copyright 2026 The armid_ros developers
 # SPDX-License-Identifier: Apache-2.0
-"""One test for all changes: a quadratic form, its tail probability, and corrections for many."""
+"""Test for changes: a quadratic form, its tail probability, and multiple-test corrections."""
 
 from __future__ import annotations
 
@@ -26,7 +26,7 @@ def quadratic_form(
     score : ndarray, shape (..., p)
         Scores s.
     information : ndarray, shape (..., p, p)
-        Their covariance S, symmetric.
+        Covariance S of the scores, symmetric.
     tolerance : float
         Share of the largest eigenvalue below which an eigenvalue counts as zero.
 
@@ -58,7 +58,7 @@ def tail(
     square : array_like
         Quadratic form in units of the noise.
     rank : array_like
-        Its degrees of freedom.
+        Degrees of freedom of the quadratic form.
     freedom : array_like
         Degrees of freedom of the noise; infinite where its size is known: chi-square.
 
@@ -71,7 +71,7 @@ def tail(
 
 def limits(chance: float, rank: FloatArray, freedom: FloatArray) -> FloatArray:
     """Return the thresholds of quadratic forms for a false alarm probability."""
-    # Fisher's distribution as that of a share, for scipy.stats takes ten times as long
+    # Fisher's distribution by the beta distribution, as scipy.stats takes ten times as long
     share = special.betaincinv(0.5 * freedom, 0.5 * rank, chance)
     return np.asarray(freedom * (1.0 - share) / share)
 

@@ -3,7 +3,7 @@
 """
 Identification: recordings in, models with uncertainties out.
 
-``identify`` works offline on whole recordings; ``online`` learns sample by sample.
+``identify`` works offline on whole recordings; ``online`` updates an estimate sample by sample.
 
 """
 

@@ -1,6 +1,6 @@
 # Copyright 2026 The armid_ros developers
 # SPDX-License-Identifier: Apache-2.0
-"""Whether two descriptions are of one robot, wherever their files are."""
+"""Digest that identifies the robot of a description, wherever its file is."""
 
 from __future__ import annotations
 
@@ -14,8 +14,8 @@ def kinematics_digest(robot: Robot) -> str:
     """
     Return a digest of the joints of a description, in hexadecimal.
 
-    Names, kinds, axes and places of the joints and names of the links count, to a micrometre.
-    Masses and gravity do not: they are what is corrected from one day to the next.
+    The digest covers names, kinds, axes and placements of joints, and names of links, to a
+    micrometre. It does not cover masses and gravity, which may be corrected later.
 
     """
     digest = hashlib.sha256()

@@ -1,10 +1,10 @@
 # Copyright 2026 The armid_ros developers
 # SPDX-License-Identifier: Apache-2.0
 """
-Which recordings a model was identified from: identification.json beside it says it.
+Recordings from which a model was identified, as listed in its identification.json.
 
-They are the baseline of a diagnosis. Each has its size and a digest there, for a recording of
-another day may be at the same path by then.
+They are the baseline of a diagnosis. The file has a size and a digest of each, as another
+recording may have replaced it at the same path.
 
 """
 
@@ -18,7 +18,7 @@ from typing import Any
 from armid_ros.errors import ModelError
 from armid_ros.files import is_file, load_json, read_text, reading
 
-#: Written anew by tools that do not touch the data.
+#: File that tools rewrite without changing the data.
 _NOT_DATA = 'metadata.yaml'
 
 
@@ -26,7 +26,7 @@ def _content(path: Path) -> dict[str, Any]:
     """Return size of a file or folder [bytes], and SHA-256 of the ends of its files."""
     inside = sorted(path.rglob('*')) if path.is_dir() else [path]
     digest, total = hashlib.sha256(), 0
-    end = 1 << 20  # bytes: time stamps at the beginning, the index at the end
+    end = 1 << 20  # bytes, enough for time stamps at the begin and the index at the end
     for file in inside:
         if not file.is_file() or file.name == _NOT_DATA:
             continue
@@ -54,8 +54,8 @@ def identified_from(path: str | Path) -> tuple[Path, ...]:
     Parameters
     ----------
     path : str or Path
-        model.yaml; the identification.json beside it names them. Paths that are relative start
-        here, in that folder, or in the one that it is in.
+        Path of model.yaml; the identification.json in its folder names the recordings. Relative
+        paths start in the working directory, in that folder, or in its parent.
 
     Raises
     ------
@@ -73,12 +73,12 @@ def require_as_identified(path: str | Path) -> None:
     Parameters
     ----------
     path : str or Path
-        model.yaml. An identification.json of before sizes and digests were kept is believed.
+        Path of model.yaml. Recordings without size and digest in the file are not checked.
 
     Raises
     ------
     ModelError
-        Naming the recording, and what to do.
+        With the recording and the remedy.
 
     """
     for place, known in _found(Path(path)).items():

@@ -53,15 +53,15 @@ from armid_ros.motion import FloatArray
 from armid_ros.recording import Recording
 import numpy as np
 
-#: Share of torque error that links which are bodies may cost, where they are preferred: simulators
-#: take nothing else, and a model that lacks an effect costs more.
+#: Largest increase of the torque error, as a share, for which physically consistent links are
+#: preferred: simulators need them, and a model that lacks an effect costs more.
 _CHEAP = 0.1
 
 
 @dataclass(frozen=True)
 class IdentificationSettings:
     """
-    How a model is fitted.
+    Settings of an identification.
 
     Attributes
     ----------
@@ -71,9 +71,9 @@ class IdentificationSettings:
     signals : SignalSettings
         Filtering and decimation.
     physical : PhysicalSettings or None
-        Fit among parameters that bodies have, and effects within their bounds.
+        Constraints for a physically consistent fit; None for an unconstrained fit.
     prefers_bodies : bool
-        Fit among such parameters where the torque error grows by a tenth at most.
+        Whether to fit physically consistent links if the torque error grows by a tenth at most.
 
     """
 
@@ -95,7 +95,7 @@ class IdentificationSettings:
 
     @property
     def least_squares(self) -> Method:
-        """Return the least-squares method that the method is, or starts from."""
+        """Return the method itself, or for 'iv' the least-squares method that it starts from."""
         return 'wls' if self.method == 'iv' else self.method
 
     @property
@@ -112,37 +112,37 @@ class Identification:
     Attributes
     ----------
     arm : ArmModel
-        The model; of all standard parameters with the identified base parameters, those nearest
-        to the description's.
+        Identified model, with the standard parameters nearest to the description among those with
+        the identified base parameters.
     theory : BaseParameters
-        What any motion of the arm can tell apart.
+        Base parameters that are identifiable in some motion of the arm.
     base : BaseParameters
-        What the data can tell apart, and how it groups the standard parameters.
+        Base parameters that the data identify, with their grouping of standard parameters.
     estimate : Estimate
-        Base and effect parameters with covariance; that of a fit among bodies is what the data
-        alone say.
+        Base and effect parameters with covariance; for a physically consistent fit, that of the
+        data alone.
     condition_number : float
-        Of the weighted base regressor.
+        Condition number of the weighted base regressor.
     joint_std : ndarray, shape (n,)
         Standard deviation of the residual of each joint [N m].
     training : tuple of Fit
-        Prediction of the data it was fitted to.
+        Predictions of the training data.
     used : Conditioning
-        Filters that were used; validation data go through the same.
+        Filters of the training data; validation data are filtered alike.
     settings : IdentificationSettings
-        What was asked.
+        Settings of the fit.
     notes : tuple of str
-        What a person should know: joints at rest, outliers, grouped parameters.
+        Notes for the user: joints at rest, outliers, grouped parameters.
     halves : HalvesError
         Torque error when either half of the data predicts the other.
     scatter : ndarray, shape (K, r)
-        What values vary by from recording to recording; see `scatter`.
+        Jackknife changes of the values without each recording; see `scatter`.
     physical : PhysicalCertificate or None
-        What shows that the links are bodies, where that was asked.
+        Evidence that the links are physically consistent, if requested.
     bodies_cost : float or None
-        Share by which the torque error of links that are bodies is larger; None if not tried.
+        Increase of the torque error by physically consistent links, as a share; None if not tried.
     passes : int
-        Linearisations of the arm that the fit took; 1 if its torque is linear in its parameters.
+        Number of linearisations in the fit; 1 if the torque is linear in the parameters.
 
     """
 
@@ -199,15 +199,15 @@ def identify(
     Parameters
     ----------
     arm : ArmModel
-        Structure: robot and effects; its values are where unidentifiable directions stay.
+        Robot and effects; unidentifiable directions keep its values.
     recordings : sequence of Recording
         Training data with torques.
     settings : IdentificationSettings, optional
         Method and filters.
     rng : numpy.random.Generator
-        Draws the states over which base parameters are found.
+        Generator of the random states from which base parameters are found.
     progress : callable, optional
-        Told the share that is done, 0 to 1.
+        Called with the finished share, 0 to 1.
 
     Returns
     -------
@@ -217,8 +217,8 @@ def identify(
     Raises
     ------
     IdentificationError
-        If the data cannot identify anything: too short, no motion, no torque, torque of the wrong
-        sign or unit; the message says which and what to do.
+        If nothing is identifiable: too short, no motion, no torque, torque of the wrong sign or
+        unit; the message contains cause and remedy.
 
     """
     settings = settings or IdentificationSettings()
@@ -227,7 +227,7 @@ def identify(
     notes = damage + check_motion(arm.robot, recordings)
     notes += beyond_limits(arm.robot, recordings) + too_short_to_tell(recordings)
     theory = arm.base_parameters(rng)
-    # inertia of a motion that is taken as slow: as described, unless bodies are fitted to weight
+    # a quasi-static fit uses the described inertia, unless physical links are fitted to the weight
     described = arm.quasi_static and settings.physical is None
     whole = replace(arm, quasi_static=False) if described else arm
     if settings.signals.cutoff_hz is None:
@@ -292,7 +292,7 @@ def _bodies(
     settings: IdentificationSettings,
     rng: np.random.Generator,
 ) -> _Bodies | None:
-    """Fit physically consistent links; None if not requested and impossible."""
+    """Fit physically consistent links; None if impossible and not required."""
     if settings.method == 'iv':
         return None
     known = settings.physical or PhysicalSettings()
@@ -314,7 +314,7 @@ def _fitted(
     settings: IdentificationSettings,
     rng: np.random.Generator,
 ) -> tuple[BaseParameters, FittedValues]:
-    """Fit what data determine better than the description; return theory and fit."""
+    """Fit parameters that data determine better than the description; return theory and fit."""
     base, problem, recordings, used = data
     method = settings.least_squares
 
@@ -329,7 +329,7 @@ def _fitted(
     rigid = len(arm.robot.rigid_parameters)
     if np.all(np.any(theory.grouping[:, rigid:], axis=0)):
         return theory, fit
-    # again with what the described arm does not show, such as saturation that it never reaches
+    # fit again with effects that the described arm does not show, such as unreached saturation
     now = fit.arm.base_parameters(rng)
     if now.rank <= theory.rank:
         return theory, fit
@@ -364,7 +364,7 @@ def _remarks(fit: FittedValues, theory: BaseParameters) -> tuple[str, ...]:
     remarks = []
     if fit.base.rank < theory.rank:
         remarks.append(
-            f'the motion tells {fit.base.rank} of {theory.rank} parameters apart; '
+            f'the motion identifies {fit.base.rank} of {theory.rank} parameters; '
             'the others are grouped, or stay as described'
         )
     if fit.solution.outliers:
@@ -372,6 +372,6 @@ def _remarks(fit: FittedValues, theory: BaseParameters) -> tuple[str, ...]:
     if not fit.settled:
         remarks.append(
             f'the fit has not settled after {fit.passes} linearisations: the effects '
-            'change one another too much in these data; leave some out, or record more'
+            'affect each other too much in these data; leave some out, or record more'
         )
     return tuple(remarks)

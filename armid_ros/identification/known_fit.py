@@ -1,6 +1,6 @@
 # Copyright 2026 The armid_ros developers
 # SPDX-License-Identifier: Apache-2.0
-"""How well a model fits, as its file says: identification.json, or the misfit of model.yaml."""
+"""Torque error of a model, as stated in identification.json or by the misfit of model.yaml."""
 
 from __future__ import annotations
 
@@ -21,17 +21,17 @@ class KnownFit:
     Attributes
     ----------
     grade : str
-        'good', 'poor' or 'unusable'; by the worst joint where the file has no grade.
+        'good', 'poor' or 'unusable'; by the worst joint if the file has no grade.
     reason : str
-        Why.
+        Reason of the grade.
     rms : mapping of str to float
-        Root mean square residual of each joint; empty where it is not known [N m].
+        Root mean square residual of each joint [N m]; empty if unknown.
     errors : mapping of str to float
-        The same over the torque of the joint [%].
+        Residual of each joint over its torque [%].
     recordings : int
-        How many it was measured on, at least one.
+        Number of recordings with this residual, at least one.
     as_diagnosed : bool
-        Whether it is the misfit of model.yaml, which has rows in which joints move alone.
+        Whether it is the misfit of model.yaml, which excludes rows at rest.
 
     """
 
@@ -60,7 +60,7 @@ def known_fit(document: Mapping[str, Any]) -> KnownFit | None:
     Raises
     ------
     KeyError, TypeError or ValueError
-        If something is missing or wrong.
+        If a key or value is missing or wrong.
 
     """
     if document.get('misfit') is not None:

@@ -1,12 +1,12 @@
 # Copyright 2026 The armid_ros developers
 # SPDX-License-Identifier: Apache-2.0
 """
-Gains of the drives, from a payload that is known.
+Estimation of drive gains from a known payload.
 
-Efforts that are all too large by one factor belong to an arm that is as much too heavy: no motion
-tells the two apart. A body of known mass that one recording has and another has not does. Each
-joint measures k (Y pi + p), where p is the torque of the known body: k is the coefficient of p in
-the regression of its effort on its columns and p.
+No motion distinguishes efforts that are all too large by one factor from an arm that is too heavy
+by that factor. A body of known mass that only some recordings have distinguishes them. Each joint
+measures k (Y pi + p), where p is the torque of the known body. So the gain k is the coefficient of
+p in the regression of its effort on its columns and p.
 
 """
 
@@ -33,23 +33,23 @@ import numpy as np
 import pinocchio as pin
 from scipy.stats import t as student
 
-#: Share of the payload's torque that the columns of a joint do not explain, at the least.
+#: Smallest share of the payload's squared torque that the columns of a joint do not explain.
 _APART = 1e-8
-#: A gain whose standard deviation is larger is not determined.
+#: Largest relative standard deviation of a gain that is determined.
 _SURE = 0.05
 
 
 @dataclass(frozen=True)
 class DriveGains:
     """
-    Measured effort over the torque of the drive.
+    Drive gains: measured effort over the torque of the drive.
 
     Attributes
     ----------
     joints : tuple of str
         Joint names.
     values, std : ndarray, shape (n,)
-        Gains and their standard deviations; 1 and infinite where the payload does not tell.
+        Gains and their standard deviations; 1 and infinite if the payload does not determine them.
     half_width : ndarray, shape (n,)
         Half of the 95 % interval.
 
@@ -98,12 +98,12 @@ def payloads_of(
     texts: Sequence[str], bags: Sequence[Path], recordings: Sequence[Recording], robot: Robot
 ) -> Mapping[str, Robot]:
     """
-    Return the robot with its payload by the source of the recording that has one.
+    Return the robot with its payload, by source, for each recording with a payload.
 
     Raises
     ------
     IdentificationError
-        A text is none, or names no recording or link.
+        If a text is malformed, or names no recording or link.
 
     """
     found: dict[str, Robot] = {}
@@ -123,7 +123,7 @@ def payloads_of(
 
 def parse_payload(text: str) -> tuple[str, str, pin.Inertia]:
     """
-    Read 'BAG=KG@LINK' or 'BAG=KG@LINK:X,Y,Z'.
+    Parse a payload, 'BAG=KG@LINK' or 'BAG=KG@LINK:X,Y,Z'.
 
     Returns
     -------
@@ -135,7 +135,7 @@ def parse_payload(text: str) -> tuple[str, str, pin.Inertia]:
     Raises
     ------
     IdentificationError
-        The text is neither.
+        If the text has neither form.
 
     """
     *parts, body = parted(text, '=')
@@ -183,20 +183,20 @@ def drive_gains(
     Parameters
     ----------
     arm : ArmModel
-        Structure: robot and effects.
+        Robot and effects.
     recordings : sequence of Recording
-        Data with efforts, of which some have another payload than others.
+        Data with efforts, where some recordings differ in their payload.
     loaded : mapping of str to Robot
         The robot with its payload, by the source of the recording.
     signals : SignalSettings
         Filtering.
     rng : numpy.random.Generator
-        Draws the states over which base parameters are found.
+        Generator of the random states from which base parameters are found.
 
     Raises
     ------
     IdentificationError
-        No recording differs from the others in its payload, so that no gain is determined.
+        If no gain is determined, as when all recordings have the same payload.
 
     """
     used = conditioning(list(recordings), signals)
@@ -225,7 +225,7 @@ def drive_gains(
     if not np.any(np.isfinite(std)):
         raise IdentificationError(
             '--payload: no gain is determined; it needs the same motion with and without the '
-            'payload, and a payload that the joints feel'
+            'payload, and a payload that is heavy enough'
         )
     return DriveGains(arm.robot.joints, values, std, width)
 
@@ -236,7 +236,7 @@ def _gain(
     """Return the coefficient of the known torque, its std, and the 95 % half-width."""
     scale = np.linalg.norm(columns, axis=0)
     columns = columns[:, scale > 0.0] / scale[scale > 0.0]
-    # The coefficient of a column is that of what the other columns leave of it (Frisch, Waugh).
+    # The coefficient of a column is that of its residual after the other columns (Frisch, Waugh).
     rest = known - columns @ np.linalg.lstsq(columns, known, rcond=1e-10)[0]
     size = float(rest @ rest)
     if size <= _APART * float(known @ known):
@@ -259,7 +259,7 @@ def corrected(
     gains: DriveGains,
     signals: SignalSettings,
 ) -> list[Recording]:
-    """Return recordings with the torque of the arm alone: efforts over gains, less the payload."""
+    """Return recordings with the torque of the arm alone: efforts over gains minus payload."""
     result = []
     for recording in recordings:
         assert recording.tau is not None
@@ -282,7 +282,7 @@ def _torque_of_payload(
     *,
     filtered: bool,
 ) -> FloatArray:
-    """Return the torque that the payload of a recording takes, at its rows or at full rate."""
+    """Return the torque of the payload of a recording, at its rows or at full rate."""
     found = []
     for motion in segments(recording, used):
         robots = (loaded.get(recording.source, arm.robot), arm.robot)

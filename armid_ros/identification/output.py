@@ -1,6 +1,6 @@
 # Copyright 2026 The armid_ros developers
 # SPDX-License-Identifier: Apache-2.0
-"""identification.json: what an identification found, for programs to read."""
+"""Document of an identification in the file identification.json."""
 
 from __future__ import annotations
 
@@ -42,9 +42,9 @@ def identification_document(
     validation : mapping of str to sequence of Fit
         Predictions of recordings that were not used for fitting, by recording.
     verification : Verification, optional
-        What the identification was put to.
+        Further tests of the identification.
     grade : Grade, optional
-        What it is good for.
+        Grade of the identification.
 
     """
     estimate = result.estimate
@@ -100,7 +100,7 @@ def identification_document(
 
 
 def write_document(path: str | Path, document: Mapping[str, Any]) -> None:
-    """Write a document as JSON, a row of numbers on a line."""
+    """Write a document as JSON, with each row of numbers on one line."""
     text = json_text(document, indent=1)
     rows = re.sub(r'\[\n[^][{}"]*\]', lambda row: ' '.join(row[0].split()), text)
     write_file(path, rows + '\n')

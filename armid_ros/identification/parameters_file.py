@@ -1,6 +1,6 @@
 # Copyright 2026 The armid_ros developers
 # SPDX-License-Identifier: Apache-2.0
-"""What a file says of an arm: identification.json, or model.yaml with less of it."""
+"""Identified parameters in a file: identification.json, or model.yaml with fewer details."""
 
 from __future__ import annotations
 
@@ -26,7 +26,7 @@ from armid_ros.robots import load_robot
 import numpy as np
 import yaml
 
-#: A grouping is a combination of others if its remainder is at most this share of it.
+#: Remainder of a grouping, as a share of it, below which it is a combination of others.
 _SAME_GROUPING = 1e-6
 _IDENTIFICATION = 'armid/identification/1'
 _SCHEMAS = (_IDENTIFICATION, MODEL)
@@ -40,30 +40,30 @@ class ParameterFile:
     Attributes
     ----------
     source : str
-        The file.
+        Path of the file.
     robot : str
-        What it calls the robot.
+        Name of the robot in the file.
     values : mapping of ParameterName to (float, float)
         Value and standard deviation of every parameter that was identified on its own.
     error_percent : float or None
         Relative torque error on held-out data, or on training data where there is none.
     covariance : ndarray, shape (P, P), or None
-        Of the values in their order; None if the file does not have it.
+        Covariance of the values in their order; None if the file does not have it.
     terms : mapping of ParameterName to (mapping of str to float)
-        Factors of the standard parameters that each value groups, where the file has them.
+        Factors of the standard parameters in each value, if the file has them.
     joints : tuple of str
-        Joints of the robot, where the file has them.
+        Joints of the robot, if the file has them.
     kinematics : str
-        What is the same for descriptions of one robot; empty where the file does not have it.
+        Digest that is equal for descriptions of one robot; empty if the file does not have it.
     scatter : ndarray, shape (K, P)
-        What the values change by without each of K recordings, so that squares sum up to a
-        variance; K is zero if the file does not have it.
+        Jackknife changes of the values without each of K recordings, whose sum of squares is a
+        variance; K is zero if the file does not have them.
     without_std : mapping of ParameterName to float
-        Values of the parameters that the file has no standard deviation of.
+        Values of the parameters without a standard deviation in the file.
     not_shown : frozenset of (name, joint)
-        Parameters that the motion did not show.
+        Parameters that the motion did not identify.
     fit : KnownFit or None
-        How well the model fits, where the file says it.
+        Torque error and grade of the model, if the file has them.
 
     """
 
@@ -106,12 +106,12 @@ class ParameterFile:
         """
         Return the information matrix of the standard parameters.
 
-        It is zero in directions that no value tells.
+        It is zero in directions that the values do not determine.
 
         Parameters
         ----------
         parameters : sequence of ParameterName
-            Of a model, rigid ones and those of effects, P of them.
+            The P parameters of a model, rigid ones and those of effects.
 
         Returns
         -------
@@ -128,10 +128,10 @@ class ParameterFile:
 
     def regrouped_as(self, other: ParameterFile) -> ParameterFile:
         """
-        Return the values, plus those of another grouping that follow from them.
+        Return the values, and values of another grouping as far as they follow from these.
 
-        A motion that shows less groups more: its parameters are combinations of those of a richer
-        one.
+        A motion that identifies less groups more parameters; its values are combinations of those
+        of a richer motion.
 
         """
         names = [name for name in other.terms if name not in self.values]
@@ -172,7 +172,7 @@ def read_parameters(path: str | Path) -> ParameterFile:
     Raises
     ------
     ModelError
-        Naming the file and what is wrong in it.
+        With the file and the mistake in it.
 
     """
     path = Path(path)
@@ -202,9 +202,9 @@ def read_parameters(path: str | Path) -> ParameterFile:
 
 
 def _beside(path: Path, model: Mapping[str, Any]) -> ParameterFile | None:
-    """Read the identification.json beside a model.yaml if it belongs to it."""
-    # It has what the model was made from: groups of parameters, with their covariance. It is of
-    # the model if the values of the model make those of every group.
+    """Read the identification.json in the folder of a model.yaml if it belongs to it."""
+    # It has the groups of parameters from which the model was made, with their covariance. It
+    # belongs to the model if the model's values yield those of every group.
     file = path.with_name('identification.json')
     if not is_file(file):
         return None
@@ -238,14 +238,14 @@ def read_misfit(path: str | Path, arm: ArmModel) -> Misfit | None:
     Parameters
     ----------
     path : str or Path
-        model.yaml; what is known of its parameters is in the identification.json beside it.
+        Path of model.yaml; the identification.json in its folder has the covariance.
     arm : ArmModel
         The model.
 
     Raises
     ------
     ModelError
-        Naming the file and what is wrong in it.
+        With the file and the mistake in it.
 
     """
     misfit, beside = load_misfit(path), Path(path).with_name('identification.json')
@@ -257,8 +257,8 @@ def read_misfit(path: str | Path, arm: ArmModel) -> Misfit | None:
 
 
 def _with_robot(found: ParameterFile, path: Path, model: str = '') -> ParameterFile:
-    """Look up the robot that a file without kinematics names, if it exists."""
-    # A text of a model.yaml has to have all parameters of it.
+    """Add joints and kinematics of the robot that a file names, if its description exists."""
+    # The text of a model.yaml must contain all parameters of the robot.
     beside = path.parent / found.robot
     source = str(beside) if is_file(beside) else found.robot
     try:
@@ -277,7 +277,7 @@ def parameters_of(source: str, document: dict[str, Any]) -> ParameterFile:
     Raises
     ------
     KeyError, TypeError or ValueError
-        If something is missing or wrong.
+        If a key or value is missing or wrong.
 
     """
     rows = list(document.get('parameters', document.get('rigid_parameters', [])))
@@ -312,7 +312,7 @@ def parameters_of(source: str, document: dict[str, Any]) -> ParameterFile:
         error = finite(told['relative_error_percent'], 'relative_error_percent')
     scatter = [[finite(v, 'a scatter') for v in row] for row in document.get('scatter', ())]
     if any(len(row) != len(values) for row in scatter):
-        raise ValueError(f'a scatter whose rows are not of {len(values)} values')
+        raise ValueError(f'the scatter has to have rows of {len(values)} values')
     about = document.get('description', {})
     return ParameterFile(
         source,
@@ -343,7 +343,7 @@ def _covariance(rows: list[list[float]] | None, size: int) -> FloatArray | None:
     if rows is None:
         return None
     if [len(row) for row in rows] != list(range(1, size + 1)):
-        raise ValueError(f'a covariance that is no triangle of {size} rows')
+        raise ValueError(f'covariance: it has to be a triangle of {size} rows')
     matrix = np.zeros((size, size))
     for index, row in enumerate(rows):
         matrix[index, : index + 1] = matrix[: index + 1, index] = row

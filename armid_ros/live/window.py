@@ -120,9 +120,9 @@ class SampleWindow:
         Parameters
         ----------
         since : float
-            Time [s].
+            Time of the first sample [s].
         source : str
-            Its name.
+            Name of the recording.
 
         """
         rows = self._rows[self._first : self._end]

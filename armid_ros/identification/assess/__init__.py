@@ -1,3 +1,3 @@
 # Copyright 2026 The armid_ros developers
 # SPDX-License-Identifier: Apache-2.0
-"""What an identification is worth, and what differs between two."""
+"""Assessment of an identification, and comparison of two."""

@@ -1,6 +1,6 @@
 # Copyright 2026 The armid_ros developers
 # SPDX-License-Identifier: Apache-2.0
-"""How an estimate agrees with values that are known, and how well it should."""
+"""Agreement of an estimate with known true values, within its covariance."""
 
 from __future__ import annotations
 
@@ -12,12 +12,12 @@ from armid_ros.motion import FloatArray
 import numpy as np
 import scipy.stats
 
-#: Standard deviations to either side of what is known.
+#: Number of standard deviations to either side of the true value.
 WIDTH = 2.0
-#: Independent values that a covariance is as if estimated from: it follows the spectrum of the
-#: residual in the band of the motion, of which a run of 20 s shows little. In 23 simulations of
-#: the demo the distance of 56 parameters had mean 56 and deviation 17, which this makes; a
-#: covariance that is known makes 11, and called five of them wrong in place of one.
+#: Degrees of freedom of an estimated covariance. It follows the spectrum of the residual in the
+#: band of the motion, of which a run of 20 s contains little. In 23 simulations of the demo, the
+#: distance of 56 parameters had mean 56 and deviation 17, as with this number. A known covariance
+#: would have deviation 11 and reject five simulations in place of one.
 FREEDOM = 40.0
 
 
@@ -26,18 +26,18 @@ class Agreement:
     """
     An estimate compared with the true values.
 
-    The misses of correlated parameters come together, so that their number says little. The
-    distance of all parameters together, in the metric of their covariance, has a distribution
-    that is known: that of Fisher's F times their number, for a covariance that is estimated.
+    Errors of correlated parameters come together, so the number of large errors means little. The
+    squared distance of all parameters, in the metric of their covariance, has a known
+    distribution: Fisher's F times their number, if the covariance is estimated.
 
     Attributes
     ----------
     parameters, within : int
-        How many, and how many of them are within two standard deviations of the truth.
+        Number of parameters, and number within two standard deviations of the truth.
     distance : float
-        e' C^-1 e, of the errors e and their covariance C (Mahalanobis 1936).
+        Squared distance e' C^-1 e of the errors e with covariance C (Mahalanobis 1936).
     lower, upper : float
-        Between which it is in 95 of 100 experiments.
+        95 % range of the distance.
 
     """
 
@@ -52,7 +52,7 @@ class Agreement:
         """
         Compare an estimate of P parameters with the truth, shape (P,).
 
-        The covariance is estimated from `freedom` independent values: many if it is known.
+        The covariance has `freedom` degrees of freedom; infinitely many if it is known exactly.
 
         """
         scaled = (estimate.values - truth) / estimate.std
@@ -83,7 +83,7 @@ class Agreement:
         )
 
     def document(self) -> dict[str, Any]:
-        """Return the numbers as a document."""
+        """Return the numbers of the comparison as a document."""
         return {
             'within_two_deviations': self.within,
             'expected_within_two_deviations': self.expected,

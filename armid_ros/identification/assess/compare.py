@@ -1,24 +1,24 @@
 # Copyright 2026 The armid_ros developers
 # SPDX-License-Identifier: Apache-2.0
 """
-Two identifications side by side: what changed beyond its uncertainty.
+Comparison of two identifications: changes beyond their uncertainty.
 
-With dozens of parameters one in twenty is outside its 95 % interval by chance, so differences are
-held against each other (Holm 1979): a change is called one if the whole list of changes is free of
-chance finds with 95 % probability.
+With dozens of parameters, one in twenty is outside its 95 % interval by chance. Differences are
+therefore corrected for their number (Holm 1979): with 95 % probability, the list of changes
+contains no false one.
 
-A model gets something wrong of every motion, and other motions give other values. What values vary
-by from recording to recording widens the deviations of each joint, where the files have it. Few
-recordings show that badly: Student's distribution holds then, and that of Fisher for groups.
+A model has errors in every motion, and other motions give other values. The scatter of values
+between recordings widens the deviations of each joint, if the files contain it. Few recordings
+determine it badly, so tests use Student's distribution, and Fisher's for groups.
 
-Where both have their covariance, the effects of each joint and the links are looked at as a whole
-too: parameters that are strongly correlated can differ together beyond doubt and none of them
-alone. What a model leaves of the torque of a joint is held against what the other leaves (Fisher's
-F): no parameter has a change that neither model describes.
+If both files have a covariance, the effects of each joint and the links are tested as groups too:
+strongly correlated parameters can differ significantly together and none of them alone. The
+residuals of the two models in each joint are compared (Fisher's F), as a change that neither
+model describes is in no parameter.
 
-A body that is fixed to link k adds its ten parameters to those of the link, and base parameters
-change by G_k p, with the factors G_k that group the parameters of link k in them. Ten numbers p
-that explain dozens of changes, to their uncertainty, are a load; its mass is the first of them.
+A body that is fixed to link k adds its ten parameters p to those of the link. Base parameters then
+change by G_k p, with the factors G_k of the parameters of link k in them. Ten numbers p that
+explain dozens of changes, to their uncertainty, are a load; its mass is the first of them.
 
 """
 
@@ -49,18 +49,18 @@ import numpy as np
 from scipy import stats
 import scipy.linalg
 
-#: Probability that the list of changes has a chance find in it.
+#: Probability that the list of changes contains a false change.
 CHANCE = 0.05
-#: Directions of a covariance below this share of the largest, all scaled, are rounding, and so
-#: are differences of a value below this share of it.
+#: Eigenvalues of a scaled covariance below this share of the largest are rounding errors, as are
+#: differences of a value below this share of it.
 _ROUNDING = 1e-10
-#: Share of its torque below which the residual of a joint is of filters, and not of an arm.
+#: Share of its torque below which the residual of a joint is due to filters, not to the arm.
 _LEAST_RESIDUAL = 1e-3
-#: A parameter of a link as base parameters name it, with its number.
+#: Name of a link parameter in the terms of base parameters, with the number of the link.
 _NUMBERED = re.compile(r'(?:m[xyz]?|I[xyz]{2})(\d+)$')
-#: Probability with which the changes of a load are taken for something else.
+#: Significance at which a load is rejected as the explanation of the changes.
 _REFUSED = 0.01
-#: Below this share of the largest a direction of a load is not seen at all.
+#: Singular values of a load below this share of the largest are not identifiable.
 _UNSEEN = 1e-9
 
 
@@ -139,7 +139,7 @@ def _require_two_of_one_robot(before: ParameterFile, after: ParameterFile) -> No
         how = (
             f'only one of them has {", ".join(sorted(apart))}'
             if apart
-            else 'their joints are of the same names, and in other places'
+            else 'their joints have the same names, but other positions'
         )
         raise ModelError(
             f'{before.source} and {after.source} are of different robots, {before.robot} and '
@@ -149,7 +149,7 @@ def _require_two_of_one_robot(before: ParameterFile, after: ParameterFile) -> No
     if same and (before.values or before.without_std):
         copy = '' if before.source == after.source else f' (is {before.source})'
         raise ModelError(
-            f'given twice: {after.source}{copy}; name two results, of recordings of their own'
+            f'given twice: {after.source}{copy}; name results of two different recordings'
         )
 
 
@@ -163,12 +163,12 @@ def _nothing_shared(before: ParameterFile, after: ParameterFile) -> str:
             )
     return (
         f'{before.source} and {after.source} have no identified parameter in common; '
-        'are they of one robot, in one gravity?'
+        'are they of one robot, with one gravity?'
     )
 
 
 def _only_in(one: ParameterFile, other: ParameterFile) -> Iterator[NotCompared]:
-    """Yield the parameters of one result that the other has no value of."""
+    """Yield the parameters of one result without a value in the other."""
     for name in one.values:
         if name in other.values or name in other.without_std:
             continue
@@ -185,12 +185,12 @@ class _Side:
     """Values, standard deviations and scatter of the shared parameters in one result."""
 
     values: FloatArray  # (p,)
-    #: Standard deviations: those of noise, and in each joint as many times as much as its values
-    #: vary from recording to recording.
+    #: Standard deviations: those of noise, times the scatter between recordings of each joint over
+    #: the noise, if that is above 1.
     std: FloatArray
     scatter: FloatArray  # changes of the values without each recording, (K, p)
-    #: Degrees of freedom of each deviation: the mean of squares of n values with correlations R
-    #: has n^2 over the sum of R^2 times those of one (Satterthwaite). Infinite for noise.
+    #: Degrees of freedom of each deviation: a mean square of n values with correlations R has
+    #: those of one value times n^2 over the sum of R^2 (Satterthwaite). Infinite for noise.
     freedoms: FloatArray
 
     @classmethod
@@ -219,7 +219,7 @@ def _single_chances(before: _Side, after: _Side) -> FloatArray:
     same = size <= _ROUNDING * np.abs(before.values)
     safe = np.where(std > 0.0, std, 1.0)
     shares = [((side.std / safe) ** 4) / side.freedoms for side in (before, after)]
-    with np.errstate(over='ignore', divide='ignore'):  # infinitely many deviations have no chance
+    with np.errstate(over='ignore', divide='ignore'):  # an infinite z-score has p-value 0
         chances = tail((size / safe) ** 2, 1, 1.0 / (shares[0] + shares[1]))
     return np.where(std > 0.0, chances, same)
 
@@ -236,7 +236,7 @@ def _whole(
     covariance = files[0].covariance_of(own) + files[1].covariance_of(own)
     if not np.all(np.diag(covariance) > 0.0):
         return difference, covariance, 1.0
-    # the covariance is that of noise, times what recordings show beyond it
+    # the covariance of noise is multiplied by the excess scatter between recordings
     scatter = np.concatenate([side.scatter[:, list(group)] for side in sides])
     inflation = 1.0
     if len(scatter):
@@ -259,8 +259,8 @@ def _squares(rows: FloatArray, covariance: FloatArray) -> tuple[float, int]:
 def _find_load(
     terms: Sequence[Mapping[str, float]], difference: FloatArray, covariance: FloatArray
 ) -> LoadChange | None:
-    """Return the load on the outermost link where one explains the changes, or None."""
-    # that is where arms hold things; none if its mass does not differ from zero
+    """Return the load on the outermost link whose load explains the changes, or None."""
+    # arms hold things at the outermost link; a mass that may be zero is no load
     std = np.sqrt(np.diag(covariance))
     if not len(std) or not np.all(std > 0.0):
         return None
@@ -281,7 +281,7 @@ def _find_load(
 
 
 def _load(link: int, columns: FloatArray, white: FloatArray) -> LoadChange | None:
-    """Fit the load of one link to changes of unit covariance."""
+    """Fit the load of one link to whitened changes of base parameters; None if rejected."""
     lengths = np.linalg.norm(columns, axis=0)
     scale = np.where(lengths > 0.0, lengths, 1.0)
     left, sizes, right = np.linalg.svd(columns / scale, full_matrices=False)
@@ -307,9 +307,9 @@ def residual_changes(
     """
     Compare the residuals of two models for each joint.
 
-    Empty where it is not known alike: the misfit of model.yaml and the residual of
-    identification.json are of other rows. What a model gets wrong of an arm is slow, so a
-    recording has few independent values of it, however many rows.
+    Empty if the residuals are not comparable: the misfit of model.yaml and the residual of
+    identification.json come from different rows. Model errors vary slowly, so a recording has
+    few independent values of them, however many rows.
 
     """
     if before is None or after is None or before.as_diagnosed != after.as_diagnosed:
@@ -322,7 +322,7 @@ def residual_changes(
             max(one.rms[joint], _LEAST_RESIDUAL * torque)
             for one, torque in zip((before, after), torques, strict=True)
         )
-        # a model leaves as many times more as there is more torque
+        # the residual of a model grows with the torque
         growth = torques[1] / torques[0] if min(torques) > 0.0 else 1.0
         ratio = 1.0 if first == second else second / first if first > 0.0 else np.inf
         ratio = float(ratio / np.clip(ratio, min(growth, 1.0), max(growth, 1.0)))

@@ -1,6 +1,6 @@
 # Copyright 2026 The armid_ros developers
 # SPDX-License-Identifier: Apache-2.0
-"""Two identifications side by side: what changed, and what is in one of them alone."""
+"""Result of a comparison of two identifications: changes, and parameters of only one."""
 
 from __future__ import annotations
 
@@ -17,15 +17,15 @@ from armid_ros.motion import FloatArray
 import numpy as np
 
 SCHEMA = 'armid/comparison/1'
-#: Deviations from zero of a value that a ratio is taken of, how many there have to be, and the
-#: share of them that has to agree.
+#: Smallest z-score of a value whose ratio is used, smallest number of ratios, and share of the
+#: ratios that have to agree.
 _CLEAR, _FEWEST, _MOST = 5.0, 4, 0.8
 
 
 @dataclass(frozen=True)
 class ParameterChange:
     """
-    One shared parameter: both values, standard deviations, and significance of the change.
+    A parameter of both results: values, standard deviations, and significance of the change.
 
     Attributes
     ----------
@@ -68,7 +68,7 @@ class GroupChange:
     Attributes
     ----------
     joint : str
-        Whose effects; empty for the rigid body.
+        Joint of the effects; empty for the rigid body.
     parameters : tuple of ParameterName
     p_value : float
     changed : bool
@@ -93,9 +93,9 @@ class LoadChange:
     mass, mass_std : float
         Mass that was added, negative if taken away, and its standard deviation [kg].
     center : ndarray, shape (3,), or None
-        Its centre of mass in the joint frame of the link [m]; None where it is not determined.
+        Centre of mass in the joint frame of the link [m]; None where it is not determined.
     p_value : float
-        Probability of what it leaves unexplained, by chance.
+        Probability of a larger unexplained change by chance.
     rivals : tuple of int
         Numbers of links on which a load would explain the changes as well.
 
@@ -122,17 +122,17 @@ class ResidualChange:
     Attributes
     ----------
     joint : str
-        Which.
+        Joint name.
     before, after : float
-        Root mean square residual, as the file has it [N m].
+        Root mean square residual, as stated in the file [N m].
     before_error, after_error : float or None
-        The same over the torque of the joint [%].
+        Residual over the torque of the joint [%].
     ratio : float
-        Of the second to the first, divided by how much more torque there was.
+        Second residual over the first, divided by the ratio of the torques.
     p_value : float
-        Probability that motions alone make them differ as much.
+        Probability of so large a difference by different motions alone.
     changed : bool
-        Whether they differ by more than chance.
+        Whether the residuals differ significantly.
 
     """
 
@@ -146,7 +146,7 @@ class ResidualChange:
     changed: bool = False
 
     def document(self) -> dict[str, Any]:
-        """Return the document for JSON."""
+        """Return the residuals as a document."""
         return asdict(self) | {'ratio': self.ratio if isfinite(self.ratio) else None}
 
 
@@ -159,9 +159,9 @@ class NotCompared:
     ----------
     parameter : ParameterName
     why : {'deviation', 'motion', 'effect', 'grouping'}
-        A file has no standard deviation of it, or of what it groups; the other motion does not
-        show it; the other model has no such effect there; or the other data group the parameters
-        of links differently.
+        'deviation': a file has no standard deviation of it, or of a parameter in its group;
+        'motion': the other motion does not identify it; 'effect': the other model lacks the
+        effect; 'grouping': the other data group the parameters of links differently.
 
     """
 
@@ -169,29 +169,29 @@ class NotCompared:
     why: Literal['deviation', 'motion', 'effect', 'grouping']
 
     def document(self) -> dict[str, str]:
-        """Return the document for JSON."""
+        """Return the parameter and the reason as a document."""
         return {'name': self.parameter.name, 'joint': self.parameter.joint, 'why': self.why}
 
 
 @dataclass(frozen=True)
 class Comparison:
     """
-    Two identifications.
+    Comparison of two identifications.
 
     Attributes
     ----------
     before, after : ParameterFile
-        What was compared.
+        The compared results.
     changes : tuple of ParameterChange
-        Every parameter that both have, in the order of the first.
+        Every parameter of both results, in the order of the first.
     only_before, only_after, left_out : tuple of NotCompared
-        What the other does not have, and what has no standard deviation.
+        Parameters missing in the other result, and parameters without a standard deviation.
     groups : tuple of GroupChange
-        Effects of every joint and the rigid body as a whole; empty without covariances.
+        Tests of the effects of every joint and of the rigid body; empty without covariances.
     load : LoadChange or None
         The load on one link that explains all changes of the rigid body.
     residuals : tuple of ResidualChange
-        What both models leave of each joint, where both files have it alike.
+        Residuals of both models in each joint, if they are comparable.
 
     """
 
@@ -277,10 +277,10 @@ class Comparison:
 
 def unit_factors(changes: Sequence[ParameterChange]) -> dict[str, float]:
     """
-    Return the factor, after over before, of each joint, if one fits nearly all values.
+    Return the factor, after over before, of each joint, if one factor fits nearly all values.
 
-    No load and no wear makes masses and friction of all joints several times what they were:
-    torques of one of the two are in another unit, or are currents. Empty where none are.
+    No load and no wear multiplies masses and friction of all joints by several times: the torques
+    of one result are in another unit, or are currents. Empty if no factor is found.
 
     """
     clear = [

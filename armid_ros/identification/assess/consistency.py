@@ -1,15 +1,15 @@
 # Copyright 2026 The armid_ros developers
 # SPDX-License-Identifier: Apache-2.0
 """
-Whether encoder noise spoils an identification: a test, and by how much.
+Test whether encoder noise biases an identification, and estimate of the bias.
 
 Least squares takes the regressor as known, but it is computed from noisy positions. Two checks:
 
-- The Durbin-Wu-Hausman test holds the fit against one with instruments, which stay unbiased if
-  the instruments do not share the regressor's noise. They are the regressor of the same motion,
-  smoothed to a fifth of the band, where a three-thousandth of the accelerations' noise is left.
-- The bias itself comes from a simulation: the arm is taken along the smoothed motion, its
-  positions are given the noise that the recorded ones have, and it is identified again.
+- The Durbin-Wu-Hausman test compares the fit with one by instruments, which is unbiased if the
+  instruments do not share the regressor's noise. They are the regressor of the same motion,
+  smoothed to a fifth of the band, where a three-thousandth of the accelerations' noise remains.
+- The bias itself comes from a simulation: the arm follows the smoothed motion, noise as in the
+  recorded positions is added to its positions, and it is identified again.
 
 Source: Hausman 1978; Janot, Vandanjon and Gautier 2014 for robots, with instruments of a simulated
 arm; Cook and Stefanski 1994 for the simulation.
@@ -34,12 +34,12 @@ from armid_ros.recording import Recording
 import numpy as np
 from scipy.stats import chi2
 
-#: Noise is what lies above this share of the sampling rate.
+#: Share of the sampling rate above which the spectrum of positions is noise.
 _NOISE_ABOVE = 0.3
-#: A difference between the two fits of less than this share of a deviation does not matter, and
-#: counts little in the test: two fits of the same data are distinguishable to a thousandth.
+#: Negligible difference between the two fits in standard deviations. It counts little in the test,
+#: as two fits of the same data are distinguishable to a thousandth.
 NEGLIGIBLE = 0.1
-#: Deviations of bias that matter: a quarter takes 95 % intervals to 94 %.
+#: Smallest bias that matters, in standard deviations: it reduces 95 % intervals to 94 %.
 BIAS_LIMIT = 0.25
 #: Significance of the test.
 SIGNIFICANCE = 0.05
@@ -55,19 +55,19 @@ class NoiseCheck:
     statistic : float
         Durbin-Wu-Hausman statistic.
     freedom : float
-        Its degrees of freedom, 1 or more: what is expected of it if encoder noise does nothing.
+        Degrees of freedom, 1 or more: expected statistic without an effect of encoder noise.
     p_value : float
-        Probability of a larger one if encoder noise did nothing.
+        Probability of a larger statistic without an effect of encoder noise.
     instrumental : Estimate
         The fit with instruments.
     position_noise : ndarray, shape (n,)
         Standard deviation of the position noise [rad or m].
     bias : ndarray, shape (r,)
-        What encoder noise adds to the parameters.
+        Bias of the parameters by encoder noise.
     bias_std : ndarray, shape (r,)
-        How well that is known, from the number of simulations.
+        Standard error of the bias, from the number of simulations.
     std : ndarray, shape (r,)
-        Standard deviations of the parameters, to hold it against.
+        Standard deviations of the parameters, for comparison with the bias.
 
     """
 
@@ -92,22 +92,22 @@ class NoiseCheck:
 
     @property
     def harmless(self) -> bool:
-        """Whether the bias of every parameter is negligible beside its standard deviation."""
+        """Whether the bias of every parameter is negligible against its standard deviation."""
         return bool(np.max(np.abs(self.relative_bias), initial=0.0) < BIAS_LIMIT)
 
     def findings(self) -> tuple[tuple[str, bool], tuple[str, bool]]:
         """
         Return sentences on the findings, each with whether it is satisfactory.
 
-        Where the test fires and the noise makes no bias that matters, something else sets the
-        two fits apart: what the model lacks, whose share of each is not the same.
+        If the test is significant and the bias by noise is negligible, the two fits differ for
+        another reason: an effect that the model lacks affects them differently.
 
         """
         found = 'no sign' if self.consistent else 'a sign'
         found += ' that encoder noise biases the parameters'
         if self.harmless and not self.consistent:
             found = (
-                'a fit with instruments differs, by more than the noise of the encoders makes; an '
+                'a fit with instruments differs by more than encoder noise explains; an '
                 'effect that the model lacks is the likelier cause'
             )
         worst = int(np.argmax(np.abs(self.relative_bias)))
@@ -146,13 +146,13 @@ def check_noise(
     result : Identification
         The identification.
     recordings : sequence of Recording
-        What it was fitted to.
+        Recordings of the fit.
     rng : numpy.random.Generator
-        Draws the noise of the simulations.
+        Generator of the noise of the simulations.
     repeats : int
-        Simulations, 2 or more.
+        Number of simulations, 2 or more.
     progress : callable, optional
-        Told the share that is done, 0 to 1.
+        Called with the finished share, 0 to 1.
 
     """
     about = partial(
@@ -169,11 +169,11 @@ def check_noise(
     sizes, axes = np.linalg.eigh(found.spread * np.outer(unit, unit))
     counted = 1.0 / (sizes.clip(0.0) + NEGLIGIBLE**2)
     statistic = float(np.sum((axes.T @ (found.difference * unit)) ** 2 * counted))
-    freedom = max(float(np.sum(sizes.clip(0.0) * counted)), 1.0)  # what to expect of it
+    freedom = max(float(np.sum(sizes.clip(0.0) * counted)), 1.0)  # expected value of the statistic
 
-    # A fit with noisy columns V to the torque W beta of exact ones finds M beta, M = V^+ W; what
-    # was found is M beta of the truth, so the bias is beta_hat - M^-1 beta_hat, or M^-1 V^+ times
-    # the difference of the torques of what was found along the exact and the noisy motion.
+    # A fit with noisy columns V to the torque W beta of exact columns yields M beta, M = V^+ W.
+    # The estimate beta_hat is M times the truth, so its bias is beta_hat - M^-1 beta_hat. That is
+    # M^-1 V^+ times the difference of its torques along the exact and the noisy motion.
     noise = np.sqrt(np.mean([position_noise(r) ** 2 for r in recordings], axis=0))
     values, std = result.estimate.values, result.estimate.std
     scale = np.where(std > 0.0, std, 1.0)
@@ -201,7 +201,7 @@ def position_noise(recording: Recording) -> FloatArray:
     """
     Return the standard deviation of white position noise, shape (n,) [rad or m].
 
-    It is the top of the spectrum of stretches without a gap: a jump across one is no noise.
+    It is the upper end of the spectrum of stretches without a gap; jumps across gaps are no noise.
 
     """
     rate = 1.0 / recording.period

@@ -1,10 +1,10 @@
 # Copyright 2026 The armid_ros developers
 # SPDX-License-Identifier: Apache-2.0
 """
-Whether data are at fault themselves, before any physics is blamed for what a model leaves of them.
+Checks for faults of the data, before a residual is explained by physics.
 
-Asked are time base, units, signs, order of joints, delay and clipped readings: a fault of the data
-explains any gap. Names, signs and units are those that identification tells; see `mistakes`.
+The checks cover time base, units, signs, order of joints, delay and clipped readings: a fault of
+the data explains any gap. Names, signs and units are checked as in identification; see `mistakes`.
 
 """
 
@@ -36,9 +36,9 @@ from armid_ros.robots import Robot
 import numpy as np
 import numpy.typing as npt
 
-#: A torque of so many times the limit of its drive is said.
+#: Ratio of a torque to the limit of its drive above which a note is given.
 _BEYOND = 1.5
-#: Share of samples at the very extreme of a reading, above which it is clipped.
+#: Share of samples at the largest value of a reading, above which it is clipped.
 _CLIPPED = 0.02
 
 
@@ -50,12 +50,12 @@ def check_data(
     before: Sequence[Recording] = (),
 ) -> tuple[list[str], list[str]]:
     """
-    Check the data for faults.
+    Check recordings for faults of the data before a diagnosis.
 
     Parameters
     ----------
     arm : ArmModel
-        What they are compared with.
+        Model that the data are compared with.
     recordings : sequence of Recording
         The data as they were recorded.
     used : Conditioning
@@ -63,14 +63,14 @@ def check_data(
     data : sequence of Stretch
         The data in rows.
     before : sequence of Recording
-        From when nothing was wrong: the unit of their torques is that of the model.
+        Baseline, whose torques have the unit of the model.
 
     Returns
     -------
     faults : list of str
-        What makes a diagnosis meaningless, in words, with the remedy.
+        Faults that make a diagnosis meaningless, with remedies.
     notes : list of str
-        What a reader should know.
+        Notes for the user.
 
     """
     sensors = list(sensor_faults(arm, recordings, data, used))
@@ -88,7 +88,7 @@ def check_data(
         for part in data
         for law in laws_of_controllers(arm.body, part.motion, part.informative)
     ]
-    if alone and not faults:  # another machine that an arm is tied to may drive it
+    if alone and not faults:  # an arm that is tied to another machine may be driven by it
         moved, torques = [part.motion for part in data], [part.tau for part in data]
         driven = driven_by_friction(arm.robot, moved, torques)
         faults += [wrong_sign(driven)] if driven else []
@@ -108,11 +108,11 @@ def _mistaken(
     motions: Sequence[Motion],
     before: Sequence[Motion],
 ) -> list[str]:
-    """Return the mistake that all recordings share, or else joints in a wrong unit."""
-    # a baseline gives the factor of all torques by itself
+    """Return the mistake that all recordings share, or otherwise joints in a wrong unit."""
+    # with a baseline, the factor of all torques is found by comparison with it
     since = bool(before) and bool(np.any(factors_since(arm, motions, before) > 0.0))
     found = [find_mistake(arm.body, recording, used) for recording in recordings]
-    # and the body: a mistake that only another body shows is a change of the arm
+    # with a baseline, a mistake that needs a fitted body is a change of the arm instead
     of_data = [one for one in found if one and one.of_data and not (before and one.fitted)]
     texts = {one.text for one in of_data if not (since and one.hypotheses[0].kind == 'scale')}
     alike = len(of_data) == len(found) and len(texts) == 1
@@ -127,14 +127,14 @@ def mistaken_recordings(
     """
     Return the mistakes in names, signs or units of each recording, with remedies.
 
-    Where they are wrong in every one `check_data` says so.
+    A mistake that is in every recording is found by `check_data`.
 
     Parameters
     ----------
     arm : ArmModel
         The model.
     recordings : sequence of (Recording, ndarray of bool, shape (n,))
-        Recordings, and the joints that may be wrong there, as they are not in others.
+        Recordings, and joints that may be wrong there because other recordings differ.
     used : Conditioning
         Filters.
 

@@ -1,12 +1,12 @@
 # Copyright 2026 The armid_ros developers
 # SPDX-License-Identifier: Apache-2.0
 """
-What an identification is good for, in one word, and why.
+Grade of an identification, with reasons.
 
-The word follows the torque error on data that were not fitted, of the joint that is predicted
-worst, and what the recordings show to be wrong with them. Errors of joints are shares of their own
-torque: a slide takes newtons and a wrist newton metres, and their sum has no unit. No model
-predicts white noise of a torque, or where in its dry friction a joint is that rests.
+The grade follows from the torque error on held-out data of the joint that is predicted worst, and
+from faults of the recordings. Errors of joints are shares of their own torque, as newtons of a
+slide and newton metres of a wrist have no common unit. No model predicts white noise of a torque,
+or the dry friction of a joint at rest.
 
 """
 
@@ -40,16 +40,16 @@ class Grade:
     Attributes
     ----------
     word : {'good', 'poor', 'unusable'}
-        The worst that any reason says.
+        The worst grade of all reasons.
     reasons : tuple of str
-        Why, the worst first; one at least.
+        Reasons, the worst first; at least one.
     faults : tuple of str
-        What the recordings themselves show to be wrong, the worst first, without a full stop.
+        Faults of the recordings themselves, the worst first, without a full stop.
     error_percent : float
-        Relative error of the torque of the worst joint, held out where anything is, otherwise of
-        one half of the data predicted from the other.
+        Relative torque error of the worst joint [%]: on held-out data if there are any, otherwise
+        of one half of the data predicted from the other.
     worst_joint : str
-        That joint.
+        Joint with that error.
 
     """
 
@@ -82,21 +82,21 @@ def grade(
     Parameters
     ----------
     result : Identification
-        What was found.
+        The identification.
     description : ArmModel
-        The model before it.
+        Model before the identification.
     recordings : sequence of Recording
-        What it was fitted to.
+        Recordings of the fit.
     validation : mapping of str to sequence of Fit
         Predictions of recordings that were not used for fitting, by recording.
     held_out : sequence of Recording
-        Those recordings.
+        The recordings of `validation`.
 
     """
     every = [*recordings, *held_out]
     fits = [*result.training, *(fit for part in validation.values() for fit in part)]
     sensors = list(sensor_faults(description, every, fits, result.used))
-    # what else a recording with a dead sensor seems to show is of that
+    # other apparent mistakes of a recording with a dead sensor are consequences of it
     blind = {fault.source for fault in sensors if fault.word == 'unusable'}
     seeing = [one for one in every if one.source not in blind]
     mistakes = _mistakes(result, description, seeing)
@@ -157,10 +157,10 @@ def _mistakes(
 def _errors(
     result: Identification, worst: Mapping[str | None, _Worst], held_out: Sequence[Fit]
 ) -> Iterator[Fault]:
-    """Yield the grade of the worst joint, and name joints that are hardly predicted."""
+    """Yield the reason of the worst joint, and joints whose torque is hardly predicted."""
     use = {
         'good': '',
-        'poor': ', too much to compute torques with',
+        'poor': ', too large to compute torques with the model',
         'unusable': ': the model does not describe this motion',
     }
     for bag, one in worst.items():
@@ -169,7 +169,7 @@ def _errors(
             yield _halves(result, word, one.text)
         else:
             yield Fault(f'torque error on {bag}, held out: {one.text}{use[word]}', word)
-    # what was held out, or what was fitted where nothing was
+    # held-out data, or training data if there are none
     fits = held_out or result.training
     every = Score.of(fits).joint_relative_error_percent
     if np.all(every[moving(fit.motion for fit in fits)] > LIMITS.unusable):
@@ -180,12 +180,12 @@ def _errors(
         named = ', '.join(
             f'{result.arm.robot.joints[j]} ({every[j]:.0f} %)' for j in np.flatnonzero(noisy)
         )
-        text = f'the torque is hardly predicted of {named}, where it is noise or friction at rest'
+        text = f'torque of mostly noise or friction at rest, hardly predicted: {named}'
         yield Fault(text, 'good')
 
 
 class _Worst(NamedTuple):
-    """The worst joint: its index, error, error without noise [%], and these in words."""
+    """The worst joint: index, error, error without noise [%], and text of both."""
 
     joint: int
     measured: float
@@ -194,7 +194,7 @@ class _Worst(NamedTuple):
 
 
 def _worst(errors: FloatArray, fits: Sequence[Fit], result: Identification) -> _Worst:
-    """Choose the joint with the largest error beyond noise, or else the largest error."""
+    """Return the joint with the largest error without noise, or otherwise the largest error."""
     joints, beyond = result.arm.robot.joints, beyond_noise(errors, fits, result.used)
     moves = moving(fit.motion for fit in fits)
     worst = int(np.lexsort((np.where(moves, errors, -1.0), beyond))[-1])
@@ -240,30 +240,30 @@ def _resting(result: Identification, validation: Mapping[str, Sequence[Fit]]) ->
         )
     if np.any(fitted & ~checked):
         names = ', '.join(joints[fitted & ~checked])
-        yield Fault(f'not checked, as they do not move in what was held out: {names}', 'good')
+        yield Fault(f'not checked, as they do not move in held-out data: {names}', 'good')
 
 
 def beyond_noise(errors: FloatArray, fits: Sequence[Fit], used: Conditioning) -> FloatArray:
     """
-    Return the errors of joints without the share of torque noise.
+    Return the relative torque errors of joints without the share of torque noise.
 
-    Noise counts twice: a row has it, and so has the prediction of a row, where that is as sure as
-    a measurement of it (leverage of one, Hoaglin and Welsch 1978). A model that is no further off
-    than a sensor is not what is wrong.
+    Noise counts twice: in a row, and in its prediction if that is as uncertain as a measurement
+    (leverage of one, Hoaglin and Welsch 1978). A model is not at fault if its error is no larger
+    than that of a sensor.
 
     Parameters
     ----------
     errors : ndarray, shape (n,)
         Norm of the residual of each joint over that of its torque [%].
     fits : sequence of Fit
-        Where they come from.
+        Fits with these errors.
     used : Conditioning
         Filters of the rows.
 
     Returns
     -------
     ndarray, shape (n,)
-        The same without the noise [%]; zero of a joint that rests throughout.
+        Errors without the noise [%]; zero for a joint at rest throughout.
 
     """
     told = np.concatenate([fit.informative for fit in fits])
@@ -279,16 +279,15 @@ def torque_noise(fits: Sequence[Fit], used: Conditioning) -> FloatArray:
     """
     Return the standard deviation of the white noise in rows of measured torque, (n,) [N m].
 
-    It shows in second differences (Gasser, Sroka and Jennen-Steinmetz 1986), whose deviation is
-    taken from their median: what the motion makes of a torque changes little from row to row, and
-    friction steps in few of them.
+    The noise is computed from the median of second differences (Gasser, Sroka and Jennen-Steinmetz
+    1986): the torque of the motion changes little from row to row, and friction steps in few rows.
 
     """
     differences = np.concatenate([np.abs(np.diff(fit.tau, 2, axis=0)) for fit in fits])
     if not len(differences):
         return np.zeros(fits[0].motion.n_joints)
     deviation = np.median(differences, axis=0) / float(stats.norm.ppf(0.75))
-    # the variance of second differences of rows over that of rows, of white noise
+    # for filtered white noise: variance of second differences of rows over that of rows
     taps, step = used.taps(), used.decimation
     own, next_one, after = (
         float(taps[: len(taps) - lag] @ taps[lag:]) if lag < len(taps) else 0.0

@@ -1,10 +1,10 @@
 # Copyright 2026 The armid_ros developers
 # SPDX-License-Identifier: Apache-2.0
 """
-The numbers that grade an identification: all of them, each with its reason.
+Limits that grade an identification, each with its reason.
 
-What happens to the grades of real and simulated recordings when each of them is 30 % larger or
-smaller is measured by ``benchmarks.grade``; see docs/identification.md.
+``benchmarks.grade`` measures how grades of real and simulated recordings change when each limit
+is 30 % larger or smaller; see docs/identification.md.
 
 """
 
@@ -15,10 +15,10 @@ from typing import Literal
 
 #: Grade of an identification, with reasons.
 Word = Literal['good', 'poor', 'unusable']
-#: Independent values of a residual in one recording. Of ten simulated arms that have lived and to
-#: which nothing happened, with other motions each day, the logarithm of the ratio of two residuals
-#: of a joint has a deviation of 0.35 with one recording a day and 0.19 with three; 8 make 0.38 and
-#: 0.21. One of the twenty pairs is said to differ.
+#: Independent values of a residual in one recording. Ten unchanged simulated arms had different
+#: motions each day. The logarithm of the ratio of two residuals of a joint had a deviation of 0.35
+#: with one recording per day and 0.19 with three; 8 independent values make 0.38 and 0.21. One of
+#: the twenty pairs is reported to differ.
 FREEDOM = 8
 
 
@@ -30,33 +30,33 @@ class GradeLimits:
     Attributes
     ----------
     poor : float
-        Relative torque error of a joint on data that were not fitted [%]. Published
-        identifications of industrial arms reach 4 to 18 %; feed-forward with more is no better
-        than a payload that is not known.
+        Relative torque error of a joint on held-out data above which a model is poor [%].
+        Published identifications of industrial arms reach 4 to 18 %; feed-forward with a larger
+        error is no better than with an unknown payload.
     unusable : float
-        The same [%]. A model with more takes less than three quarters of the torque's power:
-        1 - 0.5^2. A hypothesis that leaves more explains nothing either.
+        Error above which a model is unusable [%]. It then explains less than three quarters of
+        the torque's power: 1 - 0.5^2. A hypothesis with a larger error is not accepted either.
     undetermined : float
         Ratio of the error between the halves of a recording to that of the fit. With r parameters
-        and N independent rows it is (N + r) / (N - r), about: 3 where each parameter has two
-        rows, so that half of what is fitted is noise.
+        and N independent rows it is about (N + r) / (N - r): 3 for two rows per parameter, where
+        half of the fit is noise.
     floor : float
-        Share of a joint's torque below which an error does not count. It is what good
-        identifications leave; below it nobody asks for a cause.
+        Share of a joint's torque below which an error does not count: the residual of a good
+        identification, which needs no cause.
     gain : float
-        Likelihood ratio per independent sample from which a hypothesis is accepted, for every
-        value that it chooses: it divides the error of one joint, or of several together, by that.
-        Two is three quarters of the power. With a fitted body no hypothesis reaches 1.2 of sound
-        recordings of three arms in simulation, and of mistakes made of them the least has 4.
+        Likelihood ratio per independent sample, for every fitted value, from which a hypothesis is
+        accepted. It is the factor by which the error of one joint, or of several together, falls;
+        two is three quarters of the power. With a fitted body, hypotheses reached less than 1.2 on
+        sound recordings of three simulated arms, and at least 4 on recordings with mistakes.
     free_body : float
-        Power of that ratio that is asked of a hypothesis with a fitted body alone: the ten values
-        of a link answer to every change of the data.
+        Exponent of `gain` for a hypothesis that needs a fitted body, as the ten values of a link
+        can fit every change of the data.
     torque_factor : float
-        Factor between effort and N m from which the description cannot be what is wrong: its
-        masses are rarely off by two, all of them, in the same direction.
+        Factor between effort and N m from which the description cannot be at fault: its masses are
+        rarely all wrong by two in the same direction.
     gravity_change : float
-        Change of the gravity vector as a share of its length from which the description cannot be
-        what is wrong; a quarter is a tilt of 14 degrees.
+        Change of the gravity vector, as a share of its length, from which wrong masses are not the
+        cause; a quarter is a tilt of 14 degrees.
 
     """
 
@@ -74,5 +74,5 @@ LIMITS = GradeLimits()
 
 
 def by_error(error: float) -> Word:
-    """Return the grade of a relative torque error on data that were not fitted [%]."""
+    """Return the grade of a relative torque error on held-out data [%]."""
     return 'good' if error <= LIMITS.poor else 'poor' if error <= LIMITS.unusable else 'unusable'

@@ -1,9 +1,9 @@
 # Copyright 2026 The armid_ros developers
 # SPDX-License-Identifier: Apache-2.0
 """
-Hypotheses of what is wrong with a recording: each the change of the data that corrects it.
+Hypotheses on mistakes in a recording, each with the change of the data that corrects it.
 
-A hypothesis is accepted by its likelihood ratio against the data as they are; see `mistakes`.
+A hypothesis is accepted by its likelihood ratio against the data as recorded; see `mistakes`.
 
 """
 
@@ -27,11 +27,11 @@ from armid_ros.motion import FloatArray, Motion
 from armid_ros.robots import GRAVITIES, Robot
 import numpy as np
 
-#: Angles that the zero of a joint may be off by [degrees]: an encoder's, an axis', a drawing's.
+#: Possible errors of the zero of a joint [degrees]: of an encoder, an axis or a drawing.
 TURNS = (-135.0, -90.0, -45.0, 45.0, 90.0, 135.0, 180.0)
-#: A gravity vector is written as a known one from which it differs by less than this share.
+#: Largest difference of a gravity vector from a known one that replaces it, over the known length.
 _KNOWN = 0.3
-#: Correlation from which the factor of a joint is known: it leaves 15 % of the torque at most.
+#: Correlation from which the factor of a joint is known: the residual is 15 % of torque or less.
 _CLEAR = 0.989
 
 Kind = Literal[
@@ -49,19 +49,19 @@ class Hypothesis:
     Attributes
     ----------
     kind : str
-        What is wrong.
+        Kind of mistake.
     text : str
-        What seems to be wrong and what to do, without a full stop.
+        Suspected mistake and remedy, without a full stop.
     motion : callable
-        Returns a motion and its torque as they would be without the mistake.
+        Function that returns a motion and its torque without the mistake.
     where : tuple
-        Joints and quantity, without by how much.
+        Joints and quantity with the mistake.
     values : int
-        Numbers that are chosen to fit the data.
+        Number of values that are fitted to the data.
     body : callable
-        Returns the description as it would be without the mistake.
+        Function that returns the description without the mistake.
     nearby : callable
-        Returns finer steps of the same kind.
+        Function that returns neighbouring hypotheses in finer steps.
     of_data : bool
         Whether only the data, and no change of the arm, can explain it.
 
@@ -78,7 +78,7 @@ class Hypothesis:
 
     @property
     def of_masses(self) -> bool:
-        """Whether a common factor of all masses explains the same."""
+        """Whether a common factor of all masses explains the data as well."""
         return self.kind in ('gravity', 'scale')
 
     @property
@@ -88,7 +88,7 @@ class Hypothesis:
 
 
 AS_RECORDED = Hypothesis('nothing', 'the data are as they should be', values=0)
-#: The description says nothing of this arm: friction and drives take all there is.
+#: Hypothesis of a description without inertia: friction and drives explain the torques alone.
 WITHOUT_BODY = Hypothesis(
     'body',
     'the description does not explain the torques',
@@ -101,7 +101,7 @@ def hypotheses(robot: Robot, motions: Sequence[Motion]) -> Iterator[Hypothesis]:
     """
     Yield the possible mistakes in recorded motions of an arm, except delays.
 
-    Of an arm that moves by a few degrees some position is beyond a turn, if it is in degrees.
+    Positions in degrees exceed a turn even if an arm hardly moves; only such ones are tested.
 
     """
     turned = np.max([np.abs(one.q).max(axis=0) for one in motions], axis=0) > 2.0 * np.pi
@@ -124,7 +124,7 @@ def hypotheses(robot: Robot, motions: Sequence[Motion]) -> Iterator[Hypothesis]:
 
 
 def _of_all_torques(robot: Robot, motions: Sequence[Motion]) -> Iterator[Hypothesis]:
-    """Yield the best-fitting gravity and common torque factor, if masses do not explain them."""
+    """Yield the best-fitting gravity and common torque factor that masses do not explain."""
     motion = thinned(motions, 600)
     if motion is None:
         return
@@ -168,7 +168,7 @@ def shifted(motion: Motion, seconds: float) -> Motion:
     """
     Shift the motion by the delay of the torque.
 
-    The torque stays as it is, for its noise would be less between samples.
+    The torque is not interpolated, as this would reduce its noise.
 
     """
     t = motion.t - seconds
@@ -189,13 +189,13 @@ def other_gravity(robot: Robot, vector: FloatArray) -> Hypothesis | None:
     robot : Robot
         The description.
     vector : ndarray, shape (3,)
-        What it is instead [m/s^2].
+        Gravity vector that fits the data [m/s^2].
 
     Returns
     -------
     Hypothesis or None
-        None unless it may be a planet's and is too far from the description to be wrong masses:
-        these make all weight larger or smaller, and turn it nowhere.
+        None if no planet has such gravity, or if wrong masses may explain the difference. Wrong
+        masses make all weight larger or smaller, but do not turn it.
 
     """
     told = robot.gravity
@@ -203,7 +203,7 @@ def other_gravity(robot: Robot, vector: FloatArray) -> Hypothesis | None:
     far = LIMITS.gravity_change * max(size, 1.0) < np.linalg.norm(vector - told)
     turned = np.linalg.norm(vector / max(length, 1e-9) - told / max(size, 1e-9))
     weighs = length / size if size > 0.0 else np.inf
-    # gravity of Jupiter [m/s^2]: no arm stands where there is more
+    # 24.8 m/s^2 is the gravity of Jupiter, the largest of a planet
     if not (far and length < 24.8):
         return None
     if turned <= LIMITS.gravity_change and not _beyond_masses(weighs):
@@ -228,14 +228,14 @@ def known_gravity(vector: FloatArray, told: FloatArray) -> tuple[FloatArray, str
     Parameters
     ----------
     vector, told : ndarray, shape (3,)
-        As it was found, and as described [m/s^2]: it may act along another axis.
+        Estimated and described gravity [m/s^2]; the described length along any axis is known too.
 
     Returns
     -------
     vector : ndarray, shape (3,)
-        A known one where it is near [m/s^2].
+        The nearest known vector, or the estimated one if none is near [m/s^2].
     option : str
-        What to give to --gravity.
+        Argument of --gravity.
 
     """
     known = {name: np.array(value) for name, value in GRAVITIES.items()}
@@ -253,7 +253,7 @@ def known_gravity(vector: FloatArray, told: FloatArray) -> tuple[FloatArray, str
 
 
 def _other_scale(robot: Robot, factor: float, motions: Sequence[Motion]) -> Hypothesis:
-    """Return the hypothesis that efforts are a factor from N m: another unit, or currents."""
+    """Return the hypothesis that efforts differ from N m by a factor: a unit, or currents."""
     torques = [motion.tau for motion in motions if motion.tau is not None]
     factors, correlation = torque_factors(robot, motions, torques)
     known = (correlation > _CLEAR) & (factors > 0.0)
@@ -268,7 +268,7 @@ def _other_scale(robot: Robot, factor: float, motions: Sequence[Motion]) -> Hypo
         shown = zip(factors, known, strict=True)
         gains = ','.join(f'{1.0 / one:.3g}' if clear else '?' for one, clear in shown)
         hidden = ', '.join(robot.joints[k] for k in np.flatnonzero(~known))
-        text += f'; for currents give --current-gain {gains}, as exact as those masses'
+        text += f'; for currents give --current-gain {gains}, as accurate as those masses'
         text += f'; that of {hidden} is not determined' if hidden else ''
     scaled = _times('torque', slice(None), 1.0 / factor)
     return Hypothesis('scale', text, scaled, of_data=bool(unit))

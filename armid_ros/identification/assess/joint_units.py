@@ -1,11 +1,11 @@
 # Copyright 2026 The armid_ros developers
 # SPDX-License-Identifier: Apache-2.0
 """
-Torques in another unit than N m, where the described body does not show it.
+Detection of torques in another unit than N m where the described body does not reveal it.
 
-A joint whose torque is mostly friction, as that of a wrist, fits as well in any unit, for its
-friction is free; see `mistakes`. The limit of its drive shows it, or a model with its friction,
-or a baseline: masses that a model has wrong are wrong on both days.
+A joint whose torque is mostly friction, such as a wrist, fits as well in any unit, as its friction
+is fitted; see `mistakes`. The unit follows from the limit of its drive, from a model with its
+friction, or from a baseline. Wrong masses of a model are wrong on both days and cancel.
 
 """
 
@@ -30,13 +30,13 @@ from armid_ros.robots import Robot
 import numpy as np
 import numpy.typing as npt
 
-#: Median factor of torques from which they are in other units: a load that is put down makes less.
+#: Median factor of torques from which they are in other units; putting down a load makes less.
 _GAINS = 4.0
-#: Half of the readings of a joint at so many times the limit of its drive are in another unit: the
-#: smallest factor of one is a hundred, of which this is half in the logarithm, and no drive gives
-#: as much.
+#: Ratio of the median reading of a joint to the limit of its drive from which it is in another
+#: unit. The smallest factor of a unit is a hundred, of which this is half in the logarithm, and no
+#: drive gives as much.
 _BEYOND_DRIVE = 10.0
-#: A factor since a baseline is that of a unit of force within this factor: masses cancel.
+#: Largest ratio of a factor since a baseline to that of a unit of force: masses cancel.
 _NEAR_SINCE = 1.05
 
 
@@ -46,17 +46,17 @@ def units_beyond_drives(
     """
     Yield notes on torques in another unit, by the limits of the drives.
 
-    Where most joints are beyond their limits, or the described body needs as much, it is
-    the limits of the description that are wrong.
+    No note is given if most joints are beyond their limits, or if the described body needs as
+    much: then the limits of the description are wrong.
 
     Parameters
     ----------
     robot : Robot
-        The description.
+        Robot of the description.
     recordings : sequence of Recording
-        The data.
+        Recordings to check.
     motions : sequence of Motion
-        Their filtered motions.
+        Filtered motions of the recordings.
 
     """
     measured = [recording.tau for recording in recordings if recording.tau is not None]
@@ -90,8 +90,8 @@ def unit_faults(
     motions : sequence of Motion
         Filtered motions with torque.
     before : sequence of Motion
-        The same from when nothing was wrong: factors are those since then. Without it, factors
-        of most joints may be of masses that the model has wrong, and no fault.
+        Filtered motions of a baseline, to which factors are relative. Without it, factors of
+        most joints may be due to wrong masses of the model and are no fault.
 
     """
     factors, robot = factors_since(arm, motions, before), arm.robot
@@ -129,9 +129,9 @@ def factors_since(
     """
     Return the ratio of measured to modelled torque, relative to that of a baseline if given.
 
-    A model is off by less than the torque of a baseline itself, times the factor, or it gives
-    none: a motion that does not determine a model shows its errors there. Rows at rest count:
-    friction holds a joint with any torque up to that of its motion, and no more.
+    A factor is zero if the error of the model on the baseline is larger than the torque itself: a
+    motion that does not determine the model reveals its errors there. Rows at rest count, as
+    friction holds a joint with no more torque than that of its motion.
 
     Returns
     -------
@@ -142,7 +142,7 @@ def factors_since(
     best, factors = np.full((2, arm.robot.n_joints), 0.0)
     if not motions:
         return factors
-    # the body with friction and offset of the data, and the model with its own friction
+    # first the body, with friction and offset fitted; then the model with its own friction
     for model in (ArmModel(arm.body), arm):
         slope, correlation = _factors(model, motions)
         if before:

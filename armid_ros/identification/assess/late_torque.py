@@ -1,14 +1,14 @@
 # Copyright 2026 The armid_ros developers
 # SPDX-License-Identifier: Apache-2.0
 """
-By how much a torque comes later than the position that it belongs to, and how sure that is.
+Delay of the torques of a recording against its positions, with a confidence interval.
 
-A delay shifts all of a torque in time, friction that gives way before it slips only itself: after
-a reversal it follows the way that the joint has travelled (Dahl 1968), which at low speed takes
-tens of milliseconds. So a delay is told by weight and inertia, with friction free to come as late
-as it likes: beside the rate of the body's torque are columns of friction that gives way over
-several lengths. Where a motion is run backwards the torque of a body is the same and its rate is
-opposite, as friction is; a body that is off from its description is therefore no delay.
+A delay shifts the whole torque in time. Presliding friction only comes late itself: after a
+reversal it grows with the distance that the joint has travelled (Dahl 1968), which takes tens of
+milliseconds at low speed. So a delay is estimated from weight and inertia: its column is the rate
+of the body's torque, and friction with several presliding lengths is fitted as well. If a motion
+runs backwards, the torque of a body is the same and its rate, like friction, is opposite. An error
+of the described body therefore does not look like a delay.
 
 """
 
@@ -39,14 +39,14 @@ from armid_ros.robots import Robot
 import numpy as np
 from scipy.stats import t as student
 
-#: Lengths over which friction may give way [rad or m]: what gears of arms show, in steps of three,
-#: which any length between follows. Of 63 recordings with friction of 1 to 3 mrad they are off
-#: by -1 to 6 ms (5 to 95 %), 1 and 3 mrad alone by 0 to 6, 0.1 to 30 mrad by -3 to 6, and no
-#: length at all by -24 to 17 ms with an interval that is six times as wide.
+#: Presliding lengths of friction [rad or m], as in gears of arms, in steps of three to cover all
+#: lengths between. On 63 recordings with lengths of 1 to 3 mrad, the delay errs by -1 to 6 ms (5
+#: to 95 %). Lengths of 1 and 3 mrad alone err by 0 to 6 ms, 0.1 to 30 mrad by -3 to 6 ms. Without
+#: lengths, the error is -24 to 17 ms, with a six times wider interval.
 _LENGTHS = (0.0003, 0.001, 0.003, 0.01)
-#: Longest delay that is looked for [s].
+#: Longest delay that is tested [s].
 _LONGEST = 0.3
-#: Parts of a recording of which each tells a delay by itself: ten are nine degrees of freedom.
+#: Number of blocks of a recording whose scores give the deviation; nine degrees of freedom.
 _BLOCKS = 10
 
 
@@ -59,12 +59,12 @@ class Delay(NamedTuple):
 
 def late_torque(robot: Robot, recording: Recording, used: Conditioning) -> Delay | None:
     """
-    Return the delay with its 95 % interval; None if that includes zero.
+    Return the delay with its 95 % interval; None if the interval includes zero.
 
     Parameters
     ----------
     robot : Robot
-        The description.
+        Robot of the description.
     recording : Recording
         Data with torques.
     used : Conditioning
@@ -78,7 +78,7 @@ def late_torque(robot: Robot, recording: Recording, used: Conditioning) -> Delay
         rows = [
             _rows(robot, motion, used)
             for motion in moved
-            if len(decimated_samples(len(motion), used)) > 1  # or they have no rate
+            if len(decimated_samples(len(motion), used)) > 1  # the rate needs two samples
         ]
         found = _step(rows) if rows else None
         if found is None:
@@ -92,10 +92,10 @@ def late_torque(robot: Robot, recording: Recording, used: Conditioning) -> Delay
 
 def _rows(robot: Robot, motion: Motion, used: Conditioning) -> tuple[FloatArray, FloatArray]:
     """Return the columns of each joint, (n, M, k), and the shared ones, (n, M, 10 n + 3)."""
-    # own are offset, viscous friction, drive inertia, and dry friction that gives way over no
-    # length and over several, constant and in proportion to the load, filtered as the torque is,
-    # for it steps within a sample; shared are what bodies near the description add, what a delay
-    # of 1 s does, what is to be explained, and the torque
+    # own columns: offset, viscous friction, drive inertia, and dry friction without and with
+    # presliding, constant and in proportion to the load; it is filtered as the torque is, as it
+    # steps within a sample. Shared columns: bodies near the description, effect of a delay of
+    # 1 s, residual torque, and torque
     assert motion.tau is not None
     n, kept = motion.n_joints, np.array(decimated_samples(len(motion), used), dtype=np.intp)
     bent = Hysteresis(
@@ -116,9 +116,9 @@ def _rows(robot: Robot, motion: Motion, used: Conditioning) -> tuple[FloatArray,
 
 def _step(parts: Sequence[tuple[FloatArray, FloatArray]]) -> Delay | None:
     """Fit the delay with friction, drive inertia and body as nuisance parameters."""
-    # the deviation allows for residuals that are alike for long, or in all of a joint (Liang and
-    # Zeger 1986): sums of their products with the rate over parts of the recording, or over
-    # joints, whichever vary more
+    # the deviation allows for residuals that are correlated in time or within a joint (Liang and
+    # Zeger 1986): scores are summed over blocks of the recording, or over joints, whichever sums
+    # vary more
     own, shared = (np.concatenate(some, axis=1) for some in zip(*parts, strict=True))
     own = own / root_mean_square(own.transpose(1, 0, 2))[:, np.newaxis]
     torque = root_mean_square(shared[:, :, -1].T)
@@ -135,6 +135,6 @@ def _step(parts: Sequence[tuple[FloatArray, FloatArray]]) -> Delay | None:
     delay = float(np.sum(alone * rest)) / known
     score = alone * (rest - by_body[:, :, 1] - alone * delay)
     blocks = np.array([part.sum() for part in np.array_split(score, _BLOCKS, axis=1)])
-    # the deviation of the total of some sums; one alone tells none
+    # standard deviation of the total of several sums; zero if there is only one
     spreads = [np.sqrt(np.sum(x**2) * len(x) / max(len(x) - 1, 1)) for x in (blocks, score.sum(1))]
     return Delay(delay, float(student.ppf(0.975, _BLOCKS - 1) * max(spreads) / known))

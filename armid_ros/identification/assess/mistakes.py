@@ -1,12 +1,12 @@
 # Copyright 2026 The armid_ros developers
 # SPDX-License-Identifier: Apache-2.0
 """
-Which mistake a recording shows, if any: hypotheses by their likelihood ratio.
+Search for a mistake in a recording: hypotheses by their likelihood ratio.
 
-Each is compared with the data as they were recorded. Links that are off as those of descriptions
-may be are the commoner cause, and so the body is fitted with that prior in both: a mistake is
-accepted if it explains what no such body does. Masses that are all off by one factor are within
-that prior; a factor of all torques is therefore judged with the body as described, too.
+Each hypothesis is compared with the data as recorded. Errors of the described links are a more
+common cause, so the body is fitted with the prior of the description in both cases. A mistake is
+accepted if it explains more than such a body does. This prior allows one wrong factor of all
+masses; a factor of all torques is therefore judged with the body as described, too.
 
 """
 
@@ -43,23 +43,23 @@ from armid_ros.recording import Recording
 from armid_ros.robots import Robot
 import numpy as np
 
-#: Samples below which nothing can be asked.
+#: Smallest number of samples for a test.
 _FEWEST = 40
 
 
 @dataclass(frozen=True)
 class Mistake:
     """
-    A mistake that a recording shows.
+    A mistake in a recording.
 
     Attributes
     ----------
     hypotheses : tuple of Hypothesis
-        The one that explains most, and those that explain as much.
+        Hypothesis with the largest likelihood ratio, and equally likely ones.
     before, after : PredictionError
-        As recorded, and with the mistake put right.
+        Errors as recorded, and after correction of the mistake.
     fitted : bool
-        Whether the body was fitted, too.
+        Whether the body was fitted as well.
 
     """
 
@@ -113,7 +113,7 @@ def find_mistake(robot: Robot, recording: Recording, used: Conditioning) -> Mist
     Parameters
     ----------
     robot : Robot
-        The description.
+        Robot of the description.
     recording : Recording
         Data with torques.
     used : Conditioning
@@ -122,7 +122,7 @@ def find_mistake(robot: Robot, recording: Recording, used: Conditioning) -> Mist
     Returns
     -------
     Mistake or None
-        None where the data are best as they are, or the links may be what is wrong.
+        None if the data are best as recorded, or if errors of the links may be the cause.
 
     """
     slow = slow_motions([recording], used)
@@ -133,7 +133,7 @@ def find_mistake(robot: Robot, recording: Recording, used: Conditioning) -> Mist
     if near is None or described is None or bare is None:
         return None
     without = described.least(bare)
-    # whether a fitted body alone leaves enough to show what is wrong
+    # whether the residual with a fitted body alone is large enough to reveal a mistake
     alone = bool(100.0 * near.joints.max() >= LIMITS.poor)
     exact = PredictionError(np.zeros(robot.n_joints), without.torque)
     if without.gain(exact) < LIMITS.gain and not alone:
@@ -148,7 +148,7 @@ def find_mistake(robot: Robot, recording: Recording, used: Conditioning) -> Mist
                 continue
             price, fitted = LIMITS.gain**one.values, near
             ratio = without.gain(after) / price
-            # a fitted body follows any factor of a torque
+            # a fitted body can explain any factor of a torque
             if ratio >= 1.0 or (alone and one.kind != 'unit' and not one.of_masses):
                 fitted = _error(robot, slow, one, near=True) or near
             found.append(_Row(one, after, ratio, fitted, near.gain(fitted) / price))
@@ -158,7 +158,7 @@ def find_mistake(robot: Robot, recording: Recording, used: Conditioning) -> Mist
     tried = rows([*hypotheses(robot, slow), *([] if late is None else [delayed(*late)])])
     for ratio in ('as_described', 'as_fitted'):
         tried += rows(max(tried, key=attrgetter(ratio)).hypothesis.nearby())
-    # what explains most: more than any body near the description does, if it can
+    # first choice: hypotheses that explain more than any body near the description
     sure = [row for row in tried if _predicts(robot, row) and row.as_described >= 1.0]
     both = [row for row in sure if row.as_fitted >= 1.0]
     if both:
@@ -189,7 +189,7 @@ def _error(
     robot: Robot, slow: Sequence[Motion], one: Hypothesis, *, near: bool
 ) -> PredictionError | None:
     """Return the prediction error of a hypothesis; None if too few samples remain."""
-    # twenty for every value of a link
+    # 200 samples: twenty for every value of a link
     motion = thinned([one.motion(motion) for motion in slow], 200)
     if motion is None or len(motion) < _FEWEST:
         return None
@@ -197,7 +197,7 @@ def _error(
 
 
 def _first(rows: Sequence[_Row], ratio: str, before: PredictionError) -> Mistake:
-    """Return the hypothesis with the largest ratio, and its equals of other kinds."""
+    """Return the mistake with the largest ratio, and equally likely ones of other kinds."""
     value = attrgetter(ratio)
     first, *others = sorted(rows, key=value, reverse=True)
     likely = {first.hypothesis.kind: first.hypothesis}

@@ -1,10 +1,10 @@
 # Copyright 2026 The armid_ros developers
 # SPDX-License-Identifier: Apache-2.0
 """
-How well an arm predicts a recording.
+Error of an arm's torque prediction for a recording.
 
 Friction, offset and drive inertia of every joint are fitted. The body is that of the description,
-or the likeliest of those near it.
+or the most likely body near it.
 
 """
 
@@ -21,9 +21,9 @@ from armid_ros.motion import FloatArray, Motion
 from armid_ros.robots import Robot
 import numpy as np
 
-#: Columns of each joint's own: offset, viscous and Coulomb friction, drive inertia.
+#: Number of own columns of each joint: offset, viscous and Coulomb friction, drive inertia.
 _OWN = 4
-#: A joint below this share of its top speed may be held by its friction, with any torque.
+#: Share of its top speed below which a joint may be held by friction with any torque.
 SLOW = 0.05
 
 
@@ -35,7 +35,7 @@ class PredictionError:
     Attributes
     ----------
     joints : ndarray, shape (n,)
-        Of each joint, as a share of its torque.
+        Error of each joint, as a share of its torque.
     torque : ndarray, shape (n,)
         Root mean square torque of each joint [N m or N].
     off : float
@@ -60,8 +60,8 @@ class PredictionError:
         """
         Return the likelihood ratio of another prediction, per independent sample.
 
-        It is that of two models with unknown noise, times that of their bodies by the prior of
-        the description. Errors below the floor and above the torque itself count as that much.
+        It is the ratio of two models with unknown noise, times that of their bodies by the prior
+        of the description. Errors are limited to the range from the floor to the torque itself.
 
         """
         return self.of_data(better) * float(np.exp((self.off - better.off) / (2.0 * FREEDOM)))
@@ -72,12 +72,12 @@ class PredictionError:
         return float(np.prod(before / after))
 
     def least(self, other: PredictionError) -> PredictionError:
-        """Return the smaller error of every joint."""
+        """Return the smaller one of two errors for every joint."""
         return replace(self, joints=np.minimum(self.joints, other.joints))
 
 
 def thinned(stretches: Sequence[Motion], rows: int) -> Motion | None:
-    """Concatenate stretches with torques, and thin them to about a number of samples."""
+    """Concatenate stretches with torques, and keep about `rows` evenly spaced samples."""
     parts = [motion for motion in stretches if motion.tau is not None and len(motion) > 2]
     if not parts:
         return None
@@ -91,19 +91,19 @@ def prediction_error(robot: Robot, motion: Motion, *, near: bool) -> PredictionE
     """
     Fit friction, offset and drive inertia of every joint; return the prediction error.
 
-    Friction and the inertia of a drive are not below zero: they explain no torque of the opposite
-    sign.
+    Friction and drive inertia are bounded below by zero, so they explain no torque of the
+    opposite sign.
 
     Parameters
     ----------
     robot : Robot
-        The description.
+        Robot of the description.
     motion : Motion
         N samples with torque.
     near : bool
-        Whether the body is fitted too: parameters of a description are off by a uniform density
-        as wide as they may be, errors are those of a good identification, and a recording has few
-        independent values of them.
+        Whether the body is fitted too. The prior of its parameters is a uniform density over
+        their possible errors; residuals are those of a good identification, with few independent
+        values in a recording.
 
     """
     assert motion.tau is not None
@@ -145,7 +145,7 @@ def common_values(motion: Motion, fixed: FloatArray, columns: FloatArray) -> Flo
     motion : Motion
         N samples with torque.
     fixed : ndarray, shape (N, n)
-        Torque that is known [N m or N].
+        Known part of the torque [N m or N].
     columns : ndarray, shape (N, n, k)
         Regressor of the values.
 
@@ -162,7 +162,7 @@ def common_values(motion: Motion, fixed: FloatArray, columns: FloatArray) -> Flo
     own = _own_columns(motion) * weight
     both = beside(own.transpose(1, 0, 2), both.transpose(1, 0, 2))
     values, size = np.empty(0), np.ones(len(both))
-    # the first pass tells how much each fit leaves
+    # residuals of a pass give the weights of the next one
     for _ in range(4):
         stacked = (both / size[:, np.newaxis, np.newaxis]).reshape(-1, both.shape[2])
         values = np.asarray(np.linalg.lstsq(stacked[:, :-1], stacked[:, -1], rcond=None)[0])
@@ -173,14 +173,14 @@ def common_values(motion: Motion, fixed: FloatArray, columns: FloatArray) -> Flo
 
 def beside(own: FloatArray, shared: FloatArray) -> FloatArray:
     """
-    Project the own columns of each joint out of others (Frisch and Waugh 1933).
+    Project the own columns of each joint out of shared columns (Frisch and Waugh 1933).
 
     Parameters
     ----------
     own : ndarray, shape (n, M, k)
         Columns with a mean square of about one.
     shared : ndarray, shape (n, M, c)
-        Others.
+        Columns to project.
 
     Returns
     -------
@@ -207,8 +207,8 @@ def _own_columns(motion: Motion) -> FloatArray:
 
 def _weight(motion: Motion) -> FloatArray:
     """Return weights of rows, shape (N, n), of mean square one."""
-    # They are zero where a joint rests or turns round. Dry friction is any torque there: a bristle
-    # that gives way before it slips looks like a torque that comes late.
+    # They are zero where a joint rests or reverses. Dry friction is arbitrary there: presliding
+    # looks like a delayed torque.
     speed = np.abs(motion.dq)
     moves = speed > SLOW * speed.max(axis=0)
     moves[:, ~moves.any(axis=0)] = True

@@ -1,12 +1,12 @@
 # Copyright 2026 The armid_ros developers
 # SPDX-License-Identifier: Apache-2.0
 """
-Faults that readings show by themselves: dead sensors, velocities, clocks, joints held elsewhere.
+Faults visible in the readings: dead sensors, velocities, clocks, joints held elsewhere.
 
-A joint may be locked: its reading stays the same and its velocity is zero. A reading that does not
-change by one count is dead where the recorded velocity goes on. A passive joint and a drive at its
-limit have a torque that does not change, too: the model takes next to none of the one, and the
-other is the highest there is.
+The reading of a locked joint is constant and its velocity is zero. A constant reading is dead
+only if the recorded velocity is not zero. A passive joint and a drive at its limit have a constant
+torque, too. The model predicts hardly any torque for the passive joint, and the drive at its limit
+has its largest torque.
 
 """
 
@@ -30,33 +30,32 @@ from armid_ros.robots import described_at, held_joints, HeldJoint, Robot
 import numpy as np
 from scipy.integrate import cumulative_trapezoid
 
-#: A step of a position at this multiple of the highest velocity, or of what so many percent of
-#: the steps have, is none of the arm; one that is undone within so many samples is repaired.
+#: A step is no motion if its velocity is this multiple of the limit and of this percentile
+#: of all steps. A step that reverts within so many samples is repaired (`damage`).
 _IMPOSSIBLE, _USUAL, _BRIDGED = 10.0, 99.0, 10
-#: Range of a Brownian bridge over its scale that chance exceeds once in a million (Kuiper 1960).
+#: Range of a Brownian bridge over its scale with a probability of 1e-6 (Kuiper 1960).
 _WALK = 3.0
-#: Share of the way of a joint that the integral of a constant speed may miss: clocks and units are
-#: off by less, and a joint that turns round misses half of it.
+#: Largest error of the integral of a constant speed, as a share of the distance. Errors of clocks
+#: and units are smaller, and a reversal of the joint makes half of the distance.
 _WAY = 0.1
-#: A torque is dead that stays the same for so long [s], while the joint goes so far of its way
-#: and what the model takes changes by so much of weight or inertia: of a passive one they cancel.
+#: Least time [s], and least share of the joint's range, over which a constant channel is dead.
+#: Least change of its load over weight or inertia, which cancel in a passive joint.
 _LONG, _FAR, _TAKEN = 1.0, 0.2, 0.5
-#: Velocities are integrated over pieces of at most so many seconds, which is a period and more of
-#: what arms do: their noise adds up to a walk. What a joint of constant speed leaves its line by
-#: [rad or m].
+#: Longest piece over which velocities are integrated [s], above a usual period: integrated noise
+#: is a random walk. Largest RMS distance of a position from a line at constant speed [rad or m].
 _PIECE, _STEADY = 10.0, 0.1 * REST_RANGE
-#: Correlation from which a ratio is a plain factor: a low-pass that takes a twentieth of a
-#: velocity delays it by a phase whose cosine is 0.95. Factors that are one differ by less than
-#: the second.
+#: Correlation from which a ratio is a plain factor: a low-pass that removes a twentieth of a
+#: velocity delays it by a phase whose cosine is 0.95. Largest relative difference of the ratios of
+#: joints with a common factor.
 _PLAIN, _ALIKE = 0.98, 0.02
-#: A common factor is one from so much on. A twentieth of the time is a tenth of what inertia
-#: takes; scales of encoders and clocks are wrong by a hundredth at most, and so is the integral.
+#: Smallest deviation of a common factor from 1 that is a fault. A twentieth of the time is a tenth
+#: of the torque of inertia; errors of encoders, clocks and the integral are a hundredth at most.
 _TOLERANCE = 0.05
-#: A velocity of this correlation with what its position does, within this factor of a unit, is in
-#: that unit: half of its power follows, and no other unit or sign is near.
+#: Smallest correlation of a velocity with that of its position, and largest ratio to the factor of
+#: a unit, for a velocity in that unit: half of its power is explained, and other units are far.
 _FOLLOWS, _NEAR = 0.7, 1.25
 _DEGREE = float(np.deg2rad(1.0))
-#: Velocities over those of the positions, and what is wrong with them.
+#: Ratios of velocities to those of the positions, and the fault that each indicates.
 _RATIOS = {
     1.0 / _DEGREE: 'are in degrees/s while positions are in rad',
     _DEGREE: 'are in rad/s while positions are in degrees',
@@ -72,11 +71,11 @@ class Fault:
     Attributes
     ----------
     what : str
-        Joint, what is wrong and what to do, without the recording and without a full stop.
+        Joint, fault and remedy, without the recording and without a full stop.
     word : {'good', 'poor', 'unusable'}
-        The best grade of an identification of it; 'good' where it is only worth knowing.
+        The best possible grade of an identification with the fault; 'good' for a mere note.
     source : str or None
-        The recording; None where it is of all of them.
+        The recording; None if all recordings have the fault.
 
     """
 
@@ -101,7 +100,7 @@ def sensor_faults(
     Parameters
     ----------
     arm : ArmModel
-        What the data are compared with.
+        Model that the data are compared with.
     recordings : sequence of Recording
         The data as they were recorded, with torques.
     rows : sequence of Stretch
@@ -118,7 +117,7 @@ def sensor_faults(
         if one.report.restarted:
             yield Fault(
                 f'the clock jumped back; {one.report.restarted} of {one.report.messages} '
-                'messages, on the shorter side of it, are left out',
+                'messages, on the shorter side of the jump, are left out',
                 'good',
                 one.source,
             )
@@ -162,13 +161,13 @@ def encoder_faults(recording: Recording, units: Sequence[str] | None = None) -> 
         return
     t, units = recording.t, units or ('rad',) * recording.n_joints
     moved = np.ptp(recording.q, axis=0)
-    # A wheel or a turntable may go at constant speed: then its way is the integral of that.
+    # A wheel or a turntable may have constant speed, whose integral is its distance.
     way = np.ptp(recording.q - recording.dq * (t - t[0])[:, np.newaxis], axis=0)
     changes = np.ptp(recording.dq, axis=0) > 0.0
-    measured = bool(np.any((moved > REST_RANGE) & changes))  # or the driver has no velocities
+    measured = bool(np.any((moved > REST_RANGE) & changes))  # or the driver sends no velocities
     for j, (joint, unit) in enumerate(zip(recording.joints, units, strict=True)):
         start, stop = _longest_same(recording.q[:, j])
-        # a step of the encoder, and as much as a joint at rest goes
+        # range of a joint at rest, plus a step of the encoder
         steps = np.abs(np.diff(recording.q[:, j]))
         hidden = REST_RANGE + (float(steps[steps > 0.0].min()) if steps.any() else 0.0)
         goes = _distance(t[start:stop], recording.dq[start:stop, j])
@@ -245,7 +244,7 @@ def _distance(t: FloatArray, dq: FloatArray) -> float:
         return 0.0
     way = cumulative_trapezoid(dq, t, initial=0.0)
     way -= (t - t[0]) * way[-1] / (t[-1] - t[0])
-    # white noise of which second differences have six times the variance adds up to a walk
+    # white noise, by its second differences of six times the variance, adds up to a random walk
     noise = float(np.mean(np.diff(dq, 2) ** 2)) / 6.0
     return max(float(np.ptp(way)) - _WALK * float(np.sqrt(noise * np.sum(np.diff(t) ** 2))), 0.0)
 
@@ -254,22 +253,22 @@ def velocity_ratio(recording: Recording) -> tuple[FloatArray, FloatArray]:
     """
     Compare velocities of a recording with its positions, in the recorded time.
 
-    The integral of a velocity is compared with the position: noise and steps of a position that
-    would be differentiated do not matter, and neither do time stamps that jitter.
+    The integral of a velocity is compared with the position, so that noise and steps of positions
+    and jitter of time stamps do not matter.
 
     Returns
     -------
     ratio : ndarray, shape (n,)
-        Recorded velocities over those that positions have; NaN where a joint rests, or goes at
-        constant speed, and where none are recorded.
+        Recorded velocities over those of the positions; NaN where a joint rests or has constant
+        speed, and where no velocities are recorded.
     fit : ndarray, shape (n,)
-        Correlation of the two; 0 where there is none.
+        Correlation of the two; 0 where the ratio is NaN.
 
     """
     nothing = np.full(recording.n_joints, np.nan), np.zeros(recording.n_joints)
     if recording.dq is None:
         return nothing
-    # positions and integrated velocities of unbroken pieces, both without their line
+    # positions and integrated velocities of unbroken pieces, both without their linear trend
     pairs = []
     for stretch in unbroken(recording, 1.0 / recording.period):
         duration = recording.t[stretch[-1]] - recording.t[stretch[0]]
@@ -283,7 +282,7 @@ def velocity_ratio(recording: Recording) -> tuple[FloatArray, FloatArray]:
         return nothing
     moved, made = (np.concatenate(parts) for parts in zip(*pairs, strict=True))
     product, own, other = np.sum(moved * made, 0), np.sum(moved**2, 0), np.sum(made**2, 0)
-    # A joint of constant speed has nothing but its line, and noise.
+    # A joint of constant speed has only a linear trend and noise.
     rests = (np.ptp(recording.q, axis=0) < REST_RANGE) | (own < len(moved) * _STEADY**2)
     size = np.sqrt(own * other)
     return (
@@ -296,8 +295,8 @@ def velocity_faults(recording: Recording) -> Iterator[Fault]:
     """
     Yield faults of velocities against positions: time base, unit or sign.
 
-    Identification takes velocities from the positions, so that a unit or a sign spoils nothing.
-    Of a wrong time two joints at least have to agree, and no other that moves may disagree.
+    Identification differentiates the positions, so a wrong unit or sign of velocities is harmless.
+    A wrong time base needs at least two joints that agree, and no moving joint that disagrees.
 
     """
     ratio, fit = velocity_ratio(recording)
@@ -307,7 +306,7 @@ def velocity_faults(recording: Recording) -> Iterator[Fault]:
     if not known and np.all(np.abs(plain / factor - 1.0) <= _ALIKE):
         yield Fault(
             f'velocities of all joints that move are {factor:.3g} times what positions do in the '
-            f'recorded time. Either time stamps run {factor:.3g} times as long as it took, and '
+            f'recorded time. Either time stamps run {factor:.3g} times the true time, and '
             'inertias are off by the square of that, or velocities are in another unit. Correct '
             'which it is',
             'poor',
@@ -328,18 +327,18 @@ def held_elsewhere(
     """
     Yield undriven joints that were at another position, if that matters.
 
-    Where such a joint moves, or stands elsewhere and carries driven joints, the arm is another one
-    than the model; how much that matters is what its position makes of the described torque along
-    the recorded motion, beside the torque that was measured.
+    If such a joint moves, or carries driven joints at another position, the arm differs from the
+    model. The size of this error is the change of the described torque along the recorded motion,
+    over the measured torque.
 
     Parameters
     ----------
     robot : Robot
-        Whose description it is.
+        Robot of the description.
     recordings : sequence of Recording
-        With the range of joints that were not asked for.
+        Recordings with the ranges of all other joints.
     motions : sequence of Motion
-        Of the driven joints, with their torque.
+        Motions of the driven joints, with torques.
 
     """
     for joint in held_joints(robot):
@@ -349,10 +348,9 @@ def held_elsewhere(
         lowest, highest = min(one.lowest for one in seen), max(one.highest for one in seen)
         moves = highest - lowest > REST_RANGE
         if not (moves or joint.carries):
-            continue  # a part of the body that carries it, in whatever position
-        # the largest change of the described torque between places, as a share
-        # places of its range at which a joint that moves is compared: weight and inertia may be
-        # the same at both ends, as those of a link that swings as far to either side
+            continue  # a fixed part of the body that carries it
+        # largest relative change of the described torque between positions of the joint; several
+        # positions, as weight and inertia may be equal at both ends of the range
         places = [*np.linspace(lowest, highest, 7 if moves else 1), joint.position]
         robots = [described_at(robot, {joint.name: place}) for place in places]
         described = [np.concatenate([inverse_dynamics(r, m) for m in motions]) for r in robots]
@@ -380,6 +378,6 @@ def _elsewhere(joint: HeldJoint, lowest: float, highest: float, moves: bool, mak
     remedy = 'drive it as well (--joints), or hold it still where its torque is not measured'
     return (
         f'joint {name} is not driven, but moves from {lowest:.3g} to {highest:.3g} '
-        f'{unit}{carries}; {model}; where it is makes up to {makes}; '
+        f'{unit}{carries}; {model}; its position makes up to {makes}; '
         f'{"leave out where it moves" if joint.follows else remedy}'
     )

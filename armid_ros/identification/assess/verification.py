@@ -1,16 +1,16 @@
 # Copyright 2026 The armid_ros developers
 # SPDX-License-Identifier: Apache-2.0
 """
-What an identification is put to beside its torque error, and what came of it.
+Further tests of an identification, in addition to its torque error.
 
-Encoder noise is tested for on the training data; on held-out data the description and the
-identified arm are simulated in closed loop. What cannot be done is said, with the reason.
+Bias by encoder noise is tested on the training data. The description and the identified arm are
+simulated in closed loop along held-out data. Tests that are impossible are listed with reasons.
 
-In a forward validation a model is driven by recorded torques, and its positions are looked at. The
-model is given the recorded torque and, since errors of an integrated torque grow without bounds, a
-feedback that holds it to the recorded motion: tau = tau_recorded + M (omega^2 e + 2 omega de). A
-joint that would need a torque error d more than it gets is off by about d / (M omega^2). The
-feedback has one inertia matrix for every model, so that their errors compare.
+In a forward validation, a model is driven by recorded torques, and its positions are compared with
+the recorded ones. Errors of an integrated torque grow without bounds, so feedback holds the model
+near the recorded motion: tau = tau_recorded + M (omega^2 e + 2 omega de). A torque error d of a
+joint makes a position error of about d / (M omega^2). The feedback has the same inertia matrix for
+every model, so that errors are comparable.
 
 """
 
@@ -31,14 +31,14 @@ from armid_ros.simulation import Controller, Plant, simulate
 from armid_ros.simulation.controller import LinearFeedback
 import numpy as np
 
-#: Motion that is simulated, shared by the held-out recordings, which takes a tenth of that; and at
-#: most this much of one recording [s].
+#: Total simulated motion of all held-out recordings, and of one recording at most [s]. Simulation
+#: takes a tenth of that time.
 _SIMULATED, _LONGEST = 60.0, 30.0
-#: A joint is worse where its error grows by this share, and by this share of the largest error of
-#: joints of its kind; reversals of friction vary by less from one model to the next.
+#: Growth of an error that counts as worse, as a share of it and of the largest error of joints of
+#: the same unit; reversals of friction vary by less between models.
 _WORSE = 0.05
-#: Natural frequency of the feedback [rad/s]: 8 Hz, as of arms. A softer one would leave a light
-#: joint to its friction, whose sign at a reversal no model has to the millisecond.
+#: Natural frequency of the feedback [rad/s]: 8 Hz, as of arms. With less, a light joint depends on
+#: its friction, whose change of sign at a reversal no model predicts to the millisecond.
 _BANDWIDTH = 50.0
 
 Progress = Callable[[float, str], None]
@@ -52,7 +52,7 @@ class ForwardScore:
     Attributes
     ----------
     source : str
-        The recording.
+        Source of the recording.
     joints, units : tuple of str
         Joints in column order, and the units of their positions.
     position_error : ndarray, shape (n,)
@@ -60,9 +60,9 @@ class ForwardScore:
     torque_error : ndarray, shape (n,)
         Root mean square of recorded minus predicted torque, filtered as for the fit [N m].
     feedback_torque : ndarray, shape (n,)
-        Root mean square of what the feedback had to add [N m].
+        Root mean square torque of the feedback [N m].
     motion : Motion
-        What was recorded, filtered.
+        Recorded motion, filtered.
     simulated : ndarray, shape (N, n)
         Position of the simulated arm [rad or m].
 
@@ -132,8 +132,8 @@ def forward_validation(
     used : Conditioning
         Filters of the identification.
     nominal : ArmModel, optional
-        Gives the inertia matrix of the feedback; the same for all models that are compared, by
-        default the model itself.
+        Model with the inertia matrix of the feedback, the same for all compared models; by default
+        the model itself.
     duration : float
         At most this much of the first unbroken stretch is simulated [s].
 
@@ -147,7 +147,7 @@ def forward_validation(
     IdentificationError
         If no stretch of the recording can be filtered.
     ModelError
-        If the arm cannot be simulated, as when its links are no bodies.
+        If the arm cannot be simulated, for example because its links are not physical.
 
     """
     motion = next(iter(segments(recording, used)), None)
@@ -158,7 +158,7 @@ def forward_validation(
     feedback = LinearFeedback.of(nominal or arm, bandwidth=_BANDWIDTH, weighs=False)
     controller = _RecordedTorque(reference, feedback)
     along = arm.along(reference)
-    # no joint gets to a limit this far away [rad or m]
+    # limits so far away that no joint reaches them [rad or m]
     far, free = np.full(motion.n_joints, 1e4), np.full(motion.n_joints, np.inf)
     robot = replace(along.robot, lower=-far, upper=far, velocity_limit=free, torque_limit=free)
     plant = Plant(replace(along, robot=robot), hard_stops=False)
@@ -188,7 +188,7 @@ class ForwardValidation:
     Attributes
     ----------
     before, after : ForwardScore or None
-        Of the description and of the identified arm; None if it cannot be simulated.
+        Scores of the description and of the identified arm; None if it cannot be simulated.
 
     """
 
@@ -238,11 +238,11 @@ class Verification:
     Attributes
     ----------
     noise : NoiseCheck or None
-        What encoder noise does to it; None if that could not be found out.
+        Effect of encoder noise; None if it was not tested.
     forward : tuple of ForwardValidation
         Simulations along held-out recordings.
     left_out : tuple of str
-        What was not done, and why.
+        Tests that were not made, with reasons.
 
     """
 
@@ -273,18 +273,18 @@ def verify(
     result : Identification
         The identification.
     description : ArmModel
-        The model before it.
+        Model before the identification.
     recordings, held_out : sequence of Recording
-        What it was fitted to, and what it was not.
+        Training data, and held-out data.
     rng : numpy.random.Generator
-        Draws the noise of the simulations.
+        Generator of the noise of the simulations.
     progress : callable, optional
-        Told the share that is done, 0 to 1, and what is being done.
+        Called with the finished share, 0 to 1, and the present task.
 
     """
     left_out = []
     noise = None
-    # enough samples to tell the bias of encoder noise, all simulations together
+    # number of simulations with enough samples in total for the bias of encoder noise
     repeats = 300_000 // max(1, sum(len(recording) for recording in recordings))
     try:
         noise = check_noise(
@@ -316,20 +316,20 @@ def simulate_held_out(
     Parameters
     ----------
     before, after : ArmModel
-        What was believed, and what was found; the second one gives the feedback of both.
+        Description and identified arm; the second one defines the feedback of both.
     used : Conditioning
         Filters.
     held_out : sequence of Recording
-        Data that neither was fitted to.
+        Data that neither model was fitted to.
     progress : callable, optional
-        Told the share that is done, 0 to 1, and what is being done.
+        Called with the finished share, 0 to 1, and the present task.
 
     Returns
     -------
     pairs : tuple of ForwardValidation
-        One a recording that could be simulated.
+        Results, one per simulated recording.
     left_out : tuple of str
-        What was not done, and why.
+        Tests that were not made, with reasons.
 
     """
     if not held_out:

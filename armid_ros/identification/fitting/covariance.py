@@ -1,12 +1,12 @@
 # Copyright 2026 The armid_ros developers
 # SPDX-License-Identifier: Apache-2.0
 """
-Covariances of estimates whose errors are not those of white noise: bread, middle, bread.
+Sandwich covariances, bread middle bread', of estimates whose errors are not white noise.
 
-The bread is the inverse of the products of the columns, the middle the covariance of the products
-of columns and noise. The spectrum of the residuals tells it (`noise_products`), or neighbouring
-scores (`score_products`). What a model gets wrong differs from motion to motion: recordings that
-are left out show by how much (`scatter`).
+The bread is the inverse of the products of the columns. The middle is the covariance of the
+products of columns and noise; it follows from the spectrum of the residuals (`noise_products`) or
+from neighbouring scores (`score_products`). Model errors differ between motions: `scatter`
+measures this by leaving out recordings.
 
 """
 
@@ -22,9 +22,9 @@ import numpy.typing as npt
 from scipy import fft
 import scipy.linalg
 
-#: Order of the autoregression that whitens residuals: the slopes of drift, and one resonance.
+#: Order of the autoregression that whitens residuals: enough for drift and one resonance.
 AR_ORDER = 3
-#: Least share of the noise that a residual is taken to have kept in a band.
+#: Lower bound of the share of the noise that remains in the residual of a band.
 LEAST_LEFT = 0.1
 
 
@@ -47,9 +47,9 @@ def score_products(scores: Sequence[FloatArray], lags: int) -> FloatArray:
     Parameters
     ----------
     scores : sequence of ndarray, each of shape (M, p)
-        Of the rows of each stretch.
+        Scores of the rows of each stretch.
     lags : int
-        Rows over which errors may last.
+        Number of rows over which errors may be correlated.
 
     Returns
     -------
@@ -66,7 +66,7 @@ def score_products(scores: Sequence[FloatArray], lags: int) -> FloatArray:
 
 
 def widened(covariance: FloatArray, bread: FloatArray, middle: FloatArray) -> FloatArray:
-    """Widen a covariance, (p, p), to at least the deviations of another middle."""
+    """Widen a covariance, (p, p), to at least the deviations of the sandwich of `middle`."""
     ratio = np.diag(bread @ middle @ bread) / np.diag(covariance)
     factor = np.sqrt(np.maximum(ratio, 1.0))
     return np.asarray(covariance * np.outer(factor, factor))
@@ -82,11 +82,10 @@ def noise_products(
     """
     Return the covariance of the products of columns and noise, W' n.
 
-    The noise of each joint is coloured, with a spectrum Phi that its residual tells; noises of
-    different joints are taken as independent, those of different stretches too. A fit takes most
-    of the noise where the regressor has its power, so the residual has less of it there: at a
-    frequency of a joint the share x^H H^-1 x of what was, x being the transform of the joint's
-    rows, its leverage.
+    The noise of each joint is coloured, with a spectrum Phi that is estimated from its residual.
+    Noise is taken as independent between joints and between stretches. A fit removes noise where
+    the regressor has its power. At a frequency of a joint, it removes the share x^H H^-1 x, the
+    leverage, where x is the transform of the joint's rows.
 
     Parameters
     ----------
@@ -136,8 +135,8 @@ def _noise_spectrum(
     """Estimate the power of noise (M + 1,) on the bins of an rfft from a residual (M,)."""
     count = len(residual)
     size = 2 * count
-    # the autocovariance of the samples that tell something, over as many pairs as there are
-    # (Parzen 1963), without the negative power that it may have where there are gaps
+    # the autocovariance of the informative samples, over the number of their pairs (Parzen
+    # 1963), without the negative power that gaps may cause
     sums, pairs = (
         np.fft.irfft(np.abs(np.fft.rfft(signal, size)) ** 2)[:count]
         for signal in (residual, told.astype(float))
@@ -155,11 +154,11 @@ def _noise_spectrum(
         filtered = np.fft.rfft(np.concatenate([[1.0], -coefficients]), size)
         whitening = np.abs(filtered) ** 2
     lags = np.fft.irfft(power * whitening, size)[: count // 2]
-    # how many lags matter: four times the first at which the correlation is noise
+    # number of relevant lags: four times the first lag at which the correlation is noise
     quiet = np.abs(lags) < 2.0 / np.sqrt(count) * max(lags[0], 1e-300)
     first = int(np.argmax(quiet)) if np.any(quiet) else len(lags)
     reach = int(np.clip(4 * first, min(10, len(lags)), len(lags)))
-    # what the fit took is made up for in the same band
+    # the share that the fit removed is corrected in the same band
     left = _smoothed(1.0 - leverage, reach).clip(LEAST_LEFT)
     return np.asarray(_smoothed(power * whitening, reach).clip(0.0) / left / whitening)
 
@@ -178,25 +177,25 @@ def _smoothed(spectrum: FloatArray, reach: int) -> FloatArray:
 
 def scatter(problem: Sequence[Regression], weights: FloatArray, values: FloatArray) -> FloatArray:
     """
-    Return jackknife changes of the values, whose squares sum up to a variance.
+    Return jackknife changes of the values, whose sum of squares is their variance.
 
-    A change counts by what the other recordings determine of the value: for white noise the
-    squares then sum up to the variance of least squares, also where one recording determines most
-    of a value. A value that the others do not determine has no change.
+    A change is weighted by how well the other recordings determine the value. For white noise, the
+    sum of squares is then the variance of least squares, also if one recording determines most of
+    a value. A value that the others do not determine has no change.
 
     Parameters
     ----------
     problem : sequence of Regression
         N rows of r columns.
     weights : ndarray, shape (N, n)
-        What the fit multiplied the rows of every joint by.
+        Factors of the rows in the fit.
     values : ndarray, shape (r,)
-        What was fitted.
+        Fitted values.
 
     Returns
     -------
     ndarray, shape (K, r)
-        For each of K recordings; empty for a single one.
+        Changes without each of K recordings; empty for a single recording.
 
     References
     ----------
@@ -224,6 +223,6 @@ def scatter(problem: Sequence[Regression], weights: FloatArray, values: FloatArr
 
 
 def _solution(products: FloatArray) -> tuple[FloatArray, FloatArray]:
-    """Return means and deviations, (p,), of normal equations (p, p + 1); zero if unseen."""
+    """Return solution and deviations (p,) of normal equations (p, p + 1); 0 if undetermined."""
     basis = informative_basis(products[:, :-1])
     return basis @ (basis.T @ products[:, -1]), np.sqrt(np.sum(basis**2, axis=1))

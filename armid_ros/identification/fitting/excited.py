@@ -1,12 +1,12 @@
 # Copyright 2026 The armid_ros developers
 # SPDX-License-Identifier: Apache-2.0
 """
-What certain data determine of an arm's parameters, and the bounds of that.
+Parameters of an arm that given data determine, and their bounds.
 
-What a motion does not tell apart is grouped. What data determine worse than the description does
-stays as described: the mean squared error of an estimate without bias is its variance, that of the
-description what it may be off by. Where joints are moved one after the other, a column that other
-joints make is small and not a part of others: a value that is fitted to it is what noise makes it.
+Parameters that a motion does not separate are grouped. Parameters that the data determine worse
+than the description keep their described values: the mean squared error of an unbiased estimate is
+its variance, and that of the description its largest expected error squared. If joints move one
+after the other, coupling columns are small but independent, so their values would fit noise.
 
 """
 
@@ -25,8 +25,8 @@ from armid_ros.motion import FloatArray
 from armid_ros.robots import Robot
 import numpy as np
 
-#: Parameters whose column the data separate from the others by less than this share are grouped
-#: with them: 1e-4 of a column's length is far below what noise leaves of it.
+#: Share of a column that is independent of the others, below which its parameter is grouped with
+#: them: 1e-4 of the length of a column is far below the noise.
 EXCITATION_TOLERANCE = 1e-4
 
 
@@ -39,16 +39,16 @@ def excited(
     Parameters
     ----------
     theory : BaseParameters
-        What any motion can tell apart.
+        Base parameters that are identifiable in some motion.
     problem : sequence of Regression
-        The columns that theory keeps, along this motion.
+        Columns of `theory` along this motion.
 
     Returns
     -------
     base : BaseParameters
-        What this motion tells apart.
+        Base parameters that are identifiable in this motion.
     problem : tuple of Regression
-        The columns of that.
+        Columns of `base`.
 
     """
     base, kept = identifiable_base(theory, NormalEquations.of(problem))
@@ -64,16 +64,16 @@ def identifiable_base(
     Parameters
     ----------
     theory : BaseParameters
-        What any motion can tell apart.
+        Base parameters that are identifiable in some motion.
     normal : NormalEquations
-        Rows in the columns that theory keeps.
+        Normal equations in the columns of `theory`.
 
     Returns
     -------
     base : BaseParameters
-        What these rows tell apart.
+        Base parameters that these rows identify.
     kept : list of int
-        Which of the columns it keeps.
+        Indices of its columns among those of `theory`.
 
     """
     names = tuple(theory.standard[column] for column in theory.independent)
@@ -100,27 +100,27 @@ def determined(
     """
     Hold parameters at the description if it is more certain than the data.
 
-    The others get surer by what is held, so that one is held at a time.
+    One parameter is held at a time, as this makes the others more certain.
 
     Parameters
     ----------
     arm : ArmModel
-        The description.
+        Arm as described.
     base : BaseParameters
-        What the data tell apart.
+        Base parameters that the data identify.
     problem : sequence of Regression
-        Its columns.
+        Columns of `base`.
     method : {'ols', 'wls', 'irls'}
-        Of the fit.
+        Weights of the fit; see ``solve``.
 
     Returns
     -------
     base : BaseParameters
-        What the data determine.
+        Base parameters that are fitted.
     problem : tuple of Regression
-        Its columns, and the torque of what is held as a constant.
+        Columns of these, with the torque of held parameters as a constant.
     solution : Solution
-        Of the problem.
+        Solution of the returned problem.
 
     """
     problem = tuple(problem)
@@ -156,8 +156,7 @@ def base_spread(arm: ArmModel, base: BaseParameters) -> FloatArray:
     """
     Return the largest expected errors of described base parameters, shape (r,).
 
-    Infinite where an effect takes part that does not know the size of its values, and where no
-    link has a mass.
+    Infinite for parameters with an effect of unknown size, and where no link has a mass.
 
     """
     effects = [effect.spread(arm.robot) for effect in arm.effects]

@@ -1,15 +1,15 @@
 # Copyright 2026 The armid_ros developers
 # SPDX-License-Identifier: Apache-2.0
 """
-How well parts of the data predict others: what a fit to its own data does not show.
+Cross-validation: errors of predicting parts of the data from a fit to other parts.
 
-Where motion is too short or too poor, parameters are what the noise makes them; either half then
-gives others, and predicts the other half badly.
+If a motion is too short or too poor, parameters are fitted to noise. Each half of the data then
+yields different parameters and predicts the other half badly.
 
-Where the spectrum of a position stands out of white noise it may still be no motion that a torque
-makes: stamps that jitter, steps of an encoder and slack in a gear look like motion and are
-multiplied by the square of their frequency in the acceleration. Torques tell them apart: the
-cut-off is the one with which torques are predicted best that were not fitted.
+A spectrum of positions above white noise may still not be motion that needs torque. Jitter of
+stamps, steps of an encoder and slack in a gear look like motion, multiplied by the square of their
+frequency in the acceleration. Torques distinguish them: the cut-off is chosen by the prediction of
+held-out torques.
 
 """
 
@@ -28,20 +28,20 @@ from armid_ros.recording import Recording
 import numpy as np
 import numpy.typing as npt
 
-#: Rows that are enough to compare halves and cut-offs: some fifty for every parameter of seven
-#: joints, and some hundred.
+#: Number of rows for the comparison of halves and of cut-offs: about fifty and a hundred for every
+#: parameter of seven joints.
 _OF_HALVES, _OF_CUTOFFS = 4000, 6000
 #: Number of evenly spread windows for the comparison of cut-offs on longer data. Together they
 #: have twice as many rows; at 1 kHz, a filter of 1 Hz loses a tenth of each at its ends.
 _WINDOWS = 8
-#: A cut-off is compared with one lower by this factor.
+#: Ratio of each tested cut-off to the one before.
 _STEP = 0.5
-#: A cut-off that loses more of the rows at the ends of stretches is too low for them.
+#: Smallest share of rows remaining with a cut-off; with less, it is too low for the stretches.
 _KEPT = 0.8
-#: Stretches of the data that are predicted in turn; their losses give the deviation of a mean.
+#: Number of stretches that are predicted in turn; their losses give the standard error of a mean.
 _STRETCHES = 16
-#: Nor is a cut-off lowered for less than a tenth of the error; jitter and slack cost a third and
-#: more on every machine that was tried.
+#: Smallest gain, as a share of the error, for which a cut-off is lowered. Jitter and slack raise
+#: the error by a third or more on every tested machine.
 _NEAR = 0.1
 
 
@@ -53,9 +53,9 @@ class HalvesError:
     Attributes
     ----------
     whole : float
-        Of all joints together [%].
+        Error of all joints together [%].
     joints : ndarray, shape (n,)
-        Of each joint, as a share of its own torque [%].
+        Error of each joint, as a share of its own torque [%].
 
     """
 
@@ -77,16 +77,16 @@ def halves_error(
     problem : sequence of Regression
         N rows of r columns, in the order of time.
     weights : ndarray, shape (N, n)
-        What the fit multiplied the rows of every joint by: the inverse of their residual.
+        Factors of the rows in the fit: inverse residual of each joint.
     described : ndarray, shape (r,)
-        Values of the description, where those stay that a half does not tell.
+        Values of the description, which parameters keep that a half does not determine.
     spread : ndarray, shape (r,), optional
-        What they may be off by; as much as the torque there is if nothing is said.
+        Largest expected errors of these values; by default, errors of the size of the torque.
 
     Returns
     -------
     HalvesError
-        Of the predicted torque.
+        Errors of the predicted torque.
 
     """
     columns, tau, target, told = _some_rows(problem, _OF_HALVES)
@@ -96,10 +96,10 @@ def halves_error(
     halves = slice(0, middle), slice(middle, None)
     left = np.zeros_like(tau)
     for fitted, predicted in (halves, halves[::-1]):
-        # a Bayesian estimate in units of the residual, of changes as large as the description may
-        # be off by, or as the torque there is; without it, what a half does not tell at all would
-        # be any number. Where next to nothing is left, the residual is no unit, and what a half
-        # does not tell stays as it is described
+        # a Bayesian estimate in units of the residual. Its prior allows changes as large as the
+        # expected errors of the description, or as the torque. Without a prior, parameters that
+        # a half does not determine would be arbitrary. With a residual near zero, these
+        # parameters stay as described
         own = weight[fitted]
         stacked = (columns[fitted] * own[:, :, np.newaxis]).reshape(-1, columns.shape[2])
         size = np.sqrt(np.mean(stacked**2, axis=0))
@@ -128,25 +128,25 @@ def cutoff_of_torques(
     """
     Lower the cut-off of positions while that improves held-out torque prediction.
 
-    The highest cut-off is taken whose loss on data that were left out is within a tenth of the
-    least, or one standard deviation (Breiman et al., Classification and Regression Trees, 1984):
-    clean data keep theirs.
+    The chosen cut-off is the highest with a held-out loss within a tenth, or one standard error,
+    of the least. So clean data keep their cut-off. Source of the standard error: Breiman et al.,
+    Classification and Regression Trees, 1984.
 
     Parameters
     ----------
     arm : ArmModel
         Rigid body and effects.
     columns : ndarray of int, shape (r,)
-        Parameters of the arm that any motion tells apart.
+        Parameters of the arm that are identifiable in some motion.
     recordings : sequence of Recording
         Data with torques.
     used : Conditioning
-        Filters with the highest cut-off to be tried.
+        Filters with the highest cut-off to be tested.
 
     Returns
     -------
     Conditioning
-        The same with the cut-off that was chosen.
+        Filters with the chosen cut-off.
 
     """
     recordings = _windows(recordings, 2 * _OF_CUTOFFS * used.decimation)
@@ -175,7 +175,7 @@ def cutoff_of_torques(
 
 
 def _windows(recordings: Sequence[Recording], samples: int) -> list[Recording]:
-    """Cut about a number of samples out of longer recordings, in evenly spread windows."""
+    """Return evenly spread windows of recordings, with about `samples` samples in total."""
     total, size = sum(len(recording) for recording in recordings), samples // _WINDOWS
     if total <= samples:
         return list(recordings)
@@ -191,8 +191,8 @@ def _windows(recordings: Sequence[Recording], samples: int) -> list[Recording]:
 def _shared(
     problem: Sequence[Sequence[Regression]], shorter: Sequence[Sequence[Regression]]
 ) -> list[Regression]:
-    """Return the rows of each recording that a lower cut-off shares."""
-    # It cuts more off the ends, where arms start and stop: other rows have other losses.
+    """Return the rows of each recording that remain with a lower cut-off."""
+    # A lower cut-off removes more rows at the ends, where arms start and stop and losses differ.
     result = []
     for parts, others in zip(problem, shorter, strict=True):
         for part in parts:
@@ -205,17 +205,17 @@ def _shared(
 
 
 def _as_good(losses: FloatArray, best: FloatArray) -> bool:
-    """Whether stretches are predicted as well as by the best, within one standard error."""
+    """Whether losses are as small as the best ones, within one standard error or `_NEAR`."""
     worse = losses - best
     deviation = np.std(worse, ddof=1) / np.sqrt(len(worse))
     return bool(np.mean(worse) <= max(float(deviation), _NEAR))
 
 
 def _losses(problem: Sequence[Regression]) -> FloatArray:
-    """Return the mean log rms error of each stretch, predicted from the others, (S,)."""
-    # every second stretch is predicted from the others, and those from it; every joint counts by
-    # the ratio of its errors: a light one whose torque is mostly noise gains by a low cut-off, and
-    # must not hide that a heavy one loses
+    """Return the held-out loss of each stretch, the mean log rms error of its joints, (S,)."""
+    # odd stretches are predicted from even ones, and vice versa. Every joint counts by the ratio
+    # of its errors: a light joint, whose torque is mostly noise, gains by a low cut-off and must
+    # not hide that a heavy one loses
     x, _, y, told = _some_rows(problem, _OF_CUTOFFS)
     stretch = np.arange(len(y)) * _STRETCHES // len(y)
     left = np.zeros_like(y)
@@ -246,14 +246,14 @@ def _fit(
 
 
 def _step(problem: Sequence[Regression], most: int) -> int:
-    """Return the stride that leaves about a number of rows."""
+    """Return the stride that keeps about `most` rows."""
     return max(1, sum(len(part.tau) for part in problem) // most)
 
 
 def _some_rows(
     problem: Sequence[Regression], most: int
 ) -> tuple[FloatArray, FloatArray, FloatArray, npt.NDArray[np.bool_]]:
-    """Thin to about a number of rows: columns (N, n, r), torque, target, informative."""
+    """Return columns (N, n, r), torque, target and informative mask of about `most` rows."""
     step = _step(problem, most)
     columns, tau, target = (
         np.concatenate([getattr(part, name) for part in problem])[::step]

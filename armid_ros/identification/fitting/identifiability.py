@@ -1,6 +1,6 @@
 # Copyright 2026 The armid_ros developers
 # SPDX-License-Identifier: Apache-2.0
-"""Which parameters some data do not tell, and why: they are shown as such, not as numbers."""
+"""Parameters that data do not identify, with reasons, which are reported in place of numbers."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from armid_ros.model import BaseParameters
 import numpy as np
 import numpy.typing as npt
 
-#: Why a parameter has no value, where the joint would have to move more.
+#: Reason of a parameter without a value if the joint has to move more.
 NOT_SHOWN: Literal['this motion does not show it'] = 'this motion does not show it'
 
 #: Half width of a 95 % interval in standard deviations.
@@ -36,7 +36,7 @@ class Unidentified:
     parameter : ParameterName
         A standard parameter, or a base parameter.
     reason : str
-        Why.
+        Reason, one of `Reason`.
 
     """
 
@@ -58,11 +58,11 @@ def unidentified(
     Parameters
     ----------
     theory : BaseParameters
-        What any motion can tell apart.
+        Base parameters that are identifiable in some motion.
     base : BaseParameters
-        What the data tell apart of it.
+        Base parameters that the data identify.
     estimate : Estimate
-        The base parameters.
+        Estimate of the base parameters.
 
     """
     seen = np.any(base.grouping, axis=0)

@@ -1,11 +1,11 @@
 # Copyright 2026 The armid_ros developers
 # SPDX-License-Identifier: Apache-2.0
 """
-Instrumental variables: the regressor of a smoothed motion correlates with that without noise.
+Instrumental variables: the regressor of a smoothed motion, which has hardly any encoder noise.
 
-Least squares of noisy columns W is biased by W' W, which has the square of the noise. With columns
-Z of a motion without the noise of encoders, Z' (tau - W theta) = 0 has not. That motion is the
-recorded one, smoothed far below the band of the regressor.
+Least squares with noisy columns W is biased, as W' W contains the square of the noise. With
+columns Z of a motion without encoder noise, the solution of Z' (tau - W theta) = 0 is unbiased.
+That motion is the recorded one, smoothed far below the band of the regressor.
 Source: Young 2011; Janot, Vandanjon and Gautier 2014 for robots, with instruments of a simulation.
 
 """
@@ -36,14 +36,14 @@ import numpy as np
 from scipy import signal
 import scipy.linalg
 
-#: Instruments keep this share of the band of the regressor, which is ten times the motion's.
+#: Band of the instruments over that of the regressor, which is ten times the band of the motion.
 _SHARE = 0.2
-#: Samples that a stretch is continued by at its ends at the most: three times the length of the
-#: filter, two sections of second order, as scipy does where nothing is said.
+#: Largest number of padding samples at both ends of a stretch: three times the length of the
+#: filter, two sections of second order, which is the default of scipy.
 _EDGE = 15
-#: Linearisations of an arm whose torque is not linear in its parameters.
+#: Largest number of linearisations of an arm whose torque is not linear in its parameters.
 _MOST_ROUNDS = 4
-#: A change of less than this share of a standard deviation is the last.
+#: Change of the values, in standard deviations, below which the iteration ends.
 _SETTLED = 0.02
 
 
@@ -57,11 +57,11 @@ class Instrumented:
     values : ndarray, shape (r,)
         Parameters.
     covariance : ndarray, shape (r, r)
-        Their covariance, correlation of the residuals included.
+        Covariance of the parameters, correlation of the residuals included.
     difference : ndarray, shape (r,)
-        Values by instruments minus those of least squares, both without limits.
+        Values by instruments minus those of least squares, both without bounds.
     spread : ndarray, shape (r, r)
-        Covariance of the difference where the regressor has no noise.
+        Covariance of the difference if the regressor has no noise.
 
     """
 
@@ -75,7 +75,7 @@ def fit_by_instruments(
     fit: FittedValues, recordings: Sequence[Recording], used: Conditioning
 ) -> FittedValues:
     """
-    Fit by instrumental variables from the smoothed motion, from a weighted start.
+    Fit by instrumental variables from the smoothed motion, starting at a weighted fit.
 
     Parameters
     ----------
@@ -112,18 +112,18 @@ def by_instruments(
     limits: tuple[FloatArray, FloatArray] | None = None,
 ) -> Instrumented:
     """
-    Solve Z' (tau - W theta) = 0.
+    Estimate theta by the instrumental-variable equation Z' (tau - W theta) = 0.
 
     Parameters
     ----------
     problem : sequence of Regression
-        N samples in all, with r columns W.
+        Stretches with N samples in total and r columns W.
     instruments : sequence of ndarray, each of shape (M, n, r)
         Z at the same samples.
     weights : ndarray, shape (N, n)
-        What the rows of both are multiplied by.
+        Factors of the rows of W and Z.
     limits : tuple of two ndarray, each of shape (r,), optional
-        What is physically possible.
+        Lower and upper bounds of physical values.
 
     Raises
     ------
@@ -144,7 +144,7 @@ def by_instruments(
     except scipy.linalg.LinAlgError:
         raise IdentificationError(
             'the smoothed motion does not correlate with the recorded one in every parameter: '
-            'use wls, or record a motion that shows more'
+            'use wls, or record a richer motion'
         ) from None
     free = values = by_z @ (z.T @ target)
     if limits is not None:

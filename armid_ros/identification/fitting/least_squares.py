@@ -3,9 +3,9 @@
 """
 Linear least squares with joint weights, outliers and coloured residuals.
 
-The standard deviations come from the spectrum of the actual residuals: with filtered, over-sampled
-or badly modelled torque neighbouring residuals are alike, and counting samples would promise far
-too much.
+The standard deviations come from the spectrum of the actual residuals. With filtered, over-sampled
+or badly modelled torque, neighbouring residuals are correlated, and counting samples would make
+the deviations far too small.
 
 """
 
@@ -57,15 +57,15 @@ class Solution:
     values : ndarray, shape (r,)
         Parameters.
     covariance : ndarray, shape (r, r)
-        Their covariance, correlation of the residuals included.
+        Covariance of the parameters, correlation of the residuals included.
     joint_std : ndarray, shape (n,)
         Standard deviation of the residual of every joint [N m].
     condition_number : float
-        Of the weighted regressor.
+        Condition number of the weighted regressor.
     outliers : int
         Samples whose weight was reduced below one half.
     weights : ndarray, shape (N, n)
-        What every row was multiplied by, all stretches one after the other.
+        Factors of the rows of all stretches, one after the other.
 
     """
 
@@ -90,10 +90,10 @@ def solve(
     problem : sequence of Regression
         Stretches with the same columns.
     method : {'ols', 'wls', 'irls'}
-        All joints alike; every joint by its own residual; that, with outliers weighted down
-        (Huber's function).
+        Equal weights; weights by the residual of each joint; the latter with outliers weighted
+        down (Huber's function).
     bounds : tuple of two ndarray, each of shape (r,), optional
-        What is physically possible, lower and upper. The covariance is that without bounds.
+        Lower and upper bounds of physical values. The covariance is that without bounds.
 
     Returns
     -------
@@ -128,7 +128,7 @@ def _robust(
     for _ in range(ROUNDS):
         before = (fit.scale, relative)
         residual = _residual(problem, fit.values)
-        # the standard deviation that the middle half of each joint's residual suggests
+        # standard deviation of each joint's residual, from its median absolute deviation
         masked = np.where(used, residual, np.nan)
         spread = np.nanmedian(np.abs(masked - np.nanmedian(masked, axis=0)), axis=0)
         scale = positive(1.4826 * np.nan_to_num(spread))

@@ -1,12 +1,12 @@
 # Copyright 2026 The armid_ros developers
 # SPDX-License-Identifier: Apache-2.0
 """
-Least squares of an arm whose torque need not be linear in its parameters, by Gauss-Newton.
+Least squares by Gauss-Newton for an arm whose torque may be nonlinear in its parameters.
 
 Friction in proportion to the load, gains of torque sensors, zeros of encoders, gravity and
-elasticity change the columns of everything else. A fit at the columns of the description is the
-first step only: the arm is linearised again at what was found, until the torque that the linear
-model promises is the torque of the arm. Steps that make the fit worse are damped (Marquardt 1963).
+elasticity change the columns of all other parameters. So a fit with the columns of the description
+is only the first step. The arm is linearised again at the fitted values until the torque of the
+linear model agrees with that of the arm. Steps that worsen the fit are damped (Marquardt 1963).
 
 """
 
@@ -33,29 +33,29 @@ from armid_ros.robots import NO_MASS
 import numpy as np
 import scipy.linalg
 
-#: Samples of a stretch along which the torque is looked at for curvature.
+#: Number of samples of a stretch for the test of nonlinearity.
 _SAMPLES = 2000
-#: Curvature below this share of the torque is rounding.
+#: Nonlinear share of the torque below which it is a rounding error.
 _ROUNDING = 1e-9
 #: Linear model and arm agree where they differ by less than this share of the residual ...
 AGREED = 1e-4
 #: ... or of the torque, where there is no noise.
 _EXACT = 1e-8
-#: Linearisations; fits that settle take three to eight.
+#: Largest number of linearisations; converging fits take three to eight.
 MOST_PASSES = 20
 #: A residual torque below this share counts as zero.
 _FINE = 1e-6
-#: A gain in squares of residuals that is less than one standard deviation of one parameter.
+#: Decrease of the cost that corresponds to one standard deviation of one parameter.
 _NOTHING = 1.0
-#: A step that gains less than this of the same is the last.
+#: Decrease of the cost by a step below which the iteration ends.
 _LITTLE = 0.1
-#: Share of the squares that a model with corners promises in vain where it can get no better.
+#: Largest unattained decrease of the cost, as a share of it, with which a fit counts as converged.
 _STUCK = 0.5
-#: Shares of the squared columns that damp a step.
+#: Damping factors of a step, relative to the squared columns.
 _DAMPINGS = tuple(10.0 ** np.arange(-8.0, 3.0))
-#: A step keeps its promise if it leaves at most so many times the squares.
+#: Largest cost of an undamped step, over the cost that the linear model predicts.
 _KEPT = 2.0
-#: Where the centre of a link is taken to be whose mass nothing tells [m].
+#: Assumed distance of the centre of mass of a link whose mass is not identifiable [m].
 _REACH = 0.2
 
 Torques = tuple[FloatArray, ...]
@@ -71,17 +71,17 @@ class FittedValues:
     arm : ArmModel
         The arm with the values.
     base : BaseParameters
-        What the data tell apart.
+        Base parameters that the data identify.
     values : ndarray, shape (r,)
-        Base parameters.
+        Values of the base parameters.
     problem : tuple of Regression
-        The linear problem that gave them.
+        Linear problem of the last step.
     solution : Solution
-        Its solution: covariance, weights.
+        Solution of that problem: covariance, weights.
     predicted : tuple of ndarray, each of shape (M, n)
         Torque of the arm, filtered, for each stretch [N m].
     passes : int
-        Linearisations that it took; 1 if the torque is linear.
+        Number of linearisations; 1 if the torque is linear.
     settled : bool
         Whether the linear model and the arm agree.
 
@@ -121,22 +121,22 @@ def fit_values(
     Parameters
     ----------
     arm : ArmModel
-        Where to begin, and where what the data do not tell stays.
+        Start of the fit; parameters that the data do not determine keep its values.
     base : BaseParameters
-        What the data tell apart there.
+        Base parameters that the data identify at the start.
     problem : sequence of Regression
-        The columns there.
+        Columns of `base` at the start.
     recordings : sequence of Recording
         Training data.
     used : Conditioning
         Filters.
     method : {'ols', 'wls', 'irls'}
-        As of ``solve``.
+        See ``solve``.
     free : ndarray, shape (10 n, k), optional
-        Orthonormal directions of the rigid parameters that change no torque, where they are not
-        all those that base does not tell apart.
+        Orthonormal directions of the rigid parameters that change no torque; by default, all that
+        `base` does not identify.
     solution : Solution, optional
-        Of the problem, where it is there.
+        Solution of the problem, if known.
 
     """
     solution = solution or solve(problem, method, bounds(arm, base))
@@ -148,7 +148,7 @@ def fit_values(
         problem, _ = linearised(arm, base, recordings, used)
     elif not curved(arm, reached, motions):
         predicted = tuple(part.torque(solution.values) for part in problem)
-        # nearest to the description, if it has the fitted torque along this motion
+        # parameters nearest to the description, if they have the fitted torque along this motion
         nearest = arm.with_theta(base.lift(solution.values, arm.theta))
         rigid = _rigid(arm)
         if free is None and (
@@ -169,7 +169,7 @@ def curved(before: ArmModel, after: ArmModel, motions: Sequence[Motion]) -> bool
     before, after : ArmModel
         Two arms that differ in their values.
     motions : sequence of Motion
-        What to look along.
+        Motions along which torques are computed.
 
     """
     if np.array_equal(before.theta, after.theta):
@@ -186,19 +186,19 @@ def curved(before: ArmModel, after: ArmModel, motions: Sequence[Motion]) -> bool
 
 def moved(arm: ArmModel, base: BaseParameters, values: FloatArray, free: FloatArray) -> ArmModel:
     """
-    Return the arm with other base parameters.
+    Return the arm with given values of its base parameters.
 
-    Of what no motion tells apart, effects stay where they are and rigid parameters move as little
-    as may be: what is grouped with rigid parameters alone is so wherever the effects are.
+    In unidentifiable directions, effects keep their values and rigid parameters change as little
+    as possible: directions of rigid parameters alone are unidentifiable for any effects.
 
     Parameters
     ----------
     arm : ArmModel
-        Where to begin.
+        Arm with the present values.
     base : BaseParameters
         The base parameters that are identifiable.
     values : ndarray, shape (r,)
-        Base parameters that the arm is to have.
+        Base parameters of the returned arm.
     free : ndarray, shape (10 n, k)
         Orthonormal directions of the rigid parameters that change no torque.
 
@@ -218,8 +218,8 @@ def _carried(rigid: FloatArray, free: FloatArray) -> FloatArray:
     lacking = (np.abs(links[:, 0]) < NO_MASS) & np.any(np.abs(links[:, 1:4]) >= NO_MASS, axis=1)
     if not np.any(lacking):
         return rigid
-    # a link that is described without a mass has got a moment from the data, which tell no mass
-    # apart: any changes no torque where those of links before it change along with it
+    # the data gave a moment to a link that is described without mass, and do not determine its
+    # mass: a mass changes no torque if the parameters of links before it change as well
     mass = np.zeros_like(links)
     mass[lacking, 0] = np.linalg.norm(links[lacking, 1:4], axis=1) / _REACH
     return np.asarray(rigid + free @ (free.T @ mass.ravel()))
@@ -234,9 +234,9 @@ def linearised(
     Returns
     -------
     problem : tuple of Regression
-        With the constant that makes the linear model the arm's torque at its own values.
+        Linear model whose torque at the values of the arm is the arm's torque.
     predicted : tuple of ndarray, each of shape (M, n)
-        That torque, filtered.
+        Torque of the arm, filtered [N m].
 
     """
     predicted = torques(arm, recordings, used)
@@ -290,7 +290,7 @@ def _iterate(
             break
         trial: _State | None = None
         vain = 0.0
-        # straight to a solution that keeps its promise, else the best of damped steps
+        # the undamped step if its cost is near the predicted one, otherwise the best damped step
         for damping in (0.0, *_DAMPINGS):
             values = now.damped(damping, limits) if damping else solution.values
             if damping:
@@ -330,7 +330,7 @@ class _State:
         self._weights = self._used / np.maximum(rms, _EXACT * max(rms.max(), 1e-100))
 
     def gain(self, predicted: Torques) -> float:
-        """Return the decrease of the cost by torques; zero if there is no residual."""
+        """Return the decrease of the cost with predicted torques; zero without a residual."""
         if np.linalg.norm(self._used * self._left) <= _FINE * np.linalg.norm(
             self._used * self._tau
         ):
@@ -338,7 +338,7 @@ class _State:
         return self.cost() - self.cost(predicted)
 
     def damped(self, damping: float, limits: tuple[FloatArray, FloatArray]) -> FloatArray:
-        """Return the values after a step of Levenberg and Marquardt, within limits."""
+        """Return the values after a Levenberg-Marquardt step, within limits."""
         w, _ = weighted_rows(self.problem, self._weights)
         size = np.linalg.norm(w, axis=0)
         scaled = w / np.where(size > 0.0, size, 1.0)

@@ -1,10 +1,10 @@
 # Copyright 2026 The armid_ros developers
 # SPDX-License-Identifier: Apache-2.0
 """
-Normal equations of a regression, joint by joint, and the weighted least squares of them.
+Normal equations of a regression, joint by joint, and their weighted least squares.
 
-They have a size that does not grow with the rows and add up over stretches, recordings and
-workers. Joints are kept apart, for their weights are known only when all rows are.
+Their size does not grow with the rows, and they add up over stretches, recordings and workers.
+Joints are kept apart, as their weights are known only after all rows.
 
 """
 
@@ -20,12 +20,12 @@ import numpy.typing as npt
 import scipy.linalg
 import scipy.optimize
 
-#: Rounds of reweighting; the weights settle in three to ten.
+#: Largest number of rounds of reweighting; the weights converge in three to ten.
 ROUNDS = 20
-#: Squares of residuals below this share of those of the target are rounding errors of products.
+#: Share of the squared target below which squared residuals are rounding errors of products.
 _ROUNDING = 1e-12
-#: Directions of columns scaled to one length with less than this share of the largest eigenvalue
-#: are not identifiable: products of columns hold no more digits.
+#: Share of the largest eigenvalue of normalised columns below which a direction is not
+#: identifiable: products of columns have no more digits.
 UNINFORMATIVE = 1e-10
 
 
@@ -63,7 +63,7 @@ class NormalEquations:
         problem : sequence of Regression
             N rows of each of n joints in r columns.
         weights : ndarray, shape (N, n), optional
-            Factors of the rows; by default one, and zero where a row is not informative.
+            Factors of the rows; by default 1, and 0 for a row that is not informative.
 
         """
         n_joints, rank = problem[0].columns.shape[1:]
@@ -76,7 +76,7 @@ class NormalEquations:
             counts += part.informative.sum(axis=0)
             for joint in range(n_joints):
                 rows = np.column_stack([part.columns[:, joint], target[:, joint]])
-                active = np.flatnonzero(rows.any(axis=0))  # a joint feels no link before it
+                active = np.flatnonzero(rows.any(axis=0))  # links before a joint have zero columns
                 rows = rows[:, active] * weight[:, joint, np.newaxis]
                 products[joint][np.ix_(active, active)] += rows.T @ rows
         return cls(products, counts)
@@ -114,18 +114,18 @@ class NormalEquations:
         """Return the standard deviation of the residual of each joint, shape (n,) [N m]."""
         counts = np.maximum(self.counts, 1.0)
         rows = float(counts.sum())
-        freedom = rows / max(1.0, rows - self.rank)  # squares of residuals are too small by that
+        freedom = rows / max(1.0, rows - self.rank)  # correction for degrees of freedom
         return np.asarray(np.sqrt(freedom * self.squares(values) / counts))
 
     def packed(self) -> FloatArray:
-        """Return all numbers in one row: joints, counts and the upper triangles."""
+        """Return all numbers in one array: number of joints, counts and upper triangles."""
         upper = np.triu_indices(self.rank + 1)
         numbers = self.products[:, upper[0], upper[1]].ravel()
         return np.concatenate([[len(self.counts)], self.counts, numbers])
 
     @classmethod
     def unpacked(cls, numbers: FloatArray) -> NormalEquations:
-        """Unpack normal equations."""
+        """Return normal equations from the numbers of `packed`."""
         joints = int(numbers[0])
         triangles = numbers[1 + joints :].reshape(joints, -1)
         size = int(np.sqrt(2 * triangles.shape[1]))
@@ -138,16 +138,16 @@ class NormalEquations:
 @dataclass(frozen=True, eq=False)
 class WeightedFit:
     """
-    Weighted least squares.
+    Solution of weighted least squares.
 
     Attributes
     ----------
     values : ndarray, shape (r,)
         Parameters.
     scale : ndarray, shape (n,)
-        What the rows of each joint were divided by.
+        Divisor of the rows of each joint.
     factor, inverse : ndarray, shape (r, r)
-        F with F' F the products of the weighted columns, and its inverse.
+        F, with F' F the products of the weighted columns, and its inverse.
 
     """
 
@@ -179,11 +179,11 @@ def weighted_fit(
     Parameters
     ----------
     normal : NormalEquations
-        The rows.
+        Normal equations of the rows.
     weighted : bool
         Whether every joint is weighted by its own residual.
     bounds : tuple of two ndarray, each of shape (r,), optional
-        What is physically possible, lower and upper.
+        Lower and upper bounds of physical values.
 
     """
     fit = scaled_fit(normal, np.ones(len(normal.counts)))
@@ -198,7 +198,7 @@ def weighted_fit(
 
 
 def scaled_fit(normal: NormalEquations, scale: FloatArray) -> WeightedFit:
-    """Solve with the rows of every joint divided by a number, shape (n,)."""
+    """Solve normal equations with the rows of every joint divided by a scale, shape (n,)."""
     products = normal.summed(scale)
     factor, inverse = factored(products[:-1, :-1])
     return WeightedFit(inverse @ (inverse.T @ products[:-1, -1]), scale, factor, inverse)
@@ -208,7 +208,7 @@ def factored(products: FloatArray) -> tuple[FloatArray, FloatArray]:
     """
     Return F with F' F = products, shape (p, p), and its inverse.
 
-    Directions of less than a rounding error of the others get that.
+    Eigenvalues below the rounding error are raised to it.
 
     """
     length = np.sqrt(np.diag(products))
@@ -223,16 +223,16 @@ def within(
     values: FloatArray, factor: FloatArray, bounds: tuple[FloatArray, FloatArray]
 ) -> FloatArray:
     """
-    Return the bounded fit whose predictions are nearest to the free fit.
+    Return the bounded fit whose predictions are nearest to those of the unbounded fit.
 
     Parameters
     ----------
     values : ndarray, shape (r,)
-        The free fit.
+        Values of the unbounded fit.
     factor : ndarray, shape (r, r)
         F with F' F the products of the weighted columns.
     bounds : tuple of two ndarray, each of shape (r,)
-        Lower and upper.
+        Lower and upper bounds.
 
     """
     if np.all((values >= bounds[0]) & (values <= bounds[1])):
@@ -252,7 +252,7 @@ def positive(scale: FloatArray) -> FloatArray:
 
 def informative_basis(products: FloatArray) -> FloatArray:
     """
-    Return the identifiable directions.
+    Return a basis of the identifiable directions.
 
     Parameters
     ----------
@@ -262,7 +262,7 @@ def informative_basis(products: FloatArray) -> FloatArray:
     Returns
     -------
     ndarray, shape (p, k)
-        B of the pseudo-inverse B B'.
+        Basis B, where B B' is the pseudo-inverse of the products.
 
     """
     scale = 1.0 / np.sqrt(np.maximum(np.diag(products), 1e-300))
@@ -288,7 +288,7 @@ def informative_solution(products: FloatArray, aim: FloatArray) -> FloatArray:
     products : ndarray, shape (p, p)
         Products of columns with each other; positive semi-definite.
     aim : ndarray, shape (p,) or (p, k)
-        Products of the columns with what they are to make.
+        Products of the columns with the targets.
 
     Returns
     -------
@@ -303,7 +303,7 @@ def scaled_inverse(matrix: FloatArray) -> FloatArray:
     """
     Invert a covariance or a precision, (p, p), whose values may be of any units.
 
-    Directions of less than a rounding error of the others get that.
+    Eigenvalues below the rounding error are raised to it.
 
     """
     scale = 1.0 / np.sqrt(np.maximum(np.diag(matrix), 1e-300))

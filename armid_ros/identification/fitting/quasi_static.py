@@ -1,11 +1,11 @@
 # Copyright 2026 The armid_ros developers
 # SPDX-License-Identifier: Apache-2.0
 """
-Slow motions: the weight of an arm is fitted, and its inertia is taken from the description.
+Fit of slow motions: weight is fitted, and inertia is taken from the description.
 
-However slowly an arm moves, inertia takes a share of its torque, which goes with position as the
-weight does and pulls the fit. It is taken off as the description has it, and what a description
-may be wrong by is added to the covariance of the weight.
+Even in slow motion, inertia is a part of the torque. It varies with position as the weight does,
+and biases the fit. The described torque of inertia is subtracted, and the expected error of the
+description is added to the covariance of the weight.
 
 """
 
@@ -22,9 +22,9 @@ from armid_ros.identification.rows.signals import Conditioning
 from armid_ros.recording import Recording
 import numpy as np
 
-#: Inertia that adds less than this share to a standard deviation does not matter.
+#: Negligible deviation due to inertia, over the standard deviation of the fit.
 _NEGLIGIBLE = 0.1
-#: Below this share of the speed no motion is slow enough.
+#: Slowest motion that the note recommends, as a share of the speed.
 _SLOWEST = 0.02
 
 
@@ -42,7 +42,7 @@ def with_uncertain_inertia(
     description : ArmModel
         The arm as described, inertia included.
     fit : FittedValues
-        The weight and the effects, fitted with that inertia.
+        Weight and effects, fitted with that inertia.
     recordings : sequence of Recording
         Training data.
     used : Conditioning
@@ -51,14 +51,14 @@ def with_uncertain_inertia(
     Returns
     -------
     fit : FittedValues
-        With the larger covariance.
+        Fit with the larger covariance.
     notes : tuple of str
-        How slow the motion would have to be, where it matters.
+        Speed at which inertia would be negligible, if it is not.
 
     """
     rigid = len(description.robot.rigid_parameters)
     everything = regressions(fit.arm, np.arange(rigid), recordings, used)
-    # what the weighted fit makes of the columns of the body
+    # base parameters that the weighted fit gives for each column of the body
     rows, body = (
         weighted_rows(part, fit.solution.weights)[0] for part in (fit.problem, everything)
     )
@@ -72,7 +72,7 @@ def with_uncertain_inertia(
     ratio = np.sqrt(np.diag(added) / np.maximum(np.diag(plain), 1e-300)).max()
     notes: tuple[str, ...] = ()
     if ratio > _NEGLIGIBLE:
-        # what inertia takes goes with the square of the speed
+        # the torque of inertia grows with the square of the speed
         speed = float(np.sqrt(_NEGLIGIBLE / ratio))
         slower = (
             'no speed is slow enough for torques as free of noise as these'
@@ -80,7 +80,7 @@ def with_uncertain_inertia(
             else f'at {speed:.2g} times the speed it would not matter'
         )
         notes = (
-            'too fast for quasi-static: the inertia of the description is taken off, and what it '
-            f'may be wrong by is in the intervals; {slower}',
+            'too fast for quasi-static: the described inertia is subtracted, and its possible '
+            f'error widens the intervals; {slower}',
         )
     return replace(fit, solution=solution), notes

@@ -1,11 +1,11 @@
 # Copyright 2026 The armid_ros developers
 # SPDX-License-Identifier: Apache-2.0
 """
-Work that goes on between the samples of a stream, piece by piece.
+Background computation between the samples of a stream, in pieces.
 
-A stream must not wait, so what takes longer than a sample may is a generator that yields after
-every piece of bounded size. Each sample does a few pieces, in an order that depends on the samples
-alone: what comes out does not depend on how fast the computer is.
+A stream must not wait, so a computation that takes longer than one sample is a generator that
+yields after every piece of bounded size. Each sample runs a few pieces, in an order that depends
+on the samples alone. The results therefore do not depend on the speed of the computer.
 
 """
 
@@ -17,9 +17,9 @@ from typing import TypeVar
 
 Result = TypeVar('Result')
 
-#: A job: it yields after every piece.
+#: A background job without a result: a generator that yields after every piece of work.
 Job = Generator[None, None, None]
-#: The same with a result.
+#: A background job that returns a result.
 Pieces = Generator[None, None, Result]
 
 
@@ -55,7 +55,7 @@ class Background:
             waiting = self._urgent or self._patient
             if not waiting:
                 return
-            job = waiting.popleft()  # one that fails is not tried again
+            job = waiting.popleft()  # a job that fails is not tried again
             try:
                 next(job)
             except StopIteration:

@@ -1,6 +1,6 @@
 # Copyright 2026 The armid_ros developers
 # SPDX-License-Identifier: Apache-2.0
-"""What may change about an arm while it works, as directions in its base parameters."""
+"""Candidate changes of an arm at work, as directions in its base parameters."""
 
 from __future__ import annotations
 
@@ -14,32 +14,32 @@ from armid_ros.model import BaseParameters
 from armid_ros.motion import FloatArray, read_only
 import numpy as np
 
-#: Of a body that an arm picks up, what is reported: its mass and where it is. The torque of its
-#: inertia about its own centre is small compared with theirs.
+#: Number of reported parameters of a body that an arm picks up: its mass and first moments. The
+#: torque of its inertia about its own centre is small compared with theirs.
 _REPORTED = 4
-#: A direction of which others leave less than this share is not one of its own.
+#: Relative singular value below which directions count as linearly dependent [-].
 _INDEPENDENT = 1e-6
 
 
 @dataclass(frozen=True, eq=False)
 class ChangeCandidate:
     """
-    A candidate change.
+    A change of the arm that may be detected.
 
     Attributes
     ----------
     name : str
-        As in the catalogue of effects, or 'friction' for all friction of a joint at once.
+        Name of an effect in the catalogue, or 'friction' for all friction of a joint at once.
     joint : str
-        Where; empty for the whole arm.
+        Joint of the change; empty for the whole arm.
     parameters : tuple of ParameterName
-        Its p quantities.
+        The p quantities that change.
     directions : ndarray, shape (P, p)
-        What a unit of each adds to the base parameters.
+        Change of the base parameters per unit of each quantity.
     reopened : ndarray, shape (P, k)
-        All that may have changed with them, independent directions.
+        Independent directions in which the base parameters may have changed.
     common : bool
-        Whether it happens all day.
+        Whether such changes are frequent, as those of the carried load.
 
     """
 
@@ -57,7 +57,7 @@ class ChangeCandidate:
 
     @property
     def label(self) -> str:
-        """Return what changed where, such as 'payload at hand'."""
+        """Return name and joint of the change as text, such as 'payload at hand'."""
         text = name_in_words(self.name)
         return f'{text} at {self.joint}' if self.joint else text
 
@@ -74,14 +74,14 @@ class Change:
     Attributes
     ----------
     candidate : ChangeCandidate
-        What explains the torques best.
+        Candidate that explains the torques best.
     rivals : tuple of ChangeCandidate
-        What explains them nearly as well.
+        Candidates that explain the torques nearly as well.
     t : float
-        When it changed, to a quarter of a second [s].
+        Time of the change, to a quarter of a second [s].
     size : Estimate
-        By how much the quantities of the candidate changed, as far as it was known then; of those
-        of which nothing was known the deviation is infinite.
+        Change of each quantity of the candidate, as estimated when the change was named. The
+        standard deviation of a quantity without data is infinite.
 
     """
 
@@ -92,14 +92,14 @@ class Change:
 
     @property
     def reopened(self) -> FloatArray:
-        """Independent directions of all that may have changed, rivals included, (P, k)."""
+        """Independent directions of all possible changes, rivals included, shape (P, k)."""
         columns = np.hstack([c.reopened for c in (self.candidate, *self.rivals)])
         columns = columns / np.linalg.norm(columns, axis=0)
         left, size, _ = np.linalg.svd(columns, full_matrices=False)
         return np.asarray(left[:, size > _INDEPENDENT * size[0]])
 
     def __str__(self) -> str:
-        """Return a sentence: what changed, by how much, and rivals."""
+        """Return a sentence on the change: candidate, sizes and rivals."""
         sizes = ', '.join(
             f'{p.name} by {value:+.3g} {p.unit} ({lower:.3g} to {upper:.3g})'
             if 0.0 < upper - lower < np.inf
@@ -119,9 +119,9 @@ def change_candidates(arm: ArmModel, base: BaseParameters) -> tuple[ChangeCandid
     Parameters
     ----------
     arm : ArmModel
-        What is identified.
+        The arm to identify.
     base : BaseParameters
-        Its base parameters.
+        Base parameters of the arm.
 
     """
     found, first = [], len(arm.robot.rigid_parameters)
@@ -151,7 +151,7 @@ def _candidate(
     added_to: Sequence[int],
     names: Sequence[ParameterName] = (),
 ) -> ChangeCandidate:
-    """Return a candidate of standard parameters, or of an effect that adds to them."""
+    """Return the candidate of an effect, or of a body whose parameters add to a link's."""
     columns = base.grouping[:, added_to]
     independent = _independent(columns)
     kept = [k for k in independent if not names or k < _REPORTED]

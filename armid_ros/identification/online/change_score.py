@@ -1,20 +1,20 @@
 # Copyright 2026 The armid_ros developers
 # SPDX-License-Identifier: Apache-2.0
 """
-The likelihood ratio of a change, against what was known before and what noise usually does.
+Likelihood ratio of a change in a window of rows, given the estimate before the window.
 
-What was known before a window is theta0 with the information A = R^T R. The rows W of the window,
-of unit noise, give M = W^T W and c = W^T tau. That theta = theta0 + D delta from then on, theta0
-being as uncertain as it was, has
+The estimate before a window is theta0, with the information A = R^T R. The rows W of the window,
+of unit noise, give M = W^T W and c = W^T tau. The hypothesis theta = theta0 + D delta in the
+window, with theta0 as uncertain as before, has
 
     S = D^T A (A + M)^-1 M D    and    s = D^T A (A + M)^-1 (c - M theta0)
 
-as information on delta and its score: the estimate is S^-1 s, and s^T S^-1 s twice the logarithm
-of the likelihood ratio. What was not known before, where A D is nothing, cannot be seen to change.
+as information on delta and its score. The estimate of delta is S^-1 s, and s^T S^-1 s is twice
+the logarithm of the likelihood ratio. A change is not detectable where A D is zero.
 Source: Willsky and Jones 1976, the generalised likelihood ratio test.
 
-Twice the logarithm is chi-square of p degrees only if noise is white and the model right; how
-large it is otherwise is measured while nothing changes (``null_calibration``).
+This statistic is chi-square of p degrees only if noise is white and the model right. Its actual
+null distribution is measured while nothing changes (``null_calibration``).
 
 """
 
@@ -31,9 +31,9 @@ import numpy as np
 import numpy.typing as npt
 from scipy.linalg import lapack
 
-#: Eigenvalues of an information below this share of the largest are nothing [-].
+#: Eigenvalues of an information matrix below this share of the largest count as zero [-].
 _NOTHING = 1e-9
-#: A change of which the window leaves more than this share open is not determined by it [-].
+#: Share of a change that the data do not determine, above which its variance is infinite [-].
 _HIDDEN = 1e-6
 
 
@@ -45,23 +45,23 @@ class Block:
     Attributes
     ----------
     begin, end : float
-        From when to when [s].
+        First and last time of the stretch [s].
     information : ndarray, shape (P, P)
         M = W^T W.
     right : ndarray, shape (P,)
         c = W^T tau.
     moved : ndarray, shape (P, Q)
-        M D, along the changes that are looked for.
+        M D, with the directions D of all candidate changes.
     known : ndarray, shape (P, P)
-        Information before it, A = R^T R.
+        Information before the stretch, A = R^T R.
     known_along : ndarray, shape (P, Q)
-        A D.
+        A D, with the same D.
     before : Learned
-        What was known when it began.
+        State of the estimator with nuisance parameters at the begin.
     narrow : Learned
-        What the estimator without nuisance parameters knew then.
+        State of the estimator without nuisance parameters at the begin.
     samples : tuple of WeightedSample
-        What it was made of, to learn from it once more.
+        Samples of the stretch, kept to be learned again.
 
     """
 
@@ -85,11 +85,11 @@ class ScoreStatistics:
     Attributes
     ----------
     information : ndarray, shape (Q, Q)
-        S.
+        Information S on the changes.
     score : ndarray, shape (Q,)
-        s.
+        Score s of the changes.
     strength : ndarray, shape (Q,)
-        Squares of the torques in the window that a unit of each change would make.
+        Sum of squared torques in the window per unit of each change.
 
     """
 
@@ -106,14 +106,13 @@ class ScoreStatistics:
         """
         Return the estimate of some changes and its covariance in white noise.
 
-        The variance of a change of which the window shows nothing, or nothing by itself, is
-        infinite.
+        The variance of a change is infinite where the window does not determine it by itself.
 
         """
         information = self.information[some, some]
         covariance = np.linalg.pinv(information, hermitian=True)
         values = np.asarray(covariance @ self.score[some])
-        shown = np.einsum('pq,qp->p', covariance, information)  # 1, where all of it is seen
+        shown = np.einsum('pq,qp->p', covariance, information)  # 1 for a change that is determined
         hidden = np.flatnonzero(shown < 1.0 - _HIDDEN)
         covariance[hidden, hidden] = np.inf
         return values, np.asarray(covariance)
@@ -131,13 +130,13 @@ def weighing(
     Parameters
     ----------
     window : sequence of Block
-        Its blocks.
+        Blocks of the window.
     before : Block
-        What was known when this one began is compared with the window.
+        Block whose initial state is compared with the window.
     directions : ndarray, shape (P, Q)
-        What the changes do to the parameters.
+        Change of the parameters per unit of each candidate quantity.
     residual_scale : float
-        Noise of what was learned before, in the unit of the window's.
+        Noise of the rows over the noise that the earlier information assumes.
 
     """
     first = window[0]

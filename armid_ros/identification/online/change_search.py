@@ -1,11 +1,11 @@
 # Copyright 2026 The armid_ros developers
 # SPDX-License-Identifier: Apache-2.0
 """
-Search the last blocks of rows for a change: when it was, and what it is.
+Search the last blocks of rows for a change, its onset and its cause.
 
-After each block windows of half a second to two seconds that end with it are tested
-(``change_score``). When a test is positive, all begins of the change are compared, and it is
-named as soon as nothing else explains the torques as well, or when time is up.
+After each block, the windows of 0.5, 1 and 2 s that end with it are tested (``change_score``).
+After a positive test, all possible onsets are compared. The change is named as soon as no rival
+explains the torques as well, or after `_LATEST` blocks.
 
 """
 
@@ -25,24 +25,24 @@ import numpy as np
 
 #: Length of a block [s].
 BLOCK = 0.25
-#: Lengths of the windows that are tested, in blocks.
+#: Lengths of the tested windows, in blocks.
 _LENGTHS = (2, 4, 8)
-#: Blocks that are kept: the longest window, and one before it.
+#: Number of blocks kept: the longest window, and the block before it.
 _KEPT = 9
-#: Blocks since the change in which its torque shows: with fewer it is not named, and with so many
-#: it is in any case. Friction of a joint at rest does not show: an arm that comes to rest shows
-#: the slow motion in which estimates are least right for a moment, and no more.
+#: Number of blocks since a change that contain its torque. With fewer than the first, no change is
+#: named; with the second, it is named despite rivals. Blocks at rest have no friction torque, so
+#: an arm that stops, with the largest errors in its last slow motion, raises no alarm.
 _EARLIEST = 4
 _LATEST = 6
-#: Share of what the torque of a change is in the block with most of it, to show in another one.
+#: A block contains a change if its squared torque exceeds this share of the largest block's [-].
 _SHOWS = 0.05
-#: Logarithm of the likelihood ratio by which the best explanation is clear.
+#: Difference of log-likelihoods above which one explanation is clearly better than another.
 _CLEAR = 5.0
 #: If the log-likelihoods of two onsets differ by less, the later one is taken: soon after a change
 #: there are too few data to distinguish onsets, and every onset before the change fits.
 _ALIKE = 4.0
-#: For so long after a change its size is still being learned [s]; what is less likely than this
-#: share of it corrects the size.
+#: Time after a change during which its size is still being learned [s]. Another change in it needs
+#: more than this share of the log-likelihood of the first; otherwise it corrects the size.
 _LEARNING = 10.0
 _CORRECTION = 0.3
 
@@ -77,13 +77,13 @@ class FoundChange:
     Attributes
     ----------
     blocks : tuple of Block
-        The last ones.
+        The last blocks of rows.
     first : int
-        Which of them it was in.
+        Index of the block that contains the onset.
     best : ChangeCandidate
-        What explains the torques best.
+        Candidate that explains the torques best.
     rivals : tuple of ChangeCandidate
-        What explains them nearly as well.
+        Candidates that explain the torques nearly as well.
     likelihood : float
         Logarithm of the likelihood ratio.
 
@@ -113,18 +113,18 @@ class ChangeSearch:
     Parameters
     ----------
     candidates : sequence of ChangeCandidate
-        What may change.
+        Candidate changes to search for.
     directions : ndarray, shape (P, Q)
-        What a unit of each quantity of theirs adds to the parameters.
+        Change of the parameters per unit of each quantity of the candidates.
     chance : float
-        Of a block without a change to be tested positive.
+        Probability of a false alarm in a block.
     work : Background
-        Learns what statistics usually are.
+        Queue of the jobs that calibrate the statistics.
 
     Attributes
     ----------
     directions : ndarray, shape (P, Q)
-        As given.
+        Same as the parameter `directions`.
 
     """
 
@@ -173,9 +173,9 @@ class ChangeSearch:
         Parameters
         ----------
         block : Block
-            Its rows in units of their noise.
+            Block with rows in units of their noise.
         residual_scale : float
-            That noise over the one of what was learned before.
+            Noise of the rows over the noise that the earlier information assumes.
 
         """
         self._blocks.append(block)
@@ -196,7 +196,7 @@ class ChangeSearch:
                 self.interrupt()
                 return found
         self._waiting.append(weighed)
-        if len(self._waiting) > _LENGTHS[-1]:  # by now a change in it would have been named
+        if len(self._waiting) > _LENGTHS[-1]:  # a change in it would have been named by now
             for m, values in self._waiting.popleft().items():
                 self._work.begin(self._usual[m].learning(*values))
         return None
@@ -214,7 +214,7 @@ class ChangeSearch:
         return values, covariance * usual
 
     def _window(self, first: int, residual_scale: float) -> Pieces[ScoreStatistics]:
-        """Compute the statistics of all blocks from one on."""
+        """Compute the statistics of the window from block `first` to the last one."""
         blocks = list(self._blocks)[first:]
         return weighing(blocks, blocks[0], self.directions, residual_scale)
 
@@ -225,35 +225,35 @@ class ChangeSearch:
         return ratios
 
     def _judge(self, residual_scale: float) -> Pieces[FoundChange | None]:
-        """Locate and classify the change once it is clear or overdue."""
+        """Return onset and cause of the change, or None while they are not clear."""
         rows = []
         for k in range(len(self._blocks) - 1):
             window = yield from self._window(k, residual_scale)
             yield
             rows.append(self._ratios(window))
             yield
-        # logarithms of likelihoods, each free parameter being charged for
+        # log-likelihoods, with a penalty for each free parameter
         usual = np.nanmedian(np.concatenate([u.factors for u in self._usual.values()]))
         observations = sum(len(block.samples) for block in self._blocks)
         likelihood = np.array(rows) / (2.0 * usual) - 0.5 * self._sizes * np.log(observations)
         at = likelihood.max(axis=0)
         best = int(np.argmax(at))
         first = int(np.flatnonzero(likelihood[:, best] > at[best] - _ALIKE)[-1])
-        # the blocks from one on in which the torque of the candidate shows
+        # number of blocks since the onset that contain the torque of the candidate
         some = self._slices[best]
         directions = self.directions[:, some]
         moved = [one.moved[:, some] for one in self._blocks]
         strength = np.array([np.einsum('pq,pq->q', directions, one) for one in moved])
         shows = np.any(strength > _SHOWS * strength.max(axis=0), axis=1)
         seen = int(np.count_nonzero(shows[first:]))
-        # soon after a change, no mere correction of its size counts as another
+        # soon after a change, a correction of its size is not another change
         t, before = self._fresh
         soon = self._blocks[-1].end - t < _LEARNING
         least = max(_CLEAR, _CORRECTION * before) if soon else _CLEAR
         if not (at[best] > least and seen >= _EARLIEST):
             return None
         alike = [self._candidates[k] for k in np.flatnonzero(at > max(at[best] - _CLEAR, 0.0))]
-        # the load where it explains the torques as well: arms pick things up all day
+        # a load is preferred among equally likely candidates: arms often pick things up
         named = next((c for c in alike if c.common), self._candidates[best])
         rivals = tuple(c for c in alike if not (c.includes(named) or named.includes(c)))
         if rivals and seen < _LATEST:

@@ -1,15 +1,15 @@
 # Copyright 2026 The armid_ros developers
 # SPDX-License-Identifier: Apache-2.0
 """
-Watch for changes while learning: a load picked up, friction risen.
+Detection of changes during online estimation, such as a load or more friction.
 
 Rows are summed up in blocks of a quarter of a second, which are searched (``change_search``).
-When a change is named, the estimator returns to what it knew before, forgets what may have
-changed, and only that, and learns from the rows since then again.
+When a change is named, the estimator returns to its state before the change. It forgets only the
+directions that may have changed, and learns the rows since then again.
 
-All but the update of the estimator itself goes on in the background, so a change is named some
-samples after the block that made it clear. Until the rows since then are learned again the
-estimator goes on as if nothing had happened.
+All but the update of the estimator runs in the background, so a change is named some samples
+after the block that made it clear. Until the later rows are learned again, the estimator goes on
+as if nothing had changed.
 
 """
 
@@ -43,22 +43,22 @@ import numpy as np
 
 __all__ = ['BLOCK', 'ChangeSettings', 'ChangeWatch']
 
-#: Share of an assumed noise, of which only the ratios between joints are known, below which no
-#: torque is measured: a hundredth of a hundredth of its range.
+#: Smallest residual scale where only the ratios of the noise between joints are known: 0.01 of the
+#: assumed noise, which is 1e-4 of the torque limit [-].
 _LEAST_NOISE = 0.01
-#: Blocks whose residuals are remembered: a minute of four a second.
+#: Number of blocks whose residuals are kept: one minute at four blocks per second.
 _REMEMBERED = 240
-#: Samples that are learned in one piece of work, together or one by one, as with forgetting. More
-#: than come in the meantime, so that what came late is caught up with.
+#: Samples learned in one piece of work: together, or one by one with forgetting. Fewer samples
+#: arrive in the meantime, so that the backlog shrinks.
 _TOGETHER, _ONE_BY_ONE = 10, 4
-#: Rows whose nuisance columns are made in one piece of work.
+#: Rows whose nuisance columns are computed in one piece of work.
 _WIDENED = 3
 Item = TypeVar('Item')
 
 
 @dataclass(eq=False)
 class _Stretch:
-    """Rows not searched yet; those before an interruption have no end."""
+    """Rows that are not searched yet; `end` is None before an interruption."""
 
     begin: float
     narrow: Learned
@@ -68,25 +68,25 @@ class _Stretch:
 
 class ChangeWatch:
     """
-    Updates an estimator and detects changes of its parameters.
+    Update of an estimator with detection of changes of its parameters.
 
     Parameters
     ----------
     estimator : RecursiveLeastSquares
-        Learns.
+        Estimator that learns the rows.
     nuisance : NuisanceRows
-        Makes rows of what is learned for the tests alone.
+        Source of the nuisance columns, which only the tests use.
     candidates : sequence of ChangeCandidate
-        What may change.
+        Candidate changes to search for.
     settings : ChangeSettings
         Settings of change detection.
     work : Background
-        Does what takes long.
+        Queue for long computations.
 
     Attributes
     ----------
     changes : list of Change
-        What has changed since the last reset.
+        Detected changes since the last reset.
 
     """
 
@@ -127,14 +127,14 @@ class ChangeWatch:
 
     def use(self, settings: ChangeSettings | None, forgetting: float) -> None:
         """
-        Go on with other settings.
+        Change settings and keep the estimate.
 
         Parameters
         ----------
         settings : ChangeSettings or None
-            The threshold of a change; None looks for none.
+            Settings of change detection; None disables it.
         forgetting : float
-            Of what is learned.
+            Forgetting factor of the estimator.
 
         """
         chance = 0.0 if settings is None else BLOCK / settings.false_alarm_time
@@ -151,7 +151,7 @@ class ChangeWatch:
         """Update the estimator with one row; see ``RecursiveLeastSquares.update``."""
         if self._open is not None and row.t - self._open.begin >= BLOCK:
             self._hand_over(row.t)
-        if self._late is not None:  # a change was named, and what came since is learned again
+        if self._late is not None:  # a change was named, and the rows since then are learned again
             self._late.append(row)
         else:
             if self._open is None:
@@ -160,7 +160,7 @@ class ChangeWatch:
         self._estimator.update(*row.sample)
 
     def _among_all(self, directions: FloatArray) -> FloatArray:
-        """Map directions in the parameters to the wider parameter vector."""
+        """Extend directions by zeros for the nuisance parameters."""
         more = len(self._wider.parameters) - self._own
         return np.vstack([directions, np.zeros((more, directions.shape[1]))])
 
@@ -268,7 +268,7 @@ class ChangeWatch:
         )
 
     def _learn_again(self, found: FoundChange, reopened: FloatArray) -> Job:
-        """Restore an earlier state, reopen changed directions, and learn later samples again."""
+        """Restore the state before a change, reopen directions, and learn later samples again."""
         last = found.blocks[found.before]
         since = [sample for block in found.blocks[found.after :] for sample in block.samples]
         stretches = (*self._unseen, *([self._open] if self._open else ()))
@@ -298,7 +298,7 @@ class ChangeWatch:
 
     def _louder(self, blocks: Sequence[Block], free: int) -> Pieces[float]:
         """Return the ratio of squared residuals to the usual ones, at least 1."""
-        # A change shakes the arm, and its motion is none that the parameters were learned from.
+        # A change shakes the arm, and the parameters were not learned from such motion.
         squares = count = 0.0
         for block in blocks:
             rows, tau, weights = (np.stack(part) for part in zip(*block.samples, strict=True))

@@ -1,6 +1,6 @@
 # Copyright 2026 The armid_ros developers
 # SPDX-License-Identifier: Apache-2.0
-"""What a stream has to be like to identify anything; as a recording, see `checks`."""
+"""Conditions of identification from a stream; `rows.checks` has those of a recording."""
 
 from __future__ import annotations
 
@@ -10,22 +10,22 @@ from armid_ros.motion import FloatArray
 from armid_ros.robots import Robot
 import numpy as np
 
-#: Who is silent for longer has stopped, and nothing is lost [s].
+#: A longer silence is a stopped stream without missing samples [s].
 _SILENCE = 10.0
-#: A stamp that is further back is of a time that begins anew [s].
+#: A timestamp that is further back belongs to a restarted clock [s].
 _BEHIND = 1.0
 
 
 class StreamChecks:
     """
-    Checks whether a stream is identifiable, by the ranges of its good samples.
+    Check whether a stream is identifiable, by the ranges of its undamaged samples.
 
     Parameters
     ----------
     robot : Robot
-        Gives the limits.
+        The robot, with its joint limits.
     gate : SpikeGate
-        Knows from where to where positions and torques range.
+        Gate with the ranges of positions and torques so far.
 
     """
 
@@ -62,7 +62,7 @@ class StreamChecks:
         """Return the fault that prevents identification; empty without fault."""
         if self.silent and abs(self._moving) > SHORTEST:
             return SILENT
-        # the range is judged for each row, and seldom grows
+        # the ranges are judged at each row, but seldom grow
         lowest, highest = self._positions
         ranged = lowest.tobytes() + highest.tobytes()
         if self._judged is None or self._judged[0] != ranged:
@@ -72,14 +72,14 @@ class StreamChecks:
 
 class MissingSamples:
     """
-    Counts missing samples by the timestamps.
+    Count of missing samples by the timestamps.
 
-    Where a sample is late and those after it are early, nothing is missing.
+    A late sample that is followed by early ones is not missing.
 
     Attributes
     ----------
     count : int
-        Samples that never came; those of a longer silence are not counted.
+        Number of missing samples, those of a stopped stream excluded.
 
     """
 

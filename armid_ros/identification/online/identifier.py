@@ -1,6 +1,6 @@
 # Copyright 2026 The armid_ros developers
 # SPDX-License-Identifier: Apache-2.0
-"""Online identification: joint states in, one at a time; an estimate that converges, out."""
+"""Online identification: an estimate that is updated with one joint state at a time."""
 
 from __future__ import annotations
 
@@ -31,17 +31,17 @@ import pinocchio as pin
 
 __all__ = ['OnlineIdentifier', 'OnlineSample', 'OnlineSettings']
 
-#: Time constants of the row filter until its start, or a joint's rest, is forgotten, to 3e-3.
+#: Time constants of the row filter until the effect of its start, or a joint's rest, is 3e-3.
 _FORGOTTEN = 10.0
-#: A joint that is slower [rad/s or m/s] for longer than this [s], which is longer than a reversal
-#: takes, is at rest: where dry friction may hold it, its torque shows nothing and is not used.
+#: A joint below this velocity [rad/s or m/s] for longer than this time [s] is at rest; a reversal
+#: is shorter. Dry friction may hold a joint at rest with any torque, so its torque is not used.
 _REST_VELOCITY, _REST_TIME = 0.01, 0.1
-#: Successive samples that may be damaged by chance; what lasts longer is real.
+#: Largest number of successive damaged samples; a longer deviation is real.
 _LONGEST_DAMAGE = 10
-#: Pieces of work in the background per second, at the least; one for a sample at 1 kHz.
+#: Pieces of background work per second, at least; each sample without other work runs one or more.
 _PIECES = 400.0
-#: Samples between two rows of which one is for learning from the row alone; where there are fewer,
-#: pieces of work have to be done with it.
+#: Samples per row from which the update with a row has a sample to itself. With fewer samples, the
+#: update shares its sample with pieces of background work.
 _SPARE = 4.0
 
 
@@ -53,11 +53,11 @@ class OnlineSample:
     Attributes
     ----------
     t : float
-        When it was [s]: the stamp of the newest joint state minus the delay of the filters.
+        Time of the row [s]: the stamp of the newest joint state minus the delay of the filters.
     measured : ndarray, shape (n,)
         Filtered measured torque [N m].
     predicted : ndarray, shape (n,)
-        What the estimate before this sample predicts, filtered alike [N m].
+        Torque that the estimate before this sample predicts, filtered alike [N m].
     used : ndarray of bool, shape (n,)
         False for a joint at rest, which friction may hold with any torque.
 
@@ -85,7 +85,7 @@ class OnlineIdentifier:
     settings : OnlineSettings, optional
         Filters, weights, forgetting.
     rng : numpy.random.Generator
-        Draws the states over which base parameters are found.
+        Generator of the random states from which base parameters are found.
 
     Raises
     ------
@@ -95,9 +95,9 @@ class OnlineIdentifier:
     Attributes
     ----------
     base : BaseParameters
-        What is estimated.
+        The estimated base parameters.
     latest : tuple of OnlineSample
-        What the last update brought: several samples where some had waited for it.
+        Rows of the last update; several if earlier samples had waited for this one.
 
     Examples
     --------
@@ -114,7 +114,7 @@ class OnlineIdentifier:
 
     """
 
-    #: Settings that can change while samples are learned from.
+    #: Settings that can change without a restart.
     CHANGEABLE: ClassVar = ('forgetting', 'max_gap', 'changes')
 
     def __init__(
@@ -129,8 +129,8 @@ class OnlineIdentifier:
         for effect in arm.effects:
             if not effect.instantaneous:
                 raise IdentificationError(
-                    f'{effect.name} depends on the motion before, which single samples do not '
-                    'show; identify it from a recording'
+                    f'{effect.name} depends on earlier motion, which single samples do not '
+                    'contain; identify it from a recording'
                 )
         self.arm = arm
         self.settings = settings
@@ -163,7 +163,7 @@ class OnlineIdentifier:
         self._generation = -1
         self._last_row: float | None = None
         self._last_moving = np.full(robot.n_joints, -np.inf)
-        self._last_useless = self._last_moving.copy()  # at rest, or before the row filter started
+        self._last_useless = self._last_moving.copy()  # last rest, or start of the row filter
         self._noise: RowNoise | None = None
 
     def reset(self) -> None:
@@ -180,7 +180,7 @@ class OnlineIdentifier:
         self, t: float, q: npt.ArrayLike, dq: npt.ArrayLike | None, tau: npt.ArrayLike
     ) -> OnlineSample | None:
         """
-        Take in one joint state.
+        Update the estimate with one joint state.
 
         Parameters
         ----------
@@ -205,7 +205,7 @@ class OnlineIdentifier:
             good = self._gate.take(t, signal, self._without_consequence)
             found = [self._take(sample) for sample in good]
             self.latest = tuple(one for one in found if one is not None)
-        # some of what takes long, with a sample that does nothing else if there are such
+        # background work runs with samples that bring no other work, if there are any
         period = self._filter.period or 0.0
         if self.latest:
             busy = not self._crowded
@@ -266,18 +266,18 @@ class OnlineIdentifier:
         Raises
         ------
         IdentificationError
-            If they need a new beginning, or are out of range.
+            If the settings need a restart, or are out of range.
 
         """
         for part in fields(settings):
             same = getattr(settings, part.name) == getattr(self.settings, part.name)
             if part.name not in self.CHANGEABLE and not same:
                 raise IdentificationError(
-                    f'{part.name} cannot change while samples are learned from: begin anew'
+                    f'{part.name} cannot change during identification: restart it'
                 )
         if not self._learner.watches and settings.changes is not None:
             raise IdentificationError(
-                'changes of the arm were not looked for from the beginning: begin anew'
+                'change detection was off from the start: restart the identification'
             )
         check_forgetting(settings.forgetting)
         check_gap(settings.max_gap)
@@ -289,12 +289,12 @@ class OnlineIdentifier:
         Parameters
         ----------
         settings : OnlineSettings
-            As before but for what is `CHANGEABLE`.
+            New settings, which may differ only in those of `CHANGEABLE`.
 
         Raises
         ------
         IdentificationError
-            If they need a new beginning, or are out of range.
+            If the settings need a restart, or are out of range.
 
         """
         self.check(settings)
@@ -360,7 +360,7 @@ class OnlineIdentifier:
         rigid = pin.computeJointTorqueRegressor(
             robot.model, self._data, motion.q, motion.dq, motion.ddq
         )
-        rigid = rigid.reshape(robot.n_joints, -1)  # of a single joint it is a vector
+        rigid = rigid.reshape(robot.n_joints, -1)  # a vector for a single joint
         columns = np.concatenate([rigid, self.arm.effect_columns(one)[0]], axis=1)
         stacked = np.column_stack([motion.tau, columns.take(self.base.independent, axis=1)])
         filtered = self._row_filter.update(step, stacked.reshape(-1))[2].reshape(stacked.shape)
@@ -375,7 +375,7 @@ class OnlineIdentifier:
 
     @property
     def _without_consequence(self) -> FloatArray:
-        """Return the largest error of one sample that no row shows; 0 for all but torques."""
+        """Return the largest negligible error of one sample; 0 for all but torques."""
         n = self.arm.robot.n_joints
         floor = np.zeros((3 if self.settings.measured_velocity else 2) * n)
         if self._filter.pole is not None:

@@ -1,11 +1,11 @@
 # Copyright 2026 The armid_ros developers
 # SPDX-License-Identifier: Apache-2.0
 """
-What an online identifier learns from one row after the other, in two steps.
+Online estimate, updated with each row in two steps.
 
-The prediction of a row by the estimate before it is needed at once. Learning from it may wait for
-the next sample, which as a rule brings no row: so no sample has to do both. An estimate that is
-read includes it, for it is learned then at the latest.
+The prediction of a row by the estimate before it is needed at once. The update with the row may
+wait for the next sample, which usually brings no row, so no sample has to do both. Reading the
+estimate runs a pending update first.
 
 """
 
@@ -29,25 +29,25 @@ from armid_ros.model import BaseParameters
 from armid_ros.motion import FloatArray
 import numpy as np
 
-#: Windows of which the colour of the noise is learned [s]: longer than what it lasts.
+#: Length of the windows for the spectrum of the errors [s], beyond their correlation time.
 _WINDOW = 4.0
-#: What is divided by is at least this.
+#: Lower bound of a divisor.
 _SMALLEST = float(np.finfo(float).tiny)
 
 
 @dataclass(frozen=True)
 class OnlineSettings:
     """
-    How parameters are estimated online.
+    Settings of online estimation.
 
     Attributes
     ----------
     cutoff : float
-        Frequency of the low-pass on torque and regressor rows [Hz]. Well above the motion, as
-        the inertial torque is in the motion's fastest part; below what shakes the torque signal.
+        Frequency of the low-pass on torque and regressor rows [Hz]. Well above the motion, whose
+        fastest part carries the inertial torque, and below disturbances of the torque signal.
     row_rate : float or None
-        Rows used per second [1/s]; 40 times the cut-off frequency by default. The rows between
-        them are nearly the same once filtered, so they would cost time and teach nothing.
+        Rows used per second [1/s]; 40 times the cut-off frequency by default. After the filter,
+        the rows between them are nearly the same, so they would add only computing time.
     forgetting : float
         Forgetting factor per row used, 0.9 to 1. A memory of T seconds is 1 - 1 / (T row_rate).
     torque_noise : tuple of float or None
@@ -58,7 +58,7 @@ class OnlineSettings:
     measured_velocity : bool
         Differentiate the measured velocity instead of the position.
     changes : ChangeSettings or None
-        The threshold of a change of the arm; None does not look for any.
+        Settings of change detection; None disables it.
 
     """
 
@@ -91,18 +91,18 @@ class OnlineSettings:
 
 class Learner:
     """
-    Estimates base parameters with their covariance, and detects changes.
+    Estimator of base parameters with their covariance, and of changes.
 
     Parameters
     ----------
     arm : ArmModel
-        Structure.
+        Robot and effects.
     base : BaseParameters
-        What is estimated.
+        The estimated base parameters.
     settings : OnlineSettings
         Weights and forgetting.
     work : Background
-        Does what takes long.
+        Queue for long computations.
 
     """
 
@@ -156,7 +156,7 @@ class Learner:
             self._watch.interrupt()
 
     def predict(self, row: Row) -> FloatArray:
-        """Add a row; return the innovation, its prediction error by the estimate before."""
+        """Add a row; return its innovation, the prediction error of the estimate before it."""
         self.settle()
         innovation = row.sample.tau - row.sample.rows @ self._estimator.values
         self._waiting = row, innovation

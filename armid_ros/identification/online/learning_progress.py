@@ -1,6 +1,6 @@
 # Copyright 2026 The armid_ros developers
 # SPDX-License-Identifier: Apache-2.0
-"""What a motion does not teach: parameters that stay unknown, and how to move to learn them."""
+"""Parameters that a motion does not identify, and the motion that would identify them."""
 
 from __future__ import annotations
 
@@ -14,23 +14,23 @@ from armid_ros.model import BaseParameters, inverse_dynamics, random_motion
 from armid_ros.motion import FloatArray
 import numpy as np
 
-#: States of the work space over which torques are predicted.
+#: Number of random states over which torques are predicted.
 _STATES = 100
-#: A parameter is known when it leaves the torque less uncertain than this share of the usual.
+#: A parameter is identified if it makes a torque uncertain by less than this share of the usual.
 _KNOWN = 0.1
-#: Time over which something has to be learned [s], and by how much deviations have to fall.
+#: Progress: a standard deviation falls within this time [s] below this share of its value.
 _WAIT = 10.0
 _LEARNED = 0.9
-#: Where nothing has been learned, and so many times the usual torque is uncertain, deviations are
-#: as the noise is, and have to fall by more.
+#: Uncertainty of a torque, over the usual torque, above which nothing is identified yet. There,
+#: standard deviations depend on the noise alone and have to fall below this share.
 _NOTHING = 100.0
 _BEGUN = 0.5
-#: Standard deviations by which a torque is larger than nothing to be sure.
+#: Number of standard deviations by which an estimate has to exceed zero to be certain.
 _CERTAIN = 2.0
-#: Joints that are named at most.
+#: Largest number of joints in the message.
 _NAMED = 3
 _WORDS = {'kg m^2': 'inertia', 'kg m': 'balance', 'kg': 'mass'}
-#: How to move to show it.
+#: Motion that identifies each kind of parameter.
 _ADVICE = {
     'inertia': 'accelerate it harder',
     'balance': 'move it through more of its range',
@@ -49,9 +49,9 @@ class Unlearned:
     joint : str
         The joint; empty for the whole arm.
     parameters : tuple of ParameterName
-        What is unknown, the least known first.
+        Unidentified parameters, the most uncertain first.
     uncertainty : float
-        How uncertain the worst one leaves a torque, as a share of what that joint usually takes.
+        Uncertainty of a torque by the first parameter, over the usual torque of that joint [-].
 
     """
 
@@ -60,7 +60,7 @@ class Unlearned:
     uncertainty: float
 
     def __str__(self) -> str:
-        """Describe what is unknown, and the motion that identifies it."""
+        """Return the unidentified quantities, and the motion that identifies them."""
         words = list(dict.fromkeys(_word(p) for p in self.parameters))
         advice = list(dict.fromkeys(_ADVICE.get(word, _OTHER_ADVICE) for word in words))
         return f'{self.joint or "the arm"} ({", ".join(words)}): {" and ".join(advice)}'
@@ -68,16 +68,16 @@ class Unlearned:
 
 class LearningProgress:
     """
-    Compares estimates over time to find what the motion does not identify.
+    Comparison of estimates over time to find parameters that the motion does not identify.
 
     Parameters
     ----------
     arm : ArmModel
-        What is identified.
+        The arm to identify.
     base : BaseParameters
-        Its base parameters.
+        Base parameters of the arm.
     rng : numpy.random.Generator
-        Draws states of the work space.
+        Generator of random states.
 
     """
 
@@ -95,14 +95,14 @@ class LearningProgress:
 
     def look(self, t: float, estimate: Estimate) -> tuple[Unlearned, ...]:
         """
-        Return the unidentified quantities without progress for ten seconds, per joint.
+        Return the unidentified quantities of each joint that made no progress for ten seconds.
 
         Parameters
         ----------
         t : float
             Time of the last sample in the estimate [s].
         estimate : Estimate
-            Of the base parameters.
+            Estimate of the base parameters.
 
         """
         if self._past and t < self._past[-1][0]:
@@ -112,8 +112,8 @@ class LearningProgress:
             self._past.popleft()
         if self._past[0][0] > t - _WAIT:
             return ()
-        # the torque that a joint usually takes is what moves the links of the description and what
-        # effects, friction above all, take: by how much they are larger than they are uncertain
+        # the usual torque of a joint: that of the described links, and that of the effects (mainly
+        # friction) as far as their estimates exceed their uncertainty
         known = np.maximum(np.abs(estimate.values) - _CERTAIN * estimate.std, 0.0)
         effects = self._size * np.where(self._of_effects, known, 0.0)
         usual = np.sqrt(self._rigid**2 + np.sum(effects**2, axis=1))
@@ -131,7 +131,7 @@ class LearningProgress:
 
 
 def too_little_motion(unlearned: Sequence[Unlearned]) -> str:
-    """Return a line on what the motion does not identify; empty if nothing."""
+    """Return a message on parameters that the motion does not identify; empty if none."""
     if not unlearned:
         return ''
     rest = len(unlearned) - _NAMED

@@ -1,13 +1,13 @@
 # Copyright 2026 The armid_ros developers
 # SPDX-License-Identifier: Apache-2.0
 """
-Friction that arms have and that is not identified, as nuisance parameters.
+Friction that the model lacks, as nuisance parameters.
 
-What a model lacks bends the parameters that are identified, and comes and goes with the motion: a
-search for changes would take it for one, or the torques of a fast motion, which bent inertias
-predict wrongly, for the size of another. It is the same in every motion though, so it is learned
-together with them: viscous and Coulomb friction, if the model does not have them, friction in
-proportion to the load, and a curve over velocity, which is a sum of humps at low velocities.
+Friction that a model lacks biases the identified parameters, and the bias varies with the motion.
+A search for changes would mistake this for a change, or for a part of its size. The friction law
+does not vary, so it is estimated too: viscous and Coulomb friction, if the model lacks them, and
+friction in proportion to the load. A sum of humps at low velocities is added as a curve over
+velocity.
 
 """
 
@@ -32,17 +32,17 @@ class Row(NamedTuple):
     Attributes
     ----------
     t : float
-        Its time [s].
+        Time of the row [s].
     sample : WeightedSample
-        What the estimator takes in.
+        Rows, torques and weights for the estimator.
     motion : CausalMotion
-        Behind the motion filter.
+        Output of the motion filter.
     step : float
         Time since the row before [s].
     gain : float
-        What the rows are divided by.
+        Divisor of the rows: gain of the filters for white noise [-].
     begins : bool
-        Whether it does not continue the row before.
+        Whether the row begins a new stretch.
 
     """
 
@@ -56,19 +56,19 @@ class Row(NamedTuple):
 
 class NuisanceRows:
     """
-    Computes and filters the columns of friction that the model lacks.
+    Filtered regressor columns of friction that the model lacks.
 
     Parameters
     ----------
     arm : ArmModel
-        What it has already, and the load of its joints.
+        The arm, whose own effects are left out.
     cutoff : float
-        Of the row filter [Hz].
+        Cut-off frequency of the row filter [Hz].
 
     Attributes
     ----------
     parameters : tuple of ParameterName
-        Quantity by quantity, in each of them joint by joint.
+        Nuisance parameters, by quantity and then by joint.
 
     """
 
@@ -94,7 +94,7 @@ class NuisanceRows:
         q, dq, ddq = (np.stack(part) for part in zip(*moved, strict=True))
         t = np.array([row.motion.t for row in some])
         motion = Motion(self._arm.robot.joints, t, q, dq, ddq)
-        # the friction of a unit of each quantity, of which each acts on its own joint
+        # friction per unit of each quantity; every quantity acts on its own joint only
         torques = np.empty((len(some), motion.n_joints, len(self._effects)))
         for k, effect in enumerate(self._effects):
             torques[:, :, k] = np.diagonal(effect.columns(motion, self._arm), axis1=1, axis2=2)

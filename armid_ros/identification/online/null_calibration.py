@@ -1,12 +1,12 @@
 # Copyright 2026 The armid_ros developers
 # SPDX-License-Identifier: Apache-2.0
 """
-Distribution of likelihood ratios and residuals while nothing changes, and the limit that it gives.
+Null distribution of likelihood ratios and residuals, and the critical values that follow.
 
-Twice the logarithm is chi-square of p degrees only if noise is white and the model right. Noise
-that is coloured, and what the model lacks, make it larger, by a factor that is measured for every
-candidate while nothing changes and is 1 at least. The ratio of the two is then of Fisher's
-distribution, its degrees of freedom counting how much was measured.
+Twice the log-likelihood ratio is chi-square of p degrees only if noise is white and the model
+right. Coloured noise and model discrepancy multiply it by a factor of at least 1, which is
+measured for every candidate while nothing changes. The statistic over its factor then has
+Fisher's F distribution, whose second degrees of freedom grow with the measured windows.
 
 """
 
@@ -20,45 +20,45 @@ from armid_ros.motion import FloatArray
 import numpy as np
 from scipy import stats
 
-#: Windows that are remembered: ten minutes of four a second.
+#: Number of windows kept: ten minutes at four windows per second.
 _MEMORY = 2400
-#: Windows between two looks at how large statistics usually are, and as a share of all.
+#: New windows after which the factors are computed again, and the same as a share of all windows.
 _EVERY = 8
 _SHARE = 0.05
-#: The usual size is measured by what so many exceed.
+#: Tail probability of the quantile to which larger statistics are limited in the mean.
 _TAIL = 0.05
-#: Quantile of all statistics that shows whether large ones are more frequent than in noise.
+#: Tail probability of the quantile that shows whether large statistics are too frequent.
 _RARE = 0.01
-#: Standard deviation of the logarithms of usual sizes, at the least.
+#: Smallest standard deviation between the logarithms of the factors.
 _LEAST_SPREAD = 0.1
-#: The next motion may show so much more of what the model lacks than those before.
+#: Allowance for a next motion with more model discrepancy than the motions before [-].
 _MARGIN = 1.3
-#: What is divided by is at least this.
+#: Lower bound of a divisor.
 _SMALLEST = 1e-100
-#: What is stronger than this share of all windows is stronger than usual.
+#: Share of the windows whose torques are stronger than usual.
 _STRONG = 0.1
-#: Rounds in which factors and what is limited by them settle.
+#: Number of iterations in which factors and limited statistics converge.
 _ROUNDS = 8
-#: Independent windows before anything is judged.
+#: Smallest number of independent windows for a test.
 _FEWEST = 12.0
-#: Numbers that are looked at in one piece of work.
+#: Numbers that are processed in one piece of work.
 _AT_A_TIME = 4_000
-#: Blocks that are remembered: a minute of four a second.
+#: Number of blocks kept: one minute at four blocks per second.
 _BLOCKS = 240
-#: Blocks before the assumption is given up.
+#: Number of blocks after which the measured noise replaces the assumed one.
 _FEWEST_BLOCKS = 16
 
 
 class History:
     """
-    Buffer of the last rows of numbers.
+    Buffer of the latest rows of numbers.
 
     Parameters
     ----------
     width : int
         Numbers in a row.
     most : int
-        Rows that are remembered.
+        Largest number of rows kept.
 
     """
 
@@ -90,31 +90,30 @@ class History:
 
 class NullCalibration:
     """
-    Calibration of test statistics against those of white noise.
+    Calibration of test statistics by factors over their size in white noise.
 
-    By their mean, in which what one in twenty exceeds counts as that and no more, over the later
-    three quarters of what was seen and ten minutes at most: so what came while little was known,
-    or before a change was noticed, soon has no part in it. A few windows determine a factor only
-    roughly; those of other statistics, of the same arm and motion, are much the same, and each is
-    drawn towards their mean as far as it is less certain than they are different (Efron and
-    Morris 1975). Where large ones come more often than the mean suggests, as where the model lacks
-    what happens at reversals, by what one in a hundred of all statistics exceeds.
+    The factor of a statistic is its mean over that in white noise, with the largest 5 % limited to
+    their quantile. The mean covers the later three quarters of at most ten minutes, so that early
+    windows, or those before a late detection, soon drop out. Few windows determine a factor only
+    roughly. The factors of one arm are similar, so each uncertain factor is shrunk towards their
+    mean (Efron and Morris 1975). If large statistics are more frequent than the mean suggests, as
+    with discrepancies at reversals, the 99 % quantile of all statistics raises the limits.
 
     Parameters
     ----------
     sizes : sequence of int
         Degrees of freedom of each statistic.
     overlap : int
-        Successive windows of which one is independent of the one before.
+        Length of a window in blocks; windows at this distance are independent.
     sources : int
-        Independent sources of noise, such as joints, that the statistics look at.
+        Number of independent sources of noise in the statistics, such as joints.
 
     """
 
     def __init__(self, sizes: Sequence[int], overlap: int, sources: int) -> None:
         self._sizes = np.array(sizes)
         shared = np.arange(1, overlap) / overlap
-        self._overlap = 1.0 + 2.0 * float(np.sum(shared**2))  # of squares of sums that overlap
+        self._overlap = 1.0 + 2.0 * float(np.sum(shared**2))  # windows per independent window
         self._sources = sources
         self._ratios = History(len(sizes), _MEMORY)
         self._strengths = History(int(np.sum(sizes)), _MEMORY)
@@ -128,7 +127,7 @@ class NullCalibration:
         self._tail = 1.0
         self._limits: tuple[float, FloatArray] | None = None
         self._mean = below + _TAIL * self._most
-        # of the logarithm of the factor that makes the mean right, from one window
+        # variance of the logarithm of a factor that is estimated from one window
         self._variance = (square + _TAIL * self._most**2 - self._mean**2) / below**2
         self.factors = np.full(len(sizes), np.nan)
         self._freedom = np.zeros(len(sizes))
@@ -142,7 +141,7 @@ class NullCalibration:
         ratios : ndarray, shape (C,)
             Twice the logarithms of the likelihood ratios; 0: no data.
         strength : ndarray, shape (Q,)
-            Squares of the torques that a unit of each quantity would make.
+            Sum of squared torques per unit of each quantity.
 
         """
         if not np.any(ratios > 0.0):
@@ -162,7 +161,7 @@ class NullCalibration:
         yield from self._look(self._ratios.values[len(self._ratios) // 4 :])
 
     def _look(self, later: FloatArray) -> Job:
-        """Find the factors of the later windows; 0: no data."""
+        """Compute the factors from statistics of later windows, where 0 means no data."""
         counts = np.sum(later > 0.0, axis=0)
         independent = counts / self._overlap
         judged = independent >= _FEWEST
@@ -171,7 +170,7 @@ class NullCalibration:
         single = np.full(len(self._sizes), np.nan)
         for columns in _in_pieces(later):
             some = np.arange(len(single))[columns][judged[columns]]
-            # the factors with which the means of limited statistics are as expected
+            # factors that bring the means of the limited statistics to their values in white noise
             seen, most, mean = later[:, some], self._most[some], self._mean[some] * counts[some]
             factor = np.sum(seen, axis=0) / (self._sizes[some] * counts[some])
             for _ in range(_ROUNDS):
@@ -192,14 +191,14 @@ class NullCalibration:
         tail = yield from self._tail_of(later[:, judged], (factors * self._rare)[judged])
         self.factors, self._tail = factors, max(1.0, tail)
         self._freedom = np.zeros(len(self._sizes))
-        self._freedom[judged] = 2.0 / left  # what a mean square of so many degrees varies by
+        self._freedom[judged] = 2.0 / left  # a mean square of k degrees varies by 2 / k
         self._limits = None
 
     @staticmethod
     def _tail_of(seen: FloatArray, rare: FloatArray) -> Pieces[float]:
-        """Return the 99 % quantile of the statistics, each divided by its expected one."""
+        """Return the 99 % quantile of the statistics, each over its quantile in white noise."""
         count = int(np.sum(seen > 0.0))
-        most = count - int((1.0 - _RARE) * (count - 1))  # so many of the largest hold the quantile
+        most = count - int((1.0 - _RARE) * (count - 1))  # the quantile is among so many largest
         largest = np.empty(0)
         for columns in _in_pieces(seen):
             relative = (seen[:, columns] / rare[columns]).reshape(-1)
@@ -212,17 +211,17 @@ class NullCalibration:
 
     def excess(self, ratios: FloatArray, strength: FloatArray, chance: float) -> FloatArray:
         """
-        Return statistics over their critical values; 0 before calibration.
+        Return the ratios of statistics to their critical values; 0 before calibration.
 
-        What the model lacks has biased the parameters, and a motion that is stronger than those
-        they were learned from makes the more of it.
+        Model discrepancy has biased the parameters, so the critical values are larger for motion
+        that is stronger than usual.
 
         Parameters
         ----------
         ratios, strength : ndarray
-            The statistics, as of `learning`.
+            Statistics of one window, as in `learning`.
         chance : float
-            Of each to exceed its limit.
+            Probability of a false alarm of each statistic.
 
         """
         judged = self._freedom > 0.0
@@ -248,13 +247,13 @@ class ResidualScale:
     """
     Standard deviation of autocorrelated residuals per joint, over the assumed noise.
 
-    Sums of residuals over a block: what is quick cancels in them. By their median, which neither
-    the first blocks nor a change that is not yet noticed moves.
+    Residuals are summed over a block, in which fast errors cancel. The scale is the median over
+    blocks, which neither the first blocks nor a change that is not yet detected disturb.
 
     Parameters
     ----------
     least : float
-        What the factor is at least.
+        Lower bound of the factor [-].
 
     """
 
@@ -272,7 +271,7 @@ class ResidualScale:
         """Learn from the residuals of a block over the assumed noise, shape (k, m)."""
         used = np.sum(weights > 0.0, axis=0)
         if not used.any():
-            return  # an arm at rest must not forget what it is like in motion
+            return  # an arm at rest must not forget the residuals of its motion
         squares = np.sum(residual, axis=0) ** 2
         if self._seen is None:
             self._seen = History(len(squares), _BLOCKS)
@@ -282,7 +281,7 @@ class ResidualScale:
         later = self._seen.values[len(self._seen) // 2 :]
         known = np.any(later > 0.0, axis=0)
         value = np.ones(later.shape[1]) if self._value is None else self._value.copy()
-        # the medians of the numbers in every column; numpy's nanmedian takes ten times it
+        # medians of the columns without NaN; numpy's nanmedian takes ten times as long
         values = later[:, known]
         ordered, counts = np.sort(values, axis=0), np.sum(~np.isnan(values), axis=0)
         columns = np.arange(values.shape[1])

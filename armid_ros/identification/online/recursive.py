@@ -3,14 +3,14 @@
 """
 Recursive least squares in square-root information form.
 
-The state is the triangle R and the vector z of the QR factorisation of all weighted rows so far,
-so without forgetting the estimate is the one of a batch solution, at any number of samples, and
-the covariance R^-1 R^-T cannot lose its symmetry or become negative (Bierman 1977, chapter V).
+The state is the triangle R and the vector z of the QR factorisation of all weighted rows so far.
+Without forgetting, the estimate equals the batch solution at any number of samples. The covariance
+R^-1 R^-T cannot lose its symmetry or become negative (Bierman 1977, chapter V).
 
 Forgetting is directional (Kulhavy and Karny 1984): old information is given up only where a new
 sample brings information, and never more than the sample brings. So the covariance never grows,
-and what is not excited is neither forgotten nor moved: an arm may rest for hours. The price is
-that what a strong burst of motion taught is forgotten late by the weak motion after it.
+and a direction without excitation is neither forgotten nor moved: an arm may rest for hours. The
+price is that weak motion forgets the information of an earlier, stronger motion slowly.
 
 """
 
@@ -89,8 +89,8 @@ class RecursiveLeastSquares:
         1 keeps everything. Below 1, a direction that is excited all the time is estimated from
         about the last 1 / (1 - forgetting) samples.
     start : array_like, shape (P,), optional
-        Values to begin with, zero by default, within PRIOR_STD: a ridge too weak to be seen once a
-        parameter is excited.
+        Prior mean, zero by default. The prior standard deviation PRIOR_STD is so large that the
+        prior is negligible once a parameter is excited.
     scale_covariance : bool
         Whether the noise is known up to a factor only, the covariance being multiplied by
         ``variance_factor``.
@@ -105,7 +105,7 @@ class RecursiveLeastSquares:
     parameters : tuple of ParameterName
         P names.
     noise_is_relative : bool
-        As `scale_covariance`.
+        Whether the noise is known up to a factor only.
     samples : int
         Samples used since the last reset.
 
@@ -196,8 +196,8 @@ class RecursiveLeastSquares:
         """
         Add several samples at once, which is faster than one by one.
 
-        Without forgetting, what is learned is the same. With it, they are taken one by one, as
-        what is given up depends on the order.
+        Without forgetting, the estimate is the same. With forgetting, samples are added one by
+        one, as the forgotten information depends on the order.
 
         """
         if self._forgetting < 1.0:

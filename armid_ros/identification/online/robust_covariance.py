@@ -1,15 +1,15 @@
 # Copyright 2026 The armid_ros developers
 # SPDX-License-Identifier: Apache-2.0
 """
-The covariance of recursive estimates whose errors last.
+Covariance of recursive estimates with autocorrelated errors.
 
-R^-1 R^-T, the covariance of least squares, takes the error of every row as independent of the
-next one's. Errors that last, of coloured noise or of what the model lacks, add up. With the
-density phi_jb of the noise of joint j in a band b of frequencies, and the products M_jb = W^H W of
-its rows there, the scores W^T r have the covariance J = sum of phi_jb M_jb in place of M = sum of
-M_jb, and the values M^-1 J M^-1. Rows are transformed window by window, and their products summed
-up, so what is kept does not grow. The torques are among the columns, so the power of the residuals
-in a band is that of the present estimate, however wrong it was when the rows came.
+The covariance of least squares, R^-1 R^-T, takes errors of different rows as independent. Errors
+of coloured noise or of model discrepancy are autocorrelated and add up. Let phi_jb be the noise
+density of joint j in frequency band b, and M_jb = W^H W the products of its rows there. The scores
+W^T r have the covariance J = sum of phi_jb M_jb in place of M = sum of M_jb, and the values have
+M^-1 J M^-1. Rows are transformed window by window and their products summed up, so the memory does
+not grow. The torques are among the columns, so the residual power in a band is always that of the
+present estimate, however wrong earlier estimates were.
 Source: Newey and West 1987, with bands of frequencies in place of lags.
 
 """
@@ -26,17 +26,17 @@ from armid_ros.motion import FloatArray
 import numpy as np
 from scipy import linalg, stats
 
-#: Rows over frequencies that are used: beyond, the low-pass filter passes nothing.
+#: Rows of a window per frequency that is used: the low-pass filter stops all higher ones.
 _ROWS_OF_BIN = 8
-#: Columns that are transformed in one piece of work.
+#: Number of columns transformed in one piece of work.
 _COLUMNS = 24
-#: Ridge that keeps the information of what was never excited invertible [-].
+#: Ridge that keeps the information invertible in directions that were never excited [-].
 _RIDGE = 1e-9
-#: What is divided by is at least this.
+#: Lower bound of a divisor.
 _SMALLEST = 1e-100
-#: Least share of the power of the torques that noise has: arithmetic is no better.
+#: Smallest noise power as a share of the torque power, by rounding errors [-].
 _LEAST_NOISE = 1e-20
-#: Degrees of freedom of a variance that are taken for granted.
+#: Lower bound of the degrees of freedom of a variance.
 _FEWEST = 3.0
 #: Level of the upper end of an interval.
 _LEVEL = 0.975
@@ -47,11 +47,11 @@ class _Bands:
     """Products of the transforms of rows and torques, joint by joint and band by band."""
 
     products: FloatArray  # (m, B, P + 1, P + 1), torques last
-    counts: FloatArray  # real numbers of every column that they are sums over, (m, B)
+    counts: FloatArray  # number of real values summed up in every product, (m, B)
 
     @property
     def information(self) -> FloatArray:
-        """M of all joints and bands, shape (P, P)."""
+        """Return the information M, summed over joints and bands, shape (P, P)."""
         return np.asarray(self.products.sum(axis=(0, 1))[:-1, :-1])
 
 
@@ -64,9 +64,9 @@ class RobustCovariance:
     window : int
         Rows in a window, which should last longer than errors do.
     forgetting : float
-        Share of what was that is not forgotten with a row; no window takes more than it brings.
+        Forgetting factor per row; a window removes no more information than it brings.
     work : Background
-        Sums windows up.
+        Queue of the jobs that sum up windows.
 
     """
 
@@ -77,7 +77,7 @@ class RobustCovariance:
         self.reset()
 
     def reset(self) -> None:
-        """Forget everything; nothing may be left to be done."""
+        """Clear all sums; no background job may be pending."""
         self._settled: _Bands | None = None
         self._latest: _Bands | None = None
         self._shape: tuple[FloatArray, FloatArray] | None = None
@@ -97,7 +97,7 @@ class RobustCovariance:
         rows, tau : ndarray, shapes (m, P) and (m,)
             Rows and torques in units of the assumed noise; zero where not used.
         values : ndarray, shape (P,)
-            The estimate that residuals are taken of, at the end of a window.
+            Estimate of which the residuals are computed if this sample ends a window.
 
         """
         if self._rows is None:
@@ -111,15 +111,15 @@ class RobustCovariance:
 
     def reopen(self, directions: FloatArray, values: FloatArray) -> None:
         """
-        Allow for an unknown change of the parameters before now.
+        Allow for an unknown change of the parameters between earlier and later rows.
 
-        The last window, in which they may have changed, is left out. From the torques of all rows
-        before is subtracted what the change adds to them if it is the one for which they fit best.
+        The last window, in which they may have changed, is left out. The torque of the change that
+        fits best is subtracted from the torques of all earlier rows.
 
         Parameters
         ----------
         directions : ndarray, shape (P, k)
-            What the change may have added.
+            Directions in which the parameters may have changed.
         values : ndarray, shape (P,)
             The estimate now.
 
@@ -137,7 +137,7 @@ class RobustCovariance:
             settled = self._latest
             if self._settled is not None:
                 settled = yield from _sum(self._settled, self._latest)
-            # the share of what is known with a window that it brings, mean of all directions
+            # share of the information that the window brings, mean over all directions
             both = settled.information + window.information
             size = np.sqrt(np.diag(both).clip(PRIOR_STD**-2))
             scale, ridge = np.outer(size, size), _RIDGE * np.eye(len(size))
@@ -179,8 +179,8 @@ class RobustCovariance:
         """
         Return the covariance of an estimate, shape (P, P); None before the second window.
 
-        Few windows determine the noise only roughly: its deviations are those of normal
-        distributions with intervals as wide as Student's.
+        Few windows determine the noise only roughly. The deviations are widened such that normal
+        intervals are as wide as Student's.
 
         Parameters
         ----------
@@ -198,7 +198,7 @@ class RobustCovariance:
 
 
 def _sum(some: _Bands, more: _Bands) -> Pieces[_Bands]:
-    """Return the sums of products, joint by joint."""
+    """Return the sums of two sets of products, in pieces."""
     products = np.empty_like(some.products)
     for place, first, second in zip(products, some.products, more.products, strict=True):
         np.add(first, second, out=place)
@@ -231,9 +231,9 @@ def _transformed(columns: FloatArray) -> Pieces[_Bands]:
 
 
 def _shape(bands: _Bands, values: FloatArray) -> Pieces[tuple[FloatArray, FloatArray]]:
-    """Return a root of R_M^-T J R_M^-1, R_M that of M, and what widens deviations by it."""
-    # The noise power in a band is that of the residuals, corrected for what the fit absorbed; the
-    # covariance of every value is a sum over bands, and as certain as that (Satterthwaite 1946).
+    """Return a root of R_M^-T J R_M^-1 with R_M^T R_M = M, and factors that widen deviations."""
+    # The noise power in a band is that of the residuals, corrected for the degrees of freedom of
+    # the fit. The variance of a value is a sum over bands, with degrees by Satterthwaite (1946).
     information, scores = bands.information, bands.products[..., :-1, :-1]
     size = np.sqrt(np.diag(information).clip(PRIOR_STD**-2))
     ridge = _RIDGE * np.eye(len(size))
@@ -243,7 +243,7 @@ def _shape(bands: _Bands, values: FloatArray) -> Pieces[tuple[FloatArray, FloatA
     root = inverse / size[:, np.newaxis]
     covariance = root @ root.T
     yield
-    # what a fit takes of the scores, and the squares of its residuals, each (m, B)
+    # degrees of freedom that the fit takes, and squares of its residuals, each (m, B)
     ends, parts = np.append(values, -1.0), []
     for products in bands.products:
         absorbed = np.tensordot(products[:, :-1, :-1], covariance, axes=2)
@@ -276,7 +276,7 @@ def _shape(bands: _Bands, values: FloatArray) -> Pieces[tuple[FloatArray, FloatA
 
 
 def _triangle(information: FloatArray) -> FloatArray:
-    """Return R of R^T R; eigenvalues that rounding has taken below the ridge are the ridge."""
+    """Return R of R^T R; eigenvalues that rounding moved below the ridge are raised to it."""
     try:
         return np.asarray(linalg.cholesky(information))
     except linalg.LinAlgError:

@@ -1,9 +1,9 @@
 # Copyright 2026 The armid_ros developers
 # SPDX-License-Identifier: Apache-2.0
 """
-Information as a triangle: R theta = z stands for all weighted rows so far.
+Square-root information: a triangle R and z, where R theta = z stands for all weighted rows.
 
-Reflections take rows in and leave R^T R exactly what the rows make (Bierman 1977, chapter V).
+Householder reflections add rows and keep R^T R exact (Bierman 1977, chapter V).
 
 """
 
@@ -14,13 +14,13 @@ import numpy as np
 from scipy.linalg import lapack
 
 #: Standard deviation of every parameter before the first sample, in its SI unit. Robots have
-#: parameters of 1e-4 to 1e3; what the data leave unknown shows by this value.
+#: parameters of 1e-4 to 1e3; a parameter that the data do not identify keeps this deviation.
 PRIOR_STD = 1e6
-#: Losses are this many times those of exponential forgetting, as samples that bring less than
-#: that lose less. So a step of a Coulomb friction of a 7-joint arm in motion is followed as with
-#: exponential forgetting, 63 % in 8 s and 90 % in 28 s with a memory of 10 s.
+#: Loss of information over that of exponential forgetting, as samples with little information lose
+#: less. A step of the Coulomb friction of a moving 7-joint arm is followed as with exponential
+#: forgetting: 63 % in 8 s and 90 % in 28 s with a memory of 10 s.
 _LOSS_RATIO = 2.0
-#: The most that one sample may take away from the old information in any direction.
+#: Largest share of the old information that one sample may remove in any direction [-].
 _LARGEST_LOSS = 0.5
 _BLOCK = 8  # columns of a Householder block; the fastest for 60 to 120 parameters
 
@@ -34,14 +34,14 @@ def absorbed(
     root: FloatArray, right: FloatArray, rows: FloatArray, tau: FloatArray
 ) -> tuple[FloatArray, FloatArray]:
     """
-    Return R and z with new rows in them, annihilated by Householder reflections.
+    Return R and z after new rows are added by Householder reflections.
 
     Parameters
     ----------
     root, right : ndarray, shapes (P, P) and (P, 1)
         R and z in Fortran order; they are overwritten.
     rows, tau : ndarray, shapes (m, P) and (m,)
-        What is taken in, with noise of variance 1.
+        Rows to add, with noise of variance 1.
 
     """
     root, reflectors, factors, _ = lapack.dtpqrt(
@@ -60,14 +60,14 @@ def replaced(root: FloatArray, rows: FloatArray, forgetting: float) -> FloatArra
     In the directions b of U = rows R^-1 = A diag(s) B^T the old information, 1, becomes
     1 - f + s^2 with f = min(s^2, level). It never falls, so the new triangle is the old one
     with rows A^T rows, shortened, annihilated. The level is such that the losses add up to
-    what exponential forgetting takes from all P directions, if the sample brings that much.
+    the loss of exponential forgetting in all P directions, if the sample brings that much.
 
     Parameters
     ----------
     root : ndarray, shape (P, P)
         R in Fortran order; it is overwritten.
     rows : ndarray, shape (m, P)
-        What is taken in, with noise of variance 1.
+        Rows to add, with noise of variance 1.
     forgetting : float
         Forgetting factor, below 1.
 
@@ -75,7 +75,7 @@ def replaced(root: FloatArray, rows: FloatArray, forgetting: float) -> FloatArra
     whitened, _ = lapack.dtrtrs(root, rows.T, trans=1)
     gains, directions = np.linalg.eigh(whitened.T @ whitened)
     budget = _LOSS_RATIO * (1.0 - forgetting) * len(root)
-    # the level for which the gains cut off at it, ascending, add up to the budget
+    # the level at which the gains, ascending and limited to it, add up to the budget
     some = np.maximum(gains, 0.0)
     levels = (budget - np.append(0.0, np.cumsum(some[:-1]))) / np.arange(len(some), 0, -1)
     above = some >= levels
@@ -97,7 +97,7 @@ def step_along(root: FloatArray, gradient: FloatArray) -> FloatArray:
 
 def reopened(root: FloatArray, directions: FloatArray) -> FloatArray:
     """
-    Return R without its information on the values along some directions (P, k).
+    Return R without its information on parameters along some directions (P, k).
 
     The parameters become theta + directions delta, where nothing is known of delta: R theta = z
     is stacked with delta = 0 within PRIOR_STD, and delta is eliminated by reflections.

@@ -1,3 +1,3 @@
 # Copyright 2026 The armid_ros developers
 # SPDX-License-Identifier: Apache-2.0
-"""Fits whose parameters are those of bodies."""
+"""Fits with physically consistent links."""

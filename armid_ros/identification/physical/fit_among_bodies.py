@@ -1,12 +1,12 @@
 # Copyright 2026 The armid_ros developers
 # SPDX-License-Identifier: Apache-2.0
 """
-The fit among bodies: torque least squares over parameters that physics allows.
+Torque least squares over physically consistent parameters.
 
-The constraints are part of the fit. Moving an unconstrained estimate to the nearest body
-afterwards spoils the torques, for it is nearest in parameters of which they say nothing. What the
-data leave open comes from the description; how much that counts is decided by blocks of the
-training data that are left out in turn.
+The constraints are part of the fit. Projecting an unconstrained estimate on the nearest body
+afterwards would spoil the torques, as the distance in parameters does not measure them. Parameters
+that the data do not determine come from the description. Its weight is chosen by cross-validation
+with blocks of the training data.
 
 """
 
@@ -36,31 +36,31 @@ from armid_ros.robots import Robot
 import numpy as np
 import scipy.linalg
 
-#: A fit better than this share of the torque is taken as that good: there is always some noise.
+#: Lower bound of the error of a fit, as a share of the torque: there is always some noise.
 FINEST_FIT = 1e-4
-#: A mass beyond so many times the described one is said.
+#: Ratio of a mass to the described one above which a note is given.
 HEAVY = 3.0
 #: Blocks of the training data that are left out in turn to choose the weight of the prior.
 BLOCKS = 5
-#: Weights of the divergence that are tried. The fit is a mean of squares of about one.
+#: Weights of the divergence that are compared. The fit term is a mean square of about one.
 WEIGHTS = tuple(float(w) for w in 10.0 ** np.arange(-7.0, 0.5))
-#: The heaviest weight is taken whose held-out error is within this share of the least one.
+#: Tolerance of the held-out error over the least one: the largest weight within it is chosen.
 TOLERANCE = 1e-3
 
 
 @dataclass(frozen=True)
 class PhysicalSettings:
     """
-    Prior knowledge, in addition to the recordings.
+    Prior knowledge of masses and shapes, in addition to the recordings.
 
     Attributes
     ----------
     total_mass : float or None
-        Mass of everything that the driven joints move [kg], as of a scale.
+        Mass of everything that the driven joints move [kg], from a scale for example.
     boxes : mapping of str to (sequence of float, sequence of float)
-        Joint, and two corners [m] of a box in its frame that contains the link.
+        Joint, and two corners [m], in the joint frame, of a box that contains the link.
     mass_range : float or None
-        Factor above 1 by which a link is lighter or heavier than described at most.
+        Largest ratio between the mass of a link and the described one, above 1.
 
     """
 
@@ -94,12 +94,12 @@ def fit_to_bodies(
     rng: np.random.Generator,
 ) -> tuple[FittedValues, PhysicalCertificate]:
     """
-    Fit physically consistent links after a free fit.
+    Fit physically consistent links, starting at an unconstrained fit.
 
     Parameters
     ----------
     arm : ArmModel
-        Description: the prior of the links.
+        Arm as described, the prior of the links.
     free : FittedValues
         The fit without constraints.
     recordings : sequence of Recording
@@ -107,18 +107,18 @@ def fit_to_bodies(
     used : Conditioning
         Filters.
     method : {'ols', 'wls', 'irls'}
-        As of ``solve``.
+        See ``solve``.
     settings : PhysicalSettings
-        What else is known.
+        Further knowledge of masses and shapes.
     rng : numpy.random.Generator
-        Draws the states over which base parameters are found.
+        Generator of the random states from which base parameters are found.
 
     Returns
     -------
     fit : FittedValues
-        With values that bodies have; its covariance is what the data alone say.
+        Fit with physically consistent values; its covariance is that of the data alone.
     certificate : PhysicalCertificate
-        Why to believe it.
+        Evidence of physical consistency.
 
     """
     fit, certificate = _bodies(arm, free, settings)
@@ -243,17 +243,17 @@ def physical_program(
 
 def bodily_prior(arm: ArmModel) -> tuple[FloatArray, tuple[str, ...]]:
     """
-    Return standard parameters with bodies for links without inertia.
+    Return standard parameters of the description, with physical values for impossible links.
 
-    A link of no mass becomes a ball of the mean mass of the others; one that is a point, or whose
-    moments no body has, is given the least second moments that a body has there.
+    A link without mass becomes a ball of the mean mass of the others. A link that is a point, or
+    whose moments are impossible, is given the smallest second moments of a body of that mass.
 
     Returns
     -------
     theta : ndarray, shape (P,)
         Standard parameters, those of every link positive definite.
     notes : tuple of str
-        What was assumed.
+        Assumptions on links.
 
     """
     theta = arm.theta.copy()
@@ -265,12 +265,12 @@ def bodily_prior(arm: ArmModel) -> tuple[FloatArray, tuple[str, ...]]:
         matrix = pseudo_inertia(theta[part])
         mass = matrix[3, 3]
         if mass <= 1e-6 * typical:
-            # radius of gyration [m] of a link of which the description says nothing
+            # assumed radius of gyration of 0.05 m
             ball = np.diag([0.05**2] * 3 + [1.0]) * typical
             theta[part] = link_parameters(ball)
             notes.append(
                 f"link '{link}': the description has no mass; a ball of {typical:.3g} kg is the "
-                'prior where the data say nothing'
+                'prior where the data do not determine it'
             )
             continue
         center = matrix[:3, 3] / mass
@@ -284,7 +284,7 @@ def bodily_prior(arm: ArmModel) -> tuple[FloatArray, tuple[str, ...]]:
             matrix[:3, :3] = second + mass * np.outer(center, center)
             theta[part] = link_parameters(matrix)
             notes.append(
-                f"link '{link}': the description's inertia is hardly that of a body; the prior "
+                f"link '{link}': the described inertia is hardly possible; the prior "
                 f'has a radius of gyration of {1e3 * np.sqrt(least / mass):.2g} mm at least'
             )
     return theta, tuple(notes)
@@ -295,7 +295,7 @@ def _held_out_errors(
     blocks: FloatArray,
     counts: FloatArray,
 ) -> tuple[tuple[float, float], ...]:
-    """Return the error on blocks left out, per weight, relative to unconstrained fits."""
+    """Return weights with their held-out errors, relative to unconstrained fits."""
     free = 0.0
     squares = dict.fromkeys(WEIGHTS, 0.0)
     for left_out, block in enumerate(blocks):

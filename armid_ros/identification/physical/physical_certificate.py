@@ -1,6 +1,6 @@
 # Copyright 2026 The armid_ros developers
 # SPDX-License-Identifier: Apache-2.0
-"""What shows that an identified arm is made of bodies, and which constraints hold it there."""
+"""Evidence that an identified arm is physically consistent, and its active constraints."""
 
 from __future__ import annotations
 
@@ -13,18 +13,18 @@ from armid_ros.model.pseudo_inertia import Consistency
 from armid_ros.motion import FloatArray
 import numpy as np
 
-#: A pseudo-inertia that has shrunk to this share of the description's in some direction is at the
-#: limit of what a body can be; a distance of this share of a box is none.
+#: Smallest size of a pseudo-inertia in any direction, over the described one, that is not at the
+#: limit of physical consistency; distance to a wall of a box, over its width, that counts as zero.
 ACTIVE_SHARE = 1e-3
-#: Bodies that predict held-out torques worse than this, relative to an unconstrained fit, are not
-#: those of the arm.
+#: Held-out torque error, relative to an unconstrained fit, above which the constraints do not fit
+#: the arm.
 DEAR = 1.03
 
 
 @dataclass(frozen=True)
 class PhysicalCertificate:
     """
-    Certificate of physical consistency, with the increase of the error.
+    Evidence of physical consistency, and increase of the torque error by the constraints.
 
     Attributes
     ----------
@@ -33,22 +33,21 @@ class PhysicalCertificate:
     shares : ndarray, shape (n,)
         Smallest size of each pseudo-inertia relative to the prior's, over all directions.
     at_bound : tuple of ParameterName
-        Effect parameters that their bound holds.
+        Effect parameters at their bounds.
     at_wall : tuple of str
-        Joints whose link is at the limit of its box, and where.
+        Joints whose link is at the limit of its box, with the side.
     total_mass : float or None
-        What the masses had to add up to [kg].
+        Given sum of the masses [kg].
     weight : float
         Weight of the prior.
     tried : tuple of (float, float)
-        Weights that were tried, and the error on the blocks left out, relative to that of
-        unconstrained fits.
+        Compared weights, with held-out errors relative to those of unconstrained fits.
     misfit_ratio : float
         Weighted error on the training data, relative to the unconstrained fit's.
     notes : tuple of str
-        What was assumed of links of which the description has no body.
+        Assumptions on links without a body in the description.
     at_mass : tuple of str
-        Links that are as light or as heavy as they may be.
+        Links at the lower or upper limit of their mass.
 
     """
 
@@ -65,7 +64,7 @@ class PhysicalCertificate:
 
     @property
     def consistent(self) -> bool:
-        """Whether every link is a body."""
+        """Whether every link is physically consistent."""
         return all(link.consistent for link in self.links)
 
     @property
@@ -81,7 +80,7 @@ class PhysicalCertificate:
 
     @property
     def activity(self) -> tuple[str, ...]:
-        """Return notes on active constraints and the harm they do; empty if none applies."""
+        """Return notes on active constraints and their cost; empty if none is active."""
         said = []
         if self.held_out_ratio > DEAR:
             said.append(
@@ -152,9 +151,9 @@ def walls_reached(parameters: FloatArray, box: Box) -> tuple[str, ...]:
     Parameters
     ----------
     parameters : ndarray, shape (10,)
-        Of the link.
+        Inertial parameters of the link.
     box : tuple of two ndarray, each of shape (3,)
-        Corners [m].
+        Lower and upper corner of the box [m].
 
     """
     width = box[1] - box[0]

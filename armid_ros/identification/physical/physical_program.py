@@ -1,20 +1,20 @@
 # Copyright 2026 The armid_ros developers
 # SPDX-License-Identifier: Apache-2.0
 """
-The convex program of a physically consistent fit.
+Convex program of a physically consistent fit.
 
     minimise  |A theta - z|^2 / (2 N)  +  sum over links of  (w D(P || P0) + c (m / m0 - 1)^2 / 2)
 
 over standard parameters theta with every link's pseudo-inertia P positive definite, effects
-within their bounds, and what else is known of masses and shapes. D is the divergence of the
+within their bounds, and given limits of masses and shapes. D is the divergence of the
 log-determinant,
 
     D(P || P0) = log det P0 - log det P + tr(P0^-1 P) - 4,
 
-which is convex in the parameters, does not depend on frames or units, so that kilograms need not
-be weighed against kilogram metres squared, and grows beyond bounds towards inertias that no body
-has. Source: Lee, Wensing and Park 2020, section IV; the pseudo-inertia, Wensing, Kim and Slotine
-2018. Solved by an interior-point method in coordinates in which every P0 is the identity.
+which is convex in the parameters and grows without bounds towards impossible inertias. It does not
+depend on frames or units, so kilograms need not be weighed against kilogram metres squared.
+Source: Lee, Wensing and Park 2020, section IV; the pseudo-inertia, Wensing, Kim and Slotine 2018.
+The solver is an interior-point method in coordinates in which every P0 is the identity.
 
 """
 
@@ -33,11 +33,11 @@ import clarabel
 import numpy as np
 from scipy import sparse
 
-#: Pull of every effect to its prior value, against what no data and no other prior decides.
+#: Weight of the prior of each effect, which decides directions without data or another prior.
 _RIDGE = 1e-9
-#: Pull of a mass to that of the prior: three times as much has to make the squares 0.2 % less.
+#: Weight c of the prior of a mass: a mass three times as large must reduce the squares by 0.2 %.
 _MASS = 1e-3
-#: Variables of a log-determinant: a triangle, then the logarithms of its diagonal.
+#: Numbers of variables of a log-determinant: a triangle, then the logarithms of its diagonal.
 _TRIANGLE, _DIAGONAL = 10, 4
 _LOG_DETERMINANT = _TRIANGLE + _DIAGONAL
 
@@ -47,14 +47,14 @@ Box = tuple[FloatArray, FloatArray]
 @dataclass(frozen=True)
 class PhysicalProgram:
     """
-    Conic program, set up once for all data and weights.
+    Conic program of the constraints and priors, for any data and weight of the prior.
 
     Attributes
     ----------
     base : BaseParameters
         Grouping of P standard parameters, 10 n rigid ones first.
     prior : ndarray, shape (P,)
-        Standard parameters of the description; rigid ones of bodies.
+        Standard parameters of the description, with physically consistent links.
     lower, upper : ndarray, shape (P - 10 n,)
         Bounds of the effects.
     total_mass : float or None
@@ -62,7 +62,7 @@ class PhysicalProgram:
     boxes : mapping of int to (ndarray, ndarray)
         Link (0 is the first), and two corners, in the joint frame, of a box that contains it [m].
     mass_range : float or None
-        Factor by which a mass is below or above that of the prior at most.
+        Largest ratio between a mass and that of the prior.
 
     """
 
@@ -85,14 +85,14 @@ class PhysicalProgram:
 
     def solve(self, products: FloatArray, count: float, weight: float) -> FloatArray:
         """
-        Find the parameters.
+        Return the standard parameters that minimise the cost under the constraints.
 
         Parameters
         ----------
         products : ndarray, shape (r + 1, r + 1)
             Products of the weighted base columns and torque with each other.
         count : float
-            Number N of weighted rows that they are of.
+            Number N of weighted rows in the products.
         weight : float
             Weight w of the divergence, positive.
 
@@ -104,13 +104,13 @@ class PhysicalProgram:
         Raises
         ------
         IdentificationError
-            If nothing satisfies the constraints.
+            If no parameters satisfy the constraints.
 
         """
         rank, size, rigid = self.base.rank, len(self.prior), self._rigid
         information = self.base.grouping.T @ (products[:rank, :rank] / count) @ self.base.grouping
         lengths = np.sqrt(np.diag(information)[rigid:])
-        # from symmetric matrices, of which the identity is the prior, and effects to theta
+        # linear map to theta from symmetric matrices (the identity is the prior) and effects
         change = np.diag(
             np.concatenate([np.zeros(rigid), 1.0 / np.where(lengths > 0.0, lengths, 1.0)])
         )
@@ -128,7 +128,7 @@ class PhysicalProgram:
         gradient[:rigid] += weight * np.tile(identity, self.n_links)
         for link in range(self.n_links):
             gradient[self._first(link) + _TRIANGLE : self._first(link + 1)] = -weight
-            mass = change[PER_LINK * link] / self.prior[PER_LINK * link]  # of the prior's
+            mass = change[PER_LINK * link] / self.prior[PER_LINK * link]  # relative to the prior
             hessian[:size, :size] += _MASS * np.outer(mass, mass)
             gradient[:size] -= _MASS * mass
         rows, offsets, cones = self._constraints(change, origin)
@@ -157,7 +157,7 @@ class PhysicalProgram:
         return np.asarray(sparse.block_diag(blocks).toarray())
 
     def _first(self, link: int) -> int:
-        """Return the first of the variables of a link's log-determinant."""
+        """Return the index of the first variable of a link's log-determinant."""
         return len(self.prior) + _LOG_DETERMINANT * link
 
     def _constraints(
@@ -170,7 +170,7 @@ class PhysicalProgram:
         empty = sparse.csr_matrix((1, _LOG_DETERMINANT * self.n_links))
 
         def linear(cone: Any, normal: FloatArray, offset: FloatArray) -> None:
-            """Constrain normal @ theta + offset to a cone of as many rows."""
+            """Constrain normal @ theta + offset to a cone with one dimension per row."""
             if len(normal):
                 side = sparse.vstack([empty] * len(normal))
                 blocks.append(sparse.hstack([-sparse.csr_matrix(normal @ change), side]))
@@ -201,7 +201,7 @@ class PhysicalProgram:
     def _add_log_determinant(
         self, link: int, blocks: list[Any], offsets: list[FloatArray], cones: list[Any]
     ) -> None:
-        """Bound the logarithms u from above: sum u <= log det X, of the whitened X of a link."""
+        """Bound the logarithms u by sum u <= log det X, with the whitened matrix X of a link."""
         # X >= Z diag(Z)^-1 Z' for a lower triangle Z, and u <= log of its diagonal (Ben-Tal and
         # Nemirovski 2001, section 4.2).
         first, width = self._first(link), len(self.prior) + _LOG_DETERMINANT * self.n_links
@@ -225,8 +225,8 @@ def box_conditions(box: Box) -> FloatArray:
     """
     Return rows whose products with the parameters are positive inside a box.
 
-    The centre of mass is between the corners, and so is all mass: the integral of
-    (x - lower) (upper - x) dm is not negative along any axis.
+    The centre of mass is between the corners, and so is all mass: along every axis, the integral
+    of (x - lower) (upper - x) dm is not negative.
 
     Returns
     -------
@@ -250,7 +250,7 @@ def box_conditions(box: Box) -> FloatArray:
 
 
 def _packed(i: int, j: int) -> int:
-    """Return where an entry of the upper triangle is when the columns are stacked."""
+    """Return the index of an entry of the upper triangle with stacked columns."""
     return j * (j + 1) // 2 + i
 
 

@@ -6,10 +6,10 @@ Causal filtering and differentiation of a stream of joint states.
 Two low-passes in series. The motion filter G turns positions into positions, velocities and
 accelerations and is applied to the torque as well. The regressor, a nonlinear function of the
 motion, is evaluated behind G, and the row filter F is applied to its rows and to the torque. F is
-linear and the same on both sides, so it changes the equation tau = Y theta in nothing, whatever
-its initial state; only G has to be fast, as F[Y(q)] and Y(F[q]) differ by terms of order
-(w / w_F)^2 for a motion of frequency w. With G four times as fast as F this error is one sixteenth
-of that of one filter in front of the regressor.
+linear and the same on both sides, so the equation tau = Y theta holds behind it, whatever its
+initial state. Only G has to be fast, as F[Y(q)] and Y(F[q]) differ by terms of order (w / w_F)^2
+for a motion of frequency w. With G four times as fast as F, this error is one sixteenth of the
+error of a single filter in front of the regressor.
 
 """
 
@@ -24,16 +24,16 @@ from armid_ros.motion import FloatArray
 import numpy as np
 import numpy.typing as npt
 
-#: Cut-off frequency [Hz] (-3 dB) of three equal lags over that of one of them.
+#: Cut-off frequency (-3 dB) of three equal lags in series, over the cut-off of a single lag.
 _CUTOFF_OF_POLE = float(np.sqrt(2.0 ** (1.0 / 3.0) - 1.0))
-#: Poles of G are at most this over the sampling period: beyond, what is between samples matters.
+#: Largest pole of G times the sampling period; beyond, the signal between samples matters.
 _FASTEST_POLE = 1.0
 #: G is faster than F by this factor, where the sampling rate allows it.
 MOTION_FILTER_RATIO = 4.0
-#: Rows of the regressor are taken at this many times the cut-off frequency of F: fast enough for
-#: the steps of sign(dq) in them, and the aliases of what G lets through fold onto nothing.
+#: Rate of regressor rows over the cut-off frequency of F. It is high enough for the steps of
+#: sign(dq), and aliases of the output of G fall outside the band of F.
 ROW_RATE_RATIO = 40.0
-#: Periods between two samples beyond which some are missing.
+#: Interval between two samples, in periods, above which samples are missing.
 _GAP = 1.5
 #: No arm has positions or torques beyond this [SI units]; their squares would drown all others.
 LARGEST = 1e6
@@ -49,9 +49,9 @@ class TripleLag:
     """
     Three equal first-order lags in series, 1 / (1 + s / pole)^3, for a stack of signals.
 
-    The response to the signal interpolated linearly between its samples, exactly, whatever the
-    time between them; so the stages give exact derivatives of the output and any jitter of the
-    stamps is accounted for. It delays by 3 / pole.
+    The response is exact for a signal that is linear between its samples, at any intervals. So
+    the stages give exact derivatives of the output, and jitter of the stamps is accounted for.
+    The delay is 3 / pole.
 
     Parameters
     ----------
@@ -73,7 +73,7 @@ class TripleLag:
         return 3.0 / self.pole
 
     def reset(self) -> None:
-        """Forget everything; the next sample starts at rest."""
+        """Clear the state; the next sample starts at rest."""
         self._state = None
 
     def update(self, dt: float, signal: FloatArray) -> FloatArray:
@@ -114,7 +114,7 @@ class TripleLag:
         step[2, 0] = 0.5 * x * x * decay
         kept = ending = 0.0
         for stage, share in enumerate((decay, x * decay, 0.5 * x * x * decay)):
-            kept += share  # of what a stage is off the signal, all stages being off alike
+            kept += share  # share that remains of an offset common to all stages
             ending += kept
             step[stage, 3] = 1.0 - kept
             step[stage, 4] = 1.0 - (stage + 1.0 - ending) / x
@@ -145,10 +145,10 @@ class CausalFilter:
     Filter and differentiate joint states as they come.
 
     The sampling period is the median of the first intervals, learned again after every restart.
-    A sample with a wrong length, or a number that is not finite or beyond what arms have, is left
-    out and counted; the signal is interpolated across. A gap, or a stamp that is no later than the
-    last one, restarts the filter, which gives nothing until it has settled again. That positions
-    do not jump by full turns is seen to by a `SpikeGate`.
+    A sample with a wrong length, or with a number that is not finite or above LARGEST, is left
+    out and counted; the signal is interpolated across it. A gap, or a stamp that is no later than
+    the last one, restarts the filter, which has no output until it has settled again. A
+    `SpikeGate` removes full turns of positions beforehand.
 
     Parameters
     ----------
@@ -161,7 +161,7 @@ class CausalFilter:
         Missing samples that are interpolated across.
     measured_velocity : bool
         Differentiate the measured velocity instead of the position. Better with coarse encoders,
-        worse with drives that filter or delay what they report.
+        worse with drives that filter or delay the velocity.
 
     Raises
     ------
@@ -171,12 +171,12 @@ class CausalFilter:
     Attributes
     ----------
     generation : int
-        Number of starts; what filters the output further starts anew when it changes.
+        Number of starts; later filters have to restart when it changes.
     period : float or None
         Sampling period [s], None until it is known.
     rejected, restarts : Counter of str
-        Samples that were left out, and restarts of the filter, by reason: dropout, jump_back, and
-        those asked for.
+        Samples that were left out, and restarts of the filter, by reason: dropout, jump_back, or
+        the argument of `restart`.
 
     """
 
@@ -277,7 +277,7 @@ class CausalFilter:
         for value in (*missing, signal):
             stages = self._lag.update(dt / (len(missing) + 1), value)
         self._recent.append((t, signal))
-        # time constants until the start of G at rest is forgotten, to 1e-6
+        # the effect of the start of G at rest decays to 1e-6 in 20 time constants
         if t - self._start < 20.0 / self._lag.pole:
             return None
         n = self._n_joints
@@ -288,10 +288,10 @@ class CausalFilter:
         return CausalMotion(t, value[:n], dq[:n], ddq[:n], value[-n:])
 
     def _missing(self, t: float, dt: float, signal: FloatArray) -> list[FloatArray]:
-        """Interpolate the samples missing before one."""
-        # A straight line would have no acceleration, so the rows would lack that of the whole gap.
-        # They are on the cubic through the sample behind the gap and three before it, which are as
-        # far apart as the gap is long, for then it has hardly more noise than they.
+        """Return interpolated samples for a gap before a sample."""
+        # A straight line has no acceleration, so the rows would lack the acceleration in the gap.
+        # A cubic goes through the sample after the gap and three before it. Their distances equal
+        # the gap, so that the cubic has hardly more noise than the samples.
         assert self.period is not None
         count = round(dt / self.period) if dt > _GAP * self.period else 1
         if count < 2 or not self._recent:
@@ -306,7 +306,7 @@ class CausalFilter:
         return list(np.vander(inside, len(place)) @ factors)
 
     def _learn_period(self, dt: float) -> None:
-        """Add an interval; create the filter once there are enough."""
+        """Add an interval; create the filter after enough intervals."""
         if dt > 0.0:
             self._intervals.append(dt)
         if len(self._intervals) < 20:  # too few for a median
@@ -315,9 +315,9 @@ class CausalFilter:
         fastest = _FASTEST_POLE / period * _CUTOFF_OF_POLE / (2.0 * np.pi)
         self._lag = TripleLag(min(MOTION_FILTER_RATIO * self._cutoff, fastest))
         pole = self._lag.pole
-        # what the lag makes of a second derivative of 1: between samples the signal is a straight
-        # line, all its curvature is at the samples, and the filter sees the sum of its impulse
-        # response p^3 t^2 / 2 exp(-p t) in place of the integral
+        # Gain of the lag for a second derivative of 1. The signal is straight between samples, so
+        # its curvature is at the samples. The output has the sum of the impulse response
+        # p^3 t^2 / 2 exp(-p t) in place of its integral.
         decay, relative = math.exp(-pole * period), pole * period
         gain = 0.5 * relative**3 * decay * (1.0 + decay) / (1.0 - decay) ** 3
         curvature = pole * pole / gain

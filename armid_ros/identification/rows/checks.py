@@ -1,6 +1,6 @@
 # Copyright 2026 The armid_ros developers
 # SPDX-License-Identifier: Apache-2.0
-"""What data must be like to identify anything, and what to do when they are not."""
+"""Conditions on recordings for an identification, and remedies where they fail."""
 
 from __future__ import annotations
 
@@ -22,41 +22,41 @@ import numpy.typing as npt
 
 #: A joint that stays within this range is at rest [rad or m].
 REST_RANGE = 1e-3
-#: Positions further out of the limits than this are not in the unit of the description: two turns
-#: of a joint that a controller has let spin [rad], or [m].
+#: Largest excess of positions over the limits that is no wrong unit: two turns of a joint that a
+#: controller lets spin [rad], or one metre [m].
 LIMIT_EXCESS_TURNING, LIMIT_EXCESS_SLIDING = 4.0 * np.pi, 1.0
-#: Positions beyond a limit by less than this share of the range say nothing: a stop gives way,
+#: Excess of a position over a limit that is no fault, as a share of the range: a stop gives way,
 #: and an encoder has noise.
 _LIMIT_SLACK = 0.01
-#: A recording shorter than this holds less than a movement [s].
+#: Shortest recording with a movement [s].
 SHORTEST = 1.0
-#: Recordings shorter than this in all show few of the parameters [s].
+#: Total duration of recordings below which few parameters are identifiable [s].
 _SHORT = 5.0
-#: A torque that varies by less than this share of it is constant; filters round a constant.
+#: Range of a torque, as a share of its size, below which it is constant up to rounding errors.
 _ROUNDING = 1e-9
-#: Correlation with the direction of motion from which a torque is friction and nothing else.
+#: Correlation with the direction of motion above which a torque is friction alone.
 _CLEAR = 0.8
-#: Correlation of a torque with a described one from which their ratio is clear: four fifths of the
-#: power follow.
+#: Correlation of measured and described torque above which their ratio is meaningful: four fifths
+#: of the power are explained.
 FOLLOWS = 0.9
-#: Units of torque that are mistaken for N m, and how many of each one N m is.
+#: Units of torque that are mistaken for N m, with their number per N m.
 TORQUE_UNITS = {'N mm': 1e3, 'N cm': 1e2, 'kN m': 1e-3}
-#: A factor of torques is that of a unit if it is within this factor of it: masses of a description
-#: are off by less.
+#: Largest ratio between a factor of torques and the factor of their unit: masses of a description
+#: are wrong by less.
 NEAR = 1.5
-#: Units of a force on a lever [1/(N m)], which all joints have at once: of one joint alone a load
-#: makes the torque ten times as large.
+#: Units of a force on a lever, with their number per N m. They apply to all joints at once; a
+#: torque of a single joint that is ten times as large may be due to a load.
 _LEVER_UNITS = {'kgf m': 1.0 / 9.80665, 'kgf cm': 100.0 / 9.80665, 'lbf in': 1.0 / 0.1129848}
-#: The same for those, which gains of currents are near to: 10 N m/A is 1.02 kgf m/A. Masses of a
-#: description that are off make about as much of the factor of one joint.
+#: The same ratio for units of force, which are near gains of currents: 10 N m/A is 1.02 kgf m/A.
+#: Wrong masses of a description change the factor of one joint about as much.
 _NEAR_FORCE = 1.2
 _UNITS_OF_JOINTS = {
     **TORQUE_UNITS,
     'N m times 57.3 (degrees against radians)': float(np.rad2deg(1.0)),
 }
-#: What they are of a joint that slides, whose effort is a force.
+#: Unit of force of a prismatic joint that corresponds to each unit of torque.
 _FORCE_UNITS = {'N m': 'N', 'N mm': 'mN', 'N cm': 'cN', 'kN m': 'kN'}
-#: Said of torques that are absent.
+#: Message on absent torques.
 SILENT = 'the torque of every joint is constant; fill in effort'
 
 
@@ -69,11 +69,11 @@ def check_motion(
     Parameters
     ----------
     robot : Robot
-        Whose they are.
+        Robot of the recordings.
     recordings : sequence of Recording
-        What was recorded.
+        Recordings to check.
     used : Conditioning, optional
-        Filters behind which something has to be left, where nothing else sees to it.
+        Filters after which samples have to remain; without it, this is not checked.
 
     Returns
     -------
@@ -91,7 +91,7 @@ def check_motion(
         if recording.duration < SHORTEST:
             raise IdentificationError(
                 f'{recording.source}: {recording.duration:.2f} s in {len(recording)} samples is '
-                'too short; record a movement of several seconds, or of a table see '
+                'too short; record a movement of several seconds; for a table, check '
                 '--time-unit and --rate'
             )
         if used is not None and not any(True for _ in segments(recording, used)):
@@ -135,7 +135,9 @@ def resting(robot: Robot, source: str, ranges: FloatArray) -> tuple[str, ...]:
             'record the arm while it follows an excitation'
         )
     if names:
-        return (f'at rest throughout: {", ".join(names)}; nothing of their own is identified',)
+        return (
+            f'at rest throughout: {", ".join(names)}; their own parameters are not identified',
+        )
     return ()
 
 
@@ -143,7 +145,7 @@ def check_torque(
     arm: ArmModel, recordings: Sequence[Recording], problem: Sequence[Regression]
 ) -> tuple[str, ...]:
     """
-    Raise an error for absent torques, wrong signs or units, or mere commands.
+    Raise an error for absent torques, wrong signs or units, or torques of a controller.
 
     Sign and unit show against the rigid body of the description, if all the joints that follow it
     agree; the sign of the others shows in their friction.
@@ -202,19 +204,19 @@ def driven_by_friction(
     robot: Robot, motions: Sequence[Motion], torques: Sequence[FloatArray]
 ) -> list[str]:
     """
-    Return the joints whose torque follows the direction of motion clearly, and the wrong way.
+    Return the joints whose torque clearly has the opposite sign of friction.
 
-    Weight and inertia are taken out, as described and of the joint alone. What is left of a wrist
-    is friction, and its sign shows nowhere else.
+    Described torque, weight and inertia are fitted per joint and subtracted. The residual of a
+    wrist is friction, which alone reveals the sign of its torque.
 
     Parameters
     ----------
     robot : Robot
         The description.
     motions : sequence of Motion
-        The data.
+        Motions of the recordings.
     torques : sequence of ndarray, shape (N, n)
-        What was measured [N m].
+        Measured torques [N m].
 
     """
     found = []
@@ -235,19 +237,19 @@ def driven_by_friction(
 
 
 def _rest(values: FloatArray, nuisance: FloatArray) -> FloatArray:
-    """Return what least squares by nuisance columns leave of values, shape (N, K)."""
+    """Return the residual of a least-squares fit of values by nuisance columns, shape (N, K)."""
     return np.asarray(values - nuisance @ np.linalg.lstsq(nuisance, values, rcond=None)[0])
 
 
 def check_positions(robot: Robot, source: str, lowest: FloatArray, highest: FloatArray) -> None:
-    """Refuse a recording whose joints, from lowest to highest (n,), are far out of limits."""
+    """Raise an error for joints far out of limits, by lowest and highest positions (n,)."""
     problem = position_problem(robot, lowest, highest)
     if problem:
         raise IdentificationError(f'{source}: {problem}')
 
 
 def position_problem(robot: Robot, lowest: FloatArray, highest: FloatArray) -> str:
-    """Say which joint is far out of its limits, given where joints have been; empty if none."""
+    """Return an error on the joint farthest out of limits, by ranges (n,); empty if none."""
     excess = np.maximum(robot.lower - lowest, highest - robot.upper)
     allowed = np.where(robot.prismatic, LIMIT_EXCESS_SLIDING, LIMIT_EXCESS_TURNING)
     worst = int(np.argmax(excess / allowed))
@@ -273,12 +275,12 @@ def position_problem(robot: Robot, lowest: FloatArray, highest: FloatArray) -> s
 
 
 def effort_unit(robot: Robot, joint: int, unit: str) -> str:
-    """Return a unit of torque, or that of force that is as large where the joint slides."""
+    """Return a unit of torque, or the corresponding unit of force for a prismatic joint."""
     return _FORCE_UNITS[unit] if robot.prismatic[joint] else unit
 
 
 def beyond_limits(robot: Robot, recordings: Sequence[Recording]) -> tuple[str, ...]:
-    """Say which joints go beyond the limits of the description, with position and limit."""
+    """Return a note on joints beyond the limits of the description, with position and limit."""
     slack = _LIMIT_SLACK * (robot.upper - robot.lower)
     found = []
     for way, limits, ends in (
@@ -301,7 +303,7 @@ def torque_factors(
     robot: Robot, motions: Sequence[Motion], torques: Sequence[FloatArray]
 ) -> tuple[FloatArray, FloatArray]:
     """
-    Regress measured torques on those of a description, with friction and offset taken out first.
+    Regress measured torques on those of a description, after friction and offset are removed.
 
     Parameters
     ----------
@@ -310,7 +312,7 @@ def torque_factors(
     motions : sequence of Motion
         The data.
     torques : sequence of ndarray, shape (N, n)
-        What was measured.
+        Measured torques [N m].
 
     Returns
     -------
@@ -335,14 +337,14 @@ def torque_factors(
 
 def unit_of(factor: float, of_joints: Sequence[float] = ()) -> str:
     """
-    Return the unit, or two, in which torques are that are so many times too large, or ''.
+    Return the units that explain torques too large by a factor, joined by 'or'; '' if none.
 
     Parameters
     ----------
     factor : float
-        Of all joints together.
+        Factor of the torques of all joints together.
     of_joints : sequence of float
-        Of single joints: a unit has to fit each of them, where the gains of currents differ.
+        Factors of single joints. A unit has to fit each of them; gains of currents differ.
 
     """
     fitting = [set(units_near(one)) for one in of_joints]
@@ -351,14 +353,14 @@ def unit_of(factor: float, of_joints: Sequence[float] = ()) -> str:
 
 def units_near(factor: float, near_force: float = _NEAR_FORCE) -> dict[str, float]:
     """
-    Return the factors of units that torques may be in, by their names, the nearest first.
+    Return the possible units of torques with their factors, the nearest first.
 
     Parameters
     ----------
     factor : float
-        By which torques are too large.
+        Factor by which torques are too large.
     near_force : float
-        How far it may be from that of a unit of force on a lever, as a factor.
+        Largest ratio between the factor and that of a unit of force on a lever.
 
     """
     if factor <= 0.0:

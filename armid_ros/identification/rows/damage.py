@@ -1,6 +1,6 @@
 # Copyright 2026 The armid_ros developers
 # SPDX-License-Identifier: Apache-2.0
-"""Damaged samples of a recording, found as those of a stream are (`spikes`), and made up for."""
+"""Detection of damaged samples of a recording, as in a stream (`spikes`), and interpolation."""
 
 from __future__ import annotations
 
@@ -24,15 +24,15 @@ def without_damage(
     """
     Interpolate across damaged samples.
 
-    A torque is damaged if it alone would move a filtered row by more than noise does; how large
-    noise is, before anything has been fitted, is a share of how much the torque varies.
+    A torque sample is damaged if it alone moves a filtered row by more than noise does. Before
+    any fit, the noise is taken as a share of the spread of the torque.
 
     Returns
     -------
     list of Recording
-        Those without damage are the same objects.
+        Repaired recordings; a recording without damage is the same object.
     tuple of str
-        What was found: recording, number of samples, and the first of them.
+        Notes on the damage: recording, number of samples, and the first of them.
 
     """
     used = conditioning(list(recordings), settings)
@@ -55,7 +55,7 @@ def without_damage(
 
 
 def _damage(recording: Recording, used: Conditioning) -> tuple[str, npt.NDArray[np.bool_]]:
-    """Return the damage of a recording in words, and which samples it is, shape (N,)."""
+    """Return a note on the damage of a recording, and the mask of damaged samples, (N,)."""
     assert recording.tau is not None
     middle = np.median(recording.tau, axis=0)
     spread = 1.4826 * np.median(np.abs(recording.tau - middle), axis=0)
@@ -78,7 +78,7 @@ def _damage(recording: Recording, used: Conditioning) -> tuple[str, npt.NDArray[
     what = '1 sample jumps and comes back; it was'
     if len(damaged) > 1:
         what = f'{len(damaged)} samples jump and come back; they were'
-    most = 3  # are named
+    most = 3  # samples that the note names
     named = ', '.join((*worst[:most], *(['...'] if len(damaged) > most else [])))
     return f'{recording.source}: {what} interpolated across: {named}', bad
 
@@ -87,21 +87,21 @@ def impossible_excursions(
     gate: SpikeGate, t: FloatArray, x: FloatArray, floor: FloatArray
 ) -> list[Excursion]:
     """
-    Return what no arm makes in a whole recording, as if a gate had taken every sample of it.
+    Return the excursions of a recording that no arm makes, as a gate would find them.
 
-    What is usual, and what the signals reach, is that of the whole. Only samples that are too far
-    off what is predicted of them are taken indeed, and those after them.
+    Usual errors and ranges are those of the whole recording. The gate processes only samples too
+    far off their prediction, and the samples after them.
 
     Parameters
     ----------
     gate : SpikeGate
-        What judges.
+        Gate that judges the samples.
     t : ndarray, shape (N,)
         Stamps, at least 3, each after the one before [s].
     x : ndarray, shape (N, m)
         Signals.
     floor : ndarray, shape (m,)
-        What a sample may be off by without consequence.
+        Negligible error of a sample.
 
     Returns
     -------

@@ -1,12 +1,12 @@
 # Copyright 2026 The armid_ros developers
 # SPDX-License-Identifier: Apache-2.0
 """
-Torques that are a law of a controller, and not what the arm takes.
+Torques that are a law of a controller instead of the torque that the motion needs.
 
-Gravity compensation plays the weight of the arm while a hand moves it; energy shaping plays a
+Gravity compensation outputs the weight of the arm while a hand moves it; energy shaping outputs a
 constant torque in the direction of motion. Such a torque is a function of position and direction
-alone: the inertia of the arm, which acts all the same, is nowhere in it, so that a fit blames
-friction, or finds an arm without mass.
+alone and does not contain the torque of inertia. A fit then blames friction, or finds an arm
+without mass.
 
 """
 
@@ -20,19 +20,19 @@ from armid_ros.robots import Robot
 import numpy as np
 import numpy.typing as npt
 
-#: What the law leaves of a torque, over the torque that an arm needs beside it: a model whose
-#: inertia is ten times too large does not move an arm.
+#: Largest residual of a law, over the torque that the model needs in addition to the law: no model
+#: has an inertia that is ten times too large.
 _WITHOUT_INERTIA = 0.1
-#: A law that leaves more than this share of the torque is none; friction of a real joint differs
-#: by more from what does not know of its speed.
+#: Largest residual of a law as a share of the torque. Friction of a real joint depends on speed,
+#: so it differs by more from a law without speed.
 _FOLLOWS = 0.03
-#: A joint whose torque is less than this share of what the arm needs swings freely, or the model
-#: is wrong: its equation holds without a drive.
+#: Smallest torque of a driven joint as a share of the torque of the model. With less, the joint
+#: swings freely, or the model is wrong.
 _DRIVEN = 0.5
-#: Rows beside a reversal over which filters smear a direction, and the share of its top speed
-#: below which a joint may be turning round.
+#: Number of rows on either side of a reversal that filters smear, and speed below which a joint
+#: may reverse, as a share of its top speed.
 _BESIDE, _TURNING = 3, 0.02
-#: Rows per column of a law, below which it follows anything.
+#: Number of rows per column below which a law fits any torque.
 _ROWS_PER_COLUMN = 10
 
 
@@ -40,10 +40,10 @@ def laws_of_controllers(
     robot: Robot, motion: Motion, told: npt.NDArray[np.bool_]
 ) -> tuple[str, ...]:
     """
-    Say that the torque of every joint that is driven is a law of position and direction alone.
+    Return messages if the torque of every driven joint is a law of position and direction alone.
 
-    Of a single joint among others it is the model that is wrong: its inertia was not told. Where
-    the motion is too short to ask about most joints, a few of them say nothing of a controller.
+    If only some joints obey such a law, the model lacks their inertia instead. If the motion is
+    too short to test most joints, the other joints are no evidence of a controller.
 
     Parameters
     ----------
@@ -52,13 +52,13 @@ def laws_of_controllers(
     motion : Motion
         Filtered motion with the torque filtered alike, R samples of n joints.
     told : ndarray of bool, shape (R, n)
-        False where a joint rests.
+        False where a joint is at rest.
 
     Returns
     -------
     tuple of str
-        A sentence for each such joint, with the remedy; none if any of them obeys no law, or as
-        many cannot be asked.
+        A sentence for each such joint, with the remedy; none if any driven joint obeys no law, or
+        if at least as many joints cannot be tested.
 
     """
     assert motion.tau is not None
@@ -68,7 +68,7 @@ def laws_of_controllers(
     said: list[str] = []
     silent = 0
     for joint, (name, unit) in enumerate(zip(robot.joints, robot.torque_units, strict=True)):
-        # where a joint turns round, or filters smear that it does
+        # rows where a joint reverses, and neighbours that filters smear
         dq = motion.dq[:, joint]
         slow = np.abs(dq) <= _TURNING * np.abs(dq).max(initial=0.0)
         slow[1:] |= np.diff(np.sign(dq)) != 0
@@ -97,7 +97,7 @@ def laws_of_controllers(
 
 
 def _left(law: FloatArray, torque: FloatArray) -> float | None:
-    """Return the root mean square that a law leaves of a torque; None if it follows anything."""
+    """Return the RMS residual of a torque after the fit of a law; None with too few rows."""
     rank = int(np.linalg.matrix_rank(law)) if len(law) else 0
     if len(law) < _ROWS_PER_COLUMN * max(rank, 1):
         return None

@@ -3,11 +3,11 @@
 """
 The linear problem of an identification: decimated torques and base columns, joint by joint.
 
-Where a joint reverses between two samples nobody knows when its dry friction turned over, nor
-what it was if the joint stopped for a moment: anything between its limits. A wrong sign there is
-against the acceleration at every reversal, so it does not average out but takes something off the
-inertia. Torques and columns are therefore both interpolated across these samples before they are
-filtered, which leaves their equation as true as it was without them.
+Where a joint reverses between two samples, the time at which its dry friction changed sign is
+unknown. If the joint stopped for a moment, the friction is any value between its limits. A wrong
+sign opposes the acceleration at every reversal, so it does not average out and reduces the
+inertia. Torques and columns are therefore both interpolated across these samples before the
+filters, which keeps their equation valid.
 
 """
 
@@ -41,7 +41,7 @@ REST_TIME = 0.2
 @dataclass(frozen=True)
 class Stretch:
     """
-    One unbroken stretch of a recording in rows, filtered and decimated.
+    Rows of one unbroken stretch of a recording, filtered and decimated.
 
     Attributes
     ----------
@@ -50,7 +50,7 @@ class Stretch:
     motion : Motion
         Decimated motion of M samples with the filtered measured torque.
     informative : ndarray of bool, shape (M, n)
-        False where a joint that dry friction may hold is at rest, where any torque is right.
+        False where a joint is at rest and dry friction may hold it with any torque.
 
     """
 
@@ -75,7 +75,7 @@ class Regression(Stretch):
     columns : ndarray, shape (M, n, r)
         Filtered columns of the chosen parameters.
     constant : ndarray, shape (M, n), or None
-        Filtered torque that the linear model has where all values are zero; None for none, as of
+        Filtered torque of the linear model where all values are zero; None if it is zero, as for
         a model that is linear in all its parameters.
 
     """
@@ -89,7 +89,7 @@ class Regression(Stretch):
 
     @property
     def target(self) -> FloatArray:
-        """Return what columns times values have to be, shape (M, n)."""
+        """Return the torque that the columns are fitted to, shape (M, n)."""
         return self.tau if self.constant is None else self.tau - self.constant
 
     def torque(self, values: FloatArray) -> FloatArray:
@@ -98,17 +98,17 @@ class Regression(Stretch):
         return np.asarray(linear if self.constant is None else linear + self.constant)
 
     def residual(self, values: FloatArray) -> FloatArray:
-        """Return what values of the columns leave of the torque, shape (M, n)."""
+        """Return the residual torque for values of the columns, shape (M, n)."""
         return np.asarray(self.target - self.columns @ values)
 
     def restrict(self, columns: Sequence[int] | npt.NDArray[np.intp]) -> Regression:
-        """Return the problem in some of its columns; itself if that is all of them in order."""
+        """Return the problem with some of its columns; itself for all columns in order."""
         if np.array_equal(columns, np.arange(self.columns.shape[2])):
             return self
         return replace(self, columns=self.columns[:, :, columns])
 
     def select(self, rows: npt.NDArray[np.intp]) -> Regression:
-        """Return the problem in some of its rows."""
+        """Return the problem with some of its rows."""
         return replace(
             self,
             motion=self.motion.select(rows),
@@ -133,13 +133,13 @@ def regressions(
     arm : ArmModel
         Rigid body and effects.
     columns : ndarray of int, shape (r,)
-        Which of ``arm.parameters`` to keep, such as the independent ones.
+        Indices of the columns to keep, as in ``arm.parameters``, such as the independent ones.
     recordings : sequence of Recording
         Data with torques.
     used : Conditioning
         Filters.
     progress : callable, optional
-        Told the share that is done, 0 to 1.
+        Called with the finished share, 0 to 1.
 
     Returns
     -------
@@ -168,7 +168,7 @@ def regressions(
 @dataclass(frozen=True)
 class Fit(Stretch):
     """
-    How a model predicts a stretch.
+    Prediction of a stretch by a model.
 
     Attributes
     ----------
@@ -180,7 +180,7 @@ class Fit(Stretch):
     predicted: FloatArray
 
     def __repr__(self) -> str:
-        """Return what it is, and how far off, in a line."""
+        """Return source, number of samples and relative error in a line."""
         error = Score.of([self]).relative_error_percent
         return f'Fit of {self.source}: {len(self.motion)} samples, {error:.2f} % relative error'
 
@@ -193,14 +193,14 @@ class Fit(Stretch):
 @dataclass(frozen=True)
 class Score:
     """
-    How well a model predicts recordings.
+    Prediction error of a model on recordings.
 
     Attributes
     ----------
     relative_error_percent : float
         100 |tau - tau_hat| / |tau| over all joints and samples.
     joint_relative_error_percent : ndarray, shape (n,)
-        The same of each joint.
+        Relative error of each joint [%].
     rms : ndarray, shape (n,)
         Root mean square residual of each joint [N m].
     torque_rms : ndarray, shape (n,)
@@ -215,7 +215,7 @@ class Score:
 
     @staticmethod
     def of(fits: Sequence[Fit]) -> Score:
-        """Score one or more stretches together."""
+        """Return the score of one or more stretches together."""
         used = np.concatenate([fit.informative for fit in fits])
         residual = used * np.concatenate([fit.residual for fit in fits])
         tau = used * np.concatenate([fit.tau for fit in fits])
@@ -239,12 +239,12 @@ def weighted_rows(
 
 
 def by_stretch(problem: Sequence[Stretch], rows: FloatArray) -> list[FloatArray]:
-    """Split rows of all stretches, (N, ...), into those of each."""
+    """Split rows of all stretches, (N, ...), into one array per stretch."""
     return np.split(rows, np.cumsum([len(part.motion) for part in problem])[:-1])
 
 
 def predictions(arm: ArmModel, recordings: Sequence[Recording], used: Conditioning) -> list[Fit]:
-    """Return what the torque of an arm is along recordings, one per unbroken stretch."""
+    """Return the predicted torque of an arm along recordings, one per unbroken stretch."""
     found = []
     for recording in recordings:
         for motion in segments(recording, used):
@@ -271,7 +271,7 @@ def filtered_torque(arm: ArmModel, motion: Motion, used: Conditioning) -> FloatA
 def _rows(
     arm: ArmModel, motion: Motion, used: Conditioning
 ) -> tuple[Motion, npt.NDArray[np.bool_]]:
-    """Return the rows of a stretch: decimated motion and torque, and which say something."""
+    """Return the decimated motion and torque of a stretch, and the mask of informative rows."""
     kept = np.array(decimated_samples(len(motion), used), dtype=np.intp)
     assert motion.tau is not None
     tau = bridged(motion.tau, unsure_samples(arm, motion))
@@ -294,13 +294,13 @@ def filtered_columns(
     arm : ArmModel
         Rigid body and effects.
     columns : ndarray of int, shape (r,)
-        Which of ``arm.parameters`` to keep.
+        Indices of the columns to keep, as in ``arm.parameters``.
     motion : Motion
         The stretch at the full rate.
     used : Conditioning
         Filters.
     tick : callable, optional
-        Told how many samples were done since it was last told.
+        Called with the number of samples finished since the last call.
 
     Returns
     -------
@@ -323,13 +323,13 @@ def filtered_columns(
 
 
 class _Source(NamedTuple):
-    """Where wanted columns come from: the rigid body, which is smooth, or an effect."""
+    """Source of regressor columns: the rigid body, which is smooth, or an effect."""
 
     columns: Callable[[Motion], FloatArray]
-    inner: npt.NDArray[np.intp]  # which of them are wanted, and where they go
-    outer: npt.NDArray[np.intp]
-    instantaneous: bool  # a part of the motion will do
-    smooth: bool  # fewer samples will do
+    inner: npt.NDArray[np.intp]  # indices of the wanted columns in the source
+    outer: npt.NDArray[np.intp]  # indices of the same columns in the result
+    instantaneous: bool  # computable from a part of the motion
+    smooth: bool  # computable from fewer samples
 
 
 def _filtered(
@@ -339,7 +339,7 @@ def _filtered(
     used: Conditioning,
     tick: Callable[[int], None] = lambda samples: None,
 ) -> FloatArray:
-    """Filter and decimate what sources make of a stretch, chunk by chunk, shape (M, n, r)."""
+    """Filter and decimate the columns of a stretch, chunk by chunk, shape (M, n, r)."""
     count = sum(len(source.outer) for source in sources)
     result = np.empty((len(decimated_samples(len(motion), used)), motion.n_joints, count))
     unsure = unsure_samples(arm, motion)
@@ -360,7 +360,7 @@ def _filtered(
         for source in sources:
             if source.smooth and stride > 1:
                 few = motion.select(slice(start, stop, stride))
-                block = source.columns(few)  # interpolation would hardly change what is smooth
+                block = source.columns(few)  # smooth columns need no interpolation
                 result[rows, :, source.outer] = decimate(block[:, :, source.inner], used, stride)
             elif source.instantaneous:
                 block = source.columns(motion.select(around))[:, :, source.inner]
@@ -369,7 +369,7 @@ def _filtered(
                 )
         first = rows.stop
         tick(stop - start)
-    result.setflags(write=False)  # so that nobody who freezes it has to copy it
+    result.setflags(write=False)  # a read-only array is frozen without a copy
     return result
 
 
@@ -385,14 +385,14 @@ def unsure_samples(arm: ArmModel, motion: Motion) -> npt.NDArray[np.bool_]:
 
 def bridged(values: FloatArray, unsure: npt.NDArray[np.bool_]) -> FloatArray:
     """
-    Interpolate values of each joint across its unsure samples, in a line.
+    Interpolate values of each joint linearly across its unsure samples.
 
     Parameters
     ----------
     values : ndarray, shape (N, n, ...)
         Torques or columns.
     unsure : ndarray of bool, shape (N, n)
-        What to replace; at an end, by the nearest sample that is sure.
+        Samples to replace; those at an end get the value of the nearest sure sample.
 
     Returns
     -------
@@ -421,7 +421,7 @@ def _held(arm: ArmModel, motion: Motion) -> list[int]:
 
 
 def _at_rest(arm: ArmModel, motion: Motion) -> npt.NDArray[np.bool_]:
-    """Return where joints stand still that dry friction may hold, shape (N, n)."""
+    """Return where joints with dry friction are at rest, shape (N, n)."""
     rest = np.zeros(motion.q.shape, dtype=bool)
     shortest = REST_TIME / float(motion.t[1] - motion.t[0])
     for joint in _held(arm, motion):

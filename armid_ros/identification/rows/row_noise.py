@@ -1,6 +1,6 @@
 # Copyright 2026 The armid_ros developers
 # SPDX-License-Identifier: Apache-2.0
-"""Noise of torque sensors, what filters leave of it, and how much a filtered row tells."""
+"""Noise of torque sensors before and after the filters, and information in a filtered row."""
 
 from __future__ import annotations
 
@@ -12,21 +12,21 @@ from armid_ros.robots import Robot
 import numpy as np
 from scipy import signal
 
-#: Noise of a torque sensor relative to the torque limit of its joint, when nobody gives it; only
-#: the ratios between joints matter, as the residuals then say how large it is.
+#: Default noise of a torque sensor, over the torque limit of its joint. Only the ratios between
+#: joints matter, as the size of the noise then follows from the residuals.
 _NOISE_OF_LIMIT = 0.01
-#: The same relative to how much a torque varies, before anything has been fitted to it.
+#: Noise of a torque over the spread of that torque, assumed before any fit.
 NOISE_OF_TORQUE = 0.01
 
 
 @dataclass(frozen=True)
 class RowNoise:
     """
-    What filters leave of white noise.
+    White noise behind the filters.
 
-    The noise of a sample, of standard deviation s and density s^2 T, leaves a filter H with the
-    variance s^2 T B, where B is the integral of |H|^2 over all frequencies; rows that are `step`
-    apart hold step B independent observations each.
+    Noise of samples, of standard deviation s and density s^2 T, has the variance s^2 T B behind a
+    filter H. Its bandwidth B is the integral of |H|^2 over all frequencies. Rows at intervals of
+    `step` hold step B independent observations each.
 
     Attributes
     ----------
@@ -35,7 +35,7 @@ class RowNoise:
     gain : float
         Standard deviation of the noise of a row over that of a sample.
     single : float
-        What one sample is off by that moves a row as noise of 1 in all samples does.
+        Error of one sample that moves a row as much as noise of 1 in all samples does.
 
     """
 
@@ -45,7 +45,7 @@ class RowNoise:
 
     @classmethod
     def of(cls, period: float, motion_pole: float, row_pole: float) -> RowNoise:
-        """Return what the motion filter and the row filter leave, of these poles [rad/s]."""
+        """Return the noise behind motion filter and row filter, given their poles [rad/s]."""
         # integrate the squared gain of both filters over frequency, both signs [Hz]
         nyquist = 0.5 / period
         f = np.linspace(0.0, min(nyquist, 20.0 * row_pole / (2.0 * np.pi)), 4001)
@@ -62,7 +62,7 @@ class RowNoise:
         return cls(bandwidth, gain, gain / (period * peak))
 
     def independent(self, step: float) -> float:
-        """Return how many independent observations a row holds, `step` [s] after the last."""
+        """Return the number of independent observations in a row, `step` [s] after the last."""
         return min(1.0, self.bandwidth * step)
 
 

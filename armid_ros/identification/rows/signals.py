@@ -1,12 +1,12 @@
 # Copyright 2026 The armid_ros developers
 # SPDX-License-Identifier: Apache-2.0
 """
-From what was recorded to what a model can be fitted to.
+Conditioning of recorded signals for the fit of a model.
 
 Positions are low-passed without phase (Butterworth of order 4, forwards and backwards) and
-differentiated by central differences. Torque and regressor then go through one and the same
-low-pass and are decimated together, so that what the filter does to one side of the equation it
-does to the other (parallel filtering; Gautier 1997).
+differentiated by central differences. Torque and regressor then pass the same low-pass and are
+decimated together, so that the filter acts alike on both sides of the equation (parallel
+filtering; Gautier 1997).
 
 """
 
@@ -30,45 +30,45 @@ from scipy import signal
 from scipy.interpolate import CubicSpline
 from scipy.ndimage import correlate1d
 
-#: Samples per second below which no motion of an arm is followed [Hz].
+#: Lowest sampling rate that resolves the motion of an arm [Hz].
 SLOWEST = 2.0
 #: Rates at which arms are recorded [Hz].
 USUAL_RATES = (20.0, 20_000.0)
 #: Stamps within this share of a period of an even grid are taken as even.
 JITTER_TOLERANCE = 0.05
-#: Torque and regressor keep this many times the band of the motion and what friction adds to it.
+#: Band of torque and regressor over the band of the motion, with room for steps of friction.
 MODEL_BANDS = 10.0
-#: Positions are cut off at no more than this many times the band that rows keep: the Butterworth
-#: filter, run both ways, damps what rows keep by 5^-8 or less, below TORQUE_RESOLUTION.
+#: Largest cut-off of positions over the band of the rows. The Butterworth filter, run both ways,
+#: damps that band by 5^-8 or less, which is below TORQUE_RESOLUTION.
 _POSITION_BANDS = 5.0
 #: Samples per period of the cut-off that describe a smooth function of the filtered positions.
 _SMOOTH_SAMPLES = 5.0
-#: The positions' spectrum ends where it is less than this many times the noise.
+#: Ratio of a spectrum of positions to its noise below which it counts as noise.
 NOISE_MARGIN = 3.0
-#: Periods of the cut-off that are cut off at both ends, where the filter has no neighbours.
+#: Periods of the cut-off that are removed at both ends, where the filter lacks neighbours.
 EDGE_PERIODS = 4.0
-#: Periods of the cut-off that a stretch has to have beside what the decimation takes of it: those
-#: at both ends, and two that stay.
+#: Shortest stretch in periods of the cut-off, without the edges of the decimation: the periods
+#: removed at both ends, and two more.
 _CUTOFF_PERIODS = 2.0 * EDGE_PERIODS + 2.0
-#: No drive tells its torque to more than this share of it, which is 13 bits; what a simulation
-#: without noise leaves of a motion that is differentiated is less.
+#: Best resolution of a drive, as a share of its torque: 13 bits. Errors of differentiation in a
+#: simulation without noise are smaller.
 TORQUE_RESOLUTION = 1e-4
 #: Half length of the decimation filter in output samples; its edges are cut off.
 _HALF_TAPS = 4
-#: Second derivatives of torques, fourth of positions, are taken below this many bands of the
-#: motion: between two and five, elasticity is found all the same; at ten there is but noise.
+#: Band of second derivatives of torques (fourth of positions), over that of the motion. From two
+#: to five, elasticity is found as well; at ten, there is only noise.
 _CURVATURE_BANDS = 2.0
-#: Samples a period of the cut-off that the band of a filtered motion is taken from: a difference
-#: of two damps the cut-off itself by sinc(1 / 20), 0.4 %.
+#: Samples per period of the cut-off from which the band of a motion is computed: differences of
+#: two samples damp the cut-off by sinc(1 / 20), 0.4 %.
 _RATE_OF_BAND = 20.0
-#: Samples that a stretch has to have to have a spectrum.
+#: Smallest number of samples of a stretch for a spectrum.
 _LEAST_SAMPLES = 4
 
 
 @dataclass(frozen=True)
 class SignalSettings:
     """
-    How signals are conditioned; what is None is chosen from the recording.
+    Settings of the filters; None is replaced by a value from the recording.
 
     Attributes
     ----------
@@ -83,7 +83,7 @@ class SignalSettings:
     decimation: int | None = None
 
     def __post_init__(self) -> None:
-        """Refuse what cannot filter."""
+        """Raise an error for a cut-off or decimation out of range."""
         if self.cutoff_hz is not None and not self.cutoff_hz > 0.0:
             raise IdentificationError(f'cut-off {self.cutoff_hz} Hz: it has to be positive')
         if self.decimation is not None and self.decimation < 1:
@@ -93,7 +93,7 @@ class SignalSettings:
 @dataclass(frozen=True)
 class Conditioning:
     """
-    Settings as they are used on recordings of one rate.
+    Filters for recordings of one sampling rate.
 
     Attributes
     ----------
@@ -104,7 +104,7 @@ class Conditioning:
     decimation : int
         Factor of the decimation.
     given : frozenset of {'cutoff', 'decimation'}
-        What somebody asked for; the others were chosen from recordings.
+        Settings that the user gave; the others were chosen from recordings.
 
     """
 
@@ -115,7 +115,7 @@ class Conditioning:
 
     @property
     def kept_hz(self) -> float:
-        """Frequency up to which rows keep what is there [Hz]."""
+        """Frequency up to which rows keep the signal [Hz]."""
         # the decimation filter ends at this share of the rate of the rows
         return 0.4 * self.rate_hz / self.decimation
 
@@ -134,10 +134,10 @@ class Conditioning:
     @property
     def smooth_stride(self) -> int:
         """
-        How many samples apart what follows the filtered positions smoothly needs to be known.
+        Largest stride for smooth functions of the filtered positions, in samples.
 
-        The positions end at the cut-off, and what is made of them soon after; five samples per
-        period of the cut-off are enough for the decimation filter to see what it passes.
+        The spectrum of the positions ends at the cut-off, and that of smooth functions soon after.
+        Five samples per period of the cut-off are enough for the pass band of the decimation.
 
         """
         # five samples per period of the cut-off describe a smooth function of the filtered
@@ -151,11 +151,11 @@ def conditioning(recordings: list[Recording], settings: SignalSettings) -> Condi
     """
     Choose the cut-off and the decimation for recordings of one kind.
 
-    The positions keep what stands out of their noise: the cut-off is where their spectrum meets
-    it, at most a fifth of the rate, for beyond it there is nothing to differentiate but noise, and
-    at most five times the band of torque and regressor, which hardly see what is beyond.
-    Torque and regressor keep ten times the band of the motion, the frequency below which 99 % of
-    the velocities' power lies, and are decimated to 2.5 samples per period of that.
+    The cut-off of positions is where their spectrum meets their noise. It is at most a fifth of
+    the rate, as derivatives above it are only noise. It is at most five times the band of torque
+    and regressor, which hardly depend on higher frequencies.
+    The band of the motion contains 99 % of the velocities' power. Torque and regressor keep ten
+    times this band, and are decimated to 2.5 samples per period of the upper end.
 
     """
     for recording in recordings:
@@ -196,10 +196,10 @@ def conditioning(recordings: list[Recording], settings: SignalSettings) -> Condi
 
 def velocity_error(recording: Recording, used: Conditioning) -> FloatArray:
     """
-    Return by how much velocities are wrong that are made of filtered positions.
+    Return the error of velocities that are computed from filtered positions.
 
-    They have white noise of the positions up to the cut-off, times the square of its frequency,
-    and lack what the positions show of the motion beyond it.
+    One part is white noise of the positions up to the cut-off, times the square of its frequency.
+    The other part is the motion above the cut-off, which the filter removes.
 
     Returns
     -------
@@ -215,7 +215,7 @@ def velocity_error(recording: Recording, used: Conditioning) -> FloatArray:
 
 
 def _require_rate(recording: Recording) -> None:
-    """Raise an IdentificationError where samples are so far apart that stamps are no seconds."""
+    """Raise an IdentificationError if samples are too far apart, as with stamps not in seconds."""
     rate = 1.0 / recording.period
     if rate >= SLOWEST:
         return
@@ -228,7 +228,7 @@ def _require_rate(recording: Recording) -> None:
     ]
     raise IdentificationError(
         f'{recording.source}: {len(recording)} samples in {recording.duration:.4g} s, one every '
-        f'{1.0 / rate:.4g} s, follow no motion' + (likely[0] if likely else '')
+        f'{1.0 / rate:.4g} s: too slow for a motion' + (likely[0] if likely else '')
     )
 
 
@@ -236,7 +236,7 @@ def segments(recording: Recording, used: Conditioning) -> Iterator[Motion]:
     """
     Yield the unbroken stretches of a recording as filtered motions on even time bases.
 
-    Each has the recorded torque as it is; the position is filtered and differentiated. Stretches
+    Each has the recorded torque unchanged; the position is filtered and differentiated. Stretches
     too short for the filters are left out.
 
     """
@@ -260,24 +260,24 @@ def segments(recording: Recording, used: Conditioning) -> Iterator[Motion]:
 
 
 def unbroken(recording: Recording, rate: float) -> list[npt.NDArray[np.intp]]:
-    """Return the samples of every stretch without a gap: what is across one is no motion."""
+    """Return the indices of the samples of every stretch without a gap."""
     longest = GAP_PERIODS * max(1.0 / rate, recording.period)
     breaks = np.flatnonzero(np.diff(recording.t) > longest) + 1
     return np.split(np.arange(len(recording.t)), breaks)
 
 
 def _shortest(used: Conditioning) -> float:
-    """Return how long a stretch has to be for the filters [s]."""
+    """Return the shortest stretch that the filters can process [s]."""
     return _decimated_edges(used) + _CUTOFF_PERIODS / used.cutoff_hz
 
 
 def _decimated_edges(used: Conditioning) -> float:
-    """Return what the decimation filter takes of both ends together [s]."""
+    """Return the duration that the decimation filter removes at both ends together [s]."""
     return 2 * _HALF_TAPS * used.decimation / used.rate_hz
 
 
 def no_stretch(recording: Recording, used: Conditioning) -> IdentificationError:
-    """Say that no stretch is long enough for the filters, and how long one has to be."""
+    """Return the error that no stretch is long enough for the filters, with the needed length."""
     spans = [recording.t[part[[0, -1]]] for part in unbroken(recording, used.rate_hz)]
     longest = max(float(last - first) for first, last in spans)
     left = longest - _decimated_edges(used)
@@ -334,13 +334,13 @@ def decimate(values: FloatArray, used: Conditioning, stride: int = 1) -> FloatAr
 
 
 def decimated_samples(n_samples: int, used: Conditioning) -> range:
-    """Return which full-rate samples the decimated ones sit on."""
+    """Return the indices of the full-rate samples at the times of the decimated ones."""
     half = (len(used.taps()) - 1) // 2
     return range(half, max(half, n_samples - half), used.decimation)
 
 
 def _even(t: FloatArray, period: float, *signals: FloatArray) -> tuple[FloatArray, ...]:
-    """Return even times, and signals there; a cubic through the stamps where they jitter."""
+    """Return even times and signals there, by a cubic spline if the stamps jitter."""
     grid = np.linspace(t[0], t[-1], round((t[-1] - t[0]) / period) + 1)
     if len(grid) == len(t) and np.max(np.abs(grid - t)) < JITTER_TOLERANCE * period:
         return grid, *signals
@@ -357,7 +357,7 @@ def even_positions(recording: Recording) -> list[FloatArray]:
 def _differentiated(
     recording: Recording, t: FloatArray, q: FloatArray, tau: FloatArray, used: Conditioning
 ) -> Motion:
-    """Filter and differentiate positions of the arm, and after them those of its partner."""
+    """Filter and differentiate positions (N, k): those of the arm, then those of its partner."""
     sections = signal.butter(4, used.cutoff_hz, fs=used.rate_hz, output='sos')
     smooth = signal.sosfiltfilt(sections, q, axis=0)
     dq = _central_difference(smooth, t[1] - t[0])
@@ -370,7 +370,7 @@ def _differentiated(
     band = _CURVATURE_BANDS * _motion_band(bands, used.rate_hz / few)
     beside = None
     if recording.partner is not None:
-        # the other machine's ends of the ties along its positions and velocities
+        # motion of the ends of the ties on the other machine
         other, ties = recording.partner, recording.partner.ties
         position, jacobian = points_motion(
             other.robot,
@@ -391,16 +391,16 @@ def _central_difference(x: FloatArray, step: float) -> FloatArray:
 
 
 def _unbroken_positions(recording: Recording, rate: float) -> list[FloatArray]:
-    """Return the positions of every stretch without a gap, or of all where each is too short."""
+    """Return the positions of every stretch without a gap; of all samples if each is too short."""
     parts = [part for part in unbroken(recording, rate) if len(part) >= _LEAST_SAMPLES]
     return [recording.q[part] for part in parts] or [recording.q]
 
 
 def _motion_band(stretches: Sequence[tuple[FloatArray, npt.ArrayLike]], rate: float) -> float:
     """Return the frequency below which 99 % of the velocities' power lies [Hz], fastest joint."""
-    # Stretches are positions and the frequency up to which they, or those of each joint, are no
-    # noise. What is above does not count: a joint that hardly moves has nothing but noise where
-    # another is still moving. All stretches count together, for the same reason.
+    # Each stretch has positions and the frequency above which they, or those of each joint, are
+    # noise. Power above it does not count, as a joint that hardly moves has only noise where
+    # another joint moves. All stretches count together, for the same reason.
     band = rate / max(len(q) for q, _ in stretches)
     spectra = []
     for q, end in stretches:  # the power of velocities
@@ -423,5 +423,5 @@ def _position_spectrum(recording: Recording) -> tuple[FloatArray, FloatArray, Fl
     """Return frequencies (K,) and power (K, n) of positions, and their white noise (n,) per Hz."""
     rate = 1.0 / recording.period
     frequency, power = mean_spectrum(_unbroken_positions(recording, rate), rate)
-    upper = frequency > 0.3 * rate  # two fifths, in which there is no motion
+    upper = frequency > 0.3 * rate  # the upper two fifths of the spectrum have no motion
     return frequency, power, np.median(power[upper], axis=0)

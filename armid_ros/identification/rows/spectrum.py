@@ -1,6 +1,6 @@
 # Copyright 2026 The armid_ros developers
 # SPDX-License-Identifier: Apache-2.0
-"""The spectrum of signals that are known in several stretches."""
+"""Spectrum of signals that are recorded in several stretches."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from armid_ros.motion import FloatArray
 import numpy as np
 from scipy import signal
 
-#: Length of the segments that are averaged [s].
+#: Length of the segments whose spectra are averaged [s].
 _SEGMENT = 8.0
 
 
@@ -27,11 +27,11 @@ def mean_spectrum(
     Parameters
     ----------
     stretches : sequence of ndarray, each (N, n)
-        Evenly sampled signals; segments are no longer than the longest.
+        Evenly sampled signals; segments are no longer than the longest stretch.
     rate : float
         Samples per second.
     detrend : {'constant', 'linear'}
-        What is taken off every segment.
+        Trend that is subtracted from every segment: its mean, or a line.
     segment : float
         Length of the segments [s].
 

@@ -1,6 +1,6 @@
 # Copyright 2026 The armid_ros developers
 # SPDX-License-Identifier: Apache-2.0
-"""Whether stamps are so uneven that samples are not where they seem, and senders take turns."""
+"""Checks of time stamps: uneven or rounded stamps, and two senders on one topic."""
 
 from __future__ import annotations
 
@@ -8,42 +8,41 @@ from armid_ros.motion import FloatArray
 from armid_ros.recording import Recording
 import numpy as np
 
-#: Share of steps in time that differ from the median by more than half of it, or are less than
-#: half of their mean.
+#: Share of uneven time steps above which stamps are uneven. A step is uneven if it differs by half
+#: of the median or more, or is less than half of the mean.
 _UNEVEN = 0.05
-#: Jitter of stamps that blurs a signal at the end of the band by less than this share of it is
-#: harmless.
+#: Harmless error by jitter of stamps, as a share of a signal at the upper end of the band.
 _BLURRED = 0.1
-#: A step in time is a multiple of another one within this share of it.
+#: Largest deviation of a time step from a multiple of the smallest step, as a share of that.
 _WHOLE = 0.01
-#: Stamps are compared with an even grid over so many samples: jitter shows in them, and a clock
-#: that is slewed does not.
+#: Samples over which stamps are compared with an even grid: jitter is visible over them, and slow
+#: drift of the clock is not.
 _WINDOW = 50
-#: A joint that steps by less between two messages may stand still beside its noise [rad or m].
+#: Step between two messages below which a joint may be at rest with noise [rad or m].
 _LEAST_STEP = 1e-3
-#: A step is contradicted where the messages on both sides of it differ by so many times less.
+#: A message is contradicted if its neighbours differ from each other by so many times less.
 _CLOSER = 5.0
-#: Messages of a second sender, and their share, below which they are faulty samples.
+#: Number of contradicted messages, and their share, below which they are faulty samples.
 _FEWEST, _SHARE_OF_MESSAGES = 20, 0.01
-#: Values of one sender are nearer to each other than to those of the other by this factor.
+#: Smallest ratio of the jump between two senders to the steps of one sender.
 _TRACK = 3.0
-#: Below this share of the messages, those of a second sender come between the others; where they
-#: replace them, so that without them there is a gap of so many periods, an encoder is at fault.
+#: With less than this share of the messages, a second sender adds messages between the others. If
+#: gaps of so many periods remain without the messages, they are faults of an encoder instead.
 _FEW, _REPLACED = 0.2, 1.5
 
 
 def uneven_stamps(recording: Recording, cutoff_hz: float, band_hz: float) -> str:
     """
-    Say that time stamps are too uneven; empty where they are not.
+    Return a message on time stamps that are too uneven; empty otherwise.
 
     Parameters
     ----------
     recording : Recording
         The data.
     cutoff_hz : float
-        Up to which positions are differentiated [Hz].
+        Cut-off frequency of the position filter [Hz].
     band_hz : float
-        Up to which rows hold motion [Hz].
+        Highest frequency of motion in the rows [Hz].
 
     """
     steps = np.diff(recording.t)
@@ -63,9 +62,9 @@ def uneven_stamps(recording: Recording, cutoff_hz: float, band_hz: float) -> str
 
 def rounded_stamps(recording: Recording) -> str:
     """
-    Say to what time stamps are rounded, where samples share them for that; empty otherwise.
+    Return a message on rounded time stamps that samples share; empty otherwise.
 
-    Samples that share a stamp are dropped but one, and the others are off by half of the step.
+    One of several samples with equal stamps is kept; stamps are wrong by up to half of the step.
 
     """
     report, steps = recording.report, np.diff(recording.t)
@@ -82,9 +81,9 @@ def rounded_stamps(recording: Recording) -> str:
 
 
 def _wander(t: FloatArray) -> float:
-    """Return how far stamps are from an even grid [s]; zero where none come early."""
-    # samples that are lost make steps longer and none shorter; stamps that come late, each by
-    # another time, make short ones too, and steps alone do not tell how far they are off
+    """Return the RMS distance of stamps from an even grid [s]; zero without short steps."""
+    # lost samples make steps longer and none shorter; stamps with varying delays make short
+    # steps too, and the steps alone do not determine the error of the stamps
     steps = np.diff(t)
     if len(t) < _WINDOW or np.mean(steps < 0.5 * np.mean(steps)) <= _UNEVEN:
         return 0.0
@@ -95,11 +94,11 @@ def _wander(t: FloatArray) -> float:
 
 def two_senders(recording: Recording) -> str:
     """
-    Say that positions of a recording jump to and fro between two tracks; empty where they do not.
+    Return a message on positions that jump to and fro between two tracks; empty otherwise.
 
-    A message is of another sender than those around it where it is far from both in some joint,
-    they are near each other, and the step is faster than the joint otherwise moves. Such messages
-    are a track of their own, where those of a faulty encoder are anywhere.
+    A message has another sender than its neighbours if some joint is far from both, the two are
+    near each other, and the step is faster than usual motion. Such messages form a track of their
+    own, whereas values of a faulty encoder are scattered.
 
     """
     t, q = recording.t, recording.q
@@ -111,7 +110,7 @@ def two_senders(recording: Recording) -> str:
     fewest = max(_FEWEST, _SHARE_OF_MESSAGES * len(t))
     if np.count_nonzero(apart) < fewest:
         return ''
-    # the speed that each joint seldom exceeds, by its velocities if there are
+    # the speed that each joint seldom exceeds, from recorded velocities if there are any
     time = (t[2:] - t[:-2])[:, np.newaxis]
     usual = np.median(np.abs(across) / time, axis=0)
     if recording.dq is not None and np.any(recording.dq):

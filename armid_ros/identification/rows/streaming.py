@@ -1,12 +1,12 @@
 # Copyright 2026 The armid_ros developers
 # SPDX-License-Identifier: Apache-2.0
 """
-Rows of a recording that may be larger than the memory, piece by piece.
+Rows of a recording that may be larger than the memory, in pieces.
 
-Pieces overlap by what the filters need to forget their ends, and a piece begins where a row of the
-one before would sit, so rows are those of the whole recording; each comes from one piece alone.
-Where stamps jitter each piece has an even time base of its own, and a joint counts as at rest by
-its top speed within the piece.
+Pieces overlap, so that effects of the filters at their ends have decayed. A piece begins at the
+time of a row of the previous piece, so the rows are those of the whole recording. Each row comes
+from one piece. Two things differ per piece: the even time base of jittering stamps, and the top
+speed by which a joint counts as at rest.
 
 """
 
@@ -31,8 +31,8 @@ import numpy.typing as npt
 
 
 def _cuts(piece: Recording, used: Conditioning) -> tuple[int, int]:
-    """Return the stamps that the next piece begins with, and where its own rows begin [ns]."""
-    # after 16 periods a filter of order 4 has forgotten where it began: exp(-38)
+    """Return the stamp of the first sample of the next piece, and that of its first row [ns]."""
+    # after 16 periods, the start of a filter of order 4 has decayed to exp(-38)
     periods = (EDGE_PERIODS + 16.0) * used.rate_hz / used.cutoff_hz
     margin = int(np.ceil(periods)) + len(used.taps())
     longest = GAP_PERIODS * max(1.0 / used.rate_hz, piece.period)
@@ -58,7 +58,7 @@ def streamed(
     settings: ReadSettings,
 ) -> Iterator[tuple[Recording, Sequence[Regression]]]:
     """
-    Yield pieces of a recording without damaged samples, with the rows that each has to itself.
+    Yield pieces of a recording without damaged samples, with the rows that belong to each.
 
     Parameters
     ----------
@@ -67,13 +67,13 @@ def streamed(
     arm : ArmModel
         Rigid body and effects.
     columns : ndarray of int, shape (r,)
-        Which of ``arm.parameters`` to keep.
+        Indices of the columns to keep, as in ``arm.parameters``.
     choose : callable
-        Returns the filters, given the first piece.
+        Function that returns the filters for the first piece.
     samples : int
-        New samples a piece has at most.
+        Largest number of new samples in a piece.
     topic, settings
-        As of ``read_recording``.
+        See ``read_recording``.
 
     """
     chosen: list[Conditioning] = []  # with the first piece, before any cut

@@ -1,3 +1,3 @@
 # Copyright 2026 The armid_ros developers
 # SPDX-License-Identifier: Apache-2.0
-"""Samples of joint states as they come: damage is separated from motion, streams are merged."""
+"""Streams of joint states: removal of damaged samples, and merging of several streams."""

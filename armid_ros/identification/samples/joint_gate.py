@@ -1,6 +1,6 @@
 # Copyright 2026 The armid_ros developers
 # SPDX-License-Identifier: Apache-2.0
-"""What leaves damaged joint states out: one gate for streams, recordings and pairs of machines."""
+"""Gate that removes damaged joint states, for streams, recordings and pairs of machines."""
 
 from __future__ import annotations
 
@@ -8,11 +8,11 @@ from armid_ros.identification.samples.spikes import SpikeGate
 import numpy as np
 import numpy.typing as npt
 
-#: Resolution at best, of a position and a velocity [rad or m, and a second], and of a torque as a
-#: share of its limit: an encoder of 22 bits, a torque sensor of 17.
+#: Best resolution of a position [rad or m], of a velocity (per second), and of a torque as a share
+#: of its limit: an encoder of 22 bits, a torque sensor of 17.
 _FINEST = {'q': 1e-6, 'v': 1e-5, 't': 1e-5}
-#: Second derivative that each may have when an arm at rest begins to move, in the same units per
-#: second squared: 2 rad/s^2; a jerk of 50 rad/s^3; a torque of its limit that oscillates at 1 Hz.
+#: Second derivative of each signal when an arm at rest begins to move, in these units per second
+#: squared: 2 rad/s^2, a jerk of 50 rad/s^3, and a torque at its limit that oscillates at 1 Hz.
 _ONSET = {'q': 2.0, 'v': 50.0, 't': 50.0}
 
 
@@ -25,19 +25,19 @@ def joint_gate(
     false_alarm_time: float = 360000.0,
 ) -> SpikeGate:
     """
-    Return a gate for joint states: a position never steps, a torque may jump and come back.
+    Return a gate for joint states: positions never step, torques may jump and return.
 
     Parameters
     ----------
     prismatic : array_like of bool, shape (n,)
         Whether each joint is prismatic; the angles of the others may jump by full turns.
     signals : str
-        What a sample holds of all joints, in turn: q for positions, v for velocities, t for
-        torques, as in 'qt'.
+        Signals of a sample, each for all joints: q for positions, v for velocities, t for torques,
+        as in 'qt'.
     torque_limit : array_like, shape (n,), optional
         Largest torque of each joint [N m or N], infinite where unknown.
     max_gap, false_alarm_time
-        As for `SpikeGate`.
+        See `SpikeGate`.
 
     Returns
     -------

@@ -1,6 +1,6 @@
 # Copyright 2026 The armid_ros developers
 # SPDX-License-Identifier: Apache-2.0
-"""Joints by name, and one stream of joint states out of several that have some joints each."""
+"""Lookup of joints by name, and merging of streams with some joints each into one stream."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from armid_ros.motion import FloatArray
 import numpy as np
 import numpy.typing as npt
 
-#: Periods of a sender that its signals are interpolated across.
+#: Longest gap of a sender that is interpolated across, in its periods.
 _LONGEST = 10.0
 
 Moment = tuple[float, FloatArray]
@@ -21,7 +21,7 @@ Moment = tuple[float, FloatArray]
 
 @dataclass
 class _Part:
-    """What one sender has sent: joints, and samples of shape (s, k) that are still needed."""
+    """Joints of a sender, and its samples of shape (s, k) that are still needed."""
 
     joints: tuple[int, ...]
     samples: deque[Moment] = field(default_factory=lambda: deque(maxlen=1000))
@@ -41,11 +41,11 @@ class _Part:
         self.samples.append((t, values))
 
     def reaches(self, t: float) -> bool:
-        """Return whether what it sends has come to a time."""
+        """Return whether the samples of the sender reach a time."""
         return bool(self.samples) and self.samples[-1][0] >= t
 
     def at(self, t: float) -> FloatArray | None:
-        """Return the values at a time that has been reached; None where nothing is near."""
+        """Return the values at a time that the samples reach; None if no sample is near."""
         while len(self.samples) > 1 and self.samples[1][0] <= t:
             self.samples.popleft()
         first, values = self.samples[0]
@@ -59,16 +59,16 @@ class _Part:
 
 class JointMerger:
     """
-    Put together what several senders say of different joints, at the times of one of them.
+    Merge samples of several senders with different joints, at the times of one sender.
 
-    The sender of the first joint gives the times; the others are interpolated linearly between
-    their stamps, which are of the same clock. A joint that two senders have is taken from the
-    one that came first.
+    The sender of the first joint defines the times; other signals are interpolated linearly
+    between their stamps of the same clock. A joint with two senders is taken from the sender that
+    came first.
 
     Parameters
     ----------
     n_joints : int
-        Number of joints that are wanted.
+        Number of joints of the merged stream.
 
     """
 
@@ -84,16 +84,16 @@ class JointMerger:
 
     def take(self, joints: tuple[int, ...], t: float, values: FloatArray) -> list[Moment]:
         """
-        Take in a sample of some joints, and return those of all joints that it completes.
+        Add a sample of some joints, and return the samples of all joints that it completes.
 
         Parameters
         ----------
         joints : tuple of int
-            Which joints, k of them.
+            Indices of the k joints.
         t : float
             Stamp [s].
         values : ndarray, shape (s, k)
-            Signals of each.
+            Signals of these joints.
 
         Returns
         -------
@@ -104,7 +104,7 @@ class JointMerger:
         self._parts.setdefault(joints, _Part(joints)).take(t, values)
         if self.missing:
             return []
-        # the senders that bring a joint which none before them has
+        # senders with a joint that no earlier sender has
         found: list[_Part] = []
         known: set[int] = set()
         for part in self._parts.values():
@@ -128,19 +128,19 @@ class JointMerger:
 
 def joint_places(joints: Sequence[str], names: Sequence[str]) -> npt.NDArray[np.intp]:
     """
-    Return the positions of wanted joints among the names of a message; others are left out.
+    Return the positions of given joints among the names of a message.
 
     Parameters
     ----------
     joints : sequence of str
-        The joints that are wanted, in the order that is wanted.
+        Wanted joints, in the wanted order.
     names : sequence of str
         Joint names of the message, such as JointState.name.
 
     Returns
     -------
     ndarray of int, shape (n,)
-        ``position[indices]`` is in the order that is wanted.
+        Indices such that ``position[indices]`` is in the wanted order.
 
     Raises
     ------

@@ -1,10 +1,10 @@
 # Copyright 2026 The armid_ros developers
 # SPDX-License-Identifier: Apache-2.0
 """
-What predictions of a stream usually miss by: its noise, and the resolution of its signals.
+Usual prediction errors of a stream: its noise, and the resolution of its signals.
 
-A window of errors costs the same whether it is the second or the thousandth of a stream, for one
-sample in a hundred completes one and must not take longer than a stream can wait.
+Every window of errors takes the same computing time, whether it is the second or the thousandth.
+One sample in a hundred completes a window, and a stream must not wait.
 
 """
 
@@ -24,37 +24,37 @@ from armid_ros.motion import FloatArray
 import numpy as np
 import numpy.typing as npt
 
-#: Predictions whose usual error is measured together.
+#: Number of predictions in a window, whose usual error is computed together.
 WINDOW = 100
-#: Such windows that are remembered: a minute at 1 kHz.
+#: Number of windows kept: one minute at 1 kHz.
 _REMEMBERED = 600
-#: Share of predictions that tells the usual error. The others may be steps of friction, or damage.
+#: Share of predictions that define the usual error. Others may be steps of friction, or damage.
 SHARE = 0.95
-#: The same for the first few samples: one damaged sample spoils three predictions.
+#: Share for the first few samples, where one damaged sample spoils three predictions.
 _SHARE_FIRST = 0.75
-#: How often a step has to be seen to be one that the signal makes.
+#: Number of occurrences of a step from which it is a step of the signal itself.
 SEEN = 3
 
 
 class NoiseLevel:
     """
-    Learns from good samples what the predictions of the next ones usually miss by.
+    Estimator of the usual prediction error, from undamaged samples.
 
     Parameters
     ----------
     count : int
-        Signals m.
+        Number of signals m.
     together : int, optional
-        Most samples that are learned from before `settle`.
+        Largest number of samples that are added before `settle`.
     finest : ndarray, shape (m,), or float
-        Resolution of the signals at best.
+        Best resolution of the signals.
     onset : ndarray, shape (m,), or float
-        Second derivative that is usual before any motion was seen, per second squared.
+        Assumed second derivative before the first motion, per second squared.
 
     Attributes
     ----------
     usual : Usual
-        Of the loudest window that is remembered; at least the resolution.
+        Usual error in the noisiest window that is kept; at least the resolution.
 
     """
 
@@ -75,13 +75,13 @@ class NoiseLevel:
         self._waiting = 0
 
     def set(self, usual: Usual) -> None:
-        """Take it as known what is usual."""
+        """Set the usual prediction error."""
         self.forget()
         self._remember(usual.size, usual.noisy)
         self.usual = usual
 
     def forget(self) -> None:
-        """Measure the noise anew with the next `begin`."""
+        """Clear the measured noise; the next `begin` measures it again."""
         self._sizes[:] = 0.0
         self._seen = 0
 
@@ -94,7 +94,7 @@ class NoiseLevel:
         missed : sequence of Missed
             The prediction errors.
         moves : ndarray, shape (k, m)
-            From each sample to the next.
+            Differences between successive samples.
         period : float
             Sampling period [s].
 
@@ -107,14 +107,14 @@ class NoiseLevel:
             self.usual = Usual(period, size, share_of_noise(errors, size))
 
     def learn(self, missed: Missed, move: FloatArray) -> None:
-        """Take in the prediction error of a good sample and its move, shape (m,)."""
+        """Add the prediction error of an undamaged sample, and its change, shape (m,)."""
         self._errors[self._waiting] = missed.error
         self._growths[self._waiting, :, 0] = missed.noise, missed.bend
         self._moves[self._waiting] = move
         self._waiting += 1
 
     def settle(self, period: float) -> None:
-        """Measure what is usual anew if a whole window of errors came."""
+        """Compute the usual error again if a window of errors is complete."""
         if self._waiting < WINDOW:
             return
         growths, moves = self._growths[: self._waiting], self._moves[: self._waiting]
@@ -133,12 +133,12 @@ class NoiseLevel:
         self._seen += 1
 
     def see_steps(self, moves: FloatArray) -> None:
-        """Learn the resolution from moves of shape (k, m)."""
+        """Learn the resolution from changes between samples, shape (k, m)."""
         self._steps = _smallest(np.concatenate([self._steps, np.abs(moves)]))
 
     def _least(self, period: float) -> FloatArray:
         """Return the smallest step of every signal, at least the finest and that of an onset."""
-        # A signal that moves fast makes no small steps; but by its resolution it leaves any line.
+        # A fast signal has no small steps, but its resolution moves it off any line.
         step = np.where(np.isfinite(self._steps[-1]), self._steps[-1], 0.0)
         least = np.maximum(self._finest, self._onset * period**2)
         return np.maximum(np.minimum(self._most, step), least)
@@ -146,19 +146,19 @@ class NoiseLevel:
 
 class LineErrors(NamedTuple):
     """
-    Errors of the straight lines through the two samples before each.
+    Errors of samples against the straight line through the two samples before.
 
     Attributes
     ----------
     stretch : ndarray of int, shape (N,)
-        First sample of the stretch without a long gap that a sample is of.
+        First sample of the stretch that contains a sample; long gaps separate stretches.
     off : ndarray, shape (N, m)
-        How far off each sample is when a smooth signal bends on, over what is too far; 0 for the
-        first of a stretch.
+        Error of each sample, if a smooth signal keeps its curvature, over the largest allowed
+        error; 0 for the first samples of a stretch.
     bent : ndarray, shape (N, m)
-        How far off the straight line it is, over a period.
+        Distance of each sample from the straight line, scaled to one period.
     usual : Usual
-        What is usual of the loudest part of the whole.
+        Usual error in the noisiest part of the recording.
 
     """
 
@@ -177,7 +177,7 @@ def line_errors(
     quantile: Callable[[float], float],
 ) -> LineErrors:
     """
-    Return what the straight lines through two samples miss the next ones by, all at once.
+    Return the errors of straight lines through two samples at the next one, for all samples.
 
     Parameters
     ----------
@@ -186,13 +186,13 @@ def line_errors(
     x : ndarray, shape (N, m)
         Signals.
     floor : ndarray, shape (m,)
-        What a sample may be off by without consequence.
+        Negligible error of a sample.
     turn : ndarray, shape (m,)
-        Jumps of a signal that are none, 0 without.
+        Full turn of a signal, whose jumps are ignored; 0 without.
     max_gap : int
-        Periods beyond which a gap ends a stretch.
+        Longest gap within a stretch, in periods.
     quantile : callable
-        Returns the standard deviations that a prediction may miss by, given the period [s].
+        Function of the period [s] that returns the largest allowed error in standard deviations.
 
     """
     dt, moves = np.diff(t), np.diff(x, axis=0)
@@ -209,7 +209,7 @@ def line_errors(
     error[2:][gap[1:] | gap[:-1]] = 0.0
     plain = error[2:] / np.maximum(noise, bend)[2:]
     count = max(1, len(plain) // WINDOW)
-    size, longer = divmod(len(plain), count)  # windows of one length are taken at once
+    size, longer = divmod(len(plain), count)  # windows of equal length are processed together
     cut, signals = longer * (size + 1), x.shape[1]
     batches = (
         plain[:cut].reshape(longer, size + 1, signals),
@@ -230,14 +230,14 @@ def line_errors(
 
 
 def _loudest(period: float, sizes: FloatArray, shares: FloatArray) -> Usual:
-    """Return what is usual of the loudest of all windows, shape (K, m)."""
+    """Return the usual error of the noisiest of K windows, given sizes and shares, (K, m)."""
     loudest = np.argmax(sizes, axis=0)[np.newaxis]
     size, noisy = (np.take_along_axis(one, loudest, 0)[0] for one in (sizes, shares))
     return Usual(period, size, noisy)
 
 
 def _smallest(steps: FloatArray) -> FloatArray:
-    """Return the smallest steps of every signal that are not zero, shape (SEEN, m)."""
+    """Return the smallest nonzero steps of every signal, shape (SEEN, m)."""
     none = np.full((SEEN, steps.shape[1]), np.inf)
     steps = np.concatenate([none, np.where(steps > 0.0, steps, np.inf)])
     return np.partition(steps, SEEN - 1, axis=0)[:SEEN]

@@ -1,29 +1,28 @@
 # Copyright 2026 The armid_ros developers
 # SPDX-License-Identifier: Apache-2.0
 """
-Damaged samples in a stream of joint states, told from what the arm really does.
+Detection of damaged samples in a stream of joint states.
 
-A torque or an encoder that is off in one sample bends an estimate by as much as thousands of good
-samples mend. Every sample is predicted by the straight line through the two before it, which
-bends on as it did where a signal is smooth. One that is too far from the prediction waits for
-those after it. When they return to where the line leads and do not go on from it, it was damaged
-and is left out; otherwise the arm has changed, and all are used. So damage costs the samples that
-are damaged, and no change is lost, however large.
+One damaged sample of a torque or an encoder biases an estimate as much as thousands of good ones
+correct. Every sample is predicted by the straight line through the two before it; for a smooth
+signal, the prediction keeps the curvature. A sample too far from the prediction is held until the
+next ones arrive. If these return to the line and do not continue from the sample, it is damaged
+and left out. Otherwise the motion has changed, and all samples are used. So only damaged samples
+are lost, and no change, however large.
 
-Positions are continuous. One that steps and goes on from there is of a clock that was set or of an
-encoder that was zeroed, and what follows is a new stretch (``StreamSample.begins``). A torque may
-jump and come back, as where free play is crossed; such pulses are told from damage by what the
-torque reaches otherwise. In a stream they are left out and not called damage, as what the torque
-reaches is known too late; in a recording they are kept.
+Positions are continuous. A position that steps and continues from there means that a clock was set
+or an encoder zeroed, and a new stretch begins (``StreamSample.begins``). A torque may jump and
+return, for example when free play is crossed. Such pulses differ from damage by the range of the
+torque otherwise. In a stream they are left out and not called damage, as the range is known too
+late; in a recording they are kept.
 
-Three things say how far is too far; the largest of them counts. The noise: what predictions
-usually miss by, as much as in the loudest part of the last minute, since an arm at rest must not
-forget what it is like in motion, times the quantile of a normal distribution at the chance of one
-false alarm in `false_alarm_time`. The resolution, times the same: the smallest step that a signal
-makes. The consequence (``floor``): what one sample has to be off by to move what is estimated from
-it by as much as noise does. Across a gap the line misses by more: an acceleration takes the signal
-off it with the square of time, noise hardly. Which of them a signal has is seen in its errors:
-successive ones of white noise have the correlation -2/3, those of an acceleration 1.
+The largest allowed error is the largest of three. The noise: the usual prediction error in the
+noisiest part of the last minute, as an arm at rest must not forget its motion. It is multiplied by
+the normal quantile for one false alarm in `false_alarm_time`. The resolution, the smallest step of
+a signal, multiplied by the same. The negligible error (``floor``): the error of one sample that
+moves an estimate as much as noise does. Across a gap, errors are larger: those of an acceleration
+grow with the square of time, those of noise hardly. The errors of a signal reveal which of the two
+dominates: successive errors of white noise have the correlation -2/3, those of an acceleration 1.
 
 """
 
@@ -49,48 +48,48 @@ import numpy as np
 import numpy.typing as npt
 from scipy import stats
 
-#: Samples from which noise and period are learned before the first one is judged.
+#: Number of samples from which noise and period are learned before the first sample is judged.
 FIRST = 20
-#: A sample goes on from others that are nearer by this factor than where the line leads.
+#: Largest error of a sample against held samples that it continues, over that against the line.
 _NEARER = 0.5
-#: Periods without a sample after which one waits for the next, which may contradict its stamp.
+#: Gap in periods after which a sample is held until the next one, which may contradict its stamp.
 _LEAP = 1.5
 
 
 class SpikeGate:
     """
-    Pass on the samples of a stream without those that are damaged.
+    Gate that passes on the undamaged samples of a stream.
 
     Parameters
     ----------
     turning : array_like of bool, shape (m,)
-        Signals that may jump by full turns, which is no damage.
+        Signals whose jumps by full turns are no damage.
     max_gap : int
-        Successive samples that may be damaged; what lasts longer is real.
+        Largest number of successive damaged samples; a longer deviation is real.
     false_alarm_time : float
-        Mean time between two good samples that are left out, in normal noise [s].
+        Mean time between two good samples left out by error, in normal noise [s].
     continuous : array_like of bool, shape (m,), optional
-        Signals that never step, as positions; none by default.
+        Signals that never step, such as positions; none by default.
     pulsing : array_like of bool, shape (m,), optional
-        Signals that may jump and come back, as torques; none by default.
+        Signals that may jump and return, such as torques; none by default.
     finest : array_like, shape (m,), optional
-        Resolution of the signals at best, in their units. A simulation without noise and an arm
-        at rest have less noise than that, and a limit that follows it would leave out sound data.
+        Best resolution of the signals, in their units. A simulation without noise and an arm at
+        rest have less noise, and a limit by that noise would leave out sound data.
     onset : array_like, shape (m,), optional
-        Second derivative of the signals that is usual before any motion was seen, per second
-        squared: an arm that was at rest so far begins to move.
+        Assumed second derivative of the signals before the first motion, per second squared: an
+        arm at rest may begin to move.
 
     Attributes
     ----------
     spikes : Counter of int
-        Samples left out as damaged, by the signal that was furthest off.
+        Samples left out as damaged, by the signal with the largest error.
     rejected : Counter of str
-        Samples left out, by reason: spike; pulse, which the arm may have made; stamp, which alone
-        was off; erratic, which followed neither what was before nor other ones; out_of_order.
+        Samples left out, by reason: spike; pulse, possibly a real one; stamp, a wrong time stamp;
+        erratic, without continuity to earlier or later samples; out_of_order.
     left_out : list of Excursion
-        What the last call to `take` left out as spike, pulse or erratic.
+        Samples that the last call to `take` left out as spike, pulse or erratic.
     lowest, highest : ndarray, shape (m,)
-        From where to where the good samples range, but for the two that a stretch begins with.
+        Range of the good samples, except the first two of each stretch.
 
     """
 
@@ -114,12 +113,12 @@ class SpikeGate:
         self.reset()
 
     def reset(self) -> None:
-        """Forget everything."""
+        """Clear samples, counters and noise levels."""
         self.spikes: Counter[int] = Counter()
         self.rejected: Counter[str] = Counter()
         self.left_out: list[Excursion] = []
         self._early: StreamSample | None = None
-        self._last: FloatArray | None = None  # of the good samples, across stretches
+        self._last: FloatArray | None = None  # last good sample, also of an earlier stretch
         count = len(self._turn)
         self.lowest, self.highest = np.full(count, np.inf), np.full(count, -np.inf)
         self._level = NoiseLevel(count, self._max_gap + 1, *self._least_seen)
@@ -128,7 +127,7 @@ class SpikeGate:
 
     def take(self, t: float, x: FloatArray, floor: FloatArray | float = 0.0) -> list[StreamSample]:
         """
-        Take in a sample, and return those that are known to be good by now, oldest first.
+        Add a sample, and return the samples that are now known to be good, oldest first.
 
         Parameters
         ----------
@@ -137,26 +136,26 @@ class SpikeGate:
         x : ndarray, shape (m,)
             Finite numbers.
         floor : ndarray, shape (m,), or float
-            What a sample may be off by without consequence.
+            Negligible error of a sample.
 
         """
         self.left_out = []
         early, self._early, tail = self._early, None, self._tail
         good: list[StreamSample] = []
         if early is not None and tail is not None:
-            if tail.t < t < early.t:  # what goes on from before is kept, for there is more of it
+            if tail.t < t < early.t:  # the sample that continues the earlier ones is kept
                 self.rejected['out_of_order'] += 1
             else:
                 good = self._take(early, floor)
         ahead = 0.0 if self._tail is None else t - self._tail.t
         if _LEAP * self._period < ahead <= self._max_gap * self._period < math.inf:
-            # something seems to be lost before it
+            # samples seem to be lost before this one
             self._early = StreamSample(t, x)
             return good
         return good + self._take(StreamSample(t, x), floor)
 
     def _take(self, sample: StreamSample, floor: FloatArray | float) -> list[StreamSample]:
-        """Judge a sample whose stamp the next one does not contradict."""
+        """Process a sample whose stamp is not contradicted by the next one."""
         if self._known:
             self._last = self._known[1].x
         if self._last is not None:
@@ -173,16 +172,16 @@ class SpikeGate:
         self, usual: Usual, known: Sequence[StreamSample] = (), bent: FloatArray | float = 0.0
     ) -> None:
         """
-        Begin somewhere in a recording of which is known what is usual of the whole.
+        Begin within a recording whose usual errors are known.
 
         Parameters
         ----------
         usual : Usual
-            What is usual of its signals.
+            Usual errors of the recording.
         known : sequence of StreamSample
-            The two good samples before; none where a stretch begins.
+            The two good samples before; none at the begin of a stretch.
         bent : ndarray, shape (m,)
-            What the prediction of the last of them missed, over a period.
+            Prediction error of the last known sample, scaled to one period.
 
         """
         self._level.set(usual)
@@ -191,16 +190,16 @@ class SpikeGate:
             self._period, self._quantile = usual.period, self._quantile_of(usual.period)
 
     def line_errors(self, t: FloatArray, x: FloatArray, floor: FloatArray) -> LineErrors:
-        """Return how far off the samples of a whole recording are, as `take` would predict."""
+        """Return the prediction errors of all samples of a recording; see `line_errors`."""
         return line_errors(t, x, floor, self._turn, self._max_gap, self._quantile_of)
 
     def possible(self, excursion: Excursion, lowest: FloatArray, highest: FloatArray) -> bool:
         """
         Return whether the arm itself may have caused an excursion of a signal.
 
-        A position cannot jump and come back. A torque can, and where free play is crossed it goes
-        beyond what it reaches otherwise, from `lowest` to `highest`, but by no more than that
-        spans: an impact is of the order of what drives it.
+        A position cannot jump and return. A torque can exceed its usual range, from `lowest` to
+        `highest`, when free play is crossed, but by no more than the width of that range: an
+        impact is of the order of the driving torque.
 
         """
         values = np.stack([sample.x for sample in excursion.samples])
@@ -209,7 +208,7 @@ class SpikeGate:
         return not bool(np.any((excursion.off > 1.0) & (far | ~self._pulsing)))
 
     def _quantile_of(self, period: float) -> float:
-        """Return how many standard deviations noise exceeds at one false alarm in that time."""
+        """Return the limit in standard deviations for the false alarm time, given a period [s]."""
         chance = period / self._false_alarm_time / len(self._turn)
         return float(stats.norm.isf(min(chance, 0.5) / 2.0))
 
@@ -219,7 +218,7 @@ class SpikeGate:
         known: Sequence[StreamSample] = (),
         bent: FloatArray | float = 0.0,
     ) -> None:
-        """Begin a new stretch with some samples; what is usual stays known."""
+        """Begin a new stretch with some samples, and keep the usual errors."""
         self._first, self._known = first, tuple(known)
         self._bent = bent
         self._held: list[StreamSample] = []
@@ -232,12 +231,12 @@ class SpikeGate:
 
     @property
     def _tail(self) -> StreamSample | None:
-        """Return the newest sample that is not damaged for sure."""
+        """Return the newest sample that is not known to be damaged."""
         latest = self._held or self._first or self._known
         return latest[-1] if latest else None
 
     def _in_time(self, sample: StreamSample) -> bool:
-        """Return whether a stamp continues the stream; two that do not begin a new one."""
+        """Return whether a stamp continues the stream; two others in a row begin a new stretch."""
         tail, stray, self._stray = self._tail, self._stray, None
         dt = 0.0 if tail is None else sample.t - tail.t
         longest = self._max_gap * self._period
@@ -258,7 +257,7 @@ class SpikeGate:
         return False
 
     def _begin(self, floor: FloatArray | float) -> list[StreamSample]:
-        """Learn from the first samples, and judge them."""
+        """Learn noise and period from the first samples, and judge these."""
         raw, self._first = self._first or [], None
         first = all_unwrapped(raw, self._turn)
         self._period = float(np.median(np.diff([s.t for s in first])))
@@ -266,14 +265,14 @@ class SpikeGate:
         missed = self._lines_through(first)
         self._level.begin(missed, np.diff([s.x for s in first], axis=0), self._period)
         straight = [bool(np.all(self._off_by(m, floor) <= 1.0)) for m in missed]
-        if not any(straight):  # or the noise is not what it was: it is learned anew
+        if not any(straight):  # erratic, or the noise has changed: it is learned anew
             off = np.max([self._off_by(m, floor) for m in missed], axis=0)
             self._leave_out(Excursion(tuple(first), off, self._limits(missed[0], floor)), True)
             self._level.forget()
             self._restart([])
             return []
         start = straight.index(True)
-        first = first[:start] + all_unwrapped(raw[start:], self._turn)  # not from what is damaged
+        first = first[:start] + all_unwrapped(raw[start:], self._turn)  # from undamaged samples
         self._known = first[start], first[start + 1]
         self._leave_out_ahead(first[:start], missed[0], floor)
         good = list(self._known)
@@ -282,12 +281,12 @@ class SpikeGate:
         return good
 
     def _judge(self, sample: StreamSample, floor: FloatArray | float) -> list[StreamSample]:
-        """Return what is known to be good with another sample."""
-        if self._first is not None:  # what came before it was erratic
+        """Judge another sample; return the samples that are now known to be good."""
+        if self._first is not None:  # the samples before were erratic
             self._first.append(sample)
             return []
         missed = missed_by(self._known, sample, self._period)
-        # a smooth signal goes on bending as it does
+        # a smooth signal keeps its curvature
         bent = self._level.usual.smoothness * self._bent * missed.bend
         judged = missed._replace(error=missed.error - bent)
         if not self._held and self._surely_in_line(judged, floor):
@@ -319,7 +318,7 @@ class SpikeGate:
         return []
 
     def _go_on(self, floor: FloatArray | float) -> list[StreamSample]:
-        """Pass on the held samples, as they are real; damaged ones among them are judged again."""
+        """Pass on the held samples, which are real; judge damaged ones among them again."""
         held, self._held = self._held, []
         missed = self._lines_through(held)
         steady = ~self._pulsing
@@ -337,7 +336,7 @@ class SpikeGate:
         return good
 
     def _goes_on(self, sample: StreamSample, off: FloatArray, floor: FloatArray | float) -> bool:
-        """Return whether a sample goes on from what is held, as well as from what was before."""
+        """Return whether a sample continues the held samples, by the old slope or a new one."""
         last = self._held[-1]
         before = self._held[-2] if len(self._held) > 1 else self._known[1]
         first, second = self._known
@@ -351,29 +350,28 @@ class SpikeGate:
         return False
 
     def _stepped(self, floor: FloatArray | float) -> bool:
-        """Return whether a signal that never steps has stepped between what is known and held."""
-        # The lines before and behind a step do not meet in between; those of a turn, as in a
-        # collision, do.
+        """Return whether a continuous signal has stepped between known and held samples."""
+        # The lines before and behind a step do not intersect in between; those of a sudden turn,
+        # as in a collision, do.
         ahead = missed_by(self._known, self._held[0], self._period)
         back = missed_by((self._held[1], self._held[0]), self._known[1], self._period)
         far = np.minimum(self._off_by(ahead, floor), self._off_by(back, floor))
         return bool(np.any(far[self._continuous & (ahead.error * back.error < 0.0)] > 1.0))
 
     def _limits(self, missed: Missed, floor: FloatArray | float) -> FloatArray:
-        """Return what a sample may be off its prediction by, shape (m,)."""
+        """Return the largest allowed prediction error of a sample, shape (m,)."""
         limits = self._level.usual.limits(self._quantile, missed.noise, missed.bend)
         return np.maximum(limits, floor)
 
     def _off_by(self, missed: Missed, floor: FloatArray | float) -> FloatArray:
-        """Return how far off its prediction a sample is, over the limit, shape (m,)."""
+        """Return the prediction error of a sample over its limit, shape (m,)."""
         limit = np.maximum(self._limits(missed, floor), 1e-300)
         return np.asarray(np.abs(missed.error) / limit)
 
     def _surely_in_line(self, missed: Missed, floor: FloatArray | float) -> bool:
-        """Return whether a sample is within less than its limits, in a third of the time."""
-        # Limits grow with both times over which the prediction is made, and as fast as they do
-        # where both grow alike; so they are at least those over a period times the smaller of the
-        # two.
+        """Return whether a sample is within a lower bound of its limits, which is fast to test."""
+        # Limits grow with the factors `noise` and `bend`, and in proportion if both grow alike. So
+        # they are at least the limits over one period times the smaller factor.
         least, usual = self._least, self._level.usual
         if least is None or least[0] is not usual or least[1] != self._quantile:
             over_a_period = usual.limits(self._quantile, 1.0, 1.0)
@@ -404,13 +402,13 @@ class SpikeGate:
     def _leave_out_ahead(
         self, samples: Sequence[StreamSample], missed: Missed, floor: FloatArray | float
     ) -> None:
-        """Count samples, if any, ahead of the first ones that are in line."""
+        """Leave out samples, if any, ahead of the first ones that are in line."""
         if samples:
             off, limit = self._off_by(missed, floor), self._limits(missed, floor)
             self._leave_out(Excursion(tuple(samples), off, limit))
 
     def _leave_out(self, excursion: Excursion, erratic: bool = False) -> None:
-        """Count what is left out, by its reason."""
+        """Count samples that are left out, by reason."""
         self.left_out.append(excursion)
         count = len(excursion.samples)
         if erratic:

@@ -1,6 +1,6 @@
 # Copyright 2026 The armid_ros developers
 # SPDX-License-Identifier: Apache-2.0
-"""What the straight line through two samples of a stream misses the next one by."""
+"""Prediction of a sample of a stream by the straight line through the two before it."""
 
 from __future__ import annotations
 
@@ -16,13 +16,13 @@ from scipy import special
 
 #: Correlation of successive errors of a straight line in white noise.
 _NOISE_CORRELATION = -2.0 / 3.0
-#: Usual errors beyond which one says nothing of the correlation.
+#: Limit of errors in the computation of their correlation, in usual errors.
 _CLIPPED = 3.0
-#: Less is no jump by a full turn [rad].
+#: Smallest jump that may be a full turn [rad].
 _HALF_A_TURN = np.pi
 
 
-#: How much more something is over other times, of one sample or of each, shape (N, 1).
+#: Growth factor of errors over other times, of one sample or of each, shape (N, 1).
 Factor = float | FloatArray
 
 
@@ -36,9 +36,9 @@ class StreamSample:
     t : float
         Stamp [s].
     x : ndarray, shape (m,)
-        What was measured.
+        Measured signals.
     begins : bool
-        Whether a position has stepped here, so that this does not continue what was before.
+        Whether a position has stepped here, so that a new stretch begins.
 
     """
 
@@ -50,16 +50,16 @@ class StreamSample:
 @dataclass(frozen=True, eq=False)
 class Excursion:
     """
-    Samples that leave the line that was led to them, and come back to it.
+    Samples off the predicted line, to which later samples return.
 
     Attributes
     ----------
     samples : tuple of StreamSample
-        Those between the line before and behind.
+        Samples off the line.
     off : ndarray, shape (m,)
-        How far off the line they are at most, over what is too far.
+        Largest distance from the line, over `limit`.
     limit : ndarray, shape (m,)
-        What is too far, in units of the signals.
+        Largest allowed distance from the line, in units of the signals.
 
     """
 
@@ -71,16 +71,16 @@ class Excursion:
 @dataclass(frozen=True, eq=False)
 class Usual:
     """
-    What predictions usually miss by.
+    Usual prediction errors.
 
     Attributes
     ----------
     period : float
         Sampling period [s].
     size : ndarray, shape (m,)
-        Standard deviation of the errors over a period, where the signals are loudest.
+        Standard deviation of the errors over a period, in the noisiest window.
     noisy : ndarray, shape (m,)
-        Share of white noise in their squares.
+        Share of white noise in the squared errors.
 
     """
 
@@ -89,7 +89,7 @@ class Usual:
     noisy: FloatArray
 
     def growth(self, noise: Factor, bend: Factor) -> FloatArray:
-        """Return by how much more they miss over other times, shape (m,) or (N, m)."""
+        """Return the growth of the errors over other times, shape (m,) or (N, m)."""
         squares = bend**2
         return np.asarray(np.sqrt(squares + self.noisy * (noise**2 - squares)))
 
@@ -100,17 +100,17 @@ class Usual:
 
     @cached_property
     def _shares(self) -> tuple[FloatArray, FloatArray]:
-        """Return standard deviations of what is noise, most of what is not, over `size`, (m,)."""
-        # how hard an arm may accelerate over what 95 % of the time it does at most, times the
-        # standard deviations that those are of a normal variable
+        """Return deviation of noise, and largest error by acceleration, over `size`, (m,)."""
+        # the hardest acceleration of an arm is twice that of 95 % of the time, which is 1.96
+        # standard deviations of a normal variable
         return np.sqrt(self.noisy), np.sqrt(1.0 - self.noisy) * (2.0 * 1.96)
 
     def limits(self, quantile: float, noise: Factor, bend: Factor) -> FloatArray:
         """
-        Return what a prediction may miss by, shape (m,) or (N, m).
+        Return the largest allowed prediction errors, shape (m,) or (N, m).
 
-        An arm has a hardest acceleration, unlike noise, which has tails. So a smooth signal is
-        held to a small multiple of what it usually misses by, not to a quantile of the normal
+        The acceleration of an arm is bounded, unlike noise, which has tails. So the limit of a
+        smooth signal is a small multiple of its usual error, not a quantile of the normal
         distribution.
 
         """
@@ -121,15 +121,15 @@ class Usual:
 
 class Missed(NamedTuple):
     """
-    What a prediction missed a sample by.
+    Prediction error of a sample.
 
     Attributes
     ----------
     error : ndarray, shape (m,)
-        Measured minus predicted.
+        Measured minus predicted signals.
     noise, bend : float
-        How much more noise, and an acceleration, make a prediction over this time miss than one
-        over a period.
+        Growth of the errors by noise, and by an acceleration, over this time relative to one
+        period.
 
     """
 
@@ -139,7 +139,7 @@ class Missed(NamedTuple):
 
 
 def missed_by(known: Sequence[StreamSample], sample: StreamSample, period: float) -> Missed:
-    """Return what a straight line through two samples misses another one by."""
+    """Return the error of the straight line through two samples at another one."""
     before, last = known
     step, ahead = last.t - before.t, sample.t - last.t
     ratio = ahead / step
@@ -149,7 +149,7 @@ def missed_by(known: Sequence[StreamSample], sample: StreamSample, period: float
 
 
 def unwrapped(x: FloatArray, last: FloatArray, turn: FloatArray) -> FloatArray:
-    """Undo the jump by a full turn, where there is one, with which drivers keep within +-pi."""
+    """Undo a jump by full turns, by which drivers keep positions within +-pi."""
     if float(np.abs(x - last).max()) <= _HALF_A_TURN:
         return x
     turns = np.rint(np.divide(x - last, turn, where=turn > 0.0, out=np.zeros_like(x)))
@@ -165,7 +165,7 @@ def all_unwrapped(samples: Sequence[StreamSample], turn: FloatArray) -> list[Str
 
 
 def robust_scale(missed: FloatArray, share: float) -> FloatArray:
-    """Return the standard deviation of which a normal variable exceeds so few of the errors."""
+    """Return the standard deviation of errors (k, m), from the quantile of a share of them."""
     ordered = np.sort(np.abs(missed), axis=0)  # numpy's quantile takes ten times as long
     place = share * (len(ordered) - 1)
     first = int(place)

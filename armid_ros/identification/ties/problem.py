@@ -1,6 +1,6 @@
 # Copyright 2026 The armid_ros developers
 # SPDX-License-Identifier: Apache-2.0
-"""The regression of the springs between two machines: torques, columns, and what noise does."""
+"""Regression of springs between two machines: torques, columns, and effects of noise."""
 
 from __future__ import annotations
 
@@ -27,58 +27,58 @@ import numpy.typing as npt
 from scipy import signal
 import scipy.linalg
 
-#: A column is taken as a combination of the others if its remainder is below this share.
+#: Remainder of a column, as a share of it, below which it is a combination of the others.
 _RANK_TOLERANCE = 1e-6
 #: Step of the central differences of rigid columns [rad or m].
 _STEP = 1e-5
 
-#: Samples over which errors may last after filtering.
+#: Number of samples over which errors are correlated after filtering.
 _LAGS = 6
 
 Inertias = Literal['known', 'free']
-#: Arrays of a problem that have its samples first.
+#: Arrays of a problem with one row per sample.
 STACKED = ('tau', 'known', 'columns', 'known_by_motion', 'columns_by_motion')
-#: The others.
+#: Arrays of a problem that do not depend on its samples.
 _ALIKE = ('motion_lags', 'torque_lags', 'torque_noise', 'described', 'precision')
 
 
 @dataclass(frozen=True)
 class InteractionProblem:
     """
-    tau = known + columns theta, and how it depends on the angles of both machines.
+    Regression tau = known + columns theta, with derivatives by the motion of both machines.
 
     Attributes
     ----------
     tau : ndarray, shape (N, n)
         Measured torques of the machine [N m].
     known : ndarray, shape (N, n)
-        What the rigid body takes, where its inertias are known; zero where they are free.
+        Torque of the rigid body if its inertias are known; zero if they are free [N m].
     columns : ndarray, shape (N, n, P)
-        Springs, then combinations of inertias.
+        Columns of springs, then of combinations of inertias.
     known_by_motion : ndarray, shape (N, n, 3 J)
-        Derivatives by positions, velocities and accelerations of the J = n + m joints of both.
+        Derivatives of `known` by position, velocity, acceleration of all J = n + m joints.
     columns_by_motion : ndarray, shape (N, n, P, 3 J)
-        Derivatives by the same.
+        Derivatives of `columns` by the same.
     motion_lags : ndarray, shape (1 + L, 3 J, 3 J)
-        Covariances of what noisy angles make of positions, velocities and accelerations of a
-        sample and of itself and the L next; none where errors are independent.
+        Covariances of errors of the motion by noisy angles, between a sample and itself or each
+        of the L next ones; L is 0 if errors are independent.
     torque_lags : ndarray, shape (1 + L,)
-        Correlations of the noise of torques of the same.
+        Correlations of the noise of torques between the same samples.
     torque_noise : ndarray, shape (n,)
-        Standard deviation that the torques have at least, as they are here [N m].
+        Smallest standard deviation of these (filtered) torques [N m].
     segments : tuple of str
         Names of the springs.
     spring_joints : tuple of str
-        The joint that moves each; empty for all at once.
+        Joint that moves each spring; empty for all springs together.
     rigid : tuple of ParameterName
-        The combinations of inertias that are free.
+        Free combinations of inertias.
     described : ndarray, shape (P,)
-        Parameters as the machine's description has them; zero where it says nothing.
+        Prior parameters by the description of the machine; zero without a prior.
     precision : ndarray, shape (P, P)
-        How strongly it is believed. Of columns that are hardly more than noise any value explains
-        the torques, the larger the better; it keeps them to what a body can have.
+        Precision of the prior. Values of columns that are hardly more than noise would grow
+        without it, as any value explains the torques.
     typical_way : float
-        How far springs are drawn out, root mean square [m].
+        Root mean square extension of the springs [m].
 
     """
 
@@ -104,7 +104,7 @@ class InteractionProblem:
 
     @property
     def motion_noise(self) -> FloatArray:
-        """Covariance of what noisy angles make of the motion of a sample, shape (3 J, 3 J)."""
+        """Covariance of errors of the motion of a sample by noisy angles, shape (3 J, 3 J)."""
         return np.asarray(self.motion_lags[0])
 
     @property
@@ -114,7 +114,7 @@ class InteractionProblem:
         return np.asarray(np.sqrt(variance[: len(variance) // 3]))
 
     def with_springs(self, kept: npt.NDArray[np.intp]) -> InteractionProblem:
-        """Return the problem with some of its springs only."""
+        """Return the problem with only some of its springs."""
         columns = [*kept.tolist(), *range(len(self.segments), self.columns.shape[2])]
         return replace(
             self,
@@ -127,7 +127,7 @@ class InteractionProblem:
         )
 
     def residual(self, theta: FloatArray) -> FloatArray:
-        """Return what is left of the torques, shape (N, n) [N m]."""
+        """Return the residual torques, shape (N, n) [N m]."""
         return np.asarray(self.tau - self.known - self.columns @ theta)
 
     def sensitivity(self, theta: FloatArray) -> FloatArray:
@@ -136,7 +136,7 @@ class InteractionProblem:
         return np.asarray(self.known_by_motion + spring)
 
     def deviation(self, theta: FloatArray) -> FloatArray:
-        """Return what noise gives the residuals, root mean square, shape (n,) [N m]."""
+        """Return the root mean square of residuals that are only noise, shape (n,) [N m]."""
         by_motion = self.sensitivity(theta)
         angles = np.sum(by_motion @ self.motion_noise * by_motion, axis=2)
         return np.asarray(np.sqrt(np.mean(angles, axis=0) + self.torque_noise**2))
@@ -145,14 +145,14 @@ class InteractionProblem:
 @dataclass(frozen=True)
 class MachineNoise:
     """
-    What sensors add to the truth.
+    Noise of the sensors.
 
     Attributes
     ----------
     position : array_like, number or shape (n + m,)
         Standard deviation of the angles of both machines [rad].
     torque : array_like, number or shape (n,)
-        Standard deviation that the torques have at least [N m].
+        Smallest standard deviation of the torques [N m].
 
     """
 
@@ -177,20 +177,20 @@ def interaction_problem(
     Parameters
     ----------
     machines : TiedMachines
-        Both, and where the springs are.
+        Both machines, with the positions of the springs.
     motion, other_motion : Motion
-        On one time base; ``motion`` with torques.
+        Motions of both machines on one time base; ``motion`` with torques.
     noise : MachineNoise, optional
-        What sensors add; nothing by default.
+        Noise of the sensors; zero by default.
     used : Conditioning, optional
-        The filters that the positions went through, and by which torques and columns are to be
-        decimated. By default every sample counts and noise is in the angles alone.
+        Filters that were applied to the positions, and that decimate torques and columns. By
+        default, every sample counts and the angles are not filtered.
     inertias : {'known', 'free'}
-        Whether the machine's inertias are those of its description or are estimated as well.
+        Whether the machine's inertias are taken from its description or estimated as well.
     separate : bool
-        Whether every spring has a stiffness of its own, or all have one.
+        Whether every spring has its own stiffness, or all have the same.
     slack : float or ndarray, shape (S,)
-        Way that the springs give before they pull [m].
+        Slack of the springs before they pull [m].
 
     Raises
     ------
@@ -200,7 +200,7 @@ def interaction_problem(
     """
     robot, other, ties = machines.robot, machines.other, machines.ties
     if motion.tau is None:
-        raise IdentificationError(f'{robot.name}: no torques; the stiffness is in them alone')
+        raise IdentificationError(f'{robot.name}: no torques, which the stiffness needs')
     if len(motion) != len(other_motion) or np.max(np.abs(motion.t - other_motion.t)) > 1e-6:
         raise IdentificationError(
             f'{robot.name} and {other.name}: their motions have to be on one time base'
@@ -252,7 +252,7 @@ def interaction_problem(
 @dataclass(frozen=True)
 class _Body:
     """
-    What the rigid body is in a problem: torque that is known, or columns of free inertias.
+    Rigid body in a problem: its known torque, or columns of free inertias.
 
     Attributes are those of an InteractionProblem, without its springs.
 
@@ -309,10 +309,10 @@ def _free_body(
 
 
 def _passed(used: Conditioning) -> tuple[FloatArray, FloatArray]:
-    """Return what filters leave of white noise of positions and of torques, of rows and lags."""
-    # of position, velocity, acceleration of a row with itself and with later ones, shape
-    # (1 + lags, 3, 3), and of torques, (1 + lags,). Columns change slowly compared with the filter
-    # of the decimation, so noise passes it as if it were alone
+    """Return the covariances of filtered white noise of positions and of torques, over lags."""
+    # covariances of position, velocity, acceleration of a row with itself and with later rows,
+    # shape (1 + lags, 3, 3), and of torques, (1 + lags,). Columns change slowly compared with
+    # the filter of the decimation, so they do not affect the noise that passes it
     w = np.linspace(0.0, np.pi, 8001)
     sections = signal.butter(4, used.cutoff_hz, fs=used.rate_hz, output='sos')
     gain = np.abs(signal.sosfreqz(sections, w)[1]) ** 4
@@ -340,7 +340,7 @@ def _regressor_by_motion(robot: Robot, motion: Motion, kept: npt.NDArray[np.intp
 
 
 def _placed(by_own: FloatArray, count: int) -> FloatArray:
-    """Spread derivatives by the machine's motion, shape (..., 3, n), over both: (..., 3 J)."""
+    """Extend derivatives by one machine's motion, (..., 3, n), by zeros to (..., 3 J)."""
     result = np.zeros((*by_own.shape[:-1], count))
     result[..., : by_own.shape[-1]] = by_own
     return result.reshape((*by_own.shape[:-2], 3 * count))

@@ -1,6 +1,6 @@
 # Copyright 2026 The armid_ros developers
 # SPDX-License-Identifier: Apache-2.0
-"""The regression of the springs between two machines, from recordings of both."""
+"""Regression of springs between two machines from recordings of both."""
 
 from __future__ import annotations
 
@@ -32,11 +32,11 @@ from armid_ros.recording import recorded_together, Recording
 from armid_ros.robots import Robot
 import numpy as np
 
-#: Order of the differences that noise is measured by.
+#: Order of the differences from which noise is computed.
 _ORDER = 6
-#: The filter's pass band is so much wider than the motion's that it leaves the motion as it is.
+#: Pass band of the filter over the band of the motion, so that the motion is not changed.
 _MARGIN = 2.0
-#: The motion ends where its spectrum is less than this many times the noise.
+#: Ratio of a spectrum to the noise that ends the band of the motion.
 _ABOVE = 3.0
 
 
@@ -50,29 +50,29 @@ def recorded_interaction_problem(
     slack: float | FloatArray = 0.0,
 ) -> InteractionProblem:
     """
-    Set up the regression on recordings, the noise of their angles being measured in them.
+    Set up the regression on recordings, with the noise of their angles.
 
-    The angles of the other machine are brought to the stamps of the first; both are filtered and
-    torques and columns decimated as for any identification. White noise is what the angles have
-    in the upper two fifths of their spectrum; the filters leave a known share of it.
+    The angles of the other machine are interpolated at the stamps of the first. Both are filtered,
+    and torques and columns are decimated, as in any identification. White noise of the angles is
+    computed from differences of high order; a known share of it passes the filters.
 
     Parameters
     ----------
     machines : TiedMachines
-        Both, and where the springs are.
+        Both machines, with the positions of the springs.
     recording, other_recording : Recording
-        Of both, with overlapping stamps.
+        Recordings of both machines, with overlapping stamps.
     inertias : {'known', 'free'}
-        Whether the machine's inertias are those of its description or are estimated as well.
+        Whether the machine's inertias are taken from its description or estimated as well.
     separate : bool
-        Whether every spring has a stiffness of its own, or all have one.
+        Whether every spring has its own stiffness, or all have the same.
     slack : float or ndarray, shape (S,)
-        Way that the springs give before they pull [m].
+        Slack of the springs before they pull [m].
 
     Raises
     ------
     IdentificationError
-        If there are no torques, no common time, or too little of it.
+        If there are no torques, or no or too little common time.
 
     """
     if recording.tau is None:
@@ -104,19 +104,19 @@ def together_interaction_problem(
     robot : Robot
         The machine whose torques were measured.
     recording : Recording
-        Of the arm, with torques, and with the motion of the other machine and the ties.
+        Recording of the arm with torques, the motion of the other machine and the ties.
     used : Conditioning
         Filters.
     inertias, separate, slack
-        As of `recorded_interaction_problem`.
+        See `recorded_interaction_problem`.
     rest : callable, optional
-        Torque along a motion of what else acts on the machine, such as friction, shape (N, n)
-        [N m].
+        Function that returns the torque of other effects along a motion, such as friction, shape
+        (N, n) [N m].
 
     Raises
     ------
     IdentificationError
-        If there is too little of it.
+        If no stretch of the recording is long enough.
 
     """
     beside, n = recording.partner, len(recording.joints)
@@ -152,16 +152,16 @@ def together_interaction_problem(
 
 def stacked(problems: Sequence[InteractionProblem]) -> InteractionProblem:
     """
-    Put stretches or recordings together.
+    Concatenate the problems of stretches or recordings.
 
     Raises
     ------
     IdentificationError
-        If they do not free the same inertias.
+        If their free inertias differ.
 
     """
     if any(part.rigid != problems[0].rigid for part in problems):
-        raise IdentificationError('a stretch between gaps moves too little to free the inertias')
+        raise IdentificationError('a stretch between gaps moves too little for free inertias')
     joined = {name: np.concatenate([getattr(part, name) for part in problems]) for name in STACKED}
     return replace(problems[0], **joined)  # type: ignore[arg-type]
 
@@ -187,19 +187,19 @@ def band_of_motion(
     margin: float = _MARGIN,
 ) -> Conditioning:
     """
-    Return filters that leave the motion and nothing else, as far as settings leave them open.
+    Return filters with the band of the motion, except where settings define them.
 
     Parameters
     ----------
     recordings : sequence of Recording
-        What is to be filtered.
+        Recordings to be filtered.
     used : Conditioning
-        Filters that are to be narrowed.
+        Filters whose band is reduced.
     settings : SignalSettings
-        What was asked for.
+        Settings given by the user.
     margin : float
-        How much wider than the motion the pass band is. Accelerations have noise that grows with
-        its power of 2.5.
+        Pass band over the band of the motion. The noise of accelerations grows with its power of
+        2.5.
 
     """
     if settings.cutoff_hz is None:
@@ -212,7 +212,7 @@ def band_of_motion(
 
 
 def _crossing(recording: Recording, rate: float) -> float:
-    """Return where the motion of the fastest angle sinks into its noise [Hz]."""
+    """Return the frequency at which the motion of the fastest angle falls below its noise [Hz]."""
     # spectra of pieces of 4 s are averaged
     frequency, power = mean_spectrum([recording.q], rate, 'linear', 4.0)
     above = power > _ABOVE * 2.0 * _white(recording.q) ** 2 / rate
@@ -222,7 +222,7 @@ def _crossing(recording: Recording, rate: float) -> float:
 
 def _white(signals: FloatArray) -> FloatArray:
     """Return the standard deviation of white noise in signals of shape (N, n)."""
-    # Differences of high order leave nothing of a motion that is sampled densely.
+    # Differences of high order remove a densely sampled motion.
     differences = np.diff(signals, _ORDER, axis=0)
     return np.asarray(np.sqrt(np.mean(differences**2, axis=0) / comb(2 * _ORDER, _ORDER)))
 
@@ -230,17 +230,17 @@ def _white(signals: FloatArray) -> FloatArray:
 @dataclass(frozen=True)
 class SensorNoise:
     """
-    What white noise of the sensors does to the torques of an arm beside another machine.
+    Effect of white sensor noise on the torques of an arm that is tied to another machine.
 
-    Beside springs the noise of angles is most of what there is, and it is known from their spectra
-    far better than from what two periods of some seconds differ by.
+    With springs, the noise of angles dominates. It is known far better from the angles themselves
+    than from the difference of two periods of some seconds.
 
     Attributes
     ----------
     robot : Robot
         The arm as described.
     recording : Recording
-        Of it, with what was beside it.
+        Recording of the arm with the other machine.
     used : Conditioning
         Filters.
 
@@ -251,7 +251,7 @@ class SensorNoise:
     used: Conditioning
 
     def floor(self, arm: ArmModel) -> FloatArray:
-        """Return the standard deviation of a row beside an arm with its ties, (n,) [N m]."""
+        """Return the noise deviation of a row for an arm with its ties, shape (n,) [N m]."""
         problem = self._taut
         stiffness = dict.fromkeys(problem.spring_joints, 0.0)
         slack = dict.fromkeys(problem.spring_joints, 0.0)

@@ -1,15 +1,15 @@
 # Copyright 2026 The armid_ros developers
 # SPDX-License-Identifier: Apache-2.0
 """
-Stiffness of what ties two machines, from the torques of one and the joint angles of both.
+Stiffness of springs between two machines, from torques of one and joint angles of both.
 
-tau = Y pi + sum_s k_s J_s^T D_s is linear in k, but D, the way between the ends of a spring, is a
-small difference of measured angles: noise in them makes J^T D too long on average and k too
-small, by several per cent at 0.1 deg. To the torque the noise x of a motion does G x, where G is
-the derivative of the model by the motion, so that residuals have the covariance
-S = var(tau) + G var(x) G^T, in which k stands as well. The k that makes sum r^T S^-1 r smallest is
-consistent (generalised total least squares); its columns are those at the motion that the
-residuals make likely.
+tau = Y pi + sum_s k_s J_s^T D_s is linear in k, but D, the vector between the ends of a spring,
+is a small difference of measured angles. Noise in the angles makes J^T D too long on average and k
+too small, by several per cent at 0.1 deg. The noise x of a motion changes the torque by G x, where
+G is the derivative of the model by the motion. Residuals then have the covariance
+S = var(tau) + G var(x) G^T, which also depends on k. The k that minimises sum r^T S^-1 r is
+consistent (generalised total least squares). The columns are computed at the most likely motion,
+given the residuals.
 Source: Van Huffel and Vandewalle 1991; the leg pair's equations (16), (18), (23), (25).
 
 """
@@ -27,37 +27,37 @@ from armid_ros.motion import FloatArray, read_only
 import numpy as np
 from scipy.optimize import minimize
 
-#: Gradients below this share of a standard deviation end the iteration.
+#: Largest gradient, in standard deviations, at the end of the iteration.
 _CONVERGED = 1e-3
-#: Share of the residuals' mean square that is noise of torques where none was measured.
+#: Assumed share of torque noise in the mean square of residuals if no noise was measured.
 _LEAST_SHARE = 0.01
-#: A stiffness so many standard deviations above zero is there: a chance of 3e-5 for each.
+#: Smallest z-score of an existing stiffness: a false one has a probability of 3e-5.
 LEAST_Z = 4.0
-#: Torque per stiffness below which a spring is not drawn out, root mean square [m^2].
+#: RMS torque per stiffness below which a spring is not extended [m^2].
 _DRAWN_OUT = 1e-9
 
 
 @dataclass(frozen=True)
 class Interaction:
     """
-    What was found.
+    Estimated springs between two machines.
 
     Attributes
     ----------
     estimate : Estimate
-        Stiffnesses, then the combinations of inertias that were free.
+        Stiffnesses, then free combinations of inertias.
     uncorrected : ndarray, shape (P,)
-        The same by least squares, with the bias of noisy angles in it.
+        Least-squares estimate of these, with the bias of noisy angles.
     segments : tuple of str
-        Names of the springs; a single 'all' where they have one stiffness.
+        Names of the springs; a single 'all' if they have one stiffness.
     torque_noise : ndarray, shape (n,)
         Standard deviation of the torques, as given or as estimated [N m].
     position_noise : ndarray, shape (n + m,)
-        Standard deviation of the angles of both machines that was corrected for [rad].
+        Standard deviation of the angles of both machines, as corrected for [rad].
     residual : ndarray, shape (N, n)
-        Of the torques [N m].
+        Residual of the torques [N m].
     misfit : float
-        Weighted squares of the residuals, one for each degree of freedom where all is right.
+        Sum of weighted squared residuals; expected is one per degree of freedom.
 
     """
 
@@ -76,12 +76,12 @@ class Interaction:
 
     @property
     def std(self) -> FloatArray:
-        """Their standard deviations, shape (S,) [N/m]."""
+        """Standard deviations of the stiffnesses, shape (S,) [N/m]."""
         return self.estimate.std[: len(self.segments)]
 
     @property
     def bias(self) -> FloatArray:
-        """Return what noisy angles would have done to them, shape (S,) [N/m]."""
+        """Return the bias of least squares by noisy angles, shape (S,) [N/m]."""
         return np.asarray(self.uncorrected[: len(self.segments)] - self.stiffness)
 
     def interval(self, confidence: float = 0.95) -> FloatArray:
@@ -100,17 +100,17 @@ def identify_interaction(
     problem : InteractionProblem
         Torques, columns and their derivatives: see ``interaction_problem``.
     torque_noise : float or ndarray, shape (n,), optional
-        Standard deviation of the torques [N m]; by default as it was measured in a recording.
-        What residuals have beyond it widens the intervals.
+        Standard deviation of the torques [N m]; by default as measured in the recording. Larger
+        residuals widen the intervals.
 
     Raises
     ------
     IdentificationError
-        If the motion does not show every stiffness, or the iteration does not end.
+        If the motion does not identify every stiffness, or the iteration does not converge.
 
     """
     uncorrected = _least_squares(problem, problem.columns)
-    # one stiffness for all springs by least squares, which noise does not blow up
+    # the start is one stiffness for all springs by least squares, which noise affects little
     count = len(problem.segments)
     together = problem.columns[:, :, :count].sum(axis=2, keepdims=True)
     columns = np.concatenate([together, problem.columns[:, :, count:]], axis=2)
@@ -139,14 +139,14 @@ def identify_interaction(
 def _most_likely(
     problem: InteractionProblem, theta: FloatArray, variance: FloatArray
 ) -> FloatArray:
-    """Return the solution, from a theta near it, by a quasi-Newton method (BFGS)."""
-    # where noise makes most of a column the loss is a valley much flatter than the information
-    # says, in which steps of Gauss and Newton go to and fro; the curvature is learned from the
-    # gradients, beginning with the information
+    """Return the most likely theta, from a start near it, by a quasi-Newton method (BFGS)."""
+    # where noise dominates a column, the loss is much flatter than by the information, and
+    # Gauss-Newton steps oscillate; BFGS learns the curvature from the gradients, beginning with
+    # the information
     information = _gauss_newton(problem, theta, variance).information
     size = np.sqrt(np.diag(information))
     root = np.linalg.cholesky(information / np.outer(size, size))
-    unit = np.linalg.inv(root).T / size[:, np.newaxis]  # of one standard deviation each
+    unit = np.linalg.inv(root).T / size[:, np.newaxis]  # directions of one standard deviation
 
     def half_loss(z: FloatArray) -> tuple[float, FloatArray]:
         here = theta + unit @ z
@@ -164,7 +164,7 @@ def _most_likely(
     )
     if not np.max(np.abs(found.jac)) < 10.0 * _CONVERGED:
         raise IdentificationError(
-            'the stiffness does not settle: the angles are too noisy for ways of '
+            'the stiffness does not converge: the angles are too noisy for extensions of '
             f'{1e3 * problem.typical_way:.2g} mm; filter them, or move more'
         )
     return np.asarray(theta + unit @ found.x)
@@ -176,15 +176,15 @@ def _least_squares(problem: InteractionProblem, columns: FloatArray) -> FloatArr
     springs = scale[: columns.shape[2] - len(problem.rigid)]
     if not np.all(springs > _DRAWN_OUT * np.sqrt(len(w))):
         name = problem.segments[int(np.argmin(springs))]
-        raise IdentificationError(f'{name}: its spring is never drawn out, so nothing shows it')
+        raise IdentificationError(f'{name}: its spring is never extended, so nothing shows it')
     y = problem.tau - problem.known
     return np.asarray(np.linalg.lstsq(w / scale, y.ravel(), rcond=None)[0] / scale)
 
 
 class _Step(NamedTuple):
-    """A linearisation: columns (N, n, P), and the residuals over their covariance (N, n)."""
+    """A linearisation: columns (N, n, P), and `pull`, S^-1 times the residuals (N, n)."""
 
-    gradient: FloatArray  # minus that of half the loss
+    gradient: FloatArray  # negative gradient of half the loss
     information: FloatArray
     columns: FloatArray
     pull: FloatArray
@@ -192,7 +192,7 @@ class _Step(NamedTuple):
 
 
 def _gauss_newton(problem: InteractionProblem, theta: FloatArray, variance: FloatArray) -> _Step:
-    """Linearise at the motion that the residuals make likely."""
+    """Linearise at the most likely motion, given the residuals."""
     by_motion = problem.sensitivity(theta)
     covariance = _noise(problem, by_motion, variance)
     residual = problem.residual(theta)
@@ -220,9 +220,9 @@ def _covariance(
     excess: float,
 ) -> FloatArray:
     """Return the covariance of the parameters at the solution, H^-1 B H^-1."""
-    # B is that of the scores. Filters make neighbours alike, by how much is known; where the
-    # scores add up to more, as of noise that was not white before, deviations are widened. Poses
-    # are independent, and B is H.
+    # B is the covariance of the scores. Filters correlate neighbours by a known amount; if the
+    # scores vary more, as with noise that was not white, deviations are widened. Independent
+    # poses have B = H.
     information = step.information
     size = np.sqrt(np.diag(information))
     scaled = np.linalg.inv(information / np.outer(size, size))
