@@ -24,7 +24,7 @@ from armid_ros.papers.elastic.plant.signals import (
 )
 from armid_ros.robots import load_robot
 from armid_ros.robots.two_link import ROBOT, two_link_set, TwoLinkParameters
-from armid_ros.simulation.motor_control import VelocityLoop
+from armid_ros.simulation.controller import VelocityLoop
 from armid_ros.simulation.plant import Plant
 import numpy as np
 import pinocchio as pin

@@ -30,7 +30,7 @@ from armid_ros.papers.exo.plant.gait import read_gait
 from armid_ros.papers.exo.plant.gait_cycle import check_cycle, gait_cycle
 from armid_ros.papers.exo.plant.walkers import walking_pair
 from armid_ros.robots.two_link import two_link_set
-from armid_ros.simulation.elastic.two_link import two_link_loop, two_link_plant
+from armid_ros.simulation.elastic import two_link_loop, two_link_plant
 from matplotlib.figure import Figure
 from matplotlib.ticker import NullLocator
 import numpy as np

@@ -56,7 +56,7 @@ from armid_ros.recording.curves import draw_joints
 from armid_ros.report.diagnosis_report import diagnosis_report, Extras, LearnedResidual
 from armid_ros.report.notation import pretty
 from armid_ros.report.sections.diagnosed import named_rows
-from armid_ros.simulation.bodies import require_any_mass
+from armid_ros.simulation.plant import require_any_mass
 import numpy as np
 import numpy.typing as npt
 

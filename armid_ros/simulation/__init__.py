@@ -9,9 +9,8 @@ plant has an `Elasticity`.
 
 """
 
-from armid_ros.simulation.controller import ComputedTorque, Controller, GravityPD
+from armid_ros.simulation.controller import ComputedTorque, Controller, GravityPD, MotorControl
 from armid_ros.simulation.integrator import step
-from armid_ros.simulation.motor_control import MotorControl
 from armid_ros.simulation.plant import Plant, State
 from armid_ros.simulation.reference import Reference
 from armid_ros.simulation.run import simulate, SimulatedRun

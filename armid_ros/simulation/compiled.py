@@ -19,7 +19,7 @@ from typing import Any
 
 from armid_ros.motion import FloatArray
 from armid_ros.robots import Robot
-from armid_ros.simulation.box_complementarity import SPEED_TOLERANCE
+from armid_ros.simulation.contacts import SPEED_TOLERANCE
 from armid_ros.simulation.controller import Controller, LinearFeedback, Targets
 from armid_ros.simulation.plant import Plant, State
 import numpy as np

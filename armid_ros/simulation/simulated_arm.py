@@ -10,15 +10,12 @@ from dataclasses import dataclass, replace
 from armid_ros.arm import ArmModel
 from armid_ros.errors import ModelError
 from armid_ros.motion import FloatArray
-from armid_ros.simulation.accelerometers import LinkAccelerometers
 from armid_ros.simulation.closed_loop import command, run, Trace
 from armid_ros.simulation.compiled import CompiledLoop
-from armid_ros.simulation.controller import ComputedTorque, Controller, Targets
-from armid_ros.simulation.course import Course
-from armid_ros.simulation.motor_control import MotorControl
+from armid_ros.simulation.controller import ComputedTorque, Controller, MotorControl, Targets
 from armid_ros.simulation.plant import Plant, State
-from armid_ros.simulation.reference import Reference
-from armid_ros.simulation.sensors import RecentPast, Sensors
+from armid_ros.simulation.reference import Course, Reference
+from armid_ros.simulation.sensors import LinkAccelerometers, RecentPast, Sensors
 import numpy as np
 import numpy.typing as npt
 
@@ -164,8 +161,7 @@ class SimulatedArm:
             Time after the reset, in steps of the plant.
 
         """
-        hold = Reference(self.joints, np.zeros(1), self._home[np.newaxis])
-        self._begin(hold, steps)
+        self._begin(Reference(self.joints, np.zeros(1), self._home[np.newaxis]), steps)
 
     def start_on(self, reference: Reference) -> Reference:
         """

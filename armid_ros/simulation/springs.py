@@ -96,7 +96,7 @@ class ElasticJoints:
         """Compute the matrix of the engaged springs."""
         springs = self.transmission
         object.__setattr__(self, 'loose', bool(np.any(springs.gap)))
-        pull = self.pull_of(springs.stiffness, springs.damping)
+        pull = self._pull_of(springs.stiffness, springs.damping)
         object.__setattr__(self, 'pull', read_only(pull))
 
     @classmethod
@@ -159,7 +159,7 @@ class ElasticJoints:
             sensing=bare.action(),
         )
 
-    def pull_of(self, stiffness: FloatArray, damping: FloatArray) -> FloatArray:
+    def _pull_of(self, stiffness: FloatArray, damping: FloatArray) -> FloatArray:
         """Return torques of springs and friction per twist and velocity, (e + n, e + e + n)."""
         w = self.to_twists
         return np.hstack([-w.T * stiffness, -self.damping - (w.T * damping) @ w])
@@ -170,7 +170,7 @@ class ElasticJoints:
         meshes = np.abs(twist) > springs.gap
         stiffness = np.where(meshes, springs.stiffness, 0.0)
         damping = np.where(meshes, springs.damping, 0.0)
-        return self.pull_of(stiffness, damping), stiffness * springs.gap * np.sign(twist)
+        return self._pull_of(stiffness, damping), stiffness * springs.gap * np.sign(twist)
 
     def twist(self, load: FloatArray) -> FloatArray:
         """Return the twists of the springs (..., e) under loads on the joints (..., n) [N m]."""

@@ -15,7 +15,7 @@ from armid_ros.excitation import ClearanceModel, CollisionScene, Limits
 from armid_ros.files.own import is_plan
 from armid_ros.motion import FloatArray
 from armid_ros.recording import write_joint_trajectory
-from armid_ros.simulation.elastic.courses import multisine_course, step_course
+from armid_ros.simulation.elastic import multisine_course, step_course
 import click
 import numpy as np
 

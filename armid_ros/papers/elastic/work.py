@@ -39,9 +39,9 @@ from armid_ros.robots.two_link import (
     two_link_set,
     TwoLinkParameters,
 )
-from armid_ros.simulation.accelerometers import LinkAccelerometers
-from armid_ros.simulation.elastic.two_link import two_link_loop, two_link_plant
-from armid_ros.simulation.motor_control import VelocityLoop
+from armid_ros.simulation.controller import VelocityLoop
+from armid_ros.simulation.elastic import two_link_loop, two_link_plant
+from armid_ros.simulation.sensors import LinkAccelerometers
 import click
 import numpy as np
 

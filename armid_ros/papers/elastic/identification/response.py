@@ -20,7 +20,7 @@ from typing import Any
 from armid_ros.motion import ElasticRun, FloatArray
 from armid_ros.papers.elastic.identification.names import SIZE, unpack
 from armid_ros.robots.two_link import TwoLinkParameters
-from armid_ros.simulation.motor_control import VelocityLoop
+from armid_ros.simulation.controller import VelocityLoop
 import numpy as np
 import numpy.typing as npt
 

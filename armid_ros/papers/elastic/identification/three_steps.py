@@ -19,7 +19,7 @@ from armid_ros.papers.elastic.identification.rigid import fit_rigid, RigidFit
 from armid_ros.papers.elastic.identification.subspace import StateSpace
 from armid_ros.papers.elastic.identification.tuning import tune, Tuning
 from armid_ros.robots.two_link import TwoLinkParameters
-from armid_ros.simulation.motor_control import VelocityLoop
+from armid_ros.simulation.controller import VelocityLoop
 import numpy as np
 import numpy.typing as npt
 

@@ -29,7 +29,7 @@ from armid_ros.papers.elastic.identification.response import (
     velocities,
 )
 from armid_ros.robots.two_link import TwoLinkParameters
-from armid_ros.simulation.motor_control import VelocityLoop
+from armid_ros.simulation.controller import VelocityLoop
 import numpy as np
 from scipy.optimize import least_squares
 

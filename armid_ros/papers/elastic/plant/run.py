@@ -10,8 +10,7 @@ from dataclasses import dataclass, replace
 from armid_ros.errors import TrajectoryError
 from armid_ros.motion import ElasticRun, FloatArray, Motion
 from armid_ros.simulation.closed_loop import command, run
-from armid_ros.simulation.controller import Targets
-from armid_ros.simulation.motor_control import MotorControl, VelocityLoop
+from armid_ros.simulation.controller import MotorControl, Targets, VelocityLoop
 from armid_ros.simulation.plant import limit_slack, Plant
 import numpy as np
 import numpy.typing as npt

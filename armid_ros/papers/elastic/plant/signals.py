@@ -7,7 +7,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 from armid_ros.papers.elastic.plant.run import Experiment
-from armid_ros.simulation.elastic.courses import multisine
+from armid_ros.simulation.elastic import multisine
 import numpy as np
 import numpy.typing as npt
 

@@ -4,7 +4,7 @@
 
 from armid_ros.papers.elastic.plant.run import run_elastic
 from armid_ros.robots.two_link import two_link_set
-from armid_ros.simulation.elastic.two_link import two_link_loop, two_link_plant
+from armid_ros.simulation.elastic import two_link_loop, two_link_plant
 import numpy as np
 import pytest
 
