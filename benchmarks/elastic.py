@@ -12,11 +12,12 @@ beginning at the set before tuning.
 from __future__ import annotations
 
 from armid_ros.motion import ElasticRun, FloatArray
-from armid_ros.papers.elastic.identification.names import unpack
+from armid_ros.papers.elastic.identification.response import unpack
 from armid_ros.papers.elastic.identification.tuning import tune
-from armid_ros.papers.elastic.plant.run import ElasticSensors, Experiment
-from armid_ros.papers.elastic.plant.signals import (
+from armid_ros.papers.elastic.plant import (
+    ElasticSensors,
     EXCITATION_RMS,
+    Experiment,
     resonance_experiments,
     step_experiments,
     STEP_POSES,

@@ -23,8 +23,7 @@ from armid_ros.live.belief import LiveDiagnosis, LiveSettings
 from armid_ros.live.request import answer
 from armid_ros.papers.elastic.identification.physical import ideal_response
 from armid_ros.papers.elastic.identification.three_steps import identify_two_inertia
-from armid_ros.papers.elastic.plant.run import run_all
-from armid_ros.papers.elastic.plant.signals import EXCITATION_RMS, resonance_experiments, WEAK
+from armid_ros.papers.elastic.plant import EXCITATION_RMS, resonance_experiments, run_all, WEAK
 from armid_ros.papers.elastic.work import SENSORS
 from armid_ros.papers.exo.plant.gait import read_gait
 from armid_ros.papers.exo.plant.gait_cycle import check_cycle, gait_cycle

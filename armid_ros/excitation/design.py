@@ -13,11 +13,10 @@ from armid_ros.excitation.feasibility import excitation_faults
 from armid_ros.excitation.fourier import FourierTrajectory
 from armid_ros.excitation.geometry.clearance import ClearanceModel
 from armid_ros.excitation.limits import Limits, used_shares
-from armid_ros.excitation.problem import DesignProblem
+from armid_ros.excitation.problem import DesignProblem, DesignSettings
 from armid_ros.excitation.schedule import Excitation
 from armid_ros.excitation.search.criteria import Information
 from armid_ros.excitation.search.local import Search
-from armid_ros.excitation.settings import DesignSettings
 from armid_ros.motion import FloatArray
 from armid_ros.robots import CollisionModel
 import numpy as np

@@ -14,7 +14,7 @@ from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from typing import ClassVar
 
-from armid_ros.excitation.geometry.heights import outline
+from armid_ros.excitation.geometry.floor import outline
 from armid_ros.motion import FloatArray
 from armid_ros.report.page import Templated
 from armid_ros.robots import collision_model, CollisionModel, Robot

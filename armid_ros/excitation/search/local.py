@@ -25,8 +25,7 @@ from armid_ros.excitation.geometry.clearance import ClearanceModel
 from armid_ros.excitation.limits import Violation
 from armid_ros.excitation.problem import DesignProblem
 from armid_ros.excitation.random_trajectory import random_feasible
-from armid_ros.excitation.search.constraints import Constraints, Part
-from armid_ros.excitation.search.objective import Objective
+from armid_ros.excitation.search.functions import Constraints, Objective, Part
 from armid_ros.motion import FloatArray
 from armid_ros.robots.robot import position_range
 import numpy as np

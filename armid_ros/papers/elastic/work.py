@@ -16,19 +16,20 @@ from armid_ros.errors import RecordingError, RobotError
 from armid_ros.files import json_text, Staged, write_file
 from armid_ros.motion import FloatArray
 from armid_ros.papers.elastic.identification.files import read_runs
-from armid_ros.papers.elastic.identification.names import PER_JOINT
 from armid_ros.papers.elastic.identification.output import elastic_document, SCHEMA, tuning_story
+from armid_ros.papers.elastic.identification.response import PER_JOINT
 from armid_ros.papers.elastic.identification.three_steps import identify_two_inertia
-from armid_ros.papers.elastic.plant.run import ElasticSensors, run_all
-from armid_ros.papers.elastic.plant.signals import (
+from armid_ros.papers.elastic.plant import (
+    ElasticSensors,
     EXCITATION_RMS,
     resonance_experiments,
+    run_all,
     step_experiments,
     STEP_POSES,
     STEPS,
     WEAK,
 )
-from armid_ros.papers.elastic.report.page import elastic_report, verdict
+from armid_ros.papers.elastic.report import elastic_report, verdict
 from armid_ros.papers.elastic.springs import identify_springs
 from armid_ros.recording.elastic import write_runs
 from armid_ros.recording.writer import require_new

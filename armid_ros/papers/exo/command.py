@@ -10,7 +10,7 @@ from typing import Any
 from armid_ros.cli import parameters as options
 import click
 
-#: Motions of a leg and its exoskeleton; `armid_ros.papers.exo.plant.exercises.EXERCISES`.
+#: Motions of a leg and its exoskeleton; `armid_ros.papers.exo.plant.leg_pair.EXERCISES`.
 EXERCISES = ('step', 'quick_step', 'swing', 'lift', 'squat', 'rock')
 
 

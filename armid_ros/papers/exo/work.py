@@ -18,17 +18,22 @@ from armid_ros.identification.ties.recorded import recorded_interaction_problem
 from armid_ros.identification.ties.stiffness import identify_interaction, Interaction
 from armid_ros.motion import FloatArray, Motion
 from armid_ros.papers.exo.assumptions import read_assumptions
-from armid_ros.papers.exo.plant.exercises import exercise
 from armid_ros.papers.exo.plant.gait import Gait, read_gait
-from armid_ros.papers.exo.plant.gait_cycle import check_cycle, gait_cycle, GaitCycle, weight
+from armid_ros.papers.exo.plant.gait_cycle import (
+    check_cycle,
+    gait_cycle,
+    GaitCycle,
+    ground_by_shares,
+    weight,
+)
 from armid_ros.papers.exo.plant.leg_pair import (
+    exercise,
     leg_pair,
     pair_torques,
     PairMotion,
     TiedPair,
     walking,
 )
-from armid_ros.papers.exo.plant.shares import ground_by_shares
 from armid_ros.papers.exo.plant.walkers import walking_pair
 from armid_ros.papers.exo.report.page import exo_report, verdict
 from armid_ros.papers.exo.report.walk import Driven, SimulatedWalk

@@ -31,8 +31,7 @@ def lunar(out: Path, seed: int, every: bool, as_json: bool) -> None:
     from armid_ros.cli.terminal import progress
     from armid_ros.files import json_text, write_file
     from armid_ros.identification import write_document
-    from armid_ros.papers.lunar.output import lunar_document, SCHEMA
-    from armid_ros.papers.lunar.report import lunar_report, verdict
+    from armid_ros.papers.lunar.report import lunar_document, lunar_report, SCHEMA, verdict
     from armid_ros.papers.lunar.reproduction import reproduce
 
     staged = options.stage(out, SCHEMA)

@@ -3,7 +3,7 @@
 """Recorded experiments with the two-link arm, from MuJoCo, so that no code tests itself."""
 
 from armid_ros.motion import ElasticRun
-from armid_ros.papers.elastic.plant.signals import WEAK
+from armid_ros.papers.elastic.plant import WEAK
 from armid_ros.robots.two_link import two_link_set, TwoLinkParameters
 from armid_ros.simulation.elastic import two_link_loop
 import numpy as np

@@ -3,10 +3,10 @@
 """Springs found while both move, and slack where there is some."""
 
 from armid_ros.errors import IdentificationError
-from armid_ros.papers.exo.identification.online import InteractionSettings, OnlineInteraction
 from armid_ros.papers.exo.plant.gait import read_gait
 from armid_ros.papers.exo.plant.leg_pair import leg_pair
 from armid_ros.papers.exo.plant.simulated_pair import SimulatedPair
+from armid_ros.papers.exo.springs import InteractionSettings, OnlineInteraction
 import numpy as np
 import pytest
 

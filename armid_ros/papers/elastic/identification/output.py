@@ -10,9 +10,8 @@ from typing import Any
 from armid_ros.arm import parameter_table
 from armid_ros.papers.elastic.identification.interaction import decibel_error
 from armid_ros.papers.elastic.identification.joints import SpringEstimate
-from armid_ros.papers.elastic.identification.names import parameter_names, unpack
 from armid_ros.papers.elastic.identification.physical import BAND, frequencies, ideal_response
-from armid_ros.papers.elastic.identification.response import velocities
+from armid_ros.papers.elastic.identification.response import parameter_names, unpack, velocities
 from armid_ros.papers.elastic.identification.three_steps import TwoInertiaIdentification
 from armid_ros.papers.elastic.identification.tuning import Tuning
 from armid_ros.robots.two_link import TwoLinkParameters

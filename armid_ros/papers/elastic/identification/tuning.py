@@ -21,11 +21,14 @@ from armid_ros.errors import IdentificationError
 from armid_ros.estimate import Estimate
 from armid_ros.identification.fitting.covariance import score_products, widened
 from armid_ros.motion import ElasticRun, FloatArray
-from armid_ros.papers.elastic.identification.names import pack, parameter_names, SIZE, unpack
 from armid_ros.papers.elastic.identification.response import (
+    pack,
+    parameter_names,
     ringing,
     sensitivities,
+    SIZE,
     Steps,
+    unpack,
     velocities,
 )
 from armid_ros.robots.two_link import TwoLinkParameters

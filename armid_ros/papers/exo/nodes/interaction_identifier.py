@@ -23,8 +23,8 @@ from armid_ros.nodes.messages.timeliness import Freshness
 from armid_ros.nodes.parameters.table import NodeParameter
 from armid_ros.nodes.qos import LATCHED, MatchedSubscription
 from armid_ros.nodes.running.process import run
-from armid_ros.papers.exo.identification.online import InteractionSettings, OnlineInteraction
 from armid_ros.papers.exo.plant.leg_pair import leg_pair
+from armid_ros.papers.exo.springs import InteractionSettings, OnlineInteraction
 from diagnostic_msgs.msg import DiagnosticStatus
 import numpy as np
 from sensor_msgs.msg import JointState

@@ -12,7 +12,6 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from pathlib import Path
-from typing import NamedTuple
 
 from armid_ros.errors import TrajectoryError
 from armid_ros.files import read_text
@@ -64,37 +63,6 @@ class Gait:
         )
 
 
-class Phase(NamedTuple):
-    """
-    The phase of a leg in the gait cycle, 0 at heel strike.
-
-    Attributes
-    ----------
-    value, speed, acceleration : ndarray, shape (N,)
-        Phase [-] and its derivatives by time [1/s, 1/s^2].
-
-    """
-
-    value: FloatArray
-    speed: FloatArray
-    acceleration: FloatArray
-
-
-def steady_phase(t: FloatArray, cycle_time: float, start: float = 0.0) -> Phase:
-    """Return the phase of steady walking, given the phase at t = 0."""
-    return Phase(start + t / cycle_time, np.full_like(t, 1.0 / cycle_time), np.zeros_like(t))
-
-
-def stepping_phase(t: FloatArray, period: float, start: float, stop: float) -> Phase:
-    """Return the phase of repeated stepping from start to stop and back."""
-    w, half = 2.0 * np.pi / period, (stop - start) / 2.0
-    return Phase(
-        start + half * (1.0 - np.cos(w * t)),
-        half * w * np.sin(w * t),
-        half * w**2 * np.cos(w * t),
-    )
-
-
 def read_gait(path: Path | None = None) -> Gait:
     """
     Read a gait; by default the shipped one: level walking, hip -20..40 deg, knee 0..65 deg.
@@ -129,7 +97,7 @@ def read_gait(path: Path | None = None) -> Gait:
     return Gait.fit(rows[:, 0], np.radians(rows[:, 1:]))
 
 
-def stance_motion(gait: Gait, joints: tuple[str, ...], t: FloatArray, phase: Phase) -> Motion:
+def stance_motion(gait: Gait, joints: tuple[str, ...], t: FloatArray, phase: FloatArray) -> Motion:
     """
     Return the motion of a seven-link body on one foot.
 
@@ -141,14 +109,15 @@ def stance_motion(gait: Gait, joints: tuple[str, ...], t: FloatArray, phase: Pha
         Stance ankle, knee, hip, swing hip, knee, ankle.
     t : ndarray, shape (N,)
         Time [s].
-    phase : Phase
-        Phase of the stance leg at these times.
+    phase : ndarray, shape (3, N)
+        Phase of the stance leg at these times, 0 at heel strike, and its derivatives by time
+        [1/s, 1/s^2].
 
     """
-    speed, acceleration = phase.speed[:, np.newaxis], phase.acceleration[:, np.newaxis]
+    speed, acceleration = phase[1:, :, np.newaxis]
     here = []
     for derivative in range(3):  # a flat foot and an upright trunk
-        hip, knee, _ = gait(phase.value, derivative).T
-        far = gait(phase.value + 0.5, derivative)
+        hip, knee, _ = gait(phase[0], derivative).T
+        far = gait(phase[0] + 0.5, derivative)
         here.append(np.column_stack([knee - hip, knee, hip, far]))
     return Motion(joints, t, here[0], here[1] * speed, here[2] * speed**2 + here[1] * acceleration)

@@ -15,9 +15,8 @@ from dataclasses import dataclass, replace
 
 from armid_ros.errors import TrajectoryError
 from armid_ros.motion import FloatArray, Motion
-from armid_ros.papers.exo.plant.contact import Ground
 from armid_ros.papers.exo.plant.leg_pair import PairMotion, TiedPair
-from armid_ros.papers.exo.plant.walkers import contacts
+from armid_ros.papers.exo.plant.walkers import contacts, Ground
 import numpy as np
 import pinocchio as pin
 from scipy.interpolate import CubicSpline

@@ -10,8 +10,7 @@ from typing import Any, ClassVar
 
 from armid_ros.model.kinematics import points_motion
 from armid_ros.motion import FloatArray, Motion
-from armid_ros.papers.exo.plant.gait_cycle import GaitCycle, weight
-from armid_ros.papers.exo.plant.shares import feet_by_shares
+from armid_ros.papers.exo.plant.gait_cycle import feet_by_shares, GaitCycle, weight
 from armid_ros.papers.exo.plant.torque_driven import GaitCheck
 from armid_ros.papers.exo.plant.walkers import columns, contacts, floating, leg_length, SIDES
 from armid_ros.report.blocks import ContentSection, DataTable, Panels, Paragraph
@@ -52,7 +51,6 @@ class Driven:
     @property
     def source(self) -> float:
         """Largest error of the joint position in the source [deg]."""
-        # largest error of the source [deg]
         return {'hip': 1.5, 'knee': 2.5}[self.joint.split('_')[-1]]
 
 
@@ -230,27 +228,25 @@ def by_torque_section(walked: SimulatedWalk) -> ContentSection:
         )
         for d in walked.driven
     ]
-    panels = [(d.joint, '', _followed(d, walked.cycle.phase[::2])) for d in walked.driven]
+    phase, panels = walked.cycle.phase[::2], []
+    for d in walked.driven:
+        both: tuple[tuple[str, GaitCheck, Role], ...] = (
+            ('by its torque', d.right, 'residual'),
+            ('springs too soft', d.softer, 'predicted'),
+        )
+        angles = [
+            Series('prescribed', np.degrees(d.right.prescribed), 'measured'),
+            *(Series(name, np.degrees(check.followed), role) for name, check, role in both),
+        ]
+        errors = [Series(name, np.degrees(check.error), role) for name, check, role in both]
+        error = Chart(
+            phase, errors, _ABSCISSA, 'error [°]', height=150, link=d.joint, symmetric=True,
+            legend=False,
+        )  # fmt: skip
+        panels.append((d.joint, '', [Chart(phase, angles, '', 'angle [°]', link=d.joint), error]))
     return ContentSection(
         'Whole cycle by torque', [Paragraph(text), DataTable(heads, rows), Panels(panels)]
     )
-
-
-def _followed(d: Driven, phase: FloatArray) -> tuple[Chart, Chart]:
-    """Draw angle and error of a joint."""
-    both: tuple[tuple[str, GaitCheck, Role], ...] = (
-        ('by its torque', d.right, 'residual'),
-        ('springs too soft', d.softer, 'predicted'),
-    )
-    angles = [
-        Series('prescribed', np.degrees(d.right.prescribed), 'measured'),
-        *(Series(name, np.degrees(check.followed), role) for name, check, role in both),
-    ]
-    errors = [Series(name, np.degrees(check.error), role) for name, check, role in both]
-    return Chart(phase, angles, '', 'angle [°]', link=d.joint), Chart(
-        phase, errors, _ABSCISSA, 'error [°]', height=150, link=d.joint, symmetric=True,
-        legend=False,
-    )  # fmt: skip
 
 
 def _bodies(robot: Robot, motion: Motion, ahead: FloatArray) -> list[Any]:

@@ -8,8 +8,7 @@ from armid_ros.arm import ArmModel
 from armid_ros.effects import parse_effect
 from armid_ros.errors import TrajectoryError
 from armid_ros.motion import Motion
-from armid_ros.papers.elastic.plant.run import run_elastic
-from armid_ros.papers.elastic.plant.signals import step_experiments
+from armid_ros.papers.elastic.plant import run_elastic, step_experiments
 from armid_ros.robots import load_robot
 from armid_ros.robots.two_link import two_link_set
 from armid_ros.simulation import Reference

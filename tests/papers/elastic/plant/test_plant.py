@@ -8,8 +8,7 @@ from armid_ros.arm import ArmModel
 from armid_ros.effects import make_effect
 from armid_ros.errors import ModelError, TrajectoryError
 from armid_ros.motion import Motion
-from armid_ros.papers.elastic.plant.run import Experiment, run_elastic
-from armid_ros.papers.elastic.plant.signals import step_experiments
+from armid_ros.papers.elastic.plant import Experiment, run_elastic, step_experiments
 from armid_ros.robots import load_robot
 from armid_ros.robots.two_link import two_link_set
 from armid_ros.simulation import Elasticity, Plant, step

@@ -1,21 +1,189 @@
 # Copyright 2026 The armid_ros developers
 # SPDX-License-Identifier: Apache-2.0
-"""Two links on springs: frequency responses and step responses."""
+"""The report of two links on springs: stiffness and responses of the joints."""
 
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Sequence
 
+from armid_ros.estimate import name_in_words
+from armid_ros.identification.fitting.identifiability import HALF_WIDTH
 from armid_ros.motion import FloatArray
 from armid_ros.papers.elastic.identification.interaction import coupled_response, decibel_error
+from armid_ros.papers.elastic.identification.output import total_damping
 from armid_ros.papers.elastic.identification.physical import frequencies, ideal_response
+from armid_ros.papers.elastic.identification.response import parameter_names, PER_JOINT, unpack
+from armid_ros.papers.elastic.identification.rigid import CUTOFF, RigidFit
 from armid_ros.papers.elastic.identification.three_steps import TwoInertiaIdentification
 from armid_ros.papers.elastic.identification.tuning import Tuning
-from armid_ros.report.blocks import ContentSection, FactList, PageBlock, Panels, Paragraph
+from armid_ros.report.blocks import (
+    ContentSection,
+    DataTable,
+    FactList,
+    PageBlock,
+    Panels,
+    Paragraph,
+)
 from armid_ros.report.charts import Chart, Mark, Role, Series
-from armid_ros.report.notation import digits
+from armid_ros.report.notation import counted, digits, measured, pretty
+from armid_ros.report.page import Page, Section
+from armid_ros.report.provenance import Provenance
+from armid_ros.report.sections.frame import Origin, VerdictSection
+from armid_ros.robots.two_link import TwoLinkParameters
 import numpy as np
 import numpy.typing as npt
+
+#: Largest difference of measured decoupled response and model for a good grade [dB rms].
+_CLOSE_DB = 0.5
+
+
+def elastic_report(
+    result: TwoInertiaIdentification,
+    robot: str,
+    known: TwoLinkParameters | None,
+    source: str,
+    provenance: Provenance,
+) -> str:
+    """
+    Return report.html of an identification of elastic joints.
+
+    Parameters
+    ----------
+    result : TwoInertiaIdentification
+        Results of the three steps.
+    robot : str
+        Its name.
+    known : TwoLinkParameters or None
+        Reference parameters for comparison.
+    source : str
+        Source of the reference parameters.
+    provenance : Provenance
+        Files, versions, settings, seed.
+
+    """
+    sections: list[Section] = [verdict(result), responses_section(result)]
+    if result.tuning is not None:
+        sections.append(steps_section(result.tuning))
+    sections += [
+        parameters_section(result, known, source),
+        rigid_section(result.rigid),
+        Origin(provenance),
+    ]
+    steps = 0 if result.tuning is None else result.tuning.measured.shape[1]
+    subtitle = f'{robot} · {counted(result.experiments, "experiment")} through the resonances'
+    subtitle += f' · {counted(steps, "step response")}'
+    return Page(f'Elastic joints of {robot}', subtitle, sections).html()
+
+
+def verdict(result: TwoInertiaIdentification) -> VerdictSection:
+    """Say how stiff the springs are, how surely, and what is not known."""
+    springs = []
+    for k, joint in enumerate(result.joints):
+        value = f'{result.parameters.stiffness[k]:.0f}'
+        if result.tuning is not None:
+            estimate = result.tuning.estimate
+            value += f' ± {HALF_WIDTH * estimate.std[estimate.index("kg", joint)]:.0f}'
+        springs.append(f'{value} N m/rad at {joint}')
+    interval = ' (95 %)' if result.tuning is not None else ''
+    sentences = [f'The joint stiffness is {" and ".join(springs)}{interval}.']
+    poor = [
+        joint for k, joint in enumerate(result.joints) if decibels_apart(result, k) > _CLOSE_DB
+    ]
+    beware = (
+        [
+            f'{", ".join(poor)}: the measured response differs from that of motor, spring and '
+            f'link by more than {_CLOSE_DB:g} dB; look at the frequency responses.'
+        ]
+        if poor
+        else []
+    )
+    if result.tuning is None:
+        beware.append('Without step responses the parameters have no intervals.')
+    else:
+        before, after = result.tuning.rms
+        sentences.append(
+            f'The error of the step responses fell from {digits(before)} to {digits(after)} rad/s '
+            'rms by tuning, noise included.'
+        )
+        beware.append(
+            'Viscous friction of link and motor are known as a sum; their shares are not.'
+        )
+    return VerdictSection(
+        'uncertain' if poor else 'found', 'fair' if poor else 'good', sentences, beware
+    )
+
+
+def parameters_section(
+    result: TwoInertiaIdentification, known: TwoLinkParameters | None, source: str
+) -> ContentSection:
+    """
+    Return a section with parameters, intervals and reference parameters.
+
+    Parameters
+    ----------
+    result : TwoInertiaIdentification
+        Results of the identification.
+    known : TwoLinkParameters, or None
+        Reference parameters for comparison.
+    source : str
+        Source of the reference parameters.
+
+    """
+    names = parameter_names(result.joints)
+    long = {symbol: f'{name_in_words(field)} ({symbol})' for field, symbol, _ in PER_JOINT}
+    lines = [(long.get(name.name, name.name), name.joint, name.unit) for name in names]
+    values, untuned = unpack(result.parameters).tolist(), unpack(result.untuned).tolist()
+    base = None if known is None else unpack(known).tolist()
+    std: list[float] = []
+    text = 'From the frequency responses. Step responses would tune them and give intervals.'
+    heads = ['Parameter', 'Joint', 'Estimate']
+    if result.tuning is not None:
+        text = (
+            'Tuned to the step responses; intervals hold 95 %. Of dl and dm only the sum is known '
+            'well, dl + dm gear². The shares of link and motor are those of the start values.'
+        )
+        heads += ['± 95 %', 'Untuned']
+        std = result.tuning.estimate.std.tolist()
+        for k, total in enumerate(total_damping(result)):
+            lines.append((total['name'], total['joint'], total['unit']))
+            values.append(total['value'])
+            std.append(total['std'])
+            untuned.append(float(result.untuned.total_damping[k]))
+            if known is not None and base is not None:
+                base.append(float(known.total_damping[k]))
+    if base is not None:
+        text += f' Compared with {source}.'
+        heads += ['Known', 'Difference']
+    rows = []
+    for k, (name, joint, unit) in enumerate(lines):
+        row = [pretty(name), joint]
+        if std:
+            row += [*measured(values[k], HALF_WIDTH * std[k]), digits(untuned[k], 4)]
+        else:
+            row.append(f'{values[k]:.4g}')
+        if base is not None:
+            row += [f'{base[k]:g}', f'{100.0 * (values[k] / base[k] - 1.0):+.2f} %']
+        rows.append([*row, pretty(unit)])
+    table = DataTable([*heads, 'Unit'], rows, words=(0, 1, len(heads)))
+    return ContentSection('Parameters', [Paragraph(text), table])
+
+
+def rigid_section(fit: RigidFit) -> ContentSection:
+    """Return a section with the parameters of step 1, the arm with rigid joints."""
+    estimate = fit.estimate
+    rows = [
+        (pretty(name.name), name.joint, *measured(value, HALF_WIDTH * std), pretty(name.unit))
+        for name, value, std in zip(
+            estimate.parameters, estimate.values, estimate.std, strict=True
+        )
+    ]
+    text = (
+        f'Step 1, least squares below {CUTOFF:g} Hz: motor and link of joint 1, and friction of '
+        f'motors and links, are one. {fit.relative_error:.2f} % of the torque is left.'
+    )
+    heads = ('Parameter', 'Joint', 'Estimate', '± 95 %', 'Unit')
+    return ContentSection('Rigid arm', [Paragraph(text), DataTable(heads, rows, words=(0, 1, 4))])
+
 
 #: Frequency ranges of the plots and of the comparison of responses [Hz].
 _SHOWN, _COMPARED = (2.0, 100.0), (5.0, 60.0)
