@@ -21,7 +21,7 @@ import textwrap
 import armid_ros as ar
 from armid_ros.live.belief import LiveDiagnosis, LiveSettings
 from armid_ros.live.request import answer
-from armid_ros.papers.elastic.identification.physical import ideal_response
+from armid_ros.papers.elastic.identification.interaction import ideal_response
 from armid_ros.papers.elastic.identification.three_steps import identify_two_inertia
 from armid_ros.papers.elastic.plant import EXCITATION_RMS, resonance_experiments, run_all, WEAK
 from armid_ros.papers.elastic.work import SENSORS

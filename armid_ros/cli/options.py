@@ -4,9 +4,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Collection, Sequence
+from collections.abc import Collection, Mapping, Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import Any, TYPE_CHECKING
 
 from armid_ros.api.table import ResultOrigin, Shown, Summary
 from armid_ros.arm import ArmModel, load_model
@@ -27,6 +27,7 @@ from armid_ros.files import (
 )
 from armid_ros.files.cells import listed, parted
 from armid_ros.files.own import written_by
+from armid_ros.identification import write_document
 from armid_ros.motion import FloatArray
 from armid_ros.recording import read_robot_description, ReadSettings, Recording
 from armid_ros.recording.anything import is_table, read_anything
@@ -132,15 +133,24 @@ def show(summary: Summary, *below: str) -> None:
         say(line)
 
 
-def show_verdict(
+def deliver_page(
+    staged: Staged,
+    page: str,
+    name: str,
+    document: Mapping[str, Any],
     verdict: VerdictSection,
-    heads: Sequence[str],
-    rows: Sequence[Sequence[str]],
-    *below: str,
+    table: tuple[Sequence[str], Sequence[Sequence[str]]] | None,
 ) -> None:
-    """Print the verdict of a page, and a table."""
+    """Write report.html and the document NAME.json; print its verdict and a table, or as JSON."""
+    write_file(staged.folder / 'report.html', page)
+    write_document(staged.folder / f'{name}.json', document)
+    staged.keep()
+    if table is None:
+        click.echo(json_text(document))
+        return
     first, *others = verdict.sentences
-    show(Summary(first, verdict.grade, heads, rows, [*others, *verdict.beware]), *below)
+    shown = Summary(first, verdict.grade, *table, [*others, *verdict.beware])
+    show(shown, f'{staged.out}: {name}.json, report.html')
 
 
 def read_settings() -> ReadSettings:

@@ -148,7 +148,16 @@ def design(
     """
     problem = DesignProblem.of(arm, settings, rng, rival)
     clearance = None if collision is None else ClearanceModel.of(collision)
-    prior = _checked_prior(problem, prior_information, rival)
+    prior = None if prior_information is None else np.asarray(prior_information, dtype=float)
+    if prior is not None:
+        expected = (problem.base.rank,) * 2
+        if rival is not None or prior.shape != expected:
+            raise TrajectoryError(
+                f'prior information: a matrix {expected} over the base parameters of the arm is '
+                f"needed, and none with criterion 'T'; got {prior.shape}"
+            )
+        if not np.all(np.isfinite(prior)):
+            raise TrajectoryError('prior information: not all entries are finite numbers')
 
     def watch(done: float, cost: float) -> None:
         if progress is not None:
@@ -238,20 +247,3 @@ def evaluate(
     return Design(
         excitation, information, described, problem.noise, cost, problem.limits, settings, stopped
     )
-
-
-def _checked_prior(
-    problem: DesignProblem, prior: FloatArray | None, rival: ArmModel | None
-) -> FloatArray | None:
-    if prior is None:
-        return None
-    prior = np.asarray(prior, dtype=float)
-    expected = (problem.base.rank,) * 2
-    if rival is not None or prior.shape != expected:
-        raise TrajectoryError(
-            f'prior information: a matrix {expected} over the base parameters of the arm is '
-            f"needed, and none with criterion 'T'; got {prior.shape}"
-        )
-    if not np.all(np.isfinite(prior)):
-        raise TrajectoryError('prior information: not all entries are finite numbers')
-    return prior

@@ -1,6 +1,6 @@
 # Copyright 2026 The armid_ros developers
 # SPDX-License-Identifier: Apache-2.0
-"""The check of every motion before it is sent to an arm."""
+"""The check of every motion before it is sent to an arm, and the supervision of its end."""
 
 from __future__ import annotations
 
@@ -238,12 +238,6 @@ class Ending:
     blocked: bool = False
     warned: bool = False
 
-    def set_point(self, now: float) -> FloatArray:
-        """Return the set point of the controller, shape (n,) [rad or m]."""
-        assert self.last is not None
-        row = int(np.searchsorted(self.last.t, now - self.sent))
-        return np.asarray(self.last.q[min(row, len(self.last.t) - 1)])
-
     def stopped_again(
         self, monitor: PoseMonitor, now: float, tolerance: float, duration: float
     ) -> Motion | None:
@@ -293,36 +287,33 @@ class Ending:
 
         """
         if self.last is not None and self.blocked and monitor.unsteady(_REST) == '':
-            return self._relieved(monitor.pose.q, now, tolerance)
+            # the arm is held where it is, if the step of the set point is allowed
+            ending, measured = replace(self, blocked=False), monitor.pose.q
+            row = int(np.searchsorted(self.last.t, now - self.sent))
+            set_point = self.last.q[min(row, len(self.last.t) - 1)]
+            if np.abs(measured - set_point).max() <= tolerance:
+                return ending, None, ''
+            try:
+                motion = self.gate.hold(set_point, measured, _RELIEF * tolerance)
+            except TrajectoryError as error:
+                return ending, None, f'{self.reason}; the set point stays where it is: {error}'
+            return replace(ending, last=motion, sent=now), motion, ''
         lasts = 0.0 if self.last is None else float(self.last.t[-1])
         moving = monitor.unsteady(_REST, 2)
         if now - self.sent < lasts + patience or moving is None:
             return self, None, ''
         if not moving:
             return None, None, ''
-        motion = self.stopped_again(monitor, now, tolerance, duration)
+        stop = self.stopped_again(monitor, now, tolerance, duration)
         ending = replace(self, warned=True)
-        if motion is not None:
-            ending = replace(ending, last=motion, sent=now)
+        if stop is not None:
+            ending = replace(ending, last=stop, sent=now)
         if self.warned:
-            return ending, motion, ''
+            return ending, stop, ''
         if self.last is None:
             return ending, None, f'{self.reason}; {moving}, and this node does not move it'
         return (
             ending,
-            motion,
+            stop,
             (f'the arm still moves although it was stopped: {moving}; use the emergency stop'),
         )
-
-    def _relieved(
-        self, measured: FloatArray, now: float, tolerance: float
-    ) -> tuple[Ending, Motion | None, str]:
-        """Hold a blocked arm at its present position, if the step of the set point is allowed."""
-        ending, set_point = replace(self, blocked=False), self.set_point(now)
-        if np.abs(measured - set_point).max() <= tolerance:
-            return ending, None, ''
-        try:
-            motion = self.gate.hold(set_point, measured, _RELIEF * tolerance)
-        except TrajectoryError as error:
-            return ending, None, f'{self.reason}; the set point stays where it is: {error}'
-        return replace(ending, last=motion, sent=now), motion, ''

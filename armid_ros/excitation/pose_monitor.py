@@ -151,7 +151,13 @@ class PoseMonitor:
                 return
             source.states.clear()
         source.rivals.clear()
-        self._believe(source, state)
+        states = source.states
+        states.append(state)
+        while len(states) > AGREEING and state.arrived - states[1].arrived > _WINDOW:
+            states.popleft()
+        q = np.full(len(self.pose.joints), np.nan)
+        q[source.joints] = state.q
+        self.pose = self.pose.updated(q, state.stamp_ns, state.arrived)
 
     def contradiction(self, now: float, count: int = AGREEING) -> str:
         """Return why many positions of the last 0.5 s were rejected; empty if few were."""
@@ -259,12 +265,3 @@ class PoseMonitor:
     def _reject(self, fault: str, now: float) -> None:
         self._rejections.append((now, fault))
         self.rejected += 1
-
-    def _believe(self, source: _Source, state: _State) -> None:
-        states = source.states
-        states.append(state)
-        while len(states) > AGREEING and state.arrived - states[1].arrived > _WINDOW:
-            states.popleft()
-        q = np.full(len(self.pose.joints), np.nan)
-        q[source.joints] = state.q
-        self.pose = self.pose.updated(q, state.stamp_ns, state.arrived)

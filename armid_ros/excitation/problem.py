@@ -1,6 +1,6 @@
 # Copyright 2026 The armid_ros developers
 # SPDX-License-Identifier: Apache-2.0
-"""A design problem: parameters to identify, noise and limits."""
+"""A design problem: settings, parameters to identify, noise and limits."""
 
 from __future__ import annotations
 
@@ -238,13 +238,13 @@ class DesignProblem:
             )
         whole = arm if rival is None else _joined(arm, rival)
         motion = random_motion(arm.robot, rng)
-        columns = target_columns(whole, settings.target, motion)
+        columns = _target_columns(whole, settings.target, motion)
         if not columns.any():
             raise TrajectoryError(
                 f"target '{settings.target}': {arm.robot.name} has no such parameter to see"
             )
         level = replace(whole, robot=levelled(whole.robot))
-        flat = target_columns(level, settings.target, motion).reshape(-1, columns.shape[-1])
+        flat = _target_columns(level, settings.target, motion).reshape(-1, columns.shape[-1])
         base = group_columns(flat, whole.parameters)
         columns = (columns / noise[:, np.newaxis]).reshape(flat.shape)[:, base.independent]
         scale = 1.0 / np.sqrt(np.sum(columns**2, axis=0) / len(motion))
@@ -277,7 +277,7 @@ class DesignProblem:
 
     def columns(self, motion: Motion) -> FloatArray:
         """Return the weighted columns of all parameters, shape (N n, P)."""
-        columns = target_columns(self.arm, self.settings.target, motion)
+        columns = _target_columns(self.arm, self.settings.target, motion)
         return (columns / self.noise[:, np.newaxis]).reshape(-1, columns.shape[-1])
 
     def recorded(self, trajectory: FourierTrajectory, n_periods: int) -> Information:
@@ -307,16 +307,8 @@ class DesignProblem:
         return Information(self.base.parameters, weight * (w.T @ w), self.scale)
 
 
-def target_columns(arm: ArmModel, target: str, motion: Motion) -> FloatArray:
-    """
-    Return the sensitivities to the parameters of a target.
-
-    Returns
-    -------
-    ndarray, shape (N, n, P)
-        Columns of ``arm.parameters``; zero where a parameter is not in the target.
-
-    """
+def _target_columns(arm: ArmModel, target: str, motion: Motion) -> FloatArray:
+    """Return sensitivities (N, n, P); zero where a parameter is not in the target."""
     effects = arm.effect_columns(motion)
     if target == 'effects':
         rigid = np.zeros((*motion.q.shape, len(arm.robot.rigid_parameters)))

@@ -1,6 +1,6 @@
 # Copyright 2026 The armid_ros developers
 # SPDX-License-Identifier: Apache-2.0
-"""Random feasible trajectories: starting points of a search, and its reference."""
+"""Random feasible trajectories, and templates of motions: slow or fast, all or single joints."""
 
 from __future__ import annotations
 

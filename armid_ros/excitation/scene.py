@@ -1,6 +1,6 @@
 # Copyright 2026 The armid_ros developers
 # SPDX-License-Identifier: Apache-2.0
-"""The bodies of an arm, its floor and the obstacles around it."""
+"""The bodies of an arm, its floor and obstacles, and a summary of the checks of a run."""
 
 from __future__ import annotations
 

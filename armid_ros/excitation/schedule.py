@@ -6,6 +6,9 @@ A whole excitation run: from rest into a periodic trajectory, through it, and ba
 The arm accelerates and decelerates along the path of the trajectory. Run-in and run-out therefore
 visit only poses of the periods. The way from another pose is a `Transfer`.
 
+A run is written as YAML, and read from it. A CSV file, for spreadsheets, has one row per joint and
+coefficient of the trajectory; comment lines contain the run.
+
 """
 
 from __future__ import annotations

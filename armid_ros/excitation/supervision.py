@@ -1,6 +1,6 @@
 # Copyright 2026 The armid_ros developers
 # SPDX-License-Identifier: Apache-2.0
-"""Supervision of a running arm: measured pose, tracking error and stop."""
+"""Supervision of a running arm: measured pose, tracking error, stop, and a slow rehearsal."""
 
 from __future__ import annotations
 

@@ -154,7 +154,26 @@ class TransferPlanner:
             lambda q: not self._overload(q),
             np.random.default_rng(seed),
         )
-        return self._timed(poses, shortest)
+        # a path with the duration that the limits require
+        limits = self.limits
+        assert limits is not None
+        way = np.abs(np.diff(poses, axis=0))
+        velocity = np.where(np.isfinite(limits.velocity), limits.velocity, SLOW_VELOCITY)
+        # largest velocity and acceleration of a quintic from 0 to 1 in unit time
+        needed = np.maximum(
+            (1.875 * way / velocity).max(axis=1),
+            np.sqrt((10.0 / np.sqrt(3.0)) * way / limits.acceleration).max(axis=1),
+        )
+        t = np.append(0.0, np.cumsum(needed))
+        transfer = Transfer(limits.joints, t, poses)
+        transfer = transfer.lasting(max(transfer.duration, shortest))
+        for _ in range(_TRIES):
+            motion = transfer.at(np.linspace(0.0, transfer.duration, _SAMPLES))
+            violations = check_limits(limits, motion, self.arm.joint_torque(motion))
+            if not violations:
+                return transfer
+            transfer = transfer.lasting(_SLOWER * transfer.duration)
+        raise TrajectoryError(f'no way to the trajectory keeps the limits: {violations[0]}')
 
     def fault(self, q: FloatArray) -> str:
         """Return why an arm may not stand in a pose, shape (n,); empty if it may."""
@@ -238,28 +257,6 @@ class TransferPlanner:
             f'{torque[:, worst].max():.4g} of {self.limits.torque[worst]:.4g} '
             f'{self.limits.unit("torque", worst)}'
         )
-
-    def _timed(self, poses: FloatArray, shortest: float) -> Transfer:
-        """Return a path with the duration that the limits require."""
-        limits = self.limits
-        assert limits is not None
-        way = np.abs(np.diff(poses, axis=0))
-        velocity = np.where(np.isfinite(limits.velocity), limits.velocity, SLOW_VELOCITY)
-        # largest velocity and acceleration of a quintic from 0 to 1 in unit time
-        needed = np.maximum(
-            (1.875 * way / velocity).max(axis=1),
-            np.sqrt((10.0 / np.sqrt(3.0)) * way / limits.acceleration).max(axis=1),
-        )
-        t = np.append(0.0, np.cumsum(needed))
-        transfer = Transfer(limits.joints, t, poses)
-        transfer = transfer.lasting(max(transfer.duration, shortest))
-        for _ in range(_TRIES):
-            motion = transfer.at(np.linspace(0.0, transfer.duration, _SAMPLES))
-            violations = check_limits(limits, motion, self.arm.joint_torque(motion))
-            if not violations:
-                return transfer
-            transfer = transfer.lasting(_SLOWER * transfer.duration)
-        raise TrajectoryError(f'no way to the trajectory keeps the limits: {violations[0]}')
 
 
 def transfer_limits(

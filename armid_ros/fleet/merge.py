@@ -1,7 +1,7 @@
 # Copyright 2026 The armid_ros developers
 # SPDX-License-Identifier: Apache-2.0
 """
-From bags to estimates: sums of normal equations, a fit, and its standard deviations.
+From bags to estimates: a summary of each bag, sums of normal equations, a fit, its deviations.
 
 Standard deviations follow from the spectrum of the residuals, which normal equations do not
 contain. A second pass over the bags therefore computes the noise products at the estimate of the

@@ -1,7 +1,7 @@
 # Copyright 2026 The armid_ros developers
 # SPDX-License-Identifier: Apache-2.0
 """
-The plan of a fleet: the robot of each arm, and the filters of each kind of arm.
+The plan of a fleet: settings, the robot of each arm, filters and job of each kind of arm.
 
 fleet.json stores the plan, so that later runs use the same filters.
 
@@ -102,7 +102,7 @@ def filters_at(filters: Conditioning, rate_hz: float, source: str) -> Conditioni
     return Conditioning(rate_hz, filters.cutoff_hz, decimation)
 
 
-def filter_facts(filters: Conditioning) -> dict[str, Any]:
+def _filter_facts(filters: Conditioning) -> dict[str, Any]:
     """Return filters as an entry of fleet.json: the arguments of a ``Conditioning``."""
     return {name: getattr(filters, name) for name in ('cutoff_hz', 'decimation', 'rate_hz')}
 
@@ -148,7 +148,7 @@ class Job:
             'effects': [[effect.name, list(effect.joints)] for effect in self.arm.effects],
             'weighted': self.settings.weighted,
             'topic': self.settings.topic,
-            **filter_facts(self.filters),
+            **_filter_facts(self.filters),
         }
 
     @cached_property
@@ -162,32 +162,6 @@ class Job:
         joints = self.arm.robot.n_joints
         rows = 16_000_000 // (joints * self.theory.rank)  # larger columns are read in pieces
         return min(rows * self.filters.decimation, 1_400_000 // joints)
-
-
-def require_linear(arm: ArmModel, rng: np.random.Generator) -> None:
-    """
-    Check that the torque is linear in the parameters of all effects.
-
-    Raises
-    ------
-    FleetError
-        If an effect is nonlinear in its parameters.
-
-    """
-    motion = random_motion(arm.robot, rng, 200)
-    bare = ArmModel(arm.robot)
-    for effect in arm.effects:
-        one = bare.with_effect(effect)
-        linear = effect.instantaneous and len(one.theta) > len(bare.theta)
-        if linear:
-            values = np.clip(0.1, *effect.bounds())
-            theta = np.concatenate([1.1 * bare.theta, values])
-            linear = not curved(one, one.with_theta(theta), [motion])
-        if not linear:
-            raise FleetError(
-                f'--effects {effect.name}: the torque is not linear in its parameters, so bags '
-                'cannot be merged; name other effects, and use `armid diagnose` for this one'
-            )
 
 
 SCHEMA = 'armid/fleet/1'
@@ -312,7 +286,7 @@ def plan_fleet(
             'effects': effects,
             'method': 'wls' if settings.weighted else 'ols',
             'topic': settings.topic,
-            'filters': filter_facts(filters),
+            'filters': _filter_facts(filters),
         }
         for bag in some:
             arms[bag.arm], jobs[bag.arm] = key, job
@@ -410,5 +384,19 @@ def _model(entry: Entry, settings: FleetSettings) -> ArmModel:
         joints=listed(chosen.replace(';', ',')) if chosen else None,
     )
     model = ArmModel.of(robot, effects=(entry.effects or settings.effects).replace(';', ','))
-    require_linear(model, np.random.default_rng(settings.seed))
+    # raise a FleetError if the torque is not linear in the parameters of an effect
+    motion = random_motion(model.robot, np.random.default_rng(settings.seed), 200)
+    bare = ArmModel(model.robot)
+    for effect in model.effects:
+        one = bare.with_effect(effect)
+        linear = effect.instantaneous and len(one.theta) > len(bare.theta)
+        if linear:
+            values = np.clip(0.1, *effect.bounds())
+            theta = np.concatenate([1.1 * bare.theta, values])
+            linear = not curved(one, one.with_theta(theta), [motion])
+        if not linear:
+            raise FleetError(
+                f'--effects {effect.name}: the torque is not linear in its parameters, so bags '
+                'cannot be merged; name other effects, and use `armid diagnose` for this one'
+            )
     return model

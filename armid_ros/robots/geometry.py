@@ -1,6 +1,6 @@
 # Copyright 2026 The armid_ros developers
 # SPDX-License-Identifier: Apache-2.0
-"""The visual and collision shapes of a URDF, placed on the bodies of the model."""
+"""The visual and collision shapes of a URDF on the bodies of the model, and their distances."""
 
 from __future__ import annotations
 

@@ -104,25 +104,23 @@ def _end_velocity(
     )
     dq_next = dq_free - response.dot(taken)
     if 0 in modes:
-        _clear_stuck(dq_next, contacts, modes)
+        # set the velocity of joints that stick to exactly zero, without rounding errors
+        fixed = [
+            axis
+            for axis, mode in zip(contacts.axes, modes, strict=True)
+            if mode == 0 and axis >= 0
+        ]
+        dq_next[fixed] = 0.0
+        for direction, axis, mode in zip(contacts.directions, contacts.axes, modes, strict=True):
+            if mode == 0 and axis < 0:
+                free = np.abs(direction)
+                free[fixed] = 0.0
+                pivot = int(np.argmax(free))
+                if free[pivot] > 0.0:
+                    dq_next[pivot] = 0.0
+                    dq_next[pivot] = -direction.dot(dq_next) / direction[pivot]
+                    fixed.append(pivot)
     return dq_next, (dq_next - dq) / dt, modes
-
-
-def _clear_stuck(dq: FloatArray, contacts: Contacts, modes: Modes) -> None:
-    """Set the velocity of joints that stick to exactly zero, without rounding errors."""
-    fixed = [
-        axis for axis, mode in zip(contacts.axes, modes, strict=True) if mode == 0 and axis >= 0
-    ]
-    dq[fixed] = 0.0
-    for direction, axis, mode in zip(contacts.directions, contacts.axes, modes, strict=True):
-        if mode == 0 and axis < 0:
-            free = np.abs(direction)
-            free[fixed] = 0.0
-            pivot = int(np.argmax(free))
-            if free[pivot] > 0.0:
-                dq[pivot] = 0.0
-                dq[pivot] = -direction.dot(dq) / direction[pivot]
-                fixed.append(pivot)
 
 
 def _inside(stops: list[tuple[float, float]], q: FloatArray) -> bool:

@@ -13,14 +13,12 @@ LEFT = {
     # what acts on an arm that is shipped
     'simulation/elastic.py': 7,
     # advice and examples for a person
-    'papers/elastic/springs.py': 1,
+    'papers/elastic/springs.py': 4,
     'identification/known_payload.py': 2,
     'simulation/springs.py': 3,
     # what help shows without importing effects; a test holds it against the catalogue
     'cli/choices.py': 5,
     'nodes/running/launching.py': 2,
-    # fields of springs.json that are called as an effect is
-    'papers/elastic/identification/output.py': 3,
     # the effect that a room makes
     'residual/learn.py': 1,
     # a key of diagnosis.json that is called as an effect is

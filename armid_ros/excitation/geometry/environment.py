@@ -1,6 +1,14 @@
 # Copyright 2026 The armid_ros developers
 # SPDX-License-Identifier: Apache-2.0
-"""Obstacles around the arm: boxes, spheres, cylinders, meshes and planes."""
+"""
+Obstacles around the arm, also from files: boxes, spheres, cylinders, meshes and planes.
+
+A file is a list of obstacles or a planning scene of MoveIt, as printed by `ros2 topic echo --once
+--full-length` (moveit_msgs/PlanningScene, PlanningSceneWorld or CollisionObject). A cone is
+replaced by its enclosing cylinder, and a mesh by its enclosing box in the frame of its object.
+Objects attached to the arm are not read.
+
+"""
 
 from __future__ import annotations
 
@@ -124,7 +132,14 @@ def with_obstacles(collision: CollisionModel, obstacles: Sequence[Obstacle]) -> 
     if not obstacles:
         return collision
     geometry = collision.geometry.copy()
-    _add_points(geometry, collision.robot)
+    robot = collision.robot
+    seen = {int(body.parentJoint) for body in geometry.geometryObjects}
+    for joint, link in enumerate(robot.links, start=1):
+        if joint not in seen:
+            frame = robot.model.getFrameId(link, pin.FrameType.BODY)
+            point, here = coal.Sphere(1e-4), pin.SE3.Identity()  # radius [m]
+            added = pin.GeometryObject(f'{link}_frame', joint, frame, here, point)
+            geometry.addGeometryObject(added)
     # copied, because adding an object invalidates the Python references
     bodies = [(int(body.parentJoint), int(body.parentFrame)) for body in geometry.geometryObjects]
     links = [str(collision.robot.model.frames[frame].name) for _, frame in bodies]
@@ -149,64 +164,11 @@ def with_obstacles(collision: CollisionModel, obstacles: Sequence[Obstacle]) -> 
     return replace(collision, geometry=geometry)
 
 
-def _add_points(geometry: pin.GeometryModel, robot: Robot) -> None:
-    """Add a sphere at the joint frame of each link without a body."""
-    model = robot.model
-    seen = {int(body.parentJoint) for body in geometry.geometryObjects}
-    for joint, link in enumerate(robot.links, start=1):
-        if joint not in seen:
-            frame = model.getFrameId(link, pin.FrameType.BODY)
-            point = coal.Sphere(1e-4)  # radius [m]
-            geometry.addGeometryObject(
-                pin.GeometryObject(f'{link}_frame', joint, frame, pin.SE3.Identity(), point)
-            )
-
-
 def obstacles_alone(collision: CollisionModel, obstacles: Sequence[Obstacle]) -> CollisionModel:
     """Return the bodies of ``with_obstacles``, each checked against the obstacles only."""
     geometry = collision.geometry.copy()
     geometry.removeAllCollisionPairs()
     return with_obstacles(replace(collision, geometry=geometry), obstacles)
-
-
-def parse_obstacles(entries: Any, folder: Path) -> tuple[Obstacle, ...]:
-    """
-    Return the obstacles of a list of mappings with the attributes of `Obstacle`.
-
-    Parameters
-    ----------
-    entries : list of dict
-        Entries of a document.
-    folder : Path
-        Folder in which meshes are looked for.
-
-    Raises
-    ------
-    TrajectoryError
-        If an entry is not an obstacle.
-
-    """
-    if not isinstance(entries, list):
-        raise TrajectoryError('has to be a list of obstacles, or a planning scene')
-    found: list[Obstacle] = []
-    known = tuple(Obstacle.__dataclass_fields__)
-    for number, entry in enumerate(entries, 1):
-        if not isinstance(entry, dict) or not {'name', 'kind'} <= entry.keys() <= set(known):
-            raise TrajectoryError(
-                f'obstacle {number} needs name and kind, and may have {", ".join(known[2:])}'
-            )
-        values: dict[str, Any] = {
-            key: tuple(v) if isinstance(v, list) else v for key, v in entry.items()
-        }
-        if isinstance(values.get('size'), (int, float)):
-            values['size'] = (values['size'],)
-        if 'mesh' in values:
-            values['mesh'] = folder / str(values['mesh'])
-        try:
-            found.append(Obstacle(**values))
-        except (TypeError, ValueError) as error:
-            raise TrajectoryError(f'obstacle {number}: {error}') from error
-    return tuple(found)
 
 
 def body_name(collision: CollisionModel, number: int) -> str:
@@ -250,7 +212,28 @@ def load_environment(path: str | Path, robot: Robot | None = None) -> tuple[Obst
         document = load_yaml(re.split(r'^---$', text.removeprefix('---\n'), flags=re.M)[0])
         if isinstance(document, dict) and _SCENE & document.keys():
             return _scene_obstacles(document, robot)
-        return parse_obstacles(document, path.parent)
+        # the obstacles of a list of mappings with the attributes of `Obstacle`
+        if not isinstance(document, list):
+            raise TrajectoryError('has to be a list of obstacles, or a planning scene')
+        found: list[Obstacle] = []
+        known = tuple(Obstacle.__dataclass_fields__)
+        for number, entry in enumerate(document, 1):
+            if not isinstance(entry, dict) or not {'name', 'kind'} <= entry.keys() <= set(known):
+                raise TrajectoryError(
+                    f'obstacle {number} needs name and kind, and may have {", ".join(known[2:])}'
+                )
+            values: dict[str, Any] = {
+                key: tuple(v) if isinstance(v, list) else v for key, v in entry.items()
+            }
+            if isinstance(values.get('size'), (int, float)):
+                values['size'] = (values['size'],)
+            if 'mesh' in values:
+                values['mesh'] = path.parent / str(values['mesh'])
+            try:
+                found.append(Obstacle(**values))
+            except (TypeError, ValueError) as error:
+                raise TrajectoryError(f'obstacle {number}: {error}') from error
+        return tuple(found)
 
 
 def _scene_obstacles(document: Mapping[str, Any], robot: Robot | None) -> tuple[Obstacle, ...]:

@@ -1,11 +1,16 @@
 # Copyright 2026 The armid_ros developers
 # SPDX-License-Identifier: Apache-2.0
 """
-The cost of a trajectory and its gradient by the Fourier coefficients.
+Cost and limits of a trajectory as smooth functions of its Fourier coefficients, with gradients.
 
 Columns that depend only on the state are differentiated by finite differences of the states of all
 samples at once. Columns that depend on the past of the motion are differentiated by differences of
 every coefficient.
+
+Each limit of each joint is one constraint, c <= 0: the soft maximum (Kreisselmeier and Steinhauser
+1979) of its excess over all samples, relative to the limit. A soft maximum is never below the
+maximum, so that a trajectory that meets the constraints keeps the limits in every sample. It
+exceeds the maximum by at most log(samples) / sharpness.
 
 """
 

@@ -1,6 +1,6 @@
 # Copyright 2026 The armid_ros developers
 # SPDX-License-Identifier: Apache-2.0
-"""Simulated runs of an elastic arm under a velocity loop, and its sensors."""
+"""Simulated runs of an elastic arm under a velocity loop: experiments and sensors."""
 
 from __future__ import annotations
 
@@ -116,14 +116,13 @@ def run_all(
     plant: Plant,
     loop: VelocityLoop,
     experiments: list[Experiment],
-    progress: Callable[[float], None] | None = None,
+    progress: Callable[[float], None] = lambda share: None,
 ) -> list[ElasticRun]:
     """Run experiments one after the other."""
     runs = []
     for number, experiment in enumerate(experiments):
         runs.append(run_elastic(plant, loop, experiment))
-        if progress is not None:
-            progress((number + 1) / len(experiments))
+        progress((number + 1) / len(experiments))
     return runs
 
 
@@ -141,7 +140,6 @@ def resonance_experiments(
     *,
     rms: npt.ArrayLike,
     rng: np.random.Generator,
-    duration: float = 4.0,
 ) -> list[Experiment]:
     """
     Return experiments that excite all joints through their resonances, in many poses.
@@ -158,12 +156,10 @@ def resonance_experiments(
         Of the torque of the multisine [N m].
     rng : numpy.random.Generator
         Source of phases and poses.
-    duration : float
-        Of each experiment [s].
 
     """
     size = np.asarray(rms, dtype=float)
-    steps = round(duration / _DT)
+    steps = round(4.0 / _DT)  # an experiment of 4 s
     t = _DT * np.arange(steps)[:, np.newaxis]
     experiments = []
     for _ in range(count):

@@ -1,18 +1,29 @@
 # Copyright 2026 The armid_ros developers
 # SPDX-License-Identifier: Apache-2.0
-"""The report of two links on springs: stiffness and responses of the joints."""
+"""The report and the document of two links on springs: stiffness and responses of the joints."""
 
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Sequence
+from typing import Any
 
+from armid_ros.arm import parameter_table
 from armid_ros.estimate import name_in_words
 from armid_ros.identification.fitting.identifiability import HALF_WIDTH
 from armid_ros.motion import FloatArray
-from armid_ros.papers.elastic.identification.interaction import coupled_response, decibel_error
-from armid_ros.papers.elastic.identification.output import total_damping
-from armid_ros.papers.elastic.identification.physical import frequencies, ideal_response
-from armid_ros.papers.elastic.identification.response import parameter_names, PER_JOINT, unpack
+from armid_ros.papers.elastic.identification.interaction import (
+    BAND,
+    coupled_response,
+    decibel_error,
+    frequencies,
+    ideal_response,
+)
+from armid_ros.papers.elastic.identification.response import (
+    parameter_names,
+    PER_JOINT,
+    unpack,
+    velocities,
+)
 from armid_ros.papers.elastic.identification.rigid import CUTOFF, RigidFit
 from armid_ros.papers.elastic.identification.three_steps import TwoInertiaIdentification
 from armid_ros.papers.elastic.identification.tuning import Tuning
@@ -61,12 +72,12 @@ def elastic_report(
         Files, versions, settings, seed.
 
     """
-    sections: list[Section] = [verdict(result), responses_section(result)]
+    sections: list[Section] = [verdict(result), _responses_section(result)]
     if result.tuning is not None:
-        sections.append(steps_section(result.tuning))
+        sections.append(_steps_section(result.tuning))
     sections += [
-        parameters_section(result, known, source),
-        rigid_section(result.rigid),
+        _parameters_section(result, known, source),
+        _rigid_section(result.rigid),
         Origin(provenance),
     ]
     steps = 0 if result.tuning is None else result.tuning.measured.shape[1]
@@ -87,7 +98,7 @@ def verdict(result: TwoInertiaIdentification) -> VerdictSection:
     interval = ' (95 %)' if result.tuning is not None else ''
     sentences = [f'The joint stiffness is {" and ".join(springs)}{interval}.']
     poor = [
-        joint for k, joint in enumerate(result.joints) if decibels_apart(result, k) > _CLOSE_DB
+        joint for k, joint in enumerate(result.joints) if _decibels_apart(result, k) > _CLOSE_DB
     ]
     beware = (
         [
@@ -113,22 +124,10 @@ def verdict(result: TwoInertiaIdentification) -> VerdictSection:
     )
 
 
-def parameters_section(
+def _parameters_section(
     result: TwoInertiaIdentification, known: TwoLinkParameters | None, source: str
 ) -> ContentSection:
-    """
-    Return a section with parameters, intervals and reference parameters.
-
-    Parameters
-    ----------
-    result : TwoInertiaIdentification
-        Results of the identification.
-    known : TwoLinkParameters, or None
-        Reference parameters for comparison.
-    source : str
-        Source of the reference parameters.
-
-    """
+    """Return a section with parameters, intervals and reference parameters."""
     names = parameter_names(result.joints)
     long = {symbol: f'{name_in_words(field)} ({symbol})' for field, symbol, _ in PER_JOINT}
     lines = [(long.get(name.name, name.name), name.joint, name.unit) for name in names]
@@ -168,7 +167,7 @@ def parameters_section(
     return ContentSection('Parameters', [Paragraph(text), table])
 
 
-def rigid_section(fit: RigidFit) -> ContentSection:
+def _rigid_section(fit: RigidFit) -> ContentSection:
     """Return a section with the parameters of step 1, the arm with rigid joints."""
     estimate = fit.estimate
     rows = [
@@ -191,7 +190,7 @@ _ROLES: tuple[Role, Role] = ('residual', 'predicted')
 _SIZE = 'magnitude [dB re rad/(N m s)]'
 
 
-def responses_section(result: TwoInertiaIdentification) -> ContentSection:
+def _responses_section(result: TwoInertiaIdentification) -> ContentSection:
     """Return a section with responses from motor torque to motor velocity of both joints."""
     text = (
         'From motor torque to motor velocity. The torque between the links is a second input. '
@@ -209,7 +208,7 @@ def responses_section(result: TwoInertiaIdentification) -> ContentSection:
     )
 
 
-def decibels_apart(result: TwoInertiaIdentification, joint: int) -> float:
+def _decibels_apart(result: TwoInertiaIdentification, joint: int) -> float:
     """Return the difference of measured and model responses of a joint, 5 to 60 Hz [dB]."""
     measured = result.measured[joint]
     seen = (measured.frequency >= _COMPARED[0]) & (measured.frequency <= _COMPARED[1])
@@ -240,20 +239,27 @@ def _joint(
     within = (own >= _COMPARED[0]) & (own <= _COMPARED[1])
     rows = at[within]
     errors = (
-        decibels_apart(result, k),
+        _decibels_apart(result, k),
         decibel_error(alone[rows], decoupled[rows]),
         decibel_error(alone[rows], coupled[rows]),
     )
     size, compared = np.abs(alone[rows]), own[within]
     lowest = int(np.argmin(size))
     dip, peak = compared[lowest], compared[lowest + int(np.argmax(size[lowest:]))]
+
+    def decibel(values: npt.NDArray[np.complex128]) -> FloatArray:
+        return np.asarray(20.0 * np.log10(np.abs(values)))
+
+    def degrees(values: npt.NDArray[np.complex128]) -> FloatArray:
+        return np.asarray(np.degrees(np.angle(values)))
+
     decoupled_charts = (
-        _chart(frequency, points, modelled, _decibel, _SIZE, 260, marks),
-        _chart(frequency, points, modelled, _degrees, 'phase [°]', 150, marks, last=True),
+        _chart(frequency, points, modelled, decibel, _SIZE, 260, marks),
+        _chart(frequency, points, modelled, degrees, 'phase [°]', 150, marks, last=True),
     )
     yield joint, 'decoupled', decoupled_charts
     whole = [('whole arm, modelled', coupled), ('this joint', decoupled)]
-    alone_chart = _chart(frequency, alone, whole, _decibel, _SIZE, 220, marks, last=True)
+    alone_chart = _chart(frequency, alone, whole, decibel, _SIZE, 220, marks, last=True)
     facts = [
         ('Antiresonance, resonance of the joint', f'{low:.2f} Hz, {high:.2f} Hz'),
         ('Measured minimum and maximum, coupled', f'{dip:.1f} Hz, {peak:.1f} Hz'),
@@ -292,15 +298,7 @@ def _chart(
     )
 
 
-def _decibel(values: npt.NDArray[np.complex128]) -> FloatArray:
-    return np.asarray(20.0 * np.log10(np.abs(values)))
-
-
-def _degrees(values: npt.NDArray[np.complex128]) -> FloatArray:
-    return np.asarray(np.degrees(np.angle(values)))
-
-
-def steps_section(tuning: Tuning) -> ContentSection:
+def _steps_section(tuning: Tuning) -> ContentSection:
     """Return a section with link velocities after reference steps, before and after tuning."""
     before, after = tuning.rms
     text = (
@@ -331,3 +329,99 @@ def steps_section(tuning: Tuning) -> ContentSection:
         name = f'joint 2 at {pose:.0f}°, {asked[0]:g} and {asked[1]:g} rad/s reference'
         panels.append((name, '', charts))
     return ContentSection('Step responses', [Paragraph(text), Panels(panels)])
+
+
+SCHEMA = 'armid/elastic/1'
+#: Parameters that step responses determine well; friction and spring damping are less certain.
+MAIN = ('alpha', 'beta', 'gamma', 'mm', 'kg')
+
+
+def elastic_document(result: TwoInertiaIdentification, robot: str) -> dict[str, Any]:
+    """Return an identification of elastic joints as the document that elastic.json holds."""
+    parameters, rigid = result.parameters, result.rigid.estimate
+    names = parameter_names(result.joints)
+    std = [None] * len(names) if result.tuning is None else list(result.tuning.estimate.std)
+    frequency = np.geomspace(5.0, BAND[1], 200)
+    antiresonance, resonance = frequencies(result.untuned)
+    document: dict[str, Any] = {
+        'schema': SCHEMA,
+        'robot': robot,
+        'rigid': {
+            'relative_error_percent': result.rigid.relative_error,
+            'parameters': parameter_table(rigid.parameters, rigid.values, list(rigid.std)),
+        },
+        'joints': [
+            {
+                'joint': joint,
+                'antiresonance_hz': float(antiresonance[k]),
+                'resonance_hz': float(resonance[k]),
+                'interaction_gain': float(result.interaction_gain[k]),
+                'subspaces_against_physical_db': decibel_error(
+                    result.systems[k].response(frequency)[:, 0, 0],
+                    ideal_response(parameters, k, frequency)[:, 0, 0],
+                ),
+                'coulomb_torque': float(parameters.joint_coulomb[k]),
+            }
+            for k, joint in enumerate(result.joints)
+        ],
+        'untuned': parameter_table(names, unpack(result.untuned), [None] * len(names)),
+        'parameters': parameter_table(names, unpack(parameters), std),
+    }
+    if result.tuning is not None:
+        before, after = result.tuning.rms
+        document['tuning'] = {'rms_before': before, 'rms_after': after, 'unit': 'rad/s'}
+        document['total_damping'] = total_damping(result)
+    return document
+
+
+def total_damping(result: TwoInertiaIdentification) -> list[dict[str, Any]]:
+    """Return dl + dm gear^2 of both joints, the identifiable sum of the two."""
+    assert result.tuning is not None
+    estimate, gear = result.tuning.estimate, result.parameters.gear
+    rows = []
+    for k, joint in enumerate(result.joints):
+        weights = np.zeros(len(estimate.values))
+        weights[estimate.index('dl', joint)] = 1.0
+        weights[estimate.index('dm', joint)] = gear[k] ** 2
+        rows.append(
+            {
+                'name': 'dl + dm gear^2',
+                'joint': joint,
+                'value': float(weights @ estimate.values),
+                'std': float(np.sqrt(weights @ estimate.covariance @ weights)),
+                'unit': 'N m s/rad',
+            }
+        )
+    return rows
+
+
+def tuning_story(
+    tuning: Tuning, start: TwoLinkParameters, truth: TwoLinkParameters
+) -> dict[str, Any]:
+    """
+    Return the errors of a tuning against the true parameters of a simulated arm.
+
+    Returns
+    -------
+    dict
+        Root mean square errors of the velocities against those of the true arm, without noise,
+        and largest errors of a main parameter, at the start and at the end.
+
+    """
+    clean = velocities(tuning.steps, truth)
+    main = np.array([name.name in MAIN for name in parameter_names(('', ''))])
+    before, after = (
+        float(np.sqrt(np.mean((one - clean) ** 2))) for one in (tuning.before, tuning.after)
+    )
+    worst, best = (
+        float(100.0 * np.abs(unpack(found) / unpack(truth) - 1.0)[main].max())
+        for found in (start, tuning.parameters)
+    )
+    return {
+        'error_before': before,
+        'error_after': after,
+        'unit': 'rad/s',
+        'factor': before / after,
+        'main_parameters_percent_before': worst,
+        'main_parameters_percent_after': best,
+    }

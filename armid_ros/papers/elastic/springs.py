@@ -1,30 +1,28 @@
 # Copyright 2026 The armid_ros developers
 # SPDX-License-Identifier: Apache-2.0
-"""Springs of any arm, joint by joint, for `armid elastic`."""
+"""Springs of any arm, joint by joint, for `armid elastic`: work, report and document."""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
 from pathlib import Path
+from typing import Any
 
 from armid_ros.cli import options
 from armid_ros.cli.origin import provenance
 from armid_ros.cli.terminal import progress
 from armid_ros.errors import RecordingError
-from armid_ros.files import json_text, write_file
 from armid_ros.papers.elastic.identification.files import read_sides
 from armid_ros.papers.elastic.identification.joints import fit_springs, SpringEstimate
-from armid_ros.papers.elastic.identification.output import springs_document, SPRINGS_SCHEMA
 from armid_ros.recording.elastic import LINK
 from armid_ros.report.blocks import ContentSection, DataTable, Paragraph
 from armid_ros.report.notation import counted
 from armid_ros.report.page import Page, Section
-from armid_ros.report.provenance import Provenance
 from armid_ros.report.sections.frame import Origin, VerdictSection
 from armid_ros.robots import Robot
-import click
 import numpy as np
 
+SPRINGS_SCHEMA = 'armid/springs/1'
 _SPRINGS = (
     'Joint', 'Stiffness [N m/rad]', '95 %', 'Backlash [mrad], 95 %', 'Correlation', 'R²'
 )  # fmt: skip
@@ -72,25 +70,6 @@ def _springs(found: Sequence[SpringEstimate]) -> ContentSection:
         [Paragraph(text), DataTable(_SPRINGS, springs), DataTable(_MOTORS, motors),
          Paragraph(hint, 'hint')],
     )  # fmt: skip
-
-
-def springs_report(found: Sequence[SpringEstimate], robot: str, provenance: Provenance) -> str:
-    """
-    Return report.html of springs that were found joint by joint.
-
-    Parameters
-    ----------
-    found : sequence of SpringEstimate
-        Every joint.
-    robot : str
-        Its name.
-    provenance : Provenance
-        Files, versions, settings, seed.
-
-    """
-    sections: list[Section] = [verdict(found), _springs(found), Origin(provenance)]
-    subtitle = f'{robot} · {counted(len(found), "joint")}, encoders on both sides'
-    return Page(f'Elastic joints of {robot}', subtitle, sections).html()
 
 
 def verdict(found: Sequence[SpringEstimate]) -> VerdictSection:
@@ -144,17 +123,13 @@ def identify_springs(
         tick(0.5, 'fitting')
         found = fit_springs(body, sides, np.random.default_rng(seed))
     document = springs_document(found, source)
-    write_file(staged.folder / 'elastic.json', json_text(document, indent=1))
     origin = provenance(bags, {'model': str(model or source)})
-    page = springs_report(found, robot.name, origin)
-    write_file(staged.folder / 'report.html', page)
-    staged.keep()
-    if as_json:
-        click.echo(json_text(document))
-        return
+    sections: list[Section] = [verdict(found), _springs(found), Origin(origin)]
+    subtitle = f'{robot.name} · {counted(len(found), "joint")}, encoders on both sides'
+    page = Page(f'Elastic joints of {robot.name}', subtitle, sections).html()
     heads = ('joint', 'stiffness [N m/rad]', '95 %', 'free play', 'rotor', 'resonance')
-    files = f'{out}: elastic.json, report.html'
-    options.show_verdict(verdict(found), heads, [_row(one) for one in found], files)
+    table = None if as_json else (heads, [_row(one) for one in found])
+    options.deliver_page(staged, page, 'elastic', document, verdict(found), table)
 
 
 def _row(found: SpringEstimate) -> tuple[str, ...]:
@@ -172,3 +147,38 @@ def _row(found: SpringEstimate) -> tuple[str, ...]:
         '-' if found.motor is None else f'{found.motor[0]:.3g} kg m^2',
         f'{found.resonance:.1f} Hz' if np.isfinite(found.resonance) else '-',
     )
+
+
+def springs_document(found: Sequence[SpringEstimate], robot: str) -> dict[str, Any]:
+    """Return springs that were found joint by joint as the document that elastic.json holds."""
+
+    def number(value: float) -> float | None:
+        return float(value) if np.isfinite(value) else None
+
+    return {
+        'schema': SPRINGS_SCHEMA,
+        'robot': robot,
+        'joints': [
+            {
+                'joint': one.joint,
+                'told': one.informative,
+                'stiffness': number(one.transmission.stiffness[0]),
+                'stiffness_interval': [number(x) for x in one.transmission.stiffness[1:]],
+                'stiffness_unit': 'N m/rad',
+                'backlash': number(one.transmission.backlash[0]),
+                'backlash_interval': [number(x) for x in one.transmission.backlash[1:]],
+                'backlash_unit': 'rad',
+                'backlash_seen': one.transmission.backlash_seen,
+                'correlation': number(one.transmission.correlation),
+                'explained': number(one.transmission.explained),
+                'encoder_delay_s': number(one.transmission.delay[0]),
+                'link_inertia': one.inertia,
+                'rotor_inertia': None if one.motor is None else float(one.motor[0]),
+                'viscous_coefficient': None if one.motor is None else float(one.motor[1]),
+                'coulomb_torque': None if one.motor is None else float(one.motor[2]),
+                'antiresonance_hz': number(one.antiresonance),
+                'resonance_hz': number(one.resonance),
+            }
+            for one in found
+        ],
+    }

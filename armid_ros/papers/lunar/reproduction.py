@@ -210,8 +210,19 @@ def _repeat(
 ) -> Repeated:
     robot = load_robot(table.robot, gravity=table.gravity)
     truth = ArmModel(robot)
-    recording, moved = _recorded(truth, table, run, rng)
-    assert recording.tau is not None
+    made = simulate(
+        truth,
+        run.motion(1000.0),
+        rng=rng,
+        sensors=Sensors(resolution=2 * np.pi / 2**18),  # encoder of 18 bits
+        rate=_RATE,
+    )
+    if table.uniform:
+        noise = 2.0 * table.noise * rng.uniform(-1.0, 1.0, made.tau.shape)
+    else:
+        noise = table.noise * rng.normal(size=made.tau.shape)
+    tau, source = made.tau + noise, f'the run of table {table.number}'
+    recording = Recording(joints=made.joints, t=made.t, q=made.q, tau=tau, source=source)
     believed = load_robot('humanoid_arm', gravity=table.gravity)
     # masses of the description relative to the arm
     believed = believed.with_inertias(0.8 * believed.rigid_parameters)
@@ -223,7 +234,7 @@ def _repeat(
         arm = replace(result.arm, quasi_static=slow)
         found = [arm.torque(motion) for motion in tests]
         off = np.concatenate([f - t for f, t in zip(found, torques, strict=True)])
-        left = recording.tau - arm.torque(moved)
+        left = tau - arm.torque(made.truth)
         methods.append(MethodErrors(result, _size(off, table), _size(left, table)))
         if slow:
             shown = found[0]
@@ -240,32 +251,6 @@ def _repeat(
             shown,
         ),
     )
-
-
-def _recorded(
-    truth: ArmModel, table: PaperTable, run: Excitation, rng: np.random.Generator
-) -> tuple[Recording, Motion]:
-    """Simulate the arm; return the recording with the noise of the table, and the motion."""
-    # encoder of 18 bits
-    made = simulate(
-        truth,
-        run.motion(1000.0),
-        rng=rng,
-        sensors=Sensors(resolution=2 * np.pi / 2**18),
-        rate=_RATE,
-    )
-    if table.uniform:
-        noise = 2.0 * table.noise * rng.uniform(-1.0, 1.0, made.tau.shape)
-    else:
-        noise = table.noise * rng.normal(size=made.tau.shape)
-    recording = Recording(
-        joints=made.joints,
-        t=made.t,
-        q=made.q,
-        tau=made.tau + noise,
-        source=f'the run of table {table.number}',
-    )
-    return recording, made.truth
 
 
 def _size(errors: FloatArray, table: PaperTable) -> FloatArray:

@@ -78,7 +78,10 @@ def read_runs(
             f'{path}: velocities of {motors}, {LINK} and {REFERENCE}, and torques of {motors}, '
             'are needed; one of them was not recorded'
         )
-    stamps = [*map(_microseconds, recordings), *(np.rint(f[0] / 1000).astype(int) for f in felt)]
+    stamps = [  # [us]
+        *(np.rint(r.start_ns / 1000 + r.t * 1e6).astype(int) for r in recordings),
+        *(np.rint(f[0] / 1000).astype(int) for f in felt),
+    ]
     common = _common(path, (*names, *map(imu_topic, robot.links)), stamps)
     motor, link, asked = (
         recording.select(np.flatnonzero(np.isin(own, common)))
@@ -166,10 +169,6 @@ def _experiments(
                 found.append((max(stood, start - pause), start, int(part[-1]) + 1))
             stood = int(part[-1]) + 1 if len(part) else stood
     return found
-
-
-def _microseconds(recording: Recording) -> npt.NDArray[np.int64]:
-    return np.asarray(np.rint(recording.start_ns / 1000 + recording.t * 1e6), dtype=np.int64)
 
 
 def _common(

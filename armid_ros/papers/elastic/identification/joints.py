@@ -3,10 +3,16 @@
 """
 Springs of any arm, joint by joint, from encoders on both sides of its transmissions.
 
-The torque of a spring is that of inverse dynamics along the motion of the links. The twist has one
-part from compliance and one from free play. The rest of the motor torque is rotor inertia, viscous
-and Coulomb friction. Both models are linear, and slow motion is sufficient. The resonances follow
-from inertia and stiffness.
+The twist of motor against link is compliance times the torque in the transmission, plus half the
+backlash to the side of the flank that carries the load. If the torque is that of the motor, less
+friction and rotor acceleration, parts of the twist in proportion to sign of velocity, velocity and
+acceleration are fitted as well. Two pairs are not identifiable apart: Coulomb friction over
+stiffness and lost motion by direction of travel; viscous friction over stiffness and a delay
+between the encoders.
+
+For a whole arm, the torque of a spring is that of inverse dynamics along the motion of the links.
+The rest of the motor torque is rotor inertia, viscous and Coulomb friction. Both models are
+linear, and slow motion is sufficient. The resonances follow from inertia and stiffness.
 
 """
 

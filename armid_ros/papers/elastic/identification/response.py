@@ -7,7 +7,7 @@ Many runs at once, as arrays; the derivatives come from the complex step, f(x + 
 through every operation of the integration, friction included: the real part decides which joints
 slip and which stick. The scheme is the plant's: the Pade approximation (2, 2) of the exponential
 for motors, springs and links, the middle of the step for what is not linear. Squire and Trapp 1998
-for the complex step.
+for the complex step. The thirteen parameters that are tuned are a vector with names.
 
 """
 

@@ -11,10 +11,10 @@ from armid_ros.errors import IdentificationError
 from armid_ros.motion import ElasticRun, FloatArray
 from armid_ros.papers.elastic.identification.interaction import (
     decouple,
+    fit_joints,
     joint_signals,
     measured_response,
 )
-from armid_ros.papers.elastic.identification.physical import fit_joints
 from armid_ros.papers.elastic.identification.rigid import fit_rigid, RigidFit
 from armid_ros.papers.elastic.identification.subspace import StateSpace
 from armid_ros.papers.elastic.identification.tuning import tune, Tuning
@@ -94,7 +94,7 @@ def identify_two_inertia(
     steps: Sequence[ElasticRun] = (),
     loop: VelocityLoop | None = None,
     start: TwoLinkParameters | None = None,
-    progress: Callable[[float, str], None] | None = None,
+    progress: Callable[[float, str], None] = lambda share, what: None,
 ) -> TwoInertiaIdentification:
     """
     Identify a planar two-link arm with elastic joints.
@@ -123,12 +123,7 @@ def identify_two_inertia(
     """
     if steps and loop is None:
         raise IdentificationError('tuning to step responses needs the gains of their loop')
-
-    def tell(share: float, what: str) -> None:
-        if progress is not None:
-            progress(share, what)
-
-    tell(0.0, 'step 1: rigid arm')
+    progress(0.0, 'step 1: rigid arm')
     rigid = fit_rigid(runs)
     first, beta, gamma, rotor = rigid.estimate.values[:4].tolist()
     if not (first > 0.0 and beta > 0.0 and first * beta > gamma**2):
@@ -141,18 +136,18 @@ def identify_two_inertia(
     known = replace(
         drives, alpha=alpha, beta=beta, gamma=gamma, coulomb=rigid.coulomb / drives.gear
     )
-    tell(0.05, 'step 2: decoupled joints')
+    progress(0.05, 'step 2: decoupled joints')
     joints, systems = runs[0].motor.joints, decouple(runs, known)
-    tell(0.35, 'measured responses')
+    progress(0.35, 'measured responses')
     measured = _measured(runs, known)
-    tell(0.45, 'step 3: physical parameters')
+    progress(0.45, 'step 3: physical parameters')
     untuned, gain = fit_joints(systems, joints, known)
     tuning = None
     if steps and loop is not None:
-        tell(0.5, 'step 3: tuning to step responses')
+        progress(0.5, 'step 3: tuning to step responses')
         begin = untuned if start is None else replace(start, coulomb=untuned.coulomb)
         tuning = tune(steps, begin, loop)
-    tell(1.0, 'done')
+    progress(1.0, 'done')
     # poses that represent all poses
     angles = np.quantile(
         np.concatenate([run.link.q[:, 1] for run in runs]), np.linspace(0.02, 0.98, 25)

@@ -81,15 +81,6 @@ class Tuning:
         )
 
 
-def _prior() -> FloatArray:
-    """Return the prior of the logarithms of factors, rows of unit standard deviation, (4, 15)."""
-    rows = np.zeros((4, SIZE + 2))
-    for row, (link, motor) in enumerate(zip(_LINK, _MOTOR, strict=True)):
-        rows[row, link], rows[row, motor] = 1.0 / _SPLIT, -1.0 / _SPLIT
-    rows[[2, 3], [SIZE, SIZE + 1]] = 1.0 / _BELIEVED
-    return rows
-
-
 def tune(
     runs: Sequence[ElasticRun],
     start: TwoLinkParameters,
@@ -119,7 +110,10 @@ def tune(
         [np.hstack([run.motor.dq[:count], run.link.dq[:count]]) for run in runs], axis=1
     )
     base = np.concatenate([unpack(start), start.coulomb])
-    prior = _prior()
+    # prior of the logarithms of factors, rows of unit standard deviation
+    prior = np.zeros((4, SIZE + 2))
+    prior[[0, 1], _LINK], prior[[0, 1], _MOTOR] = 1.0 / _SPLIT, -1.0 / _SPLIT
+    prior[[2, 3], [SIZE, SIZE + 1]] = 1.0 / _BELIEVED
     weight = np.ones(measured.shape[-1])
     white = _Whitener.of(steps, start, weight)
 

@@ -163,7 +163,11 @@ class InteractionIdentifierNode(ArmidNode):
                 if machine:
                     self.identifier.take_other(sample.t, q)
                 elif self.identifier.take(sample.t, q, tau):
-                    self._publish(message)
+                    found = self.identifier.separate
+                    assert found is not None
+                    estimate = estimate_message(found.estimate, len(found.residual))
+                    estimate.header = message.header
+                    self._estimates.publish(estimate)
             except ArmidError as error:
                 self.complaints.say(topic, str(error))
 
@@ -179,7 +183,12 @@ class InteractionIdentifierNode(ArmidNode):
             signal = np.concatenate([part[order] for part in parts])
             if not np.all(np.abs(signal) <= LARGEST):
                 raise RecordingError('values that no machine reaches')
-            t = self._time(message)
+            stamp = message.header.stamp
+            if stamp.sec < 0 or stamp.nanosec >= 10**9:
+                raise RecordingError('an invalid timestamp')
+            if self._epoch is None:
+                self._epoch = stamp.sec
+            t = float(stamp.sec - self._epoch) + 1e-9 * stamp.nanosec
         except RecordingError as error:
             self.complaints.say(topic, f'{topic}: {error}')
             return []
@@ -189,21 +198,6 @@ class InteractionIdentifierNode(ArmidNode):
                 self.complaints.say(f'{topic} {reason}', f'{topic}: {_DAMAGED[reason]}')
         self._told[machine] = gate.rejected.copy()
         return good
-
-    def _publish(self, message: JointState) -> None:
-        found = self.identifier.separate
-        assert found is not None
-        estimate = estimate_message(found.estimate, len(found.residual))
-        estimate.header = message.header
-        self._estimates.publish(estimate)
-
-    def _time(self, message: JointState) -> float:
-        stamp = message.header.stamp
-        if stamp.sec < 0 or stamp.nanosec >= 10**9:
-            raise RecordingError('an invalid timestamp')
-        if self._epoch is None:
-            self._epoch = stamp.sec
-        return float(stamp.sec - self._epoch) + 1e-9 * stamp.nanosec
 
 
 def _named(found: Interaction | None, suffix: str = '') -> dict[str, object]:
