@@ -24,9 +24,6 @@ import numpy as np
 #: Number of points of the period at which a run may enter the trajectory.
 _ENTRIES = 48
 
-#: Factor by which the run-in is made longer, and how often.
-_LONGER, _TRIES = 1.5, 12
-
 
 @dataclass(frozen=True)
 class DesignProgress:
@@ -194,7 +191,7 @@ def placed(problem: DesignProblem, trajectory: FourierTrajectory) -> Excitation:
 
     run_in = settings.run_in
     last = ''
-    for _ in range(_TRIES):
+    for _ in range(12):  # run-ins, each longer than the last
         runs = [
             Excitation(
                 trajectory.shifted(k * trajectory.period / _ENTRIES),
@@ -208,7 +205,7 @@ def placed(problem: DesignProblem, trajectory: FourierTrajectory) -> Excitation:
             if not faults:
                 return run
             last = f'in {run_in:.3g} s, {faults}'
-        run_in *= _LONGER
+        run_in *= 1.5
     raise TrajectoryError(f'no way into the trajectory and out of it; {last}')
 
 

@@ -20,10 +20,6 @@ import numpy as np
 #: Factor on the duration of a stop that exceeds an acceleration limit, and the largest number of
 #: new plans. The last plan takes 4.8 times the duration.
 _LONGER, _TRIES = 1.25, 8
-#: Time of a small step, in units of its time at the velocity limit, and of the root of the step
-#: over the acceleration limit: 1.875 and 2.4 for a quintic from rest to rest. A quintic that
-#: begins with a speed needs 3.94 times the speed over the acceleration limit: at most 6 are taken.
-_STEP = 3.0
 
 
 @dataclass(frozen=True)
@@ -196,13 +192,15 @@ class MotionGate:
         velocity = np.where(np.isfinite(self.limits.velocity), self.limits.velocity, SLOW_VELOCITY)
         stopping = speed / self.limits.acceleration
         slowest = stopping + np.sqrt(stopping**2 + step / self.limits.acceleration)
-        return _STEP * float(max((step / velocity).max(), slowest.max()))
+        # time of a small step, in units of its time at the velocity limit, and of the root of the
+        # step over the acceleration limit: 1.875 and 2.4 for a quintic from rest to rest. A
+        # quintic that begins with a speed needs 3.94 times the speed over the acceleration limit:
+        # at most 6 are taken.
+        return 3.0 * float(max((step / velocity).max(), slowest.max()))
 
 
 #: Time for which an arm has to be measured at rest [s].
 _REST = 0.1
-#: Largest step of the set point to a blocked arm, in units of the tracking tolerance.
-_RELIEF = 3.0
 
 
 @dataclass(frozen=True)
@@ -294,7 +292,9 @@ class Ending:
             if np.abs(measured - set_point).max() <= tolerance:
                 return ending, None, ''
             try:
-                motion = self.gate.hold(set_point, measured, _RELIEF * tolerance)
+                # largest step of the set point to a blocked arm, in units of the tracking
+                # tolerance
+                motion = self.gate.hold(set_point, measured, 3.0 * tolerance)
             except TrajectoryError as error:
                 return ending, None, f'{self.reason}; the set point stays where it is: {error}'
             return replace(ending, last=motion, sent=now), motion, ''

@@ -19,16 +19,8 @@ import numpy.typing as npt
 AGREEING = 5
 #: Velocity below which a joint is at rest [rad/s or m/s].
 AT_REST = 0.02
-#: Range of the positions of a joint at rest, encoder noise included [rad or m].
-_STILL = 0.004
 #: Time for which a rejected position is counted [s].
 _WINDOW = 0.5
-#: Encoder noise, added to the change of position that the velocity limit allows [rad or m].
-_NOISE = 0.02
-#: Time of the position differences for a velocity [s]: noise of 0.0001 rad gives 0.01 rad/s.
-_DIFFERENCE = 0.01
-#: Transport delay: the difference of stamps may exceed that of arrivals by this time [s].
-_TRANSPORT = 0.1
 #: Largest valid position of a joint without position limits [rad or m].
 _FARTHEST = 1e4
 
@@ -171,7 +163,9 @@ class PoseMonitor:
             states = source.states
             for state in reversed(states):
                 passed = states[-1].arrived - state.arrived
-                if passed >= _DIFFERENCE:
+                # time of the position differences for a velocity [s]: noise of 0.0001 rad gives
+                # 0.01 rad/s
+                if passed >= 0.01:
                     velocity[source.joints] = (states[-1].q - state.q) / passed
                     break
         return velocity
@@ -207,7 +201,8 @@ class PoseMonitor:
             dq = np.nan_to_num(measured, posinf=0.0, neginf=0.0).mean(axis=0)
             moved = np.ptp(q, axis=0)
             for j, distance, velocity in zip(source.joints, moved, dq, strict=True):
-                speed = distance / covered if distance > _STILL else 0.0
+                # range of the positions of a joint at rest, encoder noise included [rad or m]
+                speed = distance / covered if distance > 0.004 else 0.0
                 speed = max(speed, abs(velocity))
                 if speed > AT_REST:
                     unit = f'{self._units[j]}/s'
@@ -248,9 +243,12 @@ class PoseMonitor:
         passed = state.arrived - last.arrived
         if state.stamp_ns and last.stamp_ns:
             between = (state.stamp_ns - last.stamp_ns) * 1e-9
-            passed = max(passed, min(between, passed + _TRANSPORT))
+            # transport delay: the difference of stamps may exceed that of arrivals by this time
+            # [s]
+            passed = max(passed, min(between, passed + 0.1))
         step = np.abs(state.q - last.q)
-        beyond = step - _NOISE - source.velocity * max(passed, 0.0)
+        # encoder noise, added to the change of position that the velocity limit allows [rad or m]
+        beyond = step - 0.02 - source.velocity * max(passed, 0.0)
         k = int(np.argmax(beyond))
         if not beyond[k] > 0.0:  # NaN if no position was known
             return ''

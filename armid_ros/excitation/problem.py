@@ -174,13 +174,6 @@ def whole_period(duration: float, n_periods: int, run_in: float, rate: float) ->
     return round(period * rate) / rate
 
 
-#: Assumed standard deviation of unknown torque noise, as a share of the torque limit.
-NOISE_SHARE = 0.01
-
-#: Number of samples for the information, per sample of the search.
-_EXACT = 6
-
-
 @dataclass(frozen=True)
 class DesignProblem:
     """
@@ -282,7 +275,8 @@ class DesignProblem:
 
     def recorded(self, trajectory: FourierTrajectory, n_periods: int) -> Information:
         """Return the information of a recording of some periods on the base parameters."""
-        count, margin = _EXACT * self.settings.samples, MARGIN * trajectory.n_joints
+        # number of samples for the information, per sample of the search
+        count, margin = 6 * self.settings.samples, MARGIN * trajectory.n_joints
         columns = self.columns(trajectory.with_margins(count))[margin:-margin]
         weight = self.settings.rate * trajectory.period * n_periods / count
         return self._information(columns, weight)
@@ -328,7 +322,8 @@ def _noise(arm: ArmModel, settings: DesignSettings) -> FloatArray:
     limit = arm.robot.torque_limit
     finite = np.isfinite(limit)
     fallback = limit[finite].max() if finite.any() else 100.0
-    return np.asarray(NOISE_SHARE * np.where(finite, limit, fallback))
+    # assumed standard deviation of unknown torque noise, as a share of the torque limit
+    return np.asarray(0.01 * np.where(finite, limit, fallback))
 
 
 def _joined(arm: ArmModel, rival: ArmModel) -> ArmModel:

@@ -18,8 +18,8 @@ from armid_ros.robots import CollisionModel
 from armid_ros.robots.robot import position_range
 import numpy as np
 
-#: Factors on the amplitudes of a trajectory, tried until it is feasible.
-_SHRINK, _SHRINKS = 0.75, 6
+#: How often the amplitudes of a trajectory are reduced until it is feasible.
+_SHRINKS = 6
 
 #: Samples per period and harmonic for the first check of a drawn trajectory.
 _SAMPLES = 40
@@ -183,12 +183,10 @@ def _shrunk(
         if clear(trajectory.q0[np.newaxis]) and clear(coarse):
             if not trajectory_faults(arm, limits, trajectory, clearance, margin):
                 return trajectory
-        trajectory = trajectory.scaled(_SHRINK)
+        trajectory = trajectory.scaled(0.75)
     return None
 
 
-#: Number of draws of a motion of single joints; each draw has another pose of the other joints.
-_DRAWS = 6
 #: Clearance between links [m], as excitations keep it.
 CLEARANCE = 0.01
 
@@ -239,7 +237,9 @@ class Template:
         """
         limits = Limits.of(arm.robot, speed=self.speed)
         faults = ''
-        for _ in range(_DRAWS):
+        # number of draws of a motion of single joints; each draw has another pose of the other
+        # joints
+        for _ in range(6):
             whole = random_feasible(
                 arm,
                 limits,

@@ -193,11 +193,6 @@ def slowed(path: Path, phase: float, duration: float, rate: float) -> Motion:
     )
 
 
-#: Largest accepted ratio of a measured torque to the largest predicted torque. The ratio is large
-#: because a description has no friction, and friction dominates the torque of a slow arm.
-_SURPRISING = 3.0
-
-
 class Rehearsal:
     """
     Results of a rehearsal.
@@ -255,7 +250,10 @@ class Rehearsal:
         for j, joint in enumerate(robot.joints):
             limit = robot.torque_limit[j]
             room = max(foreseen[j], 0.05 * limit if np.isfinite(limit) else 0.0)
-            if self.torque[j] > _SURPRISING * room > 0.0:
+            # largest accepted ratio of a measured torque to the largest predicted torque. The
+            # ratio is large because a description has no friction, and friction dominates the
+            # torque of a slow arm.
+            if self.torque[j] > 3.0 * room > 0.0:
                 took = f'{joint} took {self.torque[j]:.3g}'
                 surprises.append(f'{took}, and {foreseen[j]:.3g} N m were foreseen')
         worst = int(np.argmax(self.tracking))

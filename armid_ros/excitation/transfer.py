@@ -17,13 +17,6 @@ from armid_ros.robots import Robot
 import numpy as np
 import numpy.typing as npt
 
-#: Acceleration that is slow for any joint, used with `SLOW_VELOCITY` [rad/s^2 or m/s^2].
-_SLOW_ACCELERATION = 1.0
-#: Samples of a way at which its torque is checked; factor on its duration, and number of trials.
-_SAMPLES, _SLOWER, _TRIES = 200, 1.3, 20
-#: Tolerance beyond a position limit for a measured position [rad or m].
-_BEYOND = 0.01
-
 
 @dataclass(frozen=True)
 class Transfer:
@@ -141,7 +134,8 @@ class TransferPlanner:
             return Transfer(joints, np.array([0.0, shortest]), np.vstack([start, goal]))
         # a pose measured slightly beyond a limit is moved onto the limit
         inside = np.clip(start, self.limits.lower, self.limits.upper)
-        start = np.where(np.abs(start - inside) <= _BEYOND, inside, start)
+        # tolerance beyond a position limit for a measured position [rad or m]
+        start = np.where(np.abs(start - inside) <= 0.01, inside, start)
         for name, q in (('it would leave from', start), ('it would go to', goal)):
             fault = self.fault(q)
             if fault:
@@ -167,12 +161,13 @@ class TransferPlanner:
         t = np.append(0.0, np.cumsum(needed))
         transfer = Transfer(limits.joints, t, poses)
         transfer = transfer.lasting(max(transfer.duration, shortest))
-        for _ in range(_TRIES):
-            motion = transfer.at(np.linspace(0.0, transfer.duration, _SAMPLES))
+        for _ in range(20):  # durations, each longer than the last
+            # samples of a way at which its torque is checked
+            motion = transfer.at(np.linspace(0.0, transfer.duration, 200))
             violations = check_limits(limits, motion, self.arm.joint_torque(motion))
             if not violations:
                 return transfer
-            transfer = transfer.lasting(_SLOWER * transfer.duration)
+            transfer = transfer.lasting(1.3 * transfer.duration)
         raise TrajectoryError(f'no way to the trajectory keeps the limits: {violations[0]}')
 
     def fault(self, q: FloatArray) -> str:
@@ -279,10 +274,9 @@ def transfer_limits(
     run = Limits.of(robot, speed=speed, reserve=False, acceleration=acceleration)
     share = SPEED_CLASSES[speed] if isinstance(speed, str) else float(speed)
     slow = min(1.0, SPEED_CLASSES['slow'] / share)
+    # acceleration that is slow for any joint, used with `SLOW_VELOCITY` [rad/s^2 or m/s^2]
     return replace(
         run,
         velocity=np.minimum(run.velocity, np.maximum(slow * run.velocity, SLOW_VELOCITY)),
-        acceleration=np.minimum(
-            run.acceleration, np.maximum(slow * run.acceleration, _SLOW_ACCELERATION)
-        ),
+        acceleration=np.minimum(run.acceleration, np.maximum(slow * run.acceleration, 1.0)),
     )

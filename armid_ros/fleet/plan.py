@@ -38,9 +38,6 @@ from armid_ros.recording.reader import read_pieces
 from armid_ros.robots import load_robot, robot_from_urdf
 import numpy as np
 
-#: Sampling rates that differ by less than this share are treated as equal.
-_SAME_RATE = 0.02
-
 
 @dataclass(frozen=True)
 class FleetSettings:
@@ -97,7 +94,8 @@ def filters_at(filters: Conditioning, rate_hz: float, source: str) -> Conditioni
             f'{filters.cutoff_hz:.4g} Hz of its arm; set a lower one with --cutoff'
         )
     decimation = filters.decimation
-    if abs(rate_hz / filters.rate_hz - 1.0) > _SAME_RATE:
+    # sampling rates that differ by less than this share are treated as equal
+    if abs(rate_hz / filters.rate_hz - 1.0) > 0.02:
         decimation = max(1, round(rate_hz * filters.decimation / filters.rate_hz))
     return Conditioning(rate_hz, filters.cutoff_hz, decimation)
 

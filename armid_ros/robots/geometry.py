@@ -21,8 +21,6 @@ import coal
 import numpy as np
 import pinocchio as pin
 
-#: Without bodies, the last link is drawn to this many times the distance of its centre of mass.
-_BEYOND = 2.0
 _Meshes = dict[tuple[Path, tuple[float, ...]], tuple[coal.CollisionGeometry, ...]]
 #: Attributes of each kind of shape, and the default of those that have one.
 _SIZES = {
@@ -176,7 +174,9 @@ def sticks(model: pin.Model) -> list[tuple[int, FloatArray]]:
         carried = [k for k in range(1, model.njoints) if int(model.parents[k]) == joint]
         ends = [np.array(model.jointPlacements[k].translation) for k in carried]
         if joint and not ends:
-            ends = [_BEYOND * np.array(model.inertias[joint].lever)]
+            # without bodies, the last link is drawn to this many times the distance of its centre
+            # of mass
+            ends = [2.0 * np.array(model.inertias[joint].lever)]
         lines += [(joint, end) for end in ends]
     return lines
 

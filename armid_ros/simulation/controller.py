@@ -254,10 +254,6 @@ class GravityPD(Controller):
         object.__setattr__(self, 'feedback', feedback)
 
 
-#: Largest share of a motor's velocity that one sample of its loop may remove.
-_QUICKEST = 0.3
-
-
 @dataclass(frozen=True, eq=False)
 class VelocityLoop:
     """
@@ -336,11 +332,12 @@ class MotorControl(Controller):
         rotor[joints] = np.diag(springs.rotors)[:e]
         inertia = link + rotor
         gain = 2.0 * BANDWIDTH * inertia
+        # largest share of a motor's velocity that one sample of its loop may remove
         gain[joints] = np.minimum.reduce(
             [
                 gain[joints],
                 np.sqrt(springs.transmission.stiffness * link[joints]),
-                _QUICKEST * rotor[joints] / plant.dt,
+                0.3 * rotor[joints] / plant.dt,
             ]
         )
         return cls(VelocityLoop(gain, gain**2 / (4.0 * inertia)), plant.dt, plant)

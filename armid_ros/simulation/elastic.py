@@ -154,14 +154,12 @@ def make_elastic_arm(
     )
 
 
-#: Frequency band of the multisines [Hz], and their samples per second.
-_BAND, _RATE = (2.0, 100.0), 500.0
-#: Shortest duration of an experiment, pause between two experiments, and duration of a step [s].
-_EXPERIMENT, _STAND, _STEP = 4.0, 1.0, 0.5
+#: Samples per second of the multisines.
+_RATE = 500.0
+#: Pause between two experiments, and duration of a step [s].
+_STAND, _STEP = 1.0, 0.5
 #: Largest distance of a joint from its middle position [rad or m].
 _REACH = np.pi / 3.0
-#: Share of the velocity limits that a move to another pose uses during a multisine.
-_WAY = 0.25
 #: Number of poses tried before a TrajectoryError is raised.
 _TRIES = 1000
 
@@ -240,15 +238,18 @@ def multisine_course(
     samples = stand
     while True:
         there = _next_pose(robot, here, rng, clear, np.zeros(robot.n_joints))
-        needed = float(np.max(1.875 * np.abs(there - here) / (_WAY * velocity)))
-        count = round(max(_EXPERIMENT, needed) * _RATE)
+        # share of the velocity limits that a move to another pose uses during a multisine
+        needed = float(np.max(1.875 * np.abs(there - here) / (0.25 * velocity)))
+        # shortest duration of an experiment: 4 s
+        count = round(max(4.0, needed) * _RATE)
         samples += count + stand
         if samples > duration * _RATE:
             break
         x = np.arange(count)[:, np.newaxis] / count
         q = here + (there - here) * x**3 * (10.0 - 15.0 * x + 6.0 * x**2)
         on_top = np.minimum(1.0, np.minimum(x, 1.0 - x) / 0.05)
-        tau = on_top * multisine(count, 1.0 / _RATE, _BAND, torque * limit, rng)
+        # band of the multisine [Hz]
+        tau = on_top * multisine(count, 1.0 / _RATE, (2.0, 100.0), torque * limit, rng)
         parts.append((np.vstack([still + here, q]), np.vstack([still, tau])))
         here = there
     if not parts:

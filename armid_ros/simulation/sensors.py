@@ -16,9 +16,6 @@ import numpy as np
 import numpy.typing as npt
 import pinocchio as pin
 
-#: Extra samples beyond those that a reading depends on, for derivatives.
-_NEIGHBOURS = 8
-
 
 @dataclass(frozen=True, eq=False)
 class Sensors:
@@ -176,7 +173,8 @@ class RecentPast:
         self._plant = plant
         self._delay = delay
         memory = int(np.ceil(plant.sensing.reading_memory / plant.dt))
-        self._length = memory + delay + _NEIGHBOURS
+        # extra samples beyond those that a reading depends on, for derivatives
+        self._length = memory + delay + 8
         given = torque if plant.action.drive is None else plant.action.drive(torque)
         q, dq, _ = plant.motors(state)
         self._rows = np.stack([q, dq, np.zeros_like(q), given, torque])[:, np.newaxis]

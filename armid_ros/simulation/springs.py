@@ -22,9 +22,6 @@ from armid_ros.robots import Robot
 import numpy as np
 import numpy.typing as npt
 
-#: Natural frequency of a link on its stop, times the substep; low enough for the integration.
-_STOP = 0.1
-
 
 @dataclass(frozen=True, eq=False)
 class Elasticity:
@@ -134,7 +131,9 @@ class ElasticJoints:
             to_motors.T @ (none if x is None else x) @ to_motors
             for x in (action.inertia, action.damping)
         )
-        free, rate = 1.0 / np.diag(np.linalg.inv(mass)), _STOP * elasticity.substeps / dt
+        # natural frequency of a link on its stop, times the substep; low enough for the
+        # integration
+        free, rate = 1.0 / np.diag(np.linalg.inv(mass)), 0.1 * elasticity.substeps / dt
         rub = np.diag(np.broadcast_to(np.asarray(elasticity.link_damping, dtype=float), (n,)))
         # actions on the readings of the motors, which the springs do not change
         kept = [

@@ -156,9 +156,6 @@ def _support(shape: coal.CollisionGeometry, direction: FloatArray) -> FloatArray
 FLOOR = 'floor'
 #: Value of --floor for an arm without a floor.
 NO_FLOOR = 'none'
-#: A standing arm at zero reaches above its base plane at least this many times as far as below it.
-#: The wrist of a stretched small industrial arm hangs a third of its shoulder's height below.
-_ABOVE_TO_BELOW = 2.0
 
 
 @dataclass(frozen=True)
@@ -313,7 +310,10 @@ def _why_not_standing(collision: CollisionModel, up: FloatArray) -> str:
     ]
     link, below, _ = min(heights, key=lambda entry: entry[1])
     above = max(high for _, _, high in heights)
-    if above > 0.0 and above >= -_ABOVE_TO_BELOW * below:
+    # A standing arm at zero reaches above its base plane at least this many times as far as below
+    # it. The wrist of a stretched small industrial arm hangs a third of its shoulder's height
+    # below.
+    if above > 0.0 and above >= -2.0 * below:
         return ''
     return (
         f'with all joints at zero it reaches {max(above, 0.0):.2f} m above its base plane and '

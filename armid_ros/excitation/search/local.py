@@ -37,8 +37,8 @@ INTERRUPTED, OUT_OF_TIME = 'interrupted', 'time budget'
 #: Sharpness of the soft maximum: coarse while the cost improves, then fine.
 _SHARPNESS = (60.0, 300.0)
 
-#: Iterations of a round, and the gain of a round below which the search has converged.
-_ROUND, _SETTLED = 25, 0.005
+#: Iterations of a round.
+_ROUND = 25
 
 #: Rounds after which the worse half of the searches ends.
 _ROUNDS = 2
@@ -225,7 +225,8 @@ class _Branch:
         cost = self.search.offer(feasible)
         gain, self.cost = self.cost - cost, min(cost, self.cost)
         self.trajectory, self.box = feasible, min(2.0 * self.box, _BOX)
-        if gain < _SETTLED:
+        # gain of a round below which the search has converged
+        if gain < 0.005:
             self.left = 0 if self.sharpness == _SHARPNESS[-1] else self.left
             self.sharpness = _SHARPNESS[-1]
 

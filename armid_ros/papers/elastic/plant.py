@@ -131,8 +131,8 @@ def run_all(
 EXCITATION_RMS, WEAK = (60.0, 45.0), 0.15
 STEP_POSES = ((0.0, 0.0), (0.0, np.pi / 2), (0.0, np.pi / 4), (0.0, 3 * np.pi / 4))
 STEPS = ((1.0, 0.0), (0.0, 1.0), (1.0, -1.0), (1.0, 1.0))
-#: Step of experiments [s], and the band of their multisine [Hz].
-_DT, _BAND = 1e-3, (2.0, 100.0)
+#: Step of experiments [s].
+_DT = 1e-3
 
 
 def resonance_experiments(
@@ -168,7 +168,8 @@ def resonance_experiments(
         phase = 2.0 * np.pi * rng.random(len(size))
         ramp = np.minimum(t / 0.2, 1.0)
         velocity = ramp * 0.8 * np.cos(rate * t + phase)
-        torque = ramp * multisine(steps, _DT, _BAND, size, rng)
+        # band of the multisine [Hz]
+        torque = ramp * multisine(steps, _DT, (2.0, 100.0), size, rng)
         pose = np.pi / 3.0 * rng.uniform(-1.0, 1.0, len(size))
         experiments.append(Experiment(pose, velocity, torque))
     return experiments

@@ -24,9 +24,6 @@ from armid_ros.motion import FloatArray
 from armid_ros.recording import Recording
 import numpy as np
 
-#: Decrease of the misfit, in standard deviations of its noise, above which slack is significant.
-_LEAST_GAIN = 25.0
-
 
 @dataclass(frozen=True)
 class Slack:
@@ -52,7 +49,9 @@ class Slack:
     @property
     def seen(self) -> bool:
         """Whether the slack is significant."""
-        return self.gain > _LEAST_GAIN
+        # decrease of the misfit, in standard deviations of its noise, above which slack is
+        # significant
+        return self.gain > 25.0
 
 
 def find_slack(problem: Callable[[float], InteractionProblem]) -> Slack:
@@ -92,8 +91,6 @@ def find_slack(problem: Callable[[float], InteractionProblem]) -> Slack:
 
 #: Samples are averaged to about this rate [Hz], far above the frequencies of human motion.
 _RATE = 100.0
-#: Ratio of the mean square residual to the noise above which slack is fitted.
-_SIGN = 1.5
 
 
 @dataclass(frozen=True)
@@ -239,7 +236,8 @@ class OnlineInteraction:
         self.together = identify_interaction(self._problem(separate=False))
         self.separate = identify_interaction(self._problem(separate=True))
         assert self._slack_due is not None
-        if self.together.misfit < _SIGN * self.together.residual.size:
+        # ratio of the mean square residual to the noise above which slack is fitted
+        if self.together.misfit < 1.5 * self.together.residual.size:
             self.slack = None
         elif t >= self._slack_due:
             self._slack_due = t + self.settings.slack_period

@@ -28,10 +28,8 @@ import numpy.typing as npt
 
 #: Alternative topic of the motors.
 _OTHER_MOTOR = '/motor/joint_states'
-#: Least share of samples with a common timestamp on all topics.
-_SHARED = 0.9
-#: Time of rest between two experiments, and length of the shortest experiment [s].
-_STANDING, _SHORTEST = 0.1, 0.2
+#: Length of the shortest experiment [s].
+_SHORTEST = 0.2
 
 
 def read_runs(
@@ -157,7 +155,8 @@ def _experiments(
     t: FloatArray, moving: npt.NDArray[np.bool_], period: float
 ) -> list[tuple[int, int, int]]:
     """Return stretches of motion: last sample at rest, first sample of motion, and end."""
-    pause, shortest = round(_STANDING / period), round(_SHORTEST / period)
+    # time of rest between two experiments [s]
+    pause, shortest = round(0.1 / period), round(_SHORTEST / period)
     found = []
     cuts = np.flatnonzero(np.diff(t) > 1.5 * period) + 1
     for rows in np.split(np.arange(len(t)), cuts):
@@ -176,7 +175,8 @@ def _common(
 ) -> npt.NDArray[np.int64]:
     """Return the timestamps that all topics have in common [us]; some messages may be lost."""
     common: npt.NDArray[np.int64] = reduce(np.intersect1d, stamps)
-    if len(common) < _SHARED * max(map(len, stamps)):
+    # least share of samples with a common timestamp on all topics
+    if len(common) < 0.9 * max(map(len, stamps)):
         counts = ', '.join(f'{name} ({len(s)})' for name, s in zip(names, stamps, strict=True))
         raise RecordingError(
             f'{path}: of the samples of {counts} only {len(common)} have equal timestamps; '

@@ -35,14 +35,6 @@ from scipy.signal import butter, sosfiltfilt
 IntArray = npt.NDArray[np.intp]
 
 CUTOFF = 8.0
-#: Length of the bootstrap blocks [s], and number of draws.
-_BLOCK, _DRAWS = 0.5, 400
-#: Torque range in which the flank changes, as a share of the median torque.
-_MESHING = 0.05
-#: Velocity below which a joint is at rest, as a share of the largest velocity.
-_STANDING = 0.02
-#: Least number of flank changes for an estimate of free play.
-_REVERSALS = 4
 
 
 @dataclass(frozen=True, eq=False)
@@ -130,11 +122,13 @@ def fit_transmission(records: Sequence[TwoEncoders], rng: np.random.Generator) -
         raise IdentificationError('the joint hardly moves: its stiffness cannot be found')
     table, twist, blocks = _joined(pieces)
     reversals = sum(count for _, _, _, count in pieces)
-    draws = [rng.choice(len(blocks), len(blocks)) for _ in range(_DRAWS)]
+    # number of draws of bootstrap blocks
+    draws = [rng.choice(len(blocks), len(blocks)) for _ in range(400)]
     bare = np.delete(table, 1, axis=1)
     found_alone, spread_alone = _drawn(bare, twist, blocks, draws)
     alone = _inverse(found_alone[0], spread_alone[:, 0])
-    if reversals < _REVERSALS:
+    # least number of flank changes for an estimate of free play
+    if reversals < 4:
         found, spread = (np.insert(x, 1, np.nan, axis=-1) for x in (found_alone, spread_alone))
         backlash, correlation = (np.nan, -np.inf, np.inf), np.nan
         explained = _explained(bare, twist, found_alone)
@@ -161,11 +155,13 @@ def _columns(record: TwoEncoders) -> tuple[FloatArray, FloatArray, FloatArray, i
         sosfiltfilt(sections, x) for x in (record.motor, record.link, record.torque)
     )
     velocity = np.gradient(motor, record.dt)
-    moving = np.abs(velocity) > _STANDING * np.abs(velocity).max()
+    # velocity below which a joint is at rest, as a share of the largest velocity
+    moving = np.abs(velocity) > 0.02 * np.abs(velocity).max()
     ends = round(0.3 / record.dt)
     moving[:ends] = moving[-ends:] = False
     moving &= np.arange(len(moving)) % max(round(0.25 / CUTOFF / record.dt), 1) == 0
-    flank = np.tanh(torque / (_MESHING * np.median(np.abs(torque))))
+    # torque range in which the flank changes, as a share of the median torque
+    flank = np.tanh(torque / (0.05 * np.median(np.abs(torque))))
     beside = [] if record.carried else [np.sign(velocity), np.gradient(velocity, record.dt)]
     own = np.column_stack([torque, flank, velocity, *beside, motor, np.ones(len(motor))])
     changes = int(np.count_nonzero(np.diff(np.sign(torque[moving]))))
@@ -187,7 +183,8 @@ def _joined(
         table[part, :shared] = own[:, :shared]
         table[part, shared + 2 * number : shared + 2 * number + 2] = own[:, shared:]
         twist[part] = values
-        labels = (t / _BLOCK).astype(int)
+        # bootstrap blocks of 0.5 s
+        labels = (t / 0.5).astype(int)
         blocks += [at + np.flatnonzero(labels == label) for label in np.unique(labels)]
         at += len(values)
     return table, twist, blocks
@@ -230,8 +227,6 @@ def _explained(table: FloatArray, twist: FloatArray, values: FloatArray) -> floa
 
 #: Shortest stretch without a pause that is used [s].
 _SHORTEST = 2.0
-#: Least R^2 of the twist for an estimate of stiffness.
-_EXPLAINED = 0.9
 
 
 @dataclass(frozen=True, eq=False)
@@ -262,7 +257,8 @@ class SpringEstimate:
     def informative(self) -> bool:
         """Whether the twist follows the load, so that the stiffness is identifiable."""
         fit = self.transmission
-        return fit.explained > _EXPLAINED and bool(np.isfinite(fit.stiffness).all())
+        # least R^2 of the twist for an estimate of stiffness
+        return fit.explained > 0.9 and bool(np.isfinite(fit.stiffness).all())
 
     @property
     def antiresonance(self) -> float:

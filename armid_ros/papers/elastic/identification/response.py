@@ -61,7 +61,6 @@ def parameter_names(joints: tuple[str, ...]) -> tuple[ParameterName, ...]:
 DualArray = npt.NDArray[Any]
 #: Imaginary step: its square is lost in rounding, so the derivative has no truncation error.
 _STEP = 1e-30
-_ROUNDS = 16
 #: Number of integration steps per sample.
 _SUBSTEPS = 2
 
@@ -275,7 +274,7 @@ def _friction(
     # response: change of velocity at the end of the step per torque; free: what that velocity is
     # without friction; modes, a first guess: 1 slips forwards, -1 backwards, 0 sticks
     modes = modes.copy()
-    for _ in range(_ROUNDS):
+    for _ in range(16):
         stuck = modes == 0
         system = np.where(stuck[:, :, np.newaxis], response, np.eye(2))
         right = np.where(stuck, free, level * modes)

@@ -38,12 +38,11 @@ from scipy.optimize import least_squares
 
 #: Places of dl and dm of both joints in the parameter vector, and of the Coulomb torques after it.
 _LINK, _MOTOR = (7, 8), (9, 10)
-#: Prior standard deviations of the friction ratio and of the Coulomb torques (logarithms).
-_SPLIT, _BELIEVED = np.log(2.0), 0.1
+#: Prior standard deviation of the logarithm of the friction ratio.
+_SPLIT = np.log(2.0)
 #: Standard deviations of the initial vibration: twist of the springs [rad] and velocity of the
 #: links [rad/s], some tenths of a second after a step of 1 rad/s.
 _RINGING = np.array([1e-5, 1e-5, 1e-3, 1e-3])
-_ROUNDS = 3
 
 
 @dataclass(frozen=True, eq=False)
@@ -113,7 +112,8 @@ def tune(
     # prior of the logarithms of factors, rows of unit standard deviation
     prior = np.zeros((4, SIZE + 2))
     prior[[0, 1], _LINK], prior[[0, 1], _MOTOR] = 1.0 / _SPLIT, -1.0 / _SPLIT
-    prior[[2, 3], [SIZE, SIZE + 1]] = 1.0 / _BELIEVED
+    # the standard deviation of the logarithms of the Coulomb torques is 0.1
+    prior[[2, 3], [SIZE, SIZE + 1]] = 10.0
     weight = np.ones(measured.shape[-1])
     white = _Whitener.of(steps, start, weight)
 
@@ -133,7 +133,7 @@ def tune(
         return np.vstack([slopes.reshape(-1, len(base)), prior])
 
     factors = np.zeros(len(base))
-    for _ in range(_ROUNDS):  # from the second pass on, every sensor is weighted by its own noise
+    for _ in range(3):  # from the second pass on, every sensor is weighted by its own noise
         fit = least_squares(
             residual, factors, jac=jacobian, method='trf', x_scale='jac', xtol=1e-9
         )

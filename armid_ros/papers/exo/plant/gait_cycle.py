@@ -46,8 +46,8 @@ import numpy as np
 import numpy.typing as npt
 import pinocchio as pin
 
-#: Integration steps per cycle, and number of cycles before the returned one.
-_STEPS, _SETTLING = 2400, 2
+#: Integration steps per cycle.
+_STEPS = 2400
 _PLANE = np.array([0, 2])
 
 
@@ -271,7 +271,7 @@ def _walk(
 
     h, x = cycle / _STEPS, start
     states, rates = np.empty((_STEPS + 1, 8)), np.empty((_STEPS + 1, 8))
-    for _ in range(1 + _SETTLING):
+    for _ in range(3):  # the last one is returned
         for step in range(_STEPS):
             states[step] = x
             rates[step], x = runge_kutta(rate, 2 * step, h, x)
