@@ -94,7 +94,16 @@ class Objective:
             by_w = 2.0 * weight * (w @ by_matrix)
             weights[:, :, order] = by_w.reshape(*motion.q.shape, -1) * inverse_noise
             by_state = self._state_gradient(motion, _weighted(state, weights), weights)
-            return by_state + self._past_gradient(x, past, weights)
+            # differentiate sum(weights * columns) by the coefficients, for columns of the past
+            total = np.zeros_like(x)
+            if past:
+                weights = weights[:, :, -sum(block.shape[2] for block in past) :]
+                here = _weighted(past, weights)
+                for index in np.ndindex(*x.shape):
+                    moved = x.copy()
+                    moved[index] += _STEP
+                    total[index] = (_weighted(self._by_past(moved), weights) - here).sum() / _STEP
+            return by_state + total
 
         return cost, gradient
 
@@ -112,20 +121,6 @@ class Objective:
                 t = np.tile(motion.t, len(joints))
                 there = self._by_state(replace(motion, t=t, q=q, dq=dq, ddq=ddq))
                 total[joints] += (_weighted(there, weights) - here) @ basis / _STEP
-        return total
-
-    def _past_gradient(
-        self, x: FloatArray, past: Sequence[FloatArray], weights: FloatArray
-    ) -> FloatArray:
-        """Differentiate sum(weights * columns) by the coefficients, for columns of the past."""
-        total = np.zeros_like(x)
-        if past:
-            weights = weights[:, :, -sum(block.shape[2] for block in past) :]
-            here = _weighted(past, weights)
-            for index in np.ndindex(*x.shape):
-                moved = x.copy()
-                moved[index] += _STEP
-                total[index] = (_weighted(self._by_past(moved), weights) - here).sum() / _STEP
         return total
 
     def _by_state(self, motion: Motion) -> list[FloatArray]:

@@ -139,7 +139,17 @@ def identify_two_inertia(
     progress(0.05, 'step 2: decoupled joints')
     joints, systems = runs[0].motor.joints, decouple(runs, known)
     progress(0.35, 'measured responses')
-    measured = _measured(runs, known)
+    t = runs[0].motor.t
+    dt = float(t[-1] - t[0]) / (len(t) - 1)
+    window = min(1.0, min(len(run.motor) for run in runs) * dt)
+    found: list[MeasuredJoint] = []
+    for joint in range(2):
+        signals = joint_signals(runs, known, joint, decoupled=True)
+        alone = joint_signals(runs, known, joint, decoupled=False)
+        frequency, decoupled = measured_response(signals, dt, window=window)
+        _, coupled = measured_response(alone, dt, window=window)
+        found.append(MeasuredJoint(frequency, decoupled[:, :, 0], coupled[:, :, 0]))
+    measured = found[0], found[1]
     progress(0.45, 'step 3: physical parameters')
     untuned, gain = fit_joints(systems, joints, known)
     tuning = None
@@ -155,19 +165,3 @@ def identify_two_inertia(
     return TwoInertiaIdentification(
         joints, rigid, measured, systems, untuned, gain, len(runs), angles, tuning
     )
-
-
-def _measured(
-    runs: Sequence[ElasticRun], known: TwoLinkParameters
-) -> tuple[MeasuredJoint, MeasuredJoint]:
-    t = runs[0].motor.t
-    dt = float(t[-1] - t[0]) / (len(t) - 1)
-    window = min(1.0, min(len(run.motor) for run in runs) * dt)
-    found = []
-    for joint in range(2):
-        signals = joint_signals(runs, known, joint, decoupled=True)
-        alone = joint_signals(runs, known, joint, decoupled=False)
-        frequency, decoupled = measured_response(signals, dt, window=window)
-        _, coupled = measured_response(alone, dt, window=window)
-        found.append(MeasuredJoint(frequency, decoupled[:, :, 0], coupled[:, :, 0]))
-    return found[0], found[1]
