@@ -13,7 +13,7 @@ from __future__ import annotations
 
 from armid_ros.motion import ElasticRun, FloatArray
 from armid_ros.papers.elastic.identification.response import unpack
-from armid_ros.papers.elastic.identification.tuning import tune
+from armid_ros.papers.elastic.identification.three_steps import tune
 from armid_ros.papers.elastic.plant import (
     ElasticSensors,
     EXCITATION_RMS,

@@ -10,7 +10,12 @@ with every `Obstacle`. An `Excitation` runs the trajectory from rest to rest.
 """
 
 from armid_ros.excitation.design import Design, design, DesignProgress, evaluate
-from armid_ros.excitation.feasibility import excitation_faults, Faults, trajectory_faults
+from armid_ros.excitation.feasibility import (
+    excitation_faults,
+    Faults,
+    random_feasible,
+    trajectory_faults,
+)
 from armid_ros.excitation.fourier import FourierTrajectory
 from armid_ros.excitation.gate import Ending, MotionGate
 from armid_ros.excitation.geometry.clearance import Approach, ClearanceModel
@@ -31,7 +36,6 @@ from armid_ros.excitation.limits import (
 )
 from armid_ros.excitation.pose_monitor import JointState, PoseMonitor
 from armid_ros.excitation.problem import DesignProblem, DesignSettings, TARGETS, whole_period
-from armid_ros.excitation.random_trajectory import random_feasible
 from armid_ros.excitation.run import plan_run, Run
 from armid_ros.excitation.scene import CollisionScene, Fitness, fitness
 from armid_ros.excitation.schedule import Excitation, load_excitation, save_excitation

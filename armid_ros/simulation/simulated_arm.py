@@ -10,8 +10,7 @@ from dataclasses import dataclass, replace
 from armid_ros.arm import ArmModel
 from armid_ros.errors import ModelError
 from armid_ros.motion import FloatArray
-from armid_ros.simulation.closed_loop import command, run, Trace
-from armid_ros.simulation.compiled import CompiledLoop
+from armid_ros.simulation.closed_loop import command, CompiledLoop, run, Trace
 from armid_ros.simulation.controller import ComputedTorque, Controller, MotorControl, Targets
 from armid_ros.simulation.plant import Plant, State
 from armid_ros.simulation.reference import Course, Reference

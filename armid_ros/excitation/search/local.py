@@ -19,12 +19,11 @@ from functools import lru_cache
 import math
 import time
 
-from armid_ros.excitation.feasibility import trajectory_faults
+from armid_ros.excitation.feasibility import random_feasible, trajectory_faults
 from armid_ros.excitation.fourier import FourierTrajectory
 from armid_ros.excitation.geometry.clearance import ClearanceModel
 from armid_ros.excitation.limits import Violation
 from armid_ros.excitation.problem import DesignProblem
-from armid_ros.excitation.random_trajectory import random_feasible
 from armid_ros.excitation.search.functions import Constraints, Objective, Part
 from armid_ros.motion import FloatArray
 from armid_ros.robots.robot import position_range

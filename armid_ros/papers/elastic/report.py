@@ -25,8 +25,7 @@ from armid_ros.papers.elastic.identification.response import (
     velocities,
 )
 from armid_ros.papers.elastic.identification.rigid import CUTOFF, RigidFit
-from armid_ros.papers.elastic.identification.three_steps import TwoInertiaIdentification
-from armid_ros.papers.elastic.identification.tuning import Tuning
+from armid_ros.papers.elastic.identification.three_steps import Tuning, TwoInertiaIdentification
 from armid_ros.report.blocks import (
     ContentSection,
     DataTable,

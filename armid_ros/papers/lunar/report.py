@@ -10,8 +10,7 @@ from typing import Any
 
 from armid_ros.identification.fitting.identifiability import HALF_WIDTH
 from armid_ros.motion import FloatArray
-from armid_ros.papers.lunar.paper import LOAD
-from armid_ros.papers.lunar.reproduction import Composite, Repeated, Reproduction
+from armid_ros.papers.lunar.reproduction import Composite, LOAD, Repeated, Reproduction
 from armid_ros.report.blocks import ContentSection, DataTable, Fold, Panels, Paragraph
 from armid_ros.report.charts import Chart, Series, thinned
 from armid_ros.report.notation import digits, measured

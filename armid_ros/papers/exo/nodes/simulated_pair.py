@@ -18,7 +18,7 @@ from armid_ros.nodes.running.process import run
 from armid_ros.nodes.running.real_time import RealTime
 from armid_ros.papers.exo.plant.gait import read_gait
 from armid_ros.papers.exo.plant.leg_pair import leg_pair
-from armid_ros.papers.exo.plant.simulated_pair import SimulatedPair
+from armid_ros.papers.exo.plant.torque_driven import SimulatedPair
 import numpy as np
 from rclpy.time import Time
 from sensor_msgs.msg import JointState

@@ -12,7 +12,7 @@ from armid_ros.papers.elastic.identification.response import (
     unpack,
     velocities,
 )
-from armid_ros.papers.elastic.identification.tuning import tune, Tuning
+from armid_ros.papers.elastic.identification.three_steps import tune, Tuning
 from armid_ros.papers.elastic.plant import ElasticSensors, run_elastic
 from armid_ros.robots.two_link import two_link_set
 from armid_ros.simulation.elastic import two_link_loop, two_link_plant
