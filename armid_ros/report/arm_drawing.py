@@ -36,26 +36,16 @@ _POINT = 1e-3
 _LINE = 16.0
 
 
-def view(azimuth: float, elevation: float) -> FloatArray:
-    """
-    Return the directions right, up and towards the eye, as seen without perspective, shape (3, 3).
-
-    Parameters
-    ----------
-    azimuth : float
-        Direction of the eye about z, from x [rad].
-    elevation : float
-        Height of the eye over the horizon [rad].
-
-    """
+def _view(azimuth: float, elevation: float) -> FloatArray:
+    """Return right, up and towards the eye (3, 3), for azimuth and height of the eye [rad]."""
     (sa, ca), (se, ce) = ((np.sin(x), np.cos(x)) for x in (azimuth, elevation))
     return np.array([[-sa, ca, 0.0], [-ca * se, -sa * se, ce], [ca * ce, sa * ce, se]])
 
 
 #: From the left, x to the right and z up.
-SIDE = view(-np.pi / 2.0, 0.0)
+SIDE = _view(-np.pi / 2.0, 0.0)
 #: From the front right and above.
-CORNER = view(np.radians(-55.0), np.radians(18.0))
+CORNER = _view(np.radians(-55.0), np.radians(18.0))
 
 
 @dataclass(frozen=True)
