@@ -93,38 +93,6 @@ def find_slack(problem: Callable[[float], InteractionProblem]) -> Slack:
 _RATE = 100.0
 
 
-@dataclass(frozen=True)
-class InteractionSettings:
-    """
-    Settings of the online identification of springs.
-
-    Attributes
-    ----------
-    memory : float
-        Length of the time window of the estimate [s].
-    period : float
-        Time between two estimates [s].
-    slack_period : float
-        Time between two fits of slack, which need several estimates [s].
-    inertias : {'known', 'free'}
-        Whether the inertias of the machine are taken from its description or estimated.
-
-    """
-
-    memory: float = 10.0
-    period: float = 2.0
-    slack_period: float = 10.0
-    inertias: Inertias = 'known'
-
-    def __post_init__(self) -> None:
-        """Raise IdentificationError if the times are inconsistent."""
-        if not (self.memory >= 3.0 and 0.0 < self.period <= self.memory and self.slack_period > 0):
-            raise IdentificationError(
-                f'a memory of {self.memory:g} s and estimates every {self.period:g} s: the memory '
-                'has to be at least 3 s and no shorter than the time between estimates'
-            )
-
-
 @dataclass
 class _Averages:
     """Means of successive samples at the averaged rate."""
@@ -166,8 +134,19 @@ class OnlineInteraction:
     ----------
     machines : TiedMachines
         Both machines, and the attachment points of the springs.
-    settings : InteractionSettings
-        Time window and periods.
+    memory : float
+        Length of the time window of the estimate [s].
+    period : float
+        Time between two estimates [s].
+    slack_period : float
+        Time between two fits of slack, which need several estimates [s].
+    inertias : {'known', 'free'}
+        Whether the inertias of the machine are taken from its description or estimated.
+
+    Raises
+    ------
+    IdentificationError
+        If the times are inconsistent.
 
     Attributes
     ----------
@@ -179,10 +158,23 @@ class OnlineInteraction:
 
     """
 
-    def __init__(self, machines: TiedMachines, settings: InteractionSettings) -> None:
-        self.machines, self.settings = machines, settings
-        self._own = _Averages(self.settings.memory)
-        self._far = _Averages(self.settings.memory)
+    def __init__(
+        self,
+        machines: TiedMachines,
+        *,
+        memory: float = 10.0,
+        period: float = 2.0,
+        slack_period: float = 10.0,
+        inertias: Inertias = 'known',
+    ) -> None:
+        if not (memory >= 3.0 and 0.0 < period <= memory and slack_period > 0.0):
+            raise IdentificationError(
+                f'a memory of {memory:g} s and estimates every {period:g} s: the memory has to be '
+                'at least 3 s and no shorter than the time between estimates'
+            )
+        self.machines, self._inertias = machines, inertias
+        self._memory, self._period, self._slack_period = memory, period, slack_period
+        self._own, self._far = _Averages(memory), _Averages(memory)
         self.reset()
 
     def reset(self) -> None:
@@ -227,12 +219,12 @@ class OnlineInteraction:
 
         """
         self._own.take(t, np.concatenate([q, tau]))
-        if self._due is None or t < self._due - 2.0 * self.settings.memory:
-            self._due = t + self.settings.memory
+        if self._due is None or t < self._due - 2.0 * self._memory:
+            self._due = t + self._memory
             self._slack_due = self._due
         if t < self._due:
             return False
-        self._due = t + self.settings.period
+        self._due = t + self._period
         self.together = identify_interaction(self._problem(separate=False))
         self.separate = identify_interaction(self._problem(separate=True))
         assert self._slack_due is not None
@@ -240,7 +232,7 @@ class OnlineInteraction:
         if self.together.misfit < 1.5 * self.together.residual.size:
             self.slack = None
         elif t >= self._slack_due:
-            self._slack_due = t + self.settings.slack_period
+            self._slack_due = t + self._slack_period
             self.slack = find_slack(lambda slack: self._problem(separate=False, slack=slack))
         return True
 
@@ -264,7 +256,7 @@ class OnlineInteraction:
             self.machines,
             own,
             far,
-            inertias=self.settings.inertias,
+            inertias=self._inertias,
             separate=separate,
             slack=slack,
         )

@@ -24,7 +24,7 @@ from armid_ros.nodes.parameters.table import NodeParameter
 from armid_ros.nodes.qos import LATCHED, MatchedSubscription
 from armid_ros.nodes.running.process import run
 from armid_ros.papers.exo.plant.leg_pair import leg_pair
-from armid_ros.papers.exo.springs import InteractionSettings, OnlineInteraction
+from armid_ros.papers.exo.springs import OnlineInteraction
 from diagnostic_msgs.msg import DiagnosticStatus
 import numpy as np
 from sensor_msgs.msg import JointState
@@ -74,13 +74,9 @@ class InteractionIdentifierNode(ArmidNode):
         """Identify the ties of the shipped leg pair."""
         super().__init__('interaction_identifier', **kwargs)
         pair = leg_pair()
-        settings = InteractionSettings(
-            self.value('memory'),
-            self.value('period'),
-            self.value('slack_period'),
-            self.value('inertias'),
-        )
-        self.identifier = OnlineInteraction(pair.machines, settings)
+        names = ('memory', 'period', 'slack_period', 'inertias')
+        settings = {name: self.value(name) for name in names}
+        self.identifier = OnlineInteraction(pair.machines, **settings)
         self.received = 0
         self._estimates = self.create_publisher(ParameterEstimate, '~/estimate', LATCHED)
         self._joints = pair.robot.joints, pair.other.joints
