@@ -112,7 +112,13 @@ class PoseMonitor:
 
     def update(self, message: JointState, now: float) -> None:
         """Update the filter with the joint state of a message that arrived at time `now` [s]."""
-        source = self._source(message.names)
+        names, joints = message.names, self.pose.joints
+        if names not in self._sources:
+            own = [(k, joints.index(name)) for k, name in enumerate(names) if name in joints]
+            columns, indices = np.array(own, dtype=int).reshape(-1, 2).T
+            limits = (limit[indices] for limit in (self._lower, self._upper, self._velocity))
+            self._sources[names] = _Source(columns, indices, *limits)
+        source = self._sources[names]
         if not len(source.joints):
             return
         q, dq = (
@@ -209,16 +215,6 @@ class PoseMonitor:
                     return f"joint '{self.pose.joints[j]}' moves at {speed:.2g} {unit}"
             decided.update(source.joints.tolist())
         return '' if len(decided) == len(self.pose.joints) else None
-
-    def _source(self, names: tuple[str, ...]) -> _Source:
-        if names in self._sources:
-            return self._sources[names]
-        joints = self.pose.joints
-        own = [(column, joints.index(name)) for column, name in enumerate(names) if name in joints]
-        columns, indices = np.array(own, dtype=int).reshape(-1, 2).T
-        limits = (limit[indices] for limit in (self._lower, self._upper, self._velocity))
-        source = self._sources[names] = _Source(columns, indices, *limits)
-        return source
 
     def _outside(self, source: _Source, q: FloatArray) -> str:
         """Return a message if a position is not finite or is outside the limits."""
