@@ -298,20 +298,18 @@ class SimulatedArm:
         q, dq, tau = (row[np.newaxis] for row in self._past.latest())
         q, dq, tau = self.sensors.measure(q, dq, tau, dt, self.rng, self._previous)
         self._previous = q[0]
-        link = None if self.plant.springs is None else self._read_links(dt)
-        return Sample(state.steps, state.t, q[0], dq[0], tau[0], link)
-
-    def _read_links(self, dt: float) -> LinkSample:
-        """Return the readings on the link side of the springs."""
-        state, targets, row = self._state, self._targets, self._row
-        q, dq = state.q[np.newaxis], state.dq[np.newaxis]
-        none = np.zeros_like(q)
-        q, dq, _ = self.sensors.measure(q, dq, none, dt, self.rng, self._previous_link)
-        self._previous_link = q[0]
+        if self.plant.springs is None:
+            return Sample(state.steps, state.t, q[0], dq[0], tau[0])
+        # on the link side of the springs
+        at, speed, none = state.q[np.newaxis], state.dq[np.newaxis], np.zeros((1, len(state.q)))
+        at, speed, _ = self.sensors.measure(at, speed, none, dt, self.rng, self._previous_link)
+        self._previous_link = at[0]
         felt = self.accelerometers.read(state.q, state.dq, state.ddq)
         if np.any(self.sensors.acceleration_noise):
             felt = felt + self.sensors.acceleration_noise * self.rng.standard_normal(felt.shape)
-        return LinkSample(q[0], dq[0], state.ddq, felt, targets.q[row], targets.dq[row])
+        asked = self._targets.q[self._row], self._targets.dq[self._row]
+        link = LinkSample(at[0], speed[0], state.ddq, felt, *asked)
+        return Sample(state.steps, state.t, q[0], dq[0], tau[0], link)
 
     def _begin(self, reference: Reference, steps: int) -> None:
         """Put the arm on a reference without a past."""

@@ -214,14 +214,23 @@ def find_floor(
     """
     robot = collision.robot
     up = vertical(robot.gravity)
+    if given and given.strip().lower() == NO_FLOOR:
+        return Floor(None, up, 'given')
     if given:
-        return Floor(_height(given), up, 'given')
+        try:
+            height = float(given)
+        except ValueError:
+            height = math.nan
+        if not math.isfinite(height):
+            raise TrajectoryError(
+                f"floor: a height above the origin of the base [m], or {NO_FLOOR}; not '{given}'"
+            )
+        return Floor(height, up, 'given')
     if surroundings:
         return Floor(None, up, 'environment')
     mounting = read_mounting(robot)
     if mounting is not None:
-        height, path = mounting
-        return Floor(height, up, path.name)
+        return Floor(mounting[0], up, mounting[1].name)
     reason = _why_not_standing(collision, up)
     if reason:
         raise TrajectoryError(
@@ -273,20 +282,6 @@ def floor_obstacles(
     rpy = (-math.asin(float(np.clip(y, -1.0, 1.0))), math.atan2(x, z), 0.0)
     position = tuple(floor.height * floor.up)
     return (Obstacle(FLOOR, 'plane', (), position, rpy, ignore=touching),)
-
-
-def _height(text: str) -> float | None:
-    if text.strip().lower() == NO_FLOOR:
-        return None
-    try:
-        height = float(text)
-    except ValueError:
-        height = math.nan
-    if not math.isfinite(height):
-        raise TrajectoryError(
-            f"floor: a height above the origin of the base [m], or {NO_FLOOR}; not '{text}'"
-        )
-    return height
 
 
 def _why_not_standing(collision: CollisionModel, up: FloatArray) -> str:

@@ -71,12 +71,12 @@ def elastic_report(
         Files, versions, settings, seed.
 
     """
-    sections: list[Section] = [verdict(result), _responses_section(result)]
+    sections: list[Section] = [verdict(result), responses_section(result)]
     if result.tuning is not None:
-        sections.append(_steps_section(result.tuning))
+        sections.append(steps_section(result.tuning))
     sections += [
         _parameters_section(result, known, source),
-        _rigid_section(result.rigid),
+        rigid_section(result.rigid),
         Origin(provenance),
     ]
     steps = 0 if result.tuning is None else result.tuning.measured.shape[1]
@@ -97,7 +97,7 @@ def verdict(result: TwoInertiaIdentification) -> VerdictSection:
     interval = ' (95 %)' if result.tuning is not None else ''
     sentences = [f'The joint stiffness is {" and ".join(springs)}{interval}.']
     poor = [
-        joint for k, joint in enumerate(result.joints) if _decibels_apart(result, k) > _CLOSE_DB
+        joint for k, joint in enumerate(result.joints) if decibels_apart(result, k) > _CLOSE_DB
     ]
     beware = (
         [
@@ -166,7 +166,7 @@ def _parameters_section(
     return ContentSection('Parameters', [Paragraph(text), table])
 
 
-def _rigid_section(fit: RigidFit) -> ContentSection:
+def rigid_section(fit: RigidFit) -> ContentSection:
     """Return a section with the parameters of step 1, the arm with rigid joints."""
     estimate = fit.estimate
     rows = [
@@ -189,7 +189,7 @@ _ROLES: tuple[Role, Role] = ('residual', 'predicted')
 _SIZE = 'magnitude [dB re rad/(N m s)]'
 
 
-def _responses_section(result: TwoInertiaIdentification) -> ContentSection:
+def responses_section(result: TwoInertiaIdentification) -> ContentSection:
     """Return a section with responses from motor torque to motor velocity of both joints."""
     text = (
         'From motor torque to motor velocity. The torque between the links is a second input. '
@@ -207,7 +207,7 @@ def _responses_section(result: TwoInertiaIdentification) -> ContentSection:
     )
 
 
-def _decibels_apart(result: TwoInertiaIdentification, joint: int) -> float:
+def decibels_apart(result: TwoInertiaIdentification, joint: int) -> float:
     """Return the difference of measured and model responses of a joint, 5 to 60 Hz [dB]."""
     measured = result.measured[joint]
     seen = (measured.frequency >= _COMPARED[0]) & (measured.frequency <= _COMPARED[1])
@@ -238,7 +238,7 @@ def _joint(
     within = (own >= _COMPARED[0]) & (own <= _COMPARED[1])
     rows = at[within]
     errors = (
-        _decibels_apart(result, k),
+        decibels_apart(result, k),
         decibel_error(alone[rows], decoupled[rows]),
         decibel_error(alone[rows], coupled[rows]),
     )
@@ -297,7 +297,7 @@ def _chart(
     )
 
 
-def _steps_section(tuning: Tuning) -> ContentSection:
+def steps_section(tuning: Tuning) -> ContentSection:
     """Return a section with link velocities after reference steps, before and after tuning."""
     before, after = tuning.rms
     text = (

@@ -17,7 +17,6 @@ from armid_ros.papers.exo.plant.gait import Gait
 from armid_ros.papers.exo.plant.gait_cycle import (
     check_cycle,
     gait_cycle,
-    GaitCycle,
     ground_by_shares,
     weight,
 )
@@ -151,25 +150,23 @@ def exo_document(
         }
         for d in (walked.driven if walked else ())
     ]
+    feet = []
+    if walked is not None:
+        pair, walk_cycle = walked.cycle.pair, walked.cycle
+        feet = [
+            {
+                'machine': robot.name,
+                'weight': weight(robot),
+                'most': float(walk_cycle.feet(other=other)[..., 1].max()),
+                'double_support': float(np.mean(walk_cycle.support(other=other) == 2)),
+                'unit': 'N',
+            }
+            for robot, other in ((pair.robot, False), (pair.other, True))
+        ]
     return {
         'schema': SCHEMA,
         'recording': source,
         'stiffness': rows,
         'cycle': cycle,
-        'feet': _feet(walked.cycle) if walked else [],
+        'feet': feet,
     }
-
-
-def _feet(cycle: GaitCycle) -> list[dict[str, Any]]:
-    """Return the forces on the feet of both machines."""
-    pair = cycle.pair
-    return [
-        {
-            'machine': robot.name,
-            'weight': weight(robot),
-            'most': float(cycle.feet(other=other)[..., 1].max()),
-            'double_support': float(np.mean(cycle.support(other=other) == 2)),
-            'unit': 'N',
-        }
-        for robot, other in ((pair.robot, False), (pair.other, True))
-    ]

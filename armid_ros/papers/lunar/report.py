@@ -36,8 +36,8 @@ def lunar_report(found: Reproduction, provenance: Provenance) -> str:
     """
     sections: list[Section] = [
         verdict(found),
-        _tables_section(found.repeated),
-        _curves_section(found.repeated),
+        tables_section(found.repeated),
+        curves_section(found.repeated),
         _gravity_section(found.composites, _load(found)),
         Origin(provenance),
     ]
@@ -83,7 +83,7 @@ def _load(found: Reproduction) -> str:
     return ' ± '.join(measured(found.load, HALF_WIDTH * found.load_std)) + ' kg'
 
 
-def _tables_section(repeated: Sequence[Repeated]) -> ContentSection:
+def tables_section(repeated: Sequence[Repeated]) -> ContentSection:
     """Return a section with the tables of paper and reproduction, joint by joint."""
     text = (
         'Peak: as the paper prints it, and the largest gravity torque of the joint. Errors are '
@@ -129,7 +129,7 @@ def _cells(values: FloatArray, count: int = 2) -> list[str]:
     return [digits(float(value), count) for value in values]
 
 
-def _curves_section(repeated: Sequence[Repeated]) -> ContentSection:
+def curves_section(repeated: Sequence[Repeated]) -> ContentSection:
     """Return a section with true and predicted torque along a held-out trajectory."""
     text = (
         'Gravity model, identified from the noisy run, along a held-out trajectory. Drag '

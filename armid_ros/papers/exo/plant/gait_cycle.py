@@ -147,7 +147,14 @@ def gait_cycle(pair: TiedPair, gait: Gait) -> GaitCycle:
         for robot, plan, lag in ((pair.robot, own, late), (pair.other, worn, 0.0))
     ]
     courses = (_course(pair, moves[0], False), _course(pair, moves[1], True))
-    states, rates = _walk(pair, courses, ground, _start((own, worn), late / cycle, cycle), cycle)
+    places, speeds = [], []  # planned position and velocity of the hips, machine and wearer
+    for plan, lag in ((own, late), (worn, 0.0)):
+        count = len(plan.hips)
+        path = plan.hips + np.outer(np.arange(count) / count, [plan.stride, 0.0])
+        speeds.append(np.gradient(path, axis=0)[2] * count / cycle)
+        places.append(path[0] - speeds[-1] * lag)
+    start = np.concatenate([*places, *speeds])
+    states, rates = _walk(pair, courses, ground, start, cycle)
     rows = np.append(np.arange(0, 2 * _STEPS, 2), 0)
     motions = PairMotion(
         _placed(pair.robot, moves[0], rows, states[:, :2], states[:, 4:6], rates[:, 4:6], cycle),
@@ -232,17 +239,6 @@ def _course(pair: TiedPair, motion: Motion, other: bool) -> _Course:
     mass = float(robot.rigid_parameters[::10].sum())
     pull = mass * (robot.gravity[_PLANE] - hurry)
     return _Course(contact[..., _PLANE], speed[..., _PLANE], tied[..., _PLANE], pull, mass)
-
-
-def _start(gaits: tuple[WalkableGait, WalkableGait], late: float, cycle: float) -> FloatArray:
-    """Return planned position and velocity of the hips, machine and wearer, shape (8,)."""
-    places, speeds = [], []
-    for plan, lag in zip(gaits, (late, 0.0), strict=True):
-        path = plan.hips + np.outer(np.arange(len(plan.hips)) / len(plan.hips), [plan.stride, 0.0])
-        slope = np.gradient(path, axis=0)[2] * len(path) / cycle
-        places.append(path[0] - slope * lag * cycle)
-        speeds.append(slope)
-    return np.concatenate([*places, *speeds])
 
 
 def _walk(

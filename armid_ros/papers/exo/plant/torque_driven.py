@@ -326,7 +326,13 @@ class SimulatedPair:
         self._steps += 1
         if self._block is None or self._steps - self._first > _BLOCK:
             self._first = self._steps - 1
-            self._block = self._look_ahead()
+            t = (self._first + np.arange(_BLOCK + 1)) / self._rate
+            own, other = stepping(self.pair, self._gait, t)
+            own = self._driven(own) if self._columns else own
+            tau = np.array(pair_torques(self.pair, own, other).tau)
+            if self._columns:
+                tau[:, self._columns] = self._torque(t)
+            self._block = PairMotion(own, other), tau
         (own, other), tau = self._block
         k = self._steps - self._first
         noise = self._rng.standard_normal((3, len(tau[k])))
@@ -339,17 +345,6 @@ class SimulatedPair:
             other.q[k] + angles * noise[2],
             other.dq[k],
         )
-
-    def _look_ahead(self) -> tuple[PairMotion, FloatArray]:
-        """Return motion and torques from the sample before the next one on."""
-        t = (self._first + np.arange(_BLOCK + 1)) / self._rate
-        own, other = stepping(self.pair, self._gait, t)
-        if not self._columns:
-            return PairMotion(own, other), pair_torques(self.pair, own, other).tau
-        own = self._driven(own)
-        tau = np.array(pair_torques(self.pair, own, other).tau)
-        tau[:, self._columns] = self._torque(t)
-        return PairMotion(own, other), tau
 
     def _driven(self, own: Motion) -> Motion:
         """Integrate the driven joints with their torques over the block."""

@@ -79,9 +79,9 @@ def exo_report(
             feet_section(walked.cycle),
         ]
     sections += [
-        _forces_section(pair, motions, abscissa, name),
+        forces_section(pair, motions, abscissa, name),
         draw_poses(pair, motions, samples, captions),
-        _assumptions_section(),
+        assumptions_section(),
         Origin(provenance),
     ]
     title = 'Springs between an exoskeleton and its wearer'
@@ -148,7 +148,7 @@ def _range(values: FloatArray) -> str:
     return ' to '.join(ends)
 
 
-def _forces_section(
+def forces_section(
     pair: TiedPair, motions: PairMotion, abscissa: FloatArray, name: str
 ) -> ContentSection:
     """Return a section with the spring forces, and their part of the torques."""
@@ -180,7 +180,7 @@ def _forces_section(
     )
 
 
-def _assumptions_section() -> ContentSection:
+def assumptions_section() -> ContentSection:
     """Return a section with the assumptions: name, value with unit, reason."""
     rows = []
     for name, entry in read_assumptions().items():
