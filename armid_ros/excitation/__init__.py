@@ -12,26 +12,24 @@ with every `Obstacle`. An `Excitation` runs the trajectory from rest to rest.
 from armid_ros.excitation.design import Design, design, DesignProgress, evaluate
 from armid_ros.excitation.feasibility import (
     excitation_faults,
-    Faults,
     random_feasible,
     trajectory_faults,
 )
 from armid_ros.excitation.fourier import FourierTrajectory
 from armid_ros.excitation.gate import Ending, MotionGate
-from armid_ros.excitation.geometry.clearance import Approach, ClearanceModel
+from armid_ros.excitation.geometry.clearance import ClearanceModel
 from armid_ros.excitation.geometry.environment import (
     load_environment,
     Obstacle,
     obstacles_alone,
     with_obstacles,
 )
-from armid_ros.excitation.geometry.floor import find_floor, Floor, floor_obstacles, LowestPoint
+from armid_ros.excitation.geometry.floor import find_floor, Floor, floor_obstacles
 from armid_ros.excitation.limits import (
     check_limits,
     Limits,
     SPEED_CLASSES,
     used_shares,
-    Violation,
     with_joint_limits,
 )
 from armid_ros.excitation.pose_monitor import JointState, PoseMonitor
@@ -51,20 +49,17 @@ from armid_ros.excitation.transfer import Transfer, transfer_limits, TransferPla
 
 __all__ = [
     'Rehearsal',
-    'Approach',
     'CRITERIA',
     'ClearanceModel',
     'CollisionScene',
     'Design',
     'DesignSettings',
     'Excitation',
-    'Faults',
     'Fitness',
     'Floor',
     'FourierTrajectory',
     'Information',
     'Limits',
-    'LowestPoint',
     'JointState',
     'MeasuredPose',
     'MotionGate',
@@ -78,7 +73,6 @@ __all__ = [
     'TARGETS',
     'Transfer',
     'TransferPlanner',
-    'Violation',
     'check_limits',
     'design',
     'evaluate',

@@ -15,14 +15,13 @@ from armid_ros.simulation.plant import Plant, State
 from armid_ros.simulation.reference import Reference
 from armid_ros.simulation.run import simulate, SimulatedRun
 from armid_ros.simulation.sensors import Sensors
-from armid_ros.simulation.simulated_arm import Sample, SimulatedArm
+from armid_ros.simulation.simulated_arm import SimulatedArm
 from armid_ros.simulation.springs import Elasticity
 
 __all__ = [
     'simulate',
     'SimulatedRun',
     'SimulatedArm',
-    'Sample',
     'Reference',
     'Controller',
     'ComputedTorque',
