@@ -206,7 +206,6 @@ def robot_from_urdf(
         urdf=text,
         urdf_damping=np.array([joint.damping for joint in driven]),
         urdf_friction=np.array([joint.friction for joint in driven]),
-        urdf_armature=np.array([joint.armature for joint in driven]),
         notes=(
             *description.inertia_doubts(),
             *description.notes,
