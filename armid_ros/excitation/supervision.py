@@ -9,7 +9,7 @@ from dataclasses import dataclass
 from typing import Protocol
 
 from armid_ros.arm import ArmModel
-from armid_ros.motion import FloatArray, Motion, read_only
+from armid_ros.motion import FloatArray, freeze, Motion
 import numpy as np
 import numpy.typing as npt
 
@@ -49,8 +49,7 @@ class MeasuredPose:
 
     def __post_init__(self) -> None:
         """Freeze the arrays."""
-        object.__setattr__(self, 'q', read_only(self.q))
-        object.__setattr__(self, 'seen', read_only(self.seen))
+        freeze(self, 'q', 'seen')
 
     @classmethod
     def unknown(cls, joints: tuple[str, ...]) -> MeasuredPose:

@@ -12,7 +12,7 @@ from armid_ros.errors import TrajectoryError
 from armid_ros.excitation.geometry.clearance import ClearanceModel
 from armid_ros.excitation.geometry.paths import clear_line, find_path
 from armid_ros.excitation.limits import check_limits, Limits, SLOW_VELOCITY, SPEED_CLASSES
-from armid_ros.motion import FloatArray, Motion, read_only
+from armid_ros.motion import FloatArray, freeze, Motion
 from armid_ros.robots import Robot
 import numpy as np
 import numpy.typing as npt
@@ -40,8 +40,7 @@ class Transfer:
 
     def __post_init__(self) -> None:
         """Freeze the arrays."""
-        object.__setattr__(self, 't', read_only(self.t))
-        object.__setattr__(self, 'q', read_only(self.q))
+        freeze(self, 't', 'q')
 
     @property
     def duration(self) -> float:

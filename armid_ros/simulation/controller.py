@@ -10,7 +10,7 @@ from typing import Any, ClassVar
 from armid_ros.arm import ArmModel
 from armid_ros.errors import ModelError
 from armid_ros.model import inverse_dynamics
-from armid_ros.motion import FloatArray, Motion, read_only
+from armid_ros.motion import FloatArray, freeze, Motion, read_only
 from armid_ros.robots import Robot
 from armid_ros.simulation.plant import Plant
 import numpy as np
@@ -275,8 +275,7 @@ class VelocityLoop:
 
     def __post_init__(self) -> None:
         """Freeze the gains."""
-        object.__setattr__(self, 'proportional', read_only(self.proportional))
-        object.__setattr__(self, 'integral', read_only(self.integral))
+        freeze(self, 'proportional', 'integral')
 
     def torque(self, error: FloatArray, integral: FloatArray) -> FloatArray:
         """Return the torque for errors of velocity [rad/s] and their integral [rad], (n,)."""

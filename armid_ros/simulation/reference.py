@@ -15,7 +15,7 @@ from dataclasses import dataclass, field
 from typing import Any
 
 from armid_ros.errors import TrajectoryError
-from armid_ros.motion import FloatArray, Motion, read_only
+from armid_ros.motion import FloatArray, freeze, Motion
 from armid_ros.robots import Robot
 from armid_ros.simulation.plant import limit_slack, LIMIT_TOLERANCE
 import numpy as np
@@ -58,8 +58,7 @@ class Reference:
         names = [
             name for name in ('t', 'q', 'dq', 'ddq', 'tau') if getattr(self, name) is not None
         ]
-        for name in names:
-            object.__setattr__(self, name, read_only(getattr(self, name)))
+        freeze(self, *names)
         if self.t.ndim != 1 or not len(self.t):
             raise TrajectoryError('trajectory: it has no points')
         if len(set(self.joints)) != len(self.joints):

@@ -9,7 +9,7 @@ from dataclasses import dataclass, replace
 
 from armid_ros.arm import ArmModel
 from armid_ros.errors import ModelError
-from armid_ros.motion import ElasticRun, FloatArray, Motion, read_only
+from armid_ros.motion import ElasticRun, FloatArray, freeze, Motion
 from armid_ros.simulation.controller import Controller
 from armid_ros.simulation.plant import Plant
 from armid_ros.simulation.reference import Reference
@@ -57,8 +57,7 @@ class SimulatedRun:
 
     def __post_init__(self) -> None:
         """Freeze the arrays."""
-        for name in ('t', 'q', 'dq', 'tau'):
-            object.__setattr__(self, name, read_only(getattr(self, name)))
+        freeze(self, 't', 'q', 'dq', 'tau')
 
 
 def simulate(

@@ -19,7 +19,7 @@ import math
 from armid_ros.errors import TrajectoryError
 from armid_ros.excitation.geometry.environment import Obstacle
 from armid_ros.model import LinkFrames
-from armid_ros.motion import FloatArray, Motion, read_only
+from armid_ros.motion import FloatArray, freeze, Motion
 from armid_ros.robots import CollisionModel, read_mounting
 import coal
 import numpy as np
@@ -181,7 +181,7 @@ class Floor:
 
     def __post_init__(self) -> None:
         """Freeze the normal."""
-        object.__setattr__(self, 'up', read_only(self.up))
+        freeze(self, 'up')
 
     def __str__(self) -> str:
         """Return the height and its source."""

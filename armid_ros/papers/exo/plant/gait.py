@@ -15,7 +15,7 @@ from pathlib import Path
 
 from armid_ros.errors import TrajectoryError
 from armid_ros.files import read_text
-from armid_ros.motion import FloatArray, Motion, read_only
+from armid_ros.motion import FloatArray, freeze, Motion
 from armid_ros.papers.exo.assumptions import leg_pair_file
 import numpy as np
 
@@ -41,8 +41,7 @@ class Gait:
 
     def __post_init__(self) -> None:
         """Freeze the coefficients."""
-        object.__setattr__(self, 'cosine', read_only(self.cosine))
-        object.__setattr__(self, 'sine', read_only(self.sine))
+        freeze(self, 'cosine', 'sine')
 
     @classmethod
     def fit(cls, phase: FloatArray, angles: FloatArray, harmonics: int = _HARMONICS) -> Gait:
