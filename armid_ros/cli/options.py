@@ -149,8 +149,11 @@ def deliver_page(
         click.echo(json_text(document))
         return
     first, *others = verdict.sentences
-    shown = Summary(first, verdict.grade, *table, [*others, *verdict.beware])
-    show(shown, f'{staged.out}: {name}.json, report.html')
+    lines, steps = [*others, *verdict.beware], [verdict.step] if verdict.step else []
+    show(
+        Summary(first, verdict.grade, *table, lines, steps),
+        f'{staged.out}: {name}.json, report.html',
+    )
 
 
 def read_settings() -> ReadSettings:

@@ -102,12 +102,14 @@ def verdict(result: TwoInertiaIdentification) -> VerdictSection:
     beware = (
         [
             f'{", ".join(poor)}: the measured response differs from that of motor, spring and '
-            f'link by more than {_CLOSE_DB:g} dB; look at the frequency responses.'
+            f'link by more than {_CLOSE_DB:g} dB.'
         ]
         if poor
         else []
     )
+    step = 'Use the parameters of elastic.json for the controller, or in a simulation.'
     if result.tuning is None:
+        step = 'Record step responses, and add them with --steps.'
         beware.append('Without step responses the parameters have no intervals.')
     else:
         before, after = result.tuning.rms
@@ -118,9 +120,10 @@ def verdict(result: TwoInertiaIdentification) -> VerdictSection:
         beware.append(
             'Viscous friction of link and motor are known as a sum; their shares are not.'
         )
-    return VerdictSection(
-        'uncertain' if poor else 'found', 'fair' if poor else 'good', sentences, beware
-    )
+    if poor:
+        step = f'Look at the frequency responses of {", ".join(poor)}.'
+    grade, tone = ('uncertain', 'fair') if poor else ('found', 'good')
+    return VerdictSection(grade, tone, sentences, beware, step=step)
 
 
 def _parameters_section(

@@ -77,13 +77,12 @@ def verdict(found: Sequence[SpringEstimate]) -> VerdictSection:
     told = [one for one in found if one.informative]
     lost = [one.joint for one in found if not one.informative]
     beware = ['Inertias are those of the description or model: a stiffness is as right as they.']
+    step = f'Record {", ".join(lost)} again under more load, or with finer encoders.'
     if lost:
-        beware.append(
-            f'{", ".join(lost)}: the twist does not follow the load; move links there under more '
-            'load, or with finer encoders.'
-        )
+        beware.append(f'{", ".join(lost)}: the twist does not follow the load.')
     if not told:
-        return VerdictSection('not identifiable', 'bad', ['No joint shows a spring.'], beware)
+        shown = ['No joint shows a spring.']
+        return VerdictSection('not identifiable', 'bad', shown, beware, step=step)
     softest = min(told, key=lambda one: one.transmission.stiffness[0])
     value, low, high = softest.transmission.stiffness
     sentences = [
@@ -93,9 +92,11 @@ def verdict(found: Sequence[SpringEstimate]) -> VerdictSection:
     loose = [one.joint for one in told if one.transmission.backlash_seen]
     if loose:
         sentences.append(f'Free play is seen at {", ".join(loose)}.')
-    return VerdictSection(
-        'found' if not lost else 'partial', 'good' if not lost else 'fair', sentences, beware
-    )
+    if not lost:
+        spring = f'joint_elasticity@{softest.joint}:compliance={1.0 / value:.3g}'
+        step = f'Simulate with the springs: armid simulate --effect {spring}, and so for each.'
+    grade, tone = ('partial', 'fair') if lost else ('found', 'good')
+    return VerdictSection(grade, tone, sentences, beware, step=step)
 
 
 WITHOUT = (

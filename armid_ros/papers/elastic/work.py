@@ -11,6 +11,7 @@ from typing import Any
 
 from armid_ros.cli.terminal import Tick
 from armid_ros.errors import RobotError
+from armid_ros.estimate import name_in_words
 from armid_ros.files import Staged
 from armid_ros.motion import FloatArray
 from armid_ros.papers.elastic.identification.response import PER_JOINT
@@ -117,7 +118,7 @@ def resonances_table(document: dict[str, Any]) -> Table:
 
 def values_table(document: dict[str, Any]) -> Table:
     """Return all parameters with their standard deviations."""
-    words = {name: field.replace('_', ' ') for field, name, _ in PER_JOINT}
+    words = {name: name_in_words(field) for field, name, _ in PER_JOINT}
     return ('parameter', 'joint', 'value', 'std', 'unit'), [
         (
             f'{words[row["name"]]} ({row["name"]})' if row['name'] in words else row['name'],
