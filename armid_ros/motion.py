@@ -27,6 +27,12 @@ def read_only(values: npt.ArrayLike) -> FloatArray:
     return array
 
 
+def freeze(instance: object, *names: str) -> None:
+    """Make arrays of a frozen dataclass read-only copies; called from its ``__post_init__``."""
+    for name in names:
+        object.__setattr__(instance, name, read_only(getattr(instance, name)))
+
+
 @dataclass(frozen=True)
 class MovingPoints:
     """

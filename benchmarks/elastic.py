@@ -12,11 +12,12 @@ beginning at the set before tuning.
 from __future__ import annotations
 
 from armid_ros.motion import ElasticRun, FloatArray
-from armid_ros.papers.elastic.identification.names import unpack
-from armid_ros.papers.elastic.identification.tuning import tune
-from armid_ros.papers.elastic.plant.run import ElasticSensors, Experiment
-from armid_ros.papers.elastic.plant.signals import (
+from armid_ros.papers.elastic.identification.response import unpack
+from armid_ros.papers.elastic.identification.three_steps import tune
+from armid_ros.papers.elastic.plant import (
+    ElasticSensors,
     EXCITATION_RMS,
+    Experiment,
     resonance_experiments,
     step_experiments,
     STEP_POSES,
@@ -24,7 +25,7 @@ from armid_ros.papers.elastic.plant.signals import (
 )
 from armid_ros.robots import load_robot
 from armid_ros.robots.two_link import ROBOT, two_link_set, TwoLinkParameters
-from armid_ros.simulation.motor_control import VelocityLoop
+from armid_ros.simulation.controller import VelocityLoop
 from armid_ros.simulation.plant import Plant
 import numpy as np
 import pinocchio as pin

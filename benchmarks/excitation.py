@@ -39,7 +39,7 @@ from armid_ros.excitation import (
     Limits,
     random_feasible,
 )
-from armid_ros.excitation.random_trajectory import feasible_pose, position_range
+from armid_ros.excitation.feasibility import feasible_pose, position_range
 from armid_ros.motion import Motion
 from armid_ros.robots import collision_model, load_robot
 import numpy as np

@@ -13,8 +13,7 @@ from armid_ros.errors import IdentificationError
 from armid_ros.identification.ties.problem import interaction_problem, MachineNoise
 from armid_ros.model.spring_ties import SEGMENTS
 from armid_ros.motion import FloatArray
-from armid_ros.papers.exo.plant.exercises import exercise, EXERCISES
-from armid_ros.papers.exo.plant.leg_pair import leg_pair
+from armid_ros.papers.exo.plant.leg_pair import exercise, EXERCISES, leg_pair
 import numpy as np
 
 from benchmarks.exo_noise import find_springs, TORQUE_NOISE, with_torques

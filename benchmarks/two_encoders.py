@@ -14,7 +14,7 @@ import os
 from pathlib import Path
 import sys
 
-from armid_ros.papers.elastic.identification.transmission import (
+from armid_ros.papers.elastic.identification.joints import (
     fit_transmission,
     TransmissionFit,
     TwoEncoders,

@@ -28,7 +28,7 @@ BESIDE_THE_DIAGNOSIS = (
     'identification/fitting/held_out.py',
     'identification/rows/signals.py',
     'identification/rows/stamps.py',
-    'excitation/templates.py',
+    'excitation/feasibility.py',
 )
 NOTEBOOKS = ROOT / 'examples' / 'notebooks'
 

@@ -21,16 +21,15 @@ import textwrap
 import armid_ros as ar
 from armid_ros.live.belief import LiveDiagnosis, LiveSettings
 from armid_ros.live.request import answer
-from armid_ros.papers.elastic.identification.physical import ideal_response
+from armid_ros.papers.elastic.identification.interaction import ideal_response
 from armid_ros.papers.elastic.identification.three_steps import identify_two_inertia
-from armid_ros.papers.elastic.plant.run import run_all
-from armid_ros.papers.elastic.plant.signals import EXCITATION_RMS, resonance_experiments, WEAK
+from armid_ros.papers.elastic.plant import EXCITATION_RMS, resonance_experiments, run_all, WEAK
 from armid_ros.papers.elastic.work import SENSORS
 from armid_ros.papers.exo.plant.gait import read_gait
 from armid_ros.papers.exo.plant.gait_cycle import check_cycle, gait_cycle
 from armid_ros.papers.exo.plant.walkers import walking_pair
 from armid_ros.robots.two_link import two_link_set
-from armid_ros.simulation.elastic.two_link import two_link_loop, two_link_plant
+from armid_ros.simulation.elastic import two_link_loop, two_link_plant
 from matplotlib.figure import Figure
 from matplotlib.ticker import NullLocator
 import numpy as np

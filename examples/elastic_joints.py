@@ -7,7 +7,7 @@ from pathlib import Path
 import armid_ros as ar
 from armid_ros.papers.elastic.identification.joints import fit_springs
 from armid_ros.simulation import Reference, Sensors
-from armid_ros.simulation.elastic.setup import make_elastic_arm
+from armid_ros.simulation.elastic import make_elastic_arm
 from armid_ros.simulation.run import record
 import numpy as np
 

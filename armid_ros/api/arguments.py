@@ -23,7 +23,7 @@ from armid_ros.recording.columns import ColumnSettings, numbers
 from armid_ros.recording.reader import bag_contents
 from armid_ros.recording.source import DEFAULT
 from armid_ros.robots import joints_beside_arms, load_robot, Robot, shipped_robots
-from armid_ros.robots.shipped import shipped_path
+from armid_ros.robots.load import shipped_path
 import numpy as np
 
 #: A robot: as it is, as part of a model, by a shipped name, or by the path of its description or

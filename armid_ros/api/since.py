@@ -24,7 +24,7 @@ from armid_ros.errors import IdentificationError
 from armid_ros.identification.identified_from import identified_from, require_as_identified
 from armid_ros.identification.parameters_file import read_misfit
 from armid_ros.recording import Recording
-from armid_ros.simulation.bodies import require_any_mass
+from armid_ros.simulation.plant import require_any_mass
 import numpy as np
 
 

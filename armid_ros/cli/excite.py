@@ -341,7 +341,7 @@ def write_course(
     from armid_ros.cli import options
     from armid_ros.excitation import ClearanceModel, Limits
     from armid_ros.recording import write_joint_trajectory
-    from armid_ros.simulation.elastic.courses import multisine_course, step_course
+    from armid_ros.simulation.elastic import multisine_course, step_course
     import numpy as np
 
     robot = space.collision.robot

@@ -32,6 +32,7 @@ from armid_ros.files import (
 )
 from armid_ros.files.cells import listed, parted
 from armid_ros.files.own import written_by
+from armid_ros.identification import write_document
 from armid_ros.motion import FloatArray
 from armid_ros.recording import read_robot_description, ReadSettings, Recording
 from armid_ros.recording.anything import is_table, read_anything
@@ -140,16 +141,27 @@ def show(summary: Summary, *below: str) -> None:
         say(line)
 
 
-def show_verdict(
+def deliver_page(
+    staged: Staged,
+    page: str,
+    name: str,
+    document: Mapping[str, Any],
     verdict: VerdictSection,
-    heads: Sequence[str],
-    rows: Sequence[Sequence[str]],
-    *below: str,
+    table: tuple[Sequence[str], Sequence[Sequence[str]]] | None,
 ) -> None:
-    """Print the verdict of a page, and a table."""
+    """Write report.html and the document NAME.json; print its verdict and a table, or as JSON."""
+    write_file(staged.folder / 'report.html', page)
+    write_document(staged.folder / f'{name}.json', document)
+    staged.keep()
+    if table is None:
+        click.echo(json_text(document))
+        return
     first, *others = verdict.sentences
     lines, steps = [*others, *verdict.beware], [verdict.step] if verdict.step else []
-    show(Summary(first, verdict.grade, heads, rows, lines, steps), *below)
+    show(
+        Summary(first, verdict.grade, *table, lines, steps),
+        f'{staged.out}: {name}.json, report.html',
+    )
 
 
 def provenance(

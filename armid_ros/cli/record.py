@@ -82,13 +82,13 @@ def simulate(
     from armid_ros.recording.elastic import write_runs
     from armid_ros.simulation import Sensors
     from armid_ros.simulation import simulate as simulated
-    from armid_ros.simulation.bodies import require_masses
-    from armid_ros.simulation.elastic.setup import (
+    from armid_ros.simulation.elastic import (
         elastic_joints,
         make_elastic_arm,
         no_rotor,
         shipped_arm,
     )
+    from armid_ros.simulation.plant import require_masses
     from armid_ros.simulation.run import record
     import numpy as np
 
@@ -127,7 +127,7 @@ def simulate(
 def _blaming(texts: Sequence[str], robot: Robot) -> Iterator[None]:
     """Name the --effect that makes a link physically impossible."""
     from armid_ros.effects import parse_effect
-    from armid_ros.simulation.bodies import NoBodyError
+    from armid_ros.simulation.plant import NoBodyError
 
     try:
         yield

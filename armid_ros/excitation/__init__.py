@@ -10,53 +10,56 @@ with every `Obstacle`. An `Excitation` runs the trajectory from rest to rest.
 """
 
 from armid_ros.excitation.design import Design, design, DesignProgress, evaluate
-from armid_ros.excitation.ending import Ending
-from armid_ros.excitation.feasibility import excitation_faults, Faults, trajectory_faults
-from armid_ros.excitation.files import load_excitation, save_excitation
-from armid_ros.excitation.fitness import Fitness, fitness
+from armid_ros.excitation.feasibility import (
+    excitation_faults,
+    random_feasible,
+    trajectory_faults,
+)
 from armid_ros.excitation.fourier import FourierTrajectory
-from armid_ros.excitation.gate import MotionGate
-from armid_ros.excitation.geometry.clearance import Approach, ClearanceModel
-from armid_ros.excitation.geometry.environment import Obstacle, obstacles_alone, with_obstacles
+from armid_ros.excitation.gate import Ending, MotionGate
+from armid_ros.excitation.geometry.clearance import ClearanceModel
+from armid_ros.excitation.geometry.environment import (
+    load_environment,
+    Obstacle,
+    obstacles_alone,
+    with_obstacles,
+)
 from armid_ros.excitation.geometry.floor import find_floor, Floor, floor_obstacles
-from armid_ros.excitation.geometry.heights import LowestPoint
-from armid_ros.excitation.geometry.planning_scene import load_environment
 from armid_ros.excitation.limits import (
     check_limits,
     Limits,
     SPEED_CLASSES,
     used_shares,
-    Violation,
     with_joint_limits,
 )
 from armid_ros.excitation.pose_monitor import JointState, PoseMonitor
-from armid_ros.excitation.problem import DesignProblem
-from armid_ros.excitation.random_trajectory import random_feasible
-from armid_ros.excitation.rehearsal import Rehearsal
+from armid_ros.excitation.problem import DesignProblem, DesignSettings, TARGETS, whole_period
 from armid_ros.excitation.run import plan_run, Run
-from armid_ros.excitation.scene import CollisionScene
-from armid_ros.excitation.schedule import Excitation
+from armid_ros.excitation.scene import CollisionScene, Fitness, fitness
+from armid_ros.excitation.schedule import Excitation, load_excitation, save_excitation
 from armid_ros.excitation.search.criteria import CRITERIA, Information
-from armid_ros.excitation.settings import DesignSettings, TARGETS, whole_period
-from armid_ros.excitation.supervision import jump_fault, MeasuredPose, slowed, tracking_fault
+from armid_ros.excitation.supervision import (
+    jump_fault,
+    MeasuredPose,
+    Rehearsal,
+    slowed,
+    tracking_fault,
+)
 from armid_ros.excitation.transfer import Transfer, transfer_limits, TransferPlanner
 
 __all__ = [
     'Rehearsal',
-    'Approach',
     'CRITERIA',
     'ClearanceModel',
     'CollisionScene',
     'Design',
     'DesignSettings',
     'Excitation',
-    'Faults',
     'Fitness',
     'Floor',
     'FourierTrajectory',
     'Information',
     'Limits',
-    'LowestPoint',
     'JointState',
     'MeasuredPose',
     'MotionGate',
@@ -70,7 +73,6 @@ __all__ = [
     'TARGETS',
     'Transfer',
     'TransferPlanner',
-    'Violation',
     'check_limits',
     'design',
     'evaluate',

@@ -13,20 +13,16 @@ from armid_ros.excitation.feasibility import excitation_faults
 from armid_ros.excitation.fourier import FourierTrajectory
 from armid_ros.excitation.geometry.clearance import ClearanceModel
 from armid_ros.excitation.limits import Limits, used_shares
-from armid_ros.excitation.problem import DesignProblem
+from armid_ros.excitation.problem import DesignProblem, DesignSettings
 from armid_ros.excitation.schedule import Excitation
 from armid_ros.excitation.search.criteria import Information
 from armid_ros.excitation.search.local import Search
-from armid_ros.excitation.settings import DesignSettings
 from armid_ros.motion import FloatArray
 from armid_ros.robots import CollisionModel
 import numpy as np
 
 #: Number of points of the period at which a run may enter the trajectory.
 _ENTRIES = 48
-
-#: Factor by which the run-in is made longer, and how often.
-_LONGER, _TRIES = 1.5, 12
 
 
 @dataclass(frozen=True)
@@ -149,7 +145,16 @@ def design(
     """
     problem = DesignProblem.of(arm, settings, rng, rival)
     clearance = None if collision is None else ClearanceModel.of(collision)
-    prior = _checked_prior(problem, prior_information, rival)
+    prior = None if prior_information is None else np.asarray(prior_information, dtype=float)
+    if prior is not None:
+        expected = (problem.base.rank,) * 2
+        if rival is not None or prior.shape != expected:
+            raise TrajectoryError(
+                f'prior information: a matrix {expected} over the base parameters of the arm is '
+                f"needed, and none with criterion 'T'; got {prior.shape}"
+            )
+        if not np.all(np.isfinite(prior)):
+            raise TrajectoryError('prior information: not all entries are finite numbers')
 
     def watch(done: float, cost: float) -> None:
         if progress is not None:
@@ -186,7 +191,7 @@ def placed(problem: DesignProblem, trajectory: FourierTrajectory) -> Excitation:
 
     run_in = settings.run_in
     last = ''
-    for _ in range(_TRIES):
+    for _ in range(12):  # run-ins, each longer than the last
         runs = [
             Excitation(
                 trajectory.shifted(k * trajectory.period / _ENTRIES),
@@ -200,7 +205,7 @@ def placed(problem: DesignProblem, trajectory: FourierTrajectory) -> Excitation:
             if not faults:
                 return run
             last = f'in {run_in:.3g} s, {faults}'
-        run_in *= _LONGER
+        run_in *= 1.5
     raise TrajectoryError(f'no way into the trajectory and out of it; {last}')
 
 
@@ -239,20 +244,3 @@ def evaluate(
     return Design(
         excitation, information, described, problem.noise, cost, problem.limits, settings, stopped
     )
-
-
-def _checked_prior(
-    problem: DesignProblem, prior: FloatArray | None, rival: ArmModel | None
-) -> FloatArray | None:
-    if prior is None:
-        return None
-    prior = np.asarray(prior, dtype=float)
-    expected = (problem.base.rank,) * 2
-    if rival is not None or prior.shape != expected:
-        raise TrajectoryError(
-            f'prior information: a matrix {expected} over the base parameters of the arm is '
-            f"needed, and none with criterion 'T'; got {prior.shape}"
-        )
-    if not np.all(np.isfinite(prior)):
-        raise TrajectoryError('prior information: not all entries are finite numbers')
-    return prior

@@ -1,7 +1,7 @@
 # Copyright 2026 The armid_ros developers
 # SPDX-License-Identifier: Apache-2.0
 """
-Check that a trajectory keeps all limits and the clearance, at and between all samples.
+Feasible trajectories: the check of one, random ones, and templates of motions.
 
 Position, velocity, acceleration and torque are sampled densely. A bound on the increase of a curve
 between two samples is added. The clearance is proven on every interval.
@@ -10,12 +10,18 @@ between two samples is added. The clearance is proven on every interval.
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
 from armid_ros.arm import ArmModel
+from armid_ros.errors import TrajectoryError
 from armid_ros.excitation.fourier import FourierTrajectory
 from armid_ros.excitation.geometry.clearance import Approach, ClearanceModel
 from armid_ros.excitation.limits import check_limits, Limits, Violation
 from armid_ros.excitation.schedule import Excitation
 from armid_ros.motion import FloatArray, Motion
+from armid_ros.robots import CollisionModel
+from armid_ros.robots.robot import position_range
 import numpy as np
 
 #: Samples per period and harmonic.
@@ -108,3 +114,271 @@ def _outward(values: FloatArray, periodic: bool) -> FloatArray:
     typical = 20.0 * np.median(size, axis=0)
     size = np.where(size > typical, 0.0, size)
     return np.asarray(values + np.sign(values - values.mean(axis=0)) * size / 8.0)
+
+
+#: How often the amplitudes of a trajectory are reduced until it is feasible.
+_SHRINKS = 6
+
+#: Samples per period and harmonic for the first check of a drawn trajectory.
+_SAMPLES = 40
+
+
+def random_feasible(
+    arm: ArmModel,
+    limits: Limits,
+    period: float,
+    harmonics: int,
+    rng: np.random.Generator,
+    *,
+    collision: CollisionModel | ClearanceModel | None = None,
+    margin: float = 0.0,
+) -> FourierTrajectory:
+    """
+    Draw a random trajectory that keeps all limits and the clearance, also between samples.
+
+    The coefficients are normally distributed, with equal position amplitudes in all harmonics.
+    Each joint moves about a random centre, with a random share of the largest amplitude that its
+    limits allow. All amplitudes are reduced until the trajectory is feasible.
+
+    Parameters
+    ----------
+    arm : ArmModel
+        Prior model, for the torque.
+    limits : Limits
+        The limits.
+    period : float
+        Period [s].
+    harmonics : int
+        Number of harmonics.
+    rng : Generator
+        Source of randomness.
+    collision : CollisionModel or ClearanceModel, optional
+        Bodies to keep apart.
+    margin : float
+        Clearance to keep [m].
+
+    Raises
+    ------
+    TrajectoryError
+        If no solution was found; the message names the joint and its limit, or the bodies.
+
+    """
+    clearance = (
+        ClearanceModel.of(collision) if isinstance(collision, CollisionModel) else collision
+    )
+    for _ in range(60):
+        trajectory = _draw(limits, period, harmonics, rng)
+        found = _shrunk(arm, limits, trajectory, clearance, margin, _SHRINKS)
+        if found is not None:
+            return found
+    centre = feasible_pose(arm, limits, rng, clearance, margin)
+    trajectory = _draw(limits, period, harmonics, rng)
+    around = FourierTrajectory(limits.joints, period, centre, trajectory.a, trajectory.b)
+    found = _shrunk(arm, limits, around, clearance, margin, 8 * _SHRINKS)
+    if found is None:
+        raise TrajectoryError(
+            f'no motion is possible about the pose {", ".join(f"{x:.2f}" for x in centre)}'
+            f': {trajectory_faults(arm, limits, around.scaled(0.01), clearance, margin)}'
+        )
+    return found
+
+
+def feasible_pose(
+    arm: ArmModel,
+    limits: Limits,
+    rng: np.random.Generator,
+    clearance: ClearanceModel | None,
+    margin: float,
+) -> FloatArray:
+    """
+    Return the pose with the largest clearance among random poses that the arm can hold.
+
+    Raises
+    ------
+    TrajectoryError
+        If no solution was found; the message names the joint and its limit, or the bodies.
+
+    """
+    lower, upper = position_range(limits.lower, limits.upper)
+    q = rng.uniform(lower, upper, (2000, len(lower)))
+    motion = Motion.of_states(limits.joints, q, 0.0, 0.0)
+    load = np.abs(arm.joint_torque(motion)) / limits.torque
+    for j in np.flatnonzero(load.min(axis=0) > 1.0):
+        least = float(load[:, j].min() * limits.torque[j])
+        raise TrajectoryError(
+            f'joint {limits.joints[j]}: torque limit {limits.torque[j]:.4g} '
+            f'{limits.unit("torque", int(j))}, but holding still takes {least:.4g} or more in '
+            'every pose'
+        )
+    held = load.max(axis=1) <= 1.0
+    if not held.any():
+        best = int(load.max(axis=1).argmin())
+        worst = int(load[best].argmax())
+        raise TrajectoryError(
+            f'joint {limits.joints[worst]}: torque limit {limits.torque[worst]:.4g} '
+            f'{limits.unit("torque", worst)}, but no pose keeps all torque limits at once; in the '
+            f'best one holding still takes {load[best, worst] * limits.torque[worst]:.4g} there'
+        )
+    if clearance is None:
+        best = np.flatnonzero(held)[int(np.argmin(load[held].max(axis=1)))]
+        return np.asarray(q[best])
+    apart = np.where(held, clearance.smallest(q, reach=margin + 1.0), -np.inf)
+    best = int(np.argmax(apart))
+    if apart[best] <= margin:
+        nearest = clearance.closest(motion.select(np.array([best])))
+        assert nearest is not None  # without pairs the clearance is infinite
+        raise TrajectoryError(
+            f'no pose keeps a clearance of {margin:g} m; in the best one '
+            f'{nearest.first} and {nearest.second} are {nearest.distance:.4f} m apart'
+        )
+    return np.asarray(q[best])
+
+
+def _draw(
+    limits: Limits, period: float, harmonics: int, rng: np.random.Generator
+) -> FourierTrajectory:
+    n = len(limits.joints)
+    k = np.arange(1, harmonics + 1)
+    raw = FourierTrajectory(
+        limits.joints,
+        period,
+        np.zeros(n),
+        k * rng.normal(size=(n, harmonics)),
+        k * rng.normal(size=(n, harmonics)),
+    )
+    motion = raw.one_period(_SAMPLES * harmonics)
+    low, high = motion.q.min(axis=0), motion.q.max(axis=0)
+    lower, upper = position_range(limits.lower, limits.upper)
+    largest = np.minimum.reduce(
+        [
+            (upper - lower) / (high - low),
+            limits.velocity / np.abs(motion.dq).max(axis=0),
+            limits.acceleration / np.abs(motion.ddq).max(axis=0),
+        ]
+    )
+    factor = largest * rng.uniform(0.3, 0.98, n)
+    centre = rng.uniform(lower - factor * low, upper - factor * high)
+    scaled = raw.scaled(factor)
+    return FourierTrajectory(limits.joints, period, centre, scaled.a, scaled.b)
+
+
+def _shrunk(
+    arm: ArmModel,
+    limits: Limits,
+    trajectory: FourierTrajectory,
+    clearance: ClearanceModel | None,
+    margin: float,
+    shrinks: int,
+) -> FourierTrajectory | None:
+    """Reduce the amplitudes of a trajectory until it is feasible."""
+
+    def clear(q: FloatArray) -> bool:
+        return clearance is None or bool(clearance.smallest(q, margin + 1e-6).min() > margin)
+
+    for _ in range(shrinks):
+        # most trajectories that collide do so in a few samples
+        coarse = trajectory.one_period(_SAMPLES * trajectory.harmonics).q
+        if clear(trajectory.q0[np.newaxis]) and clear(coarse):
+            if not trajectory_faults(arm, limits, trajectory, clearance, margin):
+                return trajectory
+        trajectory = trajectory.scaled(0.75)
+    return None
+
+
+#: Clearance between links [m], as excitations keep it.
+CLEARANCE = 0.01
+
+
+@dataclass(frozen=True)
+class Template:
+    """
+    Template of a motion.
+
+    Attributes
+    ----------
+    name : str
+        Description of the motion.
+    speed : float
+        Share of the velocity and acceleration limits.
+    period : float
+        Period [s].
+    harmonics : int
+        Number of harmonics.
+    joints : tuple of str
+        The joints that move; all if empty.
+    amplitude : float
+        Largest amplitude [rad or m].
+    loaded : bool
+        Whether the motion is run twice, without and with a known payload.
+
+    """
+
+    name: str
+    speed: float
+    period: float
+    harmonics: int
+    joints: tuple[str, ...] = ()
+    amplitude: float = np.inf
+    loaded: bool = False
+
+    def draw(
+        self, arm: ArmModel, clearance: ClearanceModel, rng: np.random.Generator
+    ) -> FourierTrajectory:
+        """
+        Draw a motion that keeps all limits and the clearance.
+
+        Raises
+        ------
+        TrajectoryError
+            If no motion is feasible; the message names the obstruction.
+
+        """
+        limits = Limits.of(arm.robot, speed=self.speed)
+        faults = ''
+        # number of draws of a motion of single joints; each draw has another pose of the other
+        # joints
+        for _ in range(6):
+            whole = random_feasible(
+                arm,
+                limits,
+                self.period,
+                self.harmonics,
+                rng,
+                collision=clearance,
+                margin=CLEARANCE,
+            )
+            size = np.ptp(whole.one_period(40 * self.harmonics).q, axis=0) / 2.0
+            moving = [not self.joints or joint in self.joints for joint in whole.joints]
+            share = np.minimum(1.0, self.amplitude / np.maximum(size, 1e-9))
+            trajectory = whole.scaled(np.where(moving, share, 0.0))
+            found = trajectory_faults(arm, limits, trajectory, clearance, CLEARANCE)
+            if not found:
+                return trajectory
+            faults = str(found)
+        raise TrajectoryError(f'{self.name}: {faults}')
+
+
+#: Motions of all joints, slow to fast, and as fast as the accelerations allow.
+_WHOLE = (
+    Template('slow motion of all joints', 0.1, 12.0, 3),
+    Template('motion of all joints at medium speed', 0.4, 10.0, 5),
+    Template('fast motion of all joints', 0.9, 8.0, 6),
+    Template('shaking of all joints', 0.9, 4.0, 20),
+)
+
+
+def templates(joints: Sequence[str]) -> tuple[Template, ...]:
+    """Return motions that identify effects on some joints; without joints, on the arm."""
+    chosen = list(_WHOLE)
+    if joints:
+        names, alone = ', '.join(joints), tuple(joints)
+        chosen += [
+            Template(f'slow motion of {names} alone', 0.1, 12.0, 3, alone),
+            Template(f'fast motion of {names} alone', 0.9, 8.0, 6, alone),
+            Template(f'reversals of {names} by less than 0.02', 0.4, 4.0, 2, alone, 0.01),
+        ]
+    loaded = [
+        replace(t, name=f'{t.name}, without and with a known payload', loaded=True)
+        for t in _WHOLE[:3]
+    ]
+    return (*chosen, *loaded)

@@ -7,7 +7,7 @@ from __future__ import annotations
 from dataclasses import dataclass, replace
 
 from armid_ros.errors import TrajectoryError
-from armid_ros.motion import FloatArray, Motion, read_only
+from armid_ros.motion import FloatArray, freeze, Motion
 import numpy as np
 import numpy.typing as npt
 
@@ -50,8 +50,7 @@ class FourierTrajectory:
     def __post_init__(self) -> None:
         """Freeze the arrays and check shapes and values."""
         object.__setattr__(self, 'joints', tuple(self.joints))
-        for name in ('q0', 'a', 'b'):
-            object.__setattr__(self, name, read_only(getattr(self, name)))
+        freeze(self, 'q0', 'a', 'b')
         n = len(self.joints)
         if len(set(self.joints)) != n:
             raise TrajectoryError(

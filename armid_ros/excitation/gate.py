@@ -1,6 +1,6 @@
 # Copyright 2026 The armid_ros developers
 # SPDX-License-Identifier: Apache-2.0
-"""The check of every motion before it is sent to an arm."""
+"""The check of every motion before it is sent to an arm, and the supervision of its end."""
 
 from __future__ import annotations
 
@@ -10,6 +10,7 @@ from armid_ros.errors import TrajectoryError
 from armid_ros.excitation.geometry.clearance import ClearanceModel
 from armid_ros.excitation.geometry.paths import clear_line
 from armid_ros.excitation.limits import check_limits, Limits, SLOW_VELOCITY
+from armid_ros.excitation.pose_monitor import PoseMonitor
 from armid_ros.excitation.run import Run
 from armid_ros.excitation.supervision import HANDOVER, slowed
 from armid_ros.excitation.transfer import TransferPlanner
@@ -19,10 +20,6 @@ import numpy as np
 #: Factor on the duration of a stop that exceeds an acceleration limit, and the largest number of
 #: new plans. The last plan takes 4.8 times the duration.
 _LONGER, _TRIES = 1.25, 8
-#: Time of a small step, in units of its time at the velocity limit, and of the root of the step
-#: over the acceleration limit: 1.875 and 2.4 for a quintic from rest to rest. A quintic that
-#: begins with a speed needs 3.94 times the speed over the acceleration limit: at most 6 are taken.
-_STEP = 3.0
 
 
 @dataclass(frozen=True)
@@ -195,4 +192,128 @@ class MotionGate:
         velocity = np.where(np.isfinite(self.limits.velocity), self.limits.velocity, SLOW_VELOCITY)
         stopping = speed / self.limits.acceleration
         slowest = stopping + np.sqrt(stopping**2 + step / self.limits.acceleration)
-        return _STEP * float(max((step / velocity).max(), slowest.max()))
+        # time of a small step, in units of its time at the velocity limit, and of the root of the
+        # step over the acceleration limit: 1.875 and 2.4 for a quintic from rest to rest. A
+        # quintic that begins with a speed needs 3.94 times the speed over the acceleration limit:
+        # at most 6 are taken.
+        return 3.0 * float(max((step / velocity).max(), slowest.max()))
+
+
+#: Time for which an arm has to be measured at rest [s].
+_REST = 0.1
+
+
+@dataclass(frozen=True)
+class Ending:
+    """
+    State of a run that ended, until the arm is measured at rest.
+
+    Attributes
+    ----------
+    gate : MotionGate
+        Check of every motion that is sent.
+    begun : float
+        When the run began [s].
+    last : Motion or None
+        Motion that was sent last, without an approach to its first sample. None: another client
+        uses the controller, and no motion is sent.
+    sent : float
+        Time at which the motion was sent [s].
+    reason : str
+        Why the run ended.
+    blocked : bool
+        Whether the arm did not follow and has to be held at its present position.
+    warned : bool
+        Whether a warning that the arm still moves was reported.
+
+    """
+
+    gate: MotionGate
+    begun: float
+    last: Motion | None
+    sent: float
+    reason: str
+    blocked: bool = False
+    warned: bool = False
+
+    def stopped_again(
+        self, monitor: PoseMonitor, now: float, tolerance: float, duration: float
+    ) -> Motion | None:
+        """Return a new stop if the arm still moves along the path of the run; otherwise None."""
+        phase = now - self.begun
+        if self.last is None or now - self.sent < self.last.t[-1]:
+            return None
+        if not 0.0 <= phase < self.gate.run.duration:
+            return None
+        away = np.abs(monitor.pose.q - self.gate.run.at([phase]).q[0]).max()
+        if not away <= tolerance or not monitor.unsteady(_REST, 2):
+            return None
+        return self.gate.stop(phase, duration, monitor.pose.q, monitor.velocity())
+
+    def looked(
+        self,
+        monitor: PoseMonitor,
+        now: float,
+        patience: float,
+        tolerance: float,
+        duration: float,
+    ) -> tuple[Ending | None, Motion | None, str]:
+        """
+        Check whether the arm is at rest, and return the next state.
+
+        Parameters
+        ----------
+        monitor : PoseMonitor
+            Measured positions of the arm.
+        now : float
+            Time [s].
+        patience : float
+            How long after the end of a motion the arm may still move [s].
+        tolerance : float
+            Largest distance from the set point of an arm that follows [rad or m].
+        duration : float
+            Duration of a new stop [s].
+
+        Returns
+        -------
+        Ending or None
+            The next state; None: the arm is at rest.
+        Motion or None
+            Motion to send, if any.
+        str
+            Message to report; empty if none.
+
+        """
+        if self.last is not None and self.blocked and monitor.unsteady(_REST) == '':
+            # the arm is held where it is, if the step of the set point is allowed
+            ending, measured = replace(self, blocked=False), monitor.pose.q
+            row = int(np.searchsorted(self.last.t, now - self.sent))
+            set_point = self.last.q[min(row, len(self.last.t) - 1)]
+            if np.abs(measured - set_point).max() <= tolerance:
+                return ending, None, ''
+            try:
+                # largest step of the set point to a blocked arm, in units of the tracking
+                # tolerance
+                motion = self.gate.hold(set_point, measured, 3.0 * tolerance)
+            except TrajectoryError as error:
+                return ending, None, f'{self.reason}; the set point stays where it is: {error}'
+            return replace(ending, last=motion, sent=now), motion, ''
+        lasts = 0.0 if self.last is None else float(self.last.t[-1])
+        moving = monitor.unsteady(_REST, 2)
+        if now - self.sent < lasts + patience or moving is None:
+            return self, None, ''
+        if not moving:
+            return None, None, ''
+        stop = self.stopped_again(monitor, now, tolerance, duration)
+        ending = replace(self, warned=True)
+        if stop is not None:
+            ending = replace(ending, last=stop, sent=now)
+        if self.warned:
+            return ending, stop, ''
+        if self.last is None:
+            return ending, None, f'{self.reason}; {moving}, and this node does not move it'
+        return (
+            ending,
+            stop,
+            (f'the arm still moves although it was stopped: {moving}; use the emergency stop'),
+        )

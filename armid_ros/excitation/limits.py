@@ -28,9 +28,6 @@ SLOW_VELOCITY = 0.5
 #: Share of the velocity and acceleration limits that a run of each speed class may use.
 SPEED_CLASSES = {'slow': 0.15, 'medium': 0.4, 'fast': 0.9}
 
-#: Shares of the range of a joint, at each end, and of its torque limit that are kept free.
-_POSITION_RESERVE, _TORQUE_RESERVE = 0.02, 0.1
-
 #: Relative tolerance of the comparison of positions and rates with limits.
 _ROUNDING = 1e-9
 
@@ -124,7 +121,8 @@ class Limits:
         if not 0.0 < share <= 1.0:
             raise TrajectoryError(f'speed: a share of the limits in (0, 1], not {share:g}')
         span = robot.upper - robot.lower
-        margin = _POSITION_RESERVE * reserve * np.where(np.isfinite(span), span, 0.0)
+        # 2 % of the range are kept free at each end, and a tenth of the torque limit
+        margin = 0.02 * reserve * np.where(np.isfinite(span), span, 0.0)
         top = np.where(has_velocity_limit(robot), robot.velocity_limit, SLOW_VELOCITY)
         given = (
             np.full(robot.n_joints, np.nan) if acceleration is None else np.asarray(acceleration)
@@ -135,7 +133,7 @@ class Limits:
             upper=robot.upper - margin,
             velocity=share * top,
             acceleration=share * np.where(np.isnan(given), top / TIME_TO_TOP_SPEED, given),
-            torque=(1.0 - _TORQUE_RESERVE * reserve) * robot.torque_limit,
+            torque=(1.0 - 0.1 * reserve) * robot.torque_limit,
             prismatic=robot.prismatic,
         )
 

@@ -19,16 +19,8 @@ import numpy.typing as npt
 AGREEING = 5
 #: Velocity below which a joint is at rest [rad/s or m/s].
 AT_REST = 0.02
-#: Range of the positions of a joint at rest, encoder noise included [rad or m].
-_STILL = 0.004
 #: Time for which a rejected position is counted [s].
 _WINDOW = 0.5
-#: Encoder noise, added to the change of position that the velocity limit allows [rad or m].
-_NOISE = 0.02
-#: Time of the position differences for a velocity [s]: noise of 0.0001 rad gives 0.01 rad/s.
-_DIFFERENCE = 0.01
-#: Transport delay: the difference of stamps may exceed that of arrivals by this time [s].
-_TRANSPORT = 0.1
 #: Largest valid position of a joint without position limits [rad or m].
 _FARTHEST = 1e4
 
@@ -120,7 +112,13 @@ class PoseMonitor:
 
     def update(self, message: JointState, now: float) -> None:
         """Update the filter with the joint state of a message that arrived at time `now` [s]."""
-        source = self._source(message.names)
+        names, joints = message.names, self.pose.joints
+        if names not in self._sources:
+            own = [(k, joints.index(name)) for k, name in enumerate(names) if name in joints]
+            columns, indices = np.array(own, dtype=int).reshape(-1, 2).T
+            limits = (limit[indices] for limit in (self._lower, self._upper, self._velocity))
+            self._sources[names] = _Source(columns, indices, *limits)
+        source = self._sources[names]
         if not len(source.joints):
             return
         q, dq = (
@@ -151,7 +149,13 @@ class PoseMonitor:
                 return
             source.states.clear()
         source.rivals.clear()
-        self._believe(source, state)
+        states = source.states
+        states.append(state)
+        while len(states) > AGREEING and state.arrived - states[1].arrived > _WINDOW:
+            states.popleft()
+        q = np.full(len(self.pose.joints), np.nan)
+        q[source.joints] = state.q
+        self.pose = self.pose.updated(q, state.stamp_ns, state.arrived)
 
     def contradiction(self, now: float, count: int = AGREEING) -> str:
         """Return why many positions of the last 0.5 s were rejected; empty if few were."""
@@ -165,7 +169,9 @@ class PoseMonitor:
             states = source.states
             for state in reversed(states):
                 passed = states[-1].arrived - state.arrived
-                if passed >= _DIFFERENCE:
+                # time of the position differences for a velocity [s]: noise of 0.0001 rad gives
+                # 0.01 rad/s
+                if passed >= 0.01:
                     velocity[source.joints] = (states[-1].q - state.q) / passed
                     break
         return velocity
@@ -201,23 +207,14 @@ class PoseMonitor:
             dq = np.nan_to_num(measured, posinf=0.0, neginf=0.0).mean(axis=0)
             moved = np.ptp(q, axis=0)
             for j, distance, velocity in zip(source.joints, moved, dq, strict=True):
-                speed = distance / covered if distance > _STILL else 0.0
+                # range of the positions of a joint at rest, encoder noise included [rad or m]
+                speed = distance / covered if distance > 0.004 else 0.0
                 speed = max(speed, abs(velocity))
                 if speed > AT_REST:
                     unit = f'{self._units[j]}/s'
                     return f"joint '{self.pose.joints[j]}' moves at {speed:.2g} {unit}"
             decided.update(source.joints.tolist())
         return '' if len(decided) == len(self.pose.joints) else None
-
-    def _source(self, names: tuple[str, ...]) -> _Source:
-        if names in self._sources:
-            return self._sources[names]
-        joints = self.pose.joints
-        own = [(column, joints.index(name)) for column, name in enumerate(names) if name in joints]
-        columns, indices = np.array(own, dtype=int).reshape(-1, 2).T
-        limits = (limit[indices] for limit in (self._lower, self._upper, self._velocity))
-        source = self._sources[names] = _Source(columns, indices, *limits)
-        return source
 
     def _outside(self, source: _Source, q: FloatArray) -> str:
         """Return a message if a position is not finite or is outside the limits."""
@@ -242,9 +239,12 @@ class PoseMonitor:
         passed = state.arrived - last.arrived
         if state.stamp_ns and last.stamp_ns:
             between = (state.stamp_ns - last.stamp_ns) * 1e-9
-            passed = max(passed, min(between, passed + _TRANSPORT))
+            # transport delay: the difference of stamps may exceed that of arrivals by this time
+            # [s]
+            passed = max(passed, min(between, passed + 0.1))
         step = np.abs(state.q - last.q)
-        beyond = step - _NOISE - source.velocity * max(passed, 0.0)
+        # encoder noise, added to the change of position that the velocity limit allows [rad or m]
+        beyond = step - 0.02 - source.velocity * max(passed, 0.0)
         k = int(np.argmax(beyond))
         if not beyond[k] > 0.0:  # NaN if no position was known
             return ''
@@ -259,12 +259,3 @@ class PoseMonitor:
     def _reject(self, fault: str, now: float) -> None:
         self._rejections.append((now, fault))
         self.rejected += 1
-
-    def _believe(self, source: _Source, state: _State) -> None:
-        states = source.states
-        states.append(state)
-        while len(states) > AGREEING and state.arrived - states[1].arrived > _WINDOW:
-            states.popleft()
-        q = np.full(len(self.pose.joints), np.nan)
-        q[source.joints] = state.q
-        self.pose = self.pose.updated(q, state.stamp_ns, state.arrived)

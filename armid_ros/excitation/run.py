@@ -134,35 +134,19 @@ def plan_run(
 
     """
     if planner.limits is not None:
-        excitation = unwound(excitation, planner.arm, planner.limits, start)
+        excitation = _unwound(excitation, planner.arm, planner.limits, start)
     first, last = excitation.at([0.0, excitation.duration]).q
     there = planner(start, first, shortest, seed)
     home = planner(start, last, shortest, seed).reversed() if back else None
     return Run(there, excitation, home, rate)
 
 
-def unwound(
+def _unwound(
     excitation: Excitation, arm: ArmModel, limits: Limits, start: FloatArray
 ) -> Excitation:
-    """
-    Return the excitation shifted by whole turns, as close to a start pose as the limits allow.
-
-    A joint with a range of two turns reaches most poses at two positions. Above a floor, the way
-    to one of them is often blocked: the shoulder would have to swing through the floor.
-
-    Parameters
-    ----------
-    excitation : Excitation
-        The excitation.
-    arm : ArmModel
-        Prior model. If its torques change with whole turns, as with springs, the excitation is not
-        changed.
-    limits : Limits
-        Position limits in force.
-    start : ndarray, shape (n,)
-        Present pose of the arm [rad or m].
-
-    """
+    """Return the excitation shifted by whole turns, as close to a start pose as limits allow."""
+    # a joint with a range of two turns reaches most poses at two positions; above a floor, the way
+    # to one of them is often blocked, as the shoulder would have to swing through the floor
     trajectory = excitation.trajectory
     samples = 400
     q = trajectory.one_period(samples).q
@@ -177,7 +161,7 @@ def unwound(
         return excitation
     moved = replace(trajectory, q0=trajectory.q0 + turn * turns)
     before, after = (arm.joint_torque(path.one_period(samples)) for path in (trajectory, moved))
-    # equal up to rounding
+    # torques that change with whole turns, as with springs, are not equal up to rounding
     if np.abs(after - before).max() > 1e-6 * np.abs(before).max():
         return excitation
     return replace(excitation, trajectory=moved)

@@ -12,17 +12,10 @@ from armid_ros.errors import TrajectoryError
 from armid_ros.excitation.geometry.clearance import ClearanceModel
 from armid_ros.excitation.geometry.paths import clear_line, find_path
 from armid_ros.excitation.limits import check_limits, Limits, SLOW_VELOCITY, SPEED_CLASSES
-from armid_ros.motion import FloatArray, Motion, read_only
+from armid_ros.motion import FloatArray, freeze, Motion
 from armid_ros.robots import Robot
 import numpy as np
 import numpy.typing as npt
-
-#: Acceleration that is slow for any joint, used with `SLOW_VELOCITY` [rad/s^2 or m/s^2].
-_SLOW_ACCELERATION = 1.0
-#: Samples of a way at which its torque is checked; factor on its duration, and number of trials.
-_SAMPLES, _SLOWER, _TRIES = 200, 1.3, 20
-#: Tolerance beyond a position limit for a measured position [rad or m].
-_BEYOND = 0.01
 
 
 @dataclass(frozen=True)
@@ -47,8 +40,7 @@ class Transfer:
 
     def __post_init__(self) -> None:
         """Freeze the arrays."""
-        object.__setattr__(self, 't', read_only(self.t))
-        object.__setattr__(self, 'q', read_only(self.q))
+        freeze(self, 't', 'q')
 
     @property
     def duration(self) -> float:
@@ -141,7 +133,8 @@ class TransferPlanner:
             return Transfer(joints, np.array([0.0, shortest]), np.vstack([start, goal]))
         # a pose measured slightly beyond a limit is moved onto the limit
         inside = np.clip(start, self.limits.lower, self.limits.upper)
-        start = np.where(np.abs(start - inside) <= _BEYOND, inside, start)
+        # tolerance beyond a position limit for a measured position [rad or m]
+        start = np.where(np.abs(start - inside) <= 0.01, inside, start)
         for name, q in (('it would leave from', start), ('it would go to', goal)):
             fault = self.fault(q)
             if fault:
@@ -154,7 +147,27 @@ class TransferPlanner:
             lambda q: not self._overload(q),
             np.random.default_rng(seed),
         )
-        return self._timed(poses, shortest)
+        # a path with the duration that the limits require
+        limits = self.limits
+        assert limits is not None
+        way = np.abs(np.diff(poses, axis=0))
+        velocity = np.where(np.isfinite(limits.velocity), limits.velocity, SLOW_VELOCITY)
+        # largest velocity and acceleration of a quintic from 0 to 1 in unit time
+        needed = np.maximum(
+            (1.875 * way / velocity).max(axis=1),
+            np.sqrt((10.0 / np.sqrt(3.0)) * way / limits.acceleration).max(axis=1),
+        )
+        t = np.append(0.0, np.cumsum(needed))
+        transfer = Transfer(limits.joints, t, poses)
+        transfer = transfer.lasting(max(transfer.duration, shortest))
+        for _ in range(20):  # durations, each longer than the last
+            # samples of a way at which its torque is checked
+            motion = transfer.at(np.linspace(0.0, transfer.duration, 200))
+            violations = check_limits(limits, motion, self.arm.joint_torque(motion))
+            if not violations:
+                return transfer
+            transfer = transfer.lasting(1.3 * transfer.duration)
+        raise TrajectoryError(f'no way to the trajectory keeps the limits: {violations[0]}')
 
     def fault(self, q: FloatArray) -> str:
         """Return why an arm may not stand in a pose, shape (n,); empty if it may."""
@@ -239,28 +252,6 @@ class TransferPlanner:
             f'{self.limits.unit("torque", worst)}'
         )
 
-    def _timed(self, poses: FloatArray, shortest: float) -> Transfer:
-        """Return a path with the duration that the limits require."""
-        limits = self.limits
-        assert limits is not None
-        way = np.abs(np.diff(poses, axis=0))
-        velocity = np.where(np.isfinite(limits.velocity), limits.velocity, SLOW_VELOCITY)
-        # largest velocity and acceleration of a quintic from 0 to 1 in unit time
-        needed = np.maximum(
-            (1.875 * way / velocity).max(axis=1),
-            np.sqrt((10.0 / np.sqrt(3.0)) * way / limits.acceleration).max(axis=1),
-        )
-        t = np.append(0.0, np.cumsum(needed))
-        transfer = Transfer(limits.joints, t, poses)
-        transfer = transfer.lasting(max(transfer.duration, shortest))
-        for _ in range(_TRIES):
-            motion = transfer.at(np.linspace(0.0, transfer.duration, _SAMPLES))
-            violations = check_limits(limits, motion, self.arm.joint_torque(motion))
-            if not violations:
-                return transfer
-            transfer = transfer.lasting(_SLOWER * transfer.duration)
-        raise TrajectoryError(f'no way to the trajectory keeps the limits: {violations[0]}')
-
 
 def transfer_limits(
     robot: Robot, speed: str | float = 'slow', acceleration: FloatArray | None = None
@@ -282,10 +273,9 @@ def transfer_limits(
     run = Limits.of(robot, speed=speed, reserve=False, acceleration=acceleration)
     share = SPEED_CLASSES[speed] if isinstance(speed, str) else float(speed)
     slow = min(1.0, SPEED_CLASSES['slow'] / share)
+    # acceleration that is slow for any joint, used with `SLOW_VELOCITY` [rad/s^2 or m/s^2]
     return replace(
         run,
         velocity=np.minimum(run.velocity, np.maximum(slow * run.velocity, SLOW_VELOCITY)),
-        acceleration=np.minimum(
-            run.acceleration, np.maximum(slow * run.acceleration, _SLOW_ACCELERATION)
-        ),
+        acceleration=np.minimum(run.acceleration, np.maximum(slow * run.acceleration, 1.0)),
     )

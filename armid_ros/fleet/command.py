@@ -161,8 +161,7 @@ def identify(
     from armid_ros.cli.options import read_settings
     from armid_ros.fleet.bags import find_bags
     from armid_ros.fleet.cluster import connected
-    from armid_ros.fleet.job import FleetSettings
-    from armid_ros.fleet.plan import plan_fleet, read_table
+    from armid_ros.fleet.plan import FleetSettings, plan_fleet, read_table
     from armid_ros.fleet.run import identify_fleet
     from armid_ros.identification import SignalSettings
 

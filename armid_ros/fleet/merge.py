@@ -1,7 +1,7 @@
 # Copyright 2026 The armid_ros developers
 # SPDX-License-Identifier: Apache-2.0
 """
-From bags to estimates: sums of normal equations, a fit, and its standard deviations.
+From bags to estimates: a summary of each bag, sums of normal equations, a fit, its deviations.
 
 Standard deviations follow from the spectrum of the residuals, which normal equations do not
 contain. A second pass over the bags therefore computes the noise products at the estimate of the
@@ -11,12 +11,15 @@ arm. Noise products add up over bags, so the result equals one identification of
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
-from dataclasses import dataclass
+from collections.abc import Iterable, Iterator, Mapping, Sequence
+from dataclasses import dataclass, field
+import datetime
 
+from armid_ros.errors import ArmidError, IdentificationError
 from armid_ros.estimate import ParameterName
-from armid_ros.fleet.bags import BagFile
-from armid_ros.fleet.job import Job
+from armid_ros.fleet.bags import BagFile, DAY_NS
+from armid_ros.fleet.plan import filters_at, Job
+from armid_ros.fleet.store import fetched
 from armid_ros.identification.fitting.covariance import noise_products, sandwich
 from armid_ros.identification.fitting.excited import bounds, identifiable_base
 from armid_ros.identification.fitting.normal_equations import (
@@ -24,9 +27,12 @@ from armid_ros.identification.fitting.normal_equations import (
     weighted_fit,
     WeightedFit,
 )
+from armid_ros.identification.rows.checks import check_positions, check_torque, resting
 from armid_ros.identification.rows.regression import Regression
+from armid_ros.identification.rows.streaming import streamed
 from armid_ros.model import BaseParameters
 from armid_ros.motion import FloatArray
+from armid_ros.recording import Recording
 import numpy as np
 
 
@@ -174,3 +180,151 @@ class MergedBags:
             sum(part.found for part in parts),
             tuple(refused for part in parts for refused in part.refused),
         )
+
+
+@dataclass(frozen=True, eq=False)
+class BagSummary:
+    """
+    The summary of a bag.
+
+    Attributes
+    ----------
+    bag : BagFile
+        The bag.
+    day : str
+        Day of the path, or of the first timestamp, such as 2026-01-31.
+    start_ns : int
+        First timestamp [ns]; shifted to `day` if more than a day from it.
+    seconds : float
+        Time from the first sample to the last [s].
+    normal : NormalEquations
+        Normal equations of the rows, for the theoretically identifiable parameters.
+    own : FleetEstimate or None
+        Estimate from this bag; None if the bag is too short, or was found in the results.
+    motion : dict
+        Further columns of the table ``bags``; empty if the bag was found in the results.
+    computed : bool
+        False if the bag was found in the results of an earlier run.
+    rows : tuple of Regression or None
+        Rows of the bag, if they fit into the memory; None if the bag has to be read again.
+
+    """
+
+    bag: BagFile
+    day: str
+    start_ns: int
+    seconds: float
+    normal: NormalEquations
+    own: FleetEstimate | None = None
+    motion: Mapping[str, object] = field(default_factory=dict)
+    computed: bool = True
+    rows: tuple[Regression, ...] | None = None
+
+    def merged(self) -> MergedBags:
+        """Return a group that consists of this bag."""
+        version = self.bag.url, self.bag.version
+        return MergedBags(self.normal, self.seconds, (version,), 0 if self.computed else 1)
+
+    def rows_again(self, job: Job) -> Iterator[Regression]:
+        """Yield the rows of the bag from memory, or read the bag again."""
+        if self.rows is not None:
+            yield from self.rows
+            return
+        with fetched(self.bag.url) as path:
+            for _, parts in pieces(path, job):
+                yield from parts
+
+
+def prepare(bag: BagFile, job: Job, bags_of_arm: int = 1) -> BagSummary | Refused:
+    """
+    Read a bag and compress it; return the reason if the bag cannot be used.
+
+    Parameters
+    ----------
+    bag : BagFile
+        The bag.
+    job : Job
+        Model and filters.
+    bags_of_arm : int
+        Number of bags that share the memory for rows.
+
+    Raises
+    ------
+    StoreError
+        If the store did not deliver the bag.
+
+    """
+    path = bag.url
+    try:
+        with fetched(bag.url) as path:
+            # bytes of rows in memory until the fit; others are read again
+            return _prepared(bag, path, job, 48_000_000 // max(1, bags_of_arm))
+    except ArmidError as error:
+        # the message names the URL of the bag, not the path of its copy
+        return Refused(bag, str(error).replace(path, bag.url))
+
+
+def pieces(path: str, job: Job) -> Iterator[tuple[Recording, Sequence[Regression]]]:
+    """Yield the pieces of a bag, each with its rows."""
+    yield from streamed(
+        path,
+        job.arm,
+        job.theory.independent,
+        lambda piece: filters_at(job.filters, 1.0 / piece.period, path),
+        job.samples,
+        topic=job.settings.topic,
+        settings=job.settings.reading,
+    )
+
+
+def _prepared(bag: BagFile, path: str, job: Job, budget: int) -> BagSummary:
+    robot = job.arm.robot
+    normal: NormalEquations | None = None
+    kept: list[Regression] | None = []
+    start_ns, samples, seconds = 0, 0, 0.0
+    lowest, highest = np.full(robot.n_joints, np.inf), np.full(robot.n_joints, -np.inf)
+    top_speed = np.zeros(robot.n_joints)
+    for piece, parts in pieces(path, job):
+        start_ns = start_ns or piece.start_ns
+        samples, seconds = samples + len(piece), seconds + piece.duration
+        lowest = np.minimum(lowest, piece.q.min(axis=0))
+        highest = np.maximum(highest, piece.q.max(axis=0))
+        for part in parts:
+            top_speed = np.maximum(top_speed, np.abs(part.motion.dq).max(axis=0))
+        if not parts:
+            continue
+        if normal is None:
+            check_torque(job.arm, [piece], parts)
+        own_normal = NormalEquations.of(parts)
+        normal = own_normal if normal is None else normal + own_normal
+        if kept is not None:
+            kept.extend(parts)
+            if sum(part.columns.nbytes for part in kept) > budget:
+                kept = None
+    check_positions(robot, path, lowest, highest)
+    motion = {
+        'samples': samples,
+        'lowest': lowest,
+        'highest': highest,
+        'top_speed': top_speed,
+        'notes': list(resting(robot, path, highest - lowest)),
+    }
+    if normal is None:
+        raise IdentificationError(
+            f'{path}: {seconds:.2f} s in {samples} samples is too short; '
+            'record a movement of several seconds'
+        )
+    fit = FleetFit.of(normal, job)
+    own = None
+    if fit is not None:
+        rows = (part for _, parts in pieces(path, job) for part in parts) if kept is None else kept
+        own = fit.estimate(normal, fit.noise(rows))
+    stamped = datetime.datetime.fromtimestamp(start_ns * 1e-9, datetime.UTC)
+    day = bag.day or stamped.date().isoformat()
+    apart = datetime.date.fromisoformat(day) - stamped.date()
+    if (
+        abs(apart.days) > 1
+    ):  # a clock that counts from its start; a difference of one day is a time zone
+        start_ns += apart.days * DAY_NS
+    held = None if kept is None else tuple(kept)
+    return BagSummary(bag, day, start_ns, seconds, normal, own, motion, rows=held)

@@ -1,7 +1,7 @@
 # Copyright 2026 The armid_ros developers
 # SPDX-License-Identifier: Apache-2.0
 """
-The plan of a fleet: the robot of each arm, and the filters of each kind of arm.
+The plan of a fleet: settings, the robot of each arm, filters and job of each kind of arm.
 
 fleet.json stores the plan, so that later runs use the same filters.
 
@@ -12,7 +12,8 @@ from __future__ import annotations
 from collections import Counter
 from collections.abc import Mapping, Sequence
 import csv
-from dataclasses import dataclass
+from dataclasses import dataclass, field
+from functools import cached_property
 import io
 import itertools
 import json
@@ -24,17 +25,142 @@ from armid_ros.errors import ArmidError, FleetError
 from armid_ros.files import json_text, load_json, reading
 from armid_ros.files.cells import listed
 from armid_ros.fleet.bags import BagFile, digest
-from armid_ros.fleet.job import filter_facts, FleetSettings, Job, require_linear
 from armid_ros.fleet.store import fetched, opened, Store, StoreError
 from armid_ros.identification import Conditioning, SignalSettings
+from armid_ros.identification.description import kinematics_digest
 from armid_ros.identification.fitting.held_out import cutoff_of_torques
+from armid_ros.identification.fitting.nonlinear import curved
 from armid_ros.identification.rows.damage import without_damage
 from armid_ros.identification.rows.signals import conditioning
-from armid_ros.model import BaseParameters
-from armid_ros.recording import Recording
+from armid_ros.model import BaseParameters, random_motion
+from armid_ros.recording import ReadSettings, Recording
 from armid_ros.recording.reader import read_pieces
 from armid_ros.robots import load_robot, robot_from_urdf
 import numpy as np
+
+
+@dataclass(frozen=True)
+class FleetSettings:
+    """
+    Settings of the identification of a fleet.
+
+    Attributes
+    ----------
+    effects : str
+        Effects of all arms, unless the table of robots has others.
+    gravity : str
+        'earth', 'moon' or a vector, unless the table of robots has another value.
+    joints : str
+        Driven joints, separated by commas; empty for all joints except grippers.
+    weighted : bool
+        Whether joints are weighted by the standard deviations of their residuals.
+    signals : SignalSettings
+        Filters; a value of None is chosen from a few bags of each kind of arm, for all days.
+    topic : str or None
+        Name of the JointState topic.
+    resume : bool
+        Whether results of earlier runs are reused if bag and settings are the same.
+    seed : int
+        Seed of the random states with which base parameters are computed.
+    reading : ReadSettings
+        Settings for checksums and memory.
+
+    """
+
+    effects: str
+    gravity: str = 'earth'
+    joints: str = ''
+    weighted: bool = True
+    signals: SignalSettings = field(default_factory=SignalSettings)
+    topic: str | None = None
+    resume: bool = False
+    seed: int = 0
+    reading: ReadSettings = field(default_factory=ReadSettings)
+
+
+def filters_at(filters: Conditioning, rate_hz: float, source: str) -> Conditioning:
+    """
+    Adapt the filters of a kind of arm to the sampling rate of a recording.
+
+    Raises
+    ------
+    FleetError
+        If the rate is too low for the cut-off.
+
+    """
+    if filters.cutoff_hz >= 0.5 * rate_hz:
+        raise FleetError(
+            f'{source}: {rate_hz:.4g} samples/s are too few for the cut-off of '
+            f'{filters.cutoff_hz:.4g} Hz of its arm; set a lower one with --cutoff'
+        )
+    decimation = filters.decimation
+    # sampling rates that differ by less than this share are treated as equal
+    if abs(rate_hz / filters.rate_hz - 1.0) > 0.02:
+        decimation = max(1, round(rate_hz * filters.decimation / filters.rate_hz))
+    return Conditioning(rate_hz, filters.cutoff_hz, decimation)
+
+
+def _filter_facts(filters: Conditioning) -> dict[str, Any]:
+    """Return filters as an entry of fleet.json: the arguments of a ``Conditioning``."""
+    return {name: getattr(filters, name) for name in ('cutoff_hz', 'decimation', 'rate_hz')}
+
+
+@dataclass(frozen=True)
+class Job:
+    """
+    Model, filters and settings for bags of one kind of arm.
+
+    Attributes
+    ----------
+    arm : ArmModel
+        Rigid body and effects.
+    theory : BaseParameters
+        Parameters that are identifiable with a suitable motion.
+    filters : Conditioning
+        Filters of all bags of this kind, with cut-off, decimation and sampling rate.
+    out : str
+        URL of the results.
+    run : str
+        Name of the run; results of the same run are not computed again.
+    settings : FleetSettings
+        Settings of the fleet.
+
+    """
+
+    arm: ArmModel
+    theory: BaseParameters
+    filters: Conditioning
+    out: str
+    run: str
+    settings: FleetSettings
+
+    @cached_property
+    def facts(self) -> dict[str, Any]:
+        """Return the facts on which results depend, except the bag."""
+        robot = self.arm.robot
+        return {
+            'robot': robot.name,
+            'joints': list(robot.joints),
+            'kinematics': kinematics_digest(robot),
+            'gravity': [float(g) for g in robot.gravity],
+            'effects': [[effect.name, list(effect.joints)] for effect in self.arm.effects],
+            'weighted': self.settings.weighted,
+            'topic': self.settings.topic,
+            **_filter_facts(self.filters),
+        }
+
+    @cached_property
+    def digest(self) -> str:
+        """Return a hash of the facts."""
+        return digest(json.dumps(self.facts, sort_keys=True))
+
+    @property
+    def samples(self) -> int:
+        """Return the number of samples of a bag that are in memory at once."""
+        joints = self.arm.robot.n_joints
+        rows = 16_000_000 // (joints * self.theory.rank)  # larger columns are read in pieces
+        return min(rows * self.filters.decimation, 1_400_000 // joints)
+
 
 SCHEMA = 'armid/fleet/1'
 
@@ -158,7 +284,7 @@ def plan_fleet(
             'effects': effects,
             'method': 'wls' if settings.weighted else 'ols',
             'topic': settings.topic,
-            'filters': filter_facts(filters),
+            'filters': _filter_facts(filters),
         }
         for bag in some:
             arms[bag.arm], jobs[bag.arm] = key, job
@@ -256,5 +382,19 @@ def _model(entry: Entry, settings: FleetSettings) -> ArmModel:
         joints=listed(chosen.replace(';', ',')) if chosen else None,
     )
     model = ArmModel.of(robot, effects=(entry.effects or settings.effects).replace(';', ','))
-    require_linear(model, np.random.default_rng(settings.seed))
+    # raise a FleetError if the torque is not linear in the parameters of an effect
+    motion = random_motion(model.robot, np.random.default_rng(settings.seed), 200)
+    bare = ArmModel(model.robot)
+    for effect in model.effects:
+        one = bare.with_effect(effect)
+        linear = effect.instantaneous and len(one.theta) > len(bare.theta)
+        if linear:
+            values = np.clip(0.1, *effect.bounds())
+            theta = np.concatenate([1.1 * bare.theta, values])
+            linear = not curved(one, one.with_theta(theta), [motion])
+        if not linear:
+            raise FleetError(
+                f'--effects {effect.name}: the torque is not linear in its parameters, so bags '
+                'cannot be merged; name other effects, and use `armid diagnose` for this one'
+            )
     return model

@@ -21,10 +21,9 @@ import datetime
 from armid_ros.arm import parameter_table
 from armid_ros.errors import FleetError
 from armid_ros.fleet.bags import BagFile, digest, folder_of, part_of
-from armid_ros.fleet.job import Job
-from armid_ros.fleet.merge import FleetEstimate, MergedBags, Refused
+from armid_ros.fleet.merge import BagSummary, FleetEstimate, MergedBags, Refused
+from armid_ros.fleet.plan import Job
 from armid_ros.fleet.store import Store
-from armid_ros.fleet.summary import BagSummary
 from armid_ros.identification.fitting.normal_equations import NormalEquations
 import numpy as np
 import pyarrow as pa

@@ -12,8 +12,8 @@ from typing import Any
 
 from armid_ros.errors import ArmidError, FleetError
 from armid_ros.fleet.bags import BagFile
-from armid_ros.fleet.job import Job
-from armid_ros.fleet.merge import FleetFit, MergedBags, Refused
+from armid_ros.fleet.merge import BagSummary, FleetFit, MergedBags, prepare, Refused
+from armid_ros.fleet.plan import Job
 from armid_ros.fleet.results import (
     arm_is_done,
     find_summary,
@@ -22,7 +22,6 @@ from armid_ros.fleet.results import (
     write_summary,
 )
 from armid_ros.fleet.store import Store
-from armid_ros.fleet.summary import BagSummary, prepare
 from armid_ros.identification import Conditioning
 from armid_ros.motion import FloatArray
 from distributed import as_completed, Client, Future, KilledWorker

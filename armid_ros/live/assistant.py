@@ -24,7 +24,7 @@ from typing import ClassVar
 from armid_ros.api.diagnosis import DiagnosisResult
 from armid_ros.diagnosis import Diagnosis, next_run
 from armid_ros.errors import ArmidError, IdentificationError
-from armid_ros.excitation.files import excitation_text
+from armid_ros.excitation.schedule import excitation_text
 from armid_ros.live.request import Answer, answer, DiagnosisRequest
 import numpy as np
 

@@ -21,7 +21,7 @@ from armid_ros.excitation import (
     tracking_fault,
     TransferPlanner,
 )
-from armid_ros.excitation.files import load_excitation, read_excitation
+from armid_ros.excitation.schedule import load_excitation, read_excitation
 from armid_ros.excitation.supervision import HANDOVER
 from armid_ros.files import reading
 from armid_ros.nodes.arm_watch import ArmWatch

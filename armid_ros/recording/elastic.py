@@ -20,7 +20,7 @@ from armid_ros.robots import Robot
 import numpy as np
 
 if TYPE_CHECKING:
-    from armid_ros.simulation.accelerometers import LinkAccelerometers
+    from armid_ros.simulation.sensors import LinkAccelerometers
 
 #: Topics of the motor positions (converted to the joint side), the link positions, and the
 #: references of the control loops.

@@ -14,7 +14,7 @@ from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from typing import ClassVar
 
-from armid_ros.excitation.geometry.heights import outline
+from armid_ros.excitation.geometry.floor import outline
 from armid_ros.motion import FloatArray
 from armid_ros.report.page import Templated
 from armid_ros.robots import collision_model, CollisionModel, Robot
@@ -28,42 +28,24 @@ from scipy.spatial import ConvexHull
 _POSE, _SINGLE, _MARGIN = (190.0, 230.0), (300.0, 240.0), 0.03
 #: Corners of the outline of a ball.
 _ROUND = 16
-#: Radius of a bar [m].
-_BAR = 0.02
 #: Colour of what stands around the arm.
 OBSTACLE = 'var(--line)'
 #: What is smaller stands for a link without a body and cannot be seen [m].
 _POINT = 1e-3
-#: Height of a line of text, width of a letter [px].
-_LINE, _LETTER = 16.0, 9.5
-#: Poses that a single drawing is tried in.
-_POSES = 12
-#: Joint range beyond which a joint counts as endless [rad or m].
-_ENDLESS = 1e3
-#: Height of the line of captions [px].
-_CAPTION = 30.0
+#: Height of a line of text [px].
+_LINE = 16.0
 
 
-def view(azimuth: float, elevation: float) -> FloatArray:
-    """
-    Return the directions right, up and towards the eye, as seen without perspective, shape (3, 3).
-
-    Parameters
-    ----------
-    azimuth : float
-        Direction of the eye about z, from x [rad].
-    elevation : float
-        Height of the eye over the horizon [rad].
-
-    """
+def _view(azimuth: float, elevation: float) -> FloatArray:
+    """Return right, up and towards the eye (3, 3), for azimuth and height of the eye [rad]."""
     (sa, ca), (se, ce) = ((np.sin(x), np.cos(x)) for x in (azimuth, elevation))
     return np.array([[-sa, ca, 0.0], [-ca * se, -sa * se, ce], [ca * ce, sa * ce, se]])
 
 
 #: From the left, x to the right and z up.
-SIDE = view(-np.pi / 2.0, 0.0)
+SIDE = _view(-np.pi / 2.0, 0.0)
 #: From the front right and above.
-CORNER = view(np.radians(-55.0), np.radians(18.0))
+CORNER = _view(np.radians(-55.0), np.radians(18.0))
 
 
 @dataclass(frozen=True)
@@ -165,14 +147,16 @@ def draw_arm(
     """
     solids, model = _solids(collision_model(robot)), robot.model
     lower, upper = model.lowerPositionLimit, model.upperPositionLimit
-    ended = np.isfinite(lower) & np.isfinite(upper) & (upper - lower < _ENDLESS)
+    # joint range beyond which a joint counts as endless [rad or m]
+    ended = np.isfinite(lower) & np.isfinite(upper) & (upper - lower < 1e3)
     poses = [
         np.array(
             [(a + b) / 2.0 if e else 0.0 for a, b, e in zip(lower, upper, ended, strict=True)]
         )
     ]
     if q is not None and len(q):
-        poses = list(q[np.linspace(0, len(q) - 1, min(_POSES, len(q))).astype(np.intp)])
+        # poses that a single drawing is tried in
+        poses = list(q[np.linspace(0, len(q) - 1, min(12, len(q))).astype(np.intp)])
     tried = [[_frames(model, pose)] for pose in poses]
     seen = [np.array([flat(CORNER, one.translation) for one in frames]) for (frames,) in tried]
     frames = tried[int(np.argmax([np.prod(np.ptp(one, axis=0) + _POINT) for one in seen]))]
@@ -191,7 +175,7 @@ def draw_arm(
         labels.append((x, top, round(strip.pitch, 1), round(y, 1), name))
     letters = max((len(name) for *_, name in labels), default=0)
     return ArmDrawing(
-        round(strip.pitch + _LETTER * letters, 1),
+        round(strip.pitch + 9.5 * letters, 1),  # a letter is 9.5 px wide
         round(max(strip.height, y + _LINE), 1),
         tuple(bodies),
         tuple(
@@ -271,7 +255,8 @@ def _solids(collision: CollisionModel) -> list[_Solid]:
     if any(solid.joint > 0 for solid in solids):
         return solids
     bars = sticks(collision.robot.model)
-    return solids + [_Solid(k, True, np.stack([np.zeros(3), end]), _BAR) for k, end in bars]
+    # radius of a bar [m]
+    return solids + [_Solid(k, True, np.stack([np.zeros(3), end]), 0.02) for k, end in bars]
 
 
 def _frames(model: pin.Model, q: FloatArray) -> list[pin.SE3]:
@@ -324,7 +309,8 @@ class Strip:
     @property
     def size(self) -> tuple[float, float]:
         """Width and height with captions [px]."""
-        return round(self.pitch * self.count, 1), round(self.height + _CAPTION, 1)
+        # height of the line of captions [px]
+        return round(self.pitch * self.count, 1), round(self.height + 30.0, 1)
 
     def place(self, points: FloatArray, pose: int) -> FloatArray:
         """Return where flat points, shape (..., 2) [m], are in the frame of a pose [px]."""

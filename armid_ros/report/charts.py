@@ -28,8 +28,6 @@ Kind = Literal['line', 'trend', 'points', 'sticks', 'band']
 
 #: Samples of a series beyond which the extremes of equal stretches stand for all.
 MOST_SAMPLES = 3000
-#: Values are written with this share of their range as the last digit, a tenth of a pixel.
-_RESOLUTION = 2e-5
 
 
 @dataclass(frozen=True)
@@ -230,7 +228,8 @@ def rounded(values: npt.ArrayLike) -> list[float | None]:
     array = np.asarray(values, dtype=float)
     finite = array[np.isfinite(array)]
     span = float(np.ptp(finite)) if len(finite) else 0.0
-    step = _RESOLUTION * (span or (abs(float(finite[0])) if len(finite) else 1.0) or 1.0)
+    # values are written with this share of their range as the last digit, a tenth of a pixel
+    step = 2e-5 * (span or (abs(float(finite[0])) if len(finite) else 1.0) or 1.0)
     decimals = int(np.ceil(-np.log10(step)))
     return [round(value, decimals) if np.isfinite(value) else None for value in array.tolist()]
 

@@ -24,7 +24,7 @@ from armid_ros.excitation import (
     TARGETS,
     with_obstacles,
 )
-from armid_ros.excitation.fitness import FIT, UNFIT
+from armid_ros.excitation.scene import FIT, UNFIT
 from armid_ros.motion import FloatArray, Motion
 from armid_ros.report.arm_drawing import draw_poses, OBSTACLE
 from armid_ros.report.blocks import (

@@ -26,8 +26,6 @@ TERMS = {
     'held out': 'Not used to fit the model.',
     'condition number': 'How unevenly the motion shows the parameters; below 100 is good.',
 }
-#: Letters of a prefix of names that is worth leaving out.
-_SHORT = 5
 
 
 def pretty(unit: str) -> str:
@@ -153,7 +151,8 @@ def common_prefix(names: Sequence[str]) -> str:
     """
     first = names[0] if len(names) > 1 else ''
     ends = [first[: found.end()] for found in re.finditer(r'[_/.:-]', first)]
-    rests = {end: [name.removeprefix(end) for name in names] for end in ends if len(end) > _SHORT}
+    # letters of a prefix of names that is worth leaving out
+    rests = {end: [name.removeprefix(end) for name in names] for end in ends if len(end) > 5}
     shared = [end for end in rests if all(name.startswith(end) for name in names)]
     return max((end for end in shared if all(r[:1].isalpha() for r in rests[end])), default='')
 

@@ -26,14 +26,8 @@ import numpy as np
 
 #: Share of a joint's residual that one variable explains, from which there is something to find.
 TELLING_SHARE = 0.15
-#: Fewer samples of a residual go with nothing.
-_FEWEST = 20
 #: Two-sided 99 % point of the normal distribution.
 POINT_99 = 2.576
-#: Samples of the motion that the sensitivity of the torque is averaged over.
-_SAMPLES = 300
-#: Points of a cloud; more of them hide each other.
-_CLOUD = 500
 
 
 @dataclass(frozen=True)
@@ -168,7 +162,8 @@ def directions(estimate: Estimate, scale: FloatArray) -> tuple[Direction, ...]:
 def _some_columns(result: Identification, fits: Sequence[Fit]) -> FloatArray:
     """Return columns of the base parameters at samples of the longest stretch, shape (M, n, r)."""
     motion = max(fits, key=lambda fit: len(fit.motion)).motion
-    chosen = np.unique(np.linspace(0, len(motion) - 1, _SAMPLES).astype(np.intp))
+    # samples of the motion that the sensitivity of the torque is averaged over
+    chosen = np.unique(np.linspace(0, len(motion) - 1, 300).astype(np.intp))
     return np.asarray(result.arm.columns(motion.select(chosen))[:, :, result.base.independent])
 
 
@@ -229,7 +224,8 @@ def residual_section(robot: Robot, fits: Sequence[Fit], role: str) -> ContentSec
 def _cloud(x: FloatArray, residual: FloatArray, xlabel: str, ylabel: str) -> Chart:
     """Draw a residual against a variable of the same samples, with its mean in bins."""
     trend = Trend.of(x, residual)
-    chosen = np.unique(np.linspace(0, max(len(x) - 1, 0), min(_CLOUD, len(x))).astype(np.intp))
+    # points of a cloud; more of them hide each other
+    chosen = np.unique(np.linspace(0, max(len(x) - 1, 0), min(500, len(x))).astype(np.intp))
     abscissa = np.concatenate([x[chosen], trend.centre])
     points = np.concatenate([residual[chosen], np.full(len(trend.centre), np.nan)])
     means = np.concatenate([np.full(len(chosen), np.nan), trend.mean])
@@ -288,6 +284,7 @@ def residual_by_variable(
 def explained_shares(fits: Sequence[Fit], joint: int) -> dict[str, float]:
     """Return the shares of a joint's residual explained by speed, position and load."""
     residual, axes = residual_by_variable(fits, joint)
-    if len(residual) < _FEWEST:
+    # fewer samples of a residual go with nothing
+    if len(residual) < 20:
         return {}
     return {name: Trend.of(x, residual).share for name, x in axes.items()}

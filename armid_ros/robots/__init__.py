@@ -9,9 +9,14 @@ Loading of robots from URDF, xacro and MJCF files, and the robots shipped with t
 
 """
 
-from armid_ros.robots.collision import collision_model, CollisionModel
-from armid_ros.robots.load import described_at, load_robot, robot_from_urdf
-from armid_ros.robots.mounting import read_mounting
+from armid_ros.robots.geometry import collision_model, CollisionModel
+from armid_ros.robots.load import (
+    described_at,
+    load_robot,
+    read_mounting,
+    robot_from_urdf,
+    shipped_robots,
+)
 from armid_ros.robots.robot import (
     GRAVITIES,
     NO_MASS,
@@ -26,7 +31,6 @@ from armid_ros.robots.selection import (
     joints_beside_arms,
     load_arms,
 )
-from armid_ros.robots.shipped import shipped_robots
 
 __all__ = [
     'load_robot',

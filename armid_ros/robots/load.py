@@ -1,11 +1,12 @@
 # Copyright 2026 The armid_ros developers
 # SPDX-License-Identifier: Apache-2.0
-"""Loading a robot: from a shipped name, a URDF or xacro file, or the text of a URDF."""
+"""Loading a robot: a shipped name, a URDF or xacro file, or the text of a URDF; its mounting."""
 
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
+from importlib import resources
 import math
 import os
 from pathlib import Path
@@ -14,16 +15,63 @@ from xml.etree import ElementTree
 from xml.sax.saxutils import escape
 
 from armid_ros.errors import meant, RobotError
-from armid_ros.files import read_text, reading
+from armid_ros.files import load_yaml, read_text, reading
 from armid_ros.motion import FloatArray
 from armid_ros.robots.description import Description, Joint, parse_description, parse_xml, Vector
 from armid_ros.robots.mjcf import is_mjcf, urdf_of_mjcf
 from armid_ros.robots.robot import parse_gravity, Robot
 from armid_ros.robots.selection import driven_joints, several_arms, standing_position
-from armid_ros.robots.shipped import shipped_path, shipped_robots
 from armid_ros.robots.xacro_expansion import expand_xacro
 import numpy as np
 import pinocchio as pin
+
+_SHIPPED = {
+    'humanoid_arm': (
+        'humanoid_arm/humanoid_arm.urdf',
+        '6-DOF humanoid arm, 2.8 kg, 0.6 m from shoulder to wrist',
+    ),
+    'humanoid_arm_loaded': (
+        'humanoid_arm/humanoid_arm_loaded.urdf.xacro',
+        'the humanoid arm with 0.3 kg in its hand',
+    ),
+    'human_legs': (
+        'human_legs/human_legs.urdf',
+        'legs and trunk of a man of 70.5 kg in the sagittal plane, stance foot fixed',
+    ),
+    'two_link_elastic': (
+        'two_link_elastic/two_link_elastic.urdf',
+        'two links in the horizontal plane with elastic joints, 1 m, 17 kg',
+    ),
+    'exoskeleton_legs': (
+        'exoskeleton_legs/exoskeleton_legs.urdf',
+        'exoskeleton of 12.25 kg that human_legs wears, stance foot fixed',
+    ),
+}
+
+
+def shipped_robots() -> dict[str, str]:
+    """
+    Return the names and one-line descriptions of the robots shipped with the package.
+
+    Returns
+    -------
+    dict of str to str
+        Name and description.
+
+    Examples
+    --------
+    >>> import armid_ros as ar
+    >>> 'humanoid_arm' in ar.shipped_robots()
+    True
+
+    """
+    return {name: description for name, (_, description) in _SHIPPED.items()}
+
+
+def shipped_path(name: str) -> Path:
+    """Return the file of a shipped robot."""
+    return Path(str(resources.files('armid_ros.robots').joinpath(_SHIPPED[name][0])))
+
 
 #: Prefix of a package folder among the arguments of a description.
 PACKAGE = 'package:'
@@ -158,7 +206,6 @@ def robot_from_urdf(
         urdf=text,
         urdf_damping=np.array([joint.damping for joint in driven]),
         urdf_friction=np.array([joint.friction for joint in driven]),
-        urdf_armature=np.array([joint.armature for joint in driven]),
         notes=(
             *description.inertia_doubts(),
             *description.notes,
@@ -295,3 +342,40 @@ def _inertia_notes(robot: Robot) -> tuple[str, ...]:
         for joint, link, inertia in zip(robot.joints, robot.links, moved, strict=True)
         if inertia < 1e-12
     )
+
+
+#: Suffix of the mounting file beside NAME.urdf or NAME.urdf.xacro.
+SUFFIX = '.mounting.yaml'
+
+
+def read_mounting(robot: Robot) -> tuple[float | None, Path] | None:
+    """
+    Read NAME.mounting.yaml beside the description of a robot; return None without a file.
+
+    Returns
+    -------
+    floor : float or None
+        Height of the floor above the origin of the base [m]; None: no floor is within reach.
+    path : Path
+        The mounting file.
+
+    Raises
+    ------
+    RobotError
+        If the file cannot be read, or does not contain `floor: HEIGHT` or `floor: none`.
+
+    """
+    if robot.path is None:
+        return None
+    stem = robot.path.name.removesuffix('.xacro').removesuffix('.urdf')
+    path = robot.path.with_name(stem + SUFFIX)
+    if not path.is_file():
+        return None
+    with reading(path, RobotError):
+        content = load_yaml(read_text(path, RobotError))
+    floor = content.get('floor') if isinstance(content, dict) else None
+    if floor == 'none':
+        return None, path
+    if isinstance(floor, bool) or not isinstance(floor, int | float) or not math.isfinite(floor):
+        raise RobotError(f'{path}: has to say floor: HEIGHT [m], or floor: none')
+    return float(floor), path

@@ -130,7 +130,22 @@ class _Writer:
                     )
                 continue
             anchors[body] = self._link(body, parent, list(joints), anchors[parent])
-        self._not_read()
+        # add notes on elements that act in MuJoCo and do not exist in a URDF
+        model, kinds = self.model, self.mujoco.mjtEq
+        if not np.allclose(model.opt.gravity, (0.0, 0.0, -9.81), atol=0.01):
+            gravity = ','.join(f'{value:g}' for value in model.opt.gravity)
+            self.notes.append(f'gravity {gravity} of the file is not read: --gravity={gravity}')
+        closed = sum(int(kind != kinds.mjEQ_JOINT) for kind in model.eq_type)
+        counts = {
+            'equalities (connect, weld, tendon)': closed,
+            'tendons': model.ntendon,
+            'bodies with gravcomp': int(np.count_nonzero(model.body_gravcomp)),
+            'contact exclusions and pairs': model.nexclude + model.npair,
+            'flexible bodies': model.nflex,
+        }
+        found = ', '.join(f'{count} {what}' for what, count in counts.items() if count)
+        if found:
+            self.notes.append(f'not read: {found}')
         return self.root
 
     def _link(
@@ -278,24 +293,6 @@ class _Writer:
                 element = ElementTree.SubElement(link, tag)
                 _origin(element, place * pin.SE3(np.eye(3), np.array([0.0, 0.0, along])))
                 ElementTree.SubElement(ElementTree.SubElement(element, 'geometry'), shape, values)
-
-    def _not_read(self) -> None:
-        """Add notes on elements that act in MuJoCo and do not exist in a URDF."""
-        model, kinds = self.model, self.mujoco.mjtEq
-        if not np.allclose(model.opt.gravity, (0.0, 0.0, -9.81), atol=0.01):
-            gravity = ','.join(f'{value:g}' for value in model.opt.gravity)
-            self.notes.append(f'gravity {gravity} of the file is not read: --gravity={gravity}')
-        closed = sum(int(kind != kinds.mjEQ_JOINT) for kind in model.eq_type)
-        counts = {
-            'equalities (connect, weld, tendon)': closed,
-            'tendons': model.ntendon,
-            'bodies with gravcomp': int(np.count_nonzero(model.body_gravcomp)),
-            'contact exclusions and pairs': model.nexclude + model.npair,
-            'flexible bodies': model.nflex,
-        }
-        found = ', '.join(f'{count} {what}' for what, count in counts.items() if count)
-        if found:
-            self.notes.append(f'not read: {found}')
 
 
 def _names(kind: str, given: list[str]) -> list[str]:

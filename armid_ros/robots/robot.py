@@ -58,9 +58,8 @@ class Robot:
         True where a joint slides.
     urdf : str
         The description, xacro expanded.
-    urdf_damping, urdf_friction, urdf_armature : ndarray, shape (n,)
-        Values in ``<dynamics>`` of the description [N m s/rad, N m, kg m^2]; zero if missing. A
-        URDF from an MJCF contains the armature there too.
+    urdf_damping, urdf_friction : ndarray, shape (n,)
+        Values in ``<dynamics>`` of the description [N m s/rad, N m]; zero if missing.
     notes : tuple of str
         Sentences on assumptions and doubtful values in the description.
     path : Path or None
@@ -89,7 +88,6 @@ class Robot:
     urdf: str = field(repr=False)
     urdf_damping: FloatArray = field(repr=False)
     urdf_friction: FloatArray = field(repr=False)
-    urdf_armature: FloatArray = field(repr=False)
     notes: tuple[str, ...] = ()
     path: Path | None = None
 
@@ -109,7 +107,6 @@ class Robot:
             'torque_limit',
             'urdf_damping',
             'urdf_friction',
-            'urdf_armature',
         ):
             object.__setattr__(self, name, read_only(getattr(self, name)))
             if getattr(self, name).shape != (len(self.joints),):

@@ -58,7 +58,19 @@ def driven_joints(description: Description, names: Sequence[str] | None) -> tupl
         The message lists the joints that can be named.
 
     """
-    chosen = _by_default(description) if names is None else _by_name(description, names)
+    if names is None:
+        free = [joint for joint in description.movable() if not joint.mimic]
+        led = {joint.mimic.joint for joint in description.joints if joint.mimic}
+        gripper = {
+            joint.name
+            for joint in free
+            if joint.name in led or any(word in joint.name.lower() for word in GRIPPER_WORDS)
+        }
+        carriers = _carriers(description, [joint for joint in free if joint.name not in gripper])
+        chosen = tuple(j for j in free if j.name not in gripper or j.name in carriers)
+        chosen = chosen or tuple(joint for joint in free if joint.name not in led)
+    else:
+        chosen = _by_name(description, names)
     followers = {joint.mimic.joint: joint for joint in description.joints if joint.mimic}
     for joint in chosen:
         if joint.name in followers:
@@ -196,19 +208,6 @@ def _by_name(description: Description, names: Sequence[str]) -> tuple[Joint, ...
             raise RobotError(f"joint '{name}' is named twice among the driven joints")
         named.add(name)
     return tuple(joint for joint in description.joints if joint.name in named)
-
-
-def _by_default(description: Description) -> tuple[Joint, ...]:
-    free = [joint for joint in description.movable() if not joint.mimic]
-    led = {joint.mimic.joint for joint in description.joints if joint.mimic}
-    gripper = {
-        joint.name
-        for joint in free
-        if joint.name in led or any(word in joint.name.lower() for word in GRIPPER_WORDS)
-    }
-    carriers = _carriers(description, [joint for joint in free if joint.name not in gripper])
-    driven = tuple(j for j in free if j.name not in gripper or j.name in carriers)
-    return driven or tuple(joint for joint in free if joint.name not in led)
 
 
 def _carriers(description: Description, joints: Sequence[Joint]) -> set[str]:

@@ -1,17 +1,264 @@
 # Copyright 2026 The armid_ros developers
 # SPDX-License-Identifier: Apache-2.0
-"""The loop of controller, drives and plant, one controller update per step."""
+"""
+The loop of controller, drives and plant, one controller update per step, and its compiled steps.
+
+The kernel, `kernel.c`, computes the steps in which no friction element changes its mode and no
+joint reaches a stop, some fifty times as fast as `integrator.step`. `integrator.step` computes all
+other steps, and every step if the package was installed without a compiler.
+
+"""
 
 from __future__ import annotations
 
-from typing import NamedTuple
+from collections.abc import Callable
+import ctypes
+from dataclasses import dataclass
+from functools import cache
+from importlib.util import find_spec
+from typing import Any, NamedTuple
 
 from armid_ros.motion import FloatArray, read_only
-from armid_ros.simulation.compiled import CompiledLoop, CompiledRun
-from armid_ros.simulation.controller import Controller, Target, Targets
+from armid_ros.robots import Robot
+from armid_ros.simulation.contacts import SPEED_TOLERANCE
+from armid_ros.simulation.controller import Controller, LinearFeedback, Target, Targets
 from armid_ros.simulation.integrator import step
 from armid_ros.simulation.plant import Plant, State
 import numpy as np
+import numpy.typing as npt
+
+_JOINT = np.dtype(
+    [
+        ('parent', np.int64),
+        ('slide', float, 3),
+        ('turn', float, 3),
+        ('origin', float, 3),
+        ('sliding', float, 3),
+        ('turning', float, (9, 3)),
+        ('mass', float),
+        ('first_moment', float, 3),
+        ('inertia', float, 9),
+    ]
+)
+_TORQUE_LAW = ctypes.CFUNCTYPE(ctypes.c_int)
+_ADDRESS, _REAL, _COUNT = ctypes.c_void_p, ctypes.c_double, ctypes.c_int64
+
+
+class _Arm(ctypes.Structure):
+    _fields_ = (
+        ('n', _COUNT),
+        ('gravity', _REAL * 3),
+        ('joints', _ADDRESS),
+        ('added_inertia', _ADDRESS),
+    )
+
+
+class _Controller(ctypes.Structure):
+    _fields_ = (
+        ('arm', _Arm),
+        ('bandwidth', _REAL),
+        ('follows', _REAL),
+        ('stiffness', _ADDRESS),
+        ('damping', _ADDRESS),
+    )
+
+
+class _Plant(ctypes.Structure):
+    _fields_ = (
+        ('arm', _Arm),
+        ('dt', _REAL),
+        ('speed_tolerance', _REAL),
+        ('damping', _ADDRESS),
+        ('constant', _ADDRESS),
+        ('lower', _ADDRESS),
+        ('upper', _ADDRESS),
+        ('lowest_torque', _ADDRESS),
+        ('highest_torque', _ADDRESS),
+        ('n_elements', _COUNT),
+        ('element_joint', _ADDRESS),
+        ('element_lower', _ADDRESS),
+        ('element_upper', _ADDRESS),
+        ('law_input', _ADDRESS),
+        ('law_torque', _ADDRESS),
+        ('torque_law', _TORQUE_LAW),
+    )
+
+
+@cache
+def kernel() -> ctypes.CDLL | None:
+    """Return the compiled kernel; None if it was not compiled."""
+    found = find_spec('armid_ros.simulation._kernel')
+    if found is None or found.origin is None:
+        return None
+    library = ctypes.CDLL(found.origin)
+    library.advance.restype = _COUNT
+    library.advance.argtypes = [*3 * [_ADDRESS], _REAL, _COUNT, _COUNT, *8 * [_ADDRESS]]
+    library.dynamics.argtypes = 6 * [_ADDRESS]
+    return library
+
+
+def _array(values: npt.ArrayLike, kind: npt.DTypeLike = float) -> npt.NDArray[Any]:
+    return np.ascontiguousarray(values, dtype=kind)
+
+
+@dataclass(frozen=True, eq=False)
+class _Structure:
+    """A C structure of the kernel, and the arrays to which it points."""
+
+    values: Any
+    arrays: tuple[npt.NDArray[Any], ...]
+
+    @property
+    def address(self) -> int:
+        return ctypes.addressof(self.values)
+
+
+def rigid_body(robot: Robot, added_inertia: FloatArray, weighs: bool = True) -> _Structure:
+    """
+    Return a rigid-body model in the format of the kernel.
+
+    Parameters
+    ----------
+    robot : Robot
+        Robot of n joints.
+    added_inertia : ndarray, shape (n, n)
+        Inertia added to the inertia matrix of the robot [kg m^2].
+    weighs : bool
+        Whether gravity acts on the robot.
+
+    """
+    joints = np.zeros(robot.n_joints, _JOINT)
+    for row, geometry, body in zip(joints, robot.geometry, robot.model.inertias[1:], strict=True):
+        for name in ('parent', 'slide', 'turn', 'origin', 'sliding'):
+            row[name] = getattr(geometry, name)
+        row['turning'] = geometry.turning.reshape(9, 3)
+        row['mass'], row['first_moment'] = body.mass, body.mass * body.lever
+        row['inertia'] = body.matrix()[3:, 3:].ravel()
+    added = _array(added_inertia)
+    gravity = (_REAL * 3)(*(weighs * robot.gravity))
+    values = _Arm(len(joints), gravity, joints.ctypes.data, added.ctypes.data)
+    return _Structure(values, (joints, added))
+
+
+class CompiledLoop:
+    """
+    A plant and its controller in the format of the kernel.
+
+    Parameters
+    ----------
+    plant : Plant
+        Plant of rigid joints without drives, hysteresis, load-dependent or coupled dry friction.
+    feedback : LinearFeedback
+        The feedback law of its controller.
+
+    """
+
+    def __init__(self, plant: Plant, feedback: LinearFeedback) -> None:
+        n, dry = plant.robot.n_joints, plant.contacts
+        added = np.diag(plant.model.armature)
+        added = added if plant.coupling is None else added + plant.coupling
+        body = rigid_body(plant.robot, added)
+        far = np.full(n, np.inf)
+        lower, upper = (plant.robot.lower, plant.robot.upper) if plant.hard_stops else (-far, far)
+        self._law_input, self._law_torque = np.empty(1 + 2 * n), np.empty(n)
+        self._torque, self.failure = plant.torque, list[BaseException]()
+        arrays = (
+            _array(plant.damping),
+            np.zeros(n) if plant.constant is None else _array(plant.constant),
+            *map(_array, (lower, upper, *plant.torque_range)),
+            _array(dry.axes, np.int64),
+            *map(_array, (dry.law.lower, dry.law.upper)),
+        )
+        addresses = [array.ctypes.data for array in arrays]
+        self._plant = _Structure(
+            _Plant(
+                body.values,
+                plant.dt,
+                SPEED_TOLERANCE,
+                *addresses[:6],
+                len(dry.axes),
+                *addresses[6:],
+                self._law_input.ctypes.data,
+                self._law_torque.ctypes.data,
+                _TORQUE_LAW() if plant.torque is None else _TORQUE_LAW(self._smooth_effects),
+            ),
+            (*body.arrays, *arrays),
+        )
+        nominal = rigid_body(feedback.robot, feedback.added_inertia, feedback.weighs)
+        gains = [np.array(np.broadcast_to(x, n)) for x in (feedback.stiffness, feedback.damping)]
+        self._controller = _Structure(
+            _Controller(
+                nominal.values,
+                feedback.bandwidth,
+                feedback.follows,
+                *(gain.ctypes.data for gain in gains),
+            ),
+            (*nominal.arrays, *gains),
+        )
+        self.addresses = self._plant.address, self._controller.address
+
+    @classmethod
+    def of(cls, plant: Plant, controller: Controller) -> CompiledLoop | None:
+        """Return the loop; None if the kernel does not support the plant or is not compiled."""
+        action, dry = plant.action, plant.contacts
+        usual = plant.springs is None and action.drive is None and action.hysteresis is None
+        of_joints = dry.friction is None and -1 not in dry.axes
+        of_joints = of_joints and len(set(dry.axes)) == len(dry.axes)
+        feedback, library = controller.feedback, kernel()
+        if not (usual and of_joints) or feedback is None or library is None:
+            return None
+        most = _COUNT.in_dll(library, 'most_joints').value
+        return cls(plant, feedback) if plant.robot.n_joints <= most else None
+
+    def over(
+        self, targets: Targets, moved: FloatArray, tau: FloatArray
+    ) -> Callable[[State, int], int]:
+        """
+        Return a function that computes steps until a mode changes or a stop is reached.
+
+        Parameters
+        ----------
+        targets : Targets
+            The targets at the end of each of N steps.
+        moved : ndarray, shape (3, N + 1, n)
+            Position, velocity and acceleration at the steps; written by the function.
+        tau : ndarray, shape (N + 1, n)
+            Torque at the steps; written by the function.
+
+        Returns
+        -------
+        callable (state, row) -> int
+            From a state and its row to the next row.
+
+        """
+        library, last = kernel(), len(targets)
+        assert library is not None
+        asked = map(_array, (targets.q, targets.dq, targets.ddq, targets.feedforward))
+        rows = (*moved, tau, *asked)
+        addresses = [row.ctypes.data for row in rows]
+
+        def advance(state: State, row: int, rows: object = rows) -> int:  # keeps the rows alive
+            modes = np.array(state.modes, dtype=np.int64)
+            reached: int = library.advance(
+                *self.addresses, modes.ctypes.data, state.t, row, last, *addresses
+            )
+            if self.failure:
+                raise self.failure.pop()
+            return reached
+
+        return advance
+
+    def _smooth_effects(self) -> int:
+        """Compute the smooth effects of the plant for the kernel; return 1 after an exception."""
+        n = len(self._law_torque)
+        t, q, dq = self._law_input[0], self._law_input[1 : n + 1], self._law_input[n + 1 :]
+        assert self._torque is not None
+        try:
+            self._law_torque[:] = self._torque(t, q, dq)
+        except BaseException as error:  # Ctrl-C too: exceptions do not pass through C
+            self.failure.append(error)
+            return 1
+        return 0
 
 
 class Trace(NamedTuple):
@@ -76,13 +323,13 @@ def run(
     links = np.empty((3, *tau.shape))
     motors = links if plant.springs is None else np.empty_like(links)
     q, dq, ddq = links
-    fast = None if compiled is None else CompiledRun(compiled, targets, links, tau)
+    fast = None if compiled is None else compiled.over(targets, links, tau)
     k = 0
     while k < last:
         q[k], dq[k], ddq[k], tau[k] = state.q, state.dq, state.ddq, torque
         if motors is not links:
             motors[:, k] = plant.motors(state)
-        reached = k if fast is None else fast.advance(state, k)
+        reached = k if fast is None else fast(state, k)
         if reached > k:
             steps = state.steps + reached - k
             at, speed, pull = map(read_only, links[:, reached])

@@ -1,6 +1,6 @@
 # Copyright 2026 The armid_ros developers
 # SPDX-License-Identifier: Apache-2.0
-"""The plant, an arm model prepared for integration, and its state."""
+"""The plant, an arm model prepared for integration, its state, and checks that it can move."""
 
 from __future__ import annotations
 
@@ -12,16 +12,82 @@ from armid_ros.arm import ArmModel
 from armid_ros.effects import Action, DryFriction, TorqueLaw
 from armid_ros.effects.action import sum_laws
 from armid_ros.errors import ModelError, TrajectoryError
+from armid_ros.model.pseudo_inertia import PER_LINK, pseudo_inertia
 from armid_ros.motion import FloatArray, read_only
-from armid_ros.robots import Robot
-from armid_ros.simulation.bodies import no_body, NoBodyError
-from armid_ros.simulation.box_complementarity import Modes
-from armid_ros.simulation.contacts import Contacts, split_constant
+from armid_ros.robots import NO_MASS, Robot
+from armid_ros.simulation.contacts import Contacts, Modes, split_constant
 from armid_ros.simulation.springs import Elasticity, ElasticJoints
 import numpy as np
 import numpy.typing as npt
 import pinocchio as pin
 from scipy.linalg import eigh, LinAlgError
+
+NO_BODY = (
+    'the inertia matrix is not positive definite: identify with --physical, or correct the '
+    'description'
+)
+
+
+class NoBodyError(ModelError):
+    """An arm cannot be simulated because some links are not physically possible bodies."""
+
+
+def require_masses(robot: Robot) -> None:
+    """
+    Raise a ModelError if links of a robot have a negative mass.
+
+    Raises
+    ------
+    ModelError
+        If a mass is negative; the message names the links.
+
+    """
+    negative = _of_negative_mass(robot)
+    if negative:
+        raise ModelError(f'{robot.name}: {negative}; correct the description')
+
+
+def require_any_mass(robot: Robot) -> None:
+    """
+    Raise a ModelError if no link of a robot has a mass, since it then predicts no torque.
+
+    Raises
+    ------
+    ModelError
+        If no link has a mass; the message names the description and its links.
+
+    """
+    if np.all(np.abs(robot.rigid_parameters[::PER_LINK]) < NO_MASS):
+        raise ModelError(
+            f'{robot.path or robot.name}: no link has a mass ({", ".join(robot.links)}), so there '
+            'is no model to compare with. Give them an <inertial>, or identify the arm first '
+            '(armid identify) and name its model.yaml with --model'
+        )
+
+
+def no_body(robot: Robot) -> str:
+    """Return the message on an inertia matrix that is not positive definite."""
+    links = zip(robot.links, robot.rigid_parameters.reshape(-1, PER_LINK), strict=True)
+    negative = _of_negative_mass(robot)
+    odd = [
+        name
+        for name, values in links
+        if np.any(values) and np.linalg.eigvalsh(pseudo_inertia(values))[0] < 0.0
+    ]
+    if negative or not odd:
+        return f'{negative}; {NO_BODY}' if negative else NO_BODY
+    return f'inertias of {", ".join(odd)} are not those of a body; {NO_BODY}'
+
+
+def _of_negative_mass(robot: Robot) -> str:
+    masses = robot.rigid_parameters[::PER_LINK]
+    named = [
+        f"link '{name}' has a mass of {mass:g} kg"
+        for name, mass in zip(robot.links, masses, strict=True)
+        if mass < 0.0
+    ]
+    return ', '.join(named)
+
 
 #: Tolerance beyond a position limit, as a share of the range between the limits.
 LIMIT_TOLERANCE = 1e-6
@@ -225,7 +291,15 @@ class Plant:
             for x in (q, dq, ddq)
         )
         if self.hard_stops:
-            position = self._within_stops(position)
+            lower, upper, slack = self.robot.lower, self.robot.upper, limit_slack(self.robot)
+            beyond = (position < lower - slack) | (position > upper + slack)
+            for joint in np.flatnonzero(beyond)[:1]:
+                raise TrajectoryError(
+                    f"{self.robot.name}: joint '{self.robot.joints[joint]}' cannot be at "
+                    f'{position[joint]:.4g}, its stops are at {lower[joint]:.4g} and '
+                    f'{upper[joint]:.4g}'
+                )
+            position = read_only(np.clip(position, lower, upper))
         modes = tuple(np.sign(self.contacts.directions @ velocity).astype(int).tolist())
         slipping = self.action.hysteresis
         memory = np.empty(0) if slipping is None else slipping.start(velocity)
@@ -262,16 +336,6 @@ class Plant:
     def sensing(self) -> Action:
         """Return the action of the effects on the readings of the motors."""
         return self.action if self.springs is None else self.springs.sensing
-
-    def _within_stops(self, q: FloatArray) -> FloatArray:
-        lower, upper = self.robot.lower, self.robot.upper
-        slack = limit_slack(self.robot)
-        for joint in np.flatnonzero((q < lower - slack) | (q > upper + slack))[:1]:
-            raise TrajectoryError(
-                f"{self.robot.name}: joint '{self.robot.joints[joint]}' cannot be at "
-                f'{q[joint]:.4g}, its stops are at {lower[joint]:.4g} and {upper[joint]:.4g}'
-            )
-        return read_only(np.clip(q, lower, upper))
 
     def times(self, first: int, count: int) -> FloatArray:
         """Return the times of successive steps [s], shape (count,)."""

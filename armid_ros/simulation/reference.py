@@ -11,12 +11,11 @@ and after the last waypoint the arm holds still.
 
 from __future__ import annotations
 
-from collections.abc import Iterator
 from dataclasses import dataclass, field
 from typing import Any
 
 from armid_ros.errors import TrajectoryError
-from armid_ros.motion import FloatArray, Motion, read_only
+from armid_ros.motion import FloatArray, freeze, Motion
 from armid_ros.robots import Robot
 from armid_ros.simulation.plant import limit_slack, LIMIT_TOLERANCE
 import numpy as np
@@ -59,8 +58,7 @@ class Reference:
         names = [
             name for name in ('t', 'q', 'dq', 'ddq', 'tau') if getattr(self, name) is not None
         ]
-        for name in names:
-            object.__setattr__(self, name, read_only(getattr(self, name)))
+        freeze(self, *names)
         if self.t.ndim != 1 or not len(self.t):
             raise TrajectoryError('trajectory: it has no points')
         if len(set(self.joints)) != len(self.joints):
@@ -228,7 +226,9 @@ class Reference:
         """
         slack = limit_slack(robot)
         fastest = robot.velocity_limit * (1.0 + LIMIT_TOLERANCE)
-        for motion in self._blocks(dt):
+        t = np.minimum(dt * np.arange(int(np.ceil(self.duration / dt)) + 1), self.duration)
+        blocks = [self.t, *np.split(t, np.arange(_BLOCK, len(t), _BLOCK))]
+        for motion in map(self.sample, blocks):
             for beyond, values, kind, unit in (
                 (motion.q < robot.lower - slack, motion.q, 'lower', ''),
                 (motion.q > robot.upper + slack, motion.q, 'upper', ''),
@@ -248,14 +248,6 @@ class Reference:
                     f'{values[sample, joint]:.4g} {what} at {motion.t[sample]:.3f} s, beyond its '
                     f'{kind} limit of {limit:.4g} {what}'
                 )
-
-    def _blocks(self, dt: float) -> Iterator[Motion]:
-        """Yield samples of the curve at every dt and at its waypoints, in blocks."""
-        steps = int(np.ceil(self.duration / dt)) + 1
-        yield self.sample(self.t)
-        for first in range(0, steps, _BLOCK):
-            t = dt * np.arange(first, min(first + _BLOCK, steps))
-            yield self.sample(np.minimum(t, self.duration))
 
 
 def _polynomials(

@@ -9,7 +9,7 @@ from dataclasses import dataclass, replace
 
 from armid_ros.arm import ArmModel
 from armid_ros.errors import ModelError
-from armid_ros.motion import ElasticRun, FloatArray, Motion, read_only
+from armid_ros.motion import ElasticRun, FloatArray, freeze, Motion
 from armid_ros.simulation.controller import Controller
 from armid_ros.simulation.plant import Plant
 from armid_ros.simulation.reference import Reference
@@ -57,8 +57,7 @@ class SimulatedRun:
 
     def __post_init__(self) -> None:
         """Freeze the arrays."""
-        for name in ('t', 'q', 'dq', 'tau'):
-            object.__setattr__(self, name, read_only(getattr(self, name)))
+        freeze(self, 't', 'q', 'dq', 'tau')
 
 
 def simulate(
@@ -167,11 +166,18 @@ def _followed(
     arm: SimulatedArm, steps: int, progress: Callable[[float], None] | None
 ) -> tuple[FloatArray, FloatArray, FloatArray]:
     """Simulate steps; return the motion of motors and links, and the torques."""
-    pieces, done = [], 0
+    plant, pieces, done = arm.plant, [], 0
     with np.errstate(over='ignore', invalid='ignore'):  # overflow is detected below
         for trace in arm.traces(steps):
             q, dq, ddq = trace.motors
-            _require_motion(arm.plant, dq[:-1], done)
+            lost = ~(np.abs(dq[:-1]) < _LOST)
+            if np.any(lost):
+                step, joint = np.argwhere(lost)[0]
+                raise ModelError(
+                    f'{plant.robot.name}: the simulated arm does not follow; '
+                    f'{plant.robot.joints[joint]} is faster than {_LOST:g} rad/s (or m/s) after '
+                    f'{plant.dt * (done + step):.3g} s'
+                )
             motors = np.stack([q[:-1], dq[:-1], ddq[1:]])
             pieces.append((motors, trace.links[:, :-1], trace.tau[np.newaxis, :-1]))
             done = trace.state.steps
@@ -197,17 +203,6 @@ def _both_sides(arm: SimulatedArm, run: SimulatedRun, moved: Motion) -> ElasticR
         np.diff(targets.q, axis=0, prepend=before) / period,
         felt=felt,
     )
-
-
-def _require_motion(plant: Plant, dq: FloatArray, first: int) -> None:
-    """Raise a ModelError if the motion of an arm has become unstable in the given steps."""
-    lost = ~(np.abs(dq) < _LOST)
-    if np.any(lost):
-        step, joint = np.argwhere(lost)[0]
-        raise ModelError(
-            f'{plant.robot.name}: the simulated arm does not follow; {plant.robot.joints[joint]} '
-            f'is faster than {_LOST:g} rad/s (or m/s) after {plant.dt * (first + step):.3g} s'
-        )
 
 
 def whole_steps(time: float, dt: float, what: str) -> int:

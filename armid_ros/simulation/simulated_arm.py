@@ -8,20 +8,18 @@ from collections.abc import Iterator
 from dataclasses import dataclass, replace
 
 from armid_ros.arm import ArmModel
-from armid_ros.errors import ModelError
-from armid_ros.motion import FloatArray
-from armid_ros.simulation.accelerometers import LinkAccelerometers
-from armid_ros.simulation.closed_loop import command, run, Trace
-from armid_ros.simulation.compiled import CompiledLoop
-from armid_ros.simulation.controller import ComputedTorque, Controller, Targets
-from armid_ros.simulation.course import Course
-from armid_ros.simulation.motor_control import MotorControl
+from armid_ros.errors import ModelError, TrajectoryError
+from armid_ros.motion import FloatArray, Motion
+from armid_ros.simulation.closed_loop import command, CompiledLoop, run, Trace
+from armid_ros.simulation.controller import ComputedTorque, Controller, MotorControl, Targets
 from armid_ros.simulation.plant import Plant, State
 from armid_ros.simulation.reference import Reference
-from armid_ros.simulation.sensors import RecentPast, Sensors
+from armid_ros.simulation.sensors import LinkAccelerometers, RecentPast, Sensors
 import numpy as np
 import numpy.typing as npt
 
+#: Largest velocity of a trajectory at its beginning and end [rad/s or m/s].
+_AT_REST = 1e-3
 #: Steps of the reference that are evaluated at once.
 _BLOCK = 1000
 
@@ -130,8 +128,8 @@ class SimulatedArm:
         start = self.plant.robot.middle_pose if start is None else start
         self._compiled = CompiledLoop.of(self.plant, self.controller)
         self._home = self.plant.state(start).q
-        self._course = Course(self.plant.robot, self.plant.dt)
         self._state: State
+        self._reference: Reference
         self._acting: Controller
         self._targets: Targets
         self._torque: FloatArray
@@ -152,7 +150,7 @@ class SimulatedArm:
     @property
     def ends_at(self) -> float:
         """Time at which the trajectory ends, or has ended [s]."""
-        return self._course.ends_at
+        return self._begun * self.plant.dt + self._reference.duration
 
     def reset(self, steps: int = 0) -> None:
         """
@@ -164,8 +162,7 @@ class SimulatedArm:
             Time after the reset, in steps of the plant.
 
         """
-        hold = Reference(self.joints, np.zeros(1), self._home[np.newaxis])
-        self._begin(hold, steps)
+        self._begin(Reference(self.joints, np.zeros(1), self._home[np.newaxis]), steps)
 
     def start_on(self, reference: Reference) -> Reference:
         """
@@ -231,15 +228,33 @@ class SimulatedArm:
 
     def set_trajectory(self, reference: Reference) -> None:
         """
-        Begin a trajectory now; it replaces the present trajectory. See `Course.begin`.
+        Begin a trajectory now; it replaces the present trajectory.
+
+        If the time of the first point is later than zero, the arm moves to this point within that
+        time.
 
         Raises
         ------
         TrajectoryError
-            If the arm cannot follow the trajectory. The present trajectory then continues.
+            If a joint is unknown or missing, a position or velocity limit is exceeded, the arm has
+            no time to reach the first point, or the last point is not at rest. The present
+            trajectory then continues.
 
         """
-        self._course.begin(reference, self._state.steps)
+        curve, now = reference.for_robot(self.plant.robot), self._desired(1)
+        if curve.dq is not None:
+            self._require_none('ends with', curve.dq[-1], _AT_REST, '/s', 'stop it')
+        if curve.t[0] > 0.0:
+            curve = curve.after(now.q[0], now.dq[0], now.ddq[0])
+        else:
+            # a trajectory that begins at once has to begin where the arm should be [rad or m]
+            advice = 'give its first point a later time, to get there'
+            self._require_none('starts away by', curve.q[0] - now.q[0], 0.01, '', advice)
+            if curve.dq is not None:
+                jump = curve.dq[0] - now.dq[0]
+                self._require_none('starts with a jump of', jump, _AT_REST, '/s', advice)
+        curve.require_limits(self.plant.robot, self.plant.dt)
+        self._reference, self._begun = curve, self._state.steps
         self._look_ahead(self._targets.q[self._row])
         if not self.controller.acts_once:
             self._act()
@@ -283,26 +298,24 @@ class SimulatedArm:
         q, dq, tau = (row[np.newaxis] for row in self._past.latest())
         q, dq, tau = self.sensors.measure(q, dq, tau, dt, self.rng, self._previous)
         self._previous = q[0]
-        link = None if self.plant.springs is None else self._read_links(dt)
-        return Sample(state.steps, state.t, q[0], dq[0], tau[0], link)
-
-    def _read_links(self, dt: float) -> LinkSample:
-        """Return the readings on the link side of the springs."""
-        state, targets, row = self._state, self._targets, self._row
-        q, dq = state.q[np.newaxis], state.dq[np.newaxis]
-        none = np.zeros_like(q)
-        q, dq, _ = self.sensors.measure(q, dq, none, dt, self.rng, self._previous_link)
-        self._previous_link = q[0]
+        if self.plant.springs is None:
+            return Sample(state.steps, state.t, q[0], dq[0], tau[0])
+        # on the link side of the springs
+        at, speed, none = state.q[np.newaxis], state.dq[np.newaxis], np.zeros((1, len(state.q)))
+        at, speed, _ = self.sensors.measure(at, speed, none, dt, self.rng, self._previous_link)
+        self._previous_link = at[0]
         felt = self.accelerometers.read(state.q, state.dq, state.ddq)
         if np.any(self.sensors.acceleration_noise):
             felt = felt + self.sensors.acceleration_noise * self.rng.standard_normal(felt.shape)
-        return LinkSample(q[0], dq[0], state.ddq, felt, targets.q[row], targets.dq[row])
+        asked = self._targets.q[self._row], self._targets.dq[self._row]
+        link = LinkSample(at[0], speed[0], state.ddq, felt, *asked)
+        return Sample(state.steps, state.t, q[0], dq[0], tau[0], link)
 
     def _begin(self, reference: Reference, steps: int) -> None:
         """Put the arm on a reference without a past."""
         first = reference.sample(np.zeros(1))
         self._state = self.plant.state(first.q[0], first.dq[0], first.ddq[0], steps)
-        self._course.follow(reference, steps)
+        self._reference, self._begun = reference, steps
         self._acting = self.controller.started()
         self._previous = self._previous_link = None
         self._look_ahead(steps=1)
@@ -321,8 +334,25 @@ class SimulatedArm:
     def _look_ahead(self, asked: FloatArray | None = None, steps: int = _BLOCK) -> None:
         """Evaluate the reference for the next steps, given the last commanded motor position."""
         self._first = self._state.steps
-        desired = self._course.desired(self._first, steps + 1)
-        self._targets = self.controller.targets(desired, asked)
+        self._targets = self.controller.targets(self._desired(steps + 1), asked)
+
+    def _desired(self, count: int) -> Motion:
+        """Return the desired motion at successive steps from the present one on."""
+        first, times = self._state.steps, self.plant.times
+        motion = self._reference.sample(times(first - self._begun, count))
+        return replace(motion, t=times(first, count))
+
+    def _require_none(
+        self, what: str, values: FloatArray, tolerance: float, per: str, advice: str
+    ) -> None:
+        """Raise a TrajectoryError if the value of any joint exceeds a tolerance."""
+        worst = int(np.argmax(np.abs(values)))
+        if abs(values[worst]) > tolerance:
+            unit = self.plant.robot.position_units[worst] + per
+            raise TrajectoryError(
+                f"trajectory: joint '{self.joints[worst]}' {what} {values[worst]:.4g} {unit}, "
+                f'more than {tolerance:g} {unit}; {advice}'
+            )
 
     def _new_past(self) -> RecentPast:
         """Return the sensor history of an arm that begins in its present state."""

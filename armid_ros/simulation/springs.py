@@ -22,9 +22,6 @@ from armid_ros.robots import Robot
 import numpy as np
 import numpy.typing as npt
 
-#: Natural frequency of a link on its stop, times the substep; low enough for the integration.
-_STOP = 0.1
-
 
 @dataclass(frozen=True, eq=False)
 class Elasticity:
@@ -96,7 +93,7 @@ class ElasticJoints:
         """Compute the matrix of the engaged springs."""
         springs = self.transmission
         object.__setattr__(self, 'loose', bool(np.any(springs.gap)))
-        pull = self.pull_of(springs.stiffness, springs.damping)
+        pull = self._pull_of(springs.stiffness, springs.damping)
         object.__setattr__(self, 'pull', read_only(pull))
 
     @classmethod
@@ -134,7 +131,9 @@ class ElasticJoints:
             to_motors.T @ (none if x is None else x) @ to_motors
             for x in (action.inertia, action.damping)
         )
-        free, rate = 1.0 / np.diag(np.linalg.inv(mass)), _STOP * elasticity.substeps / dt
+        # natural frequency of a link on its stop, times the substep; low enough for the
+        # integration
+        free, rate = 1.0 / np.diag(np.linalg.inv(mass)), 0.1 * elasticity.substeps / dt
         rub = np.diag(np.broadcast_to(np.asarray(elasticity.link_damping, dtype=float), (n,)))
         # actions on the readings of the motors, which the springs do not change
         kept = [
@@ -159,7 +158,7 @@ class ElasticJoints:
             sensing=bare.action(),
         )
 
-    def pull_of(self, stiffness: FloatArray, damping: FloatArray) -> FloatArray:
+    def _pull_of(self, stiffness: FloatArray, damping: FloatArray) -> FloatArray:
         """Return torques of springs and friction per twist and velocity, (e + n, e + e + n)."""
         w = self.to_twists
         return np.hstack([-w.T * stiffness, -self.damping - (w.T * damping) @ w])
@@ -170,7 +169,7 @@ class ElasticJoints:
         meshes = np.abs(twist) > springs.gap
         stiffness = np.where(meshes, springs.stiffness, 0.0)
         damping = np.where(meshes, springs.damping, 0.0)
-        return self.pull_of(stiffness, damping), stiffness * springs.gap * np.sign(twist)
+        return self._pull_of(stiffness, damping), stiffness * springs.gap * np.sign(twist)
 
     def twist(self, load: FloatArray) -> FloatArray:
         """Return the twists of the springs (..., e) under loads on the joints (..., n) [N m]."""

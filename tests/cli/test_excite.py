@@ -10,7 +10,7 @@ import armid_ros.api.excitation as excitation_files
 from armid_ros.arm import ArmModel
 from armid_ros.errors import TrajectoryError
 from armid_ros.excitation import check_limits, ClearanceModel, Limits, load_excitation
-from armid_ros.excitation.geometry.heights import lowest_point
+from armid_ros.excitation.geometry.floor import lowest_point
 from armid_ros.motion import Motion
 from armid_ros.recording import read_recording, read_waypoints
 from armid_ros.robots import collision_model, load_robot

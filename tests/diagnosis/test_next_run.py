@@ -21,7 +21,7 @@ from armid_ros.excitation import (
     random_feasible,
     trajectory_faults,
 )
-from armid_ros.excitation.templates import CLEARANCE, templates
+from armid_ros.excitation.feasibility import CLEARANCE, templates
 from armid_ros.model import inverse_dynamics
 from armid_ros.recording import Recording
 from armid_ros.robots import collision_model, robot_from_urdf

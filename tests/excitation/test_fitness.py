@@ -6,7 +6,7 @@ from dataclasses import replace
 import re
 
 from armid_ros.excitation import CollisionScene, fitness, Floor, Limits, Obstacle
-from armid_ros.excitation.fitness import FIT, PARTLY, UNFIT
+from armid_ros.excitation.scene import FIT, PARTLY, UNFIT
 from armid_ros.motion import Motion
 from armid_ros.robots import collision_model, robot_from_urdf
 import numpy as np

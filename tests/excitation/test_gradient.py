@@ -7,10 +7,9 @@ from dataclasses import replace
 from armid_ros.arm import ArmModel
 from armid_ros.effects import make_effect
 from armid_ros.excitation import DesignProblem, DesignSettings
+from armid_ros.excitation.feasibility import random_feasible
 from armid_ros.excitation.geometry.clearance import ClearanceModel
-from armid_ros.excitation.random_trajectory import random_feasible
-from armid_ros.excitation.search.constraints import Constraints
-from armid_ros.excitation.search.objective import Objective
+from armid_ros.excitation.search.functions import Constraints, Objective
 from armid_ros.model import random_motion
 import numpy as np
 import pytest

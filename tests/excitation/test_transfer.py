@@ -20,7 +20,7 @@ from armid_ros.excitation import (
     TransferPlanner,
     with_obstacles,
 )
-from armid_ros.excitation.run import unwound
+from armid_ros.excitation.run import _unwound
 from armid_ros.robots import collision_model, robot_from_urdf
 import numpy as np
 import pinocchio as pin
@@ -173,5 +173,5 @@ def test_joints_are_unwound_so_that_the_floor_is_not_in_the_way():
 def test_joints_are_not_unwound_beyond_their_limits():
     robot = robot_from_urdf(urdf((*TWICE[:6], -1.0, 6.3, 60)))
     far = turned_far(robot)
-    same = unwound(far, ArmModel(robot), transfer_limits(robot), np.zeros(1))
+    same = _unwound(far, ArmModel(robot), transfer_limits(robot), np.zeros(1))
     assert same is far

@@ -3,8 +3,7 @@
 """A small fleet in bags, and a cluster of two processes."""
 
 from armid_ros.fleet.cluster import connected
-from armid_ros.fleet.job import FleetSettings
-from armid_ros.fleet.plan import plan_fleet
+from armid_ros.fleet.plan import FleetSettings, plan_fleet
 from armid_ros.fleet.run import identify_fleet
 import pytest
 

@@ -159,15 +159,15 @@ def deadly(path):
 
 def arm_the_trap():
     """Let reading one bag end the worker."""
-    from armid_ros.fleet import summary
+    from armid_ros.fleet import merge
 
-    whole = summary.fetched
+    whole = merge.fetched
 
     def trapped(url):
         deadly(url)
         return whole(url)
 
-    summary.fetched = trapped
+    merge.fetched = trapped
 
 
 def test_a_bag_that_ends_its_workers_is_given_up_and_the_others_are_used(bags, tmp_path):

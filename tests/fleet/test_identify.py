@@ -9,9 +9,9 @@ from pathlib import Path
 from armid_ros.arm import ArmModel
 from armid_ros.errors import FleetError
 from armid_ros.fleet.bags import DAY_NS, find_bags
+from armid_ros.fleet.merge import prepare
 from armid_ros.fleet.plan import document, Entry, plan_fleet
 from armid_ros.fleet.store import Store
-from armid_ros.fleet.summary import prepare
 from armid_ros.identification import IdentificationSettings, identify, Score, SignalSettings
 from armid_ros.recording import read_recording
 import duckdb

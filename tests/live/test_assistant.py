@@ -10,7 +10,7 @@ import select
 import time
 
 from armid_ros.errors import IdentificationError
-from armid_ros.excitation.files import read_excitation
+from armid_ros.excitation.schedule import read_excitation
 from armid_ros.live import Answer, Assistant, DiagnosisRequest, InProcess
 from armid_ros.live.assistant import Plan, Save
 import pytest

@@ -18,7 +18,7 @@ from armid_ros.excitation import (
     Obstacle,
     with_obstacles,
 )
-from armid_ros.excitation.fitness import PARTLY
+from armid_ros.excitation.scene import PARTLY
 from armid_ros.report.arm_drawing import draw_poses, OBSTACLE
 from armid_ros.robots import collision_model, load_robot
 import numpy as np

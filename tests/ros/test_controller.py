@@ -13,7 +13,7 @@ from armid_ros.excitation import (
     transfer_limits,
     TransferPlanner,
 )
-from armid_ros.excitation.files import excitation_text
+from armid_ros.excitation.schedule import excitation_text
 from armid_ros.nodes.excitation_publisher import ExcitationPublisherNode
 from armid_ros.nodes.qos import LATCHED, STREAM
 from armid_ros.nodes.trajectory.messages import read_trajectory

@@ -4,7 +4,7 @@
 
 from itertools import product
 
-from armid_ros.simulation.box_complementarity import BoxLaw, solve_box_complementarity
+from armid_ros.simulation.contacts import BoxLaw, solve_box_complementarity
 import numpy as np
 import pytest
 

@@ -6,7 +6,7 @@ from armid_ros.arm import ArmModel
 from armid_ros.effects import make_effect
 from armid_ros.robots import load_robot, robot_from_urdf
 from armid_ros.simulation import ComputedTorque, GravityPD, Plant, Reference, simulate
-from armid_ros.simulation.compiled import CompiledLoop, kernel, rigid_body
+from armid_ros.simulation.closed_loop import CompiledLoop, kernel, rigid_body
 from armid_ros.simulation.controller import LinearFeedback
 import numpy as np
 import pinocchio as pin

@@ -4,7 +4,7 @@
 
 from armid_ros.errors import TrajectoryError
 from armid_ros.robots import load_robot
-from armid_ros.simulation.elastic.courses import multisine_course, step_course
+from armid_ros.simulation.elastic import multisine_course, step_course
 import numpy as np
 import pytest
 

@@ -22,7 +22,7 @@ from armid_ros.nodes.lockstep import run_lockstep
 from armid_ros.recording import read_recording, Recording
 from armid_ros.report.notation import digits, pretty
 from armid_ros.robots import collision_model, Robot
-from armid_ros.robots.shipped import shipped_path
+from armid_ros.robots.load import shipped_path
 from armid_ros.simulation import Sensors, SimulatedArm
 import numpy as np
 

@@ -32,7 +32,7 @@ from armid_ros.excitation import (
     FourierTrajectory,
 )
 from armid_ros.excitation.design import placed
-from armid_ros.excitation.templates import CLEARANCE, Template, templates
+from armid_ros.excitation.feasibility import CLEARANCE, Template, templates
 from armid_ros.robots import collision_model, CollisionModel
 import numpy as np
 

@@ -15,7 +15,7 @@ from dataclasses import dataclass, field, replace
 from armid_ros.excitation.geometry.environment import body_name
 from armid_ros.model import LinkFrames
 from armid_ros.motion import FloatArray, Motion
-from armid_ros.robots import CollisionModel, Robot
+from armid_ros.robots import CollisionModel
 import coal
 import numpy as np
 import numpy.typing as npt
@@ -130,9 +130,14 @@ class ClearanceModel:
             moved[number, list(joint.movers)] = 1.0
         between = moved[joints[pairs[:, 1]]] - moved[joints[pairs[:, 0]]]
         reach = np.linalg.norm(spheres[:, :3], axis=1) + spheres[:, 3]
-        levers = np.array(
-            [_levers(robot, joint, length) for joint, length in zip(joints, reach, strict=True)]
-        ).reshape(len(joints), robot.n_joints)
+        stroke = np.maximum(np.abs(robot.lower), np.abs(robot.upper))
+        stroke = np.where(robot.prismatic, np.minimum(stroke, 10.0), 0.0)  # 10 m without limits
+        levers = np.zeros((len(joints), robot.n_joints))
+        for row, joint, length in zip(levers, joints, reach, strict=True):
+            while joint >= 0:
+                row[joint] = 1.0 if robot.prismatic[joint] else length
+                length += np.linalg.norm(robot.geometry[joint].origin) + stroke[joint]
+                joint = robot.geometry[joint].parent
         first, second = levers[pairs[:, 0]], levers[pairs[:, 1]]
         most = np.where(between > 0.0, second, np.where(between < 0.0, first, 0.0))
         return cls(collision, joints, spheres, planes, np.arange(len(pairs)), pairs, between, most)
@@ -296,15 +301,3 @@ class ClearanceModel:
     def _approach(self, pair: int, time: float, distance: float) -> Approach:
         first, second = (body_name(self.collision, int(body)) for body in self.pairs[pair])
         return Approach(first, second, time, distance)
-
-
-def _levers(robot: Robot, joint: int, length: float) -> FloatArray:
-    """Return the largest motion of any point of a body per unit of every joint, shape (n,)."""
-    levers = np.zeros(robot.n_joints)
-    stroke = np.where(robot.prismatic, np.maximum(np.abs(robot.lower), np.abs(robot.upper)), 0.0)
-    stroke = np.minimum(stroke, 10.0)  # m; without limits
-    while joint >= 0:
-        levers[joint] = 1.0 if robot.prismatic[joint] else length
-        length += float(np.linalg.norm(robot.geometry[joint].origin)) + float(stroke[joint])
-        joint = robot.geometry[joint].parent
-    return levers

@@ -22,8 +22,6 @@ import numpy as np
 #: Longest straight line of a tree, and the initial interval of the proof of its clearance [rad or
 #: m].
 _STEP, _INTERVAL = 0.6, 0.1
-#: Number of poses drawn before a TrajectoryError is raised.
-_DRAWS = 800
 
 #: Function that returns whether the arm can hold poses of shape (N, n).
 Held = Callable[[FloatArray], bool]
@@ -80,7 +78,8 @@ def find_path(
     lower = np.maximum(limits[0], np.minimum(start, goal) - UNLIMITED_HALF_RANGE)
     upper = np.minimum(limits[1], np.maximum(start, goal) + UNLIMITED_HALF_RANGE)
     near, far = _Tree([start], free), _Tree([goal], free)
-    for number in range(_DRAWS):
+    # number of poses drawn before a TrajectoryError is raised
+    for number in range(800):
         reached = near.grow(rng.uniform(lower, upper))
         if reached is not None and far.connect(near.poses[reached]):
             path = [*near.branch(reached)[::-1], *far.branch(len(far.poses) - 1)[1:]]

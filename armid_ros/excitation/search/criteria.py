@@ -154,7 +154,12 @@ class Criterion:
         projection = np.eye(len(matrix))[wanted]  # S = P M P'
         if len(nuisance):
             block, reach = matrix[np.ix_(nuisance, nuisance)], matrix[np.ix_(nuisance, wanted)]
-            projection[:, nuisance] = -_least_squares(block, reach).T
+            # least squares by the normal equations, also with linearly dependent columns
+            size = np.sqrt(np.maximum(np.diag(block), 0.0))
+            unit = np.divide(1.0, size, out=np.zeros_like(size), where=size > 0.0)
+            shares, axes = np.linalg.eigh(block * np.outer(unit, unit))
+            along = unit[:, np.newaxis] * axes[:, shares > _BLIND]
+            projection[:, nuisance] = -(reach.T @ along / shares[shares > _BLIND]) @ along.T
         units = self.scale[wanted] if self.name in 'AE' else np.ones(len(wanted))
         projection *= units[:, np.newaxis]
         left = projection @ matrix @ projection.T
@@ -193,12 +198,3 @@ def _log_norm(values: FloatArray, norm: float) -> tuple[float, FloatArray]:
     powers = (values / values.max()) ** norm
     total = powers.sum()
     return float(np.log(values.max()) + np.log(total) / norm), powers / (total * values)
-
-
-def _least_squares(block: FloatArray, reach: FloatArray) -> FloatArray:
-    """Solve the normal equations, also with linearly dependent columns."""
-    size = np.sqrt(np.maximum(np.diag(block), 0.0))
-    unit = np.divide(1.0, size, out=np.zeros_like(size), where=size > 0.0)
-    values, vectors = np.linalg.eigh(block * np.outer(unit, unit))
-    along = unit[:, np.newaxis] * vectors[:, values > _BLIND]
-    return np.asarray((along / values[values > _BLIND]) @ (along.T @ reach))

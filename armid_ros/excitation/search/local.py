@@ -19,14 +19,12 @@ from functools import lru_cache
 import math
 import time
 
-from armid_ros.excitation.feasibility import trajectory_faults
+from armid_ros.excitation.feasibility import random_feasible, trajectory_faults
 from armid_ros.excitation.fourier import FourierTrajectory
 from armid_ros.excitation.geometry.clearance import ClearanceModel
 from armid_ros.excitation.limits import Violation
 from armid_ros.excitation.problem import DesignProblem
-from armid_ros.excitation.random_trajectory import random_feasible
-from armid_ros.excitation.search.constraints import Constraints, Part
-from armid_ros.excitation.search.objective import Objective
+from armid_ros.excitation.search.functions import Constraints, Objective, Part
 from armid_ros.motion import FloatArray
 from armid_ros.robots.robot import position_range
 import numpy as np
@@ -38,8 +36,8 @@ INTERRUPTED, OUT_OF_TIME = 'interrupted', 'time budget'
 #: Sharpness of the soft maximum: coarse while the cost improves, then fine.
 _SHARPNESS = (60.0, 300.0)
 
-#: Iterations of a round, and the gain of a round below which the search has converged.
-_ROUND, _SETTLED = 25, 0.005
+#: Iterations of a round.
+_ROUND = 25
 
 #: Rounds after which the worse half of the searches ends.
 _ROUNDS = 2
@@ -110,7 +108,22 @@ class Search:
 
         """
         try:
-            self._improve(self._draw())
+            # each search starts from one of the best candidates
+            problem, settings = self.problem, self.problem.settings
+            drawn: list[tuple[float, FourierTrajectory]] = []
+            for _ in range(self._candidates):
+                trajectory = random_feasible(
+                    problem.arm,
+                    problem.limits,
+                    settings.period,
+                    settings.harmonics,
+                    self.rng,
+                    collision=self.clearance,
+                    margin=settings.clearance,
+                )
+                drawn.append((self.offer(trajectory), trajectory))
+            drawn.sort(key=lambda pair: pair[0])
+            self._improve([trajectory for _, trajectory in drawn[: settings.starts]])
         except _OutOfTime:
             return OUT_OF_TIME
         except KeyboardInterrupt:
@@ -136,24 +149,6 @@ class Search:
         self._watch(min(self._steps / self._work, 1.0), self.cost)
         if time.process_time() - self._begun > self.problem.settings.time_budget:
             raise _OutOfTime
-
-    def _draw(self) -> list[FourierTrajectory]:
-        """Return the best of the candidates, one to start each search from."""
-        problem, settings = self.problem, self.problem.settings
-        drawn: list[tuple[float, FourierTrajectory]] = []
-        for _ in range(self._candidates):
-            trajectory = random_feasible(
-                problem.arm,
-                problem.limits,
-                settings.period,
-                settings.harmonics,
-                self.rng,
-                collision=self.clearance,
-                margin=settings.clearance,
-            )
-            drawn.append((self.offer(trajectory), trajectory))
-        drawn.sort(key=lambda pair: pair[0])
-        return [trajectory for _, trajectory in drawn[: settings.starts]]
 
     def _improve(self, starts: list[FourierTrajectory]) -> None:
         """Improve several trajectories in rounds; the worse half ends after every `_ROUNDS`."""
@@ -218,7 +213,15 @@ class _Branch:
         z, used = self._solve(constraints, min(_ROUND, self.left))
         self.left -= used
         trajectory = FourierTrajectory.of(problem.limits.joints, settings.period, z * self.scale)
-        self.times = np.concatenate([self.times, _faulty_times(problem, clearance, trajectory)])
+        # the times of the worst torque or clearance faults between the samples
+        motion = trajectory.one_period(200 * trajectory.harmonics)
+        torque = np.abs(problem.arm.joint_torque(motion))
+        excess = (torque / problem.limits.torque).max(axis=1) - 1.0
+        if clearance is not None:
+            margin = problem.settings.clearance
+            excess = np.maximum(excess, margin - clearance.smallest(motion.q, reach=margin))
+        peak = (excess >= np.roll(excess, 1)) & (excess > np.roll(excess, -1)) & (excess > 0.0)
+        self.times = np.concatenate([self.times, motion.t[peak]])
         feasible = _made_feasible(problem, clearance, trajectory)
         if feasible is None:
             self.box /= 3.0
@@ -226,7 +229,8 @@ class _Branch:
         cost = self.search.offer(feasible)
         gain, self.cost = self.cost - cost, min(cost, self.cost)
         self.trajectory, self.box = feasible, min(2.0 * self.box, _BOX)
-        if gain < _SETTLED:
+        # gain of a round below which the search has converged
+        if gain < 0.005:
             self.left = 0 if self.sharpness == _SHARPNESS[-1] else self.left
             self.sharpness = _SHARPNESS[-1]
 
@@ -272,20 +276,6 @@ class _Branch:
             callback=counted,
         )
         return np.asarray(result.x).reshape(scale.shape), max(count, 1)
-
-
-def _faulty_times(
-    problem: DesignProblem, clearance: ClearanceModel | None, trajectory: FourierTrajectory
-) -> FloatArray:
-    """Return the times of the worst torque or clearance faults between the samples."""
-    motion = trajectory.one_period(200 * trajectory.harmonics)
-    torque = np.abs(problem.arm.joint_torque(motion))
-    excess = (torque / problem.limits.torque).max(axis=1) - 1.0
-    if clearance is not None:
-        margin = problem.settings.clearance
-        excess = np.maximum(excess, margin - clearance.smallest(motion.q, reach=margin))
-    peak = (excess >= np.roll(excess, 1)) & (excess > np.roll(excess, -1)) & (excess > 0.0)
-    return np.asarray(motion.t[peak])
 
 
 def _made_feasible(

@@ -17,7 +17,7 @@ from armid_ros.recording.columns import numbers, per_joint
 from armid_ros.robots import load_robot, parse_gravity
 from armid_ros.robots.two_link import TwoLinkSet
 from armid_ros.simulation import ComputedTorque, GravityPD, Plant, Sensors, SimulatedArm
-from armid_ros.simulation.elastic.setup import (
+from armid_ros.simulation.elastic import (
     elastic_joints,
     make_elastic_arm,
     no_rotor,

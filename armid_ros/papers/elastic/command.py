@@ -4,10 +4,11 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+from dataclasses import replace
 from pathlib import Path
-from typing import Any
 
-from armid_ros.cli import parameters as options
+from armid_ros.cli import parameters
 import click
 
 
@@ -24,7 +25,7 @@ import click
 @click.option(
     '--experiments', default=48, show_default=True, help='Number that --demo simulates, 4 s each.'
 )
-@options.robot_described(
+@parameters.robot_described(
     default='two_link_elastic', show_default=True, help='Robot: shipped name or path.'
 )
 @click.option(
@@ -42,13 +43,24 @@ import click
 @click.option(
     '--model', type=click.Path(path_type=Path), help='model.yaml with inertias, for other arms.'
 )
-@options.folder
-@options.reading
-@options.seed
-@options.every
-@options.as_json
+@parameters.folder
+@parameters.reading
+@parameters.seed
+@parameters.every
+@parameters.as_json
 def elastic(
-    out: Path, seed: int, every: bool, as_json: bool, robot_source: str, **given: Any
+    bags: Sequence[Path],
+    steps: Sequence[Path],
+    demo: bool,
+    experiments: int,
+    robot_source: str,
+    start: str | None,
+    model: Path | None,
+    out: Path,
+    seed: int,
+    every: bool,
+    as_json: bool,
+    **given: str | None,
 ) -> None:
     """
     Identify elastic joints.
@@ -58,6 +70,63 @@ def elastic(
     are found joint by joint.
 
     """
-    from armid_ros.papers.elastic.work import ElasticOptions, identify_elastic
+    from armid_ros.cli import options
+    from armid_ros.cli.options import provenance
+    from armid_ros.cli.terminal import progress
+    from armid_ros.errors import RecordingError, RobotError
+    from armid_ros.papers.elastic import report, work
+    from armid_ros.papers.elastic.identification.files import read_runs
+    from armid_ros.papers.elastic.identification.three_steps import identify_two_inertia
+    from armid_ros.papers.elastic.springs import identify_springs
+    from armid_ros.robots import load_robot
+    from armid_ros.robots.two_link import planar_pair, ROBOT, two_link_set
 
-    identify_elastic(ElasticOptions(robot=robot_source, **given), out, seed, as_json, every)
+    begin = start or ('before' if demo else 'found')
+    printed = None if begin == 'found' else two_link_set(begin).parameters
+    robot = load_robot(robot_source)
+    if not planar_pair(robot):
+        if demo or steps:
+            raise RobotError(
+                f'{robot.name} is no pair of links that move in a horizontal plane, as --demo and '
+                '--steps need. Without them its springs are found joint by joint'
+            )
+        identify_springs(bags, robot, robot_source, model, out, seed, as_json)
+        return
+    if model is not None:
+        raise RobotError('--model has no place in the three steps, which find the inertias')
+    radius, drives, loop = work.machine(**given)
+    staged = options.stage(out, report.SCHEMA, robot_source)
+    with progress('reading') as tick:
+        if demo:
+            bags, steps = work.simulate(robot, radius, staged, experiments, seed, tick)
+        elif not bags:
+            raise RecordingError('no bag is named; give one, or --demo to simulate one')
+        how = options.read_settings(), options.tell_damage
+        runs, responses = (
+            [run for path in paths for run in read_runs(path, robot, radius, *how)]
+            for paths in (bags, steps)
+        )
+        result = identify_two_inertia(
+            runs, drives, steps=responses, loop=loop, start=printed, progress=tick
+        )
+        tick(1.0, 'writing')
+        shipped, known, table = two_link_set('after').parameters, printed, ''
+        if robot.name == ROBOT:
+            known, table = shipped, 'Table 1 of the source, after tuning'
+        elif printed is not None:
+            table = f"the set '{begin}', which the tuning began with"
+        seeds = seed if demo else None
+        origin = provenance([*bags, *steps], {'start of the tuning': begin}, seeds)
+        page = report.elastic_report(result, robot.name, known, table, origin)
+    document, verdict = report.elastic_document(result, robot_source), report.verdict(result)
+    if demo and result.tuning is not None:
+        story = report.tuning_story(result.tuning, printed or result.untuned, shipped)
+        document['story'] = story
+        told = (
+            f'Against the true arm tuning made the error {story["factor"]:.0f} times smaller; '
+            f'main parameters are within {story["main_parameters_percent_after"]:.2g} %.'
+        )
+        verdict = replace(verdict, sentences=[*verdict.sentences, told])
+    shown = work.values_table if every else work.resonances_table
+    table_shown = None if as_json else shown(document)
+    options.deliver_page(staged, page, 'elastic', document, verdict, table_shown)

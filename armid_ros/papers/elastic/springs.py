@@ -1,25 +1,103 @@
 # Copyright 2026 The armid_ros developers
 # SPDX-License-Identifier: Apache-2.0
-"""Springs of any arm, joint by joint, for `armid elastic`."""
+"""Springs of any arm, joint by joint, for `armid elastic`: work, report and document."""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
 from pathlib import Path
+from typing import Any
 
 from armid_ros.cli import options
 from armid_ros.cli.options import provenance
 from armid_ros.cli.terminal import progress
 from armid_ros.errors import RecordingError
-from armid_ros.files import json_text, write_file
 from armid_ros.papers.elastic.identification.files import read_sides
 from armid_ros.papers.elastic.identification.joints import fit_springs, SpringEstimate
-from armid_ros.papers.elastic.identification.output import springs_document, SPRINGS_SCHEMA
-from armid_ros.papers.elastic.report.springs import springs_report, verdict
 from armid_ros.recording.elastic import LINK
+from armid_ros.report.blocks import ContentSection, DataTable, Paragraph
+from armid_ros.report.notation import counted
+from armid_ros.report.page import Page, Section
+from armid_ros.report.sections.frame import Origin, VerdictSection
 from armid_ros.robots import Robot
-import click
 import numpy as np
+
+SPRINGS_SCHEMA = 'armid/springs/1'
+_SPRINGS = (
+    'Joint', 'Stiffness [N m/rad]', '95 %', 'Backlash [mrad], 95 %', 'Correlation', 'R²'
+)  # fmt: skip
+_MOTORS = (
+    'Joint', 'Link [kg m²]', 'Rotor [kg m²]', 'Viscous [N m s/rad]', 'Coulomb [N m]',
+    'Antiresonance [Hz]', 'Resonance [Hz]',
+)  # fmt: skip
+
+
+def _springs(found: Sequence[SpringEstimate]) -> ContentSection:
+    """Return a section with stiffness, free play and motor of every joint."""
+    springs, motors = [], []
+    for one in found:
+        fit = one.transmission
+        value, low, high = fit.stiffness
+        play = [1e3 * x for x in fit.backlash]
+        springs.append(
+            (
+                one.joint,
+                f'{value:.4g}' if one.informative else 'not identifiable',
+                f'{low:.4g} to {high:.4g}' if one.informative else '',
+                f'{play[1]:.2g} to {play[2]:.2g}' if np.isfinite(play).all() else 'no reversals',
+                f'{fit.correlation:+.2f}' if np.isfinite(fit.correlation) else '',
+                f'{fit.explained:.4f}',
+            )
+        )
+        own = ['', '', ''] if one.motor is None else [f'{x:.3g}' for x in one.motor]
+        both = [
+            f'{x:.1f}' if one.informative and np.isfinite(x) else ''
+            for x in (one.antiresonance, one.resonance)
+        ]
+        motors.append((one.joint, f'{one.inertia:.3g}', *own, *both))
+    text = (
+        'The twist of each motor against its link, over what the rigid body takes there: inertia, '
+        'gravity and the interaction of all links included. Compliance and free play are '
+        'distinguishable where the load changes sides; a correlation near ±1 means they '
+        'are not.'
+    )
+    hint = (
+        'Frequencies are those of each joint alone, the others held, at its mean inertia in the '
+        'recording.'
+    )
+    return ContentSection(
+        'Springs',
+        [Paragraph(text), DataTable(_SPRINGS, springs), DataTable(_MOTORS, motors),
+         Paragraph(hint, 'hint')],
+    )  # fmt: skip
+
+
+def verdict(found: Sequence[SpringEstimate]) -> VerdictSection:
+    """Say how many springs were found, and which is the softest."""
+    told = [one for one in found if one.informative]
+    lost = [one.joint for one in found if not one.informative]
+    beware = ['Inertias are those of the description or model: a stiffness is as right as they.']
+    step = f'Record {", ".join(lost)} again under more load, or with finer encoders.'
+    if lost:
+        beware.append(f'{", ".join(lost)}: the twist does not follow the load.')
+    if not told:
+        shown = ['No joint shows a spring.']
+        return VerdictSection('not identifiable', 'bad', shown, beware, step=step)
+    softest = min(told, key=lambda one: one.transmission.stiffness[0])
+    value, low, high = softest.transmission.stiffness
+    sentences = [
+        f'Stiffness of {len(told)} of {counted(len(found), "joint")} found; the softest is '
+        f'{softest.joint} with {value:.4g} N m/rad ({low:.4g} to {high:.4g}, 95 %).'
+    ]
+    loose = [one.joint for one in told if one.transmission.backlash_seen]
+    if loose:
+        sentences.append(f'Free play is seen at {", ".join(loose)}.')
+    if not lost:
+        spring = f'joint_elasticity@{softest.joint}:compliance={1.0 / value:.3g}'
+        step = f'Simulate with the springs: armid simulate --effect {spring}, and so for each.'
+    grade, tone = ('partial', 'fair') if lost else ('found', 'good')
+    return VerdictSection(grade, tone, sentences, beware, step=step)
+
 
 WITHOUT = (
     'with encoders at the motors alone, `armid diagnose`, or `armid identify --effects '
@@ -46,17 +124,13 @@ def identify_springs(
         tick(0.5, 'fitting')
         found = fit_springs(body, sides, np.random.default_rng(seed))
     document = springs_document(found, source)
-    write_file(staged.folder / 'elastic.json', json_text(document, indent=1))
     origin = provenance(bags, {'model': str(model or source)})
-    page = springs_report(found, robot.name, origin)
-    write_file(staged.folder / 'report.html', page)
-    staged.keep()
-    if as_json:
-        click.echo(json_text(document))
-        return
+    sections: list[Section] = [verdict(found), _springs(found), Origin(origin)]
+    subtitle = f'{robot.name} · {counted(len(found), "joint")}, encoders on both sides'
+    page = Page(f'Elastic joints of {robot.name}', subtitle, sections).html()
     heads = ('joint', 'stiffness [N m/rad]', '95 %', 'free play', 'rotor', 'resonance')
-    files = f'{out}: elastic.json, report.html'
-    options.show_verdict(verdict(found), heads, [_row(one) for one in found], files)
+    table = None if as_json else (heads, [_row(one) for one in found])
+    options.deliver_page(staged, page, 'elastic', document, verdict(found), table)
 
 
 def _row(found: SpringEstimate) -> tuple[str, ...]:
@@ -74,3 +148,38 @@ def _row(found: SpringEstimate) -> tuple[str, ...]:
         '-' if found.motor is None else f'{found.motor[0]:.3g} kg m^2',
         f'{found.resonance:.1f} Hz' if np.isfinite(found.resonance) else '-',
     )
+
+
+def springs_document(found: Sequence[SpringEstimate], robot: str) -> dict[str, Any]:
+    """Return springs that were found joint by joint as the document that elastic.json holds."""
+
+    def number(value: float) -> float | None:
+        return float(value) if np.isfinite(value) else None
+
+    return {
+        'schema': SPRINGS_SCHEMA,
+        'robot': robot,
+        'joints': [
+            {
+                'joint': one.joint,
+                'told': one.informative,
+                'stiffness': number(one.transmission.stiffness[0]),
+                'stiffness_interval': [number(x) for x in one.transmission.stiffness[1:]],
+                'stiffness_unit': 'N m/rad',
+                'backlash': number(one.transmission.backlash[0]),
+                'backlash_interval': [number(x) for x in one.transmission.backlash[1:]],
+                'backlash_unit': 'rad',
+                'backlash_seen': one.transmission.backlash_seen,
+                'correlation': number(one.transmission.correlation),
+                'explained': number(one.transmission.explained),
+                'encoder_delay_s': number(one.transmission.delay[0]),
+                'link_inertia': one.inertia,
+                'rotor_inertia': None if one.motor is None else float(one.motor[0]),
+                'viscous_coefficient': None if one.motor is None else float(one.motor[1]),
+                'coulomb_torque': None if one.motor is None else float(one.motor[2]),
+                'antiresonance_hz': number(one.antiresonance),
+                'resonance_hz': number(one.resonance),
+            }
+            for one in found
+        ],
+    }

@@ -4,13 +4,13 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from pathlib import Path
-from typing import Any
 
-from armid_ros.cli import parameters as options
+from armid_ros.cli import parameters
 import click
 
-#: Motions of a leg and its exoskeleton; `armid_ros.papers.exo.plant.exercises.EXERCISES`.
+#: Motions of a leg and its exoskeleton; `armid_ros.papers.exo.plant.leg_pair.EXERCISES`.
 EXERCISES = ('step', 'quick_step', 'swing', 'lift', 'squat', 'rock')
 
 
@@ -18,7 +18,7 @@ EXERCISES = ('step', 'quick_step', 'swing', 'lift', 'squat', 'rock')
     epilog='Example: armid exo --out result; with a recording: armid exo run.mcap --out result'
 )
 @click.argument('bag', required=False, type=click.Path(path_type=Path))
-@options.folder
+@parameters.folder
 @click.option(
     '--topics',
     default='/exo/joint_states,/human/joint_states',
@@ -51,17 +51,22 @@ EXERCISES = ('step', 'quick_step', 'swing', 'lift', 'squat', 'rock')
 @click.option('--duration', default=10.0, show_default=True, help='Length of the simulation [s].')
 @click.option('--torque-noise', default=0.5, show_default=True, help='Torque noise (std) [N m].')
 @click.option('--angle-noise', default=0.05, show_default=True, help='Angle noise (std) [deg].')
-@options.seed
-@options.reading
-@options.as_json
+@parameters.seed
+@parameters.reading
+@parameters.as_json
 def exo(
     bag: Path | None,
     out: Path,
     topics: str,
     inertias: str,
+    gait_file: Path | None,
+    stiffness: float | None,
+    motion: str,
+    duration: float,
+    torque_noise: float,
+    angle_noise: float,
     seed: int,
     as_json: bool,
-    **simulated: Any,
 ) -> None:
     """
     Find what ties an exoskeleton to its wearer.
@@ -69,6 +74,57 @@ def exo(
     Without a BAG the shipped pair walks, is recorded with noise, and its springs are found again.
 
     """
-    from armid_ros.papers.exo.work import identify_pair, SimulationOptions
+    from armid_ros.cli import options
+    from armid_ros.cli.options import provenance
+    from armid_ros.cli.terminal import progress
+    from armid_ros.errors import ModelError
+    from armid_ros.files import settled
+    from armid_ros.papers.exo import work
+    from armid_ros.papers.exo.plant.gait import read_gait
+    from armid_ros.papers.exo.plant.leg_pair import exercise, leg_pair
+    from armid_ros.papers.exo.report.page import exo_report, verdict
+    from armid_ros.recording import read_recording
+    from armid_ros.recording.writer import require_new
+    import numpy as np
 
-    identify_pair(bag, out, topics, inertias, SimulationOptions(**simulated), seed, as_json)
+    pair, gait = leg_pair(stiffness), read_gait(gait_file)
+    names = topics.split(',')
+    if len(names) != 2:
+        raise ModelError(f'--topics {topics}: give two topics, of the machine and of its wearer')
+    if bag is None:
+        require_new(out / 'recording')
+    staged = options.stage(out, work.SCHEMA)
+    with progress('recording') as tick:
+        path = staged.folder / 'recording' if bag is None else bag
+        if bag is None:
+            motions = exercise(pair, motion, np.arange(0.0, duration, 1e-3), gait)
+            noise, rng = (angle_noise, torque_noise), np.random.default_rng(seed)
+            work.record(path, names, pair, motions, noise, rng)
+        settings, source = options.read_settings(), str(settled(path))
+        both = [
+            read_recording(path, joints=one.joints, topic=topic, settings=settings)
+            for one, topic in zip((pair.robot, pair.other), names, strict=True)
+        ]
+        options.tell_damage(*both)
+        machine, wearer = (replace(one, source=source) for one in both)
+        found = work.identify_ties(pair, machine, wearer, inertias, tick)
+        walked = work.walk(pair, gait, stiffness, tick) if bag is None else None
+    asked = {'inertias': inertias, 'topics': topics}
+    page = exo_report(
+        pair.with_stiffness(found[0].stiffness[0].clip(0.0)),
+        *(
+            work.single_support(pair, gait)
+            if bag is None
+            else work.recorded_motions(pair, machine, wearer)
+        ),
+        found,
+        walked,
+        provenance([path], asked, seed if bag is None else None),
+    )
+    document = work.exo_document(found, walked, source)
+    rows = [
+        (row['segment'], f'{row["value"]:.1f}', f'{row["std"]:.1f}')
+        for row in document['stiffness']
+    ]
+    table = None if as_json else (('spring', 'stiffness [N/m]', 'std'), rows)
+    options.deliver_page(staged, page, 'exo', document, verdict(found, walked), table)

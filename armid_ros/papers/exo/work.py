@@ -1,45 +1,39 @@
 # Copyright 2026 The armid_ros developers
 # SPDX-License-Identifier: Apache-2.0
-"""Identification of the springs between a machine and its wearer, from torques and angles."""
+"""Recordings, estimates and the document of `armid exo`."""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
-from armid_ros.cli import options
-from armid_ros.cli.options import provenance
-from armid_ros.cli.terminal import progress, Tick
-from armid_ros.errors import ModelError
-from armid_ros.files import json_text, settled, write_file
+from armid_ros.cli.terminal import Tick
 from armid_ros.identification.ties.recorded import recorded_interaction_problem
 from armid_ros.identification.ties.stiffness import identify_interaction, Interaction
 from armid_ros.motion import FloatArray, Motion
 from armid_ros.papers.exo.assumptions import read_assumptions
-from armid_ros.papers.exo.plant.exercises import exercise
-from armid_ros.papers.exo.plant.gait import Gait, read_gait
-from armid_ros.papers.exo.plant.gait_cycle import check_cycle, gait_cycle, GaitCycle, weight
+from armid_ros.papers.exo.plant.gait import Gait
+from armid_ros.papers.exo.plant.gait_cycle import (
+    check_cycle,
+    gait_cycle,
+    ground_by_shares,
+    weight,
+)
 from armid_ros.papers.exo.plant.leg_pair import (
-    leg_pair,
     pair_torques,
     PairMotion,
     TiedPair,
     walking,
 )
-from armid_ros.papers.exo.plant.shares import ground_by_shares
 from armid_ros.papers.exo.plant.walkers import walking_pair
-from armid_ros.papers.exo.report.page import exo_report, verdict
 from armid_ros.papers.exo.report.walk import Driven, SimulatedWalk
 from armid_ros.recording import (
-    read_recording,
     recorded_together,
     Recording,
     write_joint_states,
 )
-from armid_ros.recording.writer import require_new, whole_bag
-import click
+from armid_ros.recording.writer import whole_bag
 import numpy as np
 from numpy.random import Generator
 
@@ -47,108 +41,27 @@ from numpy.random import Generator
 _DRIVEN = ('exo_right_hip', 'exo_right_knee')
 _SOFTER = 0.2
 SCHEMA = 'armid/exo/1'
-_RATE = 1000.0
 
 
-@dataclass(frozen=True)
-class SimulationOptions:
-    """
-    Options of the simulation that replaces a recording.
-
-    Attributes
-    ----------
-    gait_file : Path or None
-        File with the angles of walking.
-    stiffness : float or None
-        Stiffness of the springs [N/m].
-    motion : str
-        Name of the exercise.
-    duration : float
-        Duration of the recording [s].
-    torque_noise, angle_noise : float
-        Standard deviations [N m, deg].
-
-    """
-
-    gait_file: Path | None
-    stiffness: float | None
-    motion: str
-    duration: float
-    torque_noise: float
-    angle_noise: float
-
-    def record(
-        self, path: Path, topics: Sequence[str], pair: TiedPair, gait: Gait, rng: Generator
-    ) -> None:
-        """Simulate the recordings of both machines along a motion, with noise."""
-        motions = exercise(pair, self.motion, np.arange(0.0, self.duration, 1.0 / _RATE), gait)
-        tau = pair_torques(pair, *motions).tau
-        tau = tau + self.torque_noise * rng.normal(size=tau.shape)
-        stamps = 10**9 + np.rint(motions.own.t * 1e9).astype(np.int64)
-        noise = np.radians(self.angle_noise)
-        with whole_bag(path) as writer:
-            for topic, motion, torque in zip(topics, motions, (tau, None), strict=True):
-                q = motion.q + noise * rng.normal(size=motion.q.shape)
-                write_joint_states(writer, topic, motion.joints, stamps, q, None, torque)
-
-
-def identify_pair(
-    bag: Path | None,
-    out: Path,
-    topics: str,
-    inertias: Any,
-    simulated: SimulationOptions,
-    seed: int,
-    as_json: bool,
+def record(
+    path: Path,
+    topics: Sequence[str],
+    pair: TiedPair,
+    motions: PairMotion,
+    noise: tuple[float, float],
+    rng: Generator,
 ) -> None:
-    """Find what ties an exoskeleton to its wearer."""
-    pair = leg_pair(simulated.stiffness)
-    gait = read_gait(simulated.gait_file)
-    names = topics.split(',')
-    if len(names) != 2:
-        raise ModelError(f'--topics {topics}: give two topics, of the machine and of its wearer')
-    if bag is None:
-        require_new(out / 'recording')
-    staged = options.stage(out, SCHEMA)
-    with progress('recording') as tick:
-        path = staged.folder / 'recording' if bag is None else bag
-        if bag is None:
-            simulated.record(path, names, pair, gait, np.random.default_rng(seed))
-        settings = options.read_settings()
-        machine, wearer = (
-            read_recording(path, joints=one.joints, topic=topic, settings=settings)
-            for one, topic in zip((pair.robot, pair.other), names, strict=True)
-        )
-        options.tell_damage(machine, wearer)
-        source = str(settled(path))
-        both = replace(machine, source=source), replace(wearer, source=source)
-        found = _identify(pair, *both, inertias, tick)
-        walked = _walk(pair, gait, simulated.stiffness, tick) if bag is None else None
-    document = _document(found, walked, both[0].source)
-    page = exo_report(
-        pair.with_stiffness(found[0].stiffness[0].clip(0.0)),
-        *(_shown(pair, gait) if bag is None else _recorded(pair, *both)),
-        found,
-        walked,
-        provenance(
-            [path], {'inertias': inertias, 'topics': topics}, seed if bag is None else None
-        ),
-    )
-    write_file(staged.folder / 'report.html', page)
-    write_file(staged.folder / 'exo.json', json_text(document, indent=1))
-    staged.keep()
-    if as_json:
-        click.echo(json_text(document))
-        return
-    rows = [
-        (row['segment'], f'{row["value"]:.1f}', f'{row["std"]:.1f}')
-        for row in document['stiffness']
-    ]
-    heads = ('spring', 'stiffness [N/m]', 'std')
-    options.show_verdict(verdict(found, walked), heads, rows, f'{out}: exo.json, report.html')
+    """Record both machines along a motion, with noise of angles [deg] and torques [N m]."""
+    tau = pair_torques(pair, *motions).tau
+    tau = tau + noise[1] * rng.normal(size=tau.shape)
+    stamps = 10**9 + np.rint(motions.own.t * 1e9).astype(np.int64)
+    with whole_bag(path) as writer:
+        for topic, motion, torque in zip(topics, motions, (tau, None), strict=True):
+            q = motion.q + np.radians(noise[0]) * rng.normal(size=motion.q.shape)
+            write_joint_states(writer, topic, motion.joints, stamps, q, None, torque)
 
 
-def _walk(pair: TiedPair, gait: Gait, stiffness: float | None, tick: Tick) -> SimulatedWalk:
+def walk(pair: TiedPair, gait: Gait, stiffness: float | None, tick: Tick) -> SimulatedWalk:
     """Simulate the walking pair, with joints driven by torque."""
     tick(0.6, 'walking a whole cycle')
     walkers = walking_pair(stiffness)
@@ -167,7 +80,7 @@ def _walk(pair: TiedPair, gait: Gait, stiffness: float | None, tick: Tick) -> Si
     return SimulatedWalk(truth, cycle, driven, _SOFTER, rate)
 
 
-def _identify(
+def identify_ties(
     pair: TiedPair, machine: Recording, wearer: Recording, inertias: Any, tick: Tick
 ) -> list[Interaction]:
     """Estimate one stiffness for all springs, and one for each."""
@@ -185,7 +98,7 @@ def _identify(
     return found
 
 
-def _shown(pair: TiedPair, gait: Gait) -> tuple[PairMotion, FloatArray, str]:
+def single_support(pair: TiedPair, gait: Gait) -> tuple[PairMotion, FloatArray, str]:
     """Return the motion of single support, over the gait cycle of the swing leg."""
     known = read_assumptions()
     begin, end = known['single_support'].value
@@ -195,7 +108,7 @@ def _shown(pair: TiedPair, gait: Gait) -> tuple[PairMotion, FloatArray, str]:
     return walking(pair, gait, t), phase, 'gait cycle of the swing leg'
 
 
-def _recorded(
+def recorded_motions(
     pair: TiedPair, machine: Recording, wearer: Recording
 ) -> tuple[PairMotion, FloatArray, str]:
     """Return the recorded motion; only its positions are shown."""
@@ -210,9 +123,10 @@ def _recorded(
     return motions, both.t, 'time [s]'
 
 
-def _document(
+def exo_document(
     found: list[Interaction], walked: SimulatedWalk | None, source: str
 ) -> dict[str, Any]:
+    """Return springs, and the cycle of simulated data, as the document of exo.json."""
     rows = [
         {
             'segment': segment,
@@ -236,25 +150,23 @@ def _document(
         }
         for d in (walked.driven if walked else ())
     ]
+    feet = []
+    if walked is not None:
+        pair, walk_cycle = walked.cycle.pair, walked.cycle
+        feet = [
+            {
+                'machine': robot.name,
+                'weight': weight(robot),
+                'most': float(walk_cycle.feet(other=other)[..., 1].max()),
+                'double_support': float(np.mean(walk_cycle.support(other=other) == 2)),
+                'unit': 'N',
+            }
+            for robot, other in ((pair.robot, False), (pair.other, True))
+        ]
     return {
         'schema': SCHEMA,
         'recording': source,
         'stiffness': rows,
         'cycle': cycle,
-        'feet': _feet(walked.cycle) if walked else [],
+        'feet': feet,
     }
-
-
-def _feet(cycle: GaitCycle) -> list[dict[str, Any]]:
-    """Return the forces on the feet of both machines."""
-    pair = cycle.pair
-    return [
-        {
-            'machine': robot.name,
-            'weight': weight(robot),
-            'most': float(cycle.feet(other=other)[..., 1].max()),
-            'double_support': float(np.mean(cycle.support(other=other) == 2)),
-            'unit': 'N',
-        }
-        for robot, other in ((pair.robot, False), (pair.other, True))
-    ]

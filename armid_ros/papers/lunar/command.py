@@ -29,23 +29,14 @@ def lunar(out: Path, seed: int, every: bool, as_json: bool) -> None:
     from armid_ros.cli import options
     from armid_ros.cli.options import provenance
     from armid_ros.cli.terminal import progress
-    from armid_ros.files import json_text, write_file
-    from armid_ros.identification import write_document
-    from armid_ros.papers.lunar.output import lunar_document, SCHEMA
-    from armid_ros.papers.lunar.report import lunar_report, verdict
+    from armid_ros.papers.lunar.report import lunar_document, lunar_report, SCHEMA, verdict
     from armid_ros.papers.lunar.reproduction import reproduce
 
     staged = options.stage(out, SCHEMA)
     with progress('designing the trajectory') as tick:
         found = reproduce(seed=seed, progress=tick)
     document = lunar_document(found)
-    write_document(staged.folder / 'lunar.json', document)
     page = lunar_report(found, provenance([], {'robot': 'humanoid_arm'}, seed))
-    write_file(staged.folder / 'report.html', page)
-    staged.keep()
-    if as_json:
-        click.echo(json_text(document))
-        return
     rows = []
     for table in document['tables']:
         unit = 'of noise' if table['measure'] == 'mae_over_noise' else '% of peak'
@@ -54,4 +45,5 @@ def lunar(out: Path, seed: int, every: bool, as_json: bool) -> None:
             values = (table[key].get(joint, fmean(table[key].values())) for key in _HEADS.values())
             rows.append((f'{table["number"]}', joint, *(f'{value:.3g}' for value in values), unit))
     heads = ('table', 'joint', *_HEADS, 'unit')
-    options.show_verdict(verdict(found), heads, rows, f'{out}: lunar.json, report.html')
+    table_shown = None if as_json else (heads, rows)
+    options.deliver_page(staged, page, 'lunar', document, verdict(found), table_shown)

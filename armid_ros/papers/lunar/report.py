@@ -1,21 +1,25 @@
 # Copyright 2026 The armid_ros developers
 # SPDX-License-Identifier: Apache-2.0
-"""The report of the lunar paper, repeated."""
+"""The report and the document of the lunar paper, repeated."""
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+from dataclasses import asdict
+from typing import Any
+
 from armid_ros.identification.fitting.identifiability import HALF_WIDTH
-from armid_ros.papers.lunar.paper import LOAD
-from armid_ros.papers.lunar.reproduction import Repeated, Reproduction
-from armid_ros.papers.lunar.sections import curves_section, gravity_section, tables_section
+from armid_ros.motion import FloatArray
+from armid_ros.papers.lunar.reproduction import Composite, LOAD, Repeated, Reproduction
+from armid_ros.report.blocks import ContentSection, DataTable, Fold, Panels, Paragraph
+from armid_ros.report.charts import Chart, Series, thinned
 from armid_ros.report.notation import digits, measured
 from armid_ros.report.page import Page, Section
 from armid_ros.report.provenance import Provenance
 from armid_ros.report.sections.frame import Origin, VerdictSection
 import numpy as np
 
-#: Limits of the errors of Tables 3 and 4 [% of the peak], and of Table 6 [of the noise].
-_WANTED = 1.0, 0.15
+SCHEMA = 'armid/lunar/1'
 
 
 def lunar_report(found: Reproduction, provenance: Provenance) -> str:
@@ -34,7 +38,7 @@ def lunar_report(found: Reproduction, provenance: Provenance) -> str:
         verdict(found),
         tables_section(found.repeated),
         curves_section(found.repeated),
-        gravity_section(found.composites, _load(found)),
+        _gravity_section(found.composites, _load(found)),
         Origin(provenance),
     ]
     subtitle = 'gravity and dynamics of a 6-DOF humanoid arm · the paper compared with its repeat'
@@ -45,7 +49,7 @@ def lunar_report(found: Reproduction, provenance: Provenance) -> str:
 
 def verdict(found: Reproduction) -> VerdictSection:
     """Say how the errors compare with those of the paper, and what load was found."""
-    lines = []
+    lines, held = [], True
     for one in found.repeated:
         slow, whole = (one.ratio(method.held_out) for method in one.methods)
         name = f'Table {one.table.number} ({one.table.title})'
@@ -56,9 +60,11 @@ def verdict(found: Reproduction) -> VerdictSection:
                 f'alone, {digits(float(whole.max()))} with the whole dynamics. '
                 f'The paper has {low} to {high}; less is better.'
             )
+            held &= bool(slow.max() <= 0.15)  # of the noise
             continue
         noisy = one.ratio(one.methods[0].noisy)
         paper = 100.0 * float(np.mean(one.table.ratio))
+        held &= bool(100.0 * slow.mean() <= 1.0)  # % of the peak
         lines += [
             f'{name}: mean torque error {digits(100.0 * float(noisy.mean()))} % of the peak; the '
             f'paper has {digits(paper)} %.',
@@ -69,17 +75,146 @@ def verdict(found: Reproduction) -> VerdictSection:
         f'The {len(found.composites)} gravity parameters give a load of {_load(found)} in the '
         f'hand; {LOAD:g} kg was simulated.'
     )
-    held = all(_as_wanted(one) for one in found.repeated)
     grade = ('reproduced', 'good') if held else ('in part', 'fair')
     return VerdictSection(*grade, lines)
 
 
-def _as_wanted(one: Repeated) -> bool:
-    ratio = one.ratio(one.methods[0].held_out)
-    if one.table.uniform:
-        return bool(np.max(ratio) <= _WANTED[1])
-    return bool(100.0 * np.mean(ratio) <= _WANTED[0])
-
-
 def _load(found: Reproduction) -> str:
     return ' ± '.join(measured(found.load, HALF_WIDTH * found.load_std)) + ' kg'
+
+
+def tables_section(repeated: Sequence[Repeated]) -> ContentSection:
+    """Return a section with the tables of paper and reproduction, joint by joint."""
+    text = (
+        'Peak: as the paper prints it, and the largest gravity torque of the joint. Errors are '
+        'those of held-out trajectories against the true torque; noisy: against the noisy torque '
+        "of the run, as the paper may have it. Gravity: the gravity model, the paper's method. "
+        'Dynamics: the full dynamics.'
+    )
+    folds = [
+        Fold(f'Table {one.table.number}: {one.table.title}', [_table(one)], opened=True)
+        for one in repeated
+    ]
+    return ContentSection('Tables', [Paragraph(text), *folds])
+
+
+def _table(one: Repeated) -> DataTable:
+    slow, whole = one.methods
+    scale, error, share = 100.0, 'RMSE', 'RMSE over peak [%]'
+    if one.table.uniform:
+        scale, error, share = 1.0, 'MAE', 'MAE over noise'
+    ratios = [
+        scale * ratio
+        for ratio in (
+            one.table.ratio,
+            one.ratio(slow.noisy),
+            one.ratio(slow.held_out),
+            one.ratio(whole.held_out),
+        )
+    ]
+    peaks = {'paper': one.table.peak, 'largest': one.peak}
+    errors = {'paper': one.table.error, 'gravity': slow.held_out, 'dynamics': whole.held_out}
+    rows = [
+        *((f'Peak, {by} [N mm]', *_cells(1e3 * x, 3), '') for by, x in peaks.items()),
+        *((f'{error}, {by} [N mm]', *_cells(1e3 * x), '') for by, x in errors.items()),
+        *(
+            (f'{share}, {by}', *_cells(ratio), digits(float(np.mean(ratio))))
+            for by, ratio in zip(('paper', 'noisy', 'gravity', 'dynamics'), ratios, strict=True)
+        ),
+    ]
+    return DataTable(('quantity', *one.joints, 'mean'), rows)
+
+
+def _cells(values: FloatArray, count: int = 2) -> list[str]:
+    return [digits(float(value), count) for value in values]
+
+
+def curves_section(repeated: Sequence[Repeated]) -> ContentSection:
+    """Return a section with true and predicted torque along a held-out trajectory."""
+    text = (
+        'Gravity model, identified from the noisy run, along a held-out trajectory. Drag '
+        'across a plot, or pinch it, to zoom; double-click or double-tap to see it all.'
+    )
+    folds = []
+    for number, one in enumerate(repeated):
+        tau, panels = one.test.motion.tau, []
+        assert tau is not None
+        for k, joint in enumerate(one.joints):
+            true, found = 1e3 * tau[:, k], 1e3 * one.test.predicted[:, k]
+            kept = thinned(true, found)
+            chart = Chart(
+                one.test.motion.t[kept],
+                [Series('true', true[kept]), Series('identified', found[kept], 'predicted')],
+                'time [s]',
+                'torque [N mm]',
+                height=170,
+                link=f'table{one.table.number}',
+            )
+            panels.append((joint, '', [chart]))
+        title = f'Table {one.table.number}: {one.table.title}'
+        folds.append(Fold(title, [Panels(panels)], opened=number == 0))
+    return ContentSection('Torque curves', [Paragraph(text, 'hint'), *folds])
+
+
+def _gravity_section(composites: Sequence[Composite], load: str) -> ContentSection:
+    """Return a section with the minimal gravity parameters, with and without the load."""
+    text = (
+        'Masses and first moments times the gravity of the moon, in N mm, by the gravity model; '
+        "± 95 %. An arm with revolute joints has an even number of them; of the paper's table "
+        'nine are legible, and all nine have this form. The two runs differ by '
+        f'{load} at the hand.'
+    )
+    heads = ('Parameter', 'Joint', 'True', 'Identified', 'True, loaded', 'Identified, loaded')
+    rows = [
+        (
+            one.name,
+            one.joint,
+            f'{one.truth:.3f}',
+            ' ± '.join(measured(one.value, HALF_WIDTH * one.std)),
+            f'{one.loaded_truth:.3f}',
+            ' ± '.join(measured(one.loaded, HALF_WIDTH * one.loaded_std)),
+        )
+        for one in composites
+    ]
+    return ContentSection(
+        'Gravity parameters', [Paragraph(text), DataTable(heads, rows, words=(0, 1))]
+    )
+
+
+def lunar_document(found: Reproduction) -> dict[str, Any]:
+    """
+    Return the reproduction as the document of lunar.json.
+
+    Parameters
+    ----------
+    found : Reproduction
+        Tables, gravity parameters, load.
+
+    """
+    tables = []
+    for one in found.repeated:
+        scale = 1.0 if one.table.uniform else 100.0
+        slow, whole = one.methods
+        values = {
+            'paper': scale * one.table.ratio,
+            'against_noise': scale * one.ratio(slow.noisy),
+            'weight_alone': scale * one.ratio(slow.held_out),
+            'whole_dynamics': scale * one.ratio(whole.held_out),
+            'paper_peak': one.table.peak,
+            'largest_torque': one.peak,
+        }
+        tables.append(
+            {
+                'number': one.table.number,
+                'title': one.table.title,
+                'measure': 'mae_over_noise' if one.table.uniform else 'rmse_percent_of_peak',
+                **{k: dict(zip(one.joints, x.tolist(), strict=True)) for k, x in values.items()},
+                'torque_unit': 'N m',
+            }
+        )
+    return {
+        'schema': SCHEMA,
+        'tables': tables,
+        'composites': [{**asdict(one), 'unit': 'N mm'} for one in found.composites],
+        'load': {'value': found.load, 'std': found.load_std, 'unit': 'kg'},
+    }

@@ -13,7 +13,7 @@ from armid_ros.excitation import (
     Obstacle,
     with_obstacles,
 )
-from armid_ros.excitation.geometry.heights import link_heights, lowest_point
+from armid_ros.excitation.geometry.floor import link_heights, lowest_point
 from armid_ros.motion import Motion
 from armid_ros.robots import collision_model, load_robot, robot_from_urdf, shipped_robots
 import numpy as np

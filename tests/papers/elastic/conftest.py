@@ -3,9 +3,9 @@
 """Experiments with the two-link arm, recorded in MuJoCo for independent tests."""
 
 from armid_ros.motion import ElasticRun
-from armid_ros.papers.elastic.plant.signals import WEAK
+from armid_ros.papers.elastic.plant import WEAK
 from armid_ros.robots.two_link import two_link_set, TwoLinkParameters
-from armid_ros.simulation.elastic.two_link import two_link_loop
+from armid_ros.simulation.elastic import two_link_loop
 import numpy as np
 import pytest
 

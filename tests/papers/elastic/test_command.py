@@ -9,7 +9,7 @@ from armid_ros.papers.elastic.command import elastic
 from armid_ros.papers.elastic.identification.files import read_runs
 from armid_ros.recording.elastic import write_runs
 from armid_ros.robots import load_robot
-from armid_ros.simulation.accelerometers import LinkAccelerometers
+from armid_ros.simulation.sensors import LinkAccelerometers
 from click.testing import CliRunner
 import numpy as np
 import pytest

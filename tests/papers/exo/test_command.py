@@ -6,7 +6,7 @@ import json
 
 from armid_ros.cli import main
 from armid_ros.papers.exo import command
-from armid_ros.papers.exo.plant.exercises import EXERCISES
+from armid_ros.papers.exo.plant.leg_pair import EXERCISES
 from click.testing import CliRunner
 import pytest
 

@@ -2,7 +2,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """The ground of Table 3."""
 
-from armid_ros.papers.exo.plant.contact import Ground
+from armid_ros.papers.exo.plant.walkers import Ground
 import numpy as np
 import pytest
 

@@ -2,8 +2,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """Motions that a person can give."""
 
-from armid_ros.papers.exo.plant.exercises import exercise, EXERCISES
-from armid_ros.papers.exo.plant.leg_pair import leg_pair
+from armid_ros.papers.exo.plant.leg_pair import exercise, EXERCISES, leg_pair
 import numpy as np
 import pytest
 

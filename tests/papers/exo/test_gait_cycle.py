@@ -3,8 +3,12 @@
 """A whole cycle: momentum, periodicity, supports, and the same in MuJoCo."""
 
 from armid_ros.model.kinematics import points_motion
-from armid_ros.papers.exo.plant.gait_cycle import check_cycle, driving_torque, weight
-from armid_ros.papers.exo.plant.shares import feet_by_shares
+from armid_ros.papers.exo.plant.gait_cycle import (
+    check_cycle,
+    driving_torque,
+    feet_by_shares,
+    weight,
+)
 from armid_ros.papers.exo.plant.walkers import contacts, floating
 import numpy as np
 import pinocchio as pin

@@ -3,22 +3,22 @@
 """Springs found while both move, and slack where there is some."""
 
 from armid_ros.errors import IdentificationError
-from armid_ros.papers.exo.identification.online import InteractionSettings, OnlineInteraction
 from armid_ros.papers.exo.plant.gait import read_gait
 from armid_ros.papers.exo.plant.leg_pair import leg_pair
-from armid_ros.papers.exo.plant.simulated_pair import SimulatedPair
+from armid_ros.papers.exo.plant.torque_driven import SimulatedPair
+from armid_ros.papers.exo.springs import OnlineInteraction
 import numpy as np
 import pytest
 
 NOISE = {'angle_noise': np.radians(0.05), 'torque_noise': 0.5}
-SETTINGS = InteractionSettings(memory=4.0, period=2.0)
+SETTINGS = {'memory': 4.0, 'period': 2.0}
 
 
 def identified(slack: float = 0.0, seconds: float = 4.2) -> OnlineInteraction:
     pair = leg_pair(1e4).with_slack(slack)
     rng = np.random.default_rng(0)
     walking = SimulatedPair(pair, read_gait(), rate=500.0, rng=rng, **NOISE)
-    online = OnlineInteraction(pair.machines, SETTINGS)
+    online = OnlineInteraction(pair.machines, **SETTINGS)
     for _ in range(round(500.0 * seconds)):
         sample = walking.advance()
         online.take_other(sample.t, sample.other_q)
@@ -47,7 +47,7 @@ def test_slack_is_seen_and_measured():
 
 def test_one_machine_alone_is_not_enough():
     pair = leg_pair()
-    online = OnlineInteraction(pair.machines, SETTINGS)
+    online = OnlineInteraction(pair.machines, **SETTINGS)
     online.take(0.0, np.zeros(6), np.zeros(6))
     with pytest.raises(IdentificationError, match='joint states'):
         online.take(5.0, np.zeros(6), np.zeros(6))
@@ -65,4 +65,4 @@ def test_what_comes_after_an_interruption_is_not_mixed_with_what_was_before():
 
 def test_settings_that_do_not_fit_are_refused():
     with pytest.raises(IdentificationError, match='memory'):
-        InteractionSettings(memory=1.0)
+        OnlineInteraction(leg_pair().machines, memory=1.0)

@@ -4,7 +4,7 @@
 
 from armid_ros.papers.exo.plant.gait import read_gait
 from armid_ros.papers.exo.plant.leg_pair import leg_pair, pair_torques, stepping
-from armid_ros.papers.exo.plant.simulated_pair import SimulatedPair
+from armid_ros.papers.exo.plant.torque_driven import SimulatedPair
 import numpy as np
 import pytest
 

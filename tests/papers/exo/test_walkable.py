@@ -3,7 +3,7 @@
 """A gait with feet that stay where they stand."""
 
 from armid_ros.papers.exo.plant.gait import read_gait
-from armid_ros.papers.exo.plant.walkable import (
+from armid_ros.papers.exo.plant.walkers import (
     foot_points,
     HEEL_DOWN,
     LegLength,

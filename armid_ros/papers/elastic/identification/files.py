@@ -28,10 +28,8 @@ import numpy.typing as npt
 
 #: Alternative topic of the motors.
 _OTHER_MOTOR = '/motor/joint_states'
-#: Least share of samples with a common timestamp on all topics.
-_SHARED = 0.9
-#: Time of rest between two experiments, and length of the shortest experiment [s].
-_STANDING, _SHORTEST = 0.1, 0.2
+#: Length of the shortest experiment [s].
+_SHORTEST = 0.2
 
 
 def read_runs(
@@ -78,7 +76,10 @@ def read_runs(
             f'{path}: velocities of {motors}, {LINK} and {REFERENCE}, and torques of {motors}, '
             'are needed; one of them was not recorded'
         )
-    stamps = [*map(_microseconds, recordings), *(np.rint(f[0] / 1000).astype(int) for f in felt)]
+    stamps = [  # [us]
+        *(np.rint(r.start_ns / 1000 + r.t * 1e6).astype(int) for r in recordings),
+        *(np.rint(f[0] / 1000).astype(int) for f in felt),
+    ]
     common = _common(path, (*names, *map(imu_topic, robot.links)), stamps)
     motor, link, asked = (
         recording.select(np.flatnonzero(np.isin(own, common)))
@@ -154,7 +155,8 @@ def _experiments(
     t: FloatArray, moving: npt.NDArray[np.bool_], period: float
 ) -> list[tuple[int, int, int]]:
     """Return stretches of motion: last sample at rest, first sample of motion, and end."""
-    pause, shortest = round(_STANDING / period), round(_SHORTEST / period)
+    # time of rest between two experiments [s]
+    pause, shortest = round(0.1 / period), round(_SHORTEST / period)
     found = []
     cuts = np.flatnonzero(np.diff(t) > 1.5 * period) + 1
     for rows in np.split(np.arange(len(t)), cuts):
@@ -168,16 +170,13 @@ def _experiments(
     return found
 
 
-def _microseconds(recording: Recording) -> npt.NDArray[np.int64]:
-    return np.asarray(np.rint(recording.start_ns / 1000 + recording.t * 1e6), dtype=np.int64)
-
-
 def _common(
     path: str | Path, names: Sequence[str], stamps: Sequence[npt.NDArray[np.int64]]
 ) -> npt.NDArray[np.int64]:
     """Return the timestamps that all topics have in common [us]; some messages may be lost."""
     common: npt.NDArray[np.int64] = reduce(np.intersect1d, stamps)
-    if len(common) < _SHARED * max(map(len, stamps)):
+    # least share of samples with a common timestamp on all topics
+    if len(common) < 0.9 * max(map(len, stamps)):
         counts = ', '.join(f'{name} ({len(s)})' for name, s in zip(names, stamps, strict=True))
         raise RecordingError(
             f'{path}: of the samples of {counts} only {len(common)} have equal timestamps; '

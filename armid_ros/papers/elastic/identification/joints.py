@@ -3,10 +3,16 @@
 """
 Springs of any arm, joint by joint, from encoders on both sides of its transmissions.
 
-The torque of a spring is that of inverse dynamics along the motion of the links. The twist has one
-part from compliance and one from free play. The rest of the motor torque is rotor inertia, viscous
-and Coulomb friction. Both models are linear, and slow motion is sufficient. The resonances follow
-from inertia and stiffness.
+The twist of motor against link is compliance times the torque in the transmission, plus half the
+backlash to the side of the flank that carries the load. If the torque is that of the motor, less
+friction and rotor acceleration, parts of the twist in proportion to sign of velocity, velocity and
+acceleration are fitted as well. Two pairs are not identifiable apart: Coulomb friction over
+stiffness and lost motion by direction of travel; viscous friction over stiffness and a delay
+between the encoders.
+
+For a whole arm, the torque of a spring is that of inverse dynamics along the motion of the links.
+The rest of the motor torque is rotor inertia, viscous and Coulomb friction. Both models are
+linear, and slow motion is sufficient. The resonances follow from inertia and stiffness.
 
 """
 
@@ -19,22 +25,208 @@ from armid_ros.errors import IdentificationError
 from armid_ros.model import inverse_dynamics
 from armid_ros.motion import FloatArray, Motion
 from armid_ros.papers.elastic.identification.interaction import direction
-from armid_ros.papers.elastic.identification.transmission import (
-    CUTOFF,
-    fit_transmission,
-    TransmissionFit,
-    TwoEncoders,
-)
 from armid_ros.recording import Recording
 from armid_ros.robots import Robot
 import numpy as np
+import numpy.typing as npt
 import pinocchio as pin
 from scipy.signal import butter, sosfiltfilt
 
+IntArray = npt.NDArray[np.intp]
+
+CUTOFF = 8.0
+
+
+@dataclass(frozen=True, eq=False)
+class TwoEncoders:
+    """
+    Signals of one joint: two encoders and a torque.
+
+    Attributes
+    ----------
+    dt : float
+        Time between samples [s].
+    motor, link : ndarray, shape (N,)
+        Positions on either side, both at the joint [rad].
+    torque : ndarray, shape (N,)
+        Torque of the motor at the joint, or torque of the spring if known [N m].
+    carried : bool
+        Whether the torque is that of the spring, so that it needs no correction.
+
+    """
+
+    dt: float
+    motor: FloatArray
+    link: FloatArray
+    torque: FloatArray
+    carried: bool = False
+
+
+@dataclass(frozen=True, eq=False)
+class TransmissionFit:
+    """
+    Stiffness and free play of one joint, with 95 % intervals.
+
+    Attributes
+    ----------
+    stiffness : tuple of float
+        Value, lower and upper bound with free play as a part of the model [N m/rad].
+    stiffness_alone : tuple of float
+        The same without free play.
+    backlash : tuple of float
+        Total free play [rad]; NaN with infinite bounds if the load changes flanks too rarely.
+    delay : tuple of float
+        Twist per velocity: delay of the link encoder after the motor encoder [s].
+    correlation : float
+        Of compliance and backlash, -1 to 1; near either end the two are collinear.
+    reversals : int
+        Number of flank changes; without any, backlash is an offset.
+    explained : float
+        R^2 of the whole model.
+
+    """
+
+    stiffness: tuple[float, float, float]
+    stiffness_alone: tuple[float, float, float]
+    backlash: tuple[float, float, float]
+    delay: tuple[float, float, float]
+    correlation: float
+    reversals: int
+    explained: float
+
+    @property
+    def backlash_seen(self) -> bool:
+        """Whether free play exceeds its uncertainty and is identifiable apart from the spring."""
+        return self.backlash[1] > 0.0 and abs(self.correlation) < 0.95
+
+
+def fit_transmission(records: Sequence[TwoEncoders], rng: np.random.Generator) -> TransmissionFit:
+    """
+    Fit spring and free play to recordings of one joint.
+
+    Parameters
+    ----------
+    records : sequence of TwoEncoders
+        Recordings; each has its own offset and slope between the encoders.
+    rng : numpy.random.Generator
+        Random numbers for the bootstrap blocks of the intervals.
+
+    Raises
+    ------
+    IdentificationError
+        If the joint moves too little.
+
+    """
+    pieces = [_columns(record) for record in records]
+    if sum(len(twist) for _, twist, _, _ in pieces) < 50:
+        raise IdentificationError('the joint hardly moves: its stiffness cannot be found')
+    table, twist, blocks = _joined(pieces)
+    reversals = sum(count for _, _, _, count in pieces)
+    # number of draws of bootstrap blocks
+    draws = [rng.choice(len(blocks), len(blocks)) for _ in range(400)]
+    bare = np.delete(table, 1, axis=1)
+    found_alone, spread_alone = _drawn(bare, twist, blocks, draws)
+    alone = _inverse(found_alone[0], spread_alone[:, 0])
+    # least number of flank changes for an estimate of free play
+    if reversals < 4:
+        found, spread = (np.insert(x, 1, np.nan, axis=-1) for x in (found_alone, spread_alone))
+        backlash, correlation = (np.nan, -np.inf, np.inf), np.nan
+        explained = _explained(bare, twist, found_alone)
+    else:
+        found, spread = _drawn(table, twist, blocks, draws)
+        backlash = _interval(2.0 * found[1], 2.0 * spread[:, 1])
+        correlation = float(np.corrcoef(spread[:, 0], spread[:, 1])[0, 1])
+        explained = _explained(table, twist, found)
+    return TransmissionFit(
+        _inverse(found[0], spread[:, 0]),
+        alone,
+        backlash,
+        _interval(found[2], spread[:, 2]),
+        correlation,
+        reversals,
+        explained,
+    )
+
+
+def _columns(record: TwoEncoders) -> tuple[FloatArray, FloatArray, FloatArray, int]:
+    """Return columns, twist, times and the number of flank changes of one recording."""
+    sections = butter(4, CUTOFF, fs=1.0 / record.dt, output='sos')
+    motor, link, torque = (
+        sosfiltfilt(sections, x) for x in (record.motor, record.link, record.torque)
+    )
+    velocity = np.gradient(motor, record.dt)
+    # velocity below which a joint is at rest, as a share of the largest velocity
+    moving = np.abs(velocity) > 0.02 * np.abs(velocity).max()
+    ends = round(0.3 / record.dt)
+    moving[:ends] = moving[-ends:] = False
+    moving &= np.arange(len(moving)) % max(round(0.25 / CUTOFF / record.dt), 1) == 0
+    # torque range in which the flank changes, as a share of the median torque
+    flank = np.tanh(torque / (0.05 * np.median(np.abs(torque))))
+    beside = [] if record.carried else [np.sign(velocity), np.gradient(velocity, record.dt)]
+    own = np.column_stack([torque, flank, velocity, *beside, motor, np.ones(len(motor))])
+    changes = int(np.count_nonzero(np.diff(np.sign(torque[moving]))))
+    times = np.asarray(record.dt * np.flatnonzero(moving), dtype=np.float64)
+    return own[moving], np.asarray((motor - link)[moving]), times, changes
+
+
+def _joined(
+    pieces: Sequence[tuple[FloatArray, FloatArray, FloatArray, int]],
+) -> tuple[FloatArray, FloatArray, list[IntArray]]:
+    """Stack recordings, each with its own slope and offset, and cut them into blocks."""
+    rows = sum(len(twist) for _, twist, _, _ in pieces)
+    shared, count = pieces[0][0].shape[1] - 2, len(pieces)
+    table = np.zeros((rows, shared + 2 * count))
+    blocks: list[IntArray] = []
+    twist, at = np.empty(rows), 0
+    for number, (own, values, t, _) in enumerate(pieces):
+        part = slice(at, at + len(values))
+        table[part, :shared] = own[:, :shared]
+        table[part, shared + 2 * number : shared + 2 * number + 2] = own[:, shared:]
+        twist[part] = values
+        # bootstrap blocks of 0.5 s
+        labels = (t / 0.5).astype(int)
+        blocks += [at + np.flatnonzero(labels == label) for label in np.unique(labels)]
+        at += len(values)
+    return table, twist, blocks
+
+
+def _drawn(
+    table: FloatArray, twist: FloatArray, blocks: list[IntArray], draws: list[IntArray]
+) -> tuple[FloatArray, FloatArray]:
+    """Return the least-squares solution, and the solutions of random sets of blocks."""
+    scale = np.linalg.norm(table, axis=0)
+    scaled = table / scale
+    normal = np.array([scaled[b].T @ scaled[b] for b in blocks])
+    right = np.array([scaled[b].T @ twist[b] for b in blocks])
+    found = np.linalg.lstsq(scaled, twist, rcond=None)[0]
+    spread = np.array(
+        [
+            np.linalg.lstsq(normal[d].sum(axis=0), right[d].sum(axis=0), rcond=None)[0]
+            for d in draws
+        ]
+    )
+    return found / scale, spread / scale
+
+
+def _interval(value: float, spread: FloatArray) -> tuple[float, float, float]:
+    lower, upper = np.quantile(spread, [0.025, 0.975])
+    return float(value), float(lower), float(upper)
+
+
+def _inverse(value: float, spread: FloatArray) -> tuple[float, float, float]:
+    """Convert a compliance into a stiffness; infinite if the interval contains zero."""
+    compliance, lower, upper = _interval(value, spread)
+    bounds = [1.0 / c if c > 0.0 else np.inf for c in (compliance, upper, lower)]
+    return bounds[0], bounds[1], bounds[2]
+
+
+def _explained(table: FloatArray, twist: FloatArray, values: FloatArray) -> float:
+    left = twist - table @ values
+    return 1.0 - float(left @ left / np.sum((twist - twist.mean()) ** 2))
+
+
 #: Shortest stretch without a pause that is used [s].
 _SHORTEST = 2.0
-#: Least R^2 of the twist for an estimate of stiffness.
-_EXPLAINED = 0.9
 
 
 @dataclass(frozen=True, eq=False)
@@ -65,7 +257,8 @@ class SpringEstimate:
     def informative(self) -> bool:
         """Whether the twist follows the load, so that the stiffness is identifiable."""
         fit = self.transmission
-        return fit.explained > _EXPLAINED and bool(np.isfinite(fit.stiffness).all())
+        # least R^2 of the twist for an estimate of stiffness
+        return fit.explained > 0.9 and bool(np.isfinite(fit.stiffness).all())
 
     @property
     def antiresonance(self) -> float:

@@ -7,28 +7,60 @@ Many runs at once, as arrays; the derivatives come from the complex step, f(x + 
 through every operation of the integration, friction included: the real part decides which joints
 slip and which stick. The scheme is the plant's: the Pade approximation (2, 2) of the exponential
 for motors, springs and links, the middle of the step for what is not linear. Squire and Trapp 1998
-for the complex step.
+for the complex step. The thirteen parameters that are tuned are a vector with names.
 
 """
 
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
+from armid_ros.estimate import ParameterName
 from armid_ros.motion import ElasticRun, FloatArray
-from armid_ros.papers.elastic.identification.names import SIZE, unpack
 from armid_ros.robots.two_link import TwoLinkParameters
-from armid_ros.simulation.motor_control import VelocityLoop
+from armid_ros.simulation.controller import VelocityLoop
 import numpy as np
 import numpy.typing as npt
+
+#: Quantities that every joint has, in the order of the vector, with name and unit.
+PER_JOINT = (
+    ('motor_inertia', 'mm', 'kg m^2'),
+    ('stiffness', 'kg', 'N m/rad'),
+    ('link_damping', 'dl', 'N m s/rad'),
+    ('motor_damping', 'dm', 'N m s/rad'),
+    ('spring_damping', 'dg', 'N m s/rad'),
+)
+SIZE = 3 + 2 * len(PER_JOINT)
+
+
+def unpack(parameters: TwoLinkParameters) -> FloatArray:
+    """Return alpha, beta, gamma, then mm, kg, dl, dm and dg of both joints, shape (13,)."""
+    joints = [getattr(parameters, field) for field, _, _ in PER_JOINT]
+    return np.concatenate([[parameters.alpha, parameters.beta, parameters.gamma], *joints])
+
+
+def pack(values: npt.ArrayLike, like: TwoLinkParameters) -> TwoLinkParameters:
+    """Return parameters with new values; friction and drives are copied from others."""
+    vector = np.asarray(values, dtype=float)
+    pairs = vector[3:].reshape(len(PER_JOINT), 2)
+    fields = {field: pair for (field, _, _), pair in zip(PER_JOINT, pairs, strict=True)}
+    alpha, beta, gamma = vector[:3].tolist()
+    return replace(like, alpha=alpha, beta=beta, gamma=gamma, **fields)
+
+
+def parameter_names(joints: tuple[str, ...]) -> tuple[ParameterName, ...]:
+    """Return the names of the vector's elements for an arm with these two joints."""
+    rigid = [ParameterName(name, '', 'kg m^2') for name in ('alpha', 'beta', 'gamma')]
+    own = [ParameterName(name, joint, unit) for _, name, unit in PER_JOINT for joint in joints]
+    return (*rigid, *own)
+
 
 #: Real values, or complex values whose imaginary part is an infinitesimal change.
 DualArray = npt.NDArray[Any]
 #: Imaginary step: its square is lost in rounding, so the derivative has no truncation error.
 _STEP = 1e-30
-_ROUNDS = 16
 #: Number of integration steps per sample.
 _SUBSTEPS = 2
 
@@ -242,7 +274,7 @@ def _friction(
     # response: change of velocity at the end of the step per torque; free: what that velocity is
     # without friction; modes, a first guess: 1 slips forwards, -1 backwards, 0 sticks
     modes = modes.copy()
-    for _ in range(_ROUNDS):
+    for _ in range(16):
         stuck = modes == 0
         system = np.where(stuck[:, :, np.newaxis], response, np.eye(2))
         right = np.where(stuck, free, level * modes)

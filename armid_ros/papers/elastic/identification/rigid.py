@@ -29,10 +29,8 @@ from scipy.signal import butter, sosfiltfilt
 CUTOFF = 2.5
 #: Length of the ends in which the filter has not settled [s].
 _ENDS = 0.4
-#: Rows per period of the cut-off frequency, and correlation time of errors in periods.
-_KEPT, _LASTING = 10, 2
-#: Least singular value relative to the largest for identifiable columns.
-_APART = 1e-6
+#: Rows per period of the cut-off frequency.
+_KEPT = 10
 
 
 @dataclass(frozen=True, eq=False)
@@ -89,7 +87,8 @@ def fit_rigid(runs: Sequence[ElasticRun]) -> RigidFit:
     if not np.all(scale > 0.0):
         raise IdentificationError('the rigid fit needs motion of both joints; one stands')
     sizes = np.linalg.eigvalsh(products / np.outer(scale, scale))
-    if sizes[0] < _APART**2 * sizes[-1]:
+    # least singular value relative to the largest for identifiable columns
+    if sizes[0] < 1e-6**2 * sizes[-1]:
         raise IdentificationError(
             'the slow motion does not make the rigid parameters identifiable; let both joints '
             'accelerate in several poses'
@@ -108,7 +107,8 @@ def fit_rigid(runs: Sequence[ElasticRun]) -> RigidFit:
     rows, target = weighted_rows(problem, solution.weights)
     scores = rows * (target - rows @ solution.values)[:, np.newaxis]
     scores = scores.reshape(-1, len(joints), rows.shape[1]).sum(axis=1)
-    middle = score_products(by_stretch(problem, scores), _LASTING * _KEPT)
+    # correlation time of errors: two periods of the cut-off
+    middle = score_products(by_stretch(problem, scores), 2 * _KEPT)
     freedom = len(rows) / max(len(rows) - rows.shape[1], 1)
     bread = np.asarray(np.linalg.inv(rows.T @ rows), dtype=np.float64)
     left = normal.squares(solution.values).sum() / normal.target_squares.sum()

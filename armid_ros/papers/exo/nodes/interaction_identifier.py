@@ -23,8 +23,8 @@ from armid_ros.nodes.messages.timeliness import Freshness
 from armid_ros.nodes.parameters.table import NodeParameter
 from armid_ros.nodes.qos import LATCHED, MatchedSubscription
 from armid_ros.nodes.running.process import run
-from armid_ros.papers.exo.identification.online import InteractionSettings, OnlineInteraction
 from armid_ros.papers.exo.plant.leg_pair import leg_pair
+from armid_ros.papers.exo.springs import OnlineInteraction
 from diagnostic_msgs.msg import DiagnosticStatus
 import numpy as np
 from sensor_msgs.msg import JointState
@@ -74,13 +74,9 @@ class InteractionIdentifierNode(ArmidNode):
         """Identify the ties of the shipped leg pair."""
         super().__init__('interaction_identifier', **kwargs)
         pair = leg_pair()
-        settings = InteractionSettings(
-            self.value('memory'),
-            self.value('period'),
-            self.value('slack_period'),
-            self.value('inertias'),
-        )
-        self.identifier = OnlineInteraction(pair.machines, settings)
+        names = ('memory', 'period', 'slack_period', 'inertias')
+        settings = {name: self.value(name) for name in names}
+        self.identifier = OnlineInteraction(pair.machines, **settings)
         self.received = 0
         self._estimates = self.create_publisher(ParameterEstimate, '~/estimate', LATCHED)
         self._joints = pair.robot.joints, pair.other.joints
@@ -163,7 +159,11 @@ class InteractionIdentifierNode(ArmidNode):
                 if machine:
                     self.identifier.take_other(sample.t, q)
                 elif self.identifier.take(sample.t, q, tau):
-                    self._publish(message)
+                    found = self.identifier.separate
+                    assert found is not None
+                    estimate = estimate_message(found.estimate, len(found.residual))
+                    estimate.header = message.header
+                    self._estimates.publish(estimate)
             except ArmidError as error:
                 self.complaints.say(topic, str(error))
 
@@ -179,7 +179,12 @@ class InteractionIdentifierNode(ArmidNode):
             signal = np.concatenate([part[order] for part in parts])
             if not np.all(np.abs(signal) <= LARGEST):
                 raise RecordingError('values that no machine reaches')
-            t = self._time(message)
+            stamp = message.header.stamp
+            if stamp.sec < 0 or stamp.nanosec >= 10**9:
+                raise RecordingError('an invalid timestamp')
+            if self._epoch is None:
+                self._epoch = stamp.sec
+            t = float(stamp.sec - self._epoch) + 1e-9 * stamp.nanosec
         except RecordingError as error:
             self.complaints.say(topic, f'{topic}: {error}')
             return []
@@ -189,21 +194,6 @@ class InteractionIdentifierNode(ArmidNode):
                 self.complaints.say(f'{topic} {reason}', f'{topic}: {_DAMAGED[reason]}')
         self._told[machine] = gate.rejected.copy()
         return good
-
-    def _publish(self, message: JointState) -> None:
-        found = self.identifier.separate
-        assert found is not None
-        estimate = estimate_message(found.estimate, len(found.residual))
-        estimate.header = message.header
-        self._estimates.publish(estimate)
-
-    def _time(self, message: JointState) -> float:
-        stamp = message.header.stamp
-        if stamp.sec < 0 or stamp.nanosec >= 10**9:
-            raise RecordingError('an invalid timestamp')
-        if self._epoch is None:
-            self._epoch = stamp.sec
-        return float(stamp.sec - self._epoch) + 1e-9 * stamp.nanosec
 
 
 def _named(found: Interaction | None, suffix: str = '') -> dict[str, object]:

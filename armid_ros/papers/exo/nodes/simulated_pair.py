@@ -4,7 +4,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from functools import partial
 import math
 from pathlib import Path
@@ -18,9 +18,8 @@ from armid_ros.nodes.running.process import run
 from armid_ros.nodes.running.real_time import RealTime
 from armid_ros.papers.exo.plant.gait import read_gait
 from armid_ros.papers.exo.plant.leg_pair import leg_pair
-from armid_ros.papers.exo.plant.simulated_pair import SimulatedPair
+from armid_ros.papers.exo.plant.torque_driven import SimulatedPair
 import numpy as np
-from rclpy.publisher import Publisher
 from rclpy.time import Time
 from sensor_msgs.msg import JointState
 
@@ -77,7 +76,20 @@ class SimulatedPairNode(ArmidNode):
 
         """
         super().__init__('simulated_pair', **kwargs)
-        self.pair = self._make_pair()
+        pair = leg_pair(self.value('stiffness'), names(self, 'segments'))
+        pair = pair.with_slack(self.value('slack'))
+        driven = names(self, 'driven')
+        gait = self.value('gait')
+        self.pair = SimulatedPair(
+            pair,
+            read_gait(Path(gait) if gait else None),
+            driven=pair.robot.joints if driven == (ALL,) else driven,
+            torque_rate=self.value('torque_rate'),
+            rate=self.value('rate'),
+            angle_noise=math.radians(self.value('angle_noise')),
+            torque_noise=self.value('torque_noise'),
+            rng=np.random.default_rng(self.value('seed')),
+        )
         self._origin_ns = self.get_clock().now().nanoseconds if start_ns is None else start_ns
         self._exo = self.create_publisher(JointState, 'exo/joint_states', SAMPLES)
         self._human = self.create_publisher(JointState, 'human/joint_states', SAMPLES)
@@ -108,7 +120,11 @@ class SimulatedPairNode(ArmidNode):
             (self._human, other.joints, (sample.other_q, sample.other_dq)),
             (self._exo, robot.joints, (sample.q, sample.dq, sample.tau)),
         ):
-            self._publish(publisher, joints, parts)
+            message = JointState(name=list(joints))
+            message.header.stamp = Time(nanoseconds=self.stamp_ns).to_msg()
+            for field, values in zip(('position', 'velocity', 'effort'), parts, strict=False):
+                setattr(message, field, values.tolist())
+            publisher.publish(message)
         return self.stamp_ns
 
     def catch_up(self) -> None:
@@ -136,31 +152,6 @@ class SimulatedPairNode(ArmidNode):
         if self.pair.fallen:
             return f'fell after {self.pair.t:.2f} s, as an open loop does: call ~/reset', values
         return self.real_time.trouble('start it with a lower rate'), values
-
-    def _publish(
-        self, publisher: Publisher, joints: tuple[str, ...], parts: Sequence[np.ndarray]
-    ) -> None:
-        message = JointState(name=list(joints))
-        message.header.stamp = Time(nanoseconds=self.stamp_ns).to_msg()
-        for field, values in zip(('position', 'velocity', 'effort'), parts, strict=False):
-            setattr(message, field, values.tolist())
-        publisher.publish(message)
-
-    def _make_pair(self) -> SimulatedPair:
-        pair = leg_pair(self.value('stiffness'), names(self, 'segments'))
-        pair = pair.with_slack(self.value('slack'))
-        driven = names(self, 'driven')
-        gait = self.value('gait')
-        return SimulatedPair(
-            pair,
-            read_gait(Path(gait) if gait else None),
-            driven=pair.robot.joints if driven == (ALL,) else driven,
-            torque_rate=self.value('torque_rate'),
-            rate=self.value('rate'),
-            angle_noise=math.radians(self.value('angle_noise')),
-            torque_noise=self.value('torque_noise'),
-            rng=np.random.default_rng(self.value('seed')),
-        )
 
 
 main = partial(run, SimulatedPairNode)

@@ -12,11 +12,10 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from pathlib import Path
-from typing import NamedTuple
 
 from armid_ros.errors import TrajectoryError
 from armid_ros.files import read_text
-from armid_ros.motion import FloatArray, Motion, read_only
+from armid_ros.motion import FloatArray, freeze, Motion
 from armid_ros.papers.exo.assumptions import leg_pair_file
 import numpy as np
 
@@ -42,8 +41,7 @@ class Gait:
 
     def __post_init__(self) -> None:
         """Freeze the coefficients."""
-        object.__setattr__(self, 'cosine', read_only(self.cosine))
-        object.__setattr__(self, 'sine', read_only(self.sine))
+        freeze(self, 'cosine', 'sine')
 
     @classmethod
     def fit(cls, phase: FloatArray, angles: FloatArray, harmonics: int = _HARMONICS) -> Gait:
@@ -62,37 +60,6 @@ class Gait:
             np.cos(turn) @ (w[:, np.newaxis] ** derivative * self.cosine)
             + np.sin(turn) @ (w[:, np.newaxis] ** derivative * self.sine)
         )
-
-
-class Phase(NamedTuple):
-    """
-    The phase of a leg in the gait cycle, 0 at heel strike.
-
-    Attributes
-    ----------
-    value, speed, acceleration : ndarray, shape (N,)
-        Phase [-] and its derivatives by time [1/s, 1/s^2].
-
-    """
-
-    value: FloatArray
-    speed: FloatArray
-    acceleration: FloatArray
-
-
-def steady_phase(t: FloatArray, cycle_time: float, start: float = 0.0) -> Phase:
-    """Return the phase of steady walking, given the phase at t = 0."""
-    return Phase(start + t / cycle_time, np.full_like(t, 1.0 / cycle_time), np.zeros_like(t))
-
-
-def stepping_phase(t: FloatArray, period: float, start: float, stop: float) -> Phase:
-    """Return the phase of repeated stepping from start to stop and back."""
-    w, half = 2.0 * np.pi / period, (stop - start) / 2.0
-    return Phase(
-        start + half * (1.0 - np.cos(w * t)),
-        half * w * np.sin(w * t),
-        half * w**2 * np.cos(w * t),
-    )
 
 
 def read_gait(path: Path | None = None) -> Gait:
@@ -129,7 +96,7 @@ def read_gait(path: Path | None = None) -> Gait:
     return Gait.fit(rows[:, 0], np.radians(rows[:, 1:]))
 
 
-def stance_motion(gait: Gait, joints: tuple[str, ...], t: FloatArray, phase: Phase) -> Motion:
+def stance_motion(gait: Gait, joints: tuple[str, ...], t: FloatArray, phase: FloatArray) -> Motion:
     """
     Return the motion of a seven-link body on one foot.
 
@@ -141,14 +108,15 @@ def stance_motion(gait: Gait, joints: tuple[str, ...], t: FloatArray, phase: Pha
         Stance ankle, knee, hip, swing hip, knee, ankle.
     t : ndarray, shape (N,)
         Time [s].
-    phase : Phase
-        Phase of the stance leg at these times.
+    phase : ndarray, shape (3, N)
+        Phase of the stance leg at these times, 0 at heel strike, and its derivatives by time
+        [1/s, 1/s^2].
 
     """
-    speed, acceleration = phase.speed[:, np.newaxis], phase.acceleration[:, np.newaxis]
+    speed, acceleration = phase[1:, :, np.newaxis]
     here = []
     for derivative in range(3):  # a flat foot and an upright trunk
-        hip, knee, _ = gait(phase.value, derivative).T
-        far = gait(phase.value + 0.5, derivative)
+        hip, knee, _ = gait(phase[0], derivative).T
+        far = gait(phase[0] + 0.5, derivative)
         here.append(np.column_stack([knee - hip, knee, hip, far]))
     return Motion(joints, t, here[0], here[1] * speed, here[2] * speed**2 + here[1] * acceleration)

@@ -9,6 +9,10 @@ follows from the simulation and is not prescribed. Torques come from Newton and 
 forces. No force remains on the hips; the moment that remains on the trunk is an external moment
 that prevents a fall.
 
+The source determines the forces on two feet by a rule, (20) to (22): it splits the trunk between
+the legs by the distances of the thighs from it. A foot then bears weight and inertial force of its
+leg and its share of the trunk, less the spring forces. A single foot bears the total.
+
 """
 
 from __future__ import annotations
@@ -18,7 +22,6 @@ from dataclasses import dataclass, replace
 from armid_ros.model.kinematics import points_motion
 from armid_ros.motion import FloatArray, Motion, read_only
 from armid_ros.papers.exo.assumptions import read_assumptions
-from armid_ros.papers.exo.plant.contact import Ground
 from armid_ros.papers.exo.plant.gait import Gait
 from armid_ros.papers.exo.plant.leg_pair import pair_torques, PairMotion, PairTorques, TiedPair
 from armid_ros.papers.exo.plant.torque_driven import (
@@ -28,15 +31,23 @@ from armid_ros.papers.exo.plant.torque_driven import (
     runge_kutta,
     splined,
 )
-from armid_ros.papers.exo.plant.walkable import walkable, WalkableGait
-from armid_ros.papers.exo.plant.walkers import columns, contacts, floating, leg_length, SIDES
+from armid_ros.papers.exo.plant.walkers import (
+    columns,
+    contacts,
+    floating,
+    Ground,
+    leg_length,
+    SIDES,
+    walkable,
+    WalkableGait,
+)
 from armid_ros.robots import Robot
 import numpy as np
 import numpy.typing as npt
 import pinocchio as pin
 
-#: Integration steps per cycle, and number of cycles before the returned one.
-_STEPS, _SETTLING = 2400, 2
+#: Integration steps per cycle.
+_STEPS = 2400
 _PLANE = np.array([0, 2])
 
 
@@ -136,7 +147,14 @@ def gait_cycle(pair: TiedPair, gait: Gait) -> GaitCycle:
         for robot, plan, lag in ((pair.robot, own, late), (pair.other, worn, 0.0))
     ]
     courses = (_course(pair, moves[0], False), _course(pair, moves[1], True))
-    states, rates = _walk(pair, courses, ground, _start((own, worn), late / cycle, cycle), cycle)
+    places, speeds = [], []  # planned position and velocity of the hips, machine and wearer
+    for plan, lag in ((own, late), (worn, 0.0)):
+        count = len(plan.hips)
+        path = plan.hips + np.outer(np.arange(count) / count, [plan.stride, 0.0])
+        speeds.append(np.gradient(path, axis=0)[2] * count / cycle)
+        places.append(path[0] - speeds[-1] * lag)
+    start = np.concatenate([*places, *speeds])
+    states, rates = _walk(pair, courses, ground, start, cycle)
     rows = np.append(np.arange(0, 2 * _STEPS, 2), 0)
     motions = PairMotion(
         _placed(pair.robot, moves[0], rows, states[:, :2], states[:, 4:6], rates[:, 4:6], cycle),
@@ -223,17 +241,6 @@ def _course(pair: TiedPair, motion: Motion, other: bool) -> _Course:
     return _Course(contact[..., _PLANE], speed[..., _PLANE], tied[..., _PLANE], pull, mass)
 
 
-def _start(gaits: tuple[WalkableGait, WalkableGait], late: float, cycle: float) -> FloatArray:
-    """Return planned position and velocity of the hips, machine and wearer, shape (8,)."""
-    places, speeds = [], []
-    for plan, lag in zip(gaits, (late, 0.0), strict=True):
-        path = plan.hips + np.outer(np.arange(len(plan.hips)) / len(plan.hips), [plan.stride, 0.0])
-        slope = np.gradient(path, axis=0)[2] * len(path) / cycle
-        places.append(path[0] - slope * lag * cycle)
-        speeds.append(slope)
-    return np.concatenate([*places, *speeds])
-
-
 def _walk(
     pair: TiedPair,
     courses: tuple[_Course, _Course],
@@ -260,7 +267,7 @@ def _walk(
 
     h, x = cycle / _STEPS, start
     states, rates = np.empty((_STEPS + 1, 8)), np.empty((_STEPS + 1, 8))
-    for _ in range(1 + _SETTLING):
+    for _ in range(3):  # the last one is returned
         for step in range(_STEPS):
             states[step] = x
             rates[step], x = runge_kutta(rate, 2 * step, h, x)
@@ -336,3 +343,61 @@ def driving_torque(
         tau = walking_torques(pair, cycle.motions, on_feet, cycle.other_ground).tau
     curve = splined(cycle.motions.own.t, tau[:, [cycle.pair.robot.index(joint)]], rate)
     return lambda t: np.concatenate([[0.0, 0.0], curve(t)])
+
+
+def feet_by_shares(cycle: GaitCycle, *, other: bool = False) -> FloatArray:
+    """
+    Return the forces on right and left foot by (20) to (22), shape (N, 2, 2) [N].
+
+    Parameters
+    ----------
+    cycle : GaitCycle
+        The motion, and the feet on the ground.
+    other : bool
+        Whether the feet are those of the wearer.
+
+    """
+    robot, motion = (
+        (cycle.pair.other, cycle.motions.other) if other else (cycle.pair.robot, cycle.motions.own)
+    )
+    # centroids and m (c'' - g) of all bodies, both
+    bodies = list(robot.model.inertias)[1:]
+    levers = np.array([body.lever for body in bodies])
+    place, jacobian = points_motion(robot, list(robot.joints), levers, motion.q)
+    speed = np.einsum('ncxj,nj->ncx', jacobian, motion.dq)
+    hurry = np.gradient(speed, motion.t, axis=0)
+    mass = np.array([body.mass for body in bodies])
+    taken = mass[:, np.newaxis] * (hurry - robot.gravity)
+    plane = np.array([0, 2])
+    place, taken = place[..., plane], taken[..., plane]
+    trunk = floating(robot)[2]
+    legs = [columns(robot, side) for side in SIDES]
+    # shares of the trunk, (20) to (22): the leg whose thigh is nearer carries more
+    far = np.linalg.norm(place[:, [leg[0] for leg in legs]] - place[:, [trunk]], axis=-1)
+    shares = far[:, ::-1] / far.sum(axis=1, keepdims=True)
+    springs = cycle.torques.forces[..., plane] * (1.0 if not other else -1.0)
+    feet = np.empty((len(motion), 2, 2))
+    for foot, own in enumerate(legs):
+        pulled = [k for k, tie in enumerate(cycle.pair.ties) if tie.name.startswith(SIDES[foot])]
+        feet[:, foot] = taken[:, own].sum(axis=1) + shares[:, [foot]] * taken[:, trunk]
+        feet[:, foot] -= springs[:, pulled].sum(axis=1)
+    bearing = cycle.feet(other=other)[:, :, 1] > 0.0
+    for foot in range(2):
+        alone = bearing[:, foot] & ~bearing[:, 1 - foot]
+        feet[alone, foot] = feet[alone].sum(axis=1)
+        feet[alone, 1 - foot] = 0.0
+    return feet
+
+
+def ground_by_shares(cycle: GaitCycle) -> FloatArray:
+    """
+    Return the forces by (20) to (22) on heels and toes of the machine, (N, 4, 2) [N].
+
+    The rule does not give the centre of pressure; that of the simulated ground is used.
+
+    """
+    feet = feet_by_shares(cycle)
+    up = cycle.ground[..., 1].reshape(-1, 2, 2)
+    whole = up.sum(axis=2, keepdims=True)
+    part = np.where(whole > 0.0, up / np.where(whole > 0.0, whole, 1.0), 0.5)
+    return np.asarray((part[..., np.newaxis] * feet[:, :, np.newaxis]).reshape(-1, 4, 2))

@@ -1,10 +1,14 @@
 # Copyright 2026 The armid_ros developers
 # SPDX-License-Identifier: Apache-2.0
 """
-Two machines tied by springs: joint torques and spring forces.
+Two machines tied by springs: joint torques, spring forces, and motions on one foot.
 
 A pair is any two robots with a common base frame. The shipped one is a man and the exoskeleton
 that he wears, tied at both thighs and both shanks.
+
+The exercises of a person for an identification are sums of a few sines of hip and knee of both
+legs; the stance foot is flat and the trunk upright. The machine follows its wearer with less
+amplitude, late, and with joints that are not quite aligned, as assumed.
 
 """
 
@@ -28,10 +32,8 @@ from armid_ros.motion import FloatArray, Motion, read_only
 from armid_ros.papers.exo.assumptions import read_assumptions
 from armid_ros.papers.exo.plant.gait import (
     Gait,
-    Phase,
+    read_gait,
     stance_motion,
-    steady_phase,
-    stepping_phase,
 )
 from armid_ros.robots import load_robot, Robot
 import numpy as np
@@ -223,7 +225,12 @@ def walking(pair: TiedPair, gait: Gait, t: FloatArray, start: float | None = Non
     known = read_assumptions()
     begin = known['single_support'].value[0] if start is None else start
     cycle = known['cycle_time'].value
-    return _on_one_foot(pair, gait, t, lambda time: steady_phase(time, cycle, begin))
+
+    def wearer(joints: tuple[str, ...], time: FloatArray) -> Motion:
+        phase = [begin + time / cycle, np.full_like(time, 1.0 / cycle), np.zeros_like(time)]
+        return stance_motion(gait, joints, time, np.array(phase))
+
+    return following(pair, t, wearer)
 
 
 def stepping(pair: TiedPair, gait: Gait, t: FloatArray, period: float | None = None) -> PairMotion:
@@ -244,8 +251,15 @@ def stepping(pair: TiedPair, gait: Gait, t: FloatArray, period: float | None = N
     """
     known = read_assumptions()
     begin, end = known['single_support'].value
-    length = known['stepping_period'].value if period is None else period
-    return _on_one_foot(pair, gait, t, lambda time: stepping_phase(time, length, begin, end))
+    w = 2.0 * np.pi / (known['stepping_period'].value if period is None else period)
+    half = (end - begin) / 2.0
+
+    def wearer(joints: tuple[str, ...], time: FloatArray) -> Motion:
+        cosine, sine = np.cos(w * time), np.sin(w * time)
+        phase = [begin + half * (1.0 - cosine), half * w * sine, half * w**2 * cosine]
+        return stance_motion(gait, joints, time, np.array(phase))
+
+    return following(pair, t, wearer)
 
 
 def following(
@@ -272,7 +286,81 @@ def following(
     return PairMotion(own, moving(pair.other.joints, t))
 
 
-def _on_one_foot(
-    pair: TiedPair, gait: Gait, t: FloatArray, phase: Callable[[FloatArray], Phase]
-) -> PairMotion:
-    return following(pair, t, lambda joints, time: stance_motion(gait, joints, time, phase(time)))
+@dataclass(frozen=True)
+class Exercise:
+    """
+    An exercise.
+
+    Attributes
+    ----------
+    what : str
+        Description of the motion of the person.
+    middle, reach : tuple of float, length 4
+        Mean and amplitude of stance hip and knee, swing hip and knee [deg].
+    period : float
+        [s].
+
+    """
+
+    what: str
+    middle: tuple[float, float, float, float]
+    reach: tuple[float, float, float, float]
+    period: float
+
+
+#: Exercises by name; steps follow the gait, forward and back.
+EXERCISES = {
+    'step': Exercise('step forward and back', (0.0,) * 4, (0.0,) * 4, 1.8),
+    'quick_step': Exercise('the same, twice as quickly', (0.0,) * 4, (0.0,) * 4, 0.9),
+    'swing': Exercise('swing the free leg', (2.0, 5.0, 10.0, 25.0), (0.0, 0.0, 30.0, 20.0), 1.2),
+    'lift': Exercise('lift the free knee', (2.0, 5.0, 40.0, 50.0), (0.0, 0.0, 35.0, 45.0), 1.2),
+    'squat': Exercise(
+        'bend the knees, the second foot on a force plate',
+        (20.0, 35.0, 20.0, 35.0),
+        (18.0, 30.0, 18.0, 30.0),
+        1.6,
+    ),
+    'rock': Exercise(
+        'rock to and fro over the standing ankle',
+        (0.0, 8.0, 5.0, 15.0),
+        (12.0, 6.0, 12.0, 6.0),
+        0.9,
+    ),
+}
+
+
+def exercise(pair: TiedPair, name: str, t: FloatArray, gait: Gait | None = None) -> PairMotion:
+    """
+    Return the motion of the shipped pair, on one foot, during an exercise.
+
+    Parameters
+    ----------
+    pair : TiedPair
+        The pair on one foot.
+    name : str
+        One of ``EXERCISES``.
+    t : ndarray, shape (N,)
+        Time [s].
+    gait : Gait, optional
+        Gait for stepping; the shipped one by default.
+
+    """
+    plan = EXERCISES[name]
+    if name.endswith('step'):
+        return stepping(pair, gait or read_gait(), t, plan.period)
+    w, middle, reach = 2.0 * np.pi / plan.period, np.radians(plan.middle), np.radians(plan.reach)
+
+    def moving(joints: tuple[str, ...], time: FloatArray) -> Motion:
+        """Return sines of hips and knees with a flat foot and an upright trunk."""
+        cosine, sine = (np.outer(f(w * time), reach) for f in (np.cos, np.sin))
+        parts = [
+            np.column_stack([knee - hip, knee, hip, far_hip, far_knee, np.zeros_like(time)])
+            for hip, knee, far_hip, far_knee in (
+                (middle - cosine).T,
+                (w * sine).T,
+                (w**2 * cosine).T,
+            )
+        ]
+        return Motion(joints, time, *parts)
+
+    return following(pair, t, moving)

@@ -10,8 +10,7 @@ from typing import Any, ClassVar
 
 from armid_ros.model.kinematics import points_motion
 from armid_ros.motion import FloatArray, Motion
-from armid_ros.papers.exo.plant.gait_cycle import GaitCycle, weight
-from armid_ros.papers.exo.plant.shares import feet_by_shares
+from armid_ros.papers.exo.plant.gait_cycle import feet_by_shares, GaitCycle, weight
 from armid_ros.papers.exo.plant.torque_driven import GaitCheck
 from armid_ros.papers.exo.plant.walkers import columns, contacts, floating, leg_length, SIDES
 from armid_ros.report.blocks import ContentSection, DataTable, Panels, Paragraph
@@ -52,7 +51,6 @@ class Driven:
     @property
     def source(self) -> float:
         """Largest error of the joint position in the source [deg]."""
-        # largest error of the source [deg]
         return {'hip': 1.5, 'knee': 2.5}[self.joint.split('_')[-1]]
 
 
@@ -139,6 +137,19 @@ class Walk(Section):
         geometry = cycle.pair.geometry(machines[0], wearer)
         start = geometry.other_position[..., [0, 2]]
         end = start + 4.0 * geometry.way[..., [0, 2]]  # magnified four times, to be visible
+        arrows = []  # points and forces of ground contact: feet of the wearer, then of the machine
+        for robot, motion, ground in (
+            (cycle.pair.other, wearer, cycle.other_ground),
+            (cycle.pair.robot, machines[0], cycle.ground),
+        ):
+            force = ground[rows].reshape(len(rows), 2, 2, 2)
+            place = points_motion(robot, *contacts(robot), motion.q)[0]
+            place = place[..., [0, 2]].reshape(len(rows), 2, 2, 2)
+            up = force[..., 1:]
+            middle = (place * up).sum(axis=2) / np.maximum(up.sum(axis=2), 1e-9)
+            foot = _placed(np.where(up.sum(axis=2) > 0.0, middle, place[:, :, 0]), ahead)
+            tip = foot + 0.16 * force.sum(axis=2) * np.array([1.0, -1.0])
+            arrows.append(np.stack([foot, tip], axis=2))
         return script_json(
             {
                 'phase': np.round(cycle.phase[rows], 3).tolist(),
@@ -146,31 +157,12 @@ class Walk(Section):
                 'wearer': _bodies(cycle.pair.other, wearer, ahead),
                 'machine': [_bodies(cycle.pair.robot, m, ahead) for m in machines],
                 'springs': _whole(_placed(np.stack([start, end], axis=2), ahead)),
-                'feet': self._feet(rows, ahead),
+                'feet': _whole(np.concatenate(arrows, axis=1)),
                 'error': [
                     np.round(np.degrees(d.right.error[rows // 2]), 4).tolist() for d in self.driven
                 ],
             }
         )
-
-    def _feet(self, rows: FloatArray, ahead: FloatArray) -> list[Any]:
-        """Return points and forces of ground contact: feet of the wearer, then of the machine."""
-        arrows = []
-        for other in (True, False):
-            robot = self.cycle.pair.other if other else self.cycle.pair.robot
-            motion = self.cycle.motions.other if other else self.cycle.motions.own
-            ground = self.cycle.other_ground if other else self.cycle.ground
-            force = ground[rows].reshape(len(rows), 2, 2, 2)
-            place = points_motion(robot, *contacts(robot), motion.q[rows])[0]
-            place = place[..., [0, 2]].reshape(len(rows), 2, 2, 2)
-            up = force[..., 1:]
-            middle = (place * up).sum(axis=2) / np.maximum(up.sum(axis=2), 1e-9)
-            foot = np.where(up.sum(axis=2) > 0.0, middle, place[:, :, 0])
-            total = force.sum(axis=2)
-            drawn = _placed(foot, ahead)
-            tip = drawn + 0.16 * total * np.array([1.0, -1.0])
-            arrows.append(np.stack([drawn, tip], axis=2))
-        return _whole(np.concatenate(arrows, axis=1))
 
 
 def feet_section(cycle: GaitCycle) -> ContentSection:
@@ -230,27 +222,25 @@ def by_torque_section(walked: SimulatedWalk) -> ContentSection:
         )
         for d in walked.driven
     ]
-    panels = [(d.joint, '', _followed(d, walked.cycle.phase[::2])) for d in walked.driven]
+    phase, panels = walked.cycle.phase[::2], []
+    for d in walked.driven:
+        both: tuple[tuple[str, GaitCheck, Role], ...] = (
+            ('by its torque', d.right, 'residual'),
+            ('springs too soft', d.softer, 'predicted'),
+        )
+        angles = [
+            Series('prescribed', np.degrees(d.right.prescribed), 'measured'),
+            *(Series(name, np.degrees(check.followed), role) for name, check, role in both),
+        ]
+        errors = [Series(name, np.degrees(check.error), role) for name, check, role in both]
+        error = Chart(
+            phase, errors, _ABSCISSA, 'error [°]', height=150, link=d.joint, symmetric=True,
+            legend=False,
+        )  # fmt: skip
+        panels.append((d.joint, '', [Chart(phase, angles, '', 'angle [°]', link=d.joint), error]))
     return ContentSection(
         'Whole cycle by torque', [Paragraph(text), DataTable(heads, rows), Panels(panels)]
     )
-
-
-def _followed(d: Driven, phase: FloatArray) -> tuple[Chart, Chart]:
-    """Draw angle and error of a joint."""
-    both: tuple[tuple[str, GaitCheck, Role], ...] = (
-        ('by its torque', d.right, 'residual'),
-        ('springs too soft', d.softer, 'predicted'),
-    )
-    angles = [
-        Series('prescribed', np.degrees(d.right.prescribed), 'measured'),
-        *(Series(name, np.degrees(check.followed), role) for name, check, role in both),
-    ]
-    errors = [Series(name, np.degrees(check.error), role) for name, check, role in both]
-    return Chart(phase, angles, '', 'angle [°]', link=d.joint), Chart(
-        phase, errors, _ABSCISSA, 'error [°]', height=150, link=d.joint, symmetric=True,
-        legend=False,
-    )  # fmt: skip
 
 
 def _bodies(robot: Robot, motion: Motion, ahead: FloatArray) -> list[Any]:

@@ -7,7 +7,7 @@ from armid_ros.papers.elastic.identification.files import read_runs
 from armid_ros.recording import BagWriter, write_joint_states
 from armid_ros.recording.elastic import write_runs
 from armid_ros.robots import load_robot
-from armid_ros.simulation.accelerometers import LinkAccelerometers
+from armid_ros.simulation.sensors import LinkAccelerometers
 import numpy as np
 import pytest
 

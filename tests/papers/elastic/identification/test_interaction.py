@@ -7,14 +7,12 @@ from armid_ros.motion import Motion
 from armid_ros.papers.elastic.identification.interaction import (
     decibel_error,
     decouple,
-    interaction_torques,
-    joint_signals,
-    measured_response,
-)
-from armid_ros.papers.elastic.identification.physical import (
     fit_joints,
     frequencies,
     ideal_response,
+    interaction_torques,
+    joint_signals,
+    measured_response,
 )
 from armid_ros.robots import load_robot
 import control

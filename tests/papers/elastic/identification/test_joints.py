@@ -14,7 +14,7 @@ from armid_ros.recording.elastic import write_runs
 from armid_ros.robots import load_robot
 from armid_ros.robots.two_link import planar_pair
 from armid_ros.simulation import Reference, Sensors
-from armid_ros.simulation.elastic.setup import make_elastic_arm
+from armid_ros.simulation.elastic import make_elastic_arm
 from armid_ros.simulation.run import record
 from click.testing import CliRunner
 import numpy as np

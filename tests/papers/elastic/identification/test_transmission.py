@@ -3,7 +3,7 @@
 """A spring and free play between two encoders: told apart where the load changes flanks."""
 
 from armid_ros.errors import IdentificationError
-from armid_ros.papers.elastic.identification.transmission import fit_transmission, TwoEncoders
+from armid_ros.papers.elastic.identification.joints import fit_transmission, TwoEncoders
 import numpy as np
 import pytest
 

@@ -4,17 +4,18 @@
 
 from dataclasses import replace
 
-from armid_ros.papers.elastic.identification.names import pack, unpack
 from armid_ros.papers.elastic.identification.response import (
+    pack,
     ringing,
     sensitivities,
     Steps,
+    unpack,
     velocities,
 )
-from armid_ros.papers.elastic.identification.tuning import tune, Tuning
-from armid_ros.papers.elastic.plant.run import ElasticSensors, run_elastic
+from armid_ros.papers.elastic.identification.three_steps import tune, Tuning
+from armid_ros.papers.elastic.plant import ElasticSensors, run_elastic
 from armid_ros.robots.two_link import two_link_set
-from armid_ros.simulation.elastic.two_link import two_link_loop, two_link_plant
+from armid_ros.simulation.elastic import two_link_loop, two_link_plant
 import numpy as np
 import pytest
 

@@ -2,9 +2,9 @@
 # SPDX-License-Identifier: Apache-2.0
 """Elastic joints against MuJoCo: other dynamics, other integration, other friction."""
 
-from armid_ros.papers.elastic.plant.run import run_elastic
+from armid_ros.papers.elastic.plant import run_elastic
 from armid_ros.robots.two_link import two_link_set
-from armid_ros.simulation.elastic.two_link import two_link_loop, two_link_plant
+from armid_ros.simulation.elastic import two_link_loop, two_link_plant
 import numpy as np
 import pytest
 

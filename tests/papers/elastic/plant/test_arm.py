@@ -8,15 +8,19 @@ from armid_ros.arm import ArmModel
 from armid_ros.effects import parse_effect
 from armid_ros.errors import TrajectoryError
 from armid_ros.motion import Motion
-from armid_ros.papers.elastic.plant.run import run_elastic
-from armid_ros.papers.elastic.plant.signals import step_experiments
+from armid_ros.papers.elastic.plant import run_elastic, step_experiments
 from armid_ros.robots import load_robot
 from armid_ros.robots.two_link import two_link_set
 from armid_ros.simulation import Reference
-from armid_ros.simulation.accelerometers import LinkAccelerometers
-from armid_ros.simulation.elastic.setup import elastic_joints, make_elastic_arm, shipped_arm
-from armid_ros.simulation.elastic.two_link import two_link_loop, two_link_plant
+from armid_ros.simulation.elastic import (
+    elastic_joints,
+    make_elastic_arm,
+    shipped_arm,
+    two_link_loop,
+    two_link_plant,
+)
 from armid_ros.simulation.run import record
+from armid_ros.simulation.sensors import LinkAccelerometers
 import numpy as np
 import pytest
 

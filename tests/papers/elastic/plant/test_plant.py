@@ -8,13 +8,12 @@ from armid_ros.arm import ArmModel
 from armid_ros.effects import make_effect
 from armid_ros.errors import ModelError, TrajectoryError
 from armid_ros.motion import Motion
-from armid_ros.papers.elastic.plant.run import Experiment, run_elastic
-from armid_ros.papers.elastic.plant.signals import step_experiments
+from armid_ros.papers.elastic.plant import Experiment, run_elastic, step_experiments
 from armid_ros.robots import load_robot
 from armid_ros.robots.two_link import two_link_set
 from armid_ros.simulation import Elasticity, Plant, step
-from armid_ros.simulation.elastic.two_link import two_link_loop, two_link_plant
-from armid_ros.simulation.motor_control import VelocityLoop
+from armid_ros.simulation.controller import VelocityLoop
+from armid_ros.simulation.elastic import two_link_loop, two_link_plant
 import numpy as np
 import pytest
 

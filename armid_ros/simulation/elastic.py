@@ -1,26 +1,165 @@
 # Copyright 2026 The armid_ros developers
 # SPDX-License-Identifier: Apache-2.0
-"""Trajectories that identify elastic joints: multisines during moves, and steps of velocity."""
+"""Simulated arms with elastic joints, the shipped two-link arm, and courses for springs."""
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
+from dataclasses import replace
 
+from armid_ros.arm import ArmModel
+from armid_ros.effects import make_effect
 from armid_ros.errors import TrajectoryError
 from armid_ros.motion import FloatArray
-from armid_ros.robots import Robot
+from armid_ros.robots import load_robot, Robot
+from armid_ros.robots.two_link import ROBOT, two_link_set, TwoLinkParameters, TwoLinkSet
+from armid_ros.simulation.controller import MotorControl, VelocityLoop
+from armid_ros.simulation.plant import Plant
 from armid_ros.simulation.reference import Reference
+from armid_ros.simulation.sensors import LinkAccelerometers, Sensors
+from armid_ros.simulation.simulated_arm import SimulatedArm
+from armid_ros.simulation.springs import Elasticity
 import numpy as np
 import numpy.typing as npt
 
-#: Frequency band of the multisines [Hz], and their samples per second.
-_BAND, _RATE = (2.0, 100.0), 500.0
-#: Shortest duration of an experiment, pause between two experiments, and duration of a step [s].
-_EXPERIMENT, _STAND, _STEP = 4.0, 1.0, 0.5
+
+def two_link_arm(parameters: TwoLinkParameters, robot: Robot | None = None) -> ArmModel:
+    """
+    Return the two-link arm as an arm model with effects of the catalogue.
+
+    The model does not contain the friction of the links, which the plant adds.
+
+    """
+    robot = parameters.body(robot or load_robot(ROBOT))
+    springs = make_effect('joint_elasticity', robot)
+    springs = springs.with_shape((parameters.spring_damping / parameters.stiffness)[:, np.newaxis])
+    arm = ArmModel(robot).with_effect(springs, 1.0 / parameters.stiffness)
+    for name, values in (
+        ('rotor_inertia', parameters.rotor),
+        ('viscous_friction', parameters.joint_motor_damping),
+        ('coulomb_friction', parameters.joint_coulomb),
+    ):
+        arm = arm.with_effect(make_effect(name, robot), values)
+    return arm
+
+
+def two_link_plant(parameters: TwoLinkParameters, *, substeps: int = 2) -> Plant:
+    """Return the plant of the two-link arm."""
+    arm = two_link_arm(parameters)
+    return Plant(arm, elasticity=Elasticity(substeps, parameters.link_damping))
+
+
+def two_link_loop(shipped: TwoLinkSet, share: float = 1.0) -> VelocityLoop:
+    """Return the velocity loop of the shipped arm, with its gains times a factor."""
+    # units of the gains are V s/rad and V/rad at the motors
+    scale = share * shipped.parameters.torque_per_volt * shipped.parameters.gear
+    proportional, integral = (
+        scale * np.asarray(shipped.assumptions[name])
+        for name in ('proportional_gain', 'integral_gain')
+    )
+    return VelocityLoop(proportional, integral)
+
+
+def shipped_arm(robot: Robot) -> tuple[ArmModel, TwoLinkSet | None]:
+    """
+    Return the arm model of a shipped robot, and its drives if they are known.
+
+    The model has no effects, except for the two-link arm: the springs, friction and drives of that
+    arm are in its parameter set 'after'.
+
+    """
+    if robot.name != ROBOT:
+        return ArmModel(robot), None
+    shipped = two_link_set('after')
+    return two_link_arm(shipped.parameters, robot), shipped
+
+
+def elastic_joints(arm: ArmModel) -> tuple[tuple[str, ...], tuple[str, ...]]:
+    """
+    Return the elastic joints: those with rotor inertia, and those without.
+
+    A motor without inertia has no motion of its own. Its spring is simulated as a twist that
+    follows the load without delay.
+
+    """
+    action, joints = arm.action(), arm.robot.joints
+    if action.transmission is None:
+        return (), ()
+    rotor = np.zeros(len(joints)) if action.inertia is None else np.diag(action.inertia)
+    springs = np.flatnonzero(np.isfinite(action.transmission.stiffness))
+    with_rotor = tuple(joints[j] for j in springs if rotor[j] > 0.0)
+    return with_rotor, tuple(joints[j] for j in springs if rotor[j] <= 0.0)
+
+
+def no_rotor(joints: Sequence[str]) -> str:
+    """Return a note on how springs are simulated whose motors have no inertia."""
+    return (
+        f'{", ".join(joints)}: joint_elasticity without rotor_inertia, so that no motor moves on '
+        'its own. All joints are simulated as rigid ones whose encoders read the twist under '
+        'load; add rotor_inertia to have vibrations'
+    )
+
+
+def make_elastic_arm(
+    arm: ArmModel,
+    *,
+    rng: np.random.Generator,
+    drives: TwoLinkSet | None = None,
+    gain: float = 1.0,
+    dt: float = 1e-3,
+    sensors: Sensors | None = None,
+    start: npt.ArrayLike | None = None,
+) -> SimulatedArm:
+    """
+    Make a simulated arm with elastic joints.
+
+    Parameters
+    ----------
+    arm : ArmModel
+        Arm model with joint_elasticity and rotor_inertia.
+    rng : numpy.random.Generator
+        Source of the sensors' noise.
+    drives : TwoLinkSet, optional
+        Velocity loops, friction of the links and places of the accelerometers of the two-link arm.
+        By default, loops are designed from the model of the arm.
+    gain : float
+        Factor on the gains of the loops.
+    dt : float
+        Step of plant and loops [s].
+    sensors, start
+        As for `SimulatedArm`.
+
+    Raises
+    ------
+    ModelError
+        If no joint is elastic, or the motor of an elastic joint has no inertia.
+
+    """
+    if drives is None:
+        plant, places = Plant(arm, dt, elasticity=Elasticity()), None
+        control = MotorControl.of(plant)
+    else:
+        elasticity = Elasticity(link_damping=drives.parameters.link_damping)
+        plant = Plant(arm, dt, elasticity=elasticity)
+        control = MotorControl(two_link_loop(drives), dt)
+        places = np.outer(drives.assumptions['accelerometer_radius'], [1.0, 0.0, 0.0])
+    loop = VelocityLoop(gain * control.loop.proportional, gain * control.loop.integral)
+    return SimulatedArm(
+        plant,
+        rng=rng,
+        controller=replace(control, loop=loop),
+        sensors=sensors,
+        accelerometers=LinkAccelerometers(plant.robot, places),
+        start=start,
+    )
+
+
+#: Samples per second of the multisines.
+_RATE = 500.0
+#: Pause between two experiments, and duration of a step [s].
+_STAND, _STEP = 1.0, 0.5
 #: Largest distance of a joint from its middle position [rad or m].
 _REACH = np.pi / 3.0
-#: Share of the velocity limits that a move to another pose uses during a multisine.
-_WAY = 0.25
 #: Number of poses tried before a TrajectoryError is raised.
 _TRIES = 1000
 
@@ -99,15 +238,18 @@ def multisine_course(
     samples = stand
     while True:
         there = _next_pose(robot, here, rng, clear, np.zeros(robot.n_joints))
-        needed = float(np.max(1.875 * np.abs(there - here) / (_WAY * velocity)))
-        count = round(max(_EXPERIMENT, needed) * _RATE)
+        # share of the velocity limits that a move to another pose uses during a multisine
+        needed = float(np.max(1.875 * np.abs(there - here) / (0.25 * velocity)))
+        # shortest duration of an experiment: 4 s
+        count = round(max(4.0, needed) * _RATE)
         samples += count + stand
         if samples > duration * _RATE:
             break
         x = np.arange(count)[:, np.newaxis] / count
         q = here + (there - here) * x**3 * (10.0 - 15.0 * x + 6.0 * x**2)
         on_top = np.minimum(1.0, np.minimum(x, 1.0 - x) / 0.05)
-        tau = on_top * multisine(count, 1.0 / _RATE, _BAND, torque * limit, rng)
+        # band of the multisine [Hz]
+        tau = on_top * multisine(count, 1.0 / _RATE, (2.0, 100.0), torque * limit, rng)
         parts.append((np.vstack([still + here, q]), np.vstack([still, tau])))
         here = there
     if not parts:

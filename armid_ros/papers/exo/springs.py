@@ -1,10 +1,18 @@
 # Copyright 2026 The armid_ros developers
 # SPDX-License-Identifier: Apache-2.0
-"""Online identification of the springs between two machines."""
+"""
+Springs between two machines: online identification, and slack of the straps.
+
+A strap with slack pulls with k (|D| - slack) along D if |D| exceeds the slack, and not otherwise.
+The torque is nonlinear in the slack, so the stiffness is fitted at several slacks. A parabola
+through the best fit and its neighbours gives the slack, and its curvature the standard deviation.
+
+"""
 
 from __future__ import annotations
 
 from collections import deque
+from collections.abc import Callable
 from dataclasses import dataclass, field
 
 from armid_ros.errors import IdentificationError
@@ -13,46 +21,76 @@ from armid_ros.identification.ties.recorded import recorded_interaction_problem
 from armid_ros.identification.ties.stiffness import identify_interaction, Interaction
 from armid_ros.model.spring_ties import TiedMachines
 from armid_ros.motion import FloatArray
-from armid_ros.papers.exo.identification.slack import find_slack, Slack
 from armid_ros.recording import Recording
 import numpy as np
 
-#: Samples are averaged to about this rate [Hz], far above the frequencies of human motion.
-_RATE = 100.0
-#: Ratio of the mean square residual to the noise above which slack is fitted.
-_SIGN = 1.5
-
 
 @dataclass(frozen=True)
-class InteractionSettings:
+class Slack:
     """
-    Settings of the online identification of springs.
+    The slack of the ties between two machines.
 
     Attributes
     ----------
-    memory : float
-        Length of the time window of the estimate [s].
-    period : float
-        Time between two estimates [s].
-    slack_period : float
-        Time between two fits of slack, which need several estimates [s].
-    inertias : {'known', 'free'}
-        Whether the inertias of the machine are taken from its description or estimated.
+    value, std : float
+        Common slack of all ties and its standard deviation [m].
+    gain : float
+        Decrease of the misfit relative to the fit without slack, in units of its noise.
+    interaction : Interaction
+        The stiffnesses with this slack.
 
     """
 
-    memory: float = 10.0
-    period: float = 2.0
-    slack_period: float = 10.0
-    inertias: Inertias = 'known'
+    value: float
+    std: float
+    gain: float
+    interaction: Interaction
 
-    def __post_init__(self) -> None:
-        """Raise IdentificationError if the times are inconsistent."""
-        if not (self.memory >= 3.0 and 0.0 < self.period <= self.memory and self.slack_period > 0):
-            raise IdentificationError(
-                f'a memory of {self.memory:g} s and estimates every {self.period:g} s: the memory '
-                'has to be at least 3 s and that time'
-            )
+    @property
+    def seen(self) -> bool:
+        """Whether the slack is significant."""
+        # decrease of the misfit, in standard deviations of its noise, above which slack is
+        # significant
+        return self.gain > 25.0
+
+
+def find_slack(problem: Callable[[float], InteractionProblem]) -> Slack:
+    """
+    Fit the slack that all ties share, and their stiffnesses with it.
+
+    Parameters
+    ----------
+    problem : callable
+        Callback that returns the regression for a slack [m].
+
+    """
+    fits: dict[float, Interaction] = {}
+
+    def misfit(slack: float) -> float:
+        if slack not in fits:
+            fits[slack] = identify_interaction(problem(slack))
+        return fits[slack].misfit
+
+    # [m]; a strap with more slack is not worn
+    best = min((0.0, 0.001, 0.002, 0.004, 0.006), key=misfit)
+    bend = np.inf
+    # steps on either side of the best slack [m]
+    for step in (5e-4, 2e-4):
+        centre = max(best, step)
+        lower, middle, upper = (misfit(centre + k * step) for k in (-1, 0, 1))
+        bend = (lower - 2.0 * middle + upper) / step**2
+        if bend > 0.0:
+            best = float(np.clip(centre + (lower - upper) / (2.0 * bend * step), 0.0, 1.0))
+    misfit(best)
+    found = fits[best]
+    freedom = max(1, found.residual.size - len(found.estimate.values))
+    noise = max(1.0, found.misfit / freedom)
+    std = float(np.sqrt(2.0 * noise / bend)) if bend > 0.0 else np.inf
+    return Slack(best, std, (misfit(0.0) - found.misfit) / noise, found)
+
+
+#: Samples are averaged to about this rate [Hz], far above the frequencies of human motion.
+_RATE = 100.0
 
 
 @dataclass
@@ -96,8 +134,19 @@ class OnlineInteraction:
     ----------
     machines : TiedMachines
         Both machines, and the attachment points of the springs.
-    settings : InteractionSettings
-        Time window and periods.
+    memory : float
+        Length of the time window of the estimate [s].
+    period : float
+        Time between two estimates [s].
+    slack_period : float
+        Time between two fits of slack, which need several estimates [s].
+    inertias : {'known', 'free'}
+        Whether the inertias of the machine are taken from its description or estimated.
+
+    Raises
+    ------
+    IdentificationError
+        If the times are inconsistent.
 
     Attributes
     ----------
@@ -109,10 +158,23 @@ class OnlineInteraction:
 
     """
 
-    def __init__(self, machines: TiedMachines, settings: InteractionSettings) -> None:
-        self.machines, self.settings = machines, settings
-        self._own = _Averages(self.settings.memory)
-        self._far = _Averages(self.settings.memory)
+    def __init__(
+        self,
+        machines: TiedMachines,
+        *,
+        memory: float = 10.0,
+        period: float = 2.0,
+        slack_period: float = 10.0,
+        inertias: Inertias = 'known',
+    ) -> None:
+        if not (memory >= 3.0 and 0.0 < period <= memory and slack_period > 0.0):
+            raise IdentificationError(
+                f'a memory of {memory:g} s and estimates every {period:g} s: the memory has to be '
+                'at least 3 s and that time'
+            )
+        self.machines, self._inertias = machines, inertias
+        self._memory, self._period, self._slack_period = memory, period, slack_period
+        self._own, self._far = _Averages(memory), _Averages(memory)
         self.reset()
 
     def reset(self) -> None:
@@ -157,19 +219,20 @@ class OnlineInteraction:
 
         """
         self._own.take(t, np.concatenate([q, tau]))
-        if self._due is None or t < self._due - 2.0 * self.settings.memory:
-            self._due = t + self.settings.memory
+        if self._due is None or t < self._due - 2.0 * self._memory:
+            self._due = t + self._memory
             self._slack_due = self._due
         if t < self._due:
             return False
-        self._due = t + self.settings.period
+        self._due = t + self._period
         self.together = identify_interaction(self._problem(separate=False))
         self.separate = identify_interaction(self._problem(separate=True))
         assert self._slack_due is not None
-        if self.together.misfit < _SIGN * self.together.residual.size:
+        # ratio of the mean square residual to the noise above which slack is fitted
+        if self.together.misfit < 1.5 * self.together.residual.size:
             self.slack = None
         elif t >= self._slack_due:
-            self._slack_due = t + self.settings.slack_period
+            self._slack_due = t + self._slack_period
             self.slack = find_slack(lambda slack: self._problem(separate=False, slack=slack))
         return True
 
@@ -193,7 +256,7 @@ class OnlineInteraction:
             self.machines,
             own,
             far,
-            inertias=self.settings.inertias,
+            inertias=self._inertias,
             separate=separate,
             slack=slack,
         )

@@ -1,0 +1,429 @@
+# Copyright 2026 The armid_ros developers
+# SPDX-License-Identifier: Apache-2.0
+"""The report and the document of two links on springs: stiffness and responses of the joints."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator, Sequence
+from typing import Any
+
+from armid_ros.arm import parameter_table
+from armid_ros.estimate import name_in_words
+from armid_ros.identification.fitting.identifiability import HALF_WIDTH
+from armid_ros.motion import FloatArray
+from armid_ros.papers.elastic.identification.interaction import (
+    BAND,
+    coupled_response,
+    decibel_error,
+    frequencies,
+    ideal_response,
+)
+from armid_ros.papers.elastic.identification.response import (
+    parameter_names,
+    PER_JOINT,
+    unpack,
+    velocities,
+)
+from armid_ros.papers.elastic.identification.rigid import CUTOFF, RigidFit
+from armid_ros.papers.elastic.identification.three_steps import Tuning, TwoInertiaIdentification
+from armid_ros.report.blocks import (
+    ContentSection,
+    DataTable,
+    FactList,
+    PageBlock,
+    Panels,
+    Paragraph,
+)
+from armid_ros.report.charts import Chart, Mark, Role, Series
+from armid_ros.report.notation import counted, digits, measured, pretty
+from armid_ros.report.page import Page, Section
+from armid_ros.report.provenance import Provenance
+from armid_ros.report.sections.frame import Origin, VerdictSection
+from armid_ros.robots.two_link import TwoLinkParameters
+import numpy as np
+import numpy.typing as npt
+
+#: Largest difference of measured decoupled response and model for a good grade [dB rms].
+_CLOSE_DB = 0.5
+
+
+def elastic_report(
+    result: TwoInertiaIdentification,
+    robot: str,
+    known: TwoLinkParameters | None,
+    source: str,
+    provenance: Provenance,
+) -> str:
+    """
+    Return report.html of an identification of elastic joints.
+
+    Parameters
+    ----------
+    result : TwoInertiaIdentification
+        Results of the three steps.
+    robot : str
+        Its name.
+    known : TwoLinkParameters or None
+        Reference parameters for comparison.
+    source : str
+        Source of the reference parameters.
+    provenance : Provenance
+        Files, versions, settings, seed.
+
+    """
+    sections: list[Section] = [verdict(result), responses_section(result)]
+    if result.tuning is not None:
+        sections.append(steps_section(result.tuning))
+    sections += [
+        _parameters_section(result, known, source),
+        rigid_section(result.rigid),
+        Origin(provenance),
+    ]
+    steps = 0 if result.tuning is None else result.tuning.measured.shape[1]
+    subtitle = f'{robot} · {counted(result.experiments, "experiment")} through the resonances'
+    subtitle += f' · {counted(steps, "step response")}'
+    return Page(f'Elastic joints of {robot}', subtitle, sections).html()
+
+
+def verdict(result: TwoInertiaIdentification) -> VerdictSection:
+    """Say how stiff the springs are, how surely, and what is not known."""
+    springs = []
+    for k, joint in enumerate(result.joints):
+        value = f'{result.parameters.stiffness[k]:.0f}'
+        if result.tuning is not None:
+            estimate = result.tuning.estimate
+            value += f' ± {HALF_WIDTH * estimate.std[estimate.index("kg", joint)]:.0f}'
+        springs.append(f'{value} N m/rad at {joint}')
+    interval = ' (95 %)' if result.tuning is not None else ''
+    sentences = [f'The joint stiffness is {" and ".join(springs)}{interval}.']
+    poor = [
+        joint for k, joint in enumerate(result.joints) if decibels_apart(result, k) > _CLOSE_DB
+    ]
+    beware = (
+        [
+            f'{", ".join(poor)}: the measured response differs from that of motor, spring and '
+            f'link by more than {_CLOSE_DB:g} dB.'
+        ]
+        if poor
+        else []
+    )
+    step = 'Use the parameters of elastic.json for the controller, or in a simulation.'
+    if result.tuning is None:
+        step = 'Record step responses, and add them with --steps.'
+        beware.append('Without step responses the parameters have no intervals.')
+    else:
+        before, after = result.tuning.rms
+        sentences.append(
+            f'The error of the step responses fell from {digits(before)} to {digits(after)} rad/s '
+            'rms by tuning, noise included.'
+        )
+        beware.append(
+            'Viscous friction of link and motor are known as a sum; their shares are not.'
+        )
+    if poor:
+        step = f'Look at the frequency responses of {", ".join(poor)}.'
+    grade, tone = ('uncertain', 'fair') if poor else ('found', 'good')
+    return VerdictSection(grade, tone, sentences, beware, step=step)
+
+
+def _parameters_section(
+    result: TwoInertiaIdentification, known: TwoLinkParameters | None, source: str
+) -> ContentSection:
+    """Return a section with parameters, intervals and reference parameters."""
+    names = parameter_names(result.joints)
+    long = {symbol: f'{name_in_words(field)} ({symbol})' for field, symbol, _ in PER_JOINT}
+    lines = [(long.get(name.name, name.name), name.joint, name.unit) for name in names]
+    values, untuned = unpack(result.parameters).tolist(), unpack(result.untuned).tolist()
+    base = None if known is None else unpack(known).tolist()
+    std: list[float] = []
+    text = 'From the frequency responses. Step responses would tune them and give intervals.'
+    heads = ['Parameter', 'Joint', 'Estimate']
+    if result.tuning is not None:
+        text = (
+            'Tuned to the step responses; intervals hold 95 %. Of dl and dm only the sum is known '
+            'well, dl + dm gear². The shares of link and motor are those of the start values.'
+        )
+        heads += ['± 95 %', 'Untuned']
+        std = result.tuning.estimate.std.tolist()
+        for k, total in enumerate(total_damping(result)):
+            lines.append((total['name'], total['joint'], total['unit']))
+            values.append(total['value'])
+            std.append(total['std'])
+            untuned.append(float(result.untuned.total_damping[k]))
+            if known is not None and base is not None:
+                base.append(float(known.total_damping[k]))
+    if base is not None:
+        text += f' Compared with {source}.'
+        heads += ['Known', 'Difference']
+    rows = []
+    for k, (name, joint, unit) in enumerate(lines):
+        row = [pretty(name), joint]
+        if std:
+            row += [*measured(values[k], HALF_WIDTH * std[k]), digits(untuned[k], 4)]
+        else:
+            row.append(f'{values[k]:.4g}')
+        if base is not None:
+            row += [f'{base[k]:g}', f'{100.0 * (values[k] / base[k] - 1.0):+.2f} %']
+        rows.append([*row, pretty(unit)])
+    table = DataTable([*heads, 'Unit'], rows, words=(0, 1, len(heads)))
+    return ContentSection('Parameters', [Paragraph(text), table])
+
+
+def rigid_section(fit: RigidFit) -> ContentSection:
+    """Return a section with the parameters of step 1, the arm with rigid joints."""
+    estimate = fit.estimate
+    rows = [
+        (pretty(name.name), name.joint, *measured(value, HALF_WIDTH * std), pretty(name.unit))
+        for name, value, std in zip(
+            estimate.parameters, estimate.values, estimate.std, strict=True
+        )
+    ]
+    text = (
+        f'Step 1, least squares below {CUTOFF:g} Hz: motor and link of joint 1, and friction of '
+        f'motors and links, are one. {fit.relative_error:.2f} % of the torque is left.'
+    )
+    heads = ('Parameter', 'Joint', 'Estimate', '± 95 %', 'Unit')
+    return ContentSection('Rigid arm', [Paragraph(text), DataTable(heads, rows, words=(0, 1, 4))])
+
+
+#: Frequency ranges of the plots and of the comparison of responses [Hz].
+_SHOWN, _COMPARED = (2.0, 100.0), (5.0, 60.0)
+_ROLES: tuple[Role, Role] = ('residual', 'predicted')
+_SIZE = 'magnitude [dB re rad/(N m s)]'
+
+
+def responses_section(result: TwoInertiaIdentification) -> ContentSection:
+    """Return a section with responses from motor torque to motor velocity of both joints."""
+    text = (
+        'From motor torque to motor velocity. The torque between the links is a second input. '
+        'Each joint then responds like one motor and one link on a spring. Drag across a plot, or '
+        'pinch it, to zoom; double-click or double-tap to see it all.'
+    )
+    hint = (
+        'The response of the whole arm is the mean over the poses of joint 2 in the recording, '
+        'with the other motor free. Dashed lines are the frequencies of the joint alone. Errors '
+        'are those from 5 to 60 Hz.'
+    )
+    panels = [panel for k in range(2) for panel in _joint(result, k)]
+    return ContentSection(
+        'Frequency responses', [Paragraph(text), Panels(panels), Paragraph(hint, 'hint')]
+    )
+
+
+def decibels_apart(result: TwoInertiaIdentification, joint: int) -> float:
+    """Return the difference of measured and model responses of a joint, 5 to 60 Hz [dB]."""
+    measured = result.measured[joint]
+    seen = (measured.frequency >= _COMPARED[0]) & (measured.frequency <= _COMPARED[1])
+    ideal = ideal_response(result.parameters, joint, measured.frequency[seen])[:, 0, 0]
+    return decibel_error(measured.decoupled[seen, 0], ideal)
+
+
+def _joint(
+    result: TwoInertiaIdentification, k: int
+) -> Iterator[tuple[str, str, Sequence[PageBlock]]]:
+    """Yield panels of one joint: decoupled, and from motor torque alone."""
+    measured, joint, parameters = result.measured[k], result.joints[k], result.parameters
+    seen = (measured.frequency >= _SHOWN[0]) & (measured.frequency <= _SHOWN[1])
+    own = measured.frequency[seen]
+    frequency = np.unique(np.concatenate([np.geomspace(*_SHOWN, 300), own]))
+    decoupled = ideal_response(parameters, k, frequency)[:, 0, 0]
+    subspaces = result.systems[k].response(frequency)[:, 0, 0]
+    coupled = coupled_response(parameters, result.angles, frequency)[:, k]
+    at = np.searchsorted(frequency, own)
+    points, alone = np.full((2, len(frequency)), np.nan, complex)
+    points[at], alone[at] = measured.decoupled[seen, 0], measured.coupled[seen, 0]
+    low, high = (float(both[k]) for both in frequencies(parameters))
+    marks = [
+        Mark(low, f'antiresonance {low:.1f} Hz', before=True),
+        Mark(high, f'resonance {high:.1f} Hz'),
+    ]
+    modelled = [('subspace model', subspaces), ('physical model', decoupled)]
+    within = (own >= _COMPARED[0]) & (own <= _COMPARED[1])
+    rows = at[within]
+    errors = (
+        decibels_apart(result, k),
+        decibel_error(alone[rows], decoupled[rows]),
+        decibel_error(alone[rows], coupled[rows]),
+    )
+    size, compared = np.abs(alone[rows]), own[within]
+    lowest = int(np.argmin(size))
+    dip, peak = compared[lowest], compared[lowest + int(np.argmax(size[lowest:]))]
+
+    def decibel(values: npt.NDArray[np.complex128]) -> FloatArray:
+        return np.asarray(20.0 * np.log10(np.abs(values)))
+
+    def degrees(values: npt.NDArray[np.complex128]) -> FloatArray:
+        return np.asarray(np.degrees(np.angle(values)))
+
+    decoupled_charts = (
+        _chart(frequency, points, modelled, decibel, _SIZE, 260, marks),
+        _chart(frequency, points, modelled, degrees, 'phase [°]', 150, marks, last=True),
+    )
+    yield joint, 'decoupled', decoupled_charts
+    whole = [('whole arm, modelled', coupled), ('this joint', decoupled)]
+    alone_chart = _chart(frequency, alone, whole, decibel, _SIZE, 220, marks, last=True)
+    facts = [
+        ('Antiresonance, resonance of the joint', f'{low:.2f} Hz, {high:.2f} Hz'),
+        ('Measured minimum and maximum, coupled', f'{dip:.1f} Hz, {peak:.1f} Hz'),
+        ('Joint model, decoupled: error', f'{errors[0]:.2f} dB rms'),
+        ('Joint model, coupled: error', f'{errors[1]:.1f} dB rms'),
+        ('Whole-arm model, coupled: error', f'{errors[2]:.1f} dB rms'),
+    ]
+    yield joint, 'coupled: from motor torque alone', (alone_chart, FactList(facts))
+
+
+def _chart(
+    frequency: FloatArray,
+    points: npt.NDArray[np.complex128],
+    curves: Sequence[tuple[str, npt.NDArray[np.complex128]]],
+    part: Callable[[npt.NDArray[np.complex128]], FloatArray],
+    ylabel: str,
+    height: int,
+    marks: Sequence[Mark],
+    *,
+    last: bool = False,
+) -> Chart:
+    series = [
+        Series(label, part(values), role)
+        for (label, values), role in zip(curves, _ROLES, strict=True)
+    ]
+    return Chart(
+        frequency,
+        [*series, Series('measured', part(points), 'measured', 'points')],
+        'frequency [Hz]' if last else '',
+        ylabel,
+        height=height,
+        link='frequency',
+        marks=marks if ylabel == _SIZE else [Mark(mark.x) for mark in marks],
+        logarithmic=True,
+        legend=ylabel == _SIZE,
+    )
+
+
+def steps_section(tuning: Tuning) -> ContentSection:
+    """Return a section with link velocities after reference steps, before and after tuning."""
+    before, after = tuning.rms
+    text = (
+        'Velocities of the links after steps of the reference. Before tuning '
+        f'{digits(before, 3)} rad/s rms is left unexplained, after it {digits(after, 3)} rad/s, '
+        'noise included.'
+    )
+    t = np.asarray(1e3 * tuning.steps.dt * np.arange(len(tuning.measured)), dtype=np.float64)
+    panels = []
+    for k, pose in enumerate(np.degrees(tuning.steps.q[:, 1])):
+        asked = tuning.steps.reference[-1, k]
+        charts = [
+            Chart(
+                t,
+                [
+                    Series('measured', tuning.measured[:, k, 2 + link], 'measured'),
+                    Series('before tuning', tuning.before[:, k, 2 + link], 'residual'),
+                    Series('after tuning', tuning.after[:, k, 2 + link], 'predicted'),
+                    Series('reference', tuning.steps.reference[:, k, link], 'faint'),
+                ],
+                'time [ms]',
+                f'link {link + 1} [rad/s]',
+                height=180,
+                link=f'step {k}',
+            )
+            for link in range(2)
+        ]
+        name = f'joint 2 at {pose:.0f}°, {asked[0]:g} and {asked[1]:g} rad/s reference'
+        panels.append((name, '', charts))
+    return ContentSection('Step responses', [Paragraph(text), Panels(panels)])
+
+
+SCHEMA = 'armid/elastic/1'
+#: Parameters that step responses determine well; friction and spring damping are less certain.
+MAIN = ('alpha', 'beta', 'gamma', 'mm', 'kg')
+
+
+def elastic_document(result: TwoInertiaIdentification, robot: str) -> dict[str, Any]:
+    """Return an identification of elastic joints as the document that elastic.json holds."""
+    parameters, rigid = result.parameters, result.rigid.estimate
+    names = parameter_names(result.joints)
+    std = [None] * len(names) if result.tuning is None else list(result.tuning.estimate.std)
+    frequency = np.geomspace(5.0, BAND[1], 200)
+    antiresonance, resonance = frequencies(result.untuned)
+    document: dict[str, Any] = {
+        'schema': SCHEMA,
+        'robot': robot,
+        'rigid': {
+            'relative_error_percent': result.rigid.relative_error,
+            'parameters': parameter_table(rigid.parameters, rigid.values, list(rigid.std)),
+        },
+        'joints': [
+            {
+                'joint': joint,
+                'antiresonance_hz': float(antiresonance[k]),
+                'resonance_hz': float(resonance[k]),
+                'interaction_gain': float(result.interaction_gain[k]),
+                'subspaces_against_physical_db': decibel_error(
+                    result.systems[k].response(frequency)[:, 0, 0],
+                    ideal_response(parameters, k, frequency)[:, 0, 0],
+                ),
+                'coulomb_torque': float(parameters.joint_coulomb[k]),
+            }
+            for k, joint in enumerate(result.joints)
+        ],
+        'untuned': parameter_table(names, unpack(result.untuned), [None] * len(names)),
+        'parameters': parameter_table(names, unpack(parameters), std),
+    }
+    if result.tuning is not None:
+        before, after = result.tuning.rms
+        document['tuning'] = {'rms_before': before, 'rms_after': after, 'unit': 'rad/s'}
+        document['total_damping'] = total_damping(result)
+    return document
+
+
+def total_damping(result: TwoInertiaIdentification) -> list[dict[str, Any]]:
+    """Return dl + dm gear^2 of both joints, the identifiable sum of the two."""
+    assert result.tuning is not None
+    estimate, gear = result.tuning.estimate, result.parameters.gear
+    rows = []
+    for k, joint in enumerate(result.joints):
+        weights = np.zeros(len(estimate.values))
+        weights[estimate.index('dl', joint)] = 1.0
+        weights[estimate.index('dm', joint)] = gear[k] ** 2
+        rows.append(
+            {
+                'name': 'dl + dm gear^2',
+                'joint': joint,
+                'value': float(weights @ estimate.values),
+                'std': float(np.sqrt(weights @ estimate.covariance @ weights)),
+                'unit': 'N m s/rad',
+            }
+        )
+    return rows
+
+
+def tuning_story(
+    tuning: Tuning, start: TwoLinkParameters, truth: TwoLinkParameters
+) -> dict[str, Any]:
+    """
+    Return the errors of a tuning against the true parameters of a simulated arm.
+
+    Returns
+    -------
+    dict
+        Root mean square errors of the velocities against those of the true arm, without noise,
+        and largest errors of a main parameter, at the start and at the end.
+
+    """
+    clean = velocities(tuning.steps, truth)
+    main = np.array([name.name in MAIN for name in parameter_names(('', ''))])
+    before, after = (
+        float(np.sqrt(np.mean((one - clean) ** 2))) for one in (tuning.before, tuning.after)
+    )
+    worst, best = (
+        float(100.0 * np.abs(unpack(found) / unpack(truth) - 1.0)[main].max())
+        for found in (start, tuning.parameters)
+    )
+    return {
+        'error_before': before,
+        'error_after': after,
+        'unit': 'rad/s',
+        'factor': before / after,
+        'main_parameters_percent_before': worst,
+        'main_parameters_percent_after': best,
+    }
