@@ -79,7 +79,7 @@ def test_a_resting_joint_is_named_and_the_others_are_identified(arm, structure):
         (lambda run: replace(run, q=0.0 * run.q), 'no motion'),
         (lambda run: replace(run, tau=None), 'no effort'),
         (lambda run: replace(run, tau=1e-309 * run.tau), 'constant'),
-        (lambda run: replace(run, tau=-run.tau), 'opposite sign.*negate'),
+        (lambda run: replace(run, tau=-run.tau), 'opposite sign.*[Nn]egate'),
         (lambda run: replace(run, tau=1e3 * run.tau), 'N mm'),
         (lambda run: replace(run, q=np.rad2deg(run.q)), 'degrees'),
     ],

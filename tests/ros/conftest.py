@@ -5,6 +5,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator
+import itertools
 import time
 from typing import Any, TypeVar
 
@@ -34,8 +35,11 @@ REPEAT = 5.0
 
 
 def busy(real_time: RealTime, monkeypatch: pytest.MonkeyPatch, seconds: float = 10.0) -> None:
-    """Let a clock appear some seconds late, as on a busy computer."""
-    monkeypatch.setattr(real_time, '_clock', lambda: time.monotonic() + seconds)
+    """Let a clock appear some seconds late, and each look at it last 1 ms: a busy computer."""
+    looks = itertools.count()
+    monkeypatch.setattr(
+        real_time, '_clock', lambda: time.monotonic() + seconds + 1e-3 * next(looks)
+    )
 
 
 class Bench:

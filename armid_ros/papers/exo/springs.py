@@ -170,7 +170,7 @@ class OnlineInteraction:
         if not (memory >= 3.0 and 0.0 < period <= memory and slack_period > 0.0):
             raise IdentificationError(
                 f'a memory of {memory:g} s and estimates every {period:g} s: the memory has to be '
-                'at least 3 s and that time'
+                'at least 3 s, and no shorter than the time between estimates'
             )
         self.machines, self._inertias = machines, inertias
         self._memory, self._period, self._slack_period = memory, period, slack_period
