@@ -36,25 +36,18 @@ def carrying(*loads):
 
 def test_by_hand_in_the_frame_of_the_flange():
     load = load_of(carrying(('roll', HAND)), frame='flange')
-    assert universal_robots(load) == (
-        'set_target_payload(2.0, [0.0, -0.04, 0.05], [0.02, 0.01, 0.025, 0.0, 0.0, 0.0])'
-    )
-    assert franka(load) == (
-        'robot.setLoad(2.0, {{0.0, -0.04, 0.05}}, '
-        '{{0.02, 0.0, 0.0, 0.0, 0.01, 0.0, 0.0, 0.0, 0.025}});'
-    )
-    form = 'LOAD_DATA[1]={{M 2.0,CM {{{},A {},B 0.0,C 0.0}},J {{X 0.02,Y 0.01,Z 0.025}}}}'
-    assert kuka(load) == form.format('X 0.0,Y -40.0,Z 50.0', '0.0')
-    form = 'PERS loaddata load1 := [2.0, [{}], [{}], 0.02, 0.01, 0.025];'
-    assert abb(load) == form.format('0.0, -40.0, 50.0', '1.0, 0.0, 0.0, 0.0')
+    call = 'set_target_payload(2.0, [0.0, -0.04, 0.05], [0.02, 0.01, 0.025, 0.0, 0.0, 0.0])'
+    assert universal_robots(load) == call
+    nine = '0.02, 0.0, 0.0, 0.0, 0.01, 0.0, 0.0, 0.0, 0.025'
+    assert franka(load) == 'robot.setLoad(2.0, {{0.0, -0.04, 0.05}}, {{' + nine + '}});'
+    place, moments = 'X 0.0,Y -40.0,Z 50.0,A 0.0,B 0.0,C 0.0', 'X 0.02,Y 0.01,Z 0.025'
+    assert kuka(load) == 'LOAD_DATA[1]={M 2.0,CM {' + place + '},J {' + moments + '}}'
+    parts = '2.0, [0.0, -40.0, 50.0], [1.0, 0.0, 0.0, 0.0], 0.02, 0.01, 0.025'
+    assert abb(load) == f'PERS loaddata load1 := [{parts}];'
     # the axes of the tool, the last link, are 30 degrees behind those of the flange
     tool = load_of(carrying(('roll', HAND)))
     assert kuka(tool).endswith(',A 30.0,B 0.0,C 0.0},J {X 0.02,Y 0.01,Z 0.025}}')
     assert '[0.965925826, 0.0, 0.0, 0.258819045], 0.02, 0.01, 0.025]' in abb(tool)
-
-
-def of_ur(v):
-    return np.array([[v[0], v[3], v[4]], [v[3], v[1], v[5]], [v[4], v[5], v[2]]])
 
 
 def turned(rotation, moments):
@@ -63,7 +56,7 @@ def turned(rotation, moments):
 
 #: How long a metre is, and the inertia of the other numbers.
 READERS = {
-    'ur': (1.0, of_ur),
+    'ur': (1.0, lambda v: v[[0, 3, 4, 3, 1, 5, 4, 5, 2]].reshape(3, 3)),
     'franka': (1.0, lambda v: v.reshape(3, 3).T),
     'kuka': (1e3, lambda v: turned(Rotation.from_euler('ZYX', v[:3], degrees=True), v[3:])),
     'abb': (1e3, lambda v: turned(Rotation.from_quat([*v[1:4], v[0]]), v[4:])),
