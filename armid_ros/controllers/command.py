@@ -76,7 +76,8 @@ def export(
         robot = options.open_robot(robot_source, 'earth', joints)
     elif joints is not None:
         raise click.UsageError('--joints needs the description they are of: name it with --robot')
-    arm, notes = options.model_of(model, robot), ()
+    arm = options.model_of(model, robot)
+    notes: tuple[str, ...] = ()
     if kind in ('cpp', 'python'):
         text, left_out = torque_code(arm, kind, str(model))
         notes = tuple(f'not in the torque: {line}' for line in left_out)

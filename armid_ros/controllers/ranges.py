@@ -7,6 +7,7 @@ from __future__ import annotations
 from armid_ros.arm import ArmModel
 from armid_ros.effects.load import described_spread
 from armid_ros.estimate import Estimate, ParameterName
+from armid_ros.identification.fitting.normal_equations import scaled_inverse
 from armid_ros.identification.parameters_file import ParameterFile
 from armid_ros.model import LINK_PARAMETERS
 from armid_ros.motion import FloatArray
@@ -40,14 +41,12 @@ def ranges_text(arm: ArmModel, known: ParameterFile, spread: float, source: str)
     """
     information = known.information(arm.parameters)
     if information is None:
-        std = [known.values.get(name, (0.0, 0.0))[1] for name in arm.parameters]
-        information = np.diag([1.0 / s**2 if s > 0.0 else 0.0 for s in std])
-    rigid = 0.5 * spread * described_spread(arm.robot).ravel()
+        stds = [known.values.get(name, (0.0, 0.0))[1] for name in arm.parameters]
+        information = np.diag([1.0 / std**2 if std > 0.0 else 0.0 for std in stds])
+    rigid = np.maximum(0.5 * spread * described_spread(arm.robot).ravel(), NO_MASS)
     others = _VAGUE * np.maximum(np.abs(arm.theta[len(rigid) :]), 1.0)
     prior = np.concatenate([rigid, others])
-    # in units of the prior, which makes its precision the unit matrix
-    scaled = np.eye(len(prior)) + prior[:, np.newaxis] * information * prior
-    covariance = prior[:, np.newaxis] * np.linalg.inv(scaled) * prior
+    covariance = scaled_inverse(information + np.diag(prior**-2.0))
     names, values, slopes, lowest = _masses_and_centres(arm)
     estimate = Estimate(names, values, slopes @ covariance @ slopes.T)
     before = np.sqrt(slopes**2 @ prior**2)
@@ -55,7 +54,7 @@ def ranges_text(arm: ArmModel, known: ParameterFile, spread: float, source: str)
     for k, name in enumerate(names):
         determined = bool(estimate.std[k] < _DETERMINED * before[k])
         described = slopes[k, : len(rigid)].any()
-        std = float(estimate.std[k]) if determined or described else None
+        own = float(estimate.std[k]) if determined or described else None
         low, high = estimate.interval()[k].tolist()
         rows.append(
             {
@@ -63,10 +62,10 @@ def ranges_text(arm: ArmModel, known: ParameterFile, spread: float, source: str)
                 'joint': name.joint,
                 'unit': name.unit,
                 'mean': float(values[k]),
-                'std': std,
-                'low': None if std is None else max(low, float(lowest[k])),
-                'high': None if std is None else high,
-                'from': None if std is None else 'recordings' if determined else 'description',
+                'std': own,
+                'low': None if own is None else max(low, float(lowest[k])),
+                'high': None if own is None else high,
+                'from': None if own is None else 'recordings' if determined else 'description',
             }
         )
     head = _HEAD.format(robot=arm.robot.name, source=' '.join(source.split()), spread=spread)

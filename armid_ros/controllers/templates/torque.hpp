@@ -10,36 +10,36 @@ $comment
 
 namespace $name {
 
-constexpr int N = $n;  // joints
-constexpr double DEAD_BAND = $dead_band;  // no Coulomb friction at speeds up to it [rad/s or m/s]
+inline constexpr int N = $n;  // joints
+inline constexpr double DEAD_BAND = $dead_band;  // no Coulomb friction at speeds up to it [rad/s or m/s]
 // gravity in the frame of the base [m/s^2]
-constexpr double GRAVITY[3] = $GRAVITY;
+inline constexpr double GRAVITY[3] = $GRAVITY;
 // joint that carries the joint; -1 is the base
-constexpr int PARENT[N] = $PARENT;
+inline constexpr int PARENT[N] = $PARENT;
 // rotation per unit of the position, in the frame of the joint
-constexpr double TURN[N][3] = $TURN;
+inline constexpr double TURN[N][3] = $TURN;
 // translation per unit of the position, in the frame of the joint
-constexpr double SLIDE[N][3] = $SLIDE;
+inline constexpr double SLIDE[N][3] = $SLIDE;
 // place of the joint at position zero, in the frame of its parent [m]
-constexpr double ORIGIN[N][3] = $ORIGIN;
+inline constexpr double ORIGIN[N][3] = $ORIGIN;
 // translation per unit of the position, in the frame of the parent
-constexpr double SLIDING[N][3] = $SLIDING;
+inline constexpr double SLIDING[N][3] = $SLIDING;
 // rotation in the frame of the parent: times 1, sin q, 1 - cos q
-constexpr double TURNING[N][3][3][3] = $TURNING;
+inline constexpr double TURNING[N][3][3][3] = $TURNING;
 // mass [kg]
-constexpr double MASS[N] = $MASS;
+inline constexpr double MASS[N] = $MASS;
 // first moment of the mass [kg m]
-constexpr double FIRST[N][3] = $FIRST;
+inline constexpr double FIRST[N][3] = $FIRST;
 // inertia about the origin of the joint [kg m^2]
-constexpr double INERTIA[N][3][3] = $INERTIA;
+inline constexpr double INERTIA[N][3][3] = $INERTIA;
 // viscous friction [N m s/rad or N s/m]
-constexpr double VISCOUS[N] = $VISCOUS;
+inline constexpr double VISCOUS[N] = $VISCOUS;
 // Coulomb friction [N m or N]
-constexpr double COULOMB[N] = $COULOMB;
+inline constexpr double COULOMB[N] = $COULOMB;
 // constant torque [N m or N]
-constexpr double OFFSET[N] = $OFFSET;
+inline constexpr double OFFSET[N] = $OFFSET;
 // inertia of the rotor [kg m^2 or kg]
-constexpr double ROTOR[N] = $ROTOR;
+inline constexpr double ROTOR[N] = $ROTOR;
 
 inline void add_cross(const double a[3], const double b[3], double sum[3]) {
   sum[0] += a[1] * b[2] - a[2] * b[1];
