@@ -3,7 +3,6 @@
 """
 An identified arm in the form of other programs: ``armid export``.
 
-``dynamics`` writes the torque as code, ``loads`` the payload as the load data of four makers,
-``ranges`` the parameters with their standard deviations, and ``sdf`` a model for Gazebo.
+The torque as code, the payload as load data, ranges of parameters, and a model for Gazebo.
 
 """

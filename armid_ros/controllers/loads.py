@@ -19,7 +19,7 @@ import pinocchio as pin
 
 
 @dataclass(frozen=True)
-class Load:
+class CarriedLoad:
     """
     A body fixed to a link of the robot.
 
@@ -49,7 +49,7 @@ class Load:
         return moments[order], axes
 
 
-def load_of(arm: ArmModel, joint: str | None = None, frame: str | None = None) -> Load:
+def load_of(arm: ArmModel, joint: str | None = None, frame: str | None = None) -> CarriedLoad:
     """
     Return the payload of a model in a frame of the robot.
 
@@ -97,10 +97,10 @@ def load_of(arm: ArmModel, joint: str | None = None, frame: str | None = None) -
             f"'{frame}' is no link that moves with the payload of joint '{joint}': name "
             f'{" or ".join(links)} with --frame{meant(frame, links)}'
         )
-    return Load(joint, frame, links[frame].actInv(pin.Inertia.FromDynamicParameters(ten)))
+    return CarriedLoad(joint, frame, links[frame].actInv(pin.Inertia.FromDynamicParameters(ten)))
 
 
-def universal_robots(load: Load) -> str:
+def universal_robots(load: CarriedLoad) -> str:
     """
     Return a call of URScript; the frame has to be that of the tool flange.
 
@@ -114,7 +114,7 @@ def universal_robots(load: Load) -> str:
     return f'set_target_payload({_list(body.mass)}, [{_list(body.lever)}], [{_list(six)}])'
 
 
-def franka(load: Load) -> str:
+def franka(load: CarriedLoad) -> str:
     """
     Return a call of libfranka; the frame has to be that of the flange.
 
@@ -129,7 +129,7 @@ def franka(load: Load) -> str:
     return f'robot.setLoad({_list(body.mass)}, {{{{{_list(body.lever)}}}}}, {{{{{inertia}}}}});'
 
 
-def kuka(load: Load) -> str:
+def kuka(load: CarriedLoad) -> str:
     """
     Return a line of $config.dat; the frame has to be that of the flange.
 
@@ -146,7 +146,7 @@ def kuka(load: Load) -> str:
     return form.format(*map(_list, values))
 
 
-def abb(load: Load) -> str:
+def abb(load: CarriedLoad) -> str:
     """
     Return a declaration of RAPID; the frame has to be that of the tool.
 
@@ -165,7 +165,7 @@ def abb(load: Load) -> str:
 
 
 #: How each maker writes a load and a comment.
-MAKERS: dict[str, tuple[Callable[[Load], str], str]] = {
+MAKERS: dict[str, tuple[Callable[[CarriedLoad], str], str]] = {
     'ur': (universal_robots, '#'),
     'franka': (franka, '//'),
     'kuka': (kuka, ';'),
@@ -173,7 +173,7 @@ MAKERS: dict[str, tuple[Callable[[Load], str], str]] = {
 }
 
 
-def load_text(load: Load, maker: str, source: str) -> tuple[str, tuple[str, ...]]:
+def load_text(load: CarriedLoad, maker: str, source: str) -> tuple[str, tuple[str, ...]]:
     """
     Return the file of the load data of a maker, a key of `MAKERS`, and notes that are in it too.
 
