@@ -33,6 +33,7 @@ from armid_ros.files import json_text, settled, write_file
 from armid_ros.motion import FloatArray, Motion
 from armid_ros.recording import write_joint_trajectory
 from armid_ros.recording.curves import draw_joints
+from armid_ros.report.provenance import Provenance
 import numpy as np
 import numpy.typing as npt
 
@@ -197,8 +198,7 @@ class ExcitationResult(Shown):
             robot=origin.of(self.arm.robot).robot,
             scene=self.scene,
             isolability=self.isolability if self.with_isolability else None,
-            step=self.next_step(origin),
-            provenance=origin.provenance,
+            provenance=replace(origin.provenance or Provenance(), step=self.next_step(origin)),
         )
 
     def fill(self, folder: Path, origin: ResultOrigin = DEFAULT_ORIGIN) -> dict[str, Any]:

@@ -51,7 +51,7 @@ def arm_urdf(arm: ArmModel) -> Exported:
         If the parameters of a link are not physically consistent.
 
     """
-    found, missing = _placed(arm, lambda effect: effect.traits.urdf_attribute)
+    found, missing = place_values(arm, lambda effect: effect.traits.urdf_attribute)
     text = export_urdf(
         arm.body,
         damping=found.get('damping'),
@@ -78,7 +78,7 @@ def arm_mjcf(arm: ArmModel) -> Exported:
         If the parameters of a link are not physically consistent.
 
     """
-    found, missing = _placed(arm, lambda effect: effect.traits.mjcf_attribute)
+    found, missing = place_values(arm, lambda effect: effect.traits.mjcf_attribute)
     found['friction'] = found.pop('frictionloss', {})
     text, left_out = export_mjcf(
         arm.body,
@@ -90,10 +90,27 @@ def arm_mjcf(arm: ArmModel) -> Exported:
     return Exported(text, missing, left_out, found)
 
 
-def _placed(
+def place_values(
     arm: ArmModel, attribute: Callable[[Effect], str]
 ) -> tuple[dict[str, dict[str, float]], tuple[str, ...]]:
-    """Return values by attribute and joint, and a line for each value without an attribute."""
+    """
+    Return the values of effects that a format has a place for, and a line for each other value.
+
+    Parameters
+    ----------
+    arm : ArmModel
+        The arm; effects that change the body are part of it, and in neither.
+    attribute : callable
+        Name of the place of an effect in the format; empty if it has none.
+
+    Returns
+    -------
+    dict of str to dict of str to float
+        Values by attribute and joint.
+    tuple of str
+        Other values, as 'effect: parameter of joint = value unit'.
+
+    """
     found: dict[str, dict[str, float]] = {}
     missing = []
     for effect, values in zip(arm.effects, arm.values, strict=True):

@@ -65,8 +65,7 @@ def excitation_report(
     robot: str,
     scene: CollisionScene,
     isolability: Isolability | None = None,
-    step: str = '',
-    provenance: Provenance | None = None,
+    provenance: Provenance,
 ) -> str:
     """
     Return report.html of a design.
@@ -87,10 +86,8 @@ def excitation_report(
         Bodies of the arm, its floor, and what stands around it.
     isolability : Isolability, optional
         What it shows of the effects of the catalogue.
-    step : str
-        What to do next.
-    provenance : Provenance, optional
-        Files, versions, settings, seed.
+    provenance : Provenance
+        Files, versions, settings, seed, and the command that follows.
 
     Returns
     -------
@@ -126,7 +123,10 @@ def excitation_report(
     if any(colour == OBSTACLE for _, colour in poses.bodies):
         colours.append(('line', ', '.join(obstacle.name for obstacle in obstacles)))
     sections: list[Section] = [
-        replace(_verdict(design, arm.robot.links, shares, checked, collision.notes), step=step),
+        replace(
+            _verdict(design, arm.robot.links, shares, checked, collision.notes),
+            step=provenance.step,
+        ),
         ContentSection('Poses', [poses, Legend(colours)]),
         _foreseen_section(design, arm.robot.links),
         *([] if isolability is None else [isolability_section(isolability)]),
@@ -134,7 +134,7 @@ def excitation_report(
         _clearance_section(motion.t, curves, design.settings.clearance, said),
         _harmonics_section(excitation.trajectory),
         _asked(design, arm, robot, obstacles, run),
-        Origin(provenance or Provenance()),
+        Origin(provenance),
     ]
     subtitle = (
         f'{robot_label(robot)} · {run.duration:.4g} s · {excitation.n_periods} periods · '

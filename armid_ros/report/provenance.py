@@ -57,6 +57,8 @@ class Provenance:
         Command line; empty when there was none.
     created : str
         When, as the caller's clock has it; empty to leave it out.
+    step : str
+        Command that follows; empty to leave it out.
 
     """
 
@@ -66,6 +68,7 @@ class Provenance:
     seed: int | None = None
     command: str = ''
     created: str = ''
+    step: str = ''
 
 
 def hash_files(paths: Iterable[str | Path]) -> tuple[FileHash, ...]:

@@ -12,7 +12,7 @@ import tomllib
 import pytest
 
 LAYERS = (
-    ('fleet', 'papers', 'view'),
+    ('controllers', 'fleet', 'papers', 'view'),
     ('cli',),
     ('nodes',),
     ('live',),

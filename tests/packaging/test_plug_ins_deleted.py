@@ -10,8 +10,15 @@ import sys
 
 import pytest
 
-#: Folders of plug-ins that bring the command of their name.
-WITH_COMMAND = ('fleet', 'papers/elastic', 'papers/exo', 'papers/lunar', 'view')
+#: Folders of plug-ins that bring a command, and its name.
+WITH_COMMAND = {
+    'controllers': 'export',
+    'fleet': 'fleet',
+    'papers/elastic': 'elastic',
+    'papers/exo': 'exo',
+    'papers/lunar': 'lunar',
+    'view': 'view',
+}
 #: Folders of plug-ins that serve commands of the core, and such a command.
 SERVING = {
     'residual': ('diagnose', 'bag', '--robot', 'ur10', '--out', 'found', '--residual', 'gp'),
@@ -88,14 +95,14 @@ def python(folder, *arguments):
 
 @pytest.mark.parametrize('plug_in', WITH_COMMAND)
 def test_the_other_commands_stay(root, tmp_path, plug_in):
-    command = plug_in.rpartition('/')[2]
+    command = WITH_COMMAND[plug_in]
     shutil.copytree(root / 'armid_ros', tmp_path / 'armid_ros')
     shutil.rmtree(tmp_path / 'armid_ros' / plug_in)
     done = python(tmp_path, '-c', ASK, command)
     assert done.returncode == 2, done.stderr
     assert f"'{command}'" in done.stderr
     listed = {line.split()[0] for line in done.stdout.splitlines() if line.startswith('  ')}
-    assert {'identify', 'fleet', 'elastic', 'exo', 'lunar', 'view'} - {command} <= listed
+    assert {'identify', *WITH_COMMAND.values()} - {command} <= listed
     assert command not in listed
 
 

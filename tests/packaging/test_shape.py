@@ -18,7 +18,6 @@ MANY = {
     'api/design.py:design_excitation',
     'api/identification.py:identify',
     'diagnosis/diagnose.py:diagnose',  # what may be known of a gap is spelled out
-    'report/excitation_report.py:excitation_report',
 }
 
 #: Lines that a room of the package may have. A room that shrinks takes its number along: a budget

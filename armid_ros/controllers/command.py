@@ -1,0 +1,94 @@
+# Copyright 2026 The armid_ros developers
+# SPDX-License-Identifier: Apache-2.0
+"""The command ``armid export``: an identified arm in the form of another program."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+from armid_ros.cli import parameters
+from armid_ros.cli.terminal import say
+from armid_ros.errors import OutputError
+import click
+from click.core import ParameterSource
+
+#: Load data of makers, and all kinds in the order of the help.
+LOADS = ('ur', 'franka', 'kuka', 'abb')
+KINDS = ('cpp', 'python', *LOADS, 'ranges', 'sdf')
+#: Kinds that an option belongs to.
+_KINDS_OF = {'joint': LOADS, 'frame': LOADS, 'spread': ('ranges',)}
+
+
+@click.command('export', epilog='Example: armid export found/model.yaml --to cpp --out torque.hpp')
+@click.argument('model', type=click.Path(path_type=Path))
+@click.option(
+    '--to',
+    'kind',
+    type=click.Choice(KINDS),
+    required=True,
+    help='Joint torque as C++ or Python; payload as load data of Universal Robots, Franka, KUKA '
+    'or ABB; ranges for domain randomisation; SDF for Gazebo.',
+)
+@click.option(
+    '--out', required=True, type=parameters.OutPath(path_type=Path), help='File to write.'
+)
+@parameters.robot_described(help='Shipped name or path; that of the model by default.')
+@parameters.joints
+@click.option('--joint', help='Joint that moves the payload; needed if several have one.')
+@click.option('--frame', help='Link whose frame the load data are in; the last one by default.')
+@click.option(
+    '--spread',
+    type=click.FloatRange(0.0, min_open=True),
+    default=0.1,
+    show_default=True,
+    help='Prior standard deviation of masses and centres, as a share of the described value.',
+)
+@click.pass_context
+def export(
+    context: click.Context,
+    model: Path,
+    kind: str,
+    out: Path,
+    robot_source: str | None,
+    joints: str | None,
+    joint: str | None,
+    frame: str | None,
+    spread: float,
+) -> None:
+    """Write a model for a controller, a maker's load data or a simulator."""
+    from armid_ros.cli import options
+    from armid_ros.controllers.dynamics import torque_code
+    from armid_ros.controllers.loads import load_of, load_text
+    from armid_ros.controllers.ranges import ranges_text
+    from armid_ros.controllers.sdf import arm_sdf
+    from armid_ros.files import write_file
+    from armid_ros.identification.parameters_file import read_parameters
+
+    for name, kinds in _KINDS_OF.items():
+        typed = context.get_parameter_source(name) is ParameterSource.COMMANDLINE
+        if typed and kind not in kinds:
+            raise click.UsageError(f'--{name} belongs to --to {", ".join(kinds)}, not to {kind}')
+    model = model / 'model.yaml' if model.is_dir() else model
+    if out.exists() and model.exists() and out.samefile(model):
+        raise OutputError(f'{out}: is the model itself; name another file with --out')
+    robot = None
+    if robot_source is not None:
+        robot = options.open_robot(robot_source, 'earth', joints)
+    elif joints is not None:
+        raise click.UsageError('--joints needs the description they are of: name it with --robot')
+    arm = options.model_of(model, robot)
+    notes: tuple[str, ...] = ()
+    if kind in ('cpp', 'python'):
+        text, left_out = torque_code(arm, kind, str(model))
+        notes = tuple(f'not in the torque: {line}' for line in left_out)
+    elif kind in LOADS:
+        text, notes = load_text(load_of(arm, joint, frame), kind, str(model))
+    elif kind == 'ranges':
+        text = ranges_text(arm, read_parameters(model), spread, str(model))
+    else:
+        text, left_out = arm_sdf(arm, str(model))
+        notes = tuple(f'not in the model: {line}' for line in left_out)
+    write_file(out, text)
+    for note in notes:
+        say(f'note: {note}')
+    say(f'{out}: written')

@@ -1,0 +1,94 @@
+# Copyright 2026 The armid_ros developers
+# SPDX-License-Identifier: Apache-2.0
+"""The joint torque tau = f(q, dq, ddq) of an arm as code without dependencies."""
+
+from __future__ import annotations
+
+from importlib.resources import files
+import re
+from string import Template
+from typing import Any
+
+from armid_ros.arm import ArmModel
+from armid_ros.arm.export import place_values
+import numpy as np
+import numpy.typing as npt
+
+#: Effects that the law has a table for.
+_TABLES = {
+    'viscous_friction': 'VISCOUS',
+    'coulomb_friction': 'COULOMB',
+    'torque_offset': 'OFFSET',
+    'rotor_inertia': 'ROTOR',
+}
+#: Template of the law, brackets of a table, and sign of a comment.
+_LANGUAGES = {'cpp': ('torque.hpp', '{}', '//'), 'python': ('torque.py.txt', '[]', '#')}
+#: Speed up to which there is no Coulomb friction [rad/s or m/s]: the noise of a velocity at rest.
+DEAD_BAND = 1e-3
+
+
+def torque_tables(arm: ArmModel) -> tuple[dict[str, npt.NDArray[Any]], tuple[str, ...]]:
+    """
+    Return the constants of the torque of an arm, joint by joint.
+
+    Returns
+    -------
+    dict of str to ndarray, each of shape (n, ...)
+        Geometry as in `JointGeometry`, inertial parameters with payloads, friction, offset and
+        rotor inertia; and the gravity, shape (3,). The templates state what each is.
+    tuple of str
+        Parameters that the tables have no place for, as lines.
+
+    """
+    placed, left_out = place_values(arm, lambda effect: _TABLES.get(effect.name, ''))
+    rigid = arm.body.rigid_parameters.reshape(arm.robot.n_joints, -1)
+    tables: dict[str, npt.NDArray[Any]] = {
+        'GRAVITY': arm.body.gravity,
+        'MASS': rigid[:, 0],
+        'FIRST': rigid[:, 1:4],
+        'INERTIA': rigid[:, [[4, 5, 7], [5, 6, 8], [7, 8, 9]]],
+    }
+    for name in ('parent', 'turn', 'slide', 'origin', 'sliding', 'turning'):
+        tables[name.upper()] = np.array([getattr(joint, name) for joint in arm.body.geometry])
+    for name in _TABLES.values():
+        values = placed.get(name, {})
+        tables[name] = np.array([values.get(joint, 0.0) for joint in arm.robot.joints])
+    return tables, left_out
+
+
+def torque_code(arm: ArmModel, language: str, source: str) -> tuple[str, tuple[str, ...]]:
+    """
+    Return the torque of an arm as code, and the lines of what is not in it.
+
+    The language is 'cpp', a C++17 header with torque(q, dq, ddq, tau), or 'python', a module with
+    torque(q, dq, ddq) that returns tau; neither needs more than its standard mathematics. A
+    comment names the source of the arm, and each parameter of an effect that is not in the code.
+
+    """
+    template, brackets, comment = _LANGUAGES[language]
+    tables, left_out = torque_tables(arm)
+    lines = [
+        f'Joint torque of {arm.robot.name}: written by armid export, from {source}.',
+        f'Joints: {", ".join(arm.robot.joints)}.',
+    ]
+    if left_out:
+        lines += ['The model has these too, which are not in the torque:', *left_out]
+    law = files('armid_ros.controllers').joinpath('templates', template).read_text('utf-8')
+    text = Template(law).substitute(
+        {name: _nested(values.tolist(), brackets, '\n') for name, values in tables.items()},
+        comment='\n'.join(f'{comment} {" ".join(line.split())}' for line in lines),
+        name='armid_' + re.sub(r'\W', '_', arm.robot.name, flags=re.ASCII),
+        n=arm.robot.n_joints,
+        joints=', '.join(map(repr, arm.robot.joints)),
+        dead_band=DEAD_BAND,
+    )
+    return text, left_out
+
+
+def _nested(values: Any, brackets: str, apart: str = ' ') -> str:
+    """Write nested lists in the brackets of a language; `apart` is between the outermost rows."""
+    if not isinstance(values, list):
+        return repr(values)
+    apart = apart if isinstance(values[0], list) else ' '
+    inner = f',{apart}'.join(_nested(row, brackets) for row in values)
+    return f'{brackets[0]}{apart.strip(" ")}{inner}{brackets[1]}'

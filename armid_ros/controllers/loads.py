@@ -1,0 +1,203 @@
+# Copyright 2026 The armid_ros developers
+# SPDX-License-Identifier: Apache-2.0
+"""The payload of a model as the load data of robot controllers."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+from itertools import permutations
+
+from armid_ros.arm import ArmModel
+from armid_ros.effects.load import Payload
+from armid_ros.errors import meant, ModelError
+from armid_ros.model import LINK_PARAMETERS
+from armid_ros.motion import FloatArray
+from armid_ros.robots import NO_MASS
+import numpy as np
+import pinocchio as pin
+
+
+@dataclass(frozen=True)
+class CarriedLoad:
+    """
+    A body fixed to a link of the robot.
+
+    Attributes
+    ----------
+    joint, frame : str
+        Joint that moves the load, and link whose frame the values are in.
+    body : pinocchio.Inertia
+        Mass [kg], centre of mass (lever) [m], and inertia about it [kg m^2] in the frame's axes.
+
+    """
+
+    joint: str
+    frame: str
+    body: pin.Inertia
+
+    def principal(self) -> tuple[FloatArray, FloatArray]:
+        """Return moments (3,) [kg m^2] and axes, columns (3, 3), as near to the frame's as any."""
+        moments, axes = np.linalg.eigh(self.body.inertia)
+        order = max(
+            map(list, permutations(range(3))),
+            key=lambda order: float(np.abs(np.diag(axes[:, order])).sum()),
+        )
+        axes = axes[:, order] * np.where(np.diag(axes[:, order]) < 0.0, -1.0, 1.0)
+        if np.linalg.det(axes) < 0.0:  # mirrored: turn the axis that is farthest from the frame's
+            axes[:, np.argmin(np.diag(axes))] *= -1.0
+        return moments[order], axes
+
+
+def load_of(arm: ArmModel, joint: str | None = None, frame: str | None = None) -> CarriedLoad:
+    """
+    Return the payload of a model in a frame of the robot.
+
+    Parameters
+    ----------
+    arm : ArmModel
+        The model, with the effect payload.
+    joint : str, optional
+        Joint that moves the payload, if there are payloads on several.
+    frame : str, optional
+        A link that moves with the payload; by default the last one along fixed joints.
+
+    Raises
+    ------
+    ModelError
+        There is no such payload or frame, or the mass is not positive.
+
+    """
+    payloads: dict[str, FloatArray] = {}
+    for effect, values in zip(arm.effects, arm.values, strict=True):
+        if isinstance(effect, Payload):
+            for owner, ten in zip(effect.joints, values.reshape(-1, 10), strict=True):
+                payloads[owner] = payloads.get(owner, np.zeros(len(LINK_PARAMETERS))) + ten
+    if not payloads:
+        raise ModelError(
+            f'the model of {arm.robot.name} has no payload to write: find it with armid diagnose '
+            '--baseline, and name the model.yaml of that result'
+        )
+    if joint is None and len(payloads) == 1:
+        (joint,) = payloads
+    if joint is None or joint not in payloads:
+        raise ModelError(f'payloads are on {", ".join(payloads)}: name the joint with --joint')
+    ten = payloads[joint]
+    if not ten[0] > NO_MASS:
+        raise ModelError(
+            f"the payload of joint '{joint}' has a mass of {ten[0]:.4g} kg, which no controller "
+            'takes: record the arm with and without it again'
+        )
+    model, number = arm.robot.model, arm.robot.index(joint) + 1
+    frames = [f for f in model.frames if (f.parentJoint, f.type) == (number, pin.FrameType.BODY)]
+    links = {str(one.name): one.placement for one in frames}
+    frame = frame or list(links)[-1]
+    if frame not in links:
+        raise ModelError(
+            f"'{frame}' is no link that moves with the payload of joint '{joint}': name "
+            f'{" or ".join(links)} with --frame{meant(frame, links)}'
+        )
+    return CarriedLoad(joint, frame, links[frame].actInv(pin.Inertia.FromDynamicParameters(ten)))
+
+
+def universal_robots(load: CarriedLoad) -> str:
+    """
+    Return a call of URScript; the frame has to be that of the tool flange.
+
+    Mass [kg], centre of gravity from the tool mount [m], and the inertia matrix [kg m^2] as Ixx,
+    Iyy, Izz, Ixy, Ixz, Iyz about the centre of gravity in the axes of the tool flange.
+    Source: Universal Robots, Script Manual, set_target_payload(m, cog, inertia).
+
+    """
+    body = load.body
+    six = body.inertia[[0, 1, 2, 0, 0, 1], [0, 1, 2, 1, 2, 2]]
+    return f'set_target_payload({_list(body.mass)}, [{_list(body.lever)}], [{_list(six)}])'
+
+
+def franka(load: CarriedLoad) -> str:
+    """
+    Return a call of libfranka; the frame has to be that of the flange.
+
+    Mass [kg], translation from the flange to the centre of mass [m], and the inertia matrix
+    [kg m^2] about the centre of mass, column-major.
+    Source: libfranka, franka::Robot::setLoad(load_mass, F_x_Cload, load_inertia);
+    franka::Model::mass for the point of the inertia.
+
+    """
+    body = load.body
+    inertia = _list(body.inertia.ravel(order='F'))
+    return f'robot.setLoad({_list(body.mass)}, {{{{{_list(body.lever)}}}}}, {{{{{inertia}}}}});'
+
+
+def kuka(load: CarriedLoad) -> str:
+    """
+    Return a line of $config.dat; the frame has to be that of the flange.
+
+    Mass M [kg], centre X, Y, Z [mm] and orientation A, B, C [deg] of the principal axes, which are
+    rotations about z, the new y and the new x; principal moments J [kg m^2].
+    Source: KUKA, MA KR IONTEC V4, Technical data, Load center of gravity and mass moment of
+    inertia; Beckhoff, TF5120, KRC_WriteLoadData, for the flange.
+
+    """
+    moments, axes = load.principal()
+    c, b, a = np.degrees(pin.rpy.matrixToRpy(axes))
+    values = [load.body.mass, *(1000.0 * load.body.lever), a, b, c, *moments]
+    form = 'LOAD_DATA[1]={{M {},CM {{X {},Y {},Z {},A {},B {},C {}}},J {{X {},Y {},Z {}}}}}'
+    return form.format(*map(_list, values))
+
+
+def abb(load: CarriedLoad) -> str:
+    """
+    Return a declaration of RAPID; the frame has to be that of the tool.
+
+    Mass [kg], centre of gravity [mm], orientation of the axes of moment as a quaternion, scalar
+    first, and moments of inertia about these axes [kg m^2]. A tload of tooldata is in the wrist
+    coordinate system instead.
+    Source: ABB, RAPID Reference Manual, Data types, loaddata and tooldata.
+
+    """
+    moments, axes = load.principal()
+    x, y, z, w = pin.Quaternion(axes).coeffs()
+    turn = np.array([w, x, y, z]) * (1.0 if w >= 0.0 else -1.0)
+    center = _list(1000.0 * load.body.lever)
+    parts = f'{_list(load.body.mass)}, [{center}], [{_list(turn)}], {_list(moments)}'
+    return f'PERS loaddata load1 := [{parts}];'
+
+
+#: How each maker writes a load and a comment.
+MAKERS: dict[str, tuple[Callable[[CarriedLoad], str], str]] = {
+    'ur': (universal_robots, '#'),
+    'franka': (franka, '//'),
+    'kuka': (kuka, ';'),
+    'abb': (abb, '!'),
+}
+
+
+def load_text(load: CarriedLoad, maker: str, source: str) -> tuple[str, tuple[str, ...]]:
+    """
+    Return the file of the load data of a maker, a key of `MAKERS`, and notes that are in it too.
+
+    An inertia that no body can have is written as zero, a point mass. The source of the load is
+    for the comment.
+
+    """
+    write, comment = MAKERS[maker]
+    place = 'tool (for a tload: the wrist)' if maker == 'abb' else 'flange'
+    notes = [f'values are in the frame of --frame {load.frame}; it has to be that of the {place}']
+    low, middle, high = np.linalg.eigvalsh(load.body.inertia)
+    if min(low, low + middle - high) < -1e-9 * abs(high):  # beyond rounding
+        notes.append(
+            f'no body has the principal moments {low:.3g}, {middle:.3g}, {high:.3g} kg m^2; the '
+            'inertia is written as zero'
+        )
+        point = pin.Inertia(load.body.mass, load.body.lever, np.zeros((3, 3)))
+        load = replace(load, body=point)
+    head = f"payload of joint '{load.joint}', written by armid export, from {source}"
+    lines = [f'{comment} {" ".join(line.split())}' for line in (head, *notes)]
+    return '\n'.join([*lines, write(load)]) + '\n', tuple(notes)
+
+
+def _list(values: FloatArray | float) -> str:
+    """Write numbers without exponents, to nine decimals."""
+    texts = [f'{value + 0.0:.9f}'.rstrip('0') for value in np.round(np.ravel(values), 9)]
+    return ', '.join(f'{text}0' if text.endswith('.') else text for text in texts)

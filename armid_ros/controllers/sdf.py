@@ -1,0 +1,56 @@
+# Copyright 2026 The armid_ros developers
+# SPDX-License-Identifier: Apache-2.0
+"""An SDF model of an identified arm, for Gazebo."""
+
+from __future__ import annotations
+
+from armid_ros.arm import ArmModel
+from armid_ros.arm.export import arm_urdf
+from armid_ros.motion import FloatArray
+from armid_ros.report.page import render
+from armid_ros.robots import held_joints
+import numpy as np
+import pinocchio as pin
+
+
+def arm_sdf(arm: ArmModel, source: str) -> tuple[str, tuple[str, ...]]:
+    """
+    Return an SDF 1.8 model of an arm that is fixed to the world, and what is not in it.
+
+    Links have the inertial parameters of the arm; joints have limits, and damping and friction as
+    in identified.urdf. The source of the arm is for the comment.
+    Source: SDFormat specification 1.8, joint and link.
+
+    Raises
+    ------
+    ModelError
+        If the parameters of a link are not those of a body.
+
+    """
+    robot, urdf = arm.body, arm_urdf(arm)
+    left_out = (
+        *urdf.without_place,
+        'shapes of links, which identified.urdf has',
+        *(f'joint {joint.name}, which is locked' for joint in held_joints(robot)),
+        f'gravity {_numbers(robot.gravity)} m/s^2 in the frame of {robot.base}, for the world',
+    )
+    lines = (f'written by armid export, from {source}; not in it:', *left_out)
+    values = {
+        'robot': robot,
+        'lines': [line.replace('--', '- -') for line in lines],
+        'limits': {
+            'lower': robot.lower,
+            'upper': robot.upper,
+            'effort': robot.torque_limit,
+            'velocity': robot.velocity_limit,
+        },
+        'friction': urdf.values,
+        'numbers': _numbers,
+        'angles': pin.rpy.matrixToRpy,
+        'infinity': np.inf,
+    }
+    return str(render('model.sdf', values, 'armid_ros.controllers')) + '\n', left_out
+
+
+def _numbers(values: FloatArray) -> str:
+    return ' '.join(repr(float(value)) for value in values)
