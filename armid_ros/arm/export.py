@@ -94,21 +94,10 @@ def place_values(
     arm: ArmModel, attribute: Callable[[Effect], str]
 ) -> tuple[dict[str, dict[str, float]], tuple[str, ...]]:
     """
-    Return the values of effects that a format has a place for, and a line for each other value.
+    Return values by attribute and joint, and a line for each that has no place in a format.
 
-    Parameters
-    ----------
-    arm : ArmModel
-        The arm; effects that change the body are part of it, and in neither.
-    attribute : callable
-        Name of the place of an effect in the format; empty if it has none.
-
-    Returns
-    -------
-    dict of str to dict of str to float
-        Values by attribute and joint.
-    tuple of str
-        Other values, as 'effect: parameter of joint = value unit'.
+    The attribute names the place of an effect, and is empty if there is none. Effects that change
+    the body are part of it, and in neither.
 
     """
     found: dict[str, dict[str, float]] = {}
