@@ -43,9 +43,7 @@ _KINDS_OF = {'joint': LOADS, 'frame': LOADS, 'spread': ('ranges',)}
     show_default=True,
     help='Prior standard deviation of masses and centres, as a share of the described value.',
 )
-@click.pass_context
 def export(
-    context: click.Context,
     model: Path,
     kind: str,
     out: Path,
@@ -64,6 +62,7 @@ def export(
     from armid_ros.files import write_file
     from armid_ros.identification.parameters_file import read_parameters
 
+    context = click.get_current_context()
     for name, kinds in _KINDS_OF.items():
         typed = context.get_parameter_source(name) is ParameterSource.COMMANDLINE
         if typed and kind not in kinds:

@@ -11,16 +11,12 @@ from typing import Any
 
 from armid_ros.arm import ArmModel
 from armid_ros.arm.export import place_values
+from armid_ros.effects import Effect
 import numpy as np
 import numpy.typing as npt
 
-#: Effects that the law has a table for.
-_TABLES = {
-    'viscous_friction': 'VISCOUS',
-    'coulomb_friction': 'COULOMB',
-    'torque_offset': 'OFFSET',
-    'rotor_inertia': 'ROTOR',
-}
+#: Tables of the law, by the attribute of MJCF that holds their values; an offset has none.
+_TABLES = {'damping': 'VISCOUS', 'frictionloss': 'COULOMB', 'armature': 'ROTOR', '': 'OFFSET'}
 #: Template of the law, brackets of a table, and sign of a comment.
 _LANGUAGES = {'cpp': ('torque.hpp', '{}', '//'), 'python': ('torque.py.txt', '[]', '#')}
 #: Speed up to which there is no Coulomb friction [rad/s or m/s]: the noise of a velocity at rest.
@@ -40,7 +36,7 @@ def torque_tables(arm: ArmModel) -> tuple[dict[str, npt.NDArray[Any]], tuple[str
         Parameters that the tables have no place for, as lines.
 
     """
-    placed, left_out = place_values(arm, lambda effect: _TABLES.get(effect.name, ''))
+    placed, left_out = place_values(arm, _table_of)
     rigid = arm.body.rigid_parameters.reshape(arm.robot.n_joints, -1)
     tables: dict[str, npt.NDArray[Any]] = {
         'GRAVITY': arm.body.gravity,
@@ -54,6 +50,12 @@ def torque_tables(arm: ArmModel) -> tuple[dict[str, npt.NDArray[Any]], tuple[str
         values = placed.get(name, {})
         tables[name] = np.array([values.get(joint, 0.0) for joint in arm.robot.joints])
     return tables, left_out
+
+
+def _table_of(effect: Effect) -> str:
+    """Return the table of the values of an effect; empty if there is none."""
+    traits = effect.traits
+    return _TABLES.get(traits.mjcf_attribute, '') if traits.mjcf_attribute or traits.usual else ''
 
 
 def torque_code(arm: ArmModel, language: str, source: str) -> tuple[str, tuple[str, ...]]:

@@ -9,7 +9,6 @@ from dataclasses import dataclass, replace
 from itertools import permutations
 
 from armid_ros.arm import ArmModel
-from armid_ros.effects.load import Payload
 from armid_ros.errors import meant, ModelError
 from armid_ros.model import LINK_PARAMETERS
 from armid_ros.motion import FloatArray
@@ -70,7 +69,7 @@ def load_of(arm: ArmModel, joint: str | None = None, frame: str | None = None) -
     """
     payloads: dict[str, FloatArray] = {}
     for effect, values in zip(arm.effects, arm.values, strict=True):
-        if isinstance(effect, Payload):
+        if effect.traits.weighs:
             for owner, ten in zip(effect.joints, values.reshape(-1, 10), strict=True):
                 payloads[owner] = payloads.get(owner, np.zeros(len(LINK_PARAMETERS))) + ten
     if not payloads:
