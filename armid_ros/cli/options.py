@@ -313,7 +313,7 @@ def read(paths: Sequence[Path], robot: Robot, topic: str | None) -> list[Recordi
     for path in paths if said.rename else ():
         if ':' in path.name and not path.exists():  # a second pair without an option of its own
             raise RecordingError(
-                f"there is no recording '{path}'; names to exchange need an option for each pair: "
+                f"there is no recording '{path}'; to rename several names, repeat the option: "
                 f"--rename '{said.rename[-1][0]}:{said.rename[-1][1]}' --rename '{path}'"
             )
     return [

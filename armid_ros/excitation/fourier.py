@@ -68,7 +68,9 @@ class FourierTrajectory:
                 f'{self.b.shape}; {n} joints with H harmonics need ({n},), ({n}, H) and ({n}, H)'
             )
         if not (np.isfinite(self.period) and self.period > 0.0):
-            raise TrajectoryError(f'Fourier trajectory: a period of {self.period} s')
+            raise TrajectoryError(
+                f'Fourier trajectory: the period has to be positive, not {self.period} s'
+            )
         for name in ('q0', 'a', 'b'):
             bad = ~np.isfinite(getattr(self, name).reshape(n, -1)).all(axis=1)
             if bad.any():

@@ -234,7 +234,7 @@ class DesignProblem:
         columns = _target_columns(whole, settings.target, motion)
         if not columns.any():
             raise TrajectoryError(
-                f"target '{settings.target}': {arm.robot.name} has no such parameter to see"
+                f"target '{settings.target}': {arm.robot.name} has no such parameter"
             )
         level = replace(whole, robot=levelled(whole.robot))
         flat = _target_columns(level, settings.target, motion).reshape(-1, columns.shape[-1])

@@ -45,7 +45,7 @@ class ReadSettings:
     memory_limit: int = field(default_factory=default_memory_limit)
 
     def __post_init__(self) -> None:
-        """Check the limit."""
+        """Raise RecordingError unless the memory limit is positive."""
         if self.memory_limit <= 0:
             raise RecordingError(f'memory_limit has to be positive, not {self.memory_limit}')
 

@@ -109,7 +109,7 @@ class NextRun:
 
 
 def _many(deviations: float) -> str:
-    """Format a z-score, from `_CERTAIN` on as "more than"."""
+    """Format a z-score; one above `_CERTAIN` becomes "more than" that."""
     return f'{deviations:.0f}' if deviations < _CERTAIN else f'more than {_CERTAIN:.0f}'
 
 

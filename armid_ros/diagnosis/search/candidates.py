@@ -303,7 +303,7 @@ def _unexplained(nuisance: Nuisance, under: Marginal) -> Unexplained:
 def candidate_effects(
     robot: Robot, kinds: Sequence[Kind]
 ) -> Iterator[tuple[Effect, list[Effect]]]:
-    """Yield effects whose columns are computed at once, each with its candidates per joint."""
+    """Yield each effect on all joints, with its candidates on single joints."""
     for kind in with_exact_vector(kinds):
         try:
             places = kind.places(robot)

@@ -126,7 +126,7 @@ def cutoff_of_torques(
     used: Conditioning,
 ) -> Conditioning:
     """
-    Lower the cut-off of positions while that improves held-out torque prediction.
+    Lower the cut-off of the position filter while held-out torques are predicted better.
 
     The chosen cut-off is the highest with a held-out loss within a tenth, or one standard error,
     of the least. So clean data keep their cut-off. Source of the standard error: Breiman et al.,

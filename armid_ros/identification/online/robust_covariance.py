@@ -276,7 +276,7 @@ def _shape(bands: _Bands, values: FloatArray) -> Pieces[tuple[FloatArray, FloatA
 
 
 def _triangle(information: FloatArray) -> FloatArray:
-    """Return R of R^T R; eigenvalues that rounding moved below the ridge are raised to it."""
+    """Return R with R^T R = information; eigenvalues below the ridge are raised to it."""
     try:
         return np.asarray(linalg.cholesky(information))
     except linalg.LinAlgError:

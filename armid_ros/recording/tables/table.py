@@ -256,7 +256,9 @@ def side_by_side(tables: Sequence[Table]) -> Table:
         return tables[0]
     if len({len(table) for table in tables}) > 1:
         counted = ', '.join(f'{table.source} has {len(table)} rows' for table in tables)
-        raise RecordingError(f'{counted}; files side by side hold the same samples')
+        raise RecordingError(
+            f'{counted}; files that are read side by side need the same number of samples'
+        )
     shared = Counter(name for table in tables for name in dict.fromkeys(table.names))
     columns: list[TableColumn] = []
     for table in tables:

@@ -210,7 +210,7 @@ def _driven(u: FloatArray, dt: float, poles: ComplexArray, hold: Hold) -> Comple
 
 
 def _real(modal: ComplexArray, states: ComplexArray, poles: ComplexArray) -> FloatArray:
-    """Return real columns, (p N, real unknowns), of outputs of modes and their conjugates."""
+    """Return the outputs of modes as real columns, two per conjugate pair, (p N, columns)."""
     columns = []
     for k, pole in enumerate(poles):
         output = np.outer(modal[:, k], states[:, k]).ravel()
