@@ -292,7 +292,7 @@ CLEARANCE = 0.01
 @dataclass(frozen=True)
 class Template:
     """
-    Template of a motion.
+    A kind of motion of some joints, to be scaled to the limits.
 
     Attributes
     ----------

@@ -74,7 +74,7 @@ class ResidualMarkersNode(ListeningNode):
         self.look_every(1.0 / self.value('rate'), self.draw)
 
     def condition(self) -> tuple[str, Mapping[str, object]]:
-        """Return what is missing to draw the arm, and the residual of each joint over its limit."""
+        """Return what is missing to draw the arm, and the share that colours each joint."""
         if self.robot is None:
             return self.awaited, {}
         if not np.isfinite(self._q).all():
