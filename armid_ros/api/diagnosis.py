@@ -191,6 +191,7 @@ class DiagnosisResult(ShownModel):
                 'training': self.recordings,
                 'held-out': self.held_out,
                 'baseline': self.baseline,
+                'simulator': self.simulated.recordings if self.simulated else (),
             },
             robot=origin.of(self.description.robot).robot,
             everything=self.settings.everything,

@@ -159,6 +159,7 @@ _ROLES = (
     ('training', 'recording', '{}'),
     ('held-out', 'held-out recording', '{}'),
     ('baseline', 'recording', '{} from before'),
+    ('simulator', 'recording', '{} of a simulator'),
 )
 
 
@@ -180,7 +181,8 @@ def diagnosis_report(
     diagnosis : Diagnosis
         What was found.
     read : mapping of str to sequence of Recording
-        Recordings by what they were used for: 'training', 'held-out', 'baseline'.
+        Recordings by what they were used for: 'training', 'held-out',
+        'baseline', 'simulator'.
     robot : str
         Shipped name or path of the description.
     everything : bool
