@@ -34,6 +34,8 @@ SHARE = 0.95
 _SHARE_FIRST = 0.75
 #: Number of occurrences of a step from which it is a step of the signal itself.
 SEEN = 3
+#: Samples that are processed together.
+_TOGETHER = 4096
 
 
 class NoiseLevel:
@@ -196,7 +198,8 @@ def line_errors(
 
     """
     dt, moves = np.diff(t), np.diff(x, axis=0)
-    moves -= np.rint(moves / np.where(turn > 0.0, turn, np.inf)) * turn
+    turns = np.flatnonzero(turn)
+    moves[:, turns] -= np.rint(moves[:, turns] / turn[turns]) * turn[turns]
     period = float(np.median(dt))
     gap = dt > max_gap * period
     first = np.where(np.concatenate([[True], gap]), np.arange(len(t)), 0)
@@ -205,7 +208,8 @@ def line_errors(
     bend = np.concatenate([[1.0, 1.0], 0.5 * dt[1:] * (dt[1:] + dt[:-1]) / period**2])
     noise, bend = noise[:, np.newaxis], bend[:, np.newaxis]
     error = np.zeros_like(x)
-    error[2:] = moves[1:] - ratio[:, np.newaxis] * moves[:-1]
+    np.multiply(ratio[:, np.newaxis], moves[:-1], out=error[2:])
+    np.subtract(moves[1:], error[2:], out=error[2:])
     error[2:][gap[1:] | gap[:-1]] = 0.0
     plain = error[2:] / np.maximum(noise, bend)[2:]
     count = max(1, len(plain) // WINDOW)
@@ -219,13 +223,22 @@ def line_errors(
     sizes = [robust_scale(part, SHARE) for part in windows]
     shares = [share_of_noise(*both) for both in zip(windows, sizes, strict=True)]
     usual = _loudest(period, np.concatenate(sizes), np.concatenate(shares))
-    smallest = _smallest(np.abs(moves))[-1]
-    least = np.minimum(np.where(np.isfinite(smallest), smallest, 0.0), np.abs(error).max(axis=0))
+    # parts that stay in the cache of the processor
+    parts = [slice(k, k + _TOGETHER) for k in range(0, len(x), _TOGETHER)]
+    steps, most = np.full((SEEN, signals), np.inf), np.zeros(signals)
+    for part in parts:
+        steps = _smallest(np.concatenate([steps, np.abs(moves[part])]))
+        most = np.maximum(most, np.abs(error[part]).max(axis=0))
+    least = np.minimum(np.where(np.isfinite(steps[-1]), steps[-1], 0.0), most)
     usual = replace(usual, size=np.maximum(usual.size, least))
-    bent = error / bend
-    error[3:] -= usual.smoothness * bent[2:-1] * bend[3:]
-    limit = np.maximum(usual.limits(quantile(period), noise, bend), floor)
-    off = np.abs(error) / np.maximum(limit, np.finfo(float).tiny)
+    floor = np.maximum(floor, np.finfo(float).tiny)
+    largest = quantile(period)
+    bent, off, kept = error / bend, np.abs(error), usual.smoothness
+    for part in parts:
+        own = slice(max(part.start, 3), part.stop)
+        before = slice(own.start - 1, min(own.stop, len(x)) - 1)
+        off[own] = np.abs(error[own] - kept * bent[before] * bend[own])
+        off[part] /= np.maximum(usual.limits(largest, noise[part], bend[part]), floor)
     return LineErrors(np.maximum.accumulate(first), off, bent, usual)
 
 
