@@ -177,7 +177,7 @@ $(STAMPS)/control_msgs: $(INTERFACES) msg_schemas/present_directories.cmake $(ST
 # Not editable, for pip then leaves out the files that ROS 2 looks for. What a build left behind
 # would be installed again, files that are gone included.
 $(STAMPS)/armid_ros: $(TREE) setup.py setup.cfg package.xml $(wildcard requirements/*.in) $(STAMPS)/armid_msgs
-	@rm -rf build/lib build/bdist.*
+	@rm -rf build/lib build/lib.* build/bdist.*
 	$(PIP) --no-deps --no-build-isolation --force-reinstall .
 	$(BIN)/python setup.py -q build_ext --inplace  # for what runs in this tree, the tests
 	@touch $@

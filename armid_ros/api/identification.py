@@ -58,6 +58,7 @@ from armid_ros.identification.identified_from import with_contents
 from armid_ros.identification.known_payload import corrected, drive_gains, DriveGains, payloads_of
 from armid_ros.identification.output import SCHEMA
 from armid_ros.identification.parameters_file import parameters_of
+from armid_ros.identification.physical.fit_among_bodies import far_from_described
 from armid_ros.identification.rows.checks import check_held_out
 from armid_ros.recording import Recording, require_once
 from armid_ros.recording.curves import draw_joints
@@ -279,7 +280,7 @@ class IdentificationResult(ShownModel):
         known = int(np.sum(excludes_zero(estimate.values, estimate.std)))
         count = f'{known} of {counted(len(estimate.parameters), "parameter")} differ from zero'
         unseen = core.theory.rank - core.base.rank
-        if unseen:
+        if unseen > 0:
             count += f'; {unseen} more cannot be identified from this motion'
         read = [*self.recordings, *self.held_out]
         damaged = [one for one in read if one.report.unwrapped or not one.report.unharmed]
@@ -296,6 +297,9 @@ class IdentificationResult(ShownModel):
             bodies = [f'no links that are bodies fit as well {grows}: --physical']
             if self.exports:
                 bodies = [f'links are bodies {grows}; {", ".join(self.exports)}']
+                bodies += far_from_described(
+                    self.description.robot, core.arm.robot.rigid_parameters[::10]
+                )
         columns = joint_columns(core, self.description, self.held_out_score)
         return Summary(
             self.graded.reasons[0],

@@ -18,6 +18,7 @@ from armid_ros.api.arguments import (
     RobotLike,
     spelled,
     topics_of,
+    USUAL,
 )
 from armid_ros.api.identification import identify
 from armid_ros.api.table import data_frame, DEFAULT_ORIGIN, ResultOrigin, Shown, Summary
@@ -276,6 +277,7 @@ def check(
     robot: RobotLike,
     recordings: RecordingLike | Sequence[RecordingLike] = (),
     *,
+    effects: str = USUAL,
     rng: Rng = 0,
 ) -> CheckResult:
     """
@@ -287,6 +289,8 @@ def check(
         The description.
     recordings : recording or path, or several, optional
         With torques; without, only the values of the description are checked.
+    effects : str
+        What the arm has besides its bodies, catalogue names with commas.
     rng : int or Generator
         Seed, or source of randomness.
 
@@ -312,7 +316,7 @@ def check(
     read = recordings_of(recordings, described)
     if not read:
         return CheckResult(described, remarks, None)
-    found = identify(described, read, physical=False, rng=rng)
+    found = identify(described, read, effects=effects, physical=False, rng=rng)
     graded = found.graded
     fault = next(iter(graded.faults), graded.reasons[0] if graded.word == 'unusable' else '')
     links = check_links(found.core, found.description, found.grade, fault)

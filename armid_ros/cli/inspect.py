@@ -92,12 +92,14 @@ def inspect(
 )
 @parameters.force
 @click.option('--strict', is_flag=True, help='End with code 3 if something is wrong.')
+@parameters.effects
 @columns.recordings
 def check(
     arguments: tuple[str, ...],
     robot_source: str | None,
     out: Path | None,
     strict: bool,
+    effects: str,
     topic: str | None,
     gravity: str,
     joints: str | None,
@@ -134,7 +136,7 @@ def check(
     staged = None if out is None else options.stage(out, CheckResult.schema, robot_source)
     robot = options.open_robot(robot_source, gravity, joints, bags, tell=False)
     with progress('checking'):
-        found = run(robot, options.read(bags, robot, topic), rng=seed)
+        found = run(robot, options.read(bags, robot, topic), effects=effects, rng=seed)
     source = [path for path in (Path(robot_source), *bags) if path.exists()]
     origin = ResultOrigin(robot_source, '', options.provenance(source, seed=seed))
     options.deliver(found, staged, origin, as_json)

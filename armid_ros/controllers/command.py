@@ -14,7 +14,7 @@ from click.core import ParameterSource
 
 #: Load data of makers, and all kinds in the order of the help.
 LOADS = ('ur', 'franka', 'kuka', 'abb')
-KINDS = ('cpp', 'python', *LOADS, 'ranges', 'sdf')
+KINDS = ('cpp', 'python', *LOADS, 'ranges', 'urdf', 'mjcf', 'sdf')
 #: Kinds that an option belongs to.
 _KINDS_OF = {'joint': LOADS, 'frame': LOADS, 'spread': ('ranges',)}
 
@@ -27,7 +27,7 @@ _KINDS_OF = {'joint': LOADS, 'frame': LOADS, 'spread': ('ranges',)}
     type=click.Choice(KINDS),
     required=True,
     help='Joint torque as C++ or Python; payload as load data of Universal Robots, Franka, KUKA '
-    'or ABB; ranges for domain randomisation; SDF for Gazebo.',
+    'or ABB; ranges for domain randomisation; URDF; MJCF for MuJoCo; SDF for Gazebo.',
 )
 @click.option(
     '--out', required=True, type=parameters.OutPath(path_type=Path), help='File to write.'
@@ -35,7 +35,10 @@ _KINDS_OF = {'joint': LOADS, 'frame': LOADS, 'spread': ('ranges',)}
 @parameters.robot_described(help='Shipped name or path; that of the model by default.')
 @parameters.joints
 @click.option('--joint', help='Joint that moves the payload; needed if several have one.')
-@click.option('--frame', help='Link whose frame the load data are in; the last one by default.')
+@click.option(
+    '--frame',
+    help='Link whose frame the load data are in; tool0, flange or the last one by default.',
+)
 @click.option(
     '--spread',
     type=click.FloatRange(0.0, min_open=True),
@@ -58,7 +61,7 @@ def export(
     from armid_ros.controllers.dynamics import torque_code
     from armid_ros.controllers.loads import load_of, load_text
     from armid_ros.controllers.ranges import ranges_text
-    from armid_ros.controllers.sdf import arm_sdf
+    from armid_ros.controllers.sdf import arm_sdf, mjcf_of, urdf_of
     from armid_ros.files import write_file
     from armid_ros.identification.parameters_file import read_parameters
 
@@ -85,7 +88,7 @@ def export(
     elif kind == 'ranges':
         text = ranges_text(arm, read_parameters(model), spread, str(model))
     else:
-        text, left_out = arm_sdf(arm, str(model))
+        text, left_out = {'urdf': urdf_of, 'mjcf': mjcf_of, 'sdf': arm_sdf}[kind](arm, str(model))
         notes = tuple(f'not in the model: {line}' for line in left_out)
     write_file(out, text)
     for note in notes:

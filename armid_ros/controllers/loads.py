@@ -59,7 +59,8 @@ def load_of(arm: ArmModel, joint: str | None = None, frame: str | None = None) -
     joint : str, optional
         Joint that moves the payload, if there are payloads on several.
     frame : str, optional
-        A link that moves with the payload; by default the last one along fixed joints.
+        A link that moves with the payload; by default tool0, flange, or the last one
+        along fixed joints.
 
     Raises
     ------
@@ -90,7 +91,9 @@ def load_of(arm: ArmModel, joint: str | None = None, frame: str | None = None) -
     model, number = arm.robot.model, arm.robot.index(joint) + 1
     frames = [f for f in model.frames if (f.parentJoint, f.type) == (number, pin.FrameType.BODY)]
     links = {str(one.name): one.placement for one in frames}
-    frame = frame or list(links)[-1]
+    # ROS-Industrial calls the frame of a flange tool0 or flange
+    usual = [name for name in ('tool0', 'flange') if name in links]
+    frame = frame or [*links, *usual[::-1]][-1]
     if frame not in links:
         raise ModelError(
             f"'{frame}' is no link that moves with the payload of joint '{joint}': name "

@@ -1,16 +1,31 @@
 # Copyright 2026 The armid_ros developers
 # SPDX-License-Identifier: Apache-2.0
-"""An SDF model of an identified arm, for Gazebo."""
+"""A description of an identified arm for simulators: URDF, MJCF and SDF."""
 
 from __future__ import annotations
 
 from armid_ros.arm import ArmModel
-from armid_ros.arm.export import arm_urdf
+from armid_ros.arm.export import arm_mjcf, arm_urdf, Exported
 from armid_ros.motion import FloatArray
 from armid_ros.report.page import render
 from armid_ros.robots import held_joints
 import numpy as np
 import pinocchio as pin
+
+
+def urdf_of(arm: ArmModel, source: str) -> tuple[str, tuple[str, ...]]:
+    """Return the URDF of an arm, and what is not in it; see `arm_urdf`."""
+    return _with_source(arm_urdf(arm), '<robot', source)
+
+
+def mjcf_of(arm: ArmModel, source: str) -> tuple[str, tuple[str, ...]]:
+    """Return the MJCF of an arm, and what is not in it; see `arm_mjcf`."""
+    return _with_source(arm_mjcf(arm), '<mujoco', source)
+
+
+def _with_source(exported: Exported, root: str, source: str) -> tuple[str, tuple[str, ...]]:
+    comment = f'<!-- written by armid export, from {source.replace("--", "- -")} -->'
+    return exported.text.replace(root, f'{comment}\n{root}', 1), exported.without_place
 
 
 def arm_sdf(arm: ArmModel, source: str) -> tuple[str, tuple[str, ...]]:

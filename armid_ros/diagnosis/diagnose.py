@@ -19,7 +19,7 @@ from armid_ros.diagnosis.data.baseline import Baseline
 from armid_ros.diagnosis.data.evidence import Evidence, noise_floor
 from armid_ros.diagnosis.data.trajectory import not_shown, trajectories, Trajectory
 from armid_ros.diagnosis.doubt import doubt_of, doubt_of_names
-from armid_ros.diagnosis.prepare import choose_filters, mended, prepare
+from armid_ros.diagnosis.prepare import choose_filters, mended, prepare, with_friction
 from armid_ros.diagnosis.search.choice import Explainer
 from armid_ros.diagnosis.search.explanation import as_bodies, Chosen, Explanation, NOISE
 from armid_ros.diagnosis.search.spans import acting_spans, Span
@@ -289,6 +289,8 @@ def _said(
     places = where_it_is(explanation, (unseen or evidence) if found else open_in, settings)
     hidden = set() if explanation.survey is None else explanation.survey.hidden
     hidden -= {finding.name for finding in found}
+    if before is None:  # what is fitted with every cause is seen in its own values
+        hidden -= {effect.name for effect in with_friction(arm, settings.library)[1]}
     explainer.tell(1.0, word.word)
     remarks = _remarks(found, worse, chosen, word, doubt, explainer)
     return Diagnosis(

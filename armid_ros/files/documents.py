@@ -30,7 +30,12 @@ LARGEST = 1e100
 MAX_NODES = 2_000_000
 
 # The parser in C, where there is one, is ten times as fast.
-_LOADER: type[Any] = getattr(yaml, 'CSafeLoader', yaml.SafeLoader)
+_Loader: Any = type('_Loader', (getattr(yaml, 'CSafeLoader', yaml.SafeLoader),), {})
+# Angles of joint_limits.yaml, such as '!degrees 90'.
+for _unit, _factor in (('!degrees', math.pi / 180.0), ('!radians', 1.0)):
+    _Loader.add_constructor(
+        _unit, lambda loader, node, factor=_factor: factor * float(loader.construct_scalar(node))
+    )
 #: Errors that code can raise while it reads a document with unexpected content.
 _UNEXPECTED = (
     ArithmeticError,
@@ -108,7 +113,7 @@ def load_yaml(text: str) -> Any:
 
     """
     _check_size(text)
-    return yaml.load(text, Loader=_LOADER)
+    return yaml.load(text, Loader=_Loader)
 
 
 def yaml_line(text: str, place: Sequence[str | int]) -> int:
@@ -123,7 +128,7 @@ def yaml_line(text: str, place: Sequence[str | int]) -> int:
         Keys and positions that lead to the entry; if it does not exist, the last existing one.
 
     """
-    node: Any = yaml.compose(text, Loader=_LOADER)
+    node: Any = yaml.compose(text, Loader=_Loader)
     mark = node.start_mark
     for part in place:
         if isinstance(node, yaml.MappingNode):
@@ -157,7 +162,7 @@ def _check_size(text: str) -> None:
     open_nodes: list[tuple[str | None, int]] = []
     sizes: dict[str, int] = {}
     total = 0
-    for event in yaml.parse(text, Loader=_LOADER):
+    for event in yaml.parse(text, Loader=_Loader):
         if isinstance(event, yaml.AliasEvent):
             total += _written_out(event, sizes)
         elif isinstance(event, (yaml.SequenceStartEvent, yaml.MappingStartEvent)):

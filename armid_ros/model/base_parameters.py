@@ -29,6 +29,8 @@ import numpy.typing as npt
 #: Part of a unit column beyond the kept columns, below which it is dependent. It is 1e-15 to 1e-13
 #: for dependent columns, by rounding, and rarely below 1e-5 for independent ones.
 RANK_TOLERANCE = 1e-9
+#: Smallest factor that a name states. Angles rounded to four digits make factors of 4e-6.
+_NAMED = 1e-5
 
 
 #: Share of gravity across an axis below which gravity counts as along the axis, as angles of a
@@ -260,7 +262,7 @@ def _expression(row: FloatArray, leader: int, standard: tuple[ParameterName, ...
     """Format a grouping with equal factors in front of their sum."""
     text = standard[leader].name
     factors: dict[float, list[tuple[float, str]]] = {}
-    for column in np.flatnonzero(row):
+    for column in np.flatnonzero(np.abs(row) >= _NAMED):
         if column != leader:
             factor = float(f'{abs(row[column]):.6g}')
             sign = float(np.sign(row[column]))

@@ -35,7 +35,7 @@ def carrying(*loads):
 
 
 def test_by_hand_in_the_frame_of_the_flange():
-    load = load_of(carrying(('roll', HAND)), frame='flange')
+    load = load_of(carrying(('roll', HAND)))  # the flange by default
     call = 'set_target_payload(2.0, [0.0, -0.04, 0.05], [0.02, 0.01, 0.025, 0.0, 0.0, 0.0])'
     assert universal_robots(load) == call
     nine = '0.02, 0.0, 0.0, 0.0, 0.01, 0.0, 0.0, 0.0, 0.025'
@@ -45,7 +45,7 @@ def test_by_hand_in_the_frame_of_the_flange():
     parts = '2.0, [0.0, -40.0, 50.0], [1.0, 0.0, 0.0, 0.0], 0.02, 0.01, 0.025'
     assert abb(load) == f'PERS loaddata load1 := [{parts}];'
     # the axes of the tool, the last link, are 30 degrees behind those of the flange
-    tool = load_of(carrying(('roll', HAND)))
+    tool = load_of(carrying(('roll', HAND)), frame='tool')
     assert kuka(tool).endswith(',A 30.0,B 0.0,C 0.0},J {X 0.02,Y 0.01,Z 0.025}}')
     assert '[0.965925826, 0.0, 0.0, 0.258819045], 0.02, 0.01, 0.025]' in abb(tool)
 

@@ -2,6 +2,8 @@
 # SPDX-License-Identifier: Apache-2.0
 """Documents are bounded before they are built, and what a parser raises names the file."""
 
+import math
+
 from armid_ros.errors import ModelError, visible
 from armid_ros.files import finite, load_yaml, reading, yaml_line
 import pytest
@@ -56,3 +58,8 @@ def test_a_number_is_finite_and_of_a_size_that_arithmetic_bears(value):
 def test_an_escape_sequence_in_a_name_is_spelled_out():
     assert visible('elbow\x1b[2J\u202e') == 'elbow\\x1b[2J\\u202e'
     assert str(ModelError("joint '\x1b]0;x\x07'")) == "joint '\\x1b]0;x\\x07'"
+
+
+def test_angles_have_the_tags_of_joint_limits():
+    limits = load_yaml('{lower: !degrees -180.0, upper: !radians 1.5, speed: 2.0}')
+    assert limits == {'lower': -math.pi, 'upper': 1.5, 'speed': 2.0}

@@ -198,7 +198,7 @@ def _bodies(
         weight=weight,
         tried=tried,
         misfit_ratio=max(_misfit(whole, values) / least, 1.0),
-        notes=(*notes, *_heavy(arm.robot, rigid)),
+        notes=(*notes, *far_from_described(arm.robot, rigid[:, 0])),
         at_mass=tuple(link for link, at in zip(arm.robot.links, off, strict=True) if at),
     )
     found = arm.with_theta(theta)
@@ -206,18 +206,18 @@ def _bodies(
     return replace(fit, arm=found, values=values, predicted=predicted), certificate
 
 
-def _heavy(robot: Robot, rigid: FloatArray) -> tuple[str, ...]:
-    """Return at most one note, on links far heavier than described; `rigid` is (n, 10)."""
+def far_from_described(robot: Robot, masses: FloatArray) -> tuple[str, ...]:
+    """Return at most one note, on links whose mass, (n,) [kg], is far from the description."""
     described = robot.rigid_parameters[::PER_LINK]
     named = [
-        f'{link} {found:.3g} kg, described {mass:.3g} kg'
-        for link, found, mass in zip(robot.links, rigid[:, 0], described, strict=True)
-        if found > HEAVY * mass > 0.0
+        f'{link} {mass:.3g} kg, described {known:.3g} kg'
+        for link, known, mass in zip(robot.links, described, masses, strict=True)
+        if known > 0.0 and not known / HEAVY <= mass <= HEAVY * known
     ]
     if not named:
         return ()
     return (
-        f'more than {HEAVY:g} times as heavy as described: {"; ".join(named)}; correct the '
+        f'masses more than {HEAVY:g} times off the description: {"; ".join(named)}; correct the '
         'masses, or add what is missing, such as rotors, springs or a load',
     )
 

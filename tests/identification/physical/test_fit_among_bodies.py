@@ -199,6 +199,6 @@ def test_masses_far_beyond_the_described_are_said(arm, recording):
     light[5] *= 0.02
     structure = ArmModel(arm.robot.with_inertias(light.ravel()), arm.effects)
     result = run(structure, recording, PhysicalSettings())
-    (note,) = (n for n in result.notes if 'as heavy' in n)
+    (note,) = (n for n in result.notes if 'off the description' in n)
     assert arm.robot.links[5] in note
     assert arm.robot.links[0] not in note
