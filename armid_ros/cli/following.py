@@ -66,7 +66,7 @@ def following(then: str, result: Shown) -> str:
         more += ['--out', next(one for one in chain([path], others) if not one.exists())]
     words = ['--robot', robot] if then in _ALONE else [*bags, '--robot', robot]
     words = [robot, *bags] if then == 'check' else words
-    kept = {'gravity', 'joints'}
+    kept = {'gravity', 'joints', *(['effects'] if then == 'check' else [])}
     if then == own:
         kept = {str(one.name) for one in context.command.params} - _OWN
     elif then not in _ALONE:

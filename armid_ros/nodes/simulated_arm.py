@@ -197,6 +197,11 @@ class SimulatedArmNode(ArmidNode):
         return (self._origin_ns or 0) + self._arm.state.steps * self._dt_ns
 
     @property
+    def joint_state(self) -> JointState:
+        """Return the last published joint state."""
+        return self._message
+
+    @property
     def moving(self) -> bool:
         """Return whether a trajectory is under way or about to begin."""
         return self._pending is not None or self._arm.state.t < self._arm.ends_at
