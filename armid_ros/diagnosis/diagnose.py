@@ -287,10 +287,6 @@ def _said(
         explanation = replace(explanation, reference=explanation.fitted)
     open_in = measured.shown_in(left, explanation)
     places = where_it_is(explanation, (unseen or evidence) if found else open_in, settings)
-    hidden = set() if explanation.survey is None else explanation.survey.hidden
-    hidden -= {finding.name for finding in found}
-    if before is None:  # what is fitted with every cause is seen in its own values
-        hidden -= {effect.name for effect in with_friction(arm, settings.library)[1]}
     explainer.tell(1.0, word.word)
     remarks = _remarks(found, worse, chosen, word, doubt, explainer)
     return Diagnosis(
@@ -304,13 +300,24 @@ def _said(
         explanation=explanation.forgetting(),
         arm=plain_arm(patched) if found and not worse else given,
         data=tuple(evidence.data),
-        not_visible=tuple(kind.name for kind in settings.kinds if kind.name in hidden),
+        not_visible=_not_visible(explanation, found, explainer),
         refitted=explanation.refitted,
         notes=tuple(note for note in notes if note not in remarks),
         baseline=chosen.floor_in_words,
         harmful=bool(found and worse),
         doubt=doubt,
     )
+
+
+def _not_visible(
+    explanation: Explanation, found: Sequence[Finding], explainer: Explainer
+) -> tuple[str, ...]:
+    """Return the effects that no place shows, in the order of the catalogue."""
+    hidden = set() if explanation.survey is None else explanation.survey.hidden
+    hidden -= {finding.name for finding in found}
+    if explainer.baseline is None:  # what is fitted with every cause is seen in its own values
+        hidden -= {one.name for one in with_friction(explainer.arm, explainer.settings.library)[1]}
+    return tuple(kind.name for kind in explainer.settings.kinds if kind.name in hidden)
 
 
 def _remarks(
