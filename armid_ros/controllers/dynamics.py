@@ -11,7 +11,7 @@ from typing import Any
 
 from armid_ros.arm import ArmModel
 from armid_ros.arm.export import place_values
-from armid_ros.effects import Effect
+from armid_ros.effects import Effect, USUAL_EFFECTS
 import numpy as np
 import numpy.typing as npt
 
@@ -54,8 +54,9 @@ def torque_tables(arm: ArmModel) -> tuple[dict[str, npt.NDArray[Any]], tuple[str
 
 def _table_of(effect: Effect) -> str:
     """Return the table of the values of an effect; empty if there is none."""
-    traits = effect.traits
-    return _TABLES.get(traits.mjcf_attribute, '') if traits.mjcf_attribute or traits.usual else ''
+    attribute = effect.traits.mjcf_attribute
+    known = attribute or effect.name in USUAL_EFFECTS  # not an effect of a user, of another law
+    return _TABLES.get(attribute, '') if known else ''
 
 
 def torque_code(arm: ArmModel, language: str, source: str) -> tuple[str, tuple[str, ...]]:

@@ -70,7 +70,7 @@ def load_of(arm: ArmModel, joint: str | None = None, frame: str | None = None) -
     """
     payloads: dict[str, FloatArray] = {}
     for effect, values in zip(arm.effects, arm.values, strict=True):
-        if effect.traits.weighs:
+        if effect.traits.weighs and len(effect.quantities) == len(LINK_PARAMETERS):
             for owner, ten in zip(effect.joints, values.reshape(-1, 10), strict=True):
                 payloads[owner] = payloads.get(owner, np.zeros(len(LINK_PARAMETERS))) + ten
     if not payloads:
