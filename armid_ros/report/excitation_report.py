@@ -46,14 +46,12 @@ from armid_ros.report.judgement import GOOD_CONDITION, WEAK_CONDITION
 from armid_ros.report.notation import counted, digits, plain, pretty, robot_label
 from armid_ros.report.page import Page, Section
 from armid_ros.report.provenance import Provenance
-from armid_ros.report.sections.diagnosed import isolability_section
+from armid_ros.report.sections.diagnosed import isolability_section, SHADE
 from armid_ros.report.sections.fit import ZOOM
 from armid_ros.report.sections.frame import Origin, VerdictSection
 import numpy as np
 
 _SAMPLES, _POSES, _WAY = 600, 6, 150
-#: Background of the largest harmonic of a joint [%].
-_SHADE = 55.0
 
 
 def excitation_report(
@@ -350,7 +348,7 @@ def _harmonics_section(trajectory: FourierTrajectory) -> ContentSection:
         (
             joint,
             *(
-                TableCell(digits(a), shade=round(_SHADE * s))
+                TableCell(digits(a), shade=round(SHADE * s))
                 for a, s in zip(size[j], share[j], strict=True)
             ),
         )

@@ -14,7 +14,7 @@ from dataclasses import dataclass
 from typing import Any
 
 from armid_ros.arm import ArmModel
-from armid_ros.diagnosis.next_run.separation import basis_of
+from armid_ros.diagnosis.next_run.separation import basis_of, informative_weight
 from armid_ros.diagnosis.search.candidates import candidate_effects
 from armid_ros.diagnosis.settings import DiagnosisSettings
 from armid_ros.diagnosis.verdict.document import Detectable, is_possible, SHOWS
@@ -26,8 +26,6 @@ import numpy.typing as npt
 #: Least share of the torque of an effect that a distinguishable other one cannot reproduce: the
 #: effect then has to be ten times its detectable size for the difference to be detectable.
 DISTINCT = 0.1
-#: A joint slower than this share of its top speed is not informative: dry friction is arbitrary.
-_SLOW = 0.02
 
 
 @dataclass(frozen=True)
@@ -110,8 +108,7 @@ def isolability(arm: ArmModel, motion: Motion, noise: FloatArray, samples: float
         Number of samples that are recorded.
 
     """
-    moving = np.abs(motion.dq) > _SLOW * np.abs(motion.dq).max(axis=0)
-    weight = np.where(moving, np.sqrt(samples / len(motion)) / noise, 0.0)[:, :, np.newaxis]
+    weight = informative_weight(motion, samples / len(motion), noise)[:, :, np.newaxis]
     found, bases = list[Detectable](), list[FloatArray]()
     for _, members in candidate_effects(arm.robot, DiagnosisSettings().kinds):
         for effect in members:

@@ -196,6 +196,11 @@ def _weight(diagnosis: Diagnosis, motion: Motion) -> FloatArray:
     used = diagnosis.data[0].used
     rows = used.rate_hz / used.decimation / _RATE
     sigma = np.sqrt(np.mean([unit**2 for unit in diagnosis.explanation.evidence.sigma], axis=0))
+    return informative_weight(motion, rows, sigma)
+
+
+def informative_weight(motion: Motion, rows: float, sigma: FloatArray) -> FloatArray:
+    """Return sqrt(rows per sample) / sigma where a joint moves, and zero elsewhere, (N, n)."""
     moving = np.abs(motion.dq) > _SLOW * np.abs(motion.dq).max(axis=0)
     return np.asarray(np.where(moving, np.sqrt(rows) / sigma, 0.0))
 

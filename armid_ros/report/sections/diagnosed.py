@@ -51,8 +51,8 @@ _JOINTS, _CANDIDATES = 3, 15
 _MEAN_SAID = 0.005
 #: Standard deviations by which a value has to differ from zero, and from what is possible.
 _SIGNIFICANT = 3.0
-#: Background of equal effects [%].
-_SHADE = 55.0
+#: Background of the largest of several cells [%].
+SHADE = 55.0
 _DETECTABLE = (
     'Effect',
     'Detectable from',
@@ -249,7 +249,7 @@ def isolability_section(isolability: Isolability) -> ContentSection:
         (
             f'{k + 1} {name}',
             *(
-                TableCell('=' if near[k, j] else '', shade=round(_SHADE * (1.0 - apart[k, j])))
+                TableCell('=' if near[k, j] else '', shade=round(SHADE * (1.0 - apart[k, j])))
                 for j in range(len(kinds))
             ),
         )
