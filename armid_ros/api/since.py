@@ -71,7 +71,7 @@ def model_in_question(
     rng: Rng,
 ) -> tuple[RobotLike | IdentificationResult, ArmModel, IdentificationResult | None]:
     """
-    Return what is believed of an arm, its model, and the identification of a simulator.
+    Return the given or simulated arm, its model, and the identification of a simulator.
 
     The model of a simulator is identified from its recordings (`against`). Without given effects,
     it has those that nearly every joint has or a MJCF describes.

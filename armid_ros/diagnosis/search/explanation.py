@@ -126,7 +126,7 @@ class Chosen:
         Notes for the reader of the report.
     untested : str
         Sentence on the recordings that would separate a change from the misfit of another motion.
-        If it is not empty, named causes have to explain most of the gap.
+        If it is not empty, and there is a baseline, named causes have to explain most of the gap.
     look : Look or None
         The first comparison of all causes.
 
