@@ -136,7 +136,7 @@ def test_a_missing_argument_is_named_with_those_that_there_are(workspace):
         load_robot(path)
     for part in ("'kind'", str(macro), f"{path} kind:=VALUE'", "grep '<xacro:arg'"):
         assert part in str(refused.value)
-    with pytest.raises(RobotError, match="'prefx'.*did you mean 'prefix'"):
+    with pytest.raises(RobotError, match=r"'prefx'.*did you mean 'prefix'"):
         load_robot(f'{path} kind:=base prefx:=b')
 
 
