@@ -113,11 +113,12 @@ def _refit(as_it_is: Excess | None, robot: Robot, floor_in_words: str) -> str:
     """Return a sentence on the refit, with the error of body and friction as given."""
     if as_it_is is None or as_it_is.ratio.max() <= 1.0:
         return ''
-    joint = robot.joints[int(np.argmax(as_it_is.ratio))]
+    worst = int(np.argmax(as_it_is.ratio))
     times = larger(np.sqrt(as_it_is.ratio.max()))
     return (
-        f'Rigid body and friction were refitted: as given, the error of {joint} is {times} '
-        f'expected from {floor_in_words}. '
+        f'Rigid body and friction were refitted: as given, the error of {robot.joints[worst]} is '
+        f'{times} expected from {floor_in_words}. armid check ROBOT BAG compares the links, '
+        f'{robot.links[worst]} first. '
     )
 
 
