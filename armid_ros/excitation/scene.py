@@ -145,8 +145,7 @@ class CollisionScene:
             and link not in (*with_body, *self.collision.left_out)
         ]
         if bare:
-            origin = 'at most the origin of the joint is checked'
-            found.append(f'bodies of {_listed(bare)} (no collision body; {origin})')
+            found.append(f'bodies of {_listed(bare)} (no collision body; joint origins only)')
         if self.collision.touching:
             pairs = [f'{first} and {second}' for first, second in self.collision.touching]
             found.append(f'the clearance of {_listed(pairs)} (touch at zero, no SRDF)')

@@ -201,7 +201,7 @@ def _of_residuals(result: Identification, fits: Sequence[Fit]) -> Iterator[Cauti
     if not known.all():
         yield (
             f'{int(np.sum(~known))} of {len(known)} parameters are not distinguishable from '
-            'zero: do not use their single values.',
+            'zero: use the torque of the model, not their single values.',
             '',
         )
     if result.condition_number > WEAK_CONDITION:

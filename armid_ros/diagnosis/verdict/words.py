@@ -85,7 +85,7 @@ def decide(
     small = sentence(minor[0], 'the gap' if open_gap else 'the remaining error') if shown else ''
     if not findings:
         if open_gap:
-            text = f'No effect in the catalogue explains {error}: it is {size}.'
+            text = f'No effect in the catalogue explains {error}. It is {size}.'
             text += f' Best candidate: {small}' if small else ''
             return Verdict('unknown', f'{text} {refit}'.rstrip())
         text = f'The model explains the recordings: the remaining error {no_larger}'

@@ -160,7 +160,7 @@ def _errors(
     """Yield the reason of the worst joint, and joints whose torque is hardly predicted."""
     use = {
         'good': '',
-        'poor': ', too large to compute torques with the model',
+        'poor': ', too large to compute torques',
         'unusable': ': the model does not describe this motion',
     }
     for bag, one in sorted(worst.items(), key=lambda item: -item[1].beyond):
