@@ -165,7 +165,7 @@ _REMEDIES = {
     'the floor': 'the height of the floor (--floor Z)',
     'mesh not found': 'the folder of the meshes (--package P=FOLDER)',
     'no collision body': '<collision> in the description',
-    'no SRDF': 'an SRDF beside the description',
+    'no SRDF': 'an SRDF next to the description',
     'no limit': 'limits (--joint-limits, --velocity or <limit>)',
     'no inertia': '<inertial> in the description',
 }

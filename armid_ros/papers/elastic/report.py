@@ -197,7 +197,7 @@ def responses_section(result: TwoInertiaIdentification) -> ContentSection:
     text = (
         'Motor velocity per motor torque at each frequency. The dip is the link swinging on its '
         'spring (antiresonance), the peak motor and link against each other (resonance). Without '
-        'the torque of the other joint (decoupled), a joint is one motor and one link on a spring. '
+        'the torque of the other joint (decoupled), a joint is a motor and a link on a spring. '
         'Drag across a plot, or pinch it, to zoom; double-click or double-tap to see it all.'
     )
     hint = (

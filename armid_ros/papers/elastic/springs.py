@@ -58,7 +58,7 @@ def _springs(found: Sequence[SpringEstimate]) -> ContentSection:
         motors.append((one.joint, f'{one.inertia:.3g}', *own, *both))
     text = (
         'A motor twists against its link by the torque of the rigid body over the stiffness. '
-        'Backlash adds a step where the load changes sides; with a correlation near ±1 the two are '
+        'Backlash adds a step where the load changes sides; with a correlation near ±1 they are '
         'not distinguishable. R² is the explained share of the twist.'
     )
     hint = (
