@@ -159,7 +159,7 @@ def _of_some_size(text: str, robot: Robot) -> tuple[Effect, FloatArray]:
             + (f', and the shape {shapes}' if shapes else '')
             + f'; write {text.partition(":")[0]}:{first}=0.1'
         )
-    if effect.name == 'payload':
+    if effect.traits.weighs:
         _tell_impossible(text, values, robot)
     return effect, values
 
