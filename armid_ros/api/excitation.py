@@ -29,6 +29,7 @@ from armid_ros.excitation import (
     TransferPlanner,
 )
 from armid_ros.excitation.problem import torque_noise
+from armid_ros.excitation.scene import UNFIT
 from armid_ros.files import json_text, settled, write_file
 from armid_ros.motion import FloatArray, Motion
 from armid_ros.recording import write_joint_trajectory
@@ -42,6 +43,8 @@ if TYPE_CHECKING:
 
 #: Waypoints per second of a JointTrajectory; controllers interpolate between them.
 WAYPOINT_RATE = 50.0
+#: Word of a result without a way to its trajectory.
+NO_WAY = 'no trajectory'
 #: Name of the bag.
 BAG = 'trajectory'
 
@@ -198,7 +201,10 @@ class ExcitationResult(Shown):
             robot=origin.of(self.arm.robot).robot,
             scene=self.scene,
             isolability=self.isolability if self.with_isolability else None,
-            provenance=replace(origin.provenance or Provenance(), step=self.next_step(origin)),
+            provenance=replace(
+                origin.provenance or Provenance(),
+                step=self.fitness.remedy or self.next_step(origin),
+            ),
         )
 
     def fill(self, folder: Path, origin: ResultOrigin = DEFAULT_ORIGIN) -> dict[str, Any]:
@@ -237,37 +243,38 @@ class ExcitationResult(Shown):
             (joint, *(f'{100 * share[k]:.0f} %' for share in shares.values()))
             for k, joint in enumerate(self.arm.robot.joints)
         ]
-        first, *more = identifiable(self.core, self.arm.robot.links)
-        more += [str(self.isolability)] if self.with_isolability else []
-        word, lines = self._of_run()
+        seen = identifiable(self.core, self.arm.robot.links)
+        seen += [str(self.isolability)] if self.with_isolability else []
+        word, (first, *lines), remedy = self._of_run()
         return Summary(
             first,
             word,
             ('joint', *(f'{name} used' for name in shares)),
             rows,
-            [*lines, *more],
-            then='simulate',
+            [*lines, *seen],
+            [remedy] if remedy else [],
+            then='' if word in (UNFIT, NO_WAY) else 'simulate',
         )
 
-    def _of_run(self) -> tuple[str, list[str]]:
-        """Return the fitness of the run in a word, and sentences on its start and its search."""
+    def _of_run(self) -> tuple[str, list[str], str]:
+        """Return the fitness of the run, sentences on it and its search, and what makes it fit."""
         try:
             run, fit = self.run, self.fitness
         except TrajectoryError as error:
-            return 'no trajectory', [f'there is no way to the trajectory: {error}']
+            found = f'There is no way to the trajectory: {error}.'
+            return NO_WAY, [found], 'Give another --start or --seed.'
         robot = self.arm.robot
         fault = '' if self.given_start is not None else self.planner.fault(robot.zero_pose)
         parts = zip(robot.joints, self.start, robot.position_units, strict=True)
         pose = [f'{joint} {value:.3g} {unit}' for joint, value, unit in parts if value]
-        lines = ['not checked: ' + '; '.join(fit.unchecked)] if fit.unchecked else []
-        lines.append(str(fit).removeprefix(f'{fit.word}: ').partition('; not checked: ')[0])
+        lines = fit.sentences()
         lines.append(
             f'starts at rest at {", ".join(pose) or "zero"}, is on the trajectory after '
             f'{run.approach.duration:.1f} s and back after {run.duration:.1f} s'
         )
         lines += [f'the zero of the description is not free: {fault}'] if fault else []
         early = f'stopped early ({self.core.stopped}): not what the seed would give'
-        return fit.word, [*lines, early] if self.core.stopped else lines
+        return fit.word, [*lines, early] if self.core.stopped else lines, fit.remedy
 
 
 def planner_of(arm: ArmModel, settings: DesignSettings, scene: CollisionScene) -> TransferPlanner:

@@ -109,8 +109,8 @@ def check(
     """
     Check a URDF: alone, or against recordings.
 
-    R is a URDF, MJCF or xacro ('arm.xacro tool:=true' with arguments), or a shipped name. It is
-    left out where armid.toml names the robot.
+    R is a URDF, MJCF or xacro ('arm.xacro tool:=true' with arguments), a shipped name, or - for
+    the description in the bag. It is left out where armid.toml names the robot.
 
     Without a recording: impossible inertias, densities of links with shapes, units of limits. With
     one: mass and centre of each link as described and as measured.
@@ -125,7 +125,11 @@ def check(
     context = click.get_current_context()
     given = context.get_parameter_source('robot_source')
     typed = given is click.core.ParameterSource.COMMANDLINE
-    if arguments and not typed and (robot_source is None or describes_robot(arguments[0])):
+    first = ''.join(arguments[:1])
+    described = first == '-' or (bool(first) and describes_robot(first))
+    if first and not typed and (robot_source is None or described):
+        if robot_source is not None:
+            click.echo(f'{first} is taken in place of that --robot', err=True)
         robot_source, *others = arguments
         arguments = tuple(others)
     if robot_source is None:

@@ -159,7 +159,38 @@ def _of_some_size(text: str, robot: Robot) -> tuple[Effect, FloatArray]:
             + (f', and the shape {shapes}' if shapes else '')
             + f'; write {text.partition(":")[0]}:{first}=0.1'
         )
+    if effect.traits.weighs:
+        _tell_impossible(text, values, robot)
     return effect, values
+
+
+def _tell_impossible(text: str, values: FloatArray, robot: Robot) -> None:
+    """Warn of a payload that no body can be, or whose centre is beyond the arm's length."""
+    from armid_ros.model.pseudo_inertia import Consistency, PER_LINK
+    import numpy as np
+
+    places = [placement.translation for placement in robot.model.jointPlacements]
+    length = max(1.0, float(np.sum(np.linalg.norm(places, axis=1))))
+    for body in np.reshape(values, (-1, PER_LINK)):
+        found = Consistency.of('', body)
+        distance, eigenvalues = float(np.linalg.norm(found.center)), found.eigenvalues
+        if np.isnan(distance) and eigenvalues[0] < 0.0:
+            reason = 'no body has a first moment and no mass: give payload_m'
+        elif eigenvalues[0] < -1e-9 * eigenvalues[-1]:
+            moments = ', '.join(f'{value:.3g}' for value in found.moments)
+            reason = (
+                'no body has these values: its principal moments about the centre of mass are '
+                f'{moments} kg m^2, and each has to be from 0 to the sum of the other two. '
+                'payload_Ixx etc. are about the joint, mass times distance squared included'
+            )
+        elif distance > length:
+            reason = (
+                f'its centre of mass is {distance:.3g} m from the joint, farther than the arm is '
+                'long; payload_mx etc. are mass times distance'
+            )
+        else:
+            continue
+        say(f"warning: --effect '{text}': {reason}", 'yellow')
 
 
 @click.command(epilog='Example: armid recover crashed/crashed_0.mcap --out whole')

@@ -178,13 +178,13 @@ TRAITS = {
         external=True,
     ),
     'payload': Traits(
-        shown_by='the same motion with and without the tool',
+        shown_by='the same motion with the tool taken off',
         look_at='the hand, the gripper, the tool, a part or a cable that it carries',
         weighs=True,
     ),
     'link_inertia': Traits(
         shown_by='fast motion and static holds',
-        look_at='the link and what is bolted to it, against its description',
+        look_at='the link and what is bolted to it, as armid check ROBOT BAG compares it',
         corrects=True,
     ),
     'coupled_joint_friction': Traits(

@@ -132,14 +132,20 @@ class CollisionScene:
         found = []
         if self.collision.left_out:
             found.append(f'bodies of {_listed(self.collision.left_out)} (mesh not found)')
-        joints = {int(body.parentJoint) - 1 for body in self.collision.geometry.geometryObjects}
+        robot = self.collision.robot
+        model, links = robot.model, robot.description.links
+        with_body = {
+            model.frames[body.parentFrame].name for body in self.collision.geometry.geometryObjects
+        }
+        heavy = (link for link, inertial in links.items() if inertial and inertial.mass > 0.0)
         bare = [
             link
-            for j, link in enumerate(self.collision.robot.links)
-            if j not in joints and link not in self.collision.left_out
+            for link in dict.fromkeys([*robot.links, *heavy])
+            if model.frames[model.getFrameId(link)].parentJoint > 0
+            and link not in (*with_body, *self.collision.left_out)
         ]
         if bare:
-            found.append(f'bodies of {_listed(bare)} (no collision body)')
+            found.append(f'bodies of {_listed(bare)} (no collision body; joint origins only)')
         if self.collision.touching:
             pairs = [f'{first} and {second}' for first, second in self.collision.touching]
             found.append(f'the clearance of {_listed(pairs)} (touch at zero, no SRDF)')
@@ -154,6 +160,15 @@ def _listed(names: Sequence[str]) -> str:
 
 
 FIT, PARTLY, UNFIT = 'fit to run', 'partly checked', 'not to be run'
+#: What makes an unchecked item checked, by words of the item.
+_REMEDIES = {
+    'the floor': 'the height of the floor (--floor Z)',
+    'mesh not found': 'the folder of the meshes (--package P=FOLDER)',
+    'no collision body': '<collision> in the description',
+    'no SRDF': 'an SRDF next to the description',
+    'no limit': 'limits (--joint-limits, --velocity or <limit>)',
+    'no inertia': '<inertial> in the description',
+}
 
 
 @dataclass(frozen=True)
@@ -188,6 +203,15 @@ class Fitness:
             return UNFIT
         return PARTLY if self.unchecked else FIT
 
+    @property
+    def remedy(self) -> str:
+        """Return a sentence on what makes the run fit; empty if it is fit."""
+        if self.word == UNFIT:
+            return 'Do not run it. Design it with another --start or --seed, or more --clearance.'
+        items = ' '.join(self.unchecked)
+        needed = ', '.join(what for words, what in _REMEDIES.items() if words in items)
+        return f'Give {needed}, or check that yourself before the arm moves.' if needed else ''
+
     def __str__(self) -> str:
         """Return a sentence on the results and on the unchecked items."""
         parts = ['no limit violated', *self.distances()]
@@ -195,6 +219,15 @@ class Fitness:
         if self.unchecked:
             sentence += f'; not checked: {"; ".join(self.unchecked)}'
         return sentence
+
+    def sentences(self) -> list[str]:
+        """Return a sentence on limits and unchecked items and one on distances, worse first."""
+        limits = 'No limit violated'
+        if self.unchecked:
+            limits += f'; not checked: {"; ".join(self.unchecked)}'
+        near = ', '.join(self.distances())
+        found = [f'{text[0].upper()}{text[1:]}.' for text in (limits, near) if text]
+        return found[::-1] if self.word == UNFIT else found
 
     def distances(self) -> list[str]:
         """Return phrases on the smallest clearance and on the lowest point, where known."""

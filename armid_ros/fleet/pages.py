@@ -114,8 +114,9 @@ def _arm_page(found: Watch, arm: WatchedArm, diagnoses: Diagnoses) -> str:
     shown.sort(key=lambda one: order.get(one.parameter, len(order)))
     cut = sum(one.parameter in order for one in shown)
     said = (
-        'Every point is a bag with its 95 % interval; it leads to the bag below. Numbers after a '
-        'name: range of the vertical axis.'
+        'Every point is a bag with its 95 % interval, the first one on the left; it leads to the '
+        'bag below. The dashed line is the change. Numbers after a name: range of the vertical '
+        'axis.'
     )
     first, rest = ([_curve(arm, one) for one in part] for part in (shown[:cut], shown[cut:]))
     curves: list[PageBlock] = [SmallMultiples(first)] if first else []
@@ -133,7 +134,10 @@ def _arm_page(found: Watch, arm: WatchedArm, diagnoses: Diagnoses) -> str:
                 with_interval(row['per_month'], std, unit),
             )
         )
-    hint = 'Slope of a straight line through all bags with its 95 % interval, each by itself.'
+    hint = (
+        'Slope of a straight line through all bags with its 95 % interval, each by itself. An '
+        'interval that includes 0 shows no wear.'
+    )
     sections += [
         _table('Wear', ('Parameter', 'Trend'), rows, (1,), hint),
         _bags(arm),
@@ -159,13 +163,15 @@ def _verdict(found: Watch, diagnoses: Diagnoses) -> VerdictSection:
     blamed = [arm.arm for arm in found.arms if _diagnosed(arm, diagnoses.get(arm.arm))]
     ill = counts['changed'] + counts['wearing']
     sentences = [f'No parameter of {counted(len(found.arms), "arm")} changed.']
-    if ill:
-        sentences = [
-            f'{counted(ill, "arm")} of {len(found.arms)} changed: {counts["changed"]} '
-            f'suddenly, {counts["wearing"]} gradually.',
-            f'At most {100.0 * found.alpha:g} % of the named arms are false alarms, on average.',
-        ]
     longest = 60  # characters
+    named = ', '.join(arm.arm for arm in found.arms if arm.health in ('changed', 'wearing'))
+    if ill:
+        which = f': {named}' if len(named) < longest else ''
+        sentences = [
+            f'{counted(ill, "arm")} of {len(found.arms)} changed{which}.',
+            f'{counts["changed"]} changed suddenly, {counts["wearing"]} gradually. At most '
+            f'{100.0 * found.alpha:g} % of the named arms are false alarms, on average.',
+        ]
     if blamed:
         names = ', '.join(blamed)
         some = names if len(names) < longest else counted(len(blamed), 'arm')
@@ -178,8 +184,7 @@ def _verdict(found: Watch, diagnoses: Diagnoses) -> VerdictSection:
         beware.append(f'{counted(refused, "bag")} refused')
     grade = 'changes' if ill else 'diagnosed' if blamed else 'quiet'
     tone = 'fair' if ill or blamed else 'good'
-    named = ', '.join(arm.arm for arm in found.arms if arm.named)
-    step = f'open the page of {named}.' if ill and len(named) < longest else ''
+    step = f'Open the page of {named}.' if ill and len(named) < longest else ''
     return VerdictSection(grade, tone, sentences, beware, step=step)
 
 
@@ -196,7 +201,8 @@ def _arm_row(arm: WatchedArm, diagnosis: Mapping[str, Any] | None) -> list[str]:
     what = Markup('')
     if diagnosis is not None and diagnosis['verdict'] != 'failed':
         report = _link(diagnosis['report'], 'Diagnosis')
-        what = Markup('{}: {}').format(report, pretty(diagnosis['summary']))
+        lead, stop, _ = pretty(diagnosis['summary']).partition('. ')
+        what = Markup('{}: {}').format(report, lead + stop.rstrip())
     for row in change_rows(arm)[:1]:
         bag = _link(f'{page}#{BagFile(arm.arm, row["bag"]).name}', 'bag')
         what += Markup('<br>' * bool(what) + '{} {}').format(pretty(row['text']), bag)

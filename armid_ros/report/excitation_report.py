@@ -156,20 +156,15 @@ def _verdict(
         for name, s in zip(design.information.parameters, design.information.std, strict=True)
         if not np.isfinite(s)
     ]
-    distances = ', '.join(checked.distances())
-    distances = f'{distances[:1].upper()}{distances[1:]}.' if distances else ''
-    limits = 'No limit violated'
-    if checked.unchecked:
-        limits += f'; not checked: {"; ".join(checked.unchecked)}'
-    lead = [f'{limits}.', distances]
     quantity, share = max(shares.items(), key=lambda item: float(item[1].max()))
     closest = (
         f'The closest limit is the {quantity} of {design.limits.joints[int(share.argmax())]} at '
         f'{100.0 * share.max():.0f} %.'
     )
-    if checked.word == UNFIT:
-        lead.reverse()
-    sentences = [lead[0], f'{lead[1]} {closest}'.lstrip(), ' '.join(identifiable(design, links))]
+    first, *others = checked.sentences()
+    sentences = [first, ' '.join([*others, closest]), ' '.join(identifiable(design, links))]
+    if unseen:
+        sentences.insert(0, sentences.pop())
     beware = []
     if unseen:
         beware.append(f'Not identifiable from this run: {", ".join(unseen)}.')
@@ -203,12 +198,14 @@ def identifiable(design: Design, links: Sequence[str]) -> list[str]:
     if seen < len(names):
         return [f'{seen} of {len(names)} parameters can be identified.']
     worst = int(np.argmax(std / information.scale))
-    sure = int(np.sum(std <= 0.1 * np.abs(design.described)))
+    size = np.abs(design.described)
+    sure, known = int(np.sum(std <= 0.1 * size)), int(np.sum(size > 0.0))
+    small = '; the others hardly change the torque' * (sure < known)
     return [
         f'All {len(names)} parameters can be identified (condition number '
         f'{plain(information.condition)}: {_conditioning(information.condition)}).',
-        f'{sure} of {len(names)} will be known to 10 % or better. The least accurate will be '
-        f'{full_label(names[worst], links)}: ± {digits(float(std[worst]))} '
+        f'{sure} of {known} described parameters will be known to 10 %{small}. The least accurate '
+        f'will be {full_label(names[worst], links)}: ± {digits(float(std[worst]))} '
         f'{pretty(names[worst].unit)}.',
     ]
 

@@ -17,7 +17,7 @@ from armid_ros.report.notation import counted, digits, plain
 from armid_ros.report.statistics import explained_shares, TELLING_SHARE, Whiteness
 import numpy as np
 
-#: Ratio of the held-out to the training error from which the model is fitted to the noise.
+#: Ratio of the held-out to the training residual from which the model is fitted to the noise.
 _OVERFIT = 1.3
 #: Condition numbers below which an excitation is good, as is the usual advice (Presse and Gautier
 #: 1993), and from which on it is weak.
@@ -140,11 +140,15 @@ def _of_errors(
     if held_out is None:
         yield '', 'Record another motion of armid excite, and test the model on it: --validate.'
     else:
+        # of a weaker torque, the same residual is a larger share
+        stronger = np.linalg.norm(held_out.torque_rms) / np.linalg.norm(training.torque_rms)
         ratio = held_out.relative_error_percent / max(training.relative_error_percent, 1e-9)
+        ratio *= min(float(stronger), 1.0)
         if ratio > _OVERFIT:
             yield (
-                f'The held-out error is {digits(ratio)} times the training error: the model '
-                'overfits, the held-out motion leaves its range, or the arm has changed.',
+                f'The held-out residual is {digits(ratio)} times the training residual, in N m '
+                'and relative to the torque: the model overfits, the held-out motion leaves its '
+                'range, or the arm has changed.',
                 'Train on more recordings, over all poses and speeds that matter. If the arm '
                 'may have changed, run armid diagnose.',
             )
@@ -197,7 +201,7 @@ def _of_residuals(result: Identification, fits: Sequence[Fit]) -> Iterator[Cauti
     if not known.all():
         yield (
             f'{int(np.sum(~known))} of {len(known)} parameters are not distinguishable from '
-            'zero: do not use their single values.',
+            'zero: use the torque of the model, not their single values.',
             '',
         )
     if result.condition_number > WEAK_CONDITION:

@@ -11,6 +11,7 @@ limits its memory and processor time before it reads the file.
 from __future__ import annotations
 
 from collections.abc import Iterator
+import difflib
 import json
 import os
 from pathlib import Path
@@ -110,13 +111,22 @@ def _reason(error: Exception, request: dict[str, Any], missing: dict[str, str]) 
     text = ' '.join(str(error).split()) or type(error).__name__
     cause = error.exc if isinstance(error, xacro.XacroException) else None
     if isinstance(cause, xacro.substitution_args.ArgException):
-        name = str(cause)
-        known = {name: 'no default'} | _declared(xacro, request['path'])
-        listed = ', '.join(f'{one} ({how})' for one, how in known.items())
+        name, path = str(cause), str(request['path'])
+        declared = _declared(xacro, path)
+        given = {_near(one, declared) or one: value for one, value in request['arguments'].items()}
+        default = declared.get(name)
+        without = [one for one, value in declared.items() if value is None]
+        needed = dict.fromkeys([*without, name], 'VALUE')
+        why = 'which is not given'
+        if default is not None:  # <xacro:arg> is below
+            why = f"above the line with its default, '{default}'"
+            needed[name] = default if re.fullmatch(r'[\w./-]+', default) else 'VALUE'
+        written = ' '.join(f'{one}:={value}' for one, value in (needed | given).items())
+        rest = _unknown(xacro, request) or f"grep '<xacro:arg' {path} lists the others"
+        place = _place(xacro)
         return (
-            f"{_place(xacro)} uses the argument '{name}', which is not given; the arguments "
-            f'are {listed}; write '
-            f"--robot '{request['path']} {name}:=VALUE'"
+            f"{'the file' if place == path else place} uses the argument '{name}', {why}; "
+            f"write --robot '{path} {written}'; {rest}"
         )
     if missing:
         lines = '; '.join(f"package '{name}' ({file})" for name, file in missing.items())
@@ -127,16 +137,24 @@ def _reason(error: Exception, request: dict[str, Any], missing: dict[str, str]) 
 
 
 def _unknown(xacro: Any, request: dict[str, Any]) -> str:
-    """Return a message on an argument that no file declares or uses; '' if there is none."""
-    declared = _declared(xacro, request['path'])
-    files = [Path(file) for file in (request['path'], *xacro.all_includes)]
+    """Return a message on arguments that no file declares or uses; '' if there are none."""
+    path, declared = str(request['path']), _declared(xacro, request['path'])
+    files = [Path(file) for file in (path, *xacro.all_includes)]
     texts = [file.read_text('utf-8', 'replace') for file in files if file.is_file()]
+    unknown = []
     for name in request['arguments']:
         used = re.compile(rf'\$\(arg\s+{re.escape(name)}\s*\)')
         if name not in declared and not any(used.search(text) for text in texts):
-            known = ', '.join(f'{one} ({how})' for one, how in declared.items()) or 'none'
-            return f"the file has no argument '{name}'; the arguments are {known}"
-    return ''
+            near = _near(name, declared)
+            unknown.append(f"'{name}'" + (f" (did you mean '{near}'?)" if near else ''))
+    if not unknown:
+        return ''
+    return f"the file has no argument {', '.join(unknown)}; grep '<xacro:arg' {path} lists them"
+
+
+def _near(name: str, declared: dict[str, str | None]) -> str:
+    """Return the declared argument with the most similar name; '' if none is similar."""
+    return next(iter(difflib.get_close_matches(name, declared, 1, 0.75)), '')
 
 
 def _place(xacro: Any) -> str:
@@ -145,9 +163,9 @@ def _place(xacro: Any) -> str:
     return str(macros[-1].history[-1][-1] if macros else files[-1])
 
 
-def _declared(xacro: Any, path: str) -> dict[str, str]:
-    """Return the declared arguments with a description of their default."""
-    known: dict[str, str] = {}
+def _declared(xacro: Any, path: str) -> dict[str, str | None]:
+    """Return the declared arguments with their default; None where one has to be given."""
+    known: dict[str, str | None] = {}
     for file in (path, *xacro.all_includes):
         try:
             elements = xacro.parse(None, file).getElementsByTagName('xacro:arg')
@@ -155,9 +173,7 @@ def _declared(xacro: Any, path: str) -> dict[str, str]:
             continue
         for element in elements:
             default = element.getAttribute('default') if element.hasAttribute('default') else None
-            known[element.getAttribute('name')] = (
-                'no default' if default is None else f"default '{default}'"
-            )
+            known[element.getAttribute('name')] = default
     return known
 
 

@@ -239,6 +239,20 @@ def test_an_effect_that_makes_a_link_no_body_is_named(tmp_path):
     assert not (tmp_path / 'x').exists()
 
 
+@pytest.mark.parametrize(
+    ('values', 'said'),
+    [
+        ('payload_m=0.4,payload_Ixx=1', 'no body'),
+        ('payload_mx=0.1', 'payload_m'),
+        ('payload_m=0.4,payload_mx=2,payload_Iyy=11,payload_Izz=11', '5 m from the joint'),
+    ],
+)
+def test_an_impossible_payload_is_warned_of(values, said, tmp_path):
+    """The trajectory is no file, so nothing is simulated."""
+    asked = *SIMULATE[:3], '--out', tmp_path / 'x', '--effect', f'payload:{values}'
+    assert said in armid(*asked, '--trajectory', tmp_path / 'none.yaml', code=2).output
+
+
 def test_passwords_are_in_no_page(tmp_path, monkeypatch):
     described = load_robot(ROBOT).urdf.replace('<robot ', '<robot xmlns:xacro="x" ', 1)
     described = described.replace('<link', '<xacro:arg name="password" default="a"/><link', 1)

@@ -50,6 +50,17 @@ CASES = {
         'upper.*mesh',
     ),
     'collision': ({'text': without('collision')}, 'upper.*collision'),
+    'a link fixed to a body': (
+        {
+            'text': urdf(*JOINTS).replace(
+                '</robot>',
+                '<link name="tool"><inertial><mass value="1"/><inertia ixx="1" iyy="1" izz="1"/>'
+                '</inertial></link><joint name="flange" type="fixed"><parent link="lower"/>'
+                '<child link="tool"/></joint></robot>',
+            )
+        },
+        'tool.*collision',
+    ),
     'inertia': ({'text': without('inertial')}, 'upper.*inertia'),
     'position': (
         {'text': urdf(*JOINTS).replace('lower="-2.5" upper="2.5"', '', 1)},
@@ -80,6 +91,7 @@ def test_what_is_missing_is_named_and_is_in_the_verdict(case):
     result = judged({'floor': GROUND, 'obstacles': PLANE, 'text': urdf(*JOINTS), **options})
     assert result.word == PARTLY and FIT not in str(result)
     assert found in str(result)
+    assert result.remedy.startswith('Give ')
 
 
 def judged(options):
@@ -112,4 +124,5 @@ def test_a_verdict_without_reserve_has_the_lowest_point_above_the_floor():
 
 def test_what_goes_through_the_floor_is_never_fit_to_run():
     result = swung(2.2)
+    assert 'Do not run' in result.remedy and 'below' in result.sentences()[0]
     assert result.word == UNFIT and 'below' in str(result) and '(lower)' in str(result)

@@ -17,6 +17,7 @@ from armid_ros.identification import (
 from armid_ros.motion import Motion
 from armid_ros.report.families import parameter_section
 from armid_ros.report.identification_report import Assessment, identification_report
+from armid_ros.report.judgement import judge
 from armid_ros.report.provenance import hash_files, Provenance, versions
 from armid_ros.report.sections.data_quality import repeatability
 from armid_ros.report.sections.fit import fit_section
@@ -187,6 +188,21 @@ def test_periods_show_what_of_the_residual_repeats(case):
     np.testing.assert_allclose(varying, 0.1, rtol=0.3)
     np.testing.assert_allclose(residual, [0.3, *5 * [0.1]], rtol=0.3)
     assert repeatability([fit]) is None
+
+
+@pytest.mark.parametrize(('share', 'noisier', 'warned'), [(0.3, 1.0, False), (0.3, 2.0, True)])
+def test_a_residual_is_no_larger_for_a_weaker_torque(case, share, noisier, warned):
+    fits = case.result.training
+    weaker = [
+        replace(
+            fit,
+            motion=replace(fit.motion, tau=share * fit.predicted + noisier * fit.residual),
+            predicted=share * fit.predicted,
+        )
+        for fit in fits
+    ]
+    judgement = judge(case.result, {'weaker': weaker}, [])
+    assert warned == any('overfits' in text for text in judgement.beware)
 
 
 def test_nothing_is_loaded(page, html):

@@ -67,13 +67,14 @@ def next_steps(
             steps[-1:] = [f'{" ".join(steps[-1:])} Run armid diagnose with {option}.'.lstrip()]
     if verdict == 'not_repeatable':
         steps.append('Keep people and loose parts away from the arm, and record again.')
-    motions = [run.sentence] if run else [f'{no_run[0].upper()}{no_run[1:]}.'] if no_run else []
+    motions = [run.sentence] if run else []
     told = () if run is None else [(s.name, s.rival) for s in run.separations if s.distinct]
     motions += [
         one.experiment
         for one in findings
         if one.rivals and (one.name, one.rivals[0].name) not in told
     ]
+    motions += [f'{no_run[0].upper()}{no_run[1:]}.'] if no_run else []
     steps = [*motions, *steps] if verdict == 'ambiguous' else [*steps, *motions]
     steps += _use_of_model(diagnosis, model, worse)
     if diagnosis.not_visible:

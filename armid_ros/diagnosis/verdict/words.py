@@ -85,7 +85,7 @@ def decide(
     small = sentence(minor[0], 'the gap' if open_gap else 'the remaining error') if shown else ''
     if not findings:
         if open_gap:
-            text = f'No effect in the catalogue explains {error}: it is {size}.'
+            text = f'No effect in the catalogue explains {error}. It is {size}.'
             text += f' Best candidate: {small}' if small else ''
             return Verdict('unknown', f'{text} {refit}'.rstrip())
         text = f'The model explains the recordings: the remaining error {no_larger}'
@@ -113,11 +113,12 @@ def _refit(as_it_is: Excess | None, robot: Robot, floor_in_words: str) -> str:
     """Return a sentence on the refit, with the error of body and friction as given."""
     if as_it_is is None or as_it_is.ratio.max() <= 1.0:
         return ''
-    joint = robot.joints[int(np.argmax(as_it_is.ratio))]
+    worst = int(np.argmax(as_it_is.ratio))
     times = larger(np.sqrt(as_it_is.ratio.max()))
     return (
-        f'Rigid body and friction were refitted: as given, the error of {joint} is {times} '
-        f'expected from {floor_in_words}. '
+        f'Rigid body and friction were refitted: as given, the error of {robot.joints[worst]} is '
+        f'{times} expected from {floor_in_words}. armid check ROBOT BAG compares the links, '
+        f'{robot.links[worst]} first. '
     )
 
 

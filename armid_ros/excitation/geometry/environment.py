@@ -114,6 +114,10 @@ class Obstacle:
         return mesh.convex
 
 
+#: Suffix of the sphere that represents a link without a body, after the name of the link.
+_ORIGIN = '_frame'
+
+
 def with_obstacles(collision: CollisionModel, obstacles: Sequence[Obstacle]) -> CollisionModel:
     """
     Return the collision bodies of a robot together with the obstacles around it.
@@ -138,7 +142,7 @@ def with_obstacles(collision: CollisionModel, obstacles: Sequence[Obstacle]) -> 
         if joint not in seen:
             frame = robot.model.getFrameId(link, pin.FrameType.BODY)
             point, here = coal.Sphere(1e-4), pin.SE3.Identity()  # radius [m]
-            added = pin.GeometryObject(f'{link}_frame', joint, frame, here, point)
+            added = pin.GeometryObject(link + _ORIGIN, joint, frame, here, point)
             geometry.addGeometryObject(added)
     # copied, because adding an object invalidates the Python references
     bodies = [(int(body.parentJoint), int(body.parentFrame)) for body in geometry.geometryObjects]
@@ -172,10 +176,13 @@ def obstacles_alone(collision: CollisionModel, obstacles: Sequence[Obstacle]) ->
 
 
 def body_name(collision: CollisionModel, number: int) -> str:
-    """Return the name of the link or obstacle of a collision body."""
+    """Return the name of the link or obstacle of a collision body, or of the joint of a link."""
     body = collision.geometry.geometryObjects[number]
     frame = int(body.parentFrame)
-    return str(body.name) if frame == 0 else str(collision.robot.model.frames[frame].name)
+    link = str(collision.robot.model.frames[frame].name)
+    if body.name == link + _ORIGIN:
+        return f'joint of {link}'
+    return str(body.name) if frame == 0 else link
 
 
 #: Names of the world frame if a description has no frame of that name.

@@ -160,10 +160,10 @@ def _errors(
     """Yield the reason of the worst joint, and joints whose torque is hardly predicted."""
     use = {
         'good': '',
-        'poor': ', too large to compute torques with the model',
+        'poor': ', too large to compute torques',
         'unusable': ': the model does not describe this motion',
     }
-    for bag, one in worst.items():
+    for bag, one in sorted(worst.items(), key=lambda item: -item[1].beyond):
         word = by_error(one.beyond)
         if bag is None:
             yield _halves(result, word, one.text)
@@ -199,10 +199,11 @@ def _worst(errors: FloatArray, fits: Sequence[Fit], result: Identification) -> _
     moves = moving(fit.motion for fit in fits)
     worst = int(np.lexsort((np.where(moves, errors, -1.0), beyond))[-1])
     measured, error = float(errors[worst]), float(beyond[worst])
-    noisy = by_error(error) != by_error(measured)
-    details = [f'{error:.3g} % without noise'] if noisy else []
+    word = by_error(error)
+    details = [f'{error:.3g} % without noise'] if word != by_error(measured) else []
     details += [f'worst joint: {joints[worst]}'] if len(joints) > 1 else []
-    text = f'{measured:.3g} %' + (f' ({", ".join(details)})' if details else '')
+    limit = LIMITS.unusable if word == 'unusable' else LIMITS.poor
+    text = f'{measured:.3g} % ({", ".join([*details, f"limit {limit:g} %"])})'
     return _Worst(worst, measured, error, text)
 
 

@@ -195,9 +195,10 @@ _SIZE = 'magnitude [dB re rad/(N m s)]'
 def responses_section(result: TwoInertiaIdentification) -> ContentSection:
     """Return a section with responses from motor torque to motor velocity of both joints."""
     text = (
-        'From motor torque to motor velocity. The torque between the links is a second input. '
-        'Each joint then responds like one motor and one link on a spring. Drag across a plot, or '
-        'pinch it, to zoom; double-click or double-tap to see it all.'
+        'Motor velocity per motor torque at each frequency. The dip is the link swinging on its '
+        'spring (antiresonance), the peak motor and link against each other (resonance). Without '
+        'the torque of the other joint (decoupled), a joint is a motor and a link on a spring. '
+        'Drag across a plot, or pinch it, to zoom; double-click or double-tap to see it all.'
     )
     hint = (
         'The response of the whole arm is the mean over the poses of joint 2 in the recording, '
@@ -237,7 +238,7 @@ def _joint(
         Mark(low, f'antiresonance {low:.1f} Hz', before=True),
         Mark(high, f'resonance {high:.1f} Hz'),
     ]
-    modelled = [('subspace model', subspaces), ('physical model', decoupled)]
+    modelled = [('any linear model', subspaces), ('motor, spring and link', decoupled)]
     within = (own >= _COMPARED[0]) & (own <= _COMPARED[1])
     rows = at[within]
     errors = (
@@ -259,17 +260,17 @@ def _joint(
         _chart(frequency, points, modelled, decibel, _SIZE, 260, marks),
         _chart(frequency, points, modelled, degrees, 'phase [°]', 150, marks, last=True),
     )
-    yield joint, 'decoupled', decoupled_charts
+    yield joint, 'decoupled: without the other joint', decoupled_charts
     whole = [('whole arm, modelled', coupled), ('this joint', decoupled)]
     alone_chart = _chart(frequency, alone, whole, decibel, _SIZE, 220, marks, last=True)
     facts = [
         ('Antiresonance, resonance of the joint', f'{low:.2f} Hz, {high:.2f} Hz'),
-        ('Measured minimum and maximum, coupled', f'{dip:.1f} Hz, {peak:.1f} Hz'),
-        ('Joint model, decoupled: error', f'{errors[0]:.2f} dB rms'),
-        ('Joint model, coupled: error', f'{errors[1]:.1f} dB rms'),
-        ('Whole-arm model, coupled: error', f'{errors[2]:.1f} dB rms'),
+        ('Dip and peak as measured', f'{dip:.1f} Hz, {peak:.1f} Hz'),
+        ('Error of the joint model, decoupled', f'{errors[0]:.2f} dB rms'),
+        ('Error of the joint model, as measured', f'{errors[1]:.1f} dB rms'),
+        ('Error of the whole arm, as measured', f'{errors[2]:.1f} dB rms'),
     ]
-    yield joint, 'coupled: from motor torque alone', (alone_chart, FactList(facts))
+    yield joint, 'as measured: with the other joint', (alone_chart, FactList(facts))
 
 
 def _chart(

@@ -39,12 +39,13 @@ def _springs(found: Sequence[SpringEstimate]) -> ContentSection:
         fit = one.transmission
         value, low, high = fit.stiffness
         play = [1e3 * x for x in fit.backlash]
+        none = 'none seen' if np.isfinite(play).all() else 'no reversals'
         springs.append(
             (
                 one.joint,
                 f'{value:.4g}' if one.informative else 'not identifiable',
                 f'{low:.4g} to {high:.4g}' if one.informative else '',
-                f'{play[1]:.2g} to {play[2]:.2g}' if np.isfinite(play).all() else 'no reversals',
+                f'{play[1]:.2g} to {play[2]:.2g}' if fit.backlash_seen else none,
                 f'{fit.correlation:+.2f}' if np.isfinite(fit.correlation) else '',
                 f'{fit.explained:.4f}',
             )
@@ -56,10 +57,9 @@ def _springs(found: Sequence[SpringEstimate]) -> ContentSection:
         ]
         motors.append((one.joint, f'{one.inertia:.3g}', *own, *both))
     text = (
-        'The twist of each motor against its link, over what the rigid body takes there: inertia, '
-        'gravity and the interaction of all links included. Compliance and free play are '
-        'distinguishable where the load changes sides; a correlation near ±1 means they '
-        'are not.'
+        'A motor twists against its link by the torque of the rigid body over the stiffness. '
+        'Backlash adds a step where the load changes sides; with a correlation near ±1 they are '
+        'not distinguishable. R² is the explained share of the twist.'
     )
     hint = (
         'Frequencies are those of each joint alone, the others held, at its mean inertia in the '
@@ -76,7 +76,9 @@ def verdict(found: Sequence[SpringEstimate]) -> VerdictSection:
     """Say how many springs were found, and which is the softest."""
     told = [one for one in found if one.informative]
     lost = [one.joint for one in found if not one.informative]
-    beware = ['Inertias are those of the description or model: a stiffness is as right as they.']
+    beware = [
+        'Inertias are those of the description or model: a stiffness is as accurate as they are.'
+    ]
     step = f'Record {", ".join(lost)} again under more load, or with finer encoders.'
     if lost:
         beware.append(f'{", ".join(lost)}: the twist does not follow the load.')
