@@ -253,13 +253,12 @@ def cause_of(
     joints = np.flatnonzero(np.any([x.any(axis=(0, 2)) for x in columns], axis=0)).tolist()
     weighted = nuisance.rows.weighted(columns, joints)
     products, aim, squares = [], [], []
-    for x, y, z in zip(nuisance.columns, nuisance.residual, weighted, strict=True):
-        products.append(
-            sum(
-                (x[joint].T @ own_rows for joint, own_rows in zip(joints, z, strict=True)),
-                start=np.zeros((x.shape[2], len(unit))),
-            )
-        )
+    for k, (y, z) in enumerate(zip(nuisance.residual, weighted, strict=True)):
+        product = np.zeros((nuisance.columns[k].shape[2], len(unit)))
+        for joint, own_rows in zip(joints, z, strict=True):
+            place, columns_of_joint = nuisance.acting[k][joint]
+            product[place] += columns_of_joint.T @ own_rows
+        products.append(product)
         flat = z.reshape(-1, len(unit))
         aim.append(flat.T @ y[joints].ravel())
         squares.append(flat.T @ flat)

@@ -174,6 +174,16 @@ class Nuisance:
         return np.arange(self.rank, size).reshape(len(self.columns[0]), -1)
 
     @cached_property
+    def acting(self) -> list[list[tuple[npt.NDArray[np.intp], FloatArray]]]:
+        """Columns that act on each joint in each recording: their indices, and values (M, c)."""
+        body = np.arange(self.rank)
+        places = [np.concatenate([body, own]) for own in self.discrepancy]
+        return [
+            [(place, x[:, place]) for place, x in zip(places, columns, strict=True)]
+            for columns in self.columns
+        ]
+
+    @cached_property
     def count(self) -> list[int]:
         """Return the number of informative entries of each recording."""
         seen = [(w > 0.0)[:, :, np.newaxis].astype(float) for w in self.rows.weight]
