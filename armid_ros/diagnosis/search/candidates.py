@@ -164,6 +164,18 @@ class Causes:
         """Return the columns of an effect in each trajectory, (M, n, p)."""
         return [part.columns(self.nuisance.arm, effect) for part in self._parts]
 
+    def renewed(self, cause: Cause) -> Cause:
+        """Return a cause of another comparison with products of these nuisance columns."""
+        columns = [x[:, :, list(cause.kept)] for x in self._columns(cause.effect)]
+        return cause_of(
+            self.nuisance,
+            SelectedEffect(cause.effect, cause.kept),
+            columns,
+            cause.unit,
+            cause.prior,
+            cause.torque,
+        )
+
     def reshaped(self, cause: Cause, shape: FloatArray) -> Cause | None:
         """Return a cause with another shape; None where it is impossible or invisible."""
         try:

@@ -14,8 +14,9 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 
 from armid_ros.arm import ArmModel, Misfit
-from armid_ros.arm.memoized_arm import memoized_arm
+from armid_ros.arm.memoized_arm import memoized_arm, plain_arm
 from armid_ros.arm.misfit import louder
+from armid_ros.arm.words import with_named
 from armid_ros.diagnosis.data.baseline import Baseline
 from armid_ros.diagnosis.data.days import Rows
 from armid_ros.diagnosis.data.evidence import Evidence, noise_floor, torque_rms
@@ -48,6 +49,8 @@ Progress = Callable[[float, str], None]
 #: Smallest part of a misfit that is no noise, as a share: the estimate of noise varies by 5 %. Of
 #: 20 effects that appeared in a running arm 20 were named, and 15 with a share of 1.
 _LEAST_PART = 0.3
+#: Most comparisons for gravity of another direction, and its relative change that counts as none.
+_MOST_TURNS, _SAME_GRAVITY = 2, 0.01
 OWN_MISFIT = 'the error of the model before'
 WRITTEN_MISFIT = 'the error of the model when it was identified'
 #: Note on a model without covariance of its identification.
@@ -114,15 +117,21 @@ class Explainer:
         evidence = Evidence.over_noise(prepared.data, prepared.sigma)
         rows = Rows.over_noise(evidence)
         unknown = with_friction(self.arm, settings.library)[1]
-        result = self.comparison(rows, settings_alone()).found()
+        result, before = self.comparison(rows, settings_alone()).found(), self.arm.robot.gravity
+        for _ in range(_MOST_TURNS):
+            gravity = self._gravity(result)
+            if np.linalg.norm(gravity - before) <= _SAME_GRAVITY * np.linalg.norm(before):
+                break
+            result = self.comparison(rows, settings_alone(), gravity=gravity).found(result)
+            before = gravity
         setting, held = result.under.setting, list[int]()
-        if setting.free:
+        if setting.body:
             accepted = [one.cause.effect for one in result.nuisance.accepted]
             changed = [p for effect in accepted for p in effect.parameters(self.arm.robot)]
             held = [k for k, p in enumerate(self.arm.parameters) if p in changed]
         else:
             evidence = prepared.described
-        nuisance = Nuisance.of(rows, memoized_arm(self.arm), self.rng, held=held)
+        nuisance = Nuisance.of(rows, memoized_arm(self.arm), self.rng, held=held, gravity=gravity)
         every = tuple(range(len(rows.today)))
         problem = JointFit(nuisance.arm, nuisance, setting, every, stated=True)
         found = explain(problem, evidence, result, settings, unknown)
@@ -132,6 +141,15 @@ class Explainer:
         sigma = tuple(np.maximum(one, misfit) for one in evidence.sigma)
         found = replace(found, evidence=replace(evidence, sigma=sigma))
         return Chosen(found, misfit, ESTIMATED, look=result.first)
+
+    def _gravity(self, result: Result) -> FloatArray:
+        """Return gravity with the accepted causes, in the frame of the base, (3,) [m/s^2]."""
+        nuisance, arm = result.nuisance, plain_arm(self.arm)
+        means = nuisance.means(result.under)
+        for one, span in zip(nuisance.accepted, nuisance.spans, strict=True):
+            if not one.cause.effect.joints:
+                arm = with_named(arm, one.cause.effect, one.cause.whole(means[span], arm.robot))
+        return arm.body.gravity
 
     def _beside(self, written: Misfit) -> Chosen:
         """
@@ -211,7 +229,11 @@ class Explainer:
         return rows.not_below_rounding()
 
     def comparison(
-        self, rows: Rows, grid: Sequence[Setting] | None, known: FloatArray | None = None
+        self,
+        rows: Rows,
+        grid: Sequence[Setting] | None,
+        known: FloatArray | None = None,
+        gravity: FloatArray | None = None,
     ) -> CauseComparison:
         """
         Return the comparison of all causes.
@@ -224,11 +246,13 @@ class Explainer:
             Amplitudes of discrepancy and noise to compare; None with a baseline.
         known : ndarray, shape (P, P), optional
             Information on the parameters of the arm, added to that of its description.
+        gravity : ndarray, shape (3,), optional
+            Gravity that acts on errors of the body; see `Nuisance.of`.
 
         """
         arm, settings = self.arm, self.settings
         fuller, unknown = with_friction(arm, settings.library)
-        nuisance = Nuisance.of(rows, memoized_arm(fuller), self.rng, known)
+        nuisance = Nuisance.of(rows, memoized_arm(fuller), self.rng, known, gravity=gravity)
         changed = self.baseline is not None or self.misfit is not None
         kinds = list(settings.kinds)
         if changed:

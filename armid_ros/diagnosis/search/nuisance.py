@@ -111,6 +111,7 @@ class Nuisance:
         rng: np.random.Generator,
         known: FloatArray | None = None,
         held: Sequence[int] = (),
+        gravity: FloatArray | None = None,
     ) -> Nuisance:
         """
         Compute the nuisance columns of the data.
@@ -127,10 +128,14 @@ class Nuisance:
             Information on the first parameters of the arm, added to that of its description.
         held : sequence of int
             Parameters of the arm that are not fitted, as an accepted cause changes them.
+        gravity : ndarray, shape (3,), optional
+            Gravity that acts on errors of the body, if it is another than in the model [m/s^2]:
+            the torque is bilinear in gravity and body.
 
         """
         free = np.setdiff1d(np.arange(len(arm.parameters)), held)
-        base, columns = excited(arm, arm.base_parameters(rng, free), rows.data)
+        felt = arm if gravity is None else replace(arm, robot=arm.robot.with_gravity(gravity))
+        base, columns = excited(felt, felt.base_parameters(rng, free), rows.data)
         described = described_precision(base, arm, known)
         rigid = len(arm.robot.rigid_parameters)
         values = arm.theta[base.independent]
@@ -272,13 +277,15 @@ class Nuisance:
     def _precision(self, setting: Setting) -> tuple[FloatArray, npt.NDArray[np.intp]]:
         """Return the prior precision of the fitted parameters, and their indices."""
         unit = self.rows.amplitude[0]
-        body = self.turn.T @ self.described @ self.turn + _HELD * np.eye(self.rank)
+        scale = np.where(self.open, 1.0, setting.body or 1.0)
+        body = self.turn.T @ self.described @ self.turn / np.outer(scale, scale)
+        body += _HELD * np.eye(self.rank)
         size = max(setting.shared, _HELD) * unit[:, np.newaxis] * self.reach
         shared = size.ravel() ** -2.0
         more = [(one.size * one.cause.unit) ** -2.0 for one in self.accepted]
         whole = linalg.block_diag(body, np.diag(np.concatenate([shared, *more])))
         used = np.ones(len(whole), dtype=bool)
-        used[: self.rank] = setting.free | self.open
+        used[: self.rank] = (setting.body > 0.0) | self.open
         used[self.discrepancy.ravel()] = setting.shared > 0.0
         kept = np.flatnonzero(used)
         return whole[np.ix_(kept, kept)], kept

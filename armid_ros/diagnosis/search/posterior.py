@@ -131,13 +131,13 @@ class JointFit:
         """
         nuisance = Nuisance.of(Rows.over_noise(evidence), memoized_arm(arm), rng, known)
         every = tuple(range(len(nuisance.columns)))
-        setting = Setting(True, 0.0, 0.0, 1.0, LASTING)
+        setting = Setting(1.0, 0.0, 0.0, 1.0, LASTING)
         return cls(nuisance.arm, nuisance, setting, every, stated=True)
 
     @property
     def refits_body(self) -> bool:
         """Whether the body of the arm is refitted."""
-        return self.stated and self.setting.free
+        return self.stated and self.setting.body > 0.0
 
     def fit(
         self, named: Sequence[SelectedEffect] = (), values: Sequence[FloatArray] = ()
@@ -209,7 +209,7 @@ class JointFit:
 
     def as_described(self) -> JointFit:
         """Return the fit with the body held at the description."""
-        return replace(self, setting=replace(self.setting, free=False))
+        return replace(self, setting=replace(self.setting, body=0.0))
 
     def rest(self, fitted: Fitted) -> list[FloatArray]:
         """
