@@ -137,22 +137,29 @@ class CauseComparison:
         effects = tuple(self.catalogue.effects)
         return Result((), self.nuisance, look.under, look, effects)
 
-    def found(self, before: Result | None = None) -> Result:
+    def begun(self, before: Result) -> Result:
+        """Return the causes of another comparison that act on the whole arm, fitted anew."""
+        accepted = [one for one in before.accepted if not one.best.cause.effect.joints]
+        nuisance = self.nuisance
+        for one in accepted:
+            cause = self.catalogue.renewed(one.best.cause)
+            nuisance = nuisance.and_cause(cause, one.best.fit.size)
+        under = self._likeliest(nuisance)
+        return replace(before, accepted=tuple(accepted), nuisance=nuisance, under=under)
+
+    def found(self, begun: Result | None = None) -> Result:
         """
         Accept the best cause until none is significant; drop causes that became redundant.
 
-        The causes of an earlier result that act on the whole arm are accepted already.
+        Parameters
+        ----------
+        begun : Result, optional
+            Causes that are accepted already.
 
         """
-        accepted, nuisance = list[Accepted](), self.nuisance
-        result = before or self.first()
-        look = result.first
-        for one in before.accepted if before else ():
-            if not one.best.cause.effect.joints:
-                accepted.append(one)
-                cause = self.catalogue.renewed(one.best.cause)
-                nuisance = nuisance.and_cause(cause, one.best.fit.size)
-                look = self.look(nuisance)
+        result = begun or self.first()
+        accepted, nuisance = list(result.accepted), result.nuisance
+        look = self.look(nuisance) if accepted else result.first
         while len(accepted) < _MOST:
             explained = sum(max(one.best.data, 0.0) for one in accepted)
             best = self.best(look, explained)

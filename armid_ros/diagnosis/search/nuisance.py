@@ -54,12 +54,26 @@ class CauseTerm:
         Standard deviation of the prior of its values, over their unit.
     acts : ndarray of bool, shape (K,)
         Whether it acts in each recording.
+    known : (ndarray, shape (p,), float, float), optional
+        Direction among its values along which their sum is known, the sum, and its standard
+        deviation.
 
     """
 
     cause: Cause
     size: float
     acts: npt.NDArray[np.bool_]
+    known: tuple[FloatArray, float, float] | None = None
+
+    @property
+    def prior(self) -> tuple[FloatArray, FloatArray, float]:
+        """Return the prior precision (p, p), its product with the mean, and half of its loss."""
+        precision = np.diag((self.size * self.cause.unit) ** -2.0)
+        if self.known is None:
+            return precision, np.zeros(len(precision)), 0.0
+        direction, total, std = self.known
+        aim = direction * total / std**2
+        return precision + np.outer(direction, direction) / std**2, aim, 0.5 * (total / std) ** 2
 
 
 @dataclass(frozen=True)
@@ -228,10 +242,14 @@ class Nuisance:
         return np.concatenate([cause.products[k], self.among_accepted(cause, k)])
 
     def and_cause(
-        self, cause: Cause, size: float, acts: npt.NDArray[np.bool_] | None = None
+        self,
+        cause: Cause,
+        size: float,
+        acts: npt.NDArray[np.bool_] | None = None,
+        known: tuple[FloatArray, float, float] | None = None,
     ) -> Nuisance:
         """Return the nuisance with one more cause, acting on the day in question by default."""
-        term = CauseTerm(cause, size, self.rows.today if acts is None else acts)
+        term = CauseTerm(cause, size, self.rows.today if acts is None else acts, known)
         return replace(self, accepted=(*self.accepted, term))
 
     def without(self, name: int) -> Nuisance:
@@ -282,8 +300,8 @@ class Nuisance:
         body += _HELD * np.eye(self.rank)
         size = max(setting.shared, _HELD) * unit[:, np.newaxis] * self.reach
         shared = size.ravel() ** -2.0
-        more = [(one.size * one.cause.unit) ** -2.0 for one in self.accepted]
-        whole = linalg.block_diag(body, np.diag(np.concatenate([shared, *more])))
+        more = [one.prior[0] for one in self.accepted]
+        whole = linalg.block_diag(body, np.diag(shared), *more)
         used = np.ones(len(whole), dtype=bool)
         used[: self.rank] = (setting.body > 0.0) | self.open
         used[self.discrepancy.ravel()] = setting.shared > 0.0
@@ -322,7 +340,11 @@ class Nuisance:
         """
         whole, kept = self._precision(setting)
         evidence = 0.5 * np.linalg.slogdet(whole)[1] + setting.prior
-        aim, scale, loss = np.zeros(len(kept)), setting.precision, 0.0
+        scale, loss = setting.precision, sum(one.prior[2] for one in self.accepted)
+        means = np.zeros(len(self.cross[0]))
+        for one, span in zip(self.accepted, self.spans, strict=True):
+            means[span] = one.prior[1]
+        aim = means[kept]
         motions = dict[int, MotionDiscrepancy]()
         for k in range(len(self.columns)) if among is None else among:
             square, cross, count = self.square[k], self.cross[k], self.count[k]
