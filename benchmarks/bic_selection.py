@@ -68,7 +68,7 @@ def bic_selection(
     rows = Rows.over_noise(Evidence.over_noise(data, [alike] * len(data)))
     nuisance = Nuisance.of(rows, memoized_arm(arm), rng)
     catalogue = Causes(settings.kinds, nuisance, False, frozenset())
-    pooled = Setting(True, 0.0, 0.0, 1.0, 1.0)
+    pooled = Setting(1.0, 0.0, 0.0, 1.0, 1.0)
     count = sum(nuisance.count)
     chosen: list[Cause] = []
     while True:

@@ -92,14 +92,7 @@ class _Memoized(ArmModel):
 
     def load(self, motion: Motion) -> FloatArray:
         """Return the torque of the rigid body along a motion of the links, (N, n) [N m]."""
-        return np.array(self._once('load', motion, self._load))
-
-    def _load(self, motion: Motion) -> FloatArray:
-        columns = self._regressor(motion)
-        if columns is None:
-            return super().load(motion)
-        flat = columns.reshape(-1, columns.shape[2]) @ self.body.rigid_parameters
-        return np.asarray(flat.reshape(motion.q.shape))
+        return np.array(self._once('load', motion, super().load))
 
     def body_columns(self, motion: Motion) -> FloatArray:
         """Return the regressor of the load along a recorded motion, shape (N, n, 10 n)."""

@@ -79,7 +79,7 @@ def columns_of(cause, nuisance):
 
 
 def test_settings_are_compared_by_the_density_of_the_data(nuisance):
-    settings = [Setting(True, 0.4, 0.3, 0.7, 1.0), Setting(True, 1.2, 0.8, 0.4, 1.0)]
+    settings = [Setting(1.0, 0.4, 0.3, 0.7, 1.0), Setting(True, 1.2, 0.8, 0.4, 1.0)]
     one, other = (nuisance.marginal(setting).evidence for setting in settings)
     first, second = (density(nuisance, setting) for setting in settings)
     assert one - other == pytest.approx(first - second, rel=1e-4, abs=1e-3)
@@ -91,7 +91,7 @@ def causes_of(nuisance, under, *names):
 
 
 def test_the_factor_of_a_cause_is_the_ratio_of_densities(nuisance):
-    setting = Setting(True, 0.4, 0.3, 0.7, 1.0)
+    setting = Setting(1.0, 0.4, 0.3, 0.7, 1.0)
     under = nuisance.marginal(setting)
     for cause in causes_of(nuisance, under, 'torque_offset', 'viscous_friction'):
         parts = columns_of(cause, nuisance)
@@ -106,7 +106,7 @@ def test_the_factor_of_a_cause_is_the_ratio_of_densities(nuisance):
 
 def test_an_accepted_cause_is_explained_as_if_it_were_data_of_the_model(nuisance):
     """Beside itself a cause has nothing left to explain."""
-    setting = Setting(True, 0.4, 0.3, 0.7, 1.0)
+    setting = Setting(1.0, 0.4, 0.3, 0.7, 1.0)
     under = nuisance.marginal(setting)
     first, _ = causes_of(nuisance, under, 'torque_offset')
     beside = nuisance.and_cause(first, 1.0)
@@ -140,7 +140,7 @@ def test_a_family_has_the_joints_of_the_largest_evidence(upright, joints):
     misfit = np.full(3, 0.05)
     rows = Rows(tuple(data), (misfit,) * 6, 3, (misfit,) * 6)
     nuisance = Nuisance.of(rows, upright.arm, np.random.default_rng(0))
-    under = nuisance.marginal(Setting(True, 0.4, 0.3, 0.7, 1.0))
+    under = nuisance.marginal(Setting(1.0, 0.4, 0.3, 0.7, 1.0))
     causes = causes_of(nuisance, under, 'viscous_friction')
     families = [one for one in causes if len(one.effect.joints) > 1]
     wanted = tuple(upright.robot.joints[k] for k in joints)
@@ -161,7 +161,7 @@ def test_every_value_of_a_cause_has_to_be_possible(upright):
 
 
 def test_earlier_causes_without_significance_are_dropped(nuisance):
-    setting = Setting(True, 0.4, 0.3, 0.7, 1.0)
+    setting = Setting(1.0, 0.4, 0.3, 0.7, 1.0)
     under = nuisance.marginal(setting)
     first, last = causes_of(nuisance, under, 'torque_offset')
     for order in ((first, last), (last, first)):

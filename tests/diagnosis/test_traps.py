@@ -48,7 +48,7 @@ def significant(arm, data, sigma, names):
     nuisance = Nuisance.of(
         Rows.over_noise(Evidence.over_noise(data, sigma)), arm, np.random.default_rng(0)
     )
-    under = nuisance.marginal(Setting(True, 0.0, 0.0, 1.0, 1.0))
+    under = nuisance.marginal(Setting(1.0, 0.0, 0.0, 1.0, 1.0))
     kinds = tuple(CATALOGUE[name] for name in names)
     causes = Causes(kinds, nuisance, False, frozenset()).causes(nuisance, under)
     p = {}

@@ -164,6 +164,18 @@ class Causes:
         """Return the columns of an effect in each trajectory, (M, n, p)."""
         return [part.columns(self.nuisance.arm, effect) for part in self._parts]
 
+    def renewed(self, cause: Cause) -> Cause:
+        """Return a cause of another comparison with products of these nuisance columns."""
+        columns = [x[:, :, list(cause.kept)] for x in self._columns(cause.effect)]
+        return cause_of(
+            self.nuisance,
+            SelectedEffect(cause.effect, cause.kept),
+            columns,
+            cause.unit,
+            cause.prior,
+            cause.torque,
+        )
+
     def reshaped(self, cause: Cause, shape: FloatArray) -> Cause | None:
         """Return a cause with another shape; None where it is impossible or invisible."""
         try:
@@ -253,13 +265,12 @@ def cause_of(
     joints = np.flatnonzero(np.any([x.any(axis=(0, 2)) for x in columns], axis=0)).tolist()
     weighted = nuisance.rows.weighted(columns, joints)
     products, aim, squares = [], [], []
-    for x, y, z in zip(nuisance.columns, nuisance.residual, weighted, strict=True):
-        products.append(
-            sum(
-                (x[joint].T @ own_rows for joint, own_rows in zip(joints, z, strict=True)),
-                start=np.zeros((x.shape[2], len(unit))),
-            )
-        )
+    for k, (y, z) in enumerate(zip(nuisance.residual, weighted, strict=True)):
+        product = np.zeros((nuisance.columns[k].shape[2], len(unit)))
+        for joint, own_rows in zip(joints, z, strict=True):
+            place, columns_of_joint = nuisance.acting[k][joint]
+            product[place] += columns_of_joint.T @ own_rows
+        products.append(product)
         flat = z.reshape(-1, len(unit))
         aim.append(flat.T @ y[joints].ravel())
         squares.append(flat.T @ flat)

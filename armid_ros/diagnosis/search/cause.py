@@ -9,6 +9,7 @@ from dataclasses import dataclass, replace
 
 from armid_ros.effects import Effect
 from armid_ros.motion import FloatArray
+from armid_ros.robots import Robot
 import numpy as np
 import numpy.typing as npt
 
@@ -57,6 +58,12 @@ class Cause:
     def key(self) -> tuple[str, tuple[str, ...], tuple[int, ...]]:
         """Identity of the cause in any shape: name, joints and quantities."""
         return self.effect.name, self.effect.joints, self.kept
+
+    def whole(self, values: FloatArray, robot: Robot) -> FloatArray:
+        """Return all parameters of the effect, from values of the kept ones; others are zero."""
+        whole = np.zeros(len(self.effect.parameters(robot)))
+        whole[list(self.kept)] = values
+        return whole
 
     def among(self, effect: Effect, values: npt.NDArray[np.intp], shapes: int) -> Cause:
         """Return the cause with some of its values, which belong to an effect on fewer joints."""

@@ -14,8 +14,9 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 
 from armid_ros.arm import ArmModel, Misfit
-from armid_ros.arm.memoized_arm import memoized_arm
+from armid_ros.arm.memoized_arm import memoized_arm, plain_arm
 from armid_ros.arm.misfit import louder
+from armid_ros.arm.words import with_named
 from armid_ros.diagnosis.data.baseline import Baseline
 from armid_ros.diagnosis.data.days import Rows
 from armid_ros.diagnosis.data.evidence import Evidence, noise_floor, torque_rms
@@ -38,16 +39,21 @@ from armid_ros.diagnosis.search.explanation import (
     NOISE,
 )
 from armid_ros.diagnosis.search.nuisance import Nuisance
-from armid_ros.diagnosis.search.posterior import JointFit
+from armid_ros.diagnosis.search.posterior import JointFit, SAME_GRAVITY
 from armid_ros.diagnosis.search.setting import Setting
 from armid_ros.diagnosis.settings import DiagnosisSettings
+from armid_ros.effects.gravity import GravityVector
 from armid_ros.motion import FloatArray
+from armid_ros.robots import GRAVITIES
 import numpy as np
 
 Progress = Callable[[float, str], None]
 #: Smallest part of a misfit that is no noise, as a share: the estimate of noise varies by 5 %. Of
 #: 20 effects that appeared in a running arm 20 were named, and 15 with a share of 1.
 _LEAST_PART = 0.3
+#: Largest number of fits of gravity of another direction: torque is bilinear in gravity and body.
+_MOST_TURNS = 5
+_KNOWN_GRAVITY = 'the magnitude of gravity is taken as that of the {}, {:g} m/s^2'
 OWN_MISFIT = 'the error of the model before'
 WRITTEN_MISFIT = 'the error of the model when it was identified'
 #: Note on a model without covariance of its identification.
@@ -114,24 +120,68 @@ class Explainer:
         evidence = Evidence.over_noise(prepared.data, prepared.sigma)
         rows = Rows.over_noise(evidence)
         unknown = with_friction(self.arm, settings.library)[1]
-        result = self.comparison(rows, settings_alone()).found()
+        comparison, gravity = self.comparison(rows, settings_alone()), self.arm.robot.gravity
+        result = comparison.found()
+        for turn in range(_MOST_TURNS):  # noqa: B007
+            before, gravity = gravity, self._gravity(result)
+            if np.linalg.norm(gravity - before) <= SAME_GRAVITY * np.linalg.norm(before):
+                break
+            grid = [x for x in settings_alone() if x.body == result.under.setting.body]
+            comparison = self.comparison(rows, grid, gravity=gravity)
+            result = comparison.begun(result)
+        result = comparison.found(result) if turn else result
+        magnitude, notes = self._magnitude(result)
         setting, held = result.under.setting, list[int]()
-        if setting.free:
+        if setting.body:
             accepted = [one.cause.effect for one in result.nuisance.accepted]
             changed = [p for effect in accepted for p in effect.parameters(self.arm.robot)]
             held = [k for k, p in enumerate(self.arm.parameters) if p in changed]
         else:
             evidence = prepared.described
-        nuisance = Nuisance.of(rows, memoized_arm(self.arm), self.rng, held=held)
+        nuisance = Nuisance.of(rows, memoized_arm(self.arm), self.rng, held=held, gravity=gravity)
         every = tuple(range(len(rows.today)))
-        problem = JointFit(nuisance.arm, nuisance, setting, every, stated=True)
+        problem = JointFit(nuisance.arm, nuisance, setting, every, True, gravity=magnitude)
         found = explain(problem, evidence, result, settings, unknown)
         if at_floor(found, settings):
-            return Chosen(found, np.zeros(self.arm.robot.n_joints), NOISE, look=result.first)
+            nothing = np.zeros(self.arm.robot.n_joints)
+            return Chosen(found, nothing, NOISE, notes, look=result.first)
         misfit = np.sqrt(evidence.power(found.residual))
         sigma = tuple(np.maximum(one, misfit) for one in evidence.sigma)
         found = replace(found, evidence=replace(evidence, sigma=sigma))
-        return Chosen(found, misfit, ESTIMATED, look=result.first)
+        return Chosen(found, misfit, ESTIMATED, notes, look=result.first)
+
+    def _gravity(self, result: Result) -> FloatArray:
+        """Return gravity with the accepted causes, in the frame of the base, (3,) [m/s^2]."""
+        nuisance, arm = result.nuisance, plain_arm(self.arm)
+        means = nuisance.means(result.under)
+        for one, span in zip(nuisance.accepted, nuisance.spans, strict=True):
+            if not one.cause.effect.joints:
+                arm = with_named(arm, one.cause.effect, one.cause.whole(means[span], arm.robot))
+        return arm.body.gravity
+
+    def _magnitude(self, result: Result) -> tuple[float | None, tuple[str, ...]]:
+        """
+        Return the magnitude of gravity of a celestial body unless data deny it, with a note.
+
+        The odds of a magnitude are its posterior density over its prior density (Dickey 1971).
+
+        """
+        nuisance, gravity = result.nuisance, self._gravity(result)
+        _, covariance = nuisance.whole(result.under)
+        for one, span in zip(nuisance.accepted, nuisance.spans, strict=True):
+            if isinstance(one.cause.effect, GravityVector):
+                size = float(np.linalg.norm(gravity))
+                along = gravity[list(one.cause.kept)] / size
+                std = float(np.sqrt(along @ covariance[span, span] @ along))
+                odds = {
+                    name: np.log(size / std) - 0.5 * ((np.linalg.norm(vector) - size) / std) ** 2
+                    for name, vector in GRAVITIES.items()
+                }
+                name = max(odds, key=lambda name: odds[name])
+                if odds[name] > -self.settings.thresholds.alarm:
+                    known = float(np.linalg.norm(GRAVITIES[name]))
+                    return known, (_KNOWN_GRAVITY.format(name, known),)
+        return None, ()
 
     def _beside(self, written: Misfit) -> Chosen:
         """
@@ -211,7 +261,11 @@ class Explainer:
         return rows.not_below_rounding()
 
     def comparison(
-        self, rows: Rows, grid: Sequence[Setting] | None, known: FloatArray | None = None
+        self,
+        rows: Rows,
+        grid: Sequence[Setting] | None,
+        known: FloatArray | None = None,
+        gravity: FloatArray | None = None,
     ) -> CauseComparison:
         """
         Return the comparison of all causes.
@@ -224,11 +278,13 @@ class Explainer:
             Amplitudes of discrepancy and noise to compare; None with a baseline.
         known : ndarray, shape (P, P), optional
             Information on the parameters of the arm, added to that of its description.
+        gravity : ndarray, shape (3,), optional
+            Gravity that acts on errors of the body; see `Nuisance.of`.
 
         """
         arm, settings = self.arm, self.settings
         fuller, unknown = with_friction(arm, settings.library)
-        nuisance = Nuisance.of(rows, memoized_arm(fuller), self.rng, known)
+        nuisance = Nuisance.of(rows, memoized_arm(fuller), self.rng, known, gravity=gravity)
         changed = self.baseline is not None or self.misfit is not None
         kinds = list(settings.kinds)
         if changed:

@@ -39,6 +39,9 @@ _SHARED, _OWN = (0.1, 0.2, 0.4, 0.8, 1.6, 3.2, 6.4), (0.2, 0.4, 0.8)
 _NOISE = (0.15, 0.3, 0.5, 0.8, 1.1)
 #: Amplitudes of d0 and d_k that are tried without a baseline, over the torque; log prior odds.
 _SHARES = ((0.0, 0.0), (0.02, -1.0), (0.06, -2.0), (0.15, -3.0))
+#: Errors of the described body that are tried without a baseline, over the largest expected ones:
+#: exact, a tenth (masses off by 10 %, centres of mass by a centimetre), and all.
+_BODIES = (0.0, 0.1, 1.0)
 #: Amplitudes of the noise without a baseline, over that of two equal periods; log prior odds.
 _FACTORS = ((1.0, 0.0), (1.3, -1.0), (2.0, -3.0), (4.0, -5.0))
 #: Number of causes whose shapes are refined, of causes compared at last, most accepted causes.
@@ -134,11 +137,29 @@ class CauseComparison:
         effects = tuple(self.catalogue.effects)
         return Result((), self.nuisance, look.under, look, effects)
 
-    def found(self) -> Result:
-        """Accept the best cause until none is significant; drop causes that became redundant."""
-        accepted, nuisance = list[Accepted](), self.nuisance
-        result = self.first()
-        look = result.first
+    def begun(self, before: Result) -> Result:
+        """Return the causes of another comparison that act on the whole arm, fitted anew."""
+        accepted = [one for one in before.accepted if not one.best.cause.effect.joints]
+        nuisance = self.nuisance
+        for one in accepted:
+            cause = self.catalogue.renewed(one.best.cause)
+            nuisance = nuisance.and_cause(cause, one.best.fit.size)
+        under = self._likeliest(nuisance)
+        return replace(before, accepted=tuple(accepted), nuisance=nuisance, under=under)
+
+    def found(self, begun: Result | None = None) -> Result:
+        """
+        Accept the best cause until none is significant; drop causes that became redundant.
+
+        Parameters
+        ----------
+        begun : Result, optional
+            Causes that are accepted already.
+
+        """
+        result = begun or self.first()
+        accepted, nuisance = list(result.accepted), result.nuisance
+        look = self.look(nuisance) if accepted else result.first
         while len(accepted) < _MOST:
             explained = sum(max(one.best.data, 0.0) for one in accepted)
             best = self.best(look, explained)
@@ -278,7 +299,7 @@ def settings_of_baseline(nuisance: Nuisance) -> tuple[Setting, ...]:
     lasting = 1.0
     for _ in range(2):
         tried = (
-            nuisance.marginal(Setting(True, shared, own, noise, lasting), before)
+            nuisance.marginal(Setting(1.0, shared, own, noise, lasting), before)
             for shared, own, noise in product(_SHARED, _OWN, _NOISE)
         )
         found = max(tried, key=lambda one: one.evidence)
@@ -287,26 +308,26 @@ def settings_of_baseline(nuisance: Nuisance) -> tuple[Setting, ...]:
 
 
 def settings_alone() -> tuple[Setting, ...]:
-    """Return the settings to compare without a baseline, with a fixed and a free body."""
+    """Return the settings to compare without a baseline, with fixed and with free bodies."""
     return tuple(
-        Setting(free, share, share, factor, LASTING, odds + more)
-        for free in (False, True)
+        Setting(body, share, share, factor, LASTING, odds + more)
+        for body in _BODIES
         for share, odds in _SHARES
         for factor, more in _FACTORS
     )
 
 
-def settings_of_misfit(free: bool) -> tuple[Setting, ...]:
+def settings_of_misfit(body: float) -> tuple[Setting, ...]:
     """Return the settings to compare where only the size of the misfit is known."""
     return tuple(
-        Setting(free, share, share, noise, LASTING) for share, noise in product(_OWN, (0.5, 1.1))
+        Setting(body, share, share, noise, LASTING) for share, noise in product(_OWN, (0.5, 1.1))
     )
 
 
 def _leading(settings: Sequence[Marginal]) -> list[Marginal]:
-    """Return the best setting and that of noise alone, each with a fixed and a free body."""
+    """Return the best setting and that of noise alone, for each size of the body's errors."""
     found = []
-    for free in (False, True):
-        own = [one for one in settings if one.setting.free is free]
+    for body in dict.fromkeys(one.setting.body for one in settings):
+        own = [one for one in settings if one.setting.body == body]
         found += [max(own, key=lambda one: one.evidence), own[0]] if own else []
     return found

@@ -63,10 +63,8 @@ def explain(
         if not _matters(cause, means[span], result, material):
             small.append(trial)
             continue
-        whole = np.zeros(len(cause.effect.parameters(robot)))
-        whole[list(cause.kept)] = means[span]
         named.append(SelectedEffect(cause.effect, cause.kept))
-        values.append(whole)
+        values.append(cause.whole(means[span], robot))
         steps.append(trial)
     there = [trial for trial in _open(result, unknown, settings) if trial.odds > alarm]
     large = {t.effect.name for t in there if np.any(np.abs(t.values) >= t.least)}

@@ -70,10 +70,10 @@ class Explanation:
     problem: JointFit | None = None
     refitted: bool = False
 
-    def without(self, name: int) -> Explanation:
-        """Return the explanation without one of its causes, the others fitted anew."""
-        fewer = self.only([k for k in range(len(self.steps)) if k != name])
-        return replace(fewer, minor=(*self.minor, self.steps[name]))
+    def without(self, *names: int) -> Explanation:
+        """Return the explanation without some of its causes, the others fitted anew."""
+        fewer = self.only([k for k in range(len(self.steps)) if k not in names])
+        return replace(fewer, minor=(*self.minor, *(self.steps[k] for k in names)))
 
     def only(self, keep: Sequence[int]) -> Explanation:
         """Return the explanation with some of its causes, in this order, fitted anew."""

@@ -54,12 +54,26 @@ class CauseTerm:
         Standard deviation of the prior of its values, over their unit.
     acts : ndarray of bool, shape (K,)
         Whether it acts in each recording.
+    known : (ndarray, shape (p,), float, float), optional
+        Direction among its values along which their sum is known, the sum, and its standard
+        deviation.
 
     """
 
     cause: Cause
     size: float
     acts: npt.NDArray[np.bool_]
+    known: tuple[FloatArray, float, float] | None = None
+
+    @property
+    def prior(self) -> tuple[FloatArray, FloatArray, float]:
+        """Return the prior precision (p, p), its product with the mean, and half of its loss."""
+        precision = np.diag((self.size * self.cause.unit) ** -2.0)
+        if self.known is None:
+            return precision, np.zeros(len(precision)), 0.0
+        direction, total, std = self.known
+        aim = direction * total / std**2
+        return precision + np.outer(direction, direction) / std**2, aim, 0.5 * (total / std) ** 2
 
 
 @dataclass(frozen=True)
@@ -111,6 +125,7 @@ class Nuisance:
         rng: np.random.Generator,
         known: FloatArray | None = None,
         held: Sequence[int] = (),
+        gravity: FloatArray | None = None,
     ) -> Nuisance:
         """
         Compute the nuisance columns of the data.
@@ -127,10 +142,14 @@ class Nuisance:
             Information on the first parameters of the arm, added to that of its description.
         held : sequence of int
             Parameters of the arm that are not fitted, as an accepted cause changes them.
+        gravity : ndarray, shape (3,), optional
+            Gravity that acts on errors of the body, if it is another than in the model [m/s^2]:
+            the torque is bilinear in gravity and body.
 
         """
         free = np.setdiff1d(np.arange(len(arm.parameters)), held)
-        base, columns = excited(arm, arm.base_parameters(rng, free), rows.data)
+        felt = arm if gravity is None else replace(arm, robot=arm.robot.with_gravity(gravity))
+        base, columns = excited(felt, felt.base_parameters(rng, free), rows.data)
         described = described_precision(base, arm, known)
         rigid = len(arm.robot.rigid_parameters)
         values = arm.theta[base.independent]
@@ -174,6 +193,16 @@ class Nuisance:
         return np.arange(self.rank, size).reshape(len(self.columns[0]), -1)
 
     @cached_property
+    def acting(self) -> list[list[tuple[npt.NDArray[np.intp], FloatArray]]]:
+        """Columns that act on each joint in each recording: their indices, and values (M, c)."""
+        body = np.arange(self.rank)
+        places = [np.concatenate([body, own]) for own in self.discrepancy]
+        return [
+            [(place, x[:, place]) for place, x in zip(places, columns, strict=True)]
+            for columns in self.columns
+        ]
+
+    @cached_property
     def count(self) -> list[int]:
         """Return the number of informative entries of each recording."""
         seen = [(w > 0.0)[:, :, np.newaxis].astype(float) for w in self.rows.weight]
@@ -213,10 +242,14 @@ class Nuisance:
         return np.concatenate([cause.products[k], self.among_accepted(cause, k)])
 
     def and_cause(
-        self, cause: Cause, size: float, acts: npt.NDArray[np.bool_] | None = None
+        self,
+        cause: Cause,
+        size: float,
+        acts: npt.NDArray[np.bool_] | None = None,
+        known: tuple[FloatArray, float, float] | None = None,
     ) -> Nuisance:
         """Return the nuisance with one more cause, acting on the day in question by default."""
-        term = CauseTerm(cause, size, self.rows.today if acts is None else acts)
+        term = CauseTerm(cause, size, self.rows.today if acts is None else acts, known)
         return replace(self, accepted=(*self.accepted, term))
 
     def without(self, name: int) -> Nuisance:
@@ -262,13 +295,15 @@ class Nuisance:
     def _precision(self, setting: Setting) -> tuple[FloatArray, npt.NDArray[np.intp]]:
         """Return the prior precision of the fitted parameters, and their indices."""
         unit = self.rows.amplitude[0]
-        body = self.turn.T @ self.described @ self.turn + _HELD * np.eye(self.rank)
+        scale = np.where(self.open, 1.0, setting.body or 1.0)
+        body = self.turn.T @ self.described @ self.turn / np.outer(scale, scale)
+        body += _HELD * np.eye(self.rank)
         size = max(setting.shared, _HELD) * unit[:, np.newaxis] * self.reach
         shared = size.ravel() ** -2.0
-        more = [(one.size * one.cause.unit) ** -2.0 for one in self.accepted]
-        whole = linalg.block_diag(body, np.diag(np.concatenate([shared, *more])))
+        more = [one.prior[0] for one in self.accepted]
+        whole = linalg.block_diag(body, np.diag(shared), *more)
         used = np.ones(len(whole), dtype=bool)
-        used[: self.rank] = setting.free | self.open
+        used[: self.rank] = (setting.body > 0.0) | self.open
         used[self.discrepancy.ravel()] = setting.shared > 0.0
         kept = np.flatnonzero(used)
         return whole[np.ix_(kept, kept)], kept
@@ -305,7 +340,11 @@ class Nuisance:
         """
         whole, kept = self._precision(setting)
         evidence = 0.5 * np.linalg.slogdet(whole)[1] + setting.prior
-        aim, scale, loss = np.zeros(len(kept)), setting.precision, 0.0
+        scale, loss = setting.precision, sum(one.prior[2] for one in self.accepted)
+        means = np.zeros(len(self.cross[0]))
+        for one, span in zip(self.accepted, self.spans, strict=True):
+            means[span] = one.prior[1]
+        aim = means[kept]
         motions = dict[int, MotionDiscrepancy]()
         for k in range(len(self.columns)) if among is None else among:
             square, cross, count = self.square[k], self.cross[k], self.count[k]

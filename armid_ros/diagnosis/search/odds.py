@@ -22,7 +22,7 @@ from armid_ros.diagnosis.search.setting import Marginal
 from armid_ros.motion import FloatArray
 import numpy as np
 import numpy.typing as npt
-from scipy import stats
+from scipy import special
 
 #: Spreads: variances of values between recordings over those for white noise. Equal values,
 #: spreads that are tried for a cause, and spreads that are tried for all causes in a baseline.
@@ -254,7 +254,7 @@ def allowed(cause: Cause, fit: CauseFit, nuisance: Nuisance) -> float:
         return IMPOSSIBLE
     lower, upper = (bound[kept] for bound in room(cause.effect, arm))
     found, prior = (
-        stats.norm.cdf((upper - mean) / wide) - stats.norm.cdf((lower - mean) / wide)
+        special.ndtr((upper - mean) / wide) - special.ndtr((lower - mean) / wide)
         for mean, wide in ((fit.values, fit.std), (0.0, fit.size * cause.unit))
     )
     ratio = np.log(np.maximum(found, 1e-300)) - np.log(np.maximum(prior, 1e-6))

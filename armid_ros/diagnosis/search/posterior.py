@@ -24,10 +24,13 @@ from armid_ros.diagnosis.search.cause import Cause, SelectedEffect
 from armid_ros.diagnosis.search.nuisance import Nuisance
 from armid_ros.diagnosis.search.patch import Patch, patch_columns
 from armid_ros.diagnosis.search.setting import LASTING, Marginal, Setting
+from armid_ros.effects.gravity import GravityVector
 from armid_ros.estimate import Estimate
 from armid_ros.motion import FloatArray
 import numpy as np
 
+#: Relative differences of gravity on one celestial body that do not count: those of Earth.
+SAME_GRAVITY = 0.003
 #: Largest number of Gauss-Newton steps; the comparison has refined the shapes already.
 _MOST_ROUNDS = 4
 #: Shares of a step that are tried until the loss falls.
@@ -96,6 +99,8 @@ class JointFit:
         Whether the fitted arm includes the fitted change of body and friction.
     spread : float
         Variance of values between recordings, over their variance for white noise.
+    gravity : float or None
+        Magnitude of gravity, if it is known [m/s^2].
 
     """
 
@@ -105,6 +110,7 @@ class JointFit:
     recordings: tuple[int, ...]
     stated: bool
     spread: float = 0.0
+    gravity: float | None = None
 
     @classmethod
     def over_noise(
@@ -131,13 +137,13 @@ class JointFit:
         """
         nuisance = Nuisance.of(Rows.over_noise(evidence), memoized_arm(arm), rng, known)
         every = tuple(range(len(nuisance.columns)))
-        setting = Setting(True, 0.0, 0.0, 1.0, LASTING)
+        setting = Setting(1.0, 0.0, 0.0, 1.0, LASTING)
         return cls(nuisance.arm, nuisance, setting, every, stated=True)
 
     @property
     def refits_body(self) -> bool:
         """Whether the body of the arm is refitted."""
-        return self.stated and self.setting.free
+        return self.stated and self.setting.body > 0.0
 
     def fit(
         self, named: Sequence[SelectedEffect] = (), values: Sequence[FloatArray] = ()
@@ -209,7 +215,7 @@ class JointFit:
 
     def as_described(self) -> JointFit:
         """Return the fit with the body held at the description."""
-        return replace(self, setting=replace(self.setting, free=False))
+        return replace(self, setting=replace(self.setting, body=0.0))
 
     def rest(self, fitted: Fitted) -> list[FloatArray]:
         """
@@ -298,7 +304,13 @@ class JointFit:
             for total, x in zip(torque, only, strict=True):
                 total[:, :, 0] += x @ values[kept]
         for cause in made:
-            result = result.and_cause(cause, 1.0)
+            known = None
+            if self.gravity is not None and isinstance(cause.effect, GravityVector):
+                now = state.model.body.gravity
+                along = now / np.linalg.norm(now)
+                more = self.gravity - float(along @ self.arm.body.gravity)
+                known = along, more, SAME_GRAVITY * self.gravity
+            result = result.and_cause(cause, 1.0, known=known)
         present = rows.weighted(torque, range(len(rows.torque)))
         return result.with_residual(
             [

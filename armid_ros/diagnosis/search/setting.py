@@ -17,12 +17,13 @@ LASTING = 2.0
 @dataclass(frozen=True)
 class Setting:
     """
-    Amplitudes of discrepancy and noise, with a fixed or a free body.
+    Amplitudes of the errors of the body, of discrepancy and of noise.
 
     Attributes
     ----------
-    free : bool
-        Whether the body is fitted anew; parameters without given values always are.
+    body : float
+        Standard deviation of the errors of described values, over the largest expected errors;
+        zero if described values are exact. Parameters without given values are always fitted.
     shared, own : float
         Standard deviations of d0 and d_k, over their unit.
     noise : float
@@ -34,7 +35,7 @@ class Setting:
 
     """
 
-    free: bool
+    body: float
     shared: float
     own: float
     noise: float

@@ -81,7 +81,7 @@ def diagnose_ties(
     )
     if not at_floor(found, replace(settings, material=0.0)):
         rest = replace(explainer, arm=memoized_arm(fitted.arm))
-        free = [one for one in settings_alone() if one.free]
+        free = [one for one in settings_alone() if one.body]
         result = rest.comparison(Rows.over_noise(evidence), free).found()
         found = explain(problem, evidence, result, settings, known=(fitted, steps))
         found = replace(found, survey=survey)
@@ -243,7 +243,7 @@ def _as_one_cause(
 ) -> tuple[Trial, Survey]:
     """Compare all ties, as one cause, with the catalogue; return their trial and the survey."""
     settings, robot = explainer.settings, explainer.arm.robot
-    free = [one for one in settings_alone() if one.free]
+    free = [one for one in settings_alone() if one.body]
     comparison = explainer.comparison(Rows.over_noise(evidence), free)
     result = comparison.first()
     loose = any(own.effect.shapes for own in fitted.named)

@@ -12,7 +12,7 @@ with a large enough share, the others are minor.
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 from armid_ros.diagnosis.data.evidence import Evidence
 from armid_ros.diagnosis.data.trajectory import block_rows
@@ -110,11 +110,11 @@ def predicted(
     for position, k in enumerate(order):
         taken[k] = squares[position] - squares[position + 1]
     shares = Attribution(tuple(order), squares[0], taken)
-    worst = min(order, key=lambda k: shares.share([k]), default=0)
-    if not order or shares.share([worst]) >= 0.0:
+    worse = [k for k in order if shares.share([k]) < 0.0]
+    if not worse:
         return explanation, shares
-    others = [k - (k > worst) for k in order if k != worst]
-    return predicted(explanation.without(worst), others, unseen)
+    others = [k - sum(k > one for one in worse) for k in order if k not in worse]
+    return predicted(explanation.without(*worse), others, unseen)
 
 
 def left_out(explanation: Explanation) -> Attribution:
@@ -122,12 +122,19 @@ def left_out(explanation: Explanation) -> Attribution:
     assert explanation.problem is not None
     problem, own = explanation.problem, explanation.fitted
     linear = problem.linear(Patch(problem.arm, own.named, own.values))
+    folds, spans = _folds(problem, linear), linear.spans
     count = len(own.named)
     remaining, order = list(range(count)), list[int]()
-    before = whole = _left(problem, linear, ())
+
+    def left(names: Sequence[int]) -> FloatArray:
+        others = [spans[n] for n in range(count) if n not in names]
+        absent = [k for span in others for k in range(span.start, span.stop)]
+        return np.concatenate([one.left(absent) for one in folds])
+
+    before = whole = left(())
     taken = np.zeros((count, len(whole)))
     while remaining:
-        after = {k: _left(problem, linear, [*order, k]) for k in remaining}
+        after = {k: left([*order, k]) for k in remaining}
         best = min(remaining, key=lambda k: float(after[k].sum()))
         taken[best], before = before - after[best], after[best]
         order.append(best)
@@ -135,27 +142,53 @@ def left_out(explanation: Explanation) -> Attribution:
     return Attribution(tuple(order), whole, taken)
 
 
-def _left(problem: JointFit, linear: Nuisance, names: Sequence[int]) -> FloatArray:
-    """Return the squared residual of each block, predicted from other folds with some causes."""
-    fewer = replace(linear, accepted=tuple(linear.accepted[k] for k in names))
-    rows = linear.rows
-    said = np.zeros(len(fewer.cross[0]), dtype=bool)
-    said[: fewer.rank] = problem.stated
-    for span in fewer.spans:
-        said[span] = True
-    found = []
+@dataclass(frozen=True)
+class _Fold:
+    """
+    A part of a recording, with the posterior of all parameters fitted to the other parts.
+
+    Attributes
+    ----------
+    columns : sequence of ndarray, each (m, p)
+        Weighted columns of each block; zero for parameters that are not part of the arm.
+    target : sequence of ndarray, each (m,)
+        Weighted residual of each block.
+    means, covariance : ndarray, shape (p,), (p, p)
+        The posterior.
+
+    """
+
+    columns: Sequence[FloatArray]
+    target: Sequence[FloatArray]
+    means: FloatArray
+    covariance: FloatArray
+
+    def left(self, absent: Sequence[int]) -> FloatArray:
+        """Return the squared residual of each block, given that some parameters are zero."""
+        values, border = self.means, self.covariance[:, absent]
+        if absent:
+            values = values - border @ np.linalg.solve(border[absent], values[absent])
+        pairs = zip(self.columns, self.target, strict=True)
+        return np.array([np.sum((y - x @ values) ** 2) for x, y in pairs])
+
+
+def _folds(problem: JointFit, linear: Nuisance) -> list[_Fold]:
+    """Return the folds of the day in question, each predicted from all other rows."""
+    rows, found = linear.rows, list[_Fold]()
+    part_of_arm = np.ones(len(linear.cross[0]), dtype=bool)
+    part_of_arm[: linear.rank] = problem.stated
+    part_of_arm[linear.discrepancy] = False
     for k in problem.recordings:
         if not rows.today[k]:
             continue
         block, fold = block_rows([part for part in rows.data if part.fold == k])
-        x, y = fewer.rows_of(k), fewer.residual[k].T
+        x, y = linear.rows_of(k), linear.residual[k].T
         for one in np.unique(fold):
-            blocks = np.flatnonzero(fold == one)
-            own = np.isin(block, blocks)
-            flat, rest = x[own].reshape(-1, x.shape[2]), y[own].ravel()
-            told = np.flatnonzero(np.any(flat, axis=1))
-            part = flat[told], rest[told]
-            values = fewer.means(fewer.marginal(problem.setting, problem.recordings, (k, *part)))
-            left = y - x @ (said * values)
-            found += [float(np.sum(left[block == each] ** 2)) for each in blocks]
-    return np.array(found)
+            blocks = [block == number for number in np.flatnonzero(fold == one)]
+            columns = [x[own].reshape(-1, x.shape[2]) for own in blocks]
+            target = [y[own].ravel() for own in blocks]
+            less = k, np.concatenate(columns), np.concatenate(target)
+            under = linear.marginal(problem.setting, problem.recordings, less)
+            columns = [own * part_of_arm for own in columns]
+            found.append(_Fold(columns, target, *linear.whole(under)))
+    return found
