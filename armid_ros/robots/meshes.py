@@ -21,7 +21,7 @@ from typing import Any
 from armid_ros.errors import RobotError
 from armid_ros.files import is_file
 from armid_ros.motion import FloatArray
-from armid_ros.robots.packages import package_folders
+from armid_ros.robots.xacro_expansion import package_folders
 import coal
 import numpy as np
 import numpy.typing as npt

@@ -14,7 +14,7 @@ from armid_ros.identification.assess.compare import compare
 from armid_ros.identification.parameters_file import read_parameters
 from armid_ros.robots import load_robot
 from armid_ros.robots.load import shipped_path
-from armid_ros.robots.xacro_process import expanded
+from armid_ros.robots.xacro_expansion import expanded
 from hypothesis import given
 from hypothesis import strategies as st
 import numpy as np
