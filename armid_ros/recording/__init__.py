@@ -17,7 +17,7 @@ from armid_ros.recording.joint_state.encoder import (
     write_recording,
 )
 from armid_ros.recording.message_types import string_cdr
-from armid_ros.recording.qos import LATCHED
+from armid_ros.recording.metadata import LATCHED
 from armid_ros.recording.reader import read_recording, read_robot_description
 from armid_ros.recording.recording import (
     PartnerMotion,

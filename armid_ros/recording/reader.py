@@ -6,6 +6,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import replace
+from itertools import chain
 from pathlib import Path
 import struct
 
@@ -67,15 +68,11 @@ def read_recording(
         chosen = choose_topics(bag, joints, topic)
         decoder = JointStateDecoder(joints, sum(one.count for one in chosen))
         name = ' + '.join(one.name for one in chosen)
-        where = f'{path}: {name}'
-        with reading(path, RecordingError):
-            pieces, size = [], 0
-            for one in chosen:
-                for block in joint_state_blocks(bag, one):
-                    for piece in decoder.decode(block):
-                        size += piece.nbytes
-                        settings.require(size, f'{where}: the recording')
-                        pieces.append(piece)
+        pieces, size = [], 0
+        for piece in chain.from_iterable(_decoded(bag, one, decoder) for one in chosen):
+            size += piece.nbytes
+            settings.require(size, f'{path}: {name}: the recording')
+            pieces.append(piece)
         damage = bag.damage
     return assembled(path, name, joints, pieces, decoder, damage)
 
@@ -178,25 +175,23 @@ def read_pieces(
         def made(damage: str = '') -> Recording:
             return assembled(path, chosen.name, joints, list(held), decoder, damage)
 
-        for part in _parts(bag, chosen, decoder, samples):
-            if new and new + len(part) > samples:
-                piece = made()
-                yield piece, False
-                held, new = list(_from(held, keep(piece), piece.clock)), 0
-            held.append(part)
-            new += len(part)
+        for states in _decoded(bag, chosen, decoder):
+            for start in range(0, len(states), samples):
+                part = states.select(slice(start, start + samples))
+                if new and new + len(part) > samples:
+                    piece = made()
+                    yield piece, False
+                    held, new = list(_from(held, keep(piece), piece.clock)), 0
+                held.append(part)
+                new += len(part)
         yield made(bag.damage), True
 
 
-def _parts(
-    bag: Bag, topic: Topic, decoder: JointStateDecoder, most: int
-) -> Iterator[JointSamples]:
-    """Yield the messages of a topic in parts of at most a given number."""
+def _decoded(bag: Bag, topic: Topic, decoder: JointStateDecoder) -> Iterator[JointSamples]:
+    """Yield the samples of a topic."""
     with reading(bag.path, RecordingError):
         for block in joint_state_blocks(bag, topic):
-            for states in decoder.decode(block):
-                for start in range(0, len(states), most):
-                    yield states.select(slice(start, start + most))
+            yield from decoder.decode(block)
 
 
 def _from(held: Sequence[JointSamples], stamp: int, clock: str) -> Iterator[JointSamples]:

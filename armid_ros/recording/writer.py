@@ -24,8 +24,14 @@ from armid_ros.errors import ArmidError, RecordingError
 from armid_ros.recording.mcap.records import MESSAGE, RECORD_HEADER
 from armid_ros.recording.mcap.writer import Compression, McapWriter, message_record
 from armid_ros.recording.message_types import message_type, MessageType, STRING, string_cdr
-from armid_ros.recording.metadata import bag_information, dump, write_metadata
-from armid_ros.recording.qos import dump_qos, LATCHED, VOLATILE
+from armid_ros.recording.metadata import (
+    bag_information,
+    dump,
+    dump_qos,
+    LATCHED,
+    VOLATILE,
+    write_metadata,
+)
 from armid_ros.recording.source import IntArray, Source, Topic, UNREADABLE
 from armid_ros.version import __version__
 from mcap.opcode import Opcode

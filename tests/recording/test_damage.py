@@ -6,7 +6,7 @@ import struct
 
 from armid_ros.errors import RecordingError
 from armid_ros.recording import read_recording, ReadSettings, recover, write_recording
-from armid_ros.recording.mcap.content import walk
+from armid_ros.recording.mcap.contents import walk
 from armid_ros.recording.mcap.records import map_file
 import numpy as np
 import pytest

@@ -12,7 +12,7 @@ from armid_ros.recording import (
     write_recording,
 )
 from armid_ros.recording.message_types import JOINT_STATE
-from armid_ros.recording.qos import LATCHED, VOLATILE
+from armid_ros.recording.metadata import LATCHED, VOLATILE
 from mcap.reader import make_reader
 from mcap_ros2.decoder import DecoderFactory
 import numpy as np

@@ -21,7 +21,7 @@ from armid_ros.recording import (
 )
 from armid_ros.recording.mcap.writer import McapWriter
 from armid_ros.recording.message_types import JOINT_STATE, message_type, store_for, STRING
-from armid_ros.recording.qos import VOLATILE
+from armid_ros.recording.metadata import VOLATILE
 from armid_ros.recording.writer import DEFAULT_CHUNK_AGE, whole_bag
 from mcap.reader import make_reader
 from mcap.records import Chunk, MessageIndex, Metadata

@@ -6,41 +6,17 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 from pathlib import Path
-from typing import Protocol
 
 from armid_ros.errors import RecordingError
-from armid_ros.motion import FloatArray
+from armid_ros.motion import Motion
 from armid_ros.recording.joint_state.layout import JointStateLayout
 from armid_ros.recording.mcap.writer import Compression
 from armid_ros.recording.message_types import JOINT_STATE, QUANTITIES
+from armid_ros.recording.recording import Recording
 from armid_ros.recording.source import IntArray
 from armid_ros.recording.writer import BagWriter, DEFAULT_CHUNK_SIZE, whole_bag
 import numpy as np
 import numpy.typing as npt
-
-
-class Measured(Protocol):
-    """Joint measurements: a Recording, or a Motion with or without torque."""
-
-    @property
-    def joints(self) -> tuple[str, ...]:
-        """Joint names, n of them."""
-
-    @property
-    def t(self) -> FloatArray:
-        """Time [s], shape (N,)."""
-
-    @property
-    def q(self) -> FloatArray:
-        """Positions, shape (N, n)."""
-
-    @property
-    def dq(self) -> FloatArray | None:
-        """Velocities, shape (N, n)."""
-
-    @property
-    def tau(self) -> FloatArray | None:
-        """Torques, shape (N, n)."""
 
 
 def joint_state_cdr(
@@ -104,7 +80,7 @@ def write_joint_states(
 
 def write_recording(
     path: str | Path,
-    measured: Measured,
+    measured: Recording | Motion,
     *,
     topic: str = '/joint_states',
     start_ns: int | None = None,
@@ -119,7 +95,7 @@ def write_recording(
     ----------
     path : str or Path
         Bag directory to create; it must not exist.
-    measured : Recording, Motion or alike
+    measured : Recording or Motion
         Measured or simulated motion; velocities and torques may be None.
     topic : str
         Topic of the messages.
