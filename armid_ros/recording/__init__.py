@@ -10,7 +10,7 @@ raw messages for the nodes. ROS is not needed.
 """
 
 from armid_ros.recording.bag import Bag, topics
-from armid_ros.recording.copying import Copied, copy_bag, recover
+from armid_ros.recording.copying import recover
 from armid_ros.recording.joint_state.encoder import (
     joint_state_cdr,
     write_joint_states,
@@ -20,14 +20,13 @@ from armid_ros.recording.message_types import string_cdr
 from armid_ros.recording.metadata import LATCHED
 from armid_ros.recording.reader import read_recording, read_robot_description
 from armid_ros.recording.recording import (
-    PartnerMotion,
     PositionRange,
     ReadReport,
     recorded_together,
     Recording,
     TimeGap,
 )
-from armid_ros.recording.source import RawMessage, ReadSettings, Topic
+from armid_ros.recording.source import ReadSettings, Topic
 from armid_ros.recording.trajectory import (
     joint_trajectory_cdr,
     read_waypoints,
@@ -42,7 +41,6 @@ __all__ = [
     'ReadSettings',
     'TimeGap',
     'PositionRange',
-    'PartnerMotion',
     'recorded_together',
     'given_twice',
     'require_once',
@@ -55,13 +53,10 @@ __all__ = [
     'write_joint_trajectory',
     'read_waypoints',
     'recover',
-    'copy_bag',
-    'Copied',
     'write_joint_states',
     'joint_state_cdr',
     'string_cdr',
     'Bag',
     'Topic',
-    'RawMessage',
     'topics',
 ]

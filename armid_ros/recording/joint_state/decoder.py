@@ -17,8 +17,8 @@ import numpy as np
 import numpy.typing as npt
 
 _NOTHING = np.empty(0)
-# With more layouts in one block, messages are decoded one by one.
-_LAYOUTS_A_BLOCK = 32
+# Layouts of one length that are kept.
+_LAYOUTS = 32
 
 
 @dataclass(frozen=True)
@@ -138,14 +138,12 @@ class JointStateDecoder:
         self, raw: npt.NDArray[np.void], numbers: IntArray, receive: IntArray
     ) -> Iterator[JointSamples]:
         """Decode messages of equal length."""
-        for _ in range(_LAYOUTS_A_BLOCK):
-            if not len(raw):
-                return
+        while len(raw):
             plan = self._plan_for(raw[:1])
             if plan is None:
                 # Messages equal to an unreadable one are unreadable too.
                 other = raw != raw[0]
-                self.malformed += len(raw) - 1 - int(other.sum())
+                self.malformed += len(raw) - int(other.sum())
                 raw, numbers, receive = raw[other], numbers[other], receive[other]
                 continue
             rows = raw.view(plan.dtype)
@@ -155,11 +153,6 @@ class JointStateDecoder:
                 return
             yield from self._read(plan, rows[fits], numbers[fits], receive[fits])
             raw, numbers, receive = raw[~fits], numbers[~fits], receive[~fits]
-        for at in range(len(raw)):
-            plan = self._plan_for(raw[at : at + 1])
-            if plan is not None:
-                rows = raw[at : at + 1].view(plan.dtype)
-                yield from self._read(plan, rows, numbers[at : at + 1], receive[at : at + 1])
 
     def _read(
         self, plan: _Plan, rows: npt.NDArray[np.void], numbers: IntArray, receive: IntArray
@@ -171,7 +164,7 @@ class JointStateDecoder:
         yield from plan.read(rows, numbers, receive, self._room)
 
     def _plan_for(self, first: npt.NDArray[np.void]) -> _Plan | None:
-        """Return the plan for a message; if it is malformed, count it and return None."""
+        """Return the plan for a message; None if it is malformed."""
         length = first.dtype.itemsize
         known = self._plans.setdefault(length, [])
         for plan in known:
@@ -181,12 +174,11 @@ class JointStateDecoder:
             layout = JointStateLayout.of(first.tobytes())
             plan = _Plan.make(layout, length, self._wanted)
         except MalformedMessage as problem:
-            self.malformed += 1
             self.first_problem = self.first_problem or str(problem)
             return None
         self._names.update(dict.fromkeys(layout.names))
         known.insert(0, plan)
-        del known[_LAYOUTS_A_BLOCK:]
+        del known[_LAYOUTS:]
         return plan
 
 
