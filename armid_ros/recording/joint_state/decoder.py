@@ -6,7 +6,6 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
-import struct
 from typing import NamedTuple
 
 from armid_ros.motion import FloatArray
@@ -292,7 +291,7 @@ class JointStateMessages:
     """Decoder of serialised messages, with a cache of layouts."""
 
     def __init__(self) -> None:
-        self._known: list[_Fields] = []
+        self._known: list[_Known] = []
 
     def read(self, data: bytes) -> JointStateValues:
         """
@@ -304,51 +303,34 @@ class JointStateMessages:
             The bytes are no JointState.
 
         """
-        for fields in self._known:
-            values = fields.read(data)
-            if values is not None:
-                return values
-        fields = _Fields(JointStateLayout.of(data))
-        self._known = [fields, *self._known[:7]]  # one layout per sender on a topic
-        values = fields.read(data)
-        assert values is not None
-        return values
-
-
-class _Fields:
-    """Fields of messages of one layout, and the bytes that identify it."""
-
-    def __init__(self, layout: JointStateLayout) -> None:
-        order = layout.order
-        self.names = layout.names
-        expected, mask = layout.names_pattern
-        self._named = slice(layout.names_offset, layout.names_offset + expected.nbytes)
-        self._text = int.from_bytes(expected.tobytes(), 'little')
-        self._mask = int.from_bytes(mask.tobytes(), 'little')
-        self._code = b'\x00\x01' if order == '<' else b'\x00\x00'
-        # the stamp and all lengths in one call
-        numbers, end = order + '4xiII', 16
-        for at, _ in layout.places:
-            numbers, end = f'{numbers}{at - end}xI', at + 4
-        self._numbers = struct.Struct(numbers).unpack_from
-        self._lengths = [layout.frame_length, *layout.counts]
-        self._end = layout.end
-        self._longest = layout.end + layout.spare
-        self._type = np.dtype(order + 'f8')
-        begins = (begin for _, begin in layout.places)
-        self._places = list(zip(layout.counts, begins, strict=True))
-
-    def read(self, data: bytes) -> JointStateValues | None:
-        """Return the values; None if the layout is another one. Padding is not compared."""
-        if data[:2] != self._code or not self._end <= len(data) <= self._longest:
-            return None
-        if int.from_bytes(data[self._named], 'little') & self._mask != self._text:
-            return None
-        sec, nanosec, *lengths = self._numbers(data)
-        if lengths != self._lengths:
-            return None
+        known = next((one for one in self._known if one.fits(data)), None)
+        if known is None:
+            known = _Known.of(JointStateLayout.of(data))
+            self._known = [known, *self._known[:7]]  # one layout per sender on a topic
+        row = np.frombuffer(data, known.dtype, 1)[0]
         position, velocity, effort = (
-            np.frombuffer(data, self._type, count, place) if count else _NOTHING
-            for count, place in self._places
+            row[name] if count else _NOTHING
+            for name, count in zip(QUANTITIES, known.layout.counts, strict=True)
         )
-        return JointStateValues(sec, nanosec, self.names, position, velocity, effort)
+        stamp = int(row['sec']), int(row['nanosec'])
+        return JointStateValues(*stamp, known.layout.names, position, velocity, effort)
+
+
+class _Known(NamedTuple):
+    """A layout, and what its messages share as numbers: comparing them takes a microsecond."""
+
+    layout: JointStateLayout
+    dtype: np.dtype[np.void]
+    fixed: int
+    mask: int
+
+    @classmethod
+    def of(cls, layout: JointStateLayout) -> _Known:
+        fixed, mask = (int.from_bytes(record.tobytes(), 'little') for record in layout.fixed)
+        return cls(layout, layout.dtype(layout.end), fixed, mask)
+
+    def fits(self, data: bytes) -> bool:
+        """Return whether a message has this layout. Padding is not compared."""
+        end = self.layout.end
+        whole = end <= len(data) <= end + self.layout.spare
+        return whole and int.from_bytes(data[:end], 'little') & self.mask == self.fixed

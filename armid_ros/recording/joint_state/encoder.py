@@ -161,13 +161,9 @@ def _encoded(
     frame = frame_id.encode()
     counts = tuple(0 if values is None else n for values in fields)
     layout = JointStateLayout('<', len(frame) + 1, joints, counts)
-    template = np.zeros(1, layout.dtype(layout.end))
-    template.view(np.uint8)[16 : 16 + len(frame)] = np.frombuffer(frame, np.uint8)
-    template['encapsulation'] = 1
-    template['frame_length'] = layout.frame_length
-    template['names'] = layout.names_pattern[0]
-    for name, count in zip(QUANTITIES, counts, strict=True):
-        template['n_' + name] = count
+    message = bytearray(layout.fixed[0].tobytes())
+    message[16 : 16 + len(frame)] = frame
+    template = np.frombuffer(message, layout.dtype(layout.end))
     size = 4096
     for at in range(0, len(stamps), size):
         batch = slice(at, at + size)
