@@ -4,7 +4,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 import contextlib
 from dataclasses import replace
 import heapq
@@ -23,6 +23,7 @@ from armid_ros.recording.metadata import BagMetadata, FILE_NAME, read_metadata
 from armid_ros.recording.source import (
     Damage,
     DEFAULT,
+    listed,
     MessageBlock,
     RawMessage,
     ReadSettings,
@@ -119,9 +120,23 @@ class Bag(Source):
                 )
         return tuple(merged.values())
 
-    def topic_of(self, type_name: str, wanted: str | None = None) -> Topic:
+    def topic_of(
+        self,
+        type_name: str,
+        wanted: str | None = None,
+        fits: Callable[[Topic], bool] | None = None,
+    ) -> Topic:
         """
         Return the topic of a type: the only one, or the one of the given name.
+
+        Parameters
+        ----------
+        type_name : str
+            The type.
+        wanted : str, optional
+            Name of the topic.
+        fits : callable, optional
+            Returns whether a topic is usable; by default whether it has the type.
 
         Raises
         ------
@@ -134,15 +149,17 @@ class Bag(Source):
         found = [
             topic
             for topic in topics
-            if topic.type_name == type_name and name in (None, '/' + topic.name.lstrip('/'))
+            if (fits(topic) if fits else topic.type_name == type_name)
+            and name in (None, '/' + topic.name.lstrip('/'))
         ]
         if len(found) == 1:
             return found[0]
-        listed = ', '.join(f'{topic.name} ({topic.type_name})' for topic in topics) or 'none'
         problem = 'several topics' if found else 'no topic'
         asked = f' called {wanted}' if wanted else ''
+        damage = f' ({self.damage})' if self.damage else ''
         raise RecordingError(
-            f'{self.path}: {problem} of {type_name}{asked}; the topics are {listed}'
+            f'{self.path}: {problem} of {type_name}{asked}; the topics are '
+            f'{listed(topics)}{damage}'
         )
 
     def blocks(self, topic: str) -> Iterator[MessageBlock]:

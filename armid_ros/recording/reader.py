@@ -209,24 +209,8 @@ def choose_topics(bag: Bag, joints: Sequence[str], wanted: str | None) -> tuple[
     topics = bag.topics()
     candidates = [topic for topic in topics if topic.type_name == JOINT_STATE]
     candidates = candidates or [topic for topic in topics if holds_joint_state(topic)]
-    available = ', '.join(f'{topic.name} ({topic.count} messages)' for topic in candidates)
-    if wanted is not None:
-        name = '/' + wanted.lstrip('/')
-        named = [topic for topic in topics if '/' + topic.name.lstrip('/') == name]
-        if not named or not holds_joint_state(named[0]):
-            what = f'there is no topic {wanted}'
-            if named:
-                what = f'{named[0].name} is a topic of {named[0].type_name}'
-            raise RecordingError(
-                f'{bag.path}: {what}; topics of {JOINT_STATE}: {available or "none"}'
-            )
-        return (named[0],)
-    if not candidates:
-        others = ', '.join(f'{topic.name} ({topic.type_name})' for topic in topics)
-        damage = f' ({bag.damage})' if bag.damage else ''
-        raise RecordingError(
-            f'{bag.path}: no topic of {JOINT_STATE}; the bag has {others or "no topics"}{damage}'
-        )
+    if wanted is not None or not candidates:
+        return (bag.topic_of(JOINT_STATE, wanted, holds_joint_state),)
     if len(candidates) == 1:
         return (candidates[0],)
     names = {topic.name: named_joints(bag, topic) for topic in candidates}
