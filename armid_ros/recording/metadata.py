@@ -11,7 +11,7 @@ from pathlib import Path
 from typing import Any
 
 from armid_ros.errors import RecordingError
-from armid_ros.files import is_file, load_yaml, read_text, reading, write_file
+from armid_ros.files import is_file, load_yaml, read_text, reading
 from armid_ros.recording.source import Topic
 from rosbags.interfaces import (
     Qos,
@@ -126,11 +126,6 @@ def dump(information: Mapping[str, Any] | Sequence[Mapping[str, Any]]) -> str:
     # The C dumper takes 1 ms and may be missing; the Python dumper takes 10 ms.
     dumper = getattr(yaml, 'CSafeDumper', yaml.SafeDumper)
     return str(yaml.dump(information, Dumper=dumper, sort_keys=False, allow_unicode=True))
-
-
-def write_metadata(bag: Path, information: Mapping[str, Any]) -> None:
-    """Write metadata.yaml atomically: after an interruption it is complete or absent."""
-    write_file(bag / FILE_NAME, dump({'rosbag2_bagfile_information': information}))
 
 
 def read_metadata(bag: Path) -> BagMetadata:

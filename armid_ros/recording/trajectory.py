@@ -7,7 +7,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
+from typing import Any, TYPE_CHECKING
 
 from armid_ros.errors import RecordingError, TrajectoryError
 from armid_ros.files import reading
@@ -20,6 +20,9 @@ from armid_ros.recording.writer import whole_bag
 import numpy as np
 from rosbags.serde import SerdeError
 from rosbags.typesys import get_typestore, Stores
+
+if TYPE_CHECKING:
+    from armid_ros.simulation.reference import Reference
 
 
 @dataclass(frozen=True)
@@ -34,13 +37,13 @@ class ReadWaypoints:
     tau: FloatArray | None
 
 
-def joint_trajectory_cdr(motion: Motion | ReadWaypoints) -> bytes:
+def joint_trajectory_cdr(motion: Motion | ReadWaypoints | Reference) -> bytes:
     """
     Serialise a motion as one trajectory_msgs/JointTrajectory.
 
     Parameters
     ----------
-    motion : Motion or ReadWaypoints
+    motion : Motion, ReadWaypoints or Reference
         Motion to serialise. Its times become time_from_start; the stamp 0 means now.
 
     """
@@ -77,7 +80,7 @@ def joint_trajectory_cdr(motion: Motion | ReadWaypoints) -> bytes:
 
 def write_joint_trajectory(
     path: str | Path,
-    motion: Motion | ReadWaypoints,
+    motion: Motion | ReadWaypoints | Reference,
     *,
     robot_description: str | None = None,
 ) -> None:
@@ -88,7 +91,7 @@ def write_joint_trajectory(
     ----------
     path : str or Path
         Bag directory to create; it must not exist.
-    motion : Motion or ReadWaypoints
+    motion : Motion, ReadWaypoints or Reference
         Motion to write. Its torque, if any, is a feedforward effort.
     robot_description : str, optional
         URDF to be written to /robot_description.

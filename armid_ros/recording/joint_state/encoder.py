@@ -6,6 +6,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 from armid_ros.errors import RecordingError
 from armid_ros.motion import Motion
@@ -17,6 +18,9 @@ from armid_ros.recording.source import IntArray
 from armid_ros.recording.writer import BagWriter, DEFAULT_CHUNK_SIZE, whole_bag
 import numpy as np
 import numpy.typing as npt
+
+if TYPE_CHECKING:
+    from armid_ros.simulation.run import SimulatedRun
 
 
 def joint_state_cdr(
@@ -80,7 +84,7 @@ def write_joint_states(
 
 def write_recording(
     path: str | Path,
-    measured: Recording | Motion,
+    measured: Recording | Motion | SimulatedRun,
     *,
     topic: str = '/joint_states',
     start_ns: int | None = None,
@@ -95,7 +99,7 @@ def write_recording(
     ----------
     path : str or Path
         Bag directory to create; it must not exist.
-    measured : Recording or Motion
+    measured : Recording, Motion or SimulatedRun
         Measured or simulated motion; velocities and torques may be None.
     topic : str
         Topic of the messages.

@@ -193,7 +193,9 @@ def _numbers(
         raise RecordingError(
             f"{path}: line {first_line + k}, column {names[j]}: '{cell}' is no number"
         )
-    words = {names[j]: [of.get(k, '') for k in range(len(values))] for j, of in said.items()}
+    words: dict[str, Sequence[str]] = {
+        names[j]: [of.get(k, '') for k in range(len(values))] for j, of in said.items()
+    }
     empty = np.argwhere(np.isnan(values) & numeric)
     if len(empty):
         many = '1 cell is' if len(empty) == 1 else f'{len(empty)} cells are'
