@@ -205,22 +205,20 @@ class Bag(Source):
 
             storage = Ros1Source
         with reading(file, RecordingError):
-            plain = self._unpacked(file) if file.suffix in _COMPRESSED else file
+            if file.suffix in _COMPRESSED:  # the temporary file is removed with the stack
+                folder = self._stack.enter_context(tempfile.TemporaryDirectory(prefix='armid-'))
+                plain = Path(folder, file.stem)
+                try:
+                    with open_regular(file, RecordingError) as packed, plain.open('wb') as stream:
+                        stream.writelines(unpacked(packed, self._settings, 'the unpacked file'))
+                except OSError as error:
+                    said = f'{file}: cannot be decompressed: {error.strerror}'
+                    raise RecordingError(said) from error
+            else:
+                plain = file
             source: Source = storage(plain, self._settings)
         self._stack.callback(source.close)
         return source
-
-    def _unpacked(self, file: Path) -> Path:
-        """Decompress a file to a temporary file, which is removed when the bag is closed."""
-        folder = self._stack.enter_context(tempfile.TemporaryDirectory(prefix='armid-'))
-        plain = Path(folder, file.stem)
-        try:
-            with open_regular(file, RecordingError) as packed, plain.open('wb') as stream:
-                for piece in unpacked(packed, self._settings, 'the unpacked file'):
-                    stream.write(piece)
-        except OSError as error:
-            raise RecordingError(f'{file}: cannot be decompressed: {error.strerror}') from error
-        return plain
 
 
 def is_ros1(path: Path) -> bool:

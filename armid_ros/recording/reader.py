@@ -181,7 +181,12 @@ def read_pieces(
                 if new and new + len(part) > samples:
                     piece = made()
                     yield piece, False
-                    held, new = list(_from(held, keep(piece), piece.clock)), 0
+                    stamp, new = keep(piece), 0
+                    times = [
+                        one.stamps if piece.clock == 'header' else one.receive for one in held
+                    ]
+                    late = [np.flatnonzero(t >= stamp) for t in times if t is not None]
+                    held = [one.select(k) for one, k in zip(held, late, strict=True) if len(k)]
                 held.append(part)
                 new += len(part)
         yield made(bag.damage), True
@@ -192,16 +197,6 @@ def _decoded(bag: Bag, topic: Topic, decoder: JointStateDecoder) -> Iterator[Joi
     with reading(bag.path, RecordingError):
         for block in joint_state_blocks(bag, topic):
             yield from decoder.decode(block)
-
-
-def _from(held: Sequence[JointSamples], stamp: int, clock: str) -> Iterator[JointSamples]:
-    """Yield the samples from a stamp on."""
-    for states in held:
-        stamps = states.stamps if clock == 'header' else states.receive
-        assert stamps is not None
-        late = stamps >= stamp
-        if late.any():
-            yield states.select(np.flatnonzero(late))
 
 
 def choose_topics(bag: Bag, joints: Sequence[str], wanted: str | None) -> tuple[Topic, ...]:

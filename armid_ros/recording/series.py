@@ -196,25 +196,18 @@ def longest_run(stamps: IntArray) -> slice | None:
     # The next message must also be earlier; otherwise a single message was late.
     down[:-1] &= stamps[2:] - stamps[:-2] < -RESTART_NS
     for back in np.flatnonzero((steps < 0) & ~down):
-        down[back] = _runs_again(stamps, int(back))
+        # Late messages fill a hole, so that the total matches the sampling rate. A clock that was
+        # set back gives twice as many messages.
+        first, last = stamps[back + 1], stamps[back]
+        before = int(np.count_nonzero(stamps[: back + 1] >= first))
+        after = int(np.argmax(np.append(stamps[back + 1 :], last + 1) > last))
+        expected = float(last - first) / float(np.median(steps[steps > 0])) + 1.0
+        down[back] = after >= 10 and before + after > 1.5 * expected
     if not down.any():
         return None
     bounds = [0, *(np.flatnonzero(down) + 1).tolist(), len(stamps)]
     begin = max(range(len(bounds) - 1), key=lambda i: bounds[i + 1] - bounds[i])
     return slice(bounds[begin], bounds[begin + 1])
-
-
-def _runs_again(stamps: IntArray, back: int) -> bool:
-    """Return whether the clock repeats a stretch of time after a step back."""
-    # Late messages fill a hole, so that the total matches the sampling rate. A clock that was set
-    # back gives twice as many messages.
-    first, last = stamps[back + 1], stamps[back]
-    steps = np.diff(stamps)
-    period = float(np.median(steps[steps > 0]))
-    before = int(np.count_nonzero(stamps[: back + 1] >= first))
-    after = int(np.argmax(np.append(stamps[back + 1 :], last + 1) > last))
-    expected = float(last - first) / period + 1.0
-    return after >= 10 and before + after > 1.5 * expected
 
 
 def _sorted(series: JointSamples, counts: Counter[str]) -> JointSamples:
