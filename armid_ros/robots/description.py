@@ -24,6 +24,8 @@ NEGLIGIBLE = 1e-12  # kg m^2
 MAX_CHAIN = 500  # joints one behind the other; Pinocchio's reader descends by recursion
 
 Vector = tuple[float, float, float]
+#: Components of an inertia, in the order of a URDF.
+INERTIA = ('ixx', 'ixy', 'ixz', 'iyy', 'iyz', 'izz')
 
 
 @dataclass(frozen=True)
@@ -33,7 +35,7 @@ class Inertial:
     mass: float
     xyz: Vector
     rpy: Vector
-    inertia: tuple[float, float, float, float, float, float]
+    inertia: tuple[float, ...]
 
     def doubt(self) -> str | None:
         """Return why no mass distribution has this inertia; None if one exists."""
@@ -250,13 +252,8 @@ def _inertial(link: ElementTree.Element, name: str) -> Inertial | None:
         mass=_number(mass, 'value', where),
         xyz=xyz,
         rpy=rpy,
-        inertia=(
-            _number(inertia, 'ixx', where),
-            _number(inertia, 'ixy', where, 0.0),
-            _number(inertia, 'ixz', where, 0.0),
-            _number(inertia, 'iyy', where),
-            _number(inertia, 'iyz', where, 0.0),
-            _number(inertia, 'izz', where),
+        inertia=tuple(
+            _number(inertia, key, where, None if key[1] == key[2] else 0.0) for key in INERTIA
         ),
     )
     if inertial.mass < 0.0:
