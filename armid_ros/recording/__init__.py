@@ -20,10 +20,12 @@ from armid_ros.recording.message_types import string_cdr
 from armid_ros.recording.metadata import LATCHED
 from armid_ros.recording.reader import read_recording, read_robot_description
 from armid_ros.recording.recording import (
+    given_twice,
     PositionRange,
     ReadReport,
     recorded_together,
     Recording,
+    require_once,
     TimeGap,
 )
 from armid_ros.recording.source import ReadSettings, Topic
@@ -32,7 +34,6 @@ from armid_ros.recording.trajectory import (
     read_waypoints,
     write_joint_trajectory,
 )
-from armid_ros.recording.twice import given_twice, require_once
 from armid_ros.recording.writer import BagWriter
 
 __all__ = [
