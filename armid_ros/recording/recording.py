@@ -44,13 +44,6 @@ class TimeGap:
     length: float
 
 
-def gaps(t: FloatArray) -> tuple[TimeGap, ...]:
-    """Return the stretches without samples."""
-    steps = np.diff(t)
-    at = np.flatnonzero(steps > GAP_PERIODS * np.median(steps))
-    return tuple(TimeGap(float(t[i]), float(steps[i])) for i in at)
-
-
 @dataclass(frozen=True)
 class PositionRange:
     """

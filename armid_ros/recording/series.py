@@ -19,7 +19,7 @@ from armid_ros.errors import RecordingError
 from armid_ros.motion import FloatArray
 from armid_ros.recording.joint_state.decoder import JointSamples
 from armid_ros.recording.message_types import QUANTITIES
-from armid_ros.recording.recording import Clock, GAP_PERIODS, gaps, ReadReport, Recording
+from armid_ros.recording.recording import Clock, GAP_PERIODS, ReadReport, Recording, TimeGap
 from armid_ros.recording.source import IntArray
 import numpy as np
 import numpy.typing as npt
@@ -390,10 +390,12 @@ def assemble(
         if array is not None:
             array.setflags(write=False)  # a read-only array is not copied by Recording
     found = {'not_finite': culprits, 'absent': absent, 'clock_note': note, **met, **counts}
+    steps = np.diff(t)
+    at = np.flatnonzero(steps > GAP_PERIODS * np.median(steps))
     report = ReadReport(
         **found,
         samples=len(samples),
-        gaps=gaps(t),
+        gaps=tuple(TimeGap(float(t[k]), float(steps[k])) for k in at),
         unwrapped=tuple(joints[k] for k in wrapped),
     )
     return Recording(
