@@ -9,39 +9,25 @@ raw messages for the nodes. ROS is not needed.
 
 """
 
-from armid_ros.recording.bag import Bag, topics
+from armid_ros.recording.bag import topics
 from armid_ros.recording.copying import recover
-from armid_ros.recording.joint_state.encoder import (
-    joint_state_cdr,
-    write_joint_states,
-    write_recording,
-)
-from armid_ros.recording.message_types import string_cdr
-from armid_ros.recording.metadata import LATCHED
+from armid_ros.recording.joint_state.encoder import write_joint_states, write_recording
 from armid_ros.recording.reader import read_recording, read_robot_description
 from armid_ros.recording.recording import (
     given_twice,
-    PositionRange,
     ReadReport,
     recorded_together,
     Recording,
     require_once,
-    TimeGap,
 )
 from armid_ros.recording.source import ReadSettings, Topic
-from armid_ros.recording.trajectory import (
-    joint_trajectory_cdr,
-    read_waypoints,
-    write_joint_trajectory,
-)
+from armid_ros.recording.trajectory import read_waypoints, write_joint_trajectory
 from armid_ros.recording.writer import BagWriter
 
 __all__ = [
     'Recording',
     'ReadReport',
     'ReadSettings',
-    'TimeGap',
-    'PositionRange',
     'recorded_together',
     'given_twice',
     'require_once',
@@ -49,15 +35,10 @@ __all__ = [
     'read_robot_description',
     'write_recording',
     'BagWriter',
-    'LATCHED',
-    'joint_trajectory_cdr',
     'write_joint_trajectory',
     'read_waypoints',
     'recover',
     'write_joint_states',
-    'joint_state_cdr',
-    'string_cdr',
-    'Bag',
     'Topic',
     'topics',
 ]

@@ -8,18 +8,17 @@ import struct
 from armid_ros.errors import RecordingError
 from armid_ros.recording import (
     BagWriter,
-    LATCHED,
     read_recording,
     read_robot_description,
     ReadSettings,
     recover,
-    string_cdr,
     topics,
     write_recording,
 )
 from armid_ros.recording.mcap.contents import walk
 from armid_ros.recording.mcap.records import map_file
-from armid_ros.recording.message_types import STRING
+from armid_ros.recording.message_types import STRING, string_cdr
+from armid_ros.recording.metadata import LATCHED
 from mcap.records import Chunk, Message
 from mcap.stream_reader import breakup_chunk, StreamReader
 import numpy as np

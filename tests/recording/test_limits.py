@@ -7,7 +7,8 @@ import resource
 import struct
 
 from armid_ros.errors import RecordingError
-from armid_ros.recording import Bag, read_recording, ReadSettings, write_recording
+from armid_ros.recording import read_recording, ReadSettings, write_recording
+from armid_ros.recording.bag import Bag
 from armid_ros.recording.compression import decompressed, unpacked
 from armid_ros.recording.mcap.records import MAGIC
 import lz4.frame

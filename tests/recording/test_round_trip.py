@@ -7,7 +7,6 @@ from dataclasses import replace
 from armid_ros.errors import ArmidError, RecordingError
 from armid_ros.recording import (
     given_twice,
-    joint_state_cdr,
     read_recording,
     read_robot_description,
     Recording,
@@ -15,6 +14,7 @@ from armid_ros.recording import (
     topics,
     write_recording,
 )
+from armid_ros.recording.joint_state.encoder import joint_state_cdr
 from armid_ros.recording.message_types import JOINT_STATE
 from armid_ros.recording.metadata import LATCHED, VOLATILE
 from mcap.reader import make_reader

@@ -15,13 +15,7 @@ import zlib
 
 from armid_ros.errors import RecordingError
 from armid_ros.recording.compression import CORRUPT, decompressed, partly_decompressed, stated_size
-from armid_ros.recording.mcap.records import (
-    Chunk,
-    FileMap,
-    MESSAGE,
-    MESSAGE_HEADER,
-    RECORD_HEADER,
-)
+from armid_ros.recording.mcap.records import Chunk, FileMap, MESSAGE, MESSAGE_HEADER, RECORD_HEADER
 from armid_ros.recording.source import (
     BLOCK_MESSAGES,
     IntArray,

@@ -10,13 +10,7 @@ import textwrap
 
 from armid_ros.errors import RecordingError
 from armid_ros.motion import FloatArray
-from armid_ros.recording.columns import (
-    ColumnSettings,
-    in_si,
-    per_joint,
-    renamed,
-    TIME_UNITS,
-)
+from armid_ros.recording.columns import ColumnSettings, in_si, per_joint, renamed, TIME_UNITS
 from armid_ros.recording.joint_state.decoder import JointSamples
 from armid_ros.recording.recording import PositionRange, Recording
 from armid_ros.recording.series import assemble, MAX_NOT_FINITE
