@@ -127,16 +127,7 @@ class Bag(Source):
         fits: Callable[[Topic], bool] | None = None,
     ) -> Topic:
         """
-        Return the topic of a type: the only one, or the one of the given name.
-
-        Parameters
-        ----------
-        type_name : str
-            The type.
-        wanted : str, optional
-            Name of the topic.
-        fits : callable, optional
-            Returns whether a topic is usable; by default whether it has the type.
+        Return the topic of a type, or one that fits: the only one, or the one of a given name.
 
         Raises
         ------
@@ -149,7 +140,7 @@ class Bag(Source):
         found = [
             topic
             for topic in topics
-            if (fits(topic) if fits else topic.type_name == type_name)
+            if (topic.type_name == type_name if fits is None else fits(topic))
             and name in (None, '/' + topic.name.lstrip('/'))
         ]
         if len(found) == 1:
