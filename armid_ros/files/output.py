@@ -100,14 +100,9 @@ _KIND = re.compile(r'^ *type: *(\S+)', re.MULTILINE)
 _OF_A_PLAN = {'trajectory_msgs/msg/JointTrajectory', 'std_msgs/msg/String'}
 #: Size of the beginning of a file that contains its mark [bytes].
 _HEAD = 4096
-_SCHEMA = re.compile(rb'schema"?: *"?armid/[a-z_]+/[0-9]')
-_MARKS = {
-    '.html': re.compile(re.escape(GENERATOR.encode())),
-    '.json': _SCHEMA,
-    '.yaml': _SCHEMA,
-    '.rviz': _SCHEMA,
-    'plotjuggler.xml': _SCHEMA,
-}
+_MARK = re.compile(re.escape(GENERATOR).encode() + rb'|schema"?: *"?armid/[a-z_]+/[0-9]')
+#: Endings of files with a mark.
+_MARKED = ('.html', '.json', '.yaml', '.rviz', 'plotjuggler.xml')
 
 
 def write_file(path: str | Path, content: str | bytes) -> None:
@@ -339,12 +334,8 @@ def refuse_replacing(folder: Path, names: Collection[str]) -> None:
 
 def _foreign(folder: Path, names: Sequence[str]) -> Iterator[str]:
     """Return foreign files; files that cannot have a mark count only if all names are such."""
-    known = [name for name in names if _mark_of(name)]
+    known = [name for name in names if name.endswith(_MARKED)]
     return (name for name in known or names if not is_own(folder / name))
-
-
-def _mark_of(name: str) -> re.Pattern[bytes] | None:
-    return _MARKS.get(name) or _MARKS.get(Path(name).suffix)
 
 
 def is_plan(path: Path) -> bool:
@@ -361,11 +352,10 @@ def is_own(path: Path) -> bool:
     """Return whether a document, page or trajectory is a result of this package."""
     if path.is_dir():
         return is_plan(path)
-    mark = _mark_of(path.name)
-    if mark is None:
+    if not path.name.endswith(_MARKED):
         return False
     try:
         with open_regular(path, OutputError) as stream:
-            return mark.search(stream.read(_HEAD)) is not None
+            return _MARK.search(stream.read(_HEAD)) is not None
     except (OutputError, OSError):
         return False
