@@ -216,9 +216,13 @@ def guess(
         pattern is empty if no column is that of a joint.
 
     """
+    groups: dict[str, dict[str, TableColumn]] = {}  # by pattern and label of the joint
+    for column in table.columns:
+        for pattern, label in _readings(column, joints, rename):
+            groups.setdefault(pattern, {})[label] = column
     scored: list[tuple[float, Family]] = []
     incomplete = '', tuple(joints or ())
-    for pattern, members in _groups(table, joints, rename).items():
+    for pattern, members in groups.items():
         score = _score(pattern, quantity)
         family = _family(pattern, members, joints, rename)
         if family is not None:
@@ -313,17 +317,6 @@ def _matching(table: Table, pattern: str) -> list[tuple[str, TableColumn]]:
             )
         listed_columns.append((part, column))
     return listed_columns
-
-
-def _groups(
-    table: Table, joints: Sequence[str] | None, rename: Rules
-) -> dict[str, dict[str, TableColumn]]:
-    """Return the columns by pattern and by label of the joint."""
-    groups: dict[str, dict[str, TableColumn]] = {}
-    for column in table.columns:
-        for pattern, label in _readings(column, joints, rename):
-            groups.setdefault(pattern, {})[label] = column
-    return groups
 
 
 def _readings(
