@@ -291,7 +291,7 @@ class JointStateMessages:
     """Decoder of serialised messages, with a cache of layouts."""
 
     def __init__(self) -> None:
-        self._known: list[_Known] = []
+        self._known: list[JointStateLayout] = []
 
     def read(self, data: bytes) -> JointStateValues:
         """
@@ -303,34 +303,14 @@ class JointStateMessages:
             The bytes are no JointState.
 
         """
-        known = next((one for one in self._known if one.fits(data)), None)
-        if known is None:
-            known = _Known.of(JointStateLayout.of(data))
-            self._known = [known, *self._known[:7]]  # one layout per sender on a topic
-        row = np.frombuffer(data, known.dtype, 1)[0]
+        layout = next((one for one in self._known if one.is_of(data)), None)
+        if layout is None:
+            layout = JointStateLayout.of(data)
+            self._known = [layout, *self._known[:7]]  # one layout per sender on a topic
+        row = np.frombuffer(data, layout.record, 1)[0]
         position, velocity, effort = (
             row[name] if count else _NOTHING
-            for name, count in zip(QUANTITIES, known.layout.counts, strict=True)
+            for name, count in zip(QUANTITIES, layout.counts, strict=True)
         )
         stamp = int(row['sec']), int(row['nanosec'])
-        return JointStateValues(*stamp, known.layout.names, position, velocity, effort)
-
-
-class _Known(NamedTuple):
-    """A layout, and what its messages share as numbers: comparing them takes a microsecond."""
-
-    layout: JointStateLayout
-    dtype: np.dtype[np.void]
-    fixed: int
-    mask: int
-
-    @classmethod
-    def of(cls, layout: JointStateLayout) -> _Known:
-        fixed, mask = (int.from_bytes(record.tobytes(), 'little') for record in layout.fixed)
-        return cls(layout, layout.dtype(layout.end), fixed, mask)
-
-    def fits(self, data: bytes) -> bool:
-        """Return whether a message has this layout. Padding is not compared."""
-        end = self.layout.end
-        whole = end <= len(data) <= end + self.layout.spare
-        return whole and int.from_bytes(data[:end], 'little') & self.mask == self.fixed
+        return JointStateValues(*stamp, layout.names, position, velocity, effort)

@@ -167,7 +167,7 @@ def _encoded(
     layout = JointStateLayout('<', len(frame) + 1, joints, counts)
     message = bytearray(layout.fixed[0].tobytes())
     message[16 : 16 + len(frame)] = frame
-    template = np.frombuffer(message, layout.dtype(layout.end))
+    template = np.frombuffer(message, layout.record)
     size = 4096
     for at in range(0, len(stamps), size):
         batch = slice(at, at + size)

@@ -118,12 +118,12 @@ class JointStateLayout:
             position = begin + 8 * count
         return tuple(places)
 
-    @property
+    @cached_property
     def end(self) -> int:
         """Where the last value ends."""
         return self.places[-1][1] + 8 * self.counts[-1]
 
-    @property
+    @cached_property
     def spare(self) -> int:
         """Largest number of bytes behind the last value."""
         # A writer reserves room to align what follows, and for each empty sequence as well.
@@ -153,9 +153,14 @@ class JointStateLayout:
         )
 
     @cached_property
+    def record(self) -> np.dtype[np.void]:
+        """Messages of this layout without spare bytes as a numpy record."""
+        return self.dtype(self.end)
+
+    @cached_property
     def fixed(self) -> tuple[npt.NDArray[np.void], npt.NDArray[np.void]]:
         """What the messages of this layout share, and which of their bits these are, (1,)."""
-        expected, mask = np.zeros((2, 1), self.dtype(self.end))
+        expected, mask = np.zeros((2, 1), self.record)
         numbers = {'encapsulation': int(self.order == '<'), 'frame_length': self.frame_length}
         numbers |= {f'n_{name}': n for name, n in zip(QUANTITIES, self.counts, strict=True)}
         for name, value in numbers.items():
@@ -172,6 +177,18 @@ class JointStateLayout:
             text[position:end], bits[position:end] = np.frombuffer(raw, np.uint8), 255
             position = end
         return expected, mask
+
+    @cached_property
+    def _fixed_bits(self) -> tuple[int, int]:
+        """What messages share, and its mask, as integers: a comparison takes a microsecond."""
+        fixed, mask = (int.from_bytes(record.tobytes(), 'little') for record in self.fixed)
+        return fixed, mask
+
+    def is_of(self, data: bytes) -> bool:
+        """Return whether one message has this layout. Padding is not compared."""
+        fixed, mask = self._fixed_bits
+        whole = self.end <= len(data) <= self.end + self.spare
+        return whole and int.from_bytes(data[: self.end], 'little') & mask == fixed
 
     def fits(self, rows: npt.NDArray[np.void]) -> npt.NDArray[np.bool_]:
         """Return which messages, read as records of this layout, have this layout."""
