@@ -12,6 +12,7 @@ import numpy as np
 import numpy.typing as npt
 
 FloatArray = npt.NDArray[np.float64]
+Samples = slice | npt.NDArray[np.intp] | npt.NDArray[np.bool_]
 
 
 def read_only(values: npt.ArrayLike) -> FloatArray:
@@ -42,10 +43,8 @@ def freeze_samples(where: str, samples: Any, *names: str) -> None:
     for name in names:
         values = getattr(samples, name)
         if values is not None and values.shape != expected:
-            raise RecordingError(
-                f'{where}: {name} has shape {values.shape}, but {expected[0]} time stamps of '
-                f'{expected[1]} joints need {expected}'
-            )
+            said = f'{where}: {name} has shape {values.shape}'
+            raise RecordingError(f'{said}, but the times and joints need {expected}')
 
 
 @dataclass(frozen=True)
@@ -70,9 +69,7 @@ class MovingPoints:
         """Freeze the arrays."""
         freeze(self, 'position', 'velocity')
 
-    def select(
-        self, samples: slice | npt.NDArray[np.intp] | npt.NDArray[np.bool_]
-    ) -> MovingPoints:
+    def select(self, samples: Samples) -> MovingPoints:
         """Return the points at selected samples."""
         return replace(self, position=self.position[samples], velocity=self.velocity[samples])
 
@@ -141,16 +138,15 @@ class Motion:
         """Return the number of joints n."""
         return len(self.joints)
 
-    def select(self, samples: slice | npt.NDArray[np.intp] | npt.NDArray[np.bool_]) -> Motion:
+    def select(self, samples: Samples) -> Motion:
         """Return the motion at selected samples."""
-        tau = None if self.tau is None else self.tau[samples]
         return replace(
             self,
             t=self.t[samples],
             q=self.q[samples],
             dq=self.dq[samples],
             ddq=self.ddq[samples],
-            tau=tau,
+            tau=None if self.tau is None else self.tau[samples],
             partner=None if self.partner is None else self.partner.select(samples),
         )
 

@@ -25,8 +25,7 @@ import time
 from typing import Any
 
 from armid_ros.motion import FloatArray
-from armid_ros.recording import read_recording
-from armid_ros.recording.joint_state.encoder import joint_state_cdr
+from armid_ros.recording import joint_state_cdr, read_recording
 from armid_ros.recording.message_types import JOINT_STATE, message_type
 from mcap.reader import make_reader
 from mcap.writer import CompressionType, IndexType, Writer

@@ -11,7 +11,11 @@ raw messages for the nodes. ROS is not needed.
 
 from armid_ros.recording.bag import topics
 from armid_ros.recording.copying import recover
-from armid_ros.recording.joint_state.encoder import write_joint_states, write_recording
+from armid_ros.recording.joint_state.encoder import (
+    joint_state_cdr,
+    write_joint_states,
+    write_recording,
+)
 from armid_ros.recording.reader import read_recording, read_robot_description
 from armid_ros.recording.recording import (
     given_twice,
@@ -39,6 +43,7 @@ __all__ = [
     'read_waypoints',
     'recover',
     'write_joint_states',
+    'joint_state_cdr',
     'Topic',
     'topics',
 ]

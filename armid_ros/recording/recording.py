@@ -10,7 +10,7 @@ from importlib import import_module
 from typing import Literal, TYPE_CHECKING
 
 from armid_ros.errors import RecordingError
-from armid_ros.motion import FloatArray, freeze, freeze_samples, Motion
+from armid_ros.motion import FloatArray, freeze, freeze_samples, Motion, Samples
 from armid_ros.recording.curves import draw_joints
 from armid_ros.robots import Robot
 import numpy as np
@@ -351,7 +351,7 @@ class Recording:
         assert isinstance(filtered, Motion)
         return filtered
 
-    def select(self, samples: slice | npt.NDArray[np.intp] | npt.NDArray[np.bool_]) -> Recording:
+    def select(self, samples: Samples) -> Recording:
         """Return a recording of some of the samples, on the same time base."""
         partner = self.partner
         return replace(

@@ -8,7 +8,7 @@ from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 from typing import NamedTuple
 
-from armid_ros.motion import FloatArray
+from armid_ros.motion import FloatArray, Samples
 from armid_ros.recording.joint_state.layout import JointStateLayout, MalformedMessage
 from armid_ros.recording.message_types import QUANTITIES
 from armid_ros.recording.source import IntArray, MessageBlock, records_at
@@ -49,9 +49,7 @@ class JointSamples:
         """Return the number of samples N."""
         return len(self.stamps)
 
-    def select(
-        self, samples: npt.NDArray[np.intp] | npt.NDArray[np.bool_] | slice
-    ) -> JointSamples:
+    def select(self, samples: Samples) -> JointSamples:
         """Return some of the samples."""
         values = tuple(None if v is None else v[samples] for v in self.values)
         receive, number = (
