@@ -5,12 +5,14 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, field, replace
+from typing import Any
 
 from armid_ros.errors import RecordingError
 import numpy as np
 import numpy.typing as npt
 
 FloatArray = npt.NDArray[np.float64]
+Samples = slice | npt.NDArray[np.intp] | npt.NDArray[np.bool_]
 
 
 def read_only(values: npt.ArrayLike) -> FloatArray:
@@ -30,7 +32,19 @@ def read_only(values: npt.ArrayLike) -> FloatArray:
 def freeze(instance: object, *names: str) -> None:
     """Make arrays of a frozen dataclass read-only copies; called from its ``__post_init__``."""
     for name in names:
-        object.__setattr__(instance, name, read_only(getattr(instance, name)))
+        if getattr(instance, name) is not None:
+            object.__setattr__(instance, name, read_only(getattr(instance, name)))
+
+
+def freeze_samples(where: str, samples: Any, *names: str) -> None:
+    """Freeze the arrays of samples of joints; RecordingError if one is not (times, joints)."""
+    freeze(samples, 't', *names)
+    expected = (len(samples.t), len(samples.joints))
+    for name in names:
+        values = getattr(samples, name)
+        if values is not None and values.shape != expected:
+            said = f'{where}: {name} has shape {values.shape}'
+            raise RecordingError(f'{said}, but the times and joints need {expected}')
 
 
 @dataclass(frozen=True)
@@ -53,12 +67,9 @@ class MovingPoints:
 
     def __post_init__(self) -> None:
         """Freeze the arrays."""
-        for name in ('position', 'velocity'):
-            object.__setattr__(self, name, read_only(getattr(self, name)))
+        freeze(self, 'position', 'velocity')
 
-    def select(
-        self, samples: slice | npt.NDArray[np.intp] | npt.NDArray[np.bool_]
-    ) -> MovingPoints:
+    def select(self, samples: Samples) -> MovingPoints:
         """Return the points at selected samples."""
         return replace(self, position=self.position[samples], velocity=self.velocity[samples])
 
@@ -108,18 +119,7 @@ class Motion:
 
     def __post_init__(self) -> None:
         """Freeze the arrays and check that their shapes agree."""
-        for name in ('t', 'q', 'dq', 'ddq', 'tau'):
-            values = getattr(self, name)
-            if values is not None:
-                object.__setattr__(self, name, read_only(values))
-        expected = (len(self.t), len(self.joints))
-        for name in ('q', 'dq', 'ddq', 'tau'):
-            values = getattr(self, name)
-            if values is not None and values.shape != expected:
-                raise RecordingError(
-                    f'motion: {name} has shape {values.shape}, but {expected[0]} timestamps of '
-                    f'{expected[1]} joints need {expected}'
-                )
+        freeze_samples('motion', self, 'q', 'dq', 'ddq', 'tau')
 
     @classmethod
     def of_states(
@@ -138,16 +138,15 @@ class Motion:
         """Return the number of joints n."""
         return len(self.joints)
 
-    def select(self, samples: slice | npt.NDArray[np.intp] | npt.NDArray[np.bool_]) -> Motion:
+    def select(self, samples: Samples) -> Motion:
         """Return the motion at selected samples."""
-        tau = None if self.tau is None else self.tau[samples]
         return replace(
             self,
             t=self.t[samples],
             q=self.q[samples],
             dq=self.dq[samples],
             ddq=self.ddq[samples],
-            tau=tau,
+            tau=None if self.tau is None else self.tau[samples],
             partner=None if self.partner is None else self.partner.select(samples),
         )
 

@@ -322,7 +322,7 @@ def _driven(source: str, gravity: str, joints: str | None, bags: tuple[Path, ...
 def require_free(folder: Path) -> None:
     """Raise a RecordingError if the recording exists, before the design begins."""
     from armid_ros.api.excitation import BAG
-    from armid_ros.files.own import is_plan
+    from armid_ros.files.output import is_plan
 
     if any(folder.glob('*.mcap')) or (folder / 'metadata.yaml').exists():
         raise RecordingError(f'{folder} is a recording; name another --out')

@@ -31,7 +31,7 @@ from armid_ros.files import (
     write_file,
 )
 from armid_ros.files.cells import listed, parted
-from armid_ros.files.own import written_by
+from armid_ros.files.output import written_by
 from armid_ros.identification import write_document
 from armid_ros.motion import FloatArray
 from armid_ros.recording import read_robot_description, ReadSettings, Recording

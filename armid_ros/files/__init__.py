@@ -11,10 +11,14 @@ command. A result of several files is written into a `staged` folder until it is
 """
 
 from armid_ros.files.documents import finite, load_json, load_yaml, parsed_yaml, reading, yaml_line
-from armid_ros.files.limits import default_memory_limit, size_text
-from armid_ros.files.output import json_text, result_folder, write_file
-from armid_ros.files.own import settled
-from armid_ros.files.regular import is_file, open_regular, read_text
+from armid_ros.files.output import json_text, result_folder, settled, write_file
+from armid_ros.files.regular import (
+    default_memory_limit,
+    is_file,
+    open_regular,
+    read_text,
+    size_text,
+)
 from armid_ros.files.staging import Staged, staged
 
 __all__ = [

@@ -10,7 +10,7 @@ Errors of a parser become one error of the package that names the file.
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 import csv
 import json
@@ -160,11 +160,13 @@ def load_json(text: str) -> Any:
 def _check_size(text: str) -> None:
     """Raise ValueError for a YAML text that is too deep or too large, from its events alone."""
     open_nodes: list[tuple[str | None, int]] = []
-    sizes: dict[str, int] = {}
+    sizes: dict[str | None, int] = {}  # of nodes with an anchor
     total = 0
     for event in yaml.parse(text, Loader=_Loader):
         if isinstance(event, yaml.AliasEvent):
-            total += _written_out(event, sizes)
+            if event.anchor not in sizes:
+                raise ValueError(f"line {_line(event)}: the alias '{event.anchor}' has no anchor")
+            total += sizes[event.anchor]
         elif isinstance(event, (yaml.SequenceStartEvent, yaml.MappingStartEvent)):
             total += 1
             open_nodes.append((event.anchor, total))
@@ -172,23 +174,14 @@ def _check_size(text: str) -> None:
                 raise ValueError(f'line {_line(event)}: nested more than {MAX_DEPTH} levels deep')
         elif isinstance(event, (yaml.SequenceEndEvent, yaml.MappingEndEvent)):
             anchor, begin = open_nodes.pop()
-            if anchor:
-                sizes[anchor] = total - begin + 1
+            sizes[anchor] = total - begin + 1
         elif isinstance(event, yaml.ScalarEvent):
             total += 1
-            if event.anchor:
-                sizes[event.anchor] = 1
+            sizes[event.anchor] = 1
         if total > MAX_NODES:
             raise ValueError(
                 f'line {_line(event)}: more than {MAX_NODES} nodes with aliases expanded'
             )
-
-
-def _written_out(event: yaml.AliasEvent, sizes: Mapping[str, int]) -> int:
-    """Return the number of nodes of an expanded alias."""
-    if event.anchor is None or event.anchor not in sizes:
-        raise ValueError(f"line {_line(event)}: the alias '{event.anchor}' has no anchor")
-    return sizes[event.anchor]
 
 
 def _line(event: yaml.Event) -> int:

@@ -7,23 +7,28 @@ A file is written under a temporary name and then moved, so a symbolic link in t
 replaced and not followed. The folder is locked while a command works on it; the system releases
 the lock when the process ends.
 
+Results of this package may be replaced. A document has its schema and a page its generator near
+the beginning; a layout has its schema in a comment or a variable. Other files have no mark: they
+are results if a document or a page is in the same folder.
+
 """
 
 from __future__ import annotations
 
-from collections.abc import Collection, Iterator
+from collections.abc import Collection, Iterator, Sequence
 from contextlib import contextmanager, suppress
 import fcntl
+from fnmatch import fnmatch
 import json
 import math
 import os
 from pathlib import Path
+import re
 from typing import Any
 
 from armid_ros.errors import OutputError
 from armid_ros.files.documents import load_json, load_yaml, reading
-from armid_ros.files.own import refuse_foreign, settled
-from armid_ros.files.regular import read_text
+from armid_ros.files.regular import open_regular, read_text
 
 #: Documents whose schema identifies the results in a folder; a command writes its document last.
 DOCUMENTS = (
@@ -39,6 +44,65 @@ DOCUMENTS = (
 #: Model file that may be in a folder without document, and schemas of results that replace it.
 _MODEL = 'model.yaml'
 _WITH_MODEL = ('armid/identification/1', 'armid/diagnosis/1')
+#: Files and folders of each kind of result, by schema.
+_WRITES = {
+    'armid/identification/1': (
+        'model.yaml',
+        'identification.json',
+        'report.html',
+        'identified.urdf',
+        'identified.mjcf.xml',
+        'robot.urdf',
+    ),
+    'armid/diagnosis/1': (
+        'diagnosis.json',
+        'model.yaml',
+        'report.html',
+        'robot.urdf',
+        'residual.csv',
+        'experiment.yaml',
+    ),
+    'armid/excitation/1': (
+        'excitation.yaml',
+        'excitation.csv',
+        'excitation.json',
+        'report.html',
+        'trajectory',
+    ),
+    'armid/comparison/1': ('comparison.json', 'report.html'),
+    'armid/inspection/1': ('inspection.html', 'inspection.json'),
+    'armid/check/1': ('check.json', 'report.html'),
+    'armid/elastic/1': ('elastic.json', 'report.html', 'resonances', 'steps'),
+    'armid/springs/1': ('elastic.json', 'report.html'),
+    'armid/exo/1': ('exo.json', 'report.html', 'recording'),
+    'armid/lunar/1': ('lunar.json', 'report.html'),
+    'armid/layout/1': ('plotjuggler.xml', 'foxglove.json', 'arm.rviz'),
+    'armid/fleet/1': (
+        'fleet.json',
+        'index.html',
+        'alarms.jsonl',
+        'arms',
+        'bags',
+        'pages',
+        'parameters',
+        'refused',
+        'reports',
+        'robots',
+        'watch',
+    ),
+}
+#: Folder in which a run writes until its result is complete.
+STAGING = '.armid-part'
+#: Element in the head of each page of this package.
+GENERATOR = '<meta name="generator" content="armid_ros">'
+#: Pattern of message types in metadata.yaml, and message types of a bag with a planned motion.
+_KIND = re.compile(r'^ *type: *(\S+)', re.MULTILINE)
+_OF_A_PLAN = {'trajectory_msgs/msg/JointTrajectory', 'std_msgs/msg/String'}
+#: Size of the beginning of a file that contains its mark [bytes].
+_HEAD = 4096
+_MARK = re.compile(re.escape(GENERATOR).encode() + rb'|schema"?: *"?armid/[a-z_]+/[0-9]')
+#: Endings of files with a mark.
+_MARKED = ('.html', '.json', '.yaml', '.rviz', 'plotjuggler.xml')
 
 
 def write_file(path: str | Path, content: str | bytes) -> None:
@@ -161,49 +225,32 @@ def locked(path: Path) -> Iterator[None]:
 
 
 def _refuse_other_results(path: Path, schema: str, robot: str) -> None:
-    for name in DOCUMENTS:
-        if not os.path.lexists(path / name):
-            continue
+    """Refuse a folder with a document, or a model without one, of another kind or robot."""
+    there = [name for name in DOCUMENTS if os.path.lexists(path / name)]
+    if not there and schema in _WITH_MODEL and os.path.lexists(path / _MODEL):
+        there = [_MODEL]
+    for name in there:
+        load = load_yaml if name == _MODEL else load_json
         try:
             with reading(path / name, OutputError):
-                found = load_json(read_text(path / name, OutputError))
+                found = load(read_text(path / name, OutputError))
                 kind, other = str(found['schema']), str(found.get('robot', ''))
         except OutputError:
             kind, other = f'{name}, which cannot be read', ''
-        if kind != schema:
-            raise OutputError(f'{path}: holds {_in_words(kind)}, not {_in_words(schema)}; {_HINT}')
-        if robot and other and not _same(robot, other):
-            raise OutputError(f'{path}: holds {kind} of {other}, not of {robot}; {_HINT}')
-    alone = not any(os.path.lexists(path / name) for name in DOCUMENTS)
-    if alone and schema in _WITH_MODEL and os.path.lexists(path / _MODEL):
-        _refuse_other_model(path, robot)
+        fits = kind.startswith('armid/model/') if name == _MODEL else kind == schema
+        hint = 'name another folder, or write over it with --force'
+        if not fits:
+            raise OutputError(f'{path}: holds {_in_words(kind)}, not {_in_words(schema)}; {hint}')
+        # '-' is the description in the bag, which may be any robot
+        same = '-' in (robot, other) or Path(robot).absolute() == Path(other).absolute()
+        if robot and other and not same:
+            raise OutputError(f'{path}: holds {kind} of {other}, not of {robot}; {hint}')
 
 
 def _in_words(schema: str) -> str:
     """Return the kind of result of a schema such as 'armid/comparison/1', in words."""
     parts = schema.split('/')
     return f'results of kind {parts[1]}' if len(parts) == 3 else schema
-
-
-def _refuse_other_model(path: Path, robot: str) -> None:
-    try:
-        with reading(path / _MODEL, OutputError):
-            found = load_yaml(read_text(path / _MODEL, OutputError))
-            kind, other = str(found['schema']), str(found['robot'])
-    except OutputError:
-        raise OutputError(f'{path}: holds a {_MODEL} that cannot be read; {_HINT}') from None
-    if not kind.startswith('armid/model/') or (robot and not _same(robot, other)):
-        raise OutputError(f'{path}: holds {kind} of {other}, not of {robot}; {_HINT}')
-
-
-_HINT = 'name another folder, or write over it with --force'
-
-
-def _same(robot: str, other: str) -> bool:
-    """Return whether two names are of one robot: shipped names, or paths of one file."""
-    if '-' in (robot, other):  # '-' is the description in the bag, which may be any robot
-        return True
-    return robot == other or Path(robot).absolute() == Path(other).absolute()
 
 
 def _representable(value: Any) -> Any:
@@ -214,3 +261,101 @@ def _representable(value: Any) -> Any:
     if isinstance(value, (list, tuple)):
         return [_representable(part) for part in value]
     return value
+
+
+def settled(path: Path) -> Path:
+    """Return the final path of a staged file; other paths unchanged."""
+    return Path(*(part for part in path.parts if part != STAGING))
+
+
+def written_by(schema: str, also: Collection[str] = ()) -> tuple[str, ...]:
+    """Return names and patterns, such as '*.png', of the files of a kind of result."""
+    return (*_WRITES.get(schema, ()), *also)
+
+
+def refuse_foreign(folder: Path, schema: str, also: Collection[str] = ()) -> None:
+    """
+    Refuse a folder with files that a command did not write.
+
+    Parameters
+    ----------
+    folder : Path
+        The folder of the results.
+    schema : str
+        Schema of the results; nothing is refused for an unknown schema.
+    also : collection of str
+        Names of further files that the command writes, or patterns such as '*.png'.
+
+    Raises
+    ------
+    OutputError
+        If there is such a file; the message names the folder and the file.
+
+    """
+    if schema not in _WRITES:
+        return
+    writes = written_by(schema, also)
+    names = sorted(path.name for path in folder.iterdir() if path.name != STAGING)
+    for name in names:
+        if not any(fnmatch(name.removeprefix('.').removesuffix('.part'), one) for one in writes):
+            raise OutputError(
+                f'{folder}: holds {name}, which this command does not write; name another folder, '
+                'or use --force, which leaves it there'
+            )
+    for name in _foreign(folder, names):
+        raise OutputError(
+            f'{folder}: holds {name}, which armid did not write; name another folder, or '
+            'write over it with --force'
+        )
+
+
+def refuse_replacing(folder: Path, names: Collection[str]) -> None:
+    """
+    Raise an error instead of replacing files that this package did not write.
+
+    Parameters
+    ----------
+    folder : Path
+        The folder, which need not exist.
+    names : collection of str
+        Names of the files to be written.
+
+    Raises
+    ------
+    OutputError
+        If there is such a file; the message names the folder and the file.
+
+    """
+    for name in _foreign(folder, [name for name in names if (folder / name).exists()]):
+        raise OutputError(
+            f'{folder}: holds {name}, which armid did not write; name another folder'
+        )
+
+
+def _foreign(folder: Path, names: Sequence[str]) -> Iterator[str]:
+    """Return foreign files; files that cannot have a mark count only if all names are such."""
+    known = [name for name in names if name.endswith(_MARKED)]
+    return (name for name in known or names if not is_own(folder / name))
+
+
+def is_plan(path: Path) -> bool:
+    """Return whether a folder is a bag with a trajectory and no measurements."""
+    try:
+        text = read_text(path / 'metadata.yaml', OutputError)
+    except OutputError:
+        return False
+    kinds = set(_KIND.findall(text))
+    return 'trajectory_msgs/msg/JointTrajectory' in kinds <= _OF_A_PLAN
+
+
+def is_own(path: Path) -> bool:
+    """Return whether a document, page or trajectory is a result of this package."""
+    if path.is_dir():
+        return is_plan(path)
+    if not path.name.endswith(_MARKED):
+        return False
+    try:
+        with open_regular(path, OutputError) as stream:
+            return _MARK.search(stream.read(_HEAD)) is not None
+    except (OutputError, OSError):
+        return False

@@ -1,7 +1,7 @@
 # Copyright 2026 The armid_ros developers
 # SPDX-License-Identifier: Apache-2.0
 """
-Regular files, opened without waiting.
+Regular files, opened without waiting, and limits of their size.
 
 Opening a FIFO waits for a writer, and reading a device may never end; neither is an input of this
 package, so both are refused at once.
@@ -12,6 +12,7 @@ from __future__ import annotations
 
 import os
 from pathlib import Path
+import resource
 import stat
 from typing import BinaryIO
 
@@ -19,6 +20,7 @@ from armid_ros.errors import ArmidError
 
 #: Largest size of a text file [bytes]; a description of 10,000 links has 6 MB.
 TEXT_LIMIT = 64 << 20
+_CONTROL_GROUP = Path('/sys/fs/cgroup/memory.max')
 
 _KINDS = (
     (stat.S_ISDIR, 'a folder'),
@@ -101,3 +103,24 @@ def read_text(path: str | Path, error: type[ArmidError], limit: int = TEXT_LIMIT
 def problem_text(problem: OSError | ValueError) -> str:
     """Return the reason of a system error, without the path."""
     return (problem.strerror if isinstance(problem, OSError) else None) or str(problem)
+
+
+def default_memory_limit() -> int:
+    """Return the memory limit of one input: a quarter of the memory [bytes]."""
+    bounds = [os.sysconf('SC_PAGE_SIZE') * os.sysconf('SC_PHYS_PAGES')]
+    limit = resource.getrlimit(resource.RLIMIT_AS)[0]
+    if limit != resource.RLIM_INFINITY:
+        bounds.append(limit)
+    try:
+        bounds.append(int(_CONTROL_GROUP.read_text(encoding='ascii')))
+    except (OSError, ValueError):  # no control group, or 'max'
+        pass
+    return min(bounds) // 4
+
+
+def size_text(size: int) -> str:
+    """Return a number of bytes as text with a unit, such as '1.5 MB'."""
+    for unit, scale in (('GB', 10**9), ('MB', 10**6), ('kB', 10**3)):
+        if size >= scale:
+            return f'{size / scale:.3g} {unit}'
+    return f'{size} bytes'

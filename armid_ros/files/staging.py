@@ -22,8 +22,7 @@ from pathlib import Path
 import shutil
 
 from armid_ros.errors import OutputError
-from armid_ros.files.output import DOCUMENTS, locked
-from armid_ros.files.own import STAGING
+from armid_ros.files.output import DOCUMENTS, locked, STAGING
 
 #: Constants of the system call renameat2(2).
 _AT_FDCWD, _RENAME_EXCHANGE = -100, 2
@@ -85,7 +84,14 @@ class Staged:
             for path in self._earlier():
                 path.unlink()
             for name in names:
-                _move(self.folder / name, self.out / name)
+                source, target = self.folder / name, self.out / name
+                if target.is_dir() and not target.is_symlink():
+                    aside = source.with_name(f'{name}.old')  # rename replaces no folder
+                    target.replace(aside)
+                    source.replace(target)
+                    shutil.rmtree(aside)
+                else:
+                    source.replace(target)
         except OSError as error:
             raise OutputError(f'{self.out}: cannot be written: {error.strerror}') from error
 
@@ -102,7 +108,10 @@ class Staged:
             _remove(new)  # left by a run that was killed
             new.mkdir()
             for path in (*kept, *self.folder.iterdir()):
-                _link(path, new / path.name)
+                if path.is_dir() and not path.is_symlink():
+                    shutil.copytree(path, new / path.name, symlinks=True, copy_function=os.link)
+                else:
+                    os.link(path, new / path.name, follow_symlinks=False)
             (new / STAGING).mkdir()
             shutil.copystat(out, new)
             self._locks.enter_context(locked(new))
@@ -159,25 +168,6 @@ def staged(
         finally:
             with suppress(OSError):
                 _remove(folder)
-
-
-def _move(source: Path, target: Path) -> None:
-    """Replace a file or folder; an existing folder is moved away first, as required by rename."""
-    if target.is_dir() and not target.is_symlink():
-        aside = source.with_name(f'{source.name}.old')
-        target.replace(aside)
-        source.replace(target)
-        shutil.rmtree(aside)
-    else:
-        source.replace(target)
-
-
-def _link(source: Path, target: Path) -> None:
-    """Make a hard link of a file, or of each file of a folder."""
-    if source.is_dir() and not source.is_symlink():
-        shutil.copytree(source, target, symlinks=True, copy_function=os.link)
-    else:
-        os.link(source, target, follow_symlinks=False)
 
 
 def _exchange(first: Path, second: Path) -> None:

@@ -9,13 +9,11 @@ Inspection does not change the data: the curves are those of the file.
 
 from armid_ros.inspection.description_check import check_links, description_remarks, LinkCheck
 from armid_ros.inspection.inspect import inspect, Inspection, inspection_document, Remark
-from armid_ros.inspection.sampling import Sampling
 
 __all__ = [
     'Inspection',
     'LinkCheck',
     'Remark',
-    'Sampling',
     'check_links',
     'description_remarks',
     'inspect',

@@ -114,26 +114,23 @@ def description_remarks(robot: Robot) -> tuple[Remark, ...]:
 
     """
     found = [Remark('bad', text) for text in robot.description.inertia_doubts()]
-    found += [*_of_limits(robot), *_of_axes(robot), *_of_shapes(robot)]
+    found += [*_of_joints(robot), *_of_shapes(robot)]
     known = {remark.text for remark in found}
     others = [note for note in notes_on(robot) if note not in known]
     return worst_first([*found, *(Remark('note', note) for note in others)])
 
 
-def _of_limits(robot: Robot) -> Iterator[Remark]:
-    for k, joint in enumerate(robot.joints):
+def _of_joints(robot: Robot) -> Iterator[Remark]:
+    """Check limits, and axes whose length in the file is not one; a model scales them."""
+    for k, name in enumerate(robot.joints):
         if robot.prismatic[k]:
             continue
         reach = max(-robot.lower[k], robot.upper[k])
         if _TURNS < reach < np.inf:
-            yield Remark('bad', f"joint '{joint}': limit {reach:g} rad; is it in degrees?")
+            yield Remark('bad', f"joint '{name}': limit {reach:g} rad; is it in degrees?")
         if _FASTEST < robot.velocity_limit[k] < np.inf:
-            fast = f"joint '{joint}': velocity limit {robot.velocity_limit[k]:g} rad/s"
+            fast = f"joint '{name}': velocity limit {robot.velocity_limit[k]:g} rad/s"
             yield Remark('doubt', f'{fast}; is it in degrees per second?')
-
-
-def _of_axes(robot: Robot) -> Iterator[Remark]:
-    """Yield remarks on axes whose length in the file is not one; a model scales them."""
     for joint in parse_xml(robot.urdf).iter('joint'):
         axis = joint.find('axis')
         if axis is None or joint.get('type') not in MOVABLE:

@@ -11,9 +11,13 @@ from typing import Any, get_args, Literal
 from armid_ros.identification.assess.sensor_faults import encoder_faults, velocity_faults
 from armid_ros.identification.rows.checks import beyond_limits, SILENT, too_short_to_tell
 from armid_ros.identification.rows.stamps import rounded_stamps, two_senders
-from armid_ros.inspection.joints import joint_facts, JointFacts
-from armid_ros.inspection.sampling import Sampling
-from armid_ros.inspection.trial import TrialFit, try_identification
+from armid_ros.inspection.facts import (
+    joint_facts,
+    JointFacts,
+    Sampling,
+    TrialFit,
+    try_identification,
+)
 from armid_ros.recording import Recording, Topic
 from armid_ros.robots import driven_in_words, held_joints, Robot
 import numpy as np

@@ -14,7 +14,7 @@ from armid_ros.excitation.pose_monitor import AGREEING
 from armid_ros.motion import FloatArray
 from armid_ros.nodes.base import ArmidNode
 from armid_ros.nodes.messages.timeliness import StampDifference
-from armid_ros.recording.joint_state.message import JointStateMessages
+from armid_ros.recording.joint_state.decoder import JointStateMessages
 from armid_ros.robots import Robot
 import numpy as np
 from rclpy.clock import Clock, ClockType, JumpThreshold

@@ -16,7 +16,7 @@ from typing import Any
 from armid_ros.arm import ArmModel
 from armid_ros.diagnosis.verdict.document import SCHEMA as DIAGNOSIS
 from armid_ros.errors import ArmidError, RecordingError, TrajectoryError
-from armid_ros.files.own import refuse_foreign
+from armid_ros.files.output import refuse_foreign
 from armid_ros.identification.output import SCHEMA as IDENTIFICATION
 from armid_ros.nodes.base import ArmidNode
 from armid_ros.nodes.parameters.table import names, NodeParameter

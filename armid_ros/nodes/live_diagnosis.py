@@ -14,7 +14,7 @@ from armid_ros.arm.model_file import model_text
 from armid_ros.diagnosis import Finding
 from armid_ros.errors import IdentificationError
 from armid_ros.estimate import name_in_words
-from armid_ros.files.own import refuse_replacing
+from armid_ros.files.output import refuse_replacing
 from armid_ros.live import Answer, Assistant, LiveDiagnosis, StreamWatch
 from armid_ros.live.assistant import Helper, Plan, Save
 from armid_ros.nodes.base import key_values

@@ -19,7 +19,7 @@ from armid_ros.effects import Effect
 from armid_ros.errors import ArmidError, IdentificationError, ModelError
 from armid_ros.estimate import Estimate
 from armid_ros.files import write_file
-from armid_ros.files.own import refuse_replacing
+from armid_ros.files.output import refuse_replacing
 from armid_ros.identification.online.identifier import OnlineIdentifier, OnlineSettings
 from armid_ros.identification.online.learning_progress import LearningProgress, too_little_motion
 from armid_ros.motion import FloatArray

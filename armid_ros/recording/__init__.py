@@ -9,40 +9,29 @@ raw messages for the nodes. ROS is not needed.
 
 """
 
-from armid_ros.recording.bag import Bag, topics
-from armid_ros.recording.copying import Copied, copy_bag, recover
+from armid_ros.recording.bag import topics
+from armid_ros.recording.copying import recover
 from armid_ros.recording.joint_state.encoder import (
     joint_state_cdr,
     write_joint_states,
     write_recording,
 )
-from armid_ros.recording.message_types import string_cdr
-from armid_ros.recording.qos import LATCHED
 from armid_ros.recording.reader import read_recording, read_robot_description
 from armid_ros.recording.recording import (
-    PartnerMotion,
-    PositionRange,
+    given_twice,
     ReadReport,
     recorded_together,
     Recording,
-    TimeGap,
+    require_once,
 )
-from armid_ros.recording.source import RawMessage, ReadSettings, Topic
-from armid_ros.recording.trajectory import (
-    joint_trajectory_cdr,
-    read_waypoints,
-    write_joint_trajectory,
-)
-from armid_ros.recording.twice import given_twice, require_once
+from armid_ros.recording.source import ReadSettings, Topic
+from armid_ros.recording.trajectory import read_waypoints, write_joint_trajectory
 from armid_ros.recording.writer import BagWriter
 
 __all__ = [
     'Recording',
     'ReadReport',
     'ReadSettings',
-    'TimeGap',
-    'PositionRange',
-    'PartnerMotion',
     'recorded_together',
     'given_twice',
     'require_once',
@@ -50,18 +39,11 @@ __all__ = [
     'read_robot_description',
     'write_recording',
     'BagWriter',
-    'LATCHED',
-    'joint_trajectory_cdr',
     'write_joint_trajectory',
     'read_waypoints',
     'recover',
-    'copy_bag',
-    'Copied',
     'write_joint_states',
     'joint_state_cdr',
-    'string_cdr',
-    'Bag',
     'Topic',
-    'RawMessage',
     'topics',
 ]

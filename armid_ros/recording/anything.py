@@ -22,7 +22,7 @@ from armid_ros.recording.columns import (
 from armid_ros.recording.message_types import JOINT_STATE
 from armid_ros.recording.reader import bag_contents, read_recording
 from armid_ros.recording.recording import Recording
-from armid_ros.recording.source import DEFAULT, ReadSettings, Topic
+from armid_ros.recording.source import DEFAULT, listed, ReadSettings, Topic
 
 if TYPE_CHECKING:
     from armid_ros.recording.tables import TablePlan
@@ -139,11 +139,8 @@ def read_anything(
         if topic is not None:
             there = [one for one in there if one.name.lstrip('/') == topic.lstrip('/')]
         if not there:
-            known = ', '.join(f'{t.name} ({t.type_name}, {t.count} messages)' for t in topics)
             which = f'{topic} of ' if topic else 'topic of '
-            raise RecordingError(
-                f'{path}: no {which}{JOINT_STATE}; there are {known or "no topics"}'
-            )
+            raise RecordingError(f'{path}: no {which}{JOINT_STATE}; there are {listed(topics)}')
         fullest = max(there, key=lambda one: one.count)
         topic, joints = fullest.name, fullest.joints
     called = [name_in_file(joint, columns.rename) for joint in joints]

@@ -4,10 +4,11 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 import contextlib
 from dataclasses import replace
 import heapq
+import io
 import os
 from pathlib import Path
 import re
@@ -16,12 +17,13 @@ from typing import Self
 
 from armid_ros.errors import RecordingError
 from armid_ros.files import open_regular, reading
-from armid_ros.recording.compression import message_content, unpacked, ZSTD
+from armid_ros.recording.compression import unpacked, ZSTD
 from armid_ros.recording.mcap.source import McapSource
 from armid_ros.recording.metadata import BagMetadata, FILE_NAME, read_metadata
 from armid_ros.recording.source import (
     Damage,
     DEFAULT,
+    listed,
     MessageBlock,
     RawMessage,
     ReadSettings,
@@ -118,9 +120,14 @@ class Bag(Source):
                 )
         return tuple(merged.values())
 
-    def topic_of(self, type_name: str, wanted: str | None = None) -> Topic:
+    def topic_of(
+        self,
+        type_name: str,
+        wanted: str | None = None,
+        fits: Callable[[Topic], bool] | None = None,
+    ) -> Topic:
         """
-        Return the topic of a type: the only one, or the one of the given name.
+        Return the topic of a type, or one that fits: the only one, or the one of a given name.
 
         Raises
         ------
@@ -133,15 +140,17 @@ class Bag(Source):
         found = [
             topic
             for topic in topics
-            if topic.type_name == type_name and name in (None, '/' + topic.name.lstrip('/'))
+            if (topic.type_name == type_name if fits is None else fits(topic))
+            and name in (None, '/' + topic.name.lstrip('/'))
         ]
         if len(found) == 1:
             return found[0]
-        listed = ', '.join(f'{topic.name} ({topic.type_name})' for topic in topics) or 'none'
         problem = 'several topics' if found else 'no topic'
         asked = f' called {wanted}' if wanted else ''
+        damage = f' ({self.damage})' if self.damage else ''
         raise RecordingError(
-            f'{self.path}: {problem} of {type_name}{asked}; the topics are {listed}'
+            f'{self.path}: {problem} of {type_name}{asked}; the topics are '
+            f'{listed(topics)}{damage}'
         )
 
     def blocks(self, topic: str) -> Iterator[MessageBlock]:
@@ -151,7 +160,14 @@ class Bag(Source):
             for source in self._sources:
                 for block in source.blocks(topic):
                     count += len(block)
-                    yield self._decompressed(block) if self._packed(block.message(0)) else block
+                    if self._by_message or block.message(0)[:4] == ZSTD:
+                        messages, size = list[bytes](), 0
+                        for at in range(len(block)):
+                            messages.append(self._content(block.message(at)))
+                            size += len(messages[-1])
+                            self._settings.require(size, 'a block of messages')
+                        block = MessageBlock.joined(messages, block.log_time, block.publish_time)
+                    yield block
         expected = self._metadata.counts.get(topic, count)
         if count != expected:
             self._damage.add(
@@ -160,18 +176,17 @@ class Bag(Source):
 
     def messages(self) -> Iterator[RawMessage]:
         """Yield all messages in the order of their log times, with few chunks in memory."""
-        limit = self._settings.memory_limit
         streams = [source.messages() for source in self._sources]
         with reading(self.path, RecordingError):
             for message in heapq.merge(*streams, key=lambda message: message.log_time_ns):
-                if self._packed(message.cdr):
-                    yield message._replace(cdr=message_content(message.cdr, limit))
-                else:
-                    yield message
+                cdr = self._content(message.cdr)
+                yield message if cdr is message.cdr else message._replace(cdr=cdr)
 
-    def _packed(self, message: bytes) -> bool:
-        """Return whether a message is compressed, by the metadata or its first bytes."""
-        return self._by_message or message[:4] == ZSTD
+    def _content(self, message: bytes) -> bytes:
+        """Decompress a message that is compressed, by the metadata or its first bytes."""
+        if not (self._by_message or message[:4] == ZSTD):
+            return message
+        return b''.join(unpacked(io.BytesIO(message), self._settings, 'a compressed message'))
 
     def _open(self, file: Path) -> Source:
         """Open one file."""
@@ -181,34 +196,20 @@ class Bag(Source):
 
             storage = Ros1Source
         with reading(file, RecordingError):
-            plain = self._unpacked(file) if file.suffix in _COMPRESSED else file
+            if file.suffix in _COMPRESSED:  # the temporary file is removed with the stack
+                folder = self._stack.enter_context(tempfile.TemporaryDirectory(prefix='armid-'))
+                plain = Path(folder, file.stem)
+                try:
+                    with open_regular(file, RecordingError) as packed, plain.open('wb') as stream:
+                        stream.writelines(unpacked(packed, self._settings, 'the unpacked file'))
+                except OSError as error:
+                    said = f'{file}: cannot be decompressed: {error.strerror}'
+                    raise RecordingError(said) from error
+            else:
+                plain = file
             source: Source = storage(plain, self._settings)
         self._stack.callback(source.close)
         return source
-
-    def _unpacked(self, file: Path) -> Path:
-        """Decompress a file to a temporary file, which is removed when the bag is closed."""
-        folder = self._stack.enter_context(tempfile.TemporaryDirectory(prefix='armid-'))
-        plain, size = Path(folder, file.stem), 0
-        try:
-            with open_regular(file, RecordingError) as packed, plain.open('wb') as stream:
-                for piece in unpacked(packed):
-                    size += len(piece)
-                    self._settings.require(size, 'the unpacked file')
-                    stream.write(piece)
-        except OSError as error:
-            raise RecordingError(f'{file}: cannot be decompressed: {error.strerror}') from error
-        return plain
-
-    def _decompressed(self, block: MessageBlock) -> MessageBlock:
-        """Return a block with its messages decompressed."""
-        messages: list[bytes] = []
-        size = 0
-        for at in range(len(block)):
-            messages.append(message_content(block.message(at), self._settings.memory_limit))
-            size += len(messages[-1])
-            self._settings.require(size, 'a block of messages')
-        return MessageBlock.joined(messages, block.log_time, block.publish_time)
 
 
 def is_ros1(path: Path) -> bool:

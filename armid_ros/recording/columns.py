@@ -8,6 +8,7 @@ from collections.abc import Collection, Sequence
 from dataclasses import dataclass, replace
 import math
 from pathlib import Path
+import re
 
 from armid_ros.errors import RecordingError
 from armid_ros.motion import FloatArray
@@ -18,24 +19,11 @@ import numpy as np
 Rules = Sequence[tuple[str, str]]
 #: Seconds in a unit of time.
 TIME_UNITS = {'s': 1.0, 'ms': 1e-3, 'us': 1e-6, 'ns': 1e-9}
-#: Settings for tables only, and their command-line options.
-_WHERE = {
-    'time': '--time',
-    'time_unit': '--time-unit',
-    'rate_hz': '--rate',
-    'position': '--position',
-    'velocity': '--velocity',
-    'effort': '--effort',
-    'episode': '--episode',
-}
-#: Settings for the meaning of numbers, for tables and bags.
-_WHAT = {
-    'degrees': '--degrees',
-    'position_scale': '--position-scale',
-    'effort_scale': '--effort-scale or --current-gain',
-    'zero': '--zero',
-    'gear': '--gear',
-}
+#: Settings for tables only, and settings for the meaning of numbers, for tables and bags.
+_WHERE = ('time', 'time_unit', 'rate_hz', 'position', 'velocity', 'effort', 'episode')
+_WHAT = ('degrees', 'position_scale', 'effort_scale', 'zero', 'gear')
+#: Command-line options that are not called like their setting.
+_OPTIONS = {'rate_hz': '--rate', 'effort_scale': '--effort-scale or --current-gain'}
 
 
 @dataclass(frozen=True)
@@ -98,11 +86,8 @@ class ColumnSettings:
 
 
 def renamed(name: str, rules: Rules) -> str:
-    """Rename a joint by the first rule that fits the whole name or its beginning."""
-    for old, new in rules:
-        if name == old:
-            return new
-    for old, new in rules:
+    """Rename a joint by the first rule that fits the whole name, or else its beginning."""
+    for old, new in sorted(rules, key=lambda rule: rule[0] != name):
         if name.startswith(old):
             return new + name[len(old) :]
     return name
@@ -110,12 +95,10 @@ def renamed(name: str, rules: Rules) -> str:
 
 def name_in_file(name: str, rules: Rules) -> str:
     """Return the name of a joint in the file, the inverse of ``renamed``."""
-    for old, new in rules:
-        if name == new:
-            return old
-    for old, new in rules:
-        if name.startswith(new) and renamed(old + name[len(new) :], rules) == name:
-            return old + name[len(new) :]
+    for old, new in sorted(rules, key=lambda rule: rule[1] != name):
+        before = old + name[len(new) :]
+        if name.startswith(new) and renamed(before, rules) == name:
+            return before
     return name
 
 
@@ -129,16 +112,11 @@ def number(text: str) -> float:
         If the text is not a number.
 
     """
-    value, sign = 1.0, 1
-    bare = text.strip().replace(' ', '')
-    pieces = bare.replace('*', '|*').replace('/', '|/').split('|')
+    value = 1.0
     try:
-        for piece in pieces:
-            sign = -1 if piece.startswith('/') else 1
-            piece = piece.lstrip('*/')
-            minus = -1.0 if piece.startswith('-') else 1.0
-            factor = math.pi if piece.lstrip('+-') == 'pi' else abs(float(piece))
-            value *= (minus * factor) ** sign
+        for sign, piece in re.findall('([*/]|^)([^*/]*)', text.replace(' ', '')):
+            factor = float(re.sub('^([+-]?)pi$', rf'\g<1>{math.pi!r}', piece))
+            value = value / factor if sign == '/' else value * factor
         if not math.isfinite(value):
             raise ValueError(text)
     except (ValueError, ZeroDivisionError):
@@ -184,7 +162,8 @@ def refuse_columns(path: str | Path, settings: ColumnSettings, *, copied: bool =
         reasons |= dict.fromkeys(_WHAT, reason)
     for name, reason in reasons.items():
         if getattr(settings, name) != getattr(ColumnSettings, name):  # its default
-            raise RecordingError(f'{path}: {(_WHERE | _WHAT)[name]} {reason}')
+            option = _OPTIONS.get(name, f'--{name.replace("_", "-")}')
+            raise RecordingError(f'{path}: {option} {reason}')
 
 
 def in_si(

@@ -11,10 +11,12 @@ size counts as damaged, and no more than the stated size is decompressed.
 from __future__ import annotations
 
 from collections.abc import Iterator
+from contextlib import suppress
 import threading
 from typing import BinaryIO
 
 from armid_ros.errors import RecordingError
+from armid_ros.recording.source import ReadSettings
 import lz4.frame
 import zstandard
 
@@ -85,65 +87,49 @@ _ZSTD = _Zstd()
 
 def partly_decompressed(stored: _Buffer, compression: str, size: int) -> bytes:
     """Return the readable content of a truncated frame, at most ``size`` bytes."""
-    content = bytearray()
-    try:
-        _decompress_into(content, stored, compression, size)
-    except (*CORRUPT, EOFError):
-        pass
-    return bytes(content[:size])
-
-
-def _decompress_into(content: bytearray, data: _Buffer, compression: str, size: int) -> None:
-    """Append the content of a frame until ``size`` bytes, or one step more, are reached."""
     if compression == 'zstd':
         decompressor = zstandard.ZstdDecompressor().decompressobj()
     else:
         decompressor = lz4.frame.LZ4FrameDecompressor()
-    step = 1024  # bytes
-    for at in range(0, len(data), step):
-        # Each block that a compressor writes can be decompressed on its own.
-        content += decompressor.decompress(bytes(data[at : at + step]))
-        if len(content) >= size:
-            break
+    content, step = bytearray(), 1024  # bytes
+    with suppress(*CORRUPT, EOFError):
+        for at in range(0, len(stored), step):
+            # Each block that a compressor writes can be decompressed on its own.
+            content += decompressor.decompress(bytes(stored[at : at + step]))
+            if len(content) >= size:
+                break
+    return bytes(content[:size])
 
 
-def unpacked(stream: BinaryIO) -> Iterator[bytes]:
+def unpacked(stream: BinaryIO, settings: ReadSettings, what: str) -> Iterator[bytes]:
     """
-    Yield the content of a zstd file, a piece at a time.
+    Yield the content of a zstd file or message, a piece at a time.
+
+    Not every writer states the size of the content in the frame, so that a limit is needed.
+
+    Parameters
+    ----------
+    stream : file
+        The compressed data.
+    settings : ReadSettings
+        The memory limit.
+    what : str
+        Name of the compressed object, for error messages.
 
     Raises
     ------
     RecordingError
-        The file is damaged, or ends within a frame.
+        The data are damaged, or their content exceeds the limit.
 
     """
+    size = 0
     try:
         with zstandard.ZstdDecompressor().stream_reader(
             stream, read_across_frames=True
         ) as content:
             while piece := content.read(1 << 20):
+                size += len(piece)
+                settings.require(size, what)
                 yield piece
     except CORRUPT as error:
-        raise RecordingError(f'the compressed file is damaged: {error}') from error
-
-
-def message_content(data: bytes, limit: int) -> bytes:
-    """
-    Decompress a message that rosbag2 compressed on its own.
-
-    Not every writer states the size of the content in the frame, so that a limit is needed.
-
-    Raises
-    ------
-    RecordingError
-        If the message is damaged, or its content exceeds the limit.
-
-    """
-    content = bytearray()
-    try:
-        _decompress_into(content, data, 'zstd', limit + 1)
-    except (*CORRUPT, EOFError) as error:
-        raise RecordingError(f'a compressed message is damaged: {error}') from error
-    if len(content) > limit:
-        raise RecordingError(f'a compressed message takes more than {limit} bytes')
-    return bytes(content)
+        raise RecordingError(f'{what} is damaged: {error}') from error

@@ -4,9 +4,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from contextlib import closing
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 import os
 from pathlib import Path
 from typing import Any
@@ -18,8 +18,8 @@ from armid_ros.recording.columns import renamed
 from armid_ros.recording.joint_state.conversion import is_plain
 from armid_ros.recording.mcap.source import McapSource
 from armid_ros.recording.message_types import JOINT_STATE
-from armid_ros.recording.source import DEFAULT, ReadSettings, Topic, UNREADABLE
-from armid_ros.recording.writer import BagWriter, whole_bag
+from armid_ros.recording.source import DEFAULT, ReadSettings, Source, Topic, UNREADABLE
+from armid_ros.recording.writer import whole_bag
 from rosbags.typesys import get_typestore, Stores
 
 
@@ -106,9 +106,7 @@ def recover(file: str | Path, out: str | Path, settings: ReadSettings = DEFAULT)
             raise RecordingError(
                 f'{path}: there is no message to recover; {source.damage or "the file is whole"}'
             )
-        with whole_bag(out) as writer:
-            writer.copy(source)
-        return _copied(path, writer, source.damage)
+        return _copied(path, source, out)
 
 
 def copy_bag(
@@ -165,13 +163,19 @@ def copy_bag(
                     f'{path}: {topic.name} is no {JOINT_STATE} of ROS 2, whose names can be '
                     'changed; give --rename to the command that reads the bag'
                 )
-        with whole_bag(out) as writer:
-            writer.copy(bag, change)
-        damage = bag.damage
+        copied = _copied(path, bag, out, change)
     changed = tuple((old, new) for old, new in names.items() if old != new)
-    return _copied(path, writer, damage, left_out=tuple(left_out), renamed=changed)
+    return replace(copied, left_out=tuple(left_out), renamed=changed)
 
 
-def _copied(path: Path, writer: BagWriter, damage: str, **more: Any) -> Copied:
+def _copied(
+    path: Path,
+    source: Source,
+    out: str | Path,
+    change: Callable[[Topic, bytes], bytes] | None = None,
+) -> Copied:
+    """Write the topics and messages of a source to a new bag, and report it."""
+    with whole_bag(out) as writer:
+        writer.copy(source, change)
     start, end = writer.time_range
-    return Copied(path, writer.path, writer.topics, damage, (end - start) * 1e-9, **more)
+    return Copied(path, writer.path, writer.topics, source.damage, (end - start) * 1e-9)

@@ -6,6 +6,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import replace
+from itertools import chain
 from pathlib import Path
 import struct
 
@@ -67,15 +68,11 @@ def read_recording(
         chosen = choose_topics(bag, joints, topic)
         decoder = JointStateDecoder(joints, sum(one.count for one in chosen))
         name = ' + '.join(one.name for one in chosen)
-        where = f'{path}: {name}'
-        with reading(path, RecordingError):
-            pieces, size = [], 0
-            for one in chosen:
-                for block in joint_state_blocks(bag, one):
-                    for piece in decoder.decode(block):
-                        size += piece.nbytes
-                        settings.require(size, f'{where}: the recording')
-                        pieces.append(piece)
+        pieces, size = [], 0
+        for piece in chain.from_iterable(_decoded(bag, one, decoder) for one in chosen):
+            size += piece.nbytes
+            settings.require(size, f'{path}: {name}: the recording')
+            pieces.append(piece)
         damage = bag.damage
     return assembled(path, name, joints, pieces, decoder, damage)
 
@@ -178,35 +175,28 @@ def read_pieces(
         def made(damage: str = '') -> Recording:
             return assembled(path, chosen.name, joints, list(held), decoder, damage)
 
-        for part in _parts(bag, chosen, decoder, samples):
-            if new and new + len(part) > samples:
-                piece = made()
-                yield piece, False
-                held, new = list(_from(held, keep(piece), piece.clock)), 0
-            held.append(part)
-            new += len(part)
+        for states in _decoded(bag, chosen, decoder):
+            for start in range(0, len(states), samples):
+                part = states.select(slice(start, start + samples))
+                if new and new + len(part) > samples:
+                    piece = made()
+                    yield piece, False
+                    stamp, new = keep(piece), 0
+                    times = [
+                        one.stamps if piece.clock == 'header' else one.receive for one in held
+                    ]
+                    late = [np.flatnonzero(t >= stamp) for t in times if t is not None]
+                    held = [one.select(k) for one, k in zip(held, late, strict=True) if len(k)]
+                held.append(part)
+                new += len(part)
         yield made(bag.damage), True
 
 
-def _parts(
-    bag: Bag, topic: Topic, decoder: JointStateDecoder, most: int
-) -> Iterator[JointSamples]:
-    """Yield the messages of a topic in parts of at most a given number."""
+def _decoded(bag: Bag, topic: Topic, decoder: JointStateDecoder) -> Iterator[JointSamples]:
+    """Yield the samples of a topic."""
     with reading(bag.path, RecordingError):
         for block in joint_state_blocks(bag, topic):
-            for states in decoder.decode(block):
-                for start in range(0, len(states), most):
-                    yield states.select(slice(start, start + most))
-
-
-def _from(held: Sequence[JointSamples], stamp: int, clock: str) -> Iterator[JointSamples]:
-    """Yield the samples from a stamp on."""
-    for states in held:
-        stamps = states.stamps if clock == 'header' else states.receive
-        assert stamps is not None
-        late = stamps >= stamp
-        if late.any():
-            yield states.select(np.flatnonzero(late))
+            yield from decoder.decode(block)
 
 
 def choose_topics(bag: Bag, joints: Sequence[str], wanted: str | None) -> tuple[Topic, ...]:
@@ -214,24 +204,8 @@ def choose_topics(bag: Bag, joints: Sequence[str], wanted: str | None) -> tuple[
     topics = bag.topics()
     candidates = [topic for topic in topics if topic.type_name == JOINT_STATE]
     candidates = candidates or [topic for topic in topics if holds_joint_state(topic)]
-    available = ', '.join(f'{topic.name} ({topic.count} messages)' for topic in candidates)
-    if wanted is not None:
-        name = '/' + wanted.lstrip('/')
-        named = [topic for topic in topics if '/' + topic.name.lstrip('/') == name]
-        if not named or not holds_joint_state(named[0]):
-            what = f'there is no topic {wanted}'
-            if named:
-                what = f'{named[0].name} is a topic of {named[0].type_name}'
-            raise RecordingError(
-                f'{bag.path}: {what}; topics of {JOINT_STATE}: {available or "none"}'
-            )
-        return (named[0],)
-    if not candidates:
-        others = ', '.join(f'{topic.name} ({topic.type_name})' for topic in topics)
-        damage = f' ({bag.damage})' if bag.damage else ''
-        raise RecordingError(
-            f'{bag.path}: no topic of {JOINT_STATE}; the bag has {others or "no topics"}{damage}'
-        )
+    if wanted is not None or not candidates:
+        return (bag.topic_of(JOINT_STATE, wanted, holds_joint_state),)
     if len(candidates) == 1:
         return (candidates[0],)
     names = {topic.name: named_joints(bag, topic) for topic in candidates}

@@ -10,7 +10,7 @@ from importlib import import_module
 from typing import Literal, TYPE_CHECKING
 
 from armid_ros.errors import RecordingError
-from armid_ros.motion import FloatArray, Motion, read_only
+from armid_ros.motion import FloatArray, freeze, freeze_samples, Motion, Samples
 from armid_ros.recording.curves import draw_joints
 from armid_ros.robots import Robot
 import numpy as np
@@ -42,13 +42,6 @@ class TimeGap:
 
     t: float
     length: float
-
-
-def gaps(t: FloatArray) -> tuple[TimeGap, ...]:
-    """Return the stretches without samples."""
-    steps = np.diff(t)
-    at = np.flatnonzero(steps > GAP_PERIODS * np.median(steps))
-    return tuple(TimeGap(float(t[i]), float(steps[i])) for i in at)
 
 
 @dataclass(frozen=True)
@@ -92,7 +85,7 @@ class PartnerMotion:
 
     def __post_init__(self) -> None:
         """Freeze the positions."""
-        object.__setattr__(self, 'q', read_only(self.q))
+        freeze(self, 'q')
 
 
 @dataclass(frozen=True)
@@ -261,10 +254,7 @@ class Recording:
     def __post_init__(self) -> None:
         """Freeze the arrays and check their shapes."""
         object.__setattr__(self, 'joints', tuple(self.joints))
-        for name in ('t', 'q', 'dq', 'tau'):
-            values = getattr(self, name)
-            if values is not None:
-                object.__setattr__(self, name, read_only(values))
+        freeze_samples(self.source or 'recording', self, 'q', 'dq', 'tau')
         backwards = np.flatnonzero(np.diff(self.t) <= 0.0)
         if len(backwards):
             k = int(backwards[0]) + 1
@@ -273,14 +263,6 @@ class Recording:
                 f'({self.t[k]:.6f} s after {self.t[k - 1]:.6f} s): sort the samples by time and '
                 'leave out those of equal stamps'
             )
-        expected = (len(self.t), len(self.joints))
-        for name in ('q', 'dq', 'tau'):
-            values = getattr(self, name)
-            if values is not None and values.shape != expected:
-                raise RecordingError(
-                    f'{self.source or "recording"}: {name} has shape {values.shape}, but '
-                    f'{expected[0]} time stamps of {expected[1]} joints need {expected}'
-                )
 
     def __len__(self) -> int:
         """Return the number of samples N."""
@@ -369,7 +351,7 @@ class Recording:
         assert isinstance(filtered, Motion)
         return filtered
 
-    def select(self, samples: slice | npt.NDArray[np.intp] | npt.NDArray[np.bool_]) -> Recording:
+    def select(self, samples: Samples) -> Recording:
         """Return a recording of some of the samples, on the same time base."""
         partner = self.partner
         return replace(
@@ -422,3 +404,44 @@ def recorded_together(
         )
     q = CubicSpline(other.t, other.q)(t[inside])
     return replace(recording.select(inside), partner=PartnerMotion(robot, tuple(ties), q))
+
+
+def given_twice(fitted: Sequence[Recording], held_out: Sequence[Recording] = ()) -> str:
+    """
+    Return a text that names the recordings that are given twice.
+
+    A recording that is fitted twice has twice the weight, and a fitted recording is not held out.
+    Two recordings are the same if positions and torques agree: two simulated runs may share their
+    positions.
+
+    Parameters
+    ----------
+    fitted, held_out : sequence of Recording
+        Recordings that the model is fitted to, and held-out recordings.
+
+    Returns
+    -------
+    str
+        Names of the repeated recordings and of their originals; empty if there are none.
+
+    """
+
+    def same(a: Recording, b: Recording) -> bool:
+        if a.tau is None or b.tau is None:
+            return a.tau is b.tau and np.array_equal(a.q, b.q)
+        return np.array_equal(a.q, b.q) and np.array_equal(a.tau, b.tau)
+
+    again = [
+        a.source if a.source == b.source else f'{a.source} (is {b.source})'
+        for k, a in enumerate([*fitted, *held_out])
+        for b in fitted[:k]
+        if same(a, b)
+    ]
+    return f'given twice, or in two roles: {", ".join(dict.fromkeys(again))}' if again else ''
+
+
+def require_once(fitted: Sequence[Recording], held_out: Sequence[Recording] = ()) -> None:
+    """Raise a RecordingError if recordings are given twice."""
+    said = given_twice(fitted, held_out)
+    if said:
+        raise RecordingError(f'{said}; give each recording once')

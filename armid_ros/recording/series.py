@@ -19,7 +19,7 @@ from armid_ros.errors import RecordingError
 from armid_ros.motion import FloatArray
 from armid_ros.recording.joint_state.decoder import JointSamples
 from armid_ros.recording.message_types import QUANTITIES
-from armid_ros.recording.recording import Clock, GAP_PERIODS, gaps, ReadReport, Recording
+from armid_ros.recording.recording import Clock, GAP_PERIODS, ReadReport, Recording, TimeGap
 from armid_ros.recording.source import IntArray
 import numpy as np
 import numpy.typing as npt
@@ -196,25 +196,18 @@ def longest_run(stamps: IntArray) -> slice | None:
     # The next message must also be earlier; otherwise a single message was late.
     down[:-1] &= stamps[2:] - stamps[:-2] < -RESTART_NS
     for back in np.flatnonzero((steps < 0) & ~down):
-        down[back] = _runs_again(stamps, int(back))
+        # Late messages fill a hole, so that the total matches the sampling rate. A clock that was
+        # set back gives twice as many messages.
+        first, last = stamps[back + 1], stamps[back]
+        before = int(np.count_nonzero(stamps[: back + 1] >= first))
+        after = int(np.argmax(np.append(stamps[back + 1 :], last + 1) > last))
+        expected = float(last - first) / float(np.median(steps[steps > 0])) + 1.0
+        down[back] = after >= 10 and before + after > 1.5 * expected
     if not down.any():
         return None
     bounds = [0, *(np.flatnonzero(down) + 1).tolist(), len(stamps)]
     begin = max(range(len(bounds) - 1), key=lambda i: bounds[i + 1] - bounds[i])
     return slice(bounds[begin], bounds[begin + 1])
-
-
-def _runs_again(stamps: IntArray, back: int) -> bool:
-    """Return whether the clock repeats a stretch of time after a step back."""
-    # Late messages fill a hole, so that the total matches the sampling rate. A clock that was set
-    # back gives twice as many messages.
-    first, last = stamps[back + 1], stamps[back]
-    steps = np.diff(stamps)
-    period = float(np.median(steps[steps > 0]))
-    before = int(np.count_nonzero(stamps[: back + 1] >= first))
-    after = int(np.argmax(np.append(stamps[back + 1 :], last + 1) > last))
-    expected = float(last - first) / period + 1.0
-    return after >= 10 and before + after > 1.5 * expected
 
 
 def _sorted(series: JointSamples, counts: Counter[str]) -> JointSamples:
@@ -397,10 +390,12 @@ def assemble(
         if array is not None:
             array.setflags(write=False)  # a read-only array is not copied by Recording
     found = {'not_finite': culprits, 'absent': absent, 'clock_note': note, **met, **counts}
+    steps = np.diff(t)
+    at = np.flatnonzero(steps > GAP_PERIODS * np.median(steps))
     report = ReadReport(
         **found,
         samples=len(samples),
-        gaps=gaps(t),
+        gaps=tuple(TimeGap(float(t[k]), float(steps[k])) for k in at),
         unwrapped=tuple(joints[k] for k in wrapped),
     )
     return Recording(

@@ -112,6 +112,12 @@ class Topic:
         return self.message_type.name
 
 
+def listed(topics: Sequence[Topic]) -> str:
+    """Format topics with their types and counts, for error messages."""
+    known = (f'{one.name} ({one.type_name}, {one.count} messages)' for one in topics)
+    return ', '.join(known) or 'none'
+
+
 @dataclass(frozen=True)
 class MessageBlock:
     """

@@ -19,7 +19,7 @@ from typing import Any
 from armid_ros.errors import RecordingError
 from armid_ros.files import is_file
 from armid_ros.recording.message_types import MessageType
-from armid_ros.recording.qos import parse_qos
+from armid_ros.recording.metadata import parse_qos
 from armid_ros.recording.source import (
     BLOCK_MESSAGES,
     DEFAULT,

@@ -7,33 +7,27 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any, Protocol
+from typing import Any, TYPE_CHECKING
 
 from armid_ros.errors import RecordingError, TrajectoryError
 from armid_ros.files import reading
-from armid_ros.motion import FloatArray
+from armid_ros.motion import FloatArray, Motion
 from armid_ros.recording.bag import Bag
-from armid_ros.recording.joint_state.encoder import Measured
 from armid_ros.recording.message_types import JOINT_TRAJECTORY, store_for
-from armid_ros.recording.qos import LATCHED
+from armid_ros.recording.metadata import LATCHED
 from armid_ros.recording.source import DEFAULT, ReadSettings
 from armid_ros.recording.writer import whole_bag
 import numpy as np
 from rosbags.serde import SerdeError
 from rosbags.typesys import get_typestore, Stores
 
-
-class Waypoints(Measured, Protocol):
-    """Contents of a JointTrajectory: a `Motion`, or a subset of its fields."""
-
-    @property
-    def ddq(self) -> FloatArray | None:
-        """Accelerations, shape (N, n)."""
+if TYPE_CHECKING:
+    from armid_ros.simulation.reference import Reference
 
 
 @dataclass(frozen=True)
 class ReadWaypoints:
-    """Waypoints read from a message; see `Waypoints`."""
+    """Waypoints of a message: a motion whose rates and torques may be None."""
 
     joints: tuple[str, ...]
     t: FloatArray
@@ -43,13 +37,13 @@ class ReadWaypoints:
     tau: FloatArray | None
 
 
-def joint_trajectory_cdr(motion: Waypoints) -> bytes:
+def joint_trajectory_cdr(motion: Motion | ReadWaypoints | Reference) -> bytes:
     """
     Serialise a motion as one trajectory_msgs/JointTrajectory.
 
     Parameters
     ----------
-    motion : Motion or other Waypoints
+    motion : Motion, ReadWaypoints or Reference
         Motion to serialise. Its times become time_from_start; the stamp 0 means now.
 
     """
@@ -86,7 +80,7 @@ def joint_trajectory_cdr(motion: Waypoints) -> bytes:
 
 def write_joint_trajectory(
     path: str | Path,
-    motion: Waypoints,
+    motion: Motion | ReadWaypoints | Reference,
     *,
     robot_description: str | None = None,
 ) -> None:
@@ -97,7 +91,7 @@ def write_joint_trajectory(
     ----------
     path : str or Path
         Bag directory to create; it must not exist.
-    motion : Motion or other Waypoints
+    motion : Motion, ReadWaypoints or Reference
         Motion to write. Its torque, if any, is a feedforward effort.
     robot_description : str, optional
         URDF to be written to /robot_description.

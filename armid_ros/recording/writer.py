@@ -18,14 +18,21 @@ import os
 from pathlib import Path
 import shutil
 import time
-from typing import NamedTuple, Self
+from typing import Self
 
 from armid_ros.errors import ArmidError, RecordingError
+from armid_ros.files import write_file
 from armid_ros.recording.mcap.records import MESSAGE, RECORD_HEADER
 from armid_ros.recording.mcap.writer import Compression, McapWriter, message_record
 from armid_ros.recording.message_types import message_type, MessageType, STRING, string_cdr
-from armid_ros.recording.metadata import bag_information, dump, write_metadata
-from armid_ros.recording.qos import dump_qos, LATCHED, VOLATILE
+from armid_ros.recording.metadata import (
+    bag_information,
+    dump,
+    dump_qos,
+    FILE_NAME,
+    LATCHED,
+    VOLATILE,
+)
 from armid_ros.recording.source import IntArray, Source, Topic, UNREADABLE
 from armid_ros.version import __version__
 from mcap.opcode import Opcode
@@ -84,13 +91,6 @@ def require_new(path: Path) -> None:
         raise RecordingError(f'{path}: exists already; choose another name, or remove it')
 
 
-class _OpenChunk(NamedTuple):
-    """Records of the chunk that is not written yet."""
-
-    number: int
-    records: list[bytes]
-
-
 class BagWriter:
     """
     Writer of a bag; a context manager.
@@ -146,7 +146,7 @@ class BagWriter:
         self._topics: dict[str, Topic] = {}
         self._schemas: dict[MessageType, int] = {}
         self._channels: dict[str, int] = {}
-        self._open = _OpenChunk(0, [])
+        self._open = 0, list[bytes]()  # number and records of the chunk that is not written yet
         self._size = 0
         self._opened = clock()
         self._closed = False
@@ -380,8 +380,7 @@ class BagWriter:
         if not self._mcap.finished:
             self.flush()
             self._write_information(self.file.name)
-        self._mcap.finish()
-        write_metadata(self.path, self._information(self.file.name))
+        self._complete()
         self._closed = True
 
     def save(self) -> str:
@@ -399,8 +398,7 @@ class BagWriter:
             return ''
         self._closed = True
         try:
-            self._mcap.finish()
-            write_metadata(self.path, self._information(self.file.name))
+            self._complete()
         except ArmidError as error:
             self._mcap.give_up()
             return str(error)
@@ -410,16 +408,20 @@ class BagWriter:
         """Return the records of the next chunk."""
         # flush() does not empty the list, since it may be interrupted after writing. Records carry
         # the number of their chunk, and are dropped once that chunk is in the file.
-        if self._open.number != self._mcap.committed.chunks:
-            self._open = _OpenChunk(self._mcap.committed.chunks, [])
-        return self._open.records
+        if self._open[0] != self._mcap.committed.chunks:
+            self._open = self._mcap.committed.chunks, []
+        return self._open[1]
 
-    def _information(self, file_name: str | None) -> dict[str, object]:
-        return bag_information(self.topics, file_name, *self.time_range)
+    def _complete(self) -> None:
+        """Write the summary of the file, and metadata.yaml."""
+        self._mcap.finish()
+        information = bag_information(self.topics, self.file.name, *self.time_range)
+        text = dump({'rosbag2_bagfile_information': information})
+        write_file(self.path / FILE_NAME, text)  # after an interruption complete or absent
 
     def _write_information(self, file_name: str | None) -> None:
         """Write the metadata record that rosbag2 writes at the beginning and end of the file."""
-        text = dump(self._information(file_name))
+        text = dump(bag_information(self.topics, file_name, *self.time_range))
         self._mcap.write_metadata('rosbag2', {'serialized_metadata': text})
 
     def _check_open(self) -> None:

@@ -17,7 +17,7 @@ from importlib.resources import files
 import re
 from typing import Any, ClassVar
 
-from armid_ros.files.own import GENERATOR
+from armid_ros.files.output import GENERATOR
 from armid_ros.report.notation import (
     common_prefix,
     counted,

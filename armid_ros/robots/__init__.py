@@ -20,7 +20,6 @@ from armid_ros.robots.load import (
 from armid_ros.robots.robot import (
     GRAVITIES,
     NO_MASS,
-    PARAMETERS_PER_BODY,
     parse_gravity,
     Robot,
 )
@@ -44,7 +43,6 @@ __all__ = [
     'described_at',
     'Robot',
     'NO_MASS',
-    'PARAMETERS_PER_BODY',
     'parse_gravity',
     'GRAVITIES',
     'collision_model',

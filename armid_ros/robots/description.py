@@ -24,6 +24,8 @@ NEGLIGIBLE = 1e-12  # kg m^2
 MAX_CHAIN = 500  # joints one behind the other; Pinocchio's reader descends by recursion
 
 Vector = tuple[float, float, float]
+#: Components of an inertia, in the order of a URDF.
+INERTIA = ('ixx', 'ixy', 'ixz', 'iyy', 'iyz', 'izz')
 
 
 @dataclass(frozen=True)
@@ -33,7 +35,7 @@ class Inertial:
     mass: float
     xyz: Vector
     rpy: Vector
-    inertia: tuple[float, float, float, float, float, float]
+    inertia: tuple[float, ...]
 
     def doubt(self) -> str | None:
         """Return why no mass distribution has this inertia; None if one exists."""
@@ -250,13 +252,8 @@ def _inertial(link: ElementTree.Element, name: str) -> Inertial | None:
         mass=_number(mass, 'value', where),
         xyz=xyz,
         rpy=rpy,
-        inertia=(
-            _number(inertia, 'ixx', where),
-            _number(inertia, 'ixy', where, 0.0),
-            _number(inertia, 'ixz', where, 0.0),
-            _number(inertia, 'iyy', where),
-            _number(inertia, 'iyz', where, 0.0),
-            _number(inertia, 'izz', where),
+        inertia=tuple(
+            _number(inertia, key, where, None if key[1] == key[2] else 0.0) for key in INERTIA
         ),
     )
     if inertial.mass < 0.0:
@@ -278,6 +275,13 @@ def _joint(element: ElementTree.Element, name: str, notes: list[str]) -> Joint:
             f"type='fixed', or take the arm's own description"
         )
     xyz, rpy = _origin(element, where)
+    axis = element.find('axis')
+    x, y, z = (1.0, 0.0, 0.0) if axis is None else _vector(axis, 'xyz', where)
+    length = math.hypot(x, y, z)
+    if length < 1e-100:  # cannot be normalised
+        if kind in MOVABLE:
+            raise RobotError(f'the axis of {where} has no direction')
+        x, y, z, length = 1.0, 0.0, 0.0, 1.0
     lower, upper, velocity, effort = _limits(element, kind, where, notes)
     mimic, followed = None, element.find('mimic')
     if followed is not None:
@@ -296,7 +300,7 @@ def _joint(element: ElementTree.Element, name: str, notes: list[str]) -> Joint:
         child=_link(element, 'child', where),
         xyz=xyz,
         rpy=rpy,
-        axis=_axis(element, where),
+        axis=(x / length, y / length, z / length),
         lower=lower,
         upper=upper,
         velocity=velocity,
@@ -341,18 +345,6 @@ def _link(element: ElementTree.Element, role: str, where: str) -> str:
     if not link:
         raise RobotError(f'{where} has no {role} link')
     return link
-
-
-def _axis(element: ElementTree.Element, where: str) -> Vector:
-    axis = element.find('axis')
-    x, y, z = (1.0, 0.0, 0.0) if axis is None else _vector(axis, 'xyz', where)
-    length = math.hypot(x, y, z)
-    # cannot be normalised
-    if length < 1e-100:
-        if element.get('type') in MOVABLE:
-            raise RobotError(f'the axis of {where} has no direction')
-        return (1.0, 0.0, 0.0)
-    return (x / length, y / length, z / length)
 
 
 def _origin(element: ElementTree.Element, where: str) -> tuple[Vector, Vector]:

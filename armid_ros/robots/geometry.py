@@ -322,8 +322,9 @@ def _leave_out_touching(robot: Robot, geometry: pin.GeometryModel) -> tuple[tupl
         for number, result in enumerate(placed.distanceResults)
         if result.min_distance <= 0.0
     }
-    numbers = range(len(geometry.collisionPairs))
-    _keep(geometry, [n for n in numbers if _links(robot, geometry, n) not in touching])
+    for number in reversed(range(len(geometry.collisionPairs))):
+        if _links(robot, geometry, number) in touching:
+            geometry.removeCollisionPair(geometry.collisionPairs[number])
     return tuple(sorted(touching))
 
 
@@ -336,7 +337,7 @@ def _leave_out_separate(robot: Robot, geometry: pin.GeometryModel) -> None:
         inner, outer = sorted(body.parentJoint for body in bodies)
         if robot.model.parents[outer] == inner:
             by_joint.setdefault(outer, []).append(number)
-    separate = set()
+    separate = set[int]()
     for joint, numbers in by_joint.items():
         closest = np.full(len(numbers), np.inf)
         span = 1.0 if robot.prismatic[joint - 1] else np.pi
@@ -349,15 +350,8 @@ def _leave_out_separate(robot: Robot, geometry: pin.GeometryModel) -> None:
             distances = [pin.computeDistance(geometry, placed, n).min_distance for n in numbers]
             closest = np.minimum(closest, distances)
         separate |= {n for n, distance in zip(numbers, closest, strict=True) if distance > 0.0}
-    _keep(geometry, [n for n in range(len(geometry.collisionPairs)) if n not in separate])
-
-
-def _keep(geometry: pin.GeometryModel, numbers: list[int]) -> None:
-    kept = [geometry.collisionPairs[number] for number in numbers]
-    pairs = [pin.CollisionPair(pair.first, pair.second) for pair in kept]
-    geometry.removeAllCollisionPairs()
-    for pair in pairs:
-        geometry.addCollisionPair(pair)
+    for number in sorted(separate, reverse=True):
+        geometry.removeCollisionPair(geometry.collisionPairs[number])
 
 
 def _links(robot: Robot, geometry: pin.GeometryModel, pair: int) -> tuple[str, str]:

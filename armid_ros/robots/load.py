@@ -17,7 +17,14 @@ from xml.sax.saxutils import escape
 from armid_ros.errors import meant, RobotError
 from armid_ros.files import load_yaml, read_text, reading
 from armid_ros.motion import FloatArray
-from armid_ros.robots.description import Description, Joint, parse_description, parse_xml, Vector
+from armid_ros.robots.description import (
+    Description,
+    INERTIA,
+    Joint,
+    parse_description,
+    parse_xml,
+    Vector,
+)
 from armid_ros.robots.mjcf import is_mjcf, urdf_of_mjcf
 from armid_ros.robots.robot import parse_gravity, Robot
 from armid_ros.robots.selection import driven_joints, several_arms, standing_position
@@ -218,7 +225,18 @@ def robot_from_urdf(
         raise RobotError(
             f'{source}: masses, lengths or inertias are too large for floating-point numbers'
         )
-    return replace(robot, notes=robot.notes + _inertia_notes(robot))
+    # joints that move no mass in several poses cannot be simulated
+    generator, moved = np.random.default_rng(0), np.zeros(robot.n_joints)
+    for _ in range(4):
+        q = generator.uniform(-math.pi, math.pi, robot.n_joints)
+        moved = np.maximum(moved, np.abs(np.diag(pin.crba(model, model.createData(), q))))
+    light = (
+        f"link '{link}', moved by joint '{joint}', has no <inertial>, nor has any link beyond it. "
+        'Its inertia can be identified, but a simulation needs a rough one'
+        for joint, link, inertia in zip(robot.joints, robot.links, moved, strict=True)
+        if inertia < 1e-12  # kg m^2 or kg; the smallest motor rotor is five orders above
+    )
+    return replace(robot, notes=(*robot.notes, *light))
 
 
 def _written_out(source: str | Path) -> tuple[str | Path, dict[str, str], dict[str, str]]:
@@ -291,8 +309,7 @@ def _kinematic_urdf(description: Description, positions: Mapping[str, float]) ->
         element = ElementTree.SubElement(link, 'inertial')
         ElementTree.SubElement(element, 'origin', xyz=_join(inertial.xyz), rpy=_join(inertial.rpy))
         ElementTree.SubElement(element, 'mass', value=repr(inertial.mass))
-        components = ('ixx', 'ixy', 'ixz', 'iyy', 'iyz', 'izz')
-        values = dict(zip(components, map(repr, inertial.inertia), strict=True))
+        values = dict(zip(INERTIA, map(repr, inertial.inertia), strict=True))
         ElementTree.SubElement(element, 'inertia', values)
     for joint in description.joints:
         driven = joint.movable and joint.name not in positions
@@ -324,24 +341,6 @@ def _placement(joint: Joint, position: float) -> tuple[Vector, Vector]:
 
 def _join(numbers: Sequence[float]) -> str:
     return ' '.join(map(repr, numbers))
-
-
-def _inertia_notes(robot: Robot) -> tuple[str, ...]:
-    """Return notes on joints that move no mass in several poses, which cannot be simulated."""
-    data = robot.model.createData()
-    generator = np.random.default_rng(0)
-    moved = np.zeros(robot.n_joints)
-    for _ in range(4):
-        q = generator.uniform(-math.pi, math.pi, robot.n_joints)
-        mass_matrix = pin.crba(robot.model, data, q)
-        moved = np.maximum(moved, np.abs(np.diag(mass_matrix)))
-    # kg m^2 or kg; the smallest motor rotor is five orders above
-    return tuple(
-        f"link '{link}', moved by joint '{joint}', has no <inertial>, nor has any link beyond it. "
-        'Its inertia can be identified, but a simulation needs a rough one'
-        for joint, link, inertia in zip(robot.joints, robot.links, moved, strict=True)
-        if inertia < 1e-12
-    )
 
 
 #: Suffix of the mounting file beside NAME.urdf or NAME.urdf.xacro.

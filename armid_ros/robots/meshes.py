@@ -21,7 +21,7 @@ from typing import Any
 from armid_ros.errors import RobotError
 from armid_ros.files import is_file
 from armid_ros.motion import FloatArray
-from armid_ros.robots.packages import package_folders
+from armid_ros.robots.xacro_expansion import package_folders
 import coal
 import numpy as np
 import numpy.typing as npt
@@ -98,10 +98,17 @@ def _slabs(
 ) -> tuple[coal.ConvexBase, ...]:
     """Return hulls of slabs across an axis; too thin a slab joins the slab before it."""
     along = vertices @ axis
+    start, end = along[ends[:, 0]], along[ends[:, 1]]
     hulls: list[coal.ConvexBase] = []
     thin = np.empty((0, 3))
     for low, high in pairwise(np.linspace(along.min(), along.max(), 13)):  # twelve slabs
-        points = np.vstack([thin, _slab(vertices, ends, along, low, high)])
+        pieces = [thin, vertices[(along >= low) & (along <= high)]]
+        for plane in (low, high):  # points where edges of the mesh cross the planes of the slab
+            crosses = (start - plane) * (end - plane) < 0.0
+            share = ((plane - start[crosses]) / (end[crosses] - start[crosses]))[:, None]
+            first, second = vertices[ends[crosses, 0]], vertices[ends[crosses, 1]]
+            pieces.append((1.0 - share) * first + share * second)
+        points = np.vstack(pieces)
         try:
             hulls.append(_hull(points))
             thin = np.empty((0, 3))
@@ -140,20 +147,6 @@ def _common_hull(first: coal.ConvexBase, second: coal.ConvexBase) -> coal.Convex
 
 def _volume(bodies: Sequence[coal.ConvexBase]) -> float:
     return sum(float(body.computeVolume()) for body in bodies)
-
-
-def _slab(
-    vertices: FloatArray, ends: npt.NDArray[np.intp], along: FloatArray, low: float, high: float
-) -> FloatArray:
-    """Return vertices within a slab, and points where edges of the mesh cross its two planes."""
-    points = [vertices[(along >= low) & (along <= high)]]
-    start, end = along[ends[:, 0]], along[ends[:, 1]]
-    for plane in (low, high):
-        crosses = (start - plane) * (end - plane) < 0.0
-        share = ((plane - start[crosses]) / (end[crosses] - start[crosses]))[:, None]
-        first, second = vertices[ends[crosses, 0]], vertices[ends[crosses, 1]]
-        points.append((1.0 - share) * first + share * second)
-    return np.vstack(points)
 
 
 def _hull(points: FloatArray) -> coal.ConvexBase:

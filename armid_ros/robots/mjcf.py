@@ -171,7 +171,18 @@ class _Writer:
             _place(element, above, name, placement)
         link = ElementTree.SubElement(self.root, 'link', name=name)
         if model.body_mass[body] > 0.0:
-            _inertial(link, model, body, anchor)
+            axes = _rotation(model.body_iquat[body])
+            tensor = axes @ np.diag(model.body_inertia[body]) @ axes.T
+            inertial = ElementTree.SubElement(link, 'inertial')
+            centre = _text(model.body_ipos[body] - anchor)
+            ElementTree.SubElement(inertial, 'origin', xyz=centre, rpy='0 0 0')
+            ElementTree.SubElement(inertial, 'mass', value=_number(model.body_mass[body]))
+            rows = {
+                f'i{"xyz"[i]}{"xyz"[j]}': _number(tensor[i, j])
+                for i in range(3)
+                for j in range(i, 3)
+            }
+            ElementTree.SubElement(inertial, 'inertia', rows)
         self._shapes(link, body, anchor)
         return anchor
 
@@ -304,19 +315,6 @@ def _unused(name: str, taken: list[str]) -> str:
     while name in taken:
         name += '_'
     return name
-
-
-def _inertial(link: ElementTree.Element, model: Any, body: int, anchor: FloatArray) -> None:
-    """Write mass, centre and inertia in the axes of the link."""
-    axes = _rotation(model.body_iquat[body])
-    tensor = axes @ np.diag(model.body_inertia[body]) @ axes.T
-    inertial = ElementTree.SubElement(link, 'inertial')
-    ElementTree.SubElement(
-        inertial, 'origin', xyz=_text(model.body_ipos[body] - anchor), rpy='0 0 0'
-    )
-    ElementTree.SubElement(inertial, 'mass', value=_number(model.body_mass[body]))
-    rows = {f'i{"xyz"[i]}{"xyz"[j]}': _number(tensor[i, j]) for i in range(3) for j in range(i, 3)}
-    ElementTree.SubElement(inertial, 'inertia', rows)
 
 
 def _place(element: ElementTree.Element, parent: str, child: str, placement: pin.SE3) -> None:

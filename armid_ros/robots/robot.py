@@ -10,7 +10,7 @@ from functools import cached_property
 from pathlib import Path
 
 from armid_ros.errors import RobotError
-from armid_ros.motion import FloatArray, read_only
+from armid_ros.motion import FloatArray, freeze, read_only
 from armid_ros.robots.description import Description, parse_description, parse_xml
 import numpy as np
 import numpy.typing as npt
@@ -100,15 +100,10 @@ class Robot:
 
     def __post_init__(self) -> None:
         """Freeze the arrays and check that model and names agree."""
-        for name in (
-            'lower',
-            'upper',
-            'velocity_limit',
-            'torque_limit',
-            'urdf_damping',
-            'urdf_friction',
-        ):
-            object.__setattr__(self, name, read_only(getattr(self, name)))
+        limits = ('lower', 'upper', 'velocity_limit', 'torque_limit')
+        names = (*limits, 'urdf_damping', 'urdf_friction')
+        freeze(self, *names)
+        for name in names:
             if getattr(self, name).shape != (len(self.joints),):
                 raise RobotError(
                     f'{self.name}: {name} has shape {getattr(self, name).shape}, '

@@ -13,7 +13,7 @@ from typing import Any
 
 from armid_ros.errors import RobotError
 from armid_ros.files import load_yaml, read_text, reading
-from armid_ros.motion import FloatArray, read_only
+from armid_ros.motion import FloatArray, freeze
 from armid_ros.robots.robot import Robot
 import numpy as np
 import pinocchio as pin
@@ -70,8 +70,8 @@ class TwoLinkParameters:
     def __post_init__(self) -> None:
         """Freeze the arrays and check that the inertia parameters are physically possible."""
         for field in fields(self)[3:]:
-            values = read_only(getattr(self, field.name))
-            object.__setattr__(self, field.name, values)
+            freeze(self, field.name)
+            values = getattr(self, field.name)
             if values.shape != (2,) or not np.all(np.isfinite(values)):
                 raise RobotError(f'two links: {field.name} has to be two numbers, got {values}')
         if not (self.alpha > 0.0 and self.alpha * self.beta > self.gamma**2):

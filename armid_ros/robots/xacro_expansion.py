@@ -1,26 +1,30 @@
 # Copyright 2026 The armid_ros developers
 # SPDX-License-Identifier: Apache-2.0
 """
-Expansion of xacro files in a separate process.
+Expansion of xacro files in a separate process, and search for ROS packages without ROS.
 
 A xacro file is a program: it can include any readable file, read environment variables and loop
 without end. It is therefore expanded in a separate process with limits of time and memory, and
-only if a person names the file. A description from a topic or a bag is never expanded.
+only if a person names the file. A description from a topic or a bag is never expanded. This file
+is the program of that process too, so it imports nothing of the package on its own. The process
+reads its request from stdin and writes its answer to stdout, both in JSON.
 
 """
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 from contextlib import suppress
+import difflib
 import json
+import os
 from pathlib import Path
+import re
+import resource
 import signal
 import subprocess
 import sys
 from typing import Any
-
-from armid_ros.errors import RobotError
 
 #: Processor time that an expansion may take [s]; the largest descriptions take one or two.
 TIME_LIMIT = 20.0
@@ -28,6 +32,10 @@ TIME_LIMIT = 20.0
 PATIENCE = 300.0
 #: Largest memory of an expansion [bytes].
 MEMORY_LIMIT = 2 << 30
+#: Placeholder for the folder of a package that is not found.
+NOWHERE = '/package-not-found/'
+#: Names of includes and macros for drives and simulators, which define no link or joint.
+DRIVES = ('ros2_control', 'ros_control', 'gazebo', 'transmission')
 
 
 def expand_xacro(path: Path, arguments: Mapping[str, str], packages: Mapping[str, str]) -> str:
@@ -49,6 +57,8 @@ def expand_xacro(path: Path, arguments: Mapping[str, str], packages: Mapping[str
         If the file cannot be expanded within the limits.
 
     """
+    from armid_ros.errors import RobotError
+
     request = {
         'path': str(path),
         'arguments': dict(arguments),
@@ -56,7 +66,7 @@ def expand_xacro(path: Path, arguments: Mapping[str, str], packages: Mapping[str
         'seconds': TIME_LIMIT,
         'memory': MEMORY_LIMIT,
     }
-    command = [sys.executable, '-P', str(Path(__file__).with_name('xacro_process.py'))]
+    command = [sys.executable, '-P', __file__]
     try:
         done = subprocess.run(
             command,
@@ -83,3 +93,217 @@ def expand_xacro(path: Path, arguments: Mapping[str, str], packages: Mapping[str
         reason = answer.get('error') or f'not expanded within {MEMORY_LIMIT >> 20} MiB'
         raise RobotError(f'{path}: xacro: {reason}')
     return str(answer['text'])
+
+
+def package_folders(
+    name: str, file: Path | None, given: Mapping[str, str | Path] | None = None
+) -> Iterator[Path]:
+    """
+    Yield the possible folders of a package, the most likely folder first.
+
+    Parameters
+    ----------
+    name : str
+        Name of the package.
+    file : Path or None
+        The description that refers to it.
+    given : mapping of str to str or Path, optional
+        Folders of packages by name; a package in this mapping is not looked for elsewhere.
+
+    Yields
+    ------
+    Path
+        The given folder, if any. Otherwise, in this order: folders whose package.xml has the name,
+        which enclose the file or lie beside an enclosing folder; such folders in ROS_PACKAGE_PATH;
+        the folder in AMENT_PREFIX_PATH; folders of that name without a package.xml, which enclose
+        the file or lie beside an enclosing folder.
+
+    """
+    if given and name in given:
+        yield Path(given[name])
+        return
+    around = [] if file is None else list(file.resolve().parents)
+    path = [Path(part) for part in _paths('ROS_PACKAGE_PATH')]
+    for root in (*around, *path):
+        yield from (folder for folder in _below(root, name) if _is_package(folder, name))
+    yield from (Path(prefix) / 'share' / name for prefix in _paths('AMENT_PREFIX_PATH'))
+    yield from (root / name for root in (*around, *path, *(root.parent for root in path)))
+
+
+def _below(root: Path, name: str) -> Iterator[Path]:
+    """Yield a folder, its subfolders, and folders of the given name one level deeper."""
+    yield root
+    if root == root.parent:
+        return
+    try:
+        inside = sorted(entry.path for entry in os.scandir(root) if entry.is_dir())
+    except OSError:
+        return
+    yield root / name
+    yield from map(Path, inside)
+    yield from (Path(folder) / name for folder in inside)
+
+
+def _is_package(folder: Path, name: str) -> bool:
+    try:
+        text = (folder / 'package.xml').read_text(encoding='utf-8', errors='replace')
+    except OSError:
+        return False
+    found = re.search(r'<name>\s*([^<]*?)\s*</name>', text)
+    return found is not None and found[1] == name
+
+
+def _paths(variable: str) -> list[str]:
+    return [part for part in os.environ.get(variable, '').split(os.pathsep) if part]
+
+
+def main() -> None:
+    """Read one request and write the answer; limit memory and processor time before."""
+    request = json.load(sys.stdin)
+    answers = os.fdopen(os.dup(1), 'w', encoding='utf-8')
+    os.dup2(2, 1)  # output of the expansion must not mix with the answer
+    seconds, memory = float(request['seconds']), int(request['memory'])
+    signal.setitimer(signal.ITIMER_PROF, seconds)
+    resource.setrlimit(resource.RLIMIT_CPU, (int(seconds) + 1, int(seconds) + 1))
+    resource.setrlimit(resource.RLIMIT_AS, (memory, memory))
+    json.dump(expanded(request), answers)
+    answers.close()
+
+
+def expanded(request: dict[str, Any]) -> dict[str, str]:
+    """Return the expanded text of a file, or the error message."""
+    answer: dict[str, str] = {}
+    missing: dict[str, str] = {}
+    try:
+        import xacro.substitution_args
+
+        _find_packages(xacro, request, missing)
+        document = xacro.process_file(request['path'], mappings=dict(request['arguments']))
+        text = str(document.toxml())
+        unknown = _unknown(xacro, request) if request['arguments'] else ''
+        if unknown:
+            return {'error': unknown}
+        answer['text'] = text.replace(f'file://{NOWHERE}', 'package://')
+        answer['text'] = answer['text'].replace(NOWHERE, 'package://')
+    except ImportError:
+        answer['error'] = 'a xacro file needs the Python package xacro'
+    except MemoryError:
+        answer['error'] = 'takes too much memory'
+    except RecursionError:
+        answer['error'] = 'nested too deep'
+    except SystemExit:
+        answer['error'] = 'the file cannot be expanded'
+    except Exception as error:  # xacro evaluates Python expressions, which can raise any error
+        answer['error'] = _reason(error, request, missing)
+    return answer
+
+
+def _find_packages(xacro: Any, request: dict[str, Any], missing: dict[str, str]) -> None:
+    """Make xacro find packages without ROS and skip packages of drives and simulators."""
+    # a missing package is an error only if one of its files is read: drivers name paths
+    arguments = xacro.substitution_args
+    include_files, macro_call = xacro.get_include_files, xacro.handle_macro_call
+
+    def find(name: str) -> str:
+        places = package_folders(name, Path(xacro.filestack[-1]), request['packages'])
+        found = next((place for place in places if place.is_dir()), None)
+        if found is None:
+            missing.setdefault(name, _place(xacro))
+        return NOWHERE + name if found is None else str(found)
+
+    def include(*values: Any) -> Iterator[str]:
+        for file in include_files(*values):
+            if not (NOWHERE in file and any(word in file for word in DRIVES)):
+                yield file
+
+    def call(node: Any, *values: Any) -> bool:
+        try:
+            return bool(macro_call(node, *values))
+        except xacro.XacroException as error:
+            name = node.tagName
+            if not (missing and f'unknown macro name: {name}' == str(error)):
+                raise
+            if not any(word in name for word in DRIVES):
+                raise
+            xacro.replace_node(node, by=None)
+            return True
+
+    arguments._eval_find = arguments._eval_dict['find'] = find
+    xacro.get_include_files, xacro.handle_macro_call = include, call
+
+
+def _reason(error: Exception, request: dict[str, Any], missing: dict[str, str]) -> str:
+    """Return why a file cannot be expanded, and a remedy."""
+    import xacro.substitution_args
+
+    text = ' '.join(str(error).split()) or type(error).__name__
+    cause = error.exc if isinstance(error, xacro.XacroException) else None
+    if isinstance(cause, xacro.substitution_args.ArgException):
+        name, path = str(cause), str(request['path'])
+        declared = _declared(xacro, path)
+        given = {_near(one, declared) or one: value for one, value in request['arguments'].items()}
+        default = declared.get(name)
+        without = [one for one, value in declared.items() if value is None]
+        needed = dict.fromkeys([*without, name], 'VALUE')
+        why = 'which is not given'
+        if default is not None:  # <xacro:arg> is below
+            why = f"above the line with its default, '{default}'"
+            needed[name] = default if re.fullmatch(r'[\w./-]+', default) else 'VALUE'
+        written = ' '.join(f'{one}:={value}' for one, value in (needed | given).items())
+        rest = _unknown(xacro, request) or f"grep '<xacro:arg' {path} lists the others"
+        place = _place(xacro)
+        return (
+            f"{'the file' if place == path else place} uses the argument '{name}', {why}; "
+            f"write --robot '{path} {written}'; {rest}"
+        )
+    if missing:
+        lines = '; '.join(f"package '{name}' ({file})" for name, file in missing.items())
+        first = next(iter(missing))
+        return f'not found: {lines}; clone or install it, or add --package {first}=FOLDER ({text})'
+    place = _place(xacro)
+    return text if place == request['path'] else f'{place}: {text}'
+
+
+def _unknown(xacro: Any, request: dict[str, Any]) -> str:
+    """Return a message on arguments that no file declares or uses; '' if there are none."""
+    path, declared = str(request['path']), _declared(xacro, request['path'])
+    files = [Path(file) for file in (path, *xacro.all_includes)]
+    texts = [file.read_text('utf-8', 'replace') for file in files if file.is_file()]
+    unknown = []
+    for name in request['arguments']:
+        used = re.compile(rf'\$\(arg\s+{re.escape(name)}\s*\)')
+        if name not in declared and not any(used.search(text) for text in texts):
+            near = _near(name, declared)
+            unknown.append(f"'{name}'" + (f" (did you mean '{near}'?)" if near else ''))
+    if not unknown:
+        return ''
+    return f"the file has no argument {', '.join(unknown)}; grep '<xacro:arg' {path} lists them"
+
+
+def _near(name: str, declared: dict[str, str | None]) -> str:
+    """Return the declared argument with the most similar name; '' if none is similar."""
+    return next(iter(difflib.get_close_matches(name, declared, 1, 0.75)), '')
+
+
+def _place(xacro: Any) -> str:
+    """Return the file in expansion: the file of the macro, if a macro is expanded."""
+    macros, files = xacro.macrostack, xacro.filestack
+    return str(macros[-1].history[-1][-1] if macros else files[-1])
+
+
+def _declared(xacro: Any, path: str) -> dict[str, str | None]:
+    """Return the declared arguments with their default; None where one has to be given."""
+    known: dict[str, str | None] = {}
+    for file in (path, *xacro.all_includes):
+        try:
+            elements = xacro.parse(None, file).getElementsByTagName('xacro:arg')
+        except Exception:  # the error of the main file is reported elsewhere
+            continue
+        for element in elements:
+            default = element.getAttribute('default') if element.hasAttribute('default') else None
+            known[element.getAttribute('name')] = default
+    return known
+
+
+if __name__ == '__main__':
+    main()

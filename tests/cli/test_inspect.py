@@ -29,7 +29,8 @@ def test_a_table_is_inspected_as_a_bag_is(tmp_path):
 
 
 def test_a_bag_without_joint_states_is_answered_with_what_there_is(tmp_path):
-    from armid_ros.recording import BagWriter, string_cdr
+    from armid_ros.recording import BagWriter
+    from armid_ros.recording.message_types import string_cdr
 
     with BagWriter(tmp_path / 'bag') as writer:
         writer.add_topic('/chatter', 'std_msgs/msg/String')

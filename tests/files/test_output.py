@@ -10,7 +10,7 @@ import sys
 
 from armid_ros.errors import OutputError
 from armid_ros.files import json_text, result_folder, write_file
-from armid_ros.files.own import refuse_replacing
+from armid_ros.files.output import refuse_replacing
 import pytest
 
 SCHEMA = 'armid/identification/1'

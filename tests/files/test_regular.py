@@ -10,7 +10,8 @@ from armid_ros.excitation import load_environment, load_excitation
 from armid_ros.files import read_text
 from armid_ros.identification.parameters_file import read_parameters
 from armid_ros.papers.exo.plant.gait import read_gait
-from armid_ros.recording import Bag, read_recording, recover
+from armid_ros.recording import read_recording, recover
+from armid_ros.recording.bag import Bag
 from armid_ros.recording.tables import open_table
 from armid_ros.robots import load_robot
 import pytest

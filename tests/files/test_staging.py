@@ -10,8 +10,7 @@ import sys
 
 from armid_ros.errors import OutputError
 from armid_ros.files import settled, staged, write_file
-from armid_ros.files.output import locked
-from armid_ros.files.own import STAGING
+from armid_ros.files.output import locked, STAGING
 import pytest
 
 

@@ -3,7 +3,6 @@
 """Mutants: of bytes, of the records of an MCAP file, of texts and of documents."""
 
 from copy import deepcopy
-import json
 import struct
 from xml.etree import ElementTree
 
@@ -191,11 +190,6 @@ def edited_tree(tree, edits):
         elif operation == 'rename' and isinstance(holder, dict):
             holder[str(value)[:50]] = holder.pop(key)
     return tree
-
-
-def to_json(tree):
-    """Return a document as JSON, as lenient writers do."""
-    return json.dumps(tree, indent=1)
 
 
 def to_yaml(tree):

@@ -121,7 +121,7 @@ def test_bytes(folder, whole, kind, edits, fields, head):
         mutant[at : at + width] = (value & (2 ** (8 * width) - 1)).to_bytes(width, 'little')
     path = folder / 'work' / f'bytes.{kind}'
     path.write_bytes(bytes(mutant) + content[size:])
-    judge(f'table, {kind}', read, path, whole, text_agrees if kind == 'csv' else agrees)
+    judge(read, path, whole, text_agrees if kind == 'csv' else agrees)
 
 
 @given(edits=st.lists(TEXT_EDIT, min_size=1, max_size=3))
@@ -129,7 +129,7 @@ def test_csv_text(folder, whole, edits):
     path = folder / 'work' / 'text.csv'
     text = (folder / 'csv').read_text().replace(',', ' , ')
     path.write_text(edited_text(text, edits), errors='surrogatepass')
-    judge('table, text', read, path, whole, text_agrees)
+    judge(read, path, whole, text_agrees)
 
 
 @given(edits=st.lists(TREE_EDIT, min_size=1, max_size=3))
@@ -141,7 +141,7 @@ def test_description_of_a_dataset(folder, whole, edits):
     features = {name: {'dtype': 'float64', 'names': None} for name in ('t', *NAMES)}
     tree = {'fps': 200, 'total_episodes': 1, 'features': features}
     (bag / 'meta' / 'info.json').write_text(json.dumps(edited_tree(tree, edits)))
-    judge('table, info.json', read, bag, whole, agrees)
+    judge(read, bag, whole, agrees)
 
 
 @given(shape=st.lists(st.sampled_from(INTEGERS[4:]), min_size=1, max_size=3), kind=st.sampled_from(
@@ -166,7 +166,7 @@ def test_stated_sizes_are_bounds(folder, whole, shape, kind):
                 file.create_dataset('q', tuple(shape), chunks=True, dtype='f8')
         except (OSError, ValueError, OverflowError):
             return  # no such file can be made
-    judge(f'table, states much: {kind}', read, path, whole, agrees)
+    judge(read, path, whole, agrees)
 
 
 def matlab_of(shape):

@@ -8,9 +8,11 @@ from armid_ros.arm import ArmModel
 from armid_ros.effects import make_effect, USUAL_EFFECTS
 from armid_ros.identification import identify
 from armid_ros.identification.assess.grade import grade
-from armid_ros.inspection import inspect, Sampling
+from armid_ros.inspection import inspect
+from armid_ros.inspection.facts import Sampling
 from armid_ros.motion import Motion
-from armid_ros.recording import PositionRange, ReadReport, Recording
+from armid_ros.recording import ReadReport, Recording
+from armid_ros.recording.recording import PositionRange
 from armid_ros.robots import load_robot
 import numpy as np
 import pytest

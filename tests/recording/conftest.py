@@ -4,7 +4,9 @@
 
 import sqlite3
 
-from armid_ros.recording import Bag, BagWriter, joint_state_cdr, Recording
+from armid_ros.recording import BagWriter, Recording
+from armid_ros.recording.bag import Bag
+from armid_ros.recording.joint_state.encoder import joint_state_cdr
 from armid_ros.recording.message_types import JOINT_STATE
 from armid_ros.recording.source import DEFAULT
 import numpy as np

@@ -8,14 +8,13 @@ import sqlite3
 from armid_ros.errors import RecordingError
 from armid_ros.recording import (
     BagWriter,
-    joint_state_cdr,
     read_recording,
     read_robot_description,
-    string_cdr,
     topics,
     write_recording,
 )
-from armid_ros.recording.message_types import JOINT_STATE, message_type, STRING
+from armid_ros.recording.joint_state.encoder import joint_state_cdr
+from armid_ros.recording.message_types import JOINT_STATE, message_type, STRING, string_cdr
 from mcap.writer import CompressionType, IndexType
 from mcap.writer import Writer as McapFileWriter
 import numpy as np

@@ -2,12 +2,14 @@
 # SPDX-License-Identifier: Apache-2.0
 """What is unpacked stays within its stated size and within the memory limit, which is named."""
 
+import io
 import resource
 import struct
 
 from armid_ros.errors import RecordingError
-from armid_ros.recording import Bag, read_recording, ReadSettings, write_recording
-from armid_ros.recording.compression import decompressed, message_content
+from armid_ros.recording import read_recording, ReadSettings, write_recording
+from armid_ros.recording.bag import Bag
+from armid_ros.recording.compression import decompressed, unpacked
 from armid_ros.recording.mcap.records import MAGIC
 import lz4.frame
 import pytest
@@ -75,8 +77,9 @@ def test_a_file_that_unpacks_to_more_than_the_limit_is_refused(tmp_path, memory)
 
 
 def test_a_message_that_unpacks_to_more_than_the_limit_is_refused(memory):
-    with pytest.raises(RecordingError, match='1000000 bytes'):
-        message_content(zeros(FAR_TOO_MUCH, 'zstd'), 1_000_000)
+    message = io.BytesIO(zeros(FAR_TOO_MUCH, 'zstd'))
+    with pytest.raises(RecordingError, match='memory_limit of 10 MB'):
+        list(unpacked(message, SMALL, 'a message'))
     assert memory() < 100_000_000
 
 

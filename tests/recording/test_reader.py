@@ -3,8 +3,10 @@
 """What real bags do to a reader: other orders, parts, repeats, gaps, and clocks that lie."""
 
 from armid_ros.errors import RecordingError
-from armid_ros.recording import joint_state_cdr, read_recording, TimeGap, write_recording
+from armid_ros.recording import read_recording, write_recording
+from armid_ros.recording.joint_state.encoder import joint_state_cdr
 from armid_ros.recording.message_types import JOINT_STATE, STRING
+from armid_ros.recording.recording import TimeGap
 import numpy as np
 import pytest
 from rosbags.typesys import get_typestore, Stores

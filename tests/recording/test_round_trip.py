@@ -2,17 +2,21 @@
 # SPDX-License-Identifier: Apache-2.0
 """What one writes the other reads: this package, rosbags and mcap-ros2-support."""
 
+from dataclasses import replace
+
 from armid_ros.errors import ArmidError, RecordingError
 from armid_ros.recording import (
-    joint_state_cdr,
+    given_twice,
     read_recording,
     read_robot_description,
     Recording,
+    require_once,
     topics,
     write_recording,
 )
+from armid_ros.recording.joint_state.encoder import joint_state_cdr
 from armid_ros.recording.message_types import JOINT_STATE
-from armid_ros.recording.qos import LATCHED, VOLATILE
+from armid_ros.recording.metadata import LATCHED, VOLATILE
 from mcap.reader import make_reader
 from mcap_ros2.decoder import DecoderFactory
 import numpy as np
@@ -79,15 +83,16 @@ def test_mcap_ros2_reads_what_is_written_by_its_own_schema(swinging, tmp_path, s
 
 
 @pytest.mark.parametrize('version', [8, 9])
+@pytest.mark.parametrize('distribution', [Stores.ROS2_FOXY, Stores.LATEST])
 @pytest.mark.parametrize(
     ('storage', 'mode'),
     [(StoragePlugin.MCAP, mode) for mode in CompressionMode]
     + [(StoragePlugin.SQLITE3, m) for m in CompressionMode if m is not CompressionMode.STORAGE],
 )
 def test_what_rosbags_writes_is_read(
-    swinging, tmp_path, stamps, assert_same, version, storage, mode
+    swinging, tmp_path, stamps, assert_same, version, distribution, storage, mode
 ):
-    store = get_typestore(Stores.ROS2_JAZZY)
+    store = get_typestore(distribution)
     writer = Writer(tmp_path / 'bag', version=version, storage_plugin=storage)
     writer.set_compression(mode, CompressionFormat.ZSTD)
     messages = joint_state_cdr(swinging.joints, stamps, swinging.q, swinging.dq, swinging.tau)
@@ -104,27 +109,6 @@ def test_what_rosbags_writes_is_read(
     if mode is CompressionMode.FILE:
         (packed,) = (tmp_path / 'bag').glob('*.zstd')
         assert_same(read_recording(packed, joints=swinging.joints), swinging)
-
-
-@pytest.mark.parametrize('distribution', [Stores.ROS2_FOXY, Stores.ROS2_HUMBLE, Stores.LATEST])
-def test_definitions_of_other_distributions_are_read(
-    swinging, tmp_path, stamps, assert_same, distribution
-):
-    store = get_typestore(distribution)
-    types = store.types
-    with Writer(tmp_path / 'bag', version=9) as writer:
-        connection = writer.add_connection('/joint_states', JOINT_STATE, typestore=store)
-        for at, stamp in enumerate(stamps.tolist()):
-            time = types['builtin_interfaces/msg/Time'](sec=stamp // 10**9, nanosec=stamp % 10**9)
-            message = types[JOINT_STATE](
-                header=types['std_msgs/msg/Header'](stamp=time, frame_id='base'),
-                name=list(swinging.joints),
-                position=swinging.q[at],
-                velocity=swinging.dq[at],
-                effort=swinging.tau[at],
-            )
-            writer.write(connection, stamp, store.serialize_cdr(message, JOINT_STATE))
-    assert_same(read_recording(tmp_path / 'bag', joints=swinging.joints), swinging)
 
 
 @pytest.mark.parametrize('names', [('j',), ('a', 'bc', 'def', 'ghij', 'klmno'), ('ä', 'gelenk_2')])
@@ -168,3 +152,23 @@ def test_a_recording_of_no_samples_is_a_bag_that_says_so(tmp_path):
     write_recording(tmp_path / 'bag', empty)
     with pytest.raises(RecordingError, match='bag: /joint_states'):
         read_recording(tmp_path / 'bag', joints=['a'])
+
+
+@pytest.fixture
+def monday(make_swing):
+    return replace(make_swing(), source='monday')
+
+
+def test_a_copy_is_said_with_what_it_is_a_copy_of(monday):
+    copy = replace(monday, source='copy')
+    for recordings in ([monday, copy],), ([monday], [copy]):
+        with pytest.raises(RecordingError, match=r'copy.*monday'):
+            require_once(*recordings)
+    assert 'monday' in given_twice([monday], [monday])
+
+
+def test_the_same_motion_with_other_torques_is_another_run(monday):
+    """Two runs of a simulated trajectory, or of one without encoder noise."""
+    assert not given_twice([monday], [replace(monday, tau=monday.tau + 1e-6)])
+    assert not given_twice([monday, replace(monday, tau=None)])
+    assert not given_twice([monday])

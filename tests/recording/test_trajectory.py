@@ -6,7 +6,6 @@ from armid_ros.errors import RecordingError
 from armid_ros.motion import Motion
 from armid_ros.recording import (
     BagWriter,
-    joint_trajectory_cdr,
     read_robot_description,
     read_waypoints,
     topics,
@@ -14,7 +13,7 @@ from armid_ros.recording import (
     write_recording,
 )
 from armid_ros.recording.message_types import JOINT_TRAJECTORY
-from armid_ros.recording.trajectory import ReadWaypoints
+from armid_ros.recording.trajectory import joint_trajectory_cdr, ReadWaypoints
 import numpy as np
 import pytest
 from rosbags.typesys import get_typestore, Stores

@@ -10,18 +10,17 @@ import sys
 import tracemalloc
 
 from armid_ros.errors import RecordingError
-from armid_ros.recording import (
-    BagWriter,
-    joint_state_cdr,
-    LATCHED,
-    read_recording,
-    string_cdr,
-    topics,
-    write_recording,
-)
+from armid_ros.recording import BagWriter, read_recording, topics, write_recording
+from armid_ros.recording.joint_state.encoder import joint_state_cdr
 from armid_ros.recording.mcap.writer import McapWriter
-from armid_ros.recording.message_types import JOINT_STATE, message_type, store_for, STRING
-from armid_ros.recording.qos import VOLATILE
+from armid_ros.recording.message_types import (
+    JOINT_STATE,
+    message_type,
+    store_for,
+    STRING,
+    string_cdr,
+)
+from armid_ros.recording.metadata import LATCHED, VOLATILE
 from armid_ros.recording.writer import DEFAULT_CHUNK_AGE, whole_bag
 from mcap.reader import make_reader
 from mcap.records import Chunk, MessageIndex, Metadata
@@ -239,7 +238,8 @@ def test_an_interrupt_anywhere_in_the_writer_spoils_nothing(
 
 KILLED = """
 import sys
-from armid_ros.recording import BagWriter, joint_state_cdr
+from armid_ros.recording import BagWriter
+from armid_ros.recording.joint_state.encoder import joint_state_cdr
 rate, seconds = 3000, 2.0
 now = [0.0]
 writer = BagWriter(sys.argv[1], clock=lambda: now[0])

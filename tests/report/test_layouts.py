@@ -7,7 +7,7 @@ from pathlib import Path
 import re
 from xml.etree import ElementTree
 
-from armid_ros.files.own import is_own
+from armid_ros.files.output import is_own
 from armid_ros.report.layouts import foxglove_layout, plotjuggler_layout, rviz_config
 from armid_ros.robots import load_robot
 import yaml

@@ -1,6 +1,11 @@
 # Copyright 2026 The armid_ros developers
 # SPDX-License-Identifier: Apache-2.0
-"""Nine arms as people write them in MJCF, each with other means of the format."""
+"""
+Arms as people write them in MJCF, each with other means that the conversion has to follow.
+
+Defaults, frames, sequences of angles and copies are those of MuJoCo, which reads the file.
+
+"""
 
 DIAG = 'diaginertia="0.02 0.03 0.01"'
 
@@ -21,12 +26,6 @@ pos="0 0.09
 0" quat="0.7 0.7 0.1 0" {DIAG}/><joint name="w3" class="wrist"/></body></body></body></body>
 </body>
 </body></body></worldbody></mujoco>""",
-    'degrees, Euler angles and other sequences': f"""<mujoco><compiler eulerseq="ZYX"/><worldbody>
-<body name="a" euler="30 -90 10" pos="0.1 0.2 0.3"><joint name="j1" axis="1 2 3" ref="25"
-range="-170 170"/><inertial mass="2" pos="0.1 0 0" euler="20 90 -60" {DIAG}/><body name="b"
-axisangle="1 1 0 120" pos="0.3 0 0"><joint name="j2" axis="0 1 0" pos="0.05 0.02 0.1"
-range="-90 0"
-/><inertial mass="1.5" pos="0 0.1 0.05" {DIAG}/></body></body></worldbody></mujoco>""",
     'inertia of shapes': """<mujoco><worldbody><body name="a"><joint name="j1" axis="0 0 1"/>
 <geom type="box" size="0.1 0.05 0.2" pos="0 0.1 0.2" euler="10 20 30" mass="3"/><geom
 type="capsule" fromto="0 0 0 0.2 0.1 0.3" size="0.04" density="2700"/><body name="b"
@@ -41,11 +40,6 @@ fullinertia="0.70337 0.70661 0.0091170 -0.000139 0.0067720 0.019169"/><body name
 quat="1 -1 0 0"><joint name="j2" damping="0.4"/><inertial mass="0.65" pos="-0.003 -0.029 0.0035"
 fullinertia="0.0379620 0.028104 0.036155 -0.0039250 0.010254 0.00070400"/></body></body>
 </worldbody></mujoco>""",
-    'nested frames': f"""<mujoco><worldbody><frame pos="0 0 1" euler="0 45 0">
-<frame quat="1 2 3 4">
-<body name="a" pos="0.1 0 0"><joint name="j1"/><frame pos="0.1 0.2 0" axisangle="0 1 1 50"><geom
-size="0.1"/><body name="b"><joint name="j2" axis="0 1 0"/><inertial mass="1" pos="0.3 0 0"
-{DIAG}/></body></frame></body></frame></frame></worldbody></mujoco>""",
     'several joints in a body': f"""<mujoco><worldbody><body name="a" pos="0 0 1"><joint name="x"
 type="slide" axis="1 0 0" ref="0.2"/><joint name="yaw" axis="0 0 1" pos="0.1 0 0" ref="40"/><joint
 name="pitch" axis="0 1 0" pos="0 0.2 0.1"/><inertial mass="3" pos="0.1 0.2 0.3" {DIAG}/>
@@ -69,10 +63,4 @@ name="right" quat="0 0 0 1"><joint name="finger_joint2" type="slide" axis="0 1 0
 <inertial mass="1" pos="0.2 0.1 0" {DIAG}/></body></body>
 </body><body name="cube" pos="1 0 0"><freejoint/><geom size="0.1"/></body></worldbody>
 </mujoco>""",
-    'two arms, repeated': f"""<mujoco><compiler inertiafromgeom="auto" boundmass="0.01"
-settotalmass="12"/><worldbody><replicate count="2" offset="0 1 0" euler="0 0 60"><body name="a">
-<joint name="j" axis="0 1 0"/><inertial mass="1" pos="0 0 0.2" {DIAG}/><body name="b"
-pos="0 0 0.4">
-<joint name="k" axis="0 1 0"/><geom type="capsule" size="0.03 0.1" pos="0 0 0.1"/></body></body>
-</replicate></worldbody></mujoco>""",
 }

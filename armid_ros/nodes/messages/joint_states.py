@@ -12,8 +12,8 @@ from armid_ros.errors import RecordingError
 from armid_ros.identification.samples.joint_merge import joint_places, JointMerger
 from armid_ros.motion import FloatArray
 from armid_ros.nodes.complaints import Complaints
+from armid_ros.recording.joint_state.decoder import JointStateMessages
 from armid_ros.recording.joint_state.layout import MalformedMessage
-from armid_ros.recording.joint_state.message import JointStateMessages
 import numpy as np
 import numpy.typing as npt
 from rclpy.clock import Clock

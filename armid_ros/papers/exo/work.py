@@ -28,11 +28,7 @@ from armid_ros.papers.exo.plant.leg_pair import (
 )
 from armid_ros.papers.exo.plant.walkers import walking_pair
 from armid_ros.papers.exo.report.walk import Driven, SimulatedWalk
-from armid_ros.recording import (
-    recorded_together,
-    Recording,
-    write_joint_states,
-)
+from armid_ros.recording import recorded_together, Recording, write_joint_states
 from armid_ros.recording.writer import whole_bag
 import numpy as np
 from numpy.random import Generator

@@ -1,21 +1,23 @@
 # Copyright 2026 The armid_ros developers
 # SPDX-License-Identifier: Apache-2.0
-"""Decode blocks of JointState messages to arrays, without a Python object per message."""
+"""Decode JointState messages: blocks of them to arrays, and one at a time."""
 
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
+from typing import NamedTuple
 
-from armid_ros.motion import FloatArray
+from armid_ros.motion import FloatArray, Samples
 from armid_ros.recording.joint_state.layout import JointStateLayout, MalformedMessage
 from armid_ros.recording.message_types import QUANTITIES
 from armid_ros.recording.source import IntArray, MessageBlock, records_at
 import numpy as np
 import numpy.typing as npt
 
-# With more layouts in one block, messages are decoded one by one.
-_LAYOUTS_A_BLOCK = 32
+_NOTHING = np.empty(0)
+# Layouts of one length that are kept.
+_LAYOUTS = 32
 
 
 @dataclass(frozen=True)
@@ -47,9 +49,7 @@ class JointSamples:
         """Return the number of samples N."""
         return len(self.stamps)
 
-    def select(
-        self, samples: npt.NDArray[np.intp] | npt.NDArray[np.bool_] | slice
-    ) -> JointSamples:
+    def select(self, samples: Samples) -> JointSamples:
         """Return some of the samples."""
         values = tuple(None if v is None else v[samples] for v in self.values)
         receive, number = (
@@ -135,14 +135,12 @@ class JointStateDecoder:
         self, raw: npt.NDArray[np.void], numbers: IntArray, receive: IntArray
     ) -> Iterator[JointSamples]:
         """Decode messages of equal length."""
-        for _ in range(_LAYOUTS_A_BLOCK):
-            if not len(raw):
-                return
+        while len(raw):
             plan = self._plan_for(raw[:1])
             if plan is None:
                 # Messages equal to an unreadable one are unreadable too.
                 other = raw != raw[0]
-                self.malformed += len(raw) - 1 - int(other.sum())
+                self.malformed += len(raw) - int(other.sum())
                 raw, numbers, receive = raw[other], numbers[other], receive[other]
                 continue
             rows = raw.view(plan.dtype)
@@ -152,11 +150,6 @@ class JointStateDecoder:
                 return
             yield from self._read(plan, rows[fits], numbers[fits], receive[fits])
             raw, numbers, receive = raw[~fits], numbers[~fits], receive[~fits]
-        for at in range(len(raw)):
-            plan = self._plan_for(raw[at : at + 1])
-            if plan is not None:
-                rows = raw[at : at + 1].view(plan.dtype)
-                yield from self._read(plan, rows, numbers[at : at + 1], receive[at : at + 1])
 
     def _read(
         self, plan: _Plan, rows: npt.NDArray[np.void], numbers: IntArray, receive: IntArray
@@ -168,7 +161,7 @@ class JointStateDecoder:
         yield from plan.read(rows, numbers, receive, self._room)
 
     def _plan_for(self, first: npt.NDArray[np.void]) -> _Plan | None:
-        """Return the plan for a message; if it is malformed, count it and return None."""
+        """Return the plan for a message; None if it is malformed."""
         length = first.dtype.itemsize
         known = self._plans.setdefault(length, [])
         for plan in known:
@@ -178,12 +171,11 @@ class JointStateDecoder:
             layout = JointStateLayout.of(first.tobytes())
             plan = _Plan.make(layout, length, self._wanted)
         except MalformedMessage as problem:
-            self.malformed += 1
             self.first_problem = self.first_problem or str(problem)
             return None
         self._names.update(dict.fromkeys(layout.names))
         known.insert(0, plan)
-        del known[_LAYOUTS_A_BLOCK:]
+        del known[_LAYOUTS:]
         return plan
 
 
@@ -268,3 +260,55 @@ class _Plan:
                 place[:] = rows[name][:, self.columns]
             values.append(place)
         yield JointSamples(self.joints, header, tuple(values), receive, numbers)
+
+
+class JointStateValues(NamedTuple):
+    """
+    Values of one message.
+
+    Attributes
+    ----------
+    sec, nanosec : int
+        Stamp.
+    names : tuple of str
+        Joints; the same object for all messages of one sender.
+    position, velocity, effort : ndarray
+        Values, as many as the message has: as a rule one per name, or none.
+
+    """
+
+    sec: int
+    nanosec: int
+    names: tuple[str, ...]
+    position: FloatArray
+    velocity: FloatArray
+    effort: FloatArray
+
+
+class JointStateMessages:
+    """Decoder of serialised messages, with a cache of layouts."""
+
+    def __init__(self) -> None:
+        self._known: list[JointStateLayout] = []
+
+    def read(self, data: bytes) -> JointStateValues:
+        """
+        Return the values of a message.
+
+        Raises
+        ------
+        MalformedMessage
+            The bytes are no JointState.
+
+        """
+        layout = next((one for one in self._known if one.is_of(data)), None)
+        if layout is None:
+            layout = JointStateLayout.of(data)
+            self._known = [layout, *self._known[:7]]  # one layout per sender on a topic
+        row = np.frombuffer(data, layout.record, 1)[0]
+        position, velocity, effort = (
+            row[name] if count else _NOTHING
+            for name, count in zip(QUANTITIES, layout.counts, strict=True)
+        )
+        stamp = int(row['sec']), int(row['nanosec'])
+        return JointStateValues(*stamp, layout.names, position, velocity, effort)

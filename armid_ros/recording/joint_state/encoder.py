@@ -6,41 +6,21 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 from pathlib import Path
-from typing import Protocol
+from typing import TYPE_CHECKING
 
 from armid_ros.errors import RecordingError
-from armid_ros.motion import FloatArray
+from armid_ros.motion import Motion
 from armid_ros.recording.joint_state.layout import JointStateLayout
 from armid_ros.recording.mcap.writer import Compression
 from armid_ros.recording.message_types import JOINT_STATE, QUANTITIES
+from armid_ros.recording.recording import Recording
 from armid_ros.recording.source import IntArray
 from armid_ros.recording.writer import BagWriter, DEFAULT_CHUNK_SIZE, whole_bag
 import numpy as np
 import numpy.typing as npt
 
-
-class Measured(Protocol):
-    """Joint measurements: a Recording, or a Motion with or without torque."""
-
-    @property
-    def joints(self) -> tuple[str, ...]:
-        """Joint names, n of them."""
-
-    @property
-    def t(self) -> FloatArray:
-        """Time [s], shape (N,)."""
-
-    @property
-    def q(self) -> FloatArray:
-        """Positions, shape (N, n)."""
-
-    @property
-    def dq(self) -> FloatArray | None:
-        """Velocities, shape (N, n)."""
-
-    @property
-    def tau(self) -> FloatArray | None:
-        """Torques, shape (N, n)."""
+if TYPE_CHECKING:
+    from armid_ros.simulation.run import SimulatedRun
 
 
 def joint_state_cdr(
@@ -104,7 +84,7 @@ def write_joint_states(
 
 def write_recording(
     path: str | Path,
-    measured: Measured,
+    measured: Recording | Motion | SimulatedRun,
     *,
     topic: str = '/joint_states',
     start_ns: int | None = None,
@@ -119,7 +99,7 @@ def write_recording(
     ----------
     path : str or Path
         Bag directory to create; it must not exist.
-    measured : Recording, Motion or alike
+    measured : Recording, Motion or SimulatedRun
         Measured or simulated motion; velocities and torques may be None.
     topic : str
         Topic of the messages.
@@ -185,13 +165,9 @@ def _encoded(
     frame = frame_id.encode()
     counts = tuple(0 if values is None else n for values in fields)
     layout = JointStateLayout('<', len(frame) + 1, joints, counts)
-    template = np.zeros(1, layout.dtype(layout.end))
-    template.view(np.uint8)[16 : 16 + len(frame)] = np.frombuffer(frame, np.uint8)
-    template['encapsulation'] = 1
-    template['frame_length'] = layout.frame_length
-    template['names'] = layout.names_pattern[0]
-    for name, count in zip(QUANTITIES, counts, strict=True):
-        template['n_' + name] = count
+    message = bytearray(layout.fixed[0].tobytes())
+    message[16 : 16 + len(frame)] = frame
+    template = np.frombuffer(message, layout.record)
     size = 4096
     for at in range(0, len(stamps), size):
         batch = slice(at, at + size)

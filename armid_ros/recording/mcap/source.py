@@ -17,11 +17,18 @@ from pathlib import Path
 
 from armid_ros.errors import RecordingError
 from armid_ros.files import open_regular
-from armid_ros.recording.mcap.chunks import Content, contents
-from armid_ros.recording.mcap.content import Gathered, heads, message_block, tiled, walk
+from armid_ros.recording.mcap.contents import (
+    Content,
+    contents,
+    Gathered,
+    heads,
+    message_block,
+    tiled,
+    walk,
+)
 from armid_ros.recording.mcap.records import add_definition, Chunk, FileMap, map_file
 from armid_ros.recording.message_types import MessageType
-from armid_ros.recording.qos import parse_qos
+from armid_ros.recording.metadata import parse_qos
 from armid_ros.recording.source import (
     BLOCK_MESSAGES,
     DEFAULT,

@@ -3,8 +3,7 @@
 """Read recordings from tables: CSV, NPZ, MAT, Parquet, LeRobot datasets; a plug-in."""
 
 from armid_ros.recording.tables.files import is_table, open_table
-from armid_ros.recording.tables.measured import measured
-from armid_ros.recording.tables.plan import plan, TablePlan
+from armid_ros.recording.tables.plan import measured, plan, TablePlan
 from armid_ros.recording.tables.table import side_by_side, Table, TableColumn
 
 __all__ = [

@@ -16,6 +16,7 @@ from typing import Literal
 
 from armid_ros.errors import RecordingError
 from armid_ros.files.cells import listed
+from armid_ros.motion import FloatArray
 from armid_ros.recording.columns import renamed, Rules
 from armid_ros.recording.tables.table import Table, TableColumn
 import numpy as np
@@ -93,6 +94,40 @@ class Family:
         return tuple(renamed(label, rename) for label in self.labels)
 
 
+@dataclass(frozen=True)
+class QuantitySource:
+    """
+    Columns and unit of one quantity.
+
+    Attributes
+    ----------
+    quantity : str
+        'position', 'velocity' or 'effort'.
+    chosen : Family
+        Columns.
+    unit : str
+        Unit in the file.
+    factor : ndarray, shape (n,)
+        To SI.
+    guessed : bool
+        Whether the columns were guessed.
+    rivals : tuple of str
+        Patterns of other columns that also fit.
+
+    """
+
+    quantity: QuantityName
+    chosen: Family
+    unit: str
+    factor: FloatArray
+    guessed: bool
+    rivals: tuple[str, ...] = ()
+
+    def values(self) -> FloatArray:
+        """Return the quantity in SI, shape (N, n)."""
+        return np.column_stack([c.values for c in self.chosen.columns]) * self.factor
+
+
 def choose(
     table: Table, pattern: str, joints: Sequence[str] | None, what: str, rename: Rules = ()
 ) -> Family:
@@ -157,9 +192,9 @@ def choose(
 
 def guess(
     table: Table, quantity: QuantityName, joints: Sequence[str] | None, rename: Rules = ()
-) -> list[Family]:
+) -> tuple[list[Family], tuple[str, tuple[str, ...]]]:
     """
-    Return the families that may hold a quantity, the most likely first.
+    Return the families that may hold a quantity, and the nearest of those that lack joints.
 
     Parameters
     ----------
@@ -172,42 +207,39 @@ def guess(
     rename : sequence of (str, str)
         From names in the file to names of the joints.
 
+    Returns
+    -------
+    families : list of Family
+        The most likely first.
+    incomplete : (str, tuple of str)
+        Pattern of the columns of the most joints, and the joints without a column of numbers; the
+        pattern is empty if no column is that of a joint.
+
     """
+    groups: dict[str, dict[str, TableColumn]] = {}  # by pattern and label of the joint
+    for column in table.columns:
+        for pattern, label in _readings(column, joints, rename):
+            groups.setdefault(pattern, {})[label] = column
     scored: list[tuple[float, Family]] = []
-    for pattern, members in _groups(table, joints, rename).items():
+    incomplete = '', tuple(joints or ())
+    for pattern, members in groups.items():
+        score = _score(pattern, quantity)
         family = _family(pattern, members, joints, rename)
         if family is not None:
             # constant columns hold no measurements
-            still = any(not np.any(np.diff(column.finite)) for column in family.columns)
-            scored.append((_score(pattern, quantity) - still, family))
-    likely = [one for one in scored if one[0] > 0.0]
-    best: dict[tuple[TableColumn, ...], Family] = {}
-    for _, one in sorted(likely, key=lambda one: (-one[0], -len(one[1].columns))):
-        best.setdefault(one.columns, one)
-    return list(best.values())
-
-
-def incomplete(
-    table: Table, quantity: QuantityName, joints: Sequence[str], rename: Rules = ()
-) -> tuple[str, tuple[str, ...]]:
-    """
-    Return the family with the most joints by name, if no family has all.
-
-    Returns
-    -------
-    pattern : str
-        Pattern of the columns; empty if no family has a joint.
-    lacking : tuple of str
-        Joints without a column of numbers.
-
-    """
-    best = '', tuple(joints)
-    for pattern, members in _groups(table, joints, rename).items():
+            score -= any(not np.any(np.diff(column.finite)) for column in family.columns)
+        if score <= 0.0:
+            continue
+        if family is not None:
+            scored.append((score, family))
         names = [renamed(label, rename) for label in members]
-        lacking = tuple(joint for joint in joints if joint not in names)
-        if len(lacking) < len(best[1]) and _score(pattern, quantity) > 0.0:
-            best = pattern, lacking
-    return best
+        lacking = tuple(joint for joint in joints or () if joint not in names)
+        if len(lacking) < len(incomplete[1]):
+            incomplete = pattern, lacking
+    best: dict[tuple[TableColumn, ...], Family] = {}
+    for _, one in sorted(scored, key=lambda one: (-one[0], -len(one[1].columns))):
+        best.setdefault(one.columns, one)
+    return list(best.values()), incomplete
 
 
 def guess_time(table: Table) -> TableColumn | None:
@@ -285,17 +317,6 @@ def _matching(table: Table, pattern: str) -> list[tuple[str, TableColumn]]:
             )
         listed_columns.append((part, column))
     return listed_columns
-
-
-def _groups(
-    table: Table, joints: Sequence[str] | None, rename: Rules
-) -> dict[str, dict[str, TableColumn]]:
-    """Return the columns by pattern and by label of the joint."""
-    groups: dict[str, dict[str, TableColumn]] = {}
-    for column in table.columns:
-        for pattern, label in _readings(column, joints, rename):
-            groups.setdefault(pattern, {})[label] = column
-    return groups
 
 
 def _readings(

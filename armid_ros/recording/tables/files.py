@@ -13,9 +13,15 @@ import re
 
 from armid_ros.errors import RecordingError
 from armid_ros.files import open_regular
-from armid_ros.recording.tables.arrays import read_hdf5, read_matlab, read_numpy
+from armid_ros.recording.tables.arrays import (
+    INFO,
+    read_hdf5,
+    read_lerobot,
+    read_matlab,
+    read_numpy,
+    read_parquet,
+)
 from armid_ros.recording.tables.families import TIMES, words_of
-from armid_ros.recording.tables.parquet import INFO, read_lerobot, read_parquet
 from armid_ros.recording.tables.table import Table, TableColumn
 from armid_ros.recording.tables.text import read_text
 import numpy as np

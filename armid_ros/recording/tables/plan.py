@@ -1,6 +1,6 @@
 # Copyright 2026 The armid_ros developers
 # SPDX-License-Identifier: Apache-2.0
-"""Plan which column and unit each quantity is read from."""
+"""Plan which column and unit each quantity is read from, and convert a table by the plan."""
 
 from __future__ import annotations
 
@@ -10,15 +10,17 @@ import textwrap
 
 from armid_ros.errors import RecordingError
 from armid_ros.motion import FloatArray
-from armid_ros.recording.columns import ColumnSettings, per_joint, TIME_UNITS
+from armid_ros.recording.columns import ColumnSettings, in_si, per_joint, renamed, TIME_UNITS
+from armid_ros.recording.joint_state.decoder import JointSamples
+from armid_ros.recording.recording import PositionRange, Recording
+from armid_ros.recording.series import assemble, MAX_NOT_FINITE
 from armid_ros.recording.tables.families import (
     choose,
     CURRENTS,
-    Family,
     guess,
     guess_time,
-    incomplete,
     QuantityName,
+    QuantitySource,
     words_of,
 )
 from armid_ros.recording.tables.table import Table, TableColumn
@@ -31,40 +33,6 @@ _SI = {'position': 'rad', 'velocity': 'rad/s', 'effort': 'N m'}
 _FACTORS = {'deg': np.pi / 180, 'deg/s': np.pi / 180, 'mN m': 1e-3, 'N mm': 1e-3, 'mA': 1e-3}
 _FACTORS |= {'mrad': 1e-3, 'kN m': 1e3, 'rpm': 2 * np.pi / 60, 'mm': 1e-3, 'mm/s': 1e-3}
 _TURNS = ('deg', 'deg/s', 'rpm', 'mrad')
-
-
-@dataclass(frozen=True)
-class QuantitySource:
-    """
-    Columns and unit of one quantity.
-
-    Attributes
-    ----------
-    quantity : str
-        'position', 'velocity' or 'effort'.
-    chosen : Family
-        Columns.
-    unit : str
-        Unit in the file.
-    factor : ndarray, shape (n,)
-        To SI.
-    guessed : bool
-        Whether the columns were guessed.
-    rivals : tuple of str
-        Patterns of other columns that also fit.
-
-    """
-
-    quantity: QuantityName
-    chosen: Family
-    unit: str
-    factor: FloatArray
-    guessed: bool
-    rivals: tuple[str, ...] = ()
-
-    def values(self) -> FloatArray:
-        """Return the quantity in SI, shape (N, n)."""
-        return np.column_stack([c.values for c in self.chosen.columns]) * self.factor
 
 
 @dataclass(frozen=True)
@@ -186,9 +154,9 @@ def plan(
 
     """
     position = _source(table, 'position', settings, joints)
-    if position is None:
-        pattern, lacking = incomplete(table, 'position', joints or (), settings.rename)
-        if pattern and settings.position is None:
+    if isinstance(position, tuple):
+        pattern, lacking = position
+        if pattern:
             raise RecordingError(
                 f"{table.source}: of positions '{pattern}' has no column of numbers for "
                 f'{", ".join(lacking)}; name their columns with --position or --rename, or leave '
@@ -204,19 +172,16 @@ def plan(
     sources = [position]
     missing: dict[QuantityName, tuple[str, tuple[str, ...]]] = {}
     for quantity in _OTHERS:
-        asked = getattr(settings, quantity) is not None
         found = _source(table, quantity, settings, names)
-        if found is None and joints is None and not asked:
+        if isinstance(found, tuple) and joints is None:
             # match the joints by number, as the names differ or are missing
             numbers = [str(k) for k in range(len(position.chosen.columns))]
-            found = _source(table, quantity, settings, numbers)
-        if found is not None:
-            sources.append(found)
+            by_number = _source(table, quantity, settings, numbers)
+            found = found if isinstance(by_number, tuple) else by_number
+        if isinstance(found, tuple):
+            missing[quantity] = found
         else:
-            none = ('', ())
-            missing[quantity] = (
-                none if asked else incomplete(table, quantity, names, settings.rename)
-            )
+            sources.append(found)
     time, unit, rate = _time(table, settings)
     effort = next((one for one in sources if one.quantity == 'effort'), None)
     notes = list(_far(position, settings, sliding))
@@ -233,18 +198,18 @@ def _source(
     quantity: QuantityName,
     settings: ColumnSettings,
     joints: Sequence[str] | None,
-) -> QuantitySource | None:
-    """Return the source of a quantity, given or guessed; None if it is not read."""
+) -> QuantitySource | tuple[str, tuple[str, ...]]:
+    """Return the source of a quantity, given or guessed; without one, the lacking joints."""
     asked = getattr(settings, quantity)
     if asked is not None and asked.lower() == 'none':
-        return None
+        return '', ()
     rivals: tuple[str, ...] = ()
     if asked is not None:
         chosen = choose(table, asked, joints, quantity, settings.rename)
     else:
-        guesses = guess(table, quantity, joints, settings.rename)
+        guesses, incomplete = guess(table, quantity, joints, settings.rename)
         if not guesses:
-            return None
+            return incomplete
         chosen, *others = guesses
         for column in chosen.columns:
             table.column(column.bare_name)  # which has to be one
@@ -365,3 +330,89 @@ def _time_unit(table: Table, column: TableColumn, said: str | None) -> str:
             'samples per second with --rate'
         )
     return fitting[0]
+
+
+def measured(plan: TablePlan) -> Recording:
+    """
+    Convert a table to a recording.
+
+    Raises
+    ------
+    RecordingError
+        If time does not increase, or too many rows have a value that is not a number.
+
+    """
+    table = plan.table
+    t, start = _times(plan)
+    stamped = np.isfinite(t)
+    for source in plan.sources:
+        for column in source.chosen.columns:
+            empty = np.flatnonzero(~np.isfinite(column.values))
+            if len(empty) > MAX_NOT_FINITE * len(table):
+                raise RecordingError(
+                    f'{table.source}: column {column.name} has no number in {len(empty)} of '
+                    f'{len(table)} rows, first in {table.where(int(empty[0]))}; leave '
+                    f'{source.quantity} out with --{source.quantity} none, or mend the file'
+                )
+    if np.mean(~stamped) > MAX_NOT_FINITE:
+        raise RecordingError(
+            f'{table.source}: {np.sum(~stamped)} of {len(table)} rows have a time that is no '
+            'number'
+        )
+    read = {source.quantity: source.values()[stamped] for source in plan.sources}
+    samples = JointSamples(
+        plan.joints,
+        start + np.round(t[stamped] * 1e9).astype(np.int64),
+        (read['position'], read.get('velocity'), read.get('effort')),
+    )
+    topic = 'the table'
+    if 'effort' not in read and plan.unread:
+        topic += f' (--effort names columns of it; not read are {plan.unread})'
+    others: list[PositionRange] = []
+    position, settings = plan.sources[0], plan.settings
+    # of joints that were not requested, if their unit is known
+    if not (settings.gear or settings.zero) and len(set(position.factor)) == 1:
+        for label, column in position.chosen.rest.items():
+            values = column.finite * position.factor[0]
+            if len(values):
+                joint = renamed(label, settings.rename)
+                others.append(PositionRange(joint, float(values.min()), float(values.max())))
+    where = table.source
+    if plan.time is not None:
+        where += f': column {plan.time.name}'
+    recording = assemble(
+        where,
+        plan.joints,
+        [samples],
+        {
+            'unstamped': int(np.sum(~stamped)),
+            'messages': len(table),
+            'absent': plan.absent,
+            'damage': '; '.join(note for note in table.notes if 'cut off' in note),
+        },
+        source=table.source,
+        topic=topic,
+        others=tuple(others),
+    )
+    sides = replace(settings, degrees=False, position_scale=(), effort_scale=())
+    return in_si(recording, sides)  # units are converted by the plan
+
+
+def _times(plan: TablePlan) -> tuple[FloatArray, int]:
+    """Return times [s] since a stamp, and this stamp [ns]; 1 s if none is known."""
+    if plan.time is None:
+        assert plan.rate_hz is not None
+        return np.arange(len(plan.table)) / plan.rate_hz, 10**9
+    scale = TIME_UNITS[plan.time_unit]
+    # no stamp is later: nanoseconds beyond the year 2255 do not fit into 64 bits
+    values = np.where(np.abs(plan.time.values * scale) < 9e9, plan.time.values, np.nan)
+    stamped = np.flatnonzero(np.isfinite(values) & (values != 0.0))  # noqa: RUF069 - as it is written
+    if len(stamped) and np.count_nonzero(values[: stamped[0]] == 0.0) > 1:  # noqa: RUF069 - as it is written
+        values[: stamped[0]] = np.nan  # simulated time is zero before the first /clock
+    there = values[np.isfinite(values)]
+    if not len(there):
+        raise RecordingError(f'{plan.table.source}: column {plan.time.name} has no time in it')
+    origin = float(there[0])
+    epoch = origin * scale > 1e8  # later times are counted from 1970
+    # Differences first: counted from 1970, nanoseconds do not fit into a float.
+    return (values - origin) * scale, int(origin * scale * 1e9) if epoch else 10**9

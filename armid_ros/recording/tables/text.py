@@ -15,7 +15,6 @@ from armid_ros.errors import RecordingError
 from armid_ros.motion import FloatArray
 from armid_ros.recording.tables.table import read_content, Table, TableColumn
 import numpy as np
-import numpy.typing as npt
 
 _SEPARATORS = {';': 'semicolons', '\t': 'tabs', ',': 'commas', ' ': 'blanks'}
 _COMMENTS = ('#', '%')
@@ -188,27 +187,24 @@ def _numbers(
                 said.setdefault(j, {})[k] = cell
     # a column with fewer numbers is one of words
     numeric = np.isfinite(values).mean(axis=0) >= 0.5
-    words: dict[str, Sequence[str]] = {}
-    for j, of in said.items():
-        if numeric[j]:
-            k, cell = next(iter(of.items()))
-            raise RecordingError(
-                f"{path}: line {first_line + k}, column {names[j]}: '{cell}' is no number"
-            )
-        words[names[j]] = [of.get(k, '') for k in range(len(values))]
-    notes += _gaps(np.argwhere(np.isnan(values) & numeric), names, first_line)
+    wrong = [(j, *next(iter(of.items()))) for j, of in said.items() if numeric[j]]
+    if wrong:
+        j, k, cell = wrong[0]
+        raise RecordingError(
+            f"{path}: line {first_line + k}, column {names[j]}: '{cell}' is no number"
+        )
+    words: dict[str, Sequence[str]] = {
+        names[j]: [of.get(k, '') for k in range(len(values))] for j, of in said.items()
+    }
+    empty = np.argwhere(np.isnan(values) & numeric)
+    if len(empty):
+        many = '1 cell is' if len(empty) == 1 else f'{len(empty)} cells are'
+        row, column = empty[0]
+        notes.append(
+            f'{many} empty and read as NaN, the first in line {first_line + row}, '
+            f'column {names[column]}'
+        )
     return values, words, tuple(notes)
-
-
-def _gaps(at: npt.NDArray[np.intp], names: list[str], first_line: int) -> list[str]:
-    """Format a note on empty cells, shape (k, 2): their number, and the first one."""
-    if not len(at):
-        return []
-    many = '1 cell is' if len(at) == 1 else f'{len(at)} cells are'
-    return [
-        f'{many} empty and read as NaN, the first in line {first_line + at[0, 0]}, '
-        f'column {names[at[0, 1]]}'
-    ]
 
 
 def _taken_apart(cells: list[str], widths: list[int | None], where: str) -> Iterator[str]:

@@ -8,7 +8,8 @@ from armid_ros.arm import ArmModel
 from armid_ros.identification import grade, identify
 from armid_ros.identification.assess.sensor_faults import held_elsewhere
 from armid_ros.model import inverse_dynamics
-from armid_ros.recording import PositionRange, Recording
+from armid_ros.recording import Recording
+from armid_ros.recording.recording import PositionRange
 from armid_ros.robots import described_at, held_joints, load_robot, robot_from_urdf
 import numpy as np
 import pytest

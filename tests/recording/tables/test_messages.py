@@ -76,14 +76,6 @@ def as_hdf5(folder, motion):
     return 'run.h5'
 
 
-def with_short_names(folder, motion):
-    text = 'sec,nanosec,pos_J1,pos_J2,vel_J1,vel_J2,trq_J1,trq_J2\n'
-    for sec, nanosec, _, *fields in rows(motion):
-        text += f'{sec},{nanosec},{",".join(map(str, chain(*fields)))}\n'
-    (folder / 'run.csv').write_text(text)
-    return 'run.csv'
-
-
 def with_dates(folder, motion):
     text = 'mode,stamp,q1,q2,dq1,dq2,tau1,tau2\n'
     for sec, nanosec, _, *fields in rows(motion):
@@ -104,7 +96,6 @@ def with_dates(folder, motion):
         as_lists(lambda field: f'[{" ".join(map(str, field))}]'),
         as_parquet,
         as_hdf5,
-        with_short_names,
         with_dates,
     ],
 )

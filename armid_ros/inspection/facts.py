@@ -1,0 +1,298 @@
+# Copyright 2026 The armid_ros developers
+# SPDX-License-Identifier: Apache-2.0
+"""Facts about a recording: its sampling, its joints, and a trial identification."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from armid_ros.arm import ArmModel
+from armid_ros.effects import USUAL_EFFECTS
+from armid_ros.errors import ArmidError
+from armid_ros.identification import identify, Score
+from armid_ros.identification.assess.grade import beyond_noise, grade
+from armid_ros.identification.assess.grade_limits import LIMITS
+from armid_ros.identification.assess.sensor_faults import held_elsewhere, velocity_ratio
+from armid_ros.identification.rows.checks import FOLLOWS, torque_factors
+from armid_ros.identification.rows.period import least_change, parabola_minimum
+from armid_ros.motion import FloatArray
+from armid_ros.recording import Recording
+from armid_ros.recording.recording import GAP_PERIODS
+from armid_ros.recording.series import NOTHING
+from armid_ros.robots import Robot
+import numpy as np
+from scipy.signal import savgol_filter
+
+#: Positions of successive periods differ by less than this share of their variation.
+_SAME = 0.03
+#: A joint slower than this share of its own top speed is at rest.
+_REST = 0.02
+#: A joint whose range is smaller than this is at rest [rad or m].
+STILL = 1e-3
+
+
+@dataclass(frozen=True)
+class Sampling:
+    """
+    Time of a recording in numbers.
+
+    Attributes
+    ----------
+    duration : float
+        Time from the first sample to the last [s].
+    rate_hz : float
+        Samples per second, from the median step.
+    jitter : float
+        Standard deviation of the steps, gaps left out, as a share of the median step.
+    longest_step : float
+        Longest time between samples [s].
+    gaps : int
+        Number of steps of more than five median steps.
+    period : float or None
+        Period of the motion [s]; None if the motion is not periodic.
+    periods : float
+        Number of periods in the recording.
+
+    """
+
+    duration: float
+    rate_hz: float
+    jitter: float
+    longest_step: float
+    gaps: int
+    period: float | None
+    periods: float
+
+    @staticmethod
+    def of(recording: Recording) -> Sampling:
+        """Return the sampling of a recording."""
+        steps = np.diff(recording.t)
+        median = float(np.median(steps))
+        ordinary = steps[steps <= GAP_PERIODS * median]
+        period = find_repetition(recording)
+        return Sampling(
+            recording.duration,
+            1.0 / median,
+            float(np.std(ordinary) / median),
+            float(steps.max()),
+            int(np.sum(steps > GAP_PERIODS * median)),
+            period,
+            recording.duration / period if period else 0.0,
+        )
+
+
+def find_repetition(recording: Recording) -> float | None:
+    """
+    Return the period of the motion [s]; None if the motion is not periodic.
+
+    For each lag, the change of positions over the lag is a mean square relative to their variance.
+    The stretch of about one lag with the least change counts, so a run-in at the beginning is
+    ignored. The period is the first lag with a small minimum.
+
+    """
+    # at most 20 Hz and 3000 samples
+    rate = min(20.0, 1.0 / recording.period, 3000 / max(recording.duration, 1e-9))
+    t = np.arange(recording.t[0], recording.t[-1], 1.0 / rate)
+    varying = np.ptp(recording.q, axis=0) > STILL
+    if len(t) < 40 or not varying.any():
+        return None
+    q = np.column_stack([np.interp(t, recording.t, column) for column in recording.q.T[varying]])
+    q = (q - q.mean(axis=0)) / q.std(axis=0)
+    lags = np.arange(max(2, int(rate)), int(0.6 * len(t)))
+    change = np.array([least_change(q, int(lag)) for lag in lags])
+    low = change < max(_SAME, (np.pi * 2 / rate) ** 2 / 4)
+    for k in range(1, len(lags) - 1):
+        if low[k] and change[k] <= change[k - 1] and change[k] <= change[k + 1]:
+            return float(lags[k] + parabola_minimum(*change[k - 1 : k + 2])) / rate
+    return None
+
+
+@dataclass(frozen=True)
+class JointFacts:
+    """
+    One joint of a recording in numbers, in the units of the file.
+
+    Attributes
+    ----------
+    name : str
+        Name of the joint.
+    lower, upper : float
+        Range of the positions.
+    speed : float
+        99th percentile of the speed, from the positions.
+    moving : float
+        Share of the time in which it moves.
+    step : float
+        Smallest change of the position from sample to sample that is not zero.
+    repeated : float
+        Share of the samples that repeat the position of the one before while it moves.
+    velocity_ratio : float or None
+        Recorded velocity divided by the derivative of position, 1 in equal units; None without
+        velocity or motion.
+    velocity_fit : float
+        Correlation of recorded velocity and derivative of position.
+    effort_rms, effort_largest : float or None
+        Root mean square and largest absolute value of the efforts; None without efforts.
+    effort_varies : bool
+        Whether the efforts change.
+
+    """
+
+    name: str
+    lower: float
+    upper: float
+    speed: float
+    moving: float
+    step: float
+    repeated: float
+    velocity_ratio: float | None
+    velocity_fit: float
+    effort_rms: float | None
+    effort_largest: float | None
+    effort_varies: bool
+
+    @property
+    def still(self) -> bool:
+        """Whether the joint is at rest throughout."""
+        return self.upper - self.lower < STILL
+
+
+def joint_facts(recording: Recording) -> tuple[JointFacts, ...]:
+    """Return the facts of every joint of a recording."""
+    speeds = np.abs(_derivative(recording))
+    found = []
+    for j, (name, ratio, fit) in enumerate(
+        zip(recording.joints, *velocity_ratio(recording), strict=True)
+    ):
+        q, top = recording.q[:, j], float(np.percentile(speeds[:, j], 99))
+        moves = speeds[:, j] > _REST * max(top, 1e-12)
+        changes = np.abs(np.diff(q))
+        still = float(np.ptp(q)) < STILL
+        tau = None if recording.tau is None else recording.tau[:, j]
+        facts = JointFacts(
+            name=name,
+            lower=float(q.min()),
+            upper=float(q.max()),
+            speed=top,
+            moving=0.0 if still else float(moves.mean()),
+            step=float(changes[changes > 0.0].min()) if changes.any() else 0.0,
+            repeated=0.0 if still else float(np.mean(changes[moves[1:]] == 0.0)),  # noqa: RUF069 - as recorded
+            velocity_ratio=float(ratio) if np.isfinite(ratio) else None,
+            velocity_fit=float(fit),
+            effort_rms=None if tau is None else float(np.sqrt(np.mean(tau**2))),
+            effort_largest=None if tau is None else float(np.abs(tau).max()),
+            effort_varies=tau is not None and bool(np.ptp(tau) > NOTHING),
+        )
+        found.append(facts)
+    return tuple(found)
+
+
+def _derivative(recording: Recording) -> FloatArray:
+    """Return velocities from positions, by parabolas through neighbours in even steps."""
+    half = 5  # samples on either side
+    if len(recording) <= 2 * half + 1:
+        return np.gradient(recording.q, recording.t, axis=0)
+    even = np.linspace(recording.t[0], recording.t[-1], len(recording))
+    columns = []
+    for column in recording.q.T:
+        q = np.interp(even, recording.t, column)
+        speed = savgol_filter(q, 2 * half + 1, 2, deriv=1, delta=float(even[1] - even[0]))
+        columns.append(np.interp(recording.t, even, speed))
+    return np.column_stack(columns)
+
+
+@dataclass(frozen=True)
+class TrialFit:
+    """
+    Result of a trial identification.
+
+    Attributes
+    ----------
+    refused : str
+        Why ``identify`` refuses the recording; empty if it accepts the recording.
+    relative_error_percent : float or None
+        100 |tau - tau_hat| / |tau| of the fit.
+    rank : int
+        Number of parameters that the motion makes identifiable, at most ``theory``.
+    theory : int
+        Number of parameters that are identifiable with a suitable motion.
+    condition_number : float or None
+        Condition number of the weighted regressor.
+    cutoff_hz : float or None
+        Cut-off of the position filter [Hz].
+    scale : ndarray, shape (n,), or None
+        Ratio of efforts to torques of the description, per joint; NaN without correlation.
+    notes : tuple of str
+        Notes of the identification.
+    elsewhere : tuple of str
+        Joints without drive that moved, or stood at another position than described.
+    poor : tuple of str
+        Joints whose torque the fit hardly describes, each with its error.
+    grade : str
+        Grade by ``identify``: good, poor or unusable; empty if the recording is refused.
+    reasons : tuple of str
+        Reasons of the grade, the worst first.
+    faults : tuple of str
+        Reasons that are faults of the recording itself, without a full stop.
+
+    """
+
+    refused: str = ''
+    relative_error_percent: float | None = None
+    rank: int = 0
+    theory: int = 0
+    condition_number: float | None = None
+    cutoff_hz: float | None = None
+    scale: FloatArray | None = None
+    notes: tuple[str, ...] = ()
+    elsewhere: tuple[str, ...] = ()
+    poor: tuple[str, ...] = ()
+    grade: str = ''
+    reasons: tuple[str, ...] = ()
+    faults: tuple[str, ...] = ()
+
+
+def try_identification(robot: Robot, recording: Recording, rng: np.random.Generator) -> TrialFit:
+    """
+    Try an identification and collect measures of its quality.
+
+    Parameters
+    ----------
+    robot : Robot
+        Description.
+    recording : Recording
+        Recording of the joints of the robot.
+    rng : numpy.random.Generator
+        Random numbers for the identification.
+
+    """
+    arm = ArmModel.of(robot, effects=USUAL_EFFECTS)
+    try:
+        result = identify(arm, [recording], rng=rng)
+        graded = grade(result, arm, [recording], {})
+    except ArmidError as refusal:
+        return TrialFit(refused=str(refusal))
+    motions = [fit.motion for fit in result.training]
+    torques = [motion.tau for motion in motions if motion.tau is not None]
+    factors, correlation = torque_factors(robot, motions, torques)
+    score = Score.of(result.training)
+    errors = score.joint_relative_error_percent
+    beyond = beyond_noise(errors, result.training, result.used)  # noise makes no model poor
+    return TrialFit(
+        relative_error_percent=score.relative_error_percent,
+        rank=result.base.rank,
+        theory=result.theory.rank,
+        condition_number=result.condition_number,
+        cutoff_hz=result.used.cutoff_hz,
+        scale=np.where(np.abs(correlation) > FOLLOWS, factors, np.nan),
+        notes=result.notes,
+        elsewhere=tuple(one.text for one in held_elsewhere(robot, [recording], motions)),
+        poor=tuple(
+            f'{error:.0f} % of the efforts of {joint}'
+            for joint, error, left in zip(robot.joints, errors, beyond, strict=True)
+            if left > LIMITS.poor
+        ),
+        grade=graded.word,
+        reasons=graded.reasons,
+        faults=graded.faults,
+    )
