@@ -199,7 +199,7 @@ class Explainer:
         part = np.maximum(rest, (_LEAST_PART * misfit) ** 2)
         amplitude = (np.sqrt(part),) * count_recordings(prepared.data)
         rows = Rows(prepared.data, evidence.sigma, 0, amplitude, unseen=True)
-        grid = settings_of_misfit(known is not None)
+        grid = settings_of_misfit(float(known is not None))
         result = self.comparison(rows, grid, known).found()
         found = self._changes(result, evidence, 0.0)
         notes = (_AS_EXACT,) if found.steps and known is None else ()
