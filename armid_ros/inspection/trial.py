@@ -92,8 +92,7 @@ def try_identification(robot: Robot, recording: Recording, rng: np.random.Genera
     except ArmidError as refusal:
         return TrialFit(refused=str(refusal))
     motions = [fit.motion for fit in result.training]
-    torques = [motion.tau for motion in motions if motion.tau is not None]
-    factors, correlation = torque_factors(robot, motions, torques)
+    factors, correlation = torque_factors(ArmModel(robot), motions)
     score = Score.of(result.training)
     errors = score.joint_relative_error_percent
     beyond = beyond_noise(errors, result.training, result.used)  # noise makes no model poor

@@ -14,6 +14,7 @@ from dataclasses import dataclass, replace
 from itertools import combinations
 from typing import Literal
 
+from armid_ros.arm import ArmModel
 from armid_ros.identification.assess.grade_limits import LIMITS
 from armid_ros.identification.assess.prediction_error import common_values, thinned
 from armid_ros.identification.rows.checks import (
@@ -254,8 +255,7 @@ def known_gravity(vector: FloatArray, told: FloatArray) -> tuple[FloatArray, str
 
 def _other_scale(robot: Robot, factor: float, motions: Sequence[Motion]) -> Hypothesis:
     """Return the hypothesis that efforts differ from N m by a factor: a unit, or currents."""
-    torques = [motion.tau for motion in motions if motion.tau is not None]
-    factors, correlation = torque_factors(robot, motions, torques)
+    factors, correlation = torque_factors(ArmModel(robot), motions)
     known = (correlation > _CLEAR) & (factors > 0.0)
     unit = unit_of(factor, factors[known].tolist())
     text = (

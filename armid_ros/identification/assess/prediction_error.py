@@ -16,6 +16,7 @@ from dataclasses import dataclass, replace
 from armid_ros.identification.assess.grade_limits import FREEDOM, LIMITS
 from armid_ros.identification.fitting.excited import near_deviation
 from armid_ros.identification.fitting.normal_equations import within
+from armid_ros.identification.rows.checks import SLOW
 from armid_ros.model import inverse_dynamics, regressor
 from armid_ros.motion import FloatArray, Motion
 from armid_ros.robots import Robot
@@ -23,8 +24,6 @@ import numpy as np
 
 #: Number of own columns of each joint: offset, viscous and Coulomb friction, drive inertia.
 _OWN = 4
-#: Share of its top speed below which a joint may be held by friction with any torque.
-SLOW = 0.05
 
 
 @dataclass(frozen=True)

@@ -54,6 +54,10 @@ _TOLERANCE = 0.05
 #: Smallest correlation of a velocity with that of its position, and largest ratio to the factor of
 #: a unit, for a velocity in that unit: half of its power is explained, and other units are far.
 _FOLLOWS, _NEAR = 0.7, 1.25
+#: Ratio of the median reading of a joint to the limit of its drive from which it is in another
+#: unit. The smallest factor of a unit is a hundred, of which this is half in the logarithm, and no
+#: drive gives as much.
+_BEYOND_DRIVE = 10.0
 _DEGREE = float(np.deg2rad(1.0))
 #: Ratios of velocities to those of the positions, and the fault that each indicates.
 _RATIOS = {
@@ -221,6 +225,43 @@ def torque_faults(
                     recording.source,
                 )
                 break
+
+
+def units_beyond_drives(
+    robot: Robot, recordings: Sequence[Recording], motions: Sequence[Motion]
+) -> Iterator[str]:
+    """
+    Yield notes on torques in another unit, by the limits of the drives.
+
+    No note is given if most joints are beyond their limits, or if the described body needs as
+    much: then the limits of the description are wrong.
+
+    Parameters
+    ----------
+    robot : Robot
+        Robot of the description.
+    recordings : sequence of Recording
+        Recordings to check, with torques.
+    motions : sequence of Motion
+        Filtered motions of the recordings.
+
+    """
+    measured = [recording.tau for recording in recordings if recording.tau is not None]
+    if not measured or not motions:
+        return
+    usual = np.median(np.abs(np.concatenate(measured)), axis=0)
+    known = np.isfinite(robot.torque_limit) & (robot.torque_limit > 0.0)
+    beyond = known & (usual > _BEYOND_DRIVE * robot.torque_limit)
+    if 2 * np.sum(beyond) > np.sum(known):
+        return
+    needed = np.max([np.abs(inverse_dynamics(robot, one)).max(axis=0) for one in motions], axis=0)
+    for joint in np.flatnonzero(beyond & (needed < robot.torque_limit)).tolist():
+        limit, unit = robot.torque_limit[joint], robot.torque_units[joint]
+        yield (
+            f'the torque of {robot.joints[joint]} seems to be in another unit than {unit}: '
+            f'half of its readings are beyond {usual[joint]:.3g}, its drive gives '
+            f'{limit:.4g} {unit}. Convert it, or correct the limit in the description'
+        )
 
 
 def _when(t: FloatArray, start: int, stop: int, always: str) -> tuple[str, str]:

@@ -15,6 +15,7 @@ from dataclasses import replace
 from typing import NamedTuple
 
 from armid_ros.identification.samples.straight_line import (
+    growth_over,
     Missed,
     robust_scale,
     share_of_noise,
@@ -34,8 +35,6 @@ SHARE = 0.95
 _SHARE_FIRST = 0.75
 #: Number of occurrences of a step from which it is a step of the signal itself.
 SEEN = 3
-#: Samples that are processed together.
-_TOGETHER = 4096
 
 
 class NoiseLevel:
@@ -203,42 +202,26 @@ def line_errors(
     period = float(np.median(dt))
     gap = dt > max_gap * period
     first = np.where(np.concatenate([[True], gap]), np.arange(len(t)), 0)
-    ratio = dt[1:] / dt[:-1]
-    noise = np.concatenate([[1.0, 1.0], np.sqrt((1.0 + (1.0 + ratio) ** 2 + ratio**2) / 6.0)])
-    bend = np.concatenate([[1.0, 1.0], 0.5 * dt[1:] * (dt[1:] + dt[:-1]) / period**2])
-    noise, bend = noise[:, np.newaxis], bend[:, np.newaxis]
+    noise, bend = np.ones((2, len(t), 1))
+    noise[2:, 0], bend[2:, 0] = growth_over(dt[:-1], dt[1:], period)
     error = np.zeros_like(x)
-    np.multiply(ratio[:, np.newaxis], moves[:-1], out=error[2:])
+    np.multiply((dt[1:] / dt[:-1])[:, np.newaxis], moves[:-1], out=error[2:])
     np.subtract(moves[1:], error[2:], out=error[2:])
     error[2:][gap[1:] | gap[:-1]] = 0.0
     plain = error[2:] / np.maximum(noise, bend)[2:]
+    # windows of equal length are processed together; the last few samples are in none
     count = max(1, len(plain) // WINDOW)
-    size, longer = divmod(len(plain), count)  # windows of equal length are processed together
-    cut, signals = longer * (size + 1), x.shape[1]
-    batches = (
-        plain[:cut].reshape(longer, size + 1, signals),
-        plain[cut:].reshape(count - longer, size, signals),
-    )
-    windows = [batch.swapaxes(0, 1) for batch in batches if len(batch)]
-    sizes = [robust_scale(part, SHARE) for part in windows]
-    shares = [share_of_noise(*both) for both in zip(windows, sizes, strict=True)]
-    usual = _loudest(period, np.concatenate(sizes), np.concatenate(shares))
-    # parts that stay in the cache of the processor
-    parts = [slice(k, k + _TOGETHER) for k in range(0, len(x), _TOGETHER)]
-    steps, most = np.full((SEEN, signals), np.inf), np.zeros(signals)
-    for part in parts:
-        steps = _smallest(np.concatenate([steps, np.abs(moves[part])]))
-        most = np.maximum(most, np.abs(error[part]).max(axis=0))
-    least = np.minimum(np.where(np.isfinite(steps[-1]), steps[-1], 0.0), most)
+    size = len(plain) // count
+    windows = plain[: count * size].reshape(count, size, -1).swapaxes(0, 1)
+    sizes = robust_scale(windows, SHARE)
+    usual = _loudest(period, sizes, share_of_noise(windows, sizes))
+    step = _smallest(np.abs(moves))[-1]
+    least = np.minimum(np.where(np.isfinite(step), step, 0.0), np.abs(error).max(axis=0))
     usual = replace(usual, size=np.maximum(usual.size, least))
+    bent, off = error / bend, np.abs(error)
+    off[3:] = np.abs(error[3:] - usual.smoothness * bent[2:-1] * bend[3:])
     floor = np.maximum(floor, np.finfo(float).tiny)
-    largest = quantile(period)
-    bent, off, kept = error / bend, np.abs(error), usual.smoothness
-    for part in parts:
-        own = slice(max(part.start, 3), part.stop)
-        before = slice(own.start - 1, min(own.stop, len(x)) - 1)
-        off[own] = np.abs(error[own] - kept * bent[before] * bend[own])
-        off[part] /= np.maximum(usual.limits(largest, noise[part], bend[part]), floor)
+    off /= np.maximum(usual.limits(quantile(period), noise, bend), floor)
     return LineErrors(np.maximum.accumulate(first), off, bent, usual)
 
 

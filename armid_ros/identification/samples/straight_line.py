@@ -7,7 +7,6 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
-import math
 from typing import NamedTuple
 
 from armid_ros.motion import FloatArray
@@ -138,14 +137,19 @@ class Missed(NamedTuple):
     bend: float
 
 
+def growth_over(step: Factor, ahead: Factor, period: float) -> tuple[Factor, Factor]:
+    """Return the growth of errors by noise and by an acceleration, a time ahead of two samples."""
+    ratio = ahead / step
+    noise = ((1.0 + (1.0 + ratio) ** 2 + ratio**2) / 6.0) ** 0.5
+    return noise, 0.5 * ahead * (ahead + step) / period**2
+
+
 def missed_by(known: Sequence[StreamSample], sample: StreamSample, period: float) -> Missed:
     """Return the error of the straight line through two samples at another one."""
     before, last = known
     step, ahead = last.t - before.t, sample.t - last.t
-    ratio = ahead / step
-    noise = math.sqrt((1.0 + (1.0 + ratio) ** 2 + ratio**2) / 6.0)
-    bend = 0.5 * ahead * (ahead + step) / period**2
-    return Missed(sample.x - last.x - ratio * (last.x - before.x), noise, bend)
+    error = sample.x - last.x - ahead / step * (last.x - before.x)
+    return Missed(error, *growth_over(step, ahead, period))
 
 
 def unwrapped(x: FloatArray, last: FloatArray, turn: FloatArray) -> FloatArray:

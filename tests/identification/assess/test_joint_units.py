@@ -7,11 +7,8 @@ from dataclasses import replace
 from armid_ros.arm import ArmModel
 from armid_ros.effects import make_effect
 from armid_ros.identification import grade, identify
-from armid_ros.identification.assess.data_faults import check_data
-from armid_ros.identification.assess.joint_units import (
-    unit_faults,
-    units_beyond_drives,
-)
+from armid_ros.identification.assess.data_faults import check_data, unit_faults
+from armid_ros.identification.assess.sensor_faults import units_beyond_drives
 from armid_ros.identification.rows.regression import Stretch
 from armid_ros.identification.rows.signals import conditioning, segments, SignalSettings
 from armid_ros.robots import load_robot
