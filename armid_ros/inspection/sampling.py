@@ -6,14 +6,12 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from armid_ros.identification.rows.period import least_change, parabola_minimum
+from armid_ros.identification.rows.period import find_period, mean_change, parabola_minimum
 from armid_ros.recording import Recording
 import numpy as np
 
 #: A step of more than this many median steps is a gap.
 GAP = 5.0
-#: Positions of successive periods differ by less than this share of their variation.
-_SAME = 0.03
 
 
 @dataclass(frozen=True)
@@ -67,14 +65,7 @@ class Sampling:
 
 
 def find_repetition(recording: Recording) -> float | None:
-    """
-    Return the period of the motion [s]; None if the motion is not periodic.
-
-    For each lag, the change of positions over the lag is a mean square relative to their variance.
-    The stretch of about one lag with the least change counts, so a run-in at the beginning is
-    ignored. The period is the first lag with a small minimum.
-
-    """
+    """Return the period of the motion [s]; None if the motion is not periodic."""
     # at most 20 Hz and 3000 samples
     rate = min(20.0, 1.0 / recording.period, 3000 / max(recording.duration, 1e-9))
     t = np.arange(recording.t[0], recording.t[-1], 1.0 / rate)
@@ -82,11 +73,9 @@ def find_repetition(recording: Recording) -> float | None:
     if len(t) < 40 or not varying.any():
         return None
     q = np.column_stack([np.interp(t, recording.t, column) for column in recording.q.T[varying]])
-    q = (q - q.mean(axis=0)) / q.std(axis=0)
-    lags = np.arange(max(2, int(rate)), int(0.6 * len(t)))
-    change = np.array([least_change(q, int(lag)) for lag in lags])
-    low = change < max(_SAME, (np.pi * 2 / rate) ** 2 / 4)
-    for k in range(1, len(lags) - 1):
-        if low[k] and change[k] <= change[k - 1] and change[k] <= change[k + 1]:
-            return float(lags[k] + parabola_minimum(*change[k - 1 : k + 2])) / rate
-    return None
+    found = find_period(t, q)
+    if found is None:
+        return None
+    lag, where = found
+    before, least, after = (mean_change(q, lag + shift, where) for shift in (-1, 0, 1))
+    return (lag + parabola_minimum(before, least, after)) / rate
