@@ -16,7 +16,7 @@ from armid_ros.arm import ArmModel
 from armid_ros.effects import CATALOGUE
 from armid_ros.errors import IdentificationError
 from armid_ros.identification.assess.hypotheses import in_unit
-from armid_ros.identification.assess.mistakes import find_mistake, slow_motions
+from armid_ros.identification.assess.mistakes import find_mistake, shared_mistakes, slow_motions
 from armid_ros.identification.assess.sensor_faults import sensor_faults, units_beyond_drives
 from armid_ros.identification.rows.checks import (
     check_motion,
@@ -114,12 +114,12 @@ def _mistaken(
     """Return the mistake that all recordings share, or otherwise joints in a wrong unit."""
     # with a baseline, the factor of all torques is found by comparison with it
     since = bool(before) and bool(np.any(_factors_since(arm, motions, before) > 0.0))
-    found = [find_mistake(arm.body, recording, used) for recording in recordings]
-    # with a baseline, a mistake that needs a fitted body is a change of the arm instead
-    of_data = [one for one in found if one and one.of_data and not (before and one.fitted)]
-    texts = {one.text for one in of_data if not (since and one.hypotheses[0].kind == 'scale')}
-    alike = len(of_data) == len(found) and len(texts) == 1
-    return list(texts) if alike else unit_faults(arm, motions, before)
+    for one, sources in shared_mistakes(arm.body, recordings, used):
+        # with a baseline, a mistake that needs a fitted body is a change of the arm instead
+        known = before and (one.fitted or (since and one.hypotheses[0].kind == 'scale'))
+        if len(sources) == len(recordings) and one.of_data and not known:
+            return [one.text]
+    return unit_faults(arm, motions, before)
 
 
 def mistaken_recordings(

@@ -183,7 +183,9 @@ def shifted(motion: Motion, seconds: float) -> Motion:
 
 def other_gravity(robot: Robot, vector: FloatArray) -> Hypothesis | None:
     """
-    Return the hypothesis of another gravity vector.
+    Return the hypothesis of another gravity vector, a known one if one is near.
+
+    The described length along any axis is known, too.
 
     Parameters
     ----------
@@ -201,18 +203,27 @@ def other_gravity(robot: Robot, vector: FloatArray) -> Hypothesis | None:
     """
     told = robot.gravity
     size, length = (float(np.linalg.norm(one)) for one in (told, vector))
-    far = LIMITS.gravity_change * max(size, 1.0) < np.linalg.norm(vector - told)
     turned = np.linalg.norm(vector / max(length, 1e-9) - told / max(size, 1e-9))
     weighs = length / size if size > 0.0 else np.inf
+    if np.linalg.norm(vector - told) <= LIMITS.gravity_change * max(size, 1.0):
+        return None
     # 24.8 m/s^2 is the gravity of Jupiter, the largest of a planet
-    if not (far and length < 24.8):
+    if length >= 24.8 or (turned <= LIMITS.gravity_change and not _beyond_masses(weighs)):
         return None
-    if turned <= LIMITS.gravity_change and not _beyond_masses(weighs):
-        return None
-    known, option = known_gravity(vector, told)
-    direction = ', '.join(
-        f'{part + 0.0:.3g}' for part in known / max(float(np.linalg.norm(known)), 1e-9)
-    )
+    known = {name: np.array(value) for name, value in GRAVITIES.items()}
+    for axis in size * np.concatenate([np.eye(3), -np.eye(3)]):
+        known.setdefault(','.join(f'{part:.3g}' for part in axis + 0.0), axis)
+    off = {
+        name: float(np.linalg.norm(vector - value)) / max(float(np.linalg.norm(value)), 1e-9)
+        for name, value in known.items()
+    }
+    option, nearest = min(off, key=off.__getitem__), vector
+    if off[option] < _KNOWN:
+        nearest = known[option]
+    else:
+        option = ','.join(f'{part:.3g}' for part in vector + 0.0)
+    along = nearest / max(float(np.linalg.norm(nearest)), 1e-9)
+    direction = ', '.join(f'{part + 0.0:.3g}' for part in along)
     return Hypothesis(
         'gravity',
         f'gravity seems to act along ({direction}) of the base with {length:.3g} m/s^2: '
@@ -220,37 +231,6 @@ def other_gravity(robot: Robot, vector: FloatArray) -> Hypothesis | None:
         body=lambda robot: robot.with_gravity(vector),
         values=3,
     )
-
-
-def known_gravity(vector: FloatArray, told: FloatArray) -> tuple[FloatArray, str]:
-    """
-    Return a gravity vector, or a known one near it, and its --gravity option.
-
-    Parameters
-    ----------
-    vector, told : ndarray, shape (3,)
-        Estimated and described gravity [m/s^2]; the described length along any axis is known too.
-
-    Returns
-    -------
-    vector : ndarray, shape (3,)
-        The nearest known vector, or the estimated one if none is near [m/s^2].
-    option : str
-        Argument of --gravity.
-
-    """
-    known = {name: np.array(value) for name, value in GRAVITIES.items()}
-    size = float(np.linalg.norm(told))
-    for axis in size * np.concatenate([np.eye(3), -np.eye(3)]):
-        known.setdefault(','.join(f'{part:.3g}' for part in axis + 0.0), axis)
-    off = {
-        name: float(np.linalg.norm(vector - value)) / max(float(np.linalg.norm(value)), 1e-9)
-        for name, value in known.items()
-    }
-    name = min(off, key=off.__getitem__)
-    if off[name] < _KNOWN:
-        return known[name], name
-    return vector, ','.join(f'{part:.3g}' for part in vector + 0.0)
 
 
 def _other_scale(robot: Robot, factor: float, motions: Sequence[Motion]) -> Hypothesis:

@@ -96,6 +96,42 @@ class Mistake:
         )
 
 
+def shared_mistakes(
+    robot: Robot, recordings: Sequence[Recording], used: Conditioning
+) -> list[tuple[Mistake, tuple[str, ...]]]:
+    """
+    Find the mistakes in recordings, those of one kind and place together.
+
+    Parameters
+    ----------
+    robot : Robot
+        Robot of the description.
+    recordings : sequence of Recording
+        Data with torques.
+    used : Conditioning
+        Filters that the recordings are identified with.
+
+    Returns
+    -------
+    list of (Mistake, tuple of str)
+        The mistake in the recording with the largest error, and the sources of all of them.
+
+    """
+    alike: dict[tuple[object, ...], list[tuple[str, Mistake]]] = {}
+    for recording in recordings:
+        mistake = find_mistake(robot, recording, used)
+        if mistake is not None:
+            kind = (mistake.hypotheses[0].kind, *mistake.hypotheses[0].where)
+            alike.setdefault(kind, []).append((recording.source, mistake))
+    return [
+        (
+            max((one for _, one in found), key=lambda one: float(one.before.joints.max())),
+            tuple(source for source, _ in found),
+        )
+        for found in alike.values()
+    ]
+
+
 class _Row(NamedTuple):
     """A hypothesis with its errors and its likelihood ratios over their limits."""
 

@@ -169,28 +169,21 @@ def encoder_faults(recording: Recording, units: Sequence[str] | None = None) -> 
     way = np.ptp(recording.q - recording.dq * (t - t[0])[:, np.newaxis], axis=0)
     changes = np.ptp(recording.dq, axis=0) > 0.0
     measured = bool(np.any((moved > REST_RANGE) & changes))  # or the driver sends no velocities
-    for j, (joint, unit) in enumerate(zip(recording.joints, units, strict=True)):
+    for j, unit in enumerate(units):
         start, stop = _longest_same(recording.q[:, j])
         # range of a joint at rest, plus a step of the encoder
         steps = np.abs(np.diff(recording.q[:, j]))
         hidden = REST_RANGE + (float(steps[steps > 0.0].min()) if steps.any() else 0.0)
         goes = _distance(t[start:stop], recording.dq[start:stop, j])
         if goes > hidden:
-            when, remedy = _when(t, start, stop, 'record again')
-            yield Fault(
-                f'the position of {joint} stays at {recording.q[start, j]:.4g} {unit} {when}, '
-                f'while its velocity goes {goes:.3g} {unit}: its encoder is dead; {remedy}',
-                'unusable',
-                recording.source,
-            )
+            why = f', while its velocity goes {goes:.3g} {unit}: its encoder is dead'
+            value = f'{recording.q[start, j]:.4g} {unit}'
+            yield _stays(recording, j, 'position', value, (start, stop), why, 'record again')
         if measured and moved[j] > REST_RANGE and not changes[j] and way[j] > _WAY * moved[j]:
-            yield Fault(
-                f'the velocity of {joint} stays at {recording.dq[0, j] + 0.0:.4g} {unit}/s '
-                f'throughout, while its position goes {moved[j]:.3g} {unit}: one of the two is '
-                'dead. Record again, or leave velocities out if the positions are right',
-                'unusable',
-                recording.source,
-            )
+            why = f', while its position goes {moved[j]:.3g} {unit}: one of the two is dead'
+            remedy = 'record again, or leave velocities out if the positions are right'
+            value = f'{recording.dq[0, j] + 0.0:.4g} {unit}/s'
+            yield _stays(recording, j, 'velocity', value, (0, len(t)), why, remedy)
 
 
 def torque_faults(
@@ -202,7 +195,7 @@ def torque_faults(
         yield Fault(SILENT, 'unusable', recording.source)
         return
     t, least = recording.t, max(2, round(_LONG / recording.period))
-    for j, joint in enumerate(recording.joints):
+    for j in range(recording.n_joints):
         reading, q = recording.tau[:, j], recording.q[:, j]
         start, stop = _longest_same(reading, NOTHING)
         moved = float(np.ptp(q[start:stop])) > _FAR * float(np.ptp(q))
@@ -216,14 +209,10 @@ def torque_faults(
             load, weight = arm.load(part)[:, j], arm.load(part.at_rest())[:, j]
             largest = max(float(np.std(weight)), float(np.std(load - weight)))
             if float(np.std(load)) > _TAKEN * largest > 0.0:
-                when, remedy = _when(t, start, stop, 'record with the joint held still')
                 value = f'{reading[start] + 0.0:.4g} {arm.robot.torque_units[j]}'
-                yield Fault(
-                    f'the torque of {joint} stays at {value} {when} while the joint moves: its '
-                    f'channel is dead; {remedy}',
-                    'unusable',
-                    recording.source,
-                )
+                why = ' while the joint moves: its channel is dead'
+                remedy = 'record with the joint held still'
+                yield _stays(recording, j, 'torque', value, (start, stop), why, remedy)
                 break
 
 
@@ -264,11 +253,22 @@ def units_beyond_drives(
         )
 
 
-def _when(t: FloatArray, start: int, stop: int, always: str) -> tuple[str, str]:
-    """Describe when a channel is constant, and the remedy."""
-    if stop - start == len(t):
-        return 'throughout', always
-    return f'from {t[start]:.3f} s to {t[stop - 1]:.3f} s', 'leave that time out'
+def _stays(
+    recording: Recording,
+    joint: int,
+    what: str,
+    value: str,
+    run: tuple[int, int],
+    why: str,
+    always: str,
+) -> Fault:
+    """Return the fault of a channel that is constant for a run, and its remedy if it always is."""
+    when, remedy = 'throughout', always
+    if run != (0, len(recording)):
+        first, last = recording.t[run[0]], recording.t[run[1] - 1]
+        when, remedy = f'from {first:.3f} s to {last:.3f} s', 'leave that time out'
+    text = f'the {what} of {recording.joints[joint]} stays at {value} {when}{why}; {remedy}'
+    return Fault(text, 'unusable', recording.source)
 
 
 def _longest_same(reading: FloatArray, step: float = 0.0) -> tuple[int, int]:

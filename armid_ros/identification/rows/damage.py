@@ -7,7 +7,6 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import replace
 
-from armid_ros.identification.rows.row_noise import NOISE_OF_TORQUE
 from armid_ros.identification.rows.signals import Conditioning, conditioning, SignalSettings
 from armid_ros.identification.samples.joint_gate import joint_gate
 from armid_ros.identification.samples.spikes import FIRST, SpikeGate
@@ -16,6 +15,9 @@ from armid_ros.motion import FloatArray
 from armid_ros.recording import Recording
 import numpy as np
 import numpy.typing as npt
+
+#: Noise of a torque over the spread of that torque, assumed before any fit.
+_NOISE_OF_TORQUE = 0.01
 
 
 def without_damage(
@@ -60,7 +62,7 @@ def _damage(recording: Recording, used: Conditioning) -> tuple[str, npt.NDArray[
     middle = np.median(recording.tau, axis=0)
     spread = 1.4826 * np.median(np.abs(recording.tau - middle), axis=0)
     peak = float(np.max(used.taps()) / np.sum(used.taps()))
-    floor = np.concatenate([np.zeros(recording.n_joints), NOISE_OF_TORQUE * spread / peak])
+    floor = np.concatenate([np.zeros(recording.n_joints), _NOISE_OF_TORQUE * spread / peak])
     # angles of a recording are not wrapped
     gate = joint_gate([True] * recording.n_joints, 'qt')
     signals = np.hstack([recording.q, recording.tau])

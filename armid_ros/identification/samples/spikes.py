@@ -33,12 +33,14 @@ from collections.abc import Sequence
 from dataclasses import replace
 import math
 
-from armid_ros.identification.samples.noise_level import line_errors, LineErrors, NoiseLevel
 from armid_ros.identification.samples.straight_line import (
     all_unwrapped,
     Excursion,
+    line_errors,
+    LineErrors,
     Missed,
     missed_by,
+    NoiseLevel,
     StreamSample,
     unwrapped,
     Usual,
