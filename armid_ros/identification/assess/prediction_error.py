@@ -16,7 +16,7 @@ from dataclasses import dataclass, replace
 from armid_ros.identification.assess.grade_limits import FREEDOM, LIMITS
 from armid_ros.identification.fitting.excited import near_deviation
 from armid_ros.identification.fitting.normal_equations import within
-from armid_ros.identification.rows.checks import SLOW
+from armid_ros.identification.rows.checks import joined, SLOW
 from armid_ros.model import inverse_dynamics, regressor
 from armid_ros.motion import FloatArray, Motion
 from armid_ros.robots import Robot
@@ -83,10 +83,8 @@ def thinned(stretches: Sequence[Motion], rows: int) -> Motion | None:
     parts = [motion for motion in stretches if motion.tau is not None and len(motion) > 2]
     if not parts:
         return None
-    names = ('t', 'q', 'dq', 'ddq', 'tau')
-    arrays = [np.concatenate([getattr(part, name) for part in parts]) for name in names]
-    step = max(1, len(arrays[0]) // rows)
-    return Motion(parts[0].joints, *(array[::step] for array in arrays))
+    motion = joined(parts)
+    return motion.select(slice(None, None, max(1, len(motion) // rows)))
 
 
 def prediction_error(robot: Robot, motion: Motion, *, near: bool) -> PredictionError:

@@ -211,17 +211,14 @@ def driven_by_friction(robot: Robot, motions: Sequence[Motion]) -> str:
         Motions of the recordings, with torques.
 
     """
-    found = []
-    described = np.concatenate([inverse_dynamics(robot, motion) for motion in motions])
-    tau = _torques(motions)
+    found, whole = [], joined(motions)
+    assert whole.tau is not None
+    described = inverse_dynamics(robot, whole)
     for joint, name in enumerate(robot.joints):
-        q, dq, ddq = (
-            np.concatenate([getattr(motion, which)[:, joint] for motion in motions])
-            for which in ('q', 'dq', 'ddq')
-        )
+        q, dq, ddq, tau = (x[:, joint] for x in (whole.q, whole.dq, whole.ddq, whole.tau))
         weight = [np.ones(len(q)), np.sin(q), np.cos(q)]
         held = np.column_stack([*weight, ddq, described[:, joint]])
-        rest = residual_of_fit(np.column_stack([np.sign(dq), tau[:, joint]]), held)
+        rest = residual_of_fit(np.column_stack([np.sign(dq), tau]), held)
         size = float(np.sqrt(np.prod(np.sum(rest**2, axis=0))))
         if size > 0.0 and rest[:, 0] @ rest[:, 1] < -_CLEAR * size:
             found.append(name)
@@ -313,7 +310,9 @@ def torque_factors(arm: ArmModel, motions: Sequence[Motion]) -> tuple[FloatArray
     """
     slope, correlation = np.zeros((2, arm.robot.n_joints))
     predicted = np.concatenate([arm.torque(motion) for motion in motions])
-    measured, dq = _torques(motions), np.concatenate([motion.dq for motion in motions])
+    whole = joined(motions)
+    measured, dq = whole.tau, whole.dq
+    assert measured is not None
     moves = np.abs(dq) >= SLOW * np.abs(dq).max(axis=0)
     for joint in range(arm.robot.n_joints):
         pair = np.column_stack([predicted[:, joint], measured[:, joint]])
@@ -329,9 +328,11 @@ def torque_factors(arm: ArmModel, motions: Sequence[Motion]) -> tuple[FloatArray
     return slope, correlation
 
 
-def _torques(motions: Sequence[Motion]) -> FloatArray:
-    """Return the measured torques of motions, shape (N, n)."""
-    return np.concatenate([motion.tau for motion in motions if motion.tau is not None])
+def joined(motions: Sequence[Motion]) -> Motion:
+    """Return all samples of motions with torques, in order."""
+    names = ('t', 'q', 'dq', 'ddq', 'tau')
+    arrays = [np.concatenate([getattr(motion, name) for motion in motions]) for name in names]
+    return Motion(motions[0].joints, *arrays)
 
 
 def unit_of(

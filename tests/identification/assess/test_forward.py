@@ -20,7 +20,7 @@ def recording(arm):
 
 
 def test_the_true_arm_follows_its_own_torques(arm, recording):
-    score = forward_validation(arm, recording, USED)
+    score = forward_validation(arm, recording, USED, nominal=arm, duration=30.0)
     assert 1e3 * score.position_error.max() < 2.0
     assert score.torque_error.max() < 2e-3
     assert score.simulated.shape == score.motion.q.shape
@@ -32,7 +32,9 @@ def test_missing_friction_moves_the_arm_by_its_torque_over_the_stiffness(arm, re
     values = list(arm.values)
     values[1] = values[1] + np.array([0.1, 0, 0, 0, 0, 0])
     other = ArmModel(arm.robot, arm.effects, tuple(values))
-    scores = [forward_validation(a, recording, USED, nominal=arm) for a in (arm, other)]
+    scores = [
+        forward_validation(a, recording, USED, nominal=arm, duration=30.0) for a in (arm, other)
+    ]
     assert scores[1].position_error[0] > 5.0 * scores[0].position_error[0]
     assert 0.02 < scores[1].feedback_torque[0] < 0.2
 
@@ -41,4 +43,4 @@ def test_a_recording_too_short_is_refused(arm, recording):
     part = slice(0, 20)
     short = replace(recording, t=recording.t[part], q=recording.q[part], tau=recording.tau[part])
     with pytest.raises(IdentificationError, match='bag: no stretch'):
-        forward_validation(arm, short, USED)
+        forward_validation(arm, short, USED, nominal=arm, duration=30.0)
