@@ -13,7 +13,7 @@ masses; a factor of all torques is therefore judged with the body as described, 
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from operator import attrgetter
 from typing import NamedTuple
 
@@ -168,7 +168,7 @@ def find_mistake(robot: Robot, recording: Recording, used: Conditioning) -> Mist
     )
     if near is None or described is None or bare is None:
         return None
-    without = described.least(bare)
+    without = replace(described, joints=np.minimum(described.joints, bare.joints))
     # whether the residual with a fitted body alone is large enough to reveal a mistake
     alone = bool(100.0 * near.joints.max() >= LIMITS.poor)
     exact = PredictionError(np.zeros(robot.n_joints), without.torque)

@@ -11,7 +11,7 @@ or the most likely body near it.
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 from armid_ros.identification.assess.grade_limits import FREEDOM, LIMITS
 from armid_ros.identification.fitting.excited import near_deviation
@@ -72,10 +72,6 @@ class PredictionError:
         """Return the likelihood ratio without the prior of the bodies."""
         before, after = (np.clip(x.joints, LIMITS.floor, 1.0) for x in (self, better))
         return float(np.prod(before / after))
-
-    def least(self, other: PredictionError) -> PredictionError:
-        """Return the smaller one of two errors for every joint."""
-        return replace(self, joints=np.minimum(self.joints, other.joints))
 
 
 def thinned(stretches: Sequence[Motion], rows: int) -> Motion | None:
