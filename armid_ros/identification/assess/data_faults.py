@@ -116,7 +116,7 @@ def _mistaken(
     since = bool(before) and bool(np.any(_factors_since(arm, motions, before) > 0.0))
     for one, sources in shared_mistakes(arm.body, recordings, used):
         # with a baseline, a mistake that needs a fitted body is a change of the arm instead
-        known = before and (one.fitted or (since and one.hypotheses[0].kind == 'scale'))
+        known = before and (one.fitted or (since and one.hypotheses[0].of_masses))
         if len(sources) == len(recordings) and one.of_data and not known:
             return [one.text]
     return unit_faults(arm, motions, before)
@@ -228,14 +228,14 @@ def _described_friction(arm: ArmModel) -> list[str]:
     """Return a list with a note if the description states friction the model lacks."""
     robot = arm.robot
     there = {(effect.name, joint) for effect in arm.effects for joint in effect.joints}
+    kinds = [kind for kind in CATALOGUE.values() if kind.traits.urdf_attribute]
     stated = [
         joint
         for k, joint in enumerate(robot.joints)
         if any(
             getattr(robot, f'urdf_{kind.traits.urdf_attribute}')[k] > 0.0
             and (kind.name, joint) not in there
-            for kind in CATALOGUE.values()
-            if kind.traits.urdf_attribute
+            for kind in kinds
         )
     ]
     if not stated:

@@ -145,7 +145,7 @@ def _mistakes(
         if len(sources) < len(recordings):
             text = f'in {", ".join(dict.fromkeys(sources))}: {text}'
         error = 100.0 * float(worst.before.joints[worst.joint])
-        certain = error > LIMITS.unusable and not worst.hypotheses[0].disputable
+        certain = error > LIMITS.unusable and worst.hypotheses[0].kind != 'scale'
         faults.append(Fault(text, 'unusable' if certain else 'poor'))
     return faults
 

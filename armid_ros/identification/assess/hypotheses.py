@@ -35,9 +35,6 @@ _KNOWN = 0.3
 #: Correlation from which the factor of a joint is known: the residual is 15 % of torque or less.
 _CLEAR = 0.989
 
-Kind = Literal[
-    'nothing', 'body', 'gravity', 'scale', 'degrees', 'unit', 'sign', 'exchange', 'zero', 'delay'
-]
 Quantity = Literal['position', 'torque', 'position and torque']
 QUANTITIES: tuple[Quantity, ...] = ('position and torque', 'position', 'torque')
 
@@ -50,7 +47,8 @@ class Hypothesis:
     Attributes
     ----------
     kind : str
-        Kind of mistake.
+        Kind of mistake: body, gravity, scale (of all torques; units if it is that of a unit),
+        unit, degrees, sign, exchange, zero or delay.
     text : str
         Suspected mistake and remedy, without a full stop.
     motion : callable
@@ -63,29 +61,26 @@ class Hypothesis:
         Function that returns the description without the mistake.
     nearby : callable
         Function that returns neighbouring hypotheses in finer steps.
-    of_data : bool
-        Whether only the data, and no change of the arm, can explain it.
 
     """
 
-    kind: Kind
+    kind: str
     text: str
     motion: Callable[[Motion], Motion] = lambda motion: motion
     where: tuple[object, ...] = ()
     values: int = 1
     body: Callable[[Robot], Robot] = lambda robot: robot
     nearby: Callable[[], Sequence[Hypothesis]] = tuple
-    of_data: bool = False
 
     @property
     def of_masses(self) -> bool:
         """Whether a common factor of all masses explains the data as well."""
-        return self.kind in ('gravity', 'scale')
+        return self.kind in ('gravity', 'scale', 'units')
 
     @property
-    def disputable(self) -> bool:
-        """Whether other masses explain the data as well."""
-        return self.kind == 'scale' and not self.of_data
+    def of_data(self) -> bool:
+        """Whether only the data, and no change of the arm, can explain it."""
+        return self.kind in ('units', 'unit', 'degrees', 'sign', 'exchange')
 
 
 AS_RECORDED = Hypothesis('nothing', 'the data are as they should be', values=0)
@@ -150,7 +145,6 @@ def in_unit(robot: Robot, joint: int, unit: str) -> Hypothesis:
         'convert it',
         _times('torque', joint, 1.0 / TORQUE_UNITS[unit]),
         (joint, unit),
-        of_data=True,
     )
 
 
@@ -251,7 +245,7 @@ def _other_scale(robot: Robot, factor: float, motions: Sequence[Motion]) -> Hypo
         text += f'; for currents give --current-gain {gains}, as accurate as those masses'
         text += f'; that of {hidden} is not determined' if hidden else ''
     scaled = _times('torque', slice(None), 1.0 / factor)
-    return Hypothesis('scale', text, scaled, of_data=bool(unit))
+    return Hypothesis('units' if unit else 'scale', text, scaled)
 
 
 def _reversed(robot: Robot, joint: int, quantity: Quantity) -> Hypothesis:
@@ -260,7 +254,7 @@ def _reversed(robot: Robot, joint: int, quantity: Quantity) -> Hypothesis:
     if quantity == 'position and torque':
         text = f'position and torque of {name} seem to have the opposite sign: negate both'
     change = _times(quantity, joint, -1.0)
-    return Hypothesis('sign', text, change, (joint, quantity), of_data=True)
+    return Hypothesis('sign', text, change, (joint, quantity))
 
 
 def _exchanged(robot: Robot, first: int, second: int, quantity: Quantity) -> Hypothesis:
@@ -272,7 +266,6 @@ def _exchanged(robot: Robot, first: int, second: int, quantity: Quantity) -> Hyp
         'exchanged: check the names of the joints',
         lambda motion: _changed(motion, quantity, lambda values: values[:, order]),
         (first, second, quantity),
-        of_data=True,
     )
 
 
@@ -297,7 +290,7 @@ def _in_degrees(robot: Robot, joint: int | None = None) -> Hypothesis:
     if joint is not None:
         text = f'the position of {robot.joints[joint]} seems to be in degrees: convert it to rad'
     change = _times('position', slice(None) if joint is None else joint, np.deg2rad(1.0))
-    return Hypothesis('degrees', text, change, (joint,), of_data=True)
+    return Hypothesis('degrees', text, change, (joint,))
 
 
 def _beyond_masses(factor: float) -> bool:
