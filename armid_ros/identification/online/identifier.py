@@ -26,7 +26,7 @@ from armid_ros.identification.rows.causal import (
     RowNoise,
     TripleLag,
 )
-from armid_ros.identification.samples.joint_gate import joint_gate
+from armid_ros.identification.samples.spikes import SpikeGate
 from armid_ros.identification.samples.straight_line import StreamSample
 from armid_ros.model import BaseParameters
 from armid_ros.motion import FloatArray, Motion
@@ -147,7 +147,7 @@ class OnlineIdentifier:
             measured_velocity=settings.measured_velocity,
         )
         measured = 'qvt' if settings.measured_velocity else 'qt'
-        self._gate = joint_gate(
+        self._gate = SpikeGate(
             robot.prismatic,
             measured,
             torque_limit=robot.torque_limit,

@@ -8,7 +8,6 @@ from collections.abc import Sequence
 from dataclasses import replace
 
 from armid_ros.identification.rows.signals import conditioning, SignalSettings
-from armid_ros.identification.samples.joint_gate import joint_gate
 from armid_ros.identification.samples.spikes import FIRST, SpikeGate
 from armid_ros.identification.samples.straight_line import Excursion, StreamSample
 from armid_ros.motion import FloatArray
@@ -48,7 +47,7 @@ def without_damage(
             continue
         spread = 1.4826 * np.median(np.abs(tau - np.median(tau, axis=0)), axis=0)
         floor = np.concatenate([np.zeros(len(joints)), _NOISE_OF_TORQUE * spread / peak])
-        gate = joint_gate([True] * len(joints), 'qt')  # angles of a recording are not wrapped
+        gate = SpikeGate([True] * len(joints), 'qt')  # angles of a recording are not wrapped
         excursions = impossible_excursions(gate, t, np.hstack([recording.q, tau]), floor)
         damaged = [sample.t for one in excursions for sample in one.samples]
         good = ~np.isin(t, damaged)

@@ -215,11 +215,11 @@ class NoiseLevel:
     ----------
     count : int
         Number of signals m.
-    together : int, optional
+    together : int
         Largest number of samples that are added before `settle`.
-    finest : ndarray, shape (m,), or float
+    finest : ndarray, shape (m,)
         Best resolution of the signals.
-    onset : ndarray, shape (m,), or float
+    onset : ndarray, shape (m,)
         Assumed second derivative before the first motion, per second squared.
 
     Attributes
@@ -229,13 +229,7 @@ class NoiseLevel:
 
     """
 
-    def __init__(
-        self,
-        count: int,
-        together: int = 1,
-        finest: FloatArray | float = 0.0,
-        onset: FloatArray | float = 0.0,
-    ) -> None:
+    def __init__(self, count: int, together: int, finest: FloatArray, onset: FloatArray) -> None:
         self._finest, self._onset = finest, onset
         self.usual = Usual(np.inf, np.zeros(count), np.zeros(count))
         self._steps, self._most = np.full((_SEEN, count), np.inf), np.zeros(count)
