@@ -22,7 +22,9 @@ from armid_ros.identification.rows.checks import (
     check_motion,
     driven_by_friction,
     FOLLOWS,
+    joined,
     NEAR,
+    SLOW,
     torque_factors,
     TORQUE_UNITS,
     unit_of,
@@ -212,10 +214,12 @@ def _factors_since(
             then, follows = torque_factors(model, before)
             # a baseline that does not determine the model has an error larger than the torque
             # itself; rows at rest count, as friction holds a joint with no more torque
-            measured = np.concatenate([one.tau for one in before if one.tau is not None])
-            expected = np.concatenate([model.torque(one) for one in before])
-            off = np.mean(np.square(measured - then * expected), axis=0)
-            known = (then > 0.0) & (off < np.mean(np.square(measured), axis=0))
+            whole = joined(before)
+            assert whole.tau is not None
+            speed, expected = np.abs(whole.dq), np.concatenate([model.torque(x) for x in before])
+            size = np.mean(whole.tau**2, axis=0, where=speed >= SLOW * speed.max(axis=0))
+            off = np.mean(np.square(whole.tau - then * expected), axis=0)
+            known = (then > 0.0) & (off < size)
             slope = np.where(known, slope / np.where(known, then, 1.0), 0.0)
             correlation = np.minimum(correlation, follows)
         better = (correlation > np.maximum(best, FOLLOWS)) & (slope > 0.0)

@@ -143,7 +143,7 @@ def in_unit(robot: Robot, joint: int, unit: str) -> Hypothesis:
         'unit',
         f'the torque of {robot.joints[joint]} seems to be in {wrong} instead of {right}: '
         'convert it',
-        _times('torque', joint, 1.0 / TORQUE_UNITS[unit]),
+        _times(robot, 'torque', joint, 1.0 / TORQUE_UNITS[unit]),
         (joint, unit),
     )
 
@@ -244,7 +244,7 @@ def _other_scale(robot: Robot, factor: float, motions: Sequence[Motion]) -> Hypo
         hidden = ', '.join(robot.joints[k] for k in np.flatnonzero(~known))
         text += f'; for currents give --current-gain {gains}, as accurate as those masses'
         text += f'; that of {hidden} is not determined' if hidden else ''
-    scaled = _times('torque', slice(None), 1.0 / factor)
+    scaled = _times(robot, 'torque', slice(None), 1.0 / factor)
     return Hypothesis('units' if unit else 'scale', text, scaled)
 
 
@@ -253,18 +253,18 @@ def _reversed(robot: Robot, joint: int, quantity: Quantity) -> Hypothesis:
     text = f'the {quantity} of {name} seems to have the opposite sign: negate it'
     if quantity == 'position and torque':
         text = f'position and torque of {name} seem to have the opposite sign: negate both'
-    change = _times(quantity, joint, -1.0)
+    change = _times(robot, quantity, joint, -1.0)
     return Hypothesis('sign', text, change, (joint, quantity))
 
 
 def _exchanged(robot: Robot, first: int, second: int, quantity: Quantity) -> Hypothesis:
-    order = np.arange(robot.n_joints)
-    order[[first, second]] = order[[second, first]]
+    matrix = np.eye(robot.n_joints)
+    matrix[[first, second]] = matrix[[second, first]]
     return Hypothesis(
         'exchange',
         f'the {quantity} of {robot.joints[first]} and of {robot.joints[second]} seem to be '
         'exchanged: check the names of the joints',
-        lambda motion: _changed(motion, quantity, lambda values: values[:, order]),
+        _changed(quantity, matrix),
         (first, second, quantity),
     )
 
@@ -289,7 +289,7 @@ def _in_degrees(robot: Robot, joint: int | None = None) -> Hypothesis:
     text = 'the positions seem to be in degrees: convert them to rad'
     if joint is not None:
         text = f'the position of {robot.joints[joint]} seems to be in degrees: convert it to rad'
-    change = _times('position', slice(None) if joint is None else joint, np.deg2rad(1.0))
+    change = _times(robot, 'position', slice(None) if joint is None else joint, np.deg2rad(1.0))
     return Hypothesis('degrees', text, change, (joint,))
 
 
@@ -298,24 +298,25 @@ def _beyond_masses(factor: float) -> bool:
     return not 1.0 / LIMITS.torque_factor < factor < LIMITS.torque_factor
 
 
-def _times(quantity: Quantity, joint: int | slice, factor: float) -> Callable[[Motion], Motion]:
+def _times(
+    robot: Robot, quantity: Quantity, joint: int | slice, factor: float
+) -> Callable[[Motion], Motion]:
     """Return a function that multiplies a quantity of one or several joints."""
-
-    def scaled(values: FloatArray) -> FloatArray:
-        scale = np.ones(values.shape[1])
-        scale[joint] = factor
-        return values * scale
-
-    return lambda motion: _changed(motion, quantity, scaled)
+    scale = np.ones(robot.n_joints)
+    scale[joint] = factor
+    return _changed(quantity, np.diag(scale))
 
 
-def _changed(
-    motion: Motion, quantity: Quantity, change: Callable[[FloatArray], FloatArray]
-) -> Motion:
-    """Return a motion with a change of a quantity."""
-    if quantity != 'torque':
-        motion = replace(motion, q=change(motion.q), dq=change(motion.dq), ddq=change(motion.ddq))
-    if quantity != 'position':
-        assert motion.tau is not None
-        motion = motion.with_torque(change(motion.tau))
-    return motion
+def _changed(quantity: Quantity, matrix: FloatArray) -> Callable[[Motion], Motion]:
+    """Return a function that multiplies a quantity of all joints by a matrix."""
+
+    def changed(motion: Motion) -> Motion:
+        if quantity != 'torque':
+            q, dq, ddq = (x @ matrix for x in (motion.q, motion.dq, motion.ddq))
+            motion = replace(motion, q=q, dq=dq, ddq=ddq)
+        if quantity != 'position':
+            assert motion.tau is not None
+            motion = motion.with_torque(motion.tau @ matrix)
+        return motion
+
+    return changed
