@@ -23,7 +23,6 @@ ROOT = Path(__file__).parents[1]
 #: What explains gaps, finds faults of data and plans motions for a diagnosis, below armid_ros.
 BESIDE_THE_DIAGNOSIS = (
     'identification/assess/data_faults.py',
-    'identification/assess/joint_units.py',
     'identification/assess/sensor_faults.py',
     'identification/fitting/held_out.py',
     'identification/rows/signals.py',

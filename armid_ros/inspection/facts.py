@@ -14,7 +14,7 @@ from armid_ros.identification.assess.grade import beyond_noise, grade
 from armid_ros.identification.assess.grade_limits import LIMITS
 from armid_ros.identification.assess.sensor_faults import held_elsewhere, velocity_ratio
 from armid_ros.identification.rows.checks import FOLLOWS, torque_factors
-from armid_ros.identification.rows.period import least_change, parabola_minimum
+from armid_ros.identification.rows.period import find_period, mean_change, parabola_minimum
 from armid_ros.motion import FloatArray
 from armid_ros.recording import Recording
 from armid_ros.recording.recording import GAP_PERIODS
@@ -23,8 +23,6 @@ from armid_ros.robots import Robot
 import numpy as np
 from scipy.signal import savgol_filter
 
-#: Positions of successive periods differ by less than this share of their variation.
-_SAME = 0.03
 #: A joint slower than this share of its own top speed is at rest.
 _REST = 0.02
 #: A joint whose range is smaller than this is at rest [rad or m].
@@ -82,29 +80,20 @@ class Sampling:
 
 
 def find_repetition(recording: Recording) -> float | None:
-    """
-    Return the period of the motion [s]; None if the motion is not periodic.
-
-    For each lag, the change of positions over the lag is a mean square relative to their variance.
-    The stretch of about one lag with the least change counts, so a run-in at the beginning is
-    ignored. The period is the first lag with a small minimum.
-
-    """
+    """Return the period of the motion [s]; None if the motion is not periodic."""
     # at most 20 Hz and 3000 samples
     rate = min(20.0, 1.0 / recording.period, 3000 / max(recording.duration, 1e-9))
     t = np.arange(recording.t[0], recording.t[-1], 1.0 / rate)
-    varying = np.ptp(recording.q, axis=0) > STILL
+    varying = np.ptp(recording.q, axis=0) > 1e-3
     if len(t) < 40 or not varying.any():
         return None
     q = np.column_stack([np.interp(t, recording.t, column) for column in recording.q.T[varying]])
-    q = (q - q.mean(axis=0)) / q.std(axis=0)
-    lags = np.arange(max(2, int(rate)), int(0.6 * len(t)))
-    change = np.array([least_change(q, int(lag)) for lag in lags])
-    low = change < max(_SAME, (np.pi * 2 / rate) ** 2 / 4)
-    for k in range(1, len(lags) - 1):
-        if low[k] and change[k] <= change[k - 1] and change[k] <= change[k + 1]:
-            return float(lags[k] + parabola_minimum(*change[k - 1 : k + 2])) / rate
-    return None
+    found = find_period(t, q)
+    if found is None:
+        return None
+    lag, where = found
+    before, least, after = (mean_change(q, lag + shift, where) for shift in (-1, 0, 1))
+    return (lag + parabola_minimum(before, least, after)) / rate
 
 
 @dataclass(frozen=True)
@@ -273,8 +262,7 @@ def try_identification(robot: Robot, recording: Recording, rng: np.random.Genera
     except ArmidError as refusal:
         return TrialFit(refused=str(refusal))
     motions = [fit.motion for fit in result.training]
-    torques = [motion.tau for motion in motions if motion.tau is not None]
-    factors, correlation = torque_factors(robot, motions, torques)
+    factors, correlation = torque_factors(ArmModel(robot), motions)
     score = Score.of(result.training)
     errors = score.joint_relative_error_percent
     beyond = beyond_noise(errors, result.training, result.used)  # noise makes no model poor

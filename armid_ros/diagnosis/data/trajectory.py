@@ -113,7 +113,7 @@ class Trajectory:
     @cached_property
     def period(self) -> tuple[int, slice] | None:
         """Return the repeated period of the motion; see `find_period`."""
-        return find_period(self.motion)
+        return find_period(self.motion.t, self.motion.q)
 
     @property
     def torque(self) -> FloatArray:

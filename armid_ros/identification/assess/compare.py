@@ -91,24 +91,12 @@ def compare(before: ParameterFile, after: ParameterFile) -> Comparison:
     residuals = residual_changes(before.fit, after.fit)
     chance = CHANCE / sum((True, bool(places), bool(residuals)))
     chances = [_whole(sides, (first, second), shared, group)[2] for group in places]
-    changes = tuple(
-        ParameterChange(name, row[0], row[1], row[2], row[3], sure)
-        for name, row, sure in zip(
-            shared,
-            np.array([*(side.values for side in sides), *(side.std for side in sides)]).T.tolist(),
-            beyond_chance(_single_chances(*sides), chance),
-            strict=True,
-        )
-    )
-    found = tuple(
-        GroupChange('' if own[0].rigid else own[0].joint, own, p_value, sure)
-        for own, p_value, sure in zip(
-            [tuple(shared[k] for k in group) for group in places],
-            chances,
-            beyond_chance(chances, chance),
-            strict=True,
-        )
-    )
+    numbers = [*(side.values for side in sides), *(side.std for side in sides)]
+    sure = beyond_chance(_single_chances(*sides), chance)
+    changes = tuple(map(ParameterChange, shared, *(one.tolist() for one in numbers), sure))
+    members = [tuple(shared[k] for k in group) for group in places]
+    joints = ['' if own[0].rigid else own[0].joint for own in members]
+    found = tuple(map(GroupChange, joints, members, chances, beyond_chance(chances, chance)))
     rigid = [k for k, name in enumerate(shared) if name.rigid]
     load = None
     moved = any(changes[k].changed for k in rigid) or any(g.changed and not g.joint for g in found)

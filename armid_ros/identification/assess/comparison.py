@@ -4,7 +4,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from dataclasses import asdict, dataclass
 from math import isfinite
 from typing import Any, Literal
@@ -108,11 +107,6 @@ class LoadChange:
     p_value: float
     rivals: tuple[int, ...] = ()
 
-    def document(self) -> dict[str, Any]:
-        """Return the load as a document."""
-        center = None if self.center is None else self.center.tolist()
-        return {**asdict(self), 'center': center, 'rivals': list(self.rivals)}
-
 
 @dataclass(frozen=True)
 class ResidualChange:
@@ -145,10 +139,6 @@ class ResidualChange:
     p_value: float
     changed: bool = False
 
-    def document(self) -> dict[str, Any]:
-        """Return the residuals as a document."""
-        return asdict(self) | {'ratio': self.ratio if isfinite(self.ratio) else None}
-
 
 @dataclass(frozen=True)
 class NotCompared:
@@ -167,10 +157,6 @@ class NotCompared:
 
     parameter: ParameterName
     why: Literal['deviation', 'motion', 'effect', 'grouping']
-
-    def document(self) -> dict[str, str]:
-        """Return the parameter and the reason as a document."""
-        return {'name': self.parameter.name, 'joint': self.parameter.joint, 'why': self.why}
 
 
 @dataclass(frozen=True)
@@ -218,8 +204,30 @@ class Comparison:
 
     @property
     def factors(self) -> dict[str, float]:
-        """Return the factor by which each joint's values changed; see ``unit_factors``."""
-        return unit_factors(self.changes)
+        """
+        Return the factor, after over before, of each joint, if one factor fits nearly all values.
+
+        No load and no wear multiplies masses and friction of all joints by several times: the
+        torques of one result are in another unit, or are currents. Empty if no factor is found.
+
+        """
+        clear = [
+            (c.parameter.joint, c.after / c.before)
+            for c in self.changes
+            if abs(c.before) > _CLEAR * c.before_std and abs(c.after) > _CLEAR * c.after_std
+        ]
+        ratios = np.array([ratio for _, ratio in clear])
+        if len(ratios) < _FEWEST or np.mean(ratios > 0.0) < _MOST:
+            return {}
+        common = float(np.median(ratios))
+        near = np.abs(np.log(np.maximum(ratios / common, 1e-9))) < np.log(NEAR)
+        if 1.0 / LIMITS.torque_factor < common < LIMITS.torque_factor or np.mean(near) < _MOST:
+            return {}
+        joints = dict.fromkeys(joint for joint, _ in clear if joint)
+        return {
+            joint: float(np.median([ratio for of, ratio in clear if of == joint]))
+            for joint in joints
+        }
 
     @property
     def not_compared(self) -> tuple[NotCompared, ...]:
@@ -250,6 +258,9 @@ class Comparison:
             row = asdict(change)
             del row['parameter']['effect']
             parameters.append(row.pop('parameter') | row)
+        load, center = self.load, None
+        if load is not None:
+            center = None if load.center is None else load.center.tolist()
         return {
             'schema': SCHEMA,
             'before': self.before.source,
@@ -259,9 +270,12 @@ class Comparison:
                 asdict(group) | {'parameters': [one.name for one in group.parameters]}
                 for group in self.groups
             ],
-            'load': None if self.load is None else self.load.document(),
+            'load': load and asdict(load) | {'center': center, 'rivals': list(load.rivals)},
             'factors': self.factors,
-            'residuals': [one.document() for one in self.residuals],
+            'residuals': [
+                asdict(one) | {'ratio': one.ratio if isfinite(one.ratio) else None}
+                for one in self.residuals
+            ],
             'unusable': [
                 {'source': one.source, 'reason': one.fit.reason}
                 for one in self.unusable
@@ -269,33 +283,10 @@ class Comparison:
             ],
             'not_compared': len(self.not_compared),
             **{
-                name: [one.document() for one in getattr(self, name)]
+                name: [
+                    {'name': one.parameter.name, 'joint': one.parameter.joint, 'why': one.why}
+                    for one in getattr(self, name)
+                ]
                 for name in ('left_out', 'only_before', 'only_after')
             },
         }
-
-
-def unit_factors(changes: Sequence[ParameterChange]) -> dict[str, float]:
-    """
-    Return the factor, after over before, of each joint, if one factor fits nearly all values.
-
-    No load and no wear multiplies masses and friction of all joints by several times: the torques
-    of one result are in another unit, or are currents. Empty if no factor is found.
-
-    """
-    clear = [
-        (c.parameter.joint, c.after / c.before)
-        for c in changes
-        if abs(c.before) > _CLEAR * c.before_std and abs(c.after) > _CLEAR * c.after_std
-    ]
-    ratios = np.array([ratio for _, ratio in clear])
-    if len(ratios) < _FEWEST or np.mean(ratios > 0.0) < _MOST:
-        return {}
-    common = float(np.median(ratios))
-    near = np.abs(np.log(np.maximum(ratios / common, 1e-9))) < np.log(NEAR)
-    if 1.0 / LIMITS.torque_factor < common < LIMITS.torque_factor or np.mean(near) < _MOST:
-        return {}
-    joints = dict.fromkeys(joint for joint, _ in clear if joint)
-    return {
-        joint: float(np.median([ratio for of, ratio in clear if of == joint])) for joint in joints
-    }

@@ -15,27 +15,33 @@ from collections.abc import Iterator, Sequence
 from armid_ros.arm import ArmModel
 from armid_ros.effects import CATALOGUE
 from armid_ros.errors import IdentificationError
-from armid_ros.identification.assess.joint_units import (
-    factors_since,
-    unit_faults,
-    units_beyond_drives,
-)
-from armid_ros.identification.assess.mistakes import find_mistake, slow_motions
-from armid_ros.identification.assess.sensor_faults import sensor_faults
+from armid_ros.identification.assess.hypotheses import in_unit
+from armid_ros.identification.assess.mistakes import find_mistake, shared_mistakes, slow_motions
+from armid_ros.identification.assess.sensor_faults import sensor_faults, units_beyond_drives
 from armid_ros.identification.rows.checks import (
     check_motion,
     driven_by_friction,
-    wrong_sign,
+    FOLLOWS,
+    joined,
+    NEAR,
+    SLOW,
+    torque_factors,
+    TORQUE_UNITS,
+    unit_of,
 )
 from armid_ros.identification.rows.feedback import laws_of_controllers
 from armid_ros.identification.rows.regression import Stretch
 from armid_ros.identification.rows.signals import Conditioning
-from armid_ros.motion import Motion
+from armid_ros.motion import FloatArray, Motion
 from armid_ros.recording import Recording
 from armid_ros.robots import Robot
 import numpy as np
 import numpy.typing as npt
 
+#: Median factor of torques from which they are in other units; putting down a load makes less.
+_GAINS = 4.0
+#: Largest ratio of a factor since a baseline to that of a unit of force: masses cancel.
+_NEAR_SINCE = 1.05
 #: Ratio of a torque to the limit of its drive above which a note is given.
 _BEYOND = 1.5
 #: Share of samples at the largest value of a reading, above which it is clipped.
@@ -89,9 +95,8 @@ def check_data(
         for law in laws_of_controllers(arm.body, part.motion, part.informative)
     ]
     if alone and not faults:  # an arm that is tied to another machine may be driven by it
-        moved, torques = [part.motion for part in data], [part.tau for part in data]
-        driven = driven_by_friction(arm.robot, moved, torques)
-        faults += [wrong_sign(driven)] if driven else []
+        driven = driven_by_friction(arm.robot, [part.motion for part in data])
+        faults += [driven] if driven else []
     notes = [note for one in recordings for note in _extremes(arm.robot, one)]
     notes += [*_described_friction(arm), *(one.text for one in sensors)]
     try:
@@ -110,13 +115,13 @@ def _mistaken(
 ) -> list[str]:
     """Return the mistake that all recordings share, or otherwise joints in a wrong unit."""
     # with a baseline, the factor of all torques is found by comparison with it
-    since = bool(before) and bool(np.any(factors_since(arm, motions, before) > 0.0))
-    found = [find_mistake(arm.body, recording, used) for recording in recordings]
-    # with a baseline, a mistake that needs a fitted body is a change of the arm instead
-    of_data = [one for one in found if one and one.of_data and not (before and one.fitted)]
-    texts = {one.text for one in of_data if not (since and one.hypotheses[0].kind == 'scale')}
-    alike = len(of_data) == len(found) and len(texts) == 1
-    return list(texts) if alike else unit_faults(arm, motions, before)
+    since = bool(before) and bool(np.any(_factors_since(arm, motions, before) > 0.0))
+    for one, sources in shared_mistakes(arm.body, recordings, used):
+        # with a baseline, a mistake that needs a fitted body is a change of the arm instead
+        known = before and (one.fitted or (since and one.hypotheses[0].of_masses))
+        if len(sources) == len(recordings) and one.of_data and not known:
+            return [one.text]
+    return unit_faults(arm, motions, before)
 
 
 def mistaken_recordings(
@@ -147,18 +152,94 @@ def mistaken_recordings(
     return found
 
 
+def unit_faults(
+    arm: ArmModel, motions: Sequence[Motion], before: Sequence[Motion] = ()
+) -> list[str]:
+    """
+    Return notes on the unit of torques, by a model with friction or by a baseline.
+
+    A joint whose torque is mostly friction, such as a wrist, fits as well in any unit, as its
+    friction is fitted; see `mistakes`. A model with its friction, or a baseline, reveals the unit.
+    Wrong masses of a model are wrong in a baseline as well and cancel.
+
+    Parameters
+    ----------
+    arm : ArmModel
+        The model.
+    motions : sequence of Motion
+        Filtered motions with torque.
+    before : sequence of Motion
+        Filtered motions of a baseline, to which factors are relative. Without it, factors of
+        most joints may be due to wrong masses of the model and are no fault.
+
+    """
+    factors, robot = _factors_since(arm, motions, before), arm.robot
+    found = [
+        in_unit(robot, joint, unit).text
+        for joint, factor in enumerate(factors)
+        for unit, per in TORQUE_UNITS.items()
+        if per / NEAR < factor < per * NEAR
+    ]
+    if 2 * len(found) <= robot.n_joints and found:
+        return found
+    clear = np.flatnonzero(factors > 0.0).tolist()
+    if not before or len(clear) < min(2, robot.n_joints):
+        return []
+    typical = float(np.median(factors[clear]))
+    unit = unit_of(typical, factors[clear].tolist(), _NEAR_SINCE)
+    if not unit and 1.0 / _GAINS < typical < _GAINS:
+        return []
+    named = ', '.join(f'{factors[k]:.3g} in {robot.joints[k]}' for k in clear)
+    gains = ','.join(f'{1.0 / factor:.3g}' if factor > 0.0 else '?' for factor in factors)
+    remedy = (
+        f'{unit} if those of the baseline are in N m: convert them'
+        if unit
+        else 'other units than N m (currents? drivers change from one to the other with their '
+        f'version): convert each joint by its own gain, as with --current-gain {gains}'
+    )
+    return [f'torques are those of the baseline times {named}: one of the two is in {remedy}']
+
+
+def _factors_since(
+    arm: ArmModel, motions: Sequence[Motion], before: Sequence[Motion]
+) -> FloatArray:
+    """Return measured over modelled torques relative to a baseline, (n,); zero if not clear."""
+    best, factors = np.full((2, arm.robot.n_joints), 0.0)
+    if not motions:
+        return factors
+    # first the body, with friction and offset fitted; then the model with its own friction
+    for model in (ArmModel(arm.body), arm):
+        slope, correlation = torque_factors(model, motions)
+        if before:
+            then, follows = torque_factors(model, before)
+            # a baseline that does not determine the model has an error larger than the torque
+            # itself; rows at rest count, as friction holds a joint with no more torque
+            whole = joined(before)
+            assert whole.tau is not None
+            speed, expected = np.abs(whole.dq), np.concatenate([model.torque(x) for x in before])
+            size = np.mean(whole.tau**2, axis=0, where=speed >= SLOW * speed.max(axis=0))
+            off = np.mean(np.square(whole.tau - then * expected), axis=0)
+            known = (then > 0.0) & (off < size)
+            slope = np.where(known, slope / np.where(known, then, 1.0), 0.0)
+            correlation = np.minimum(correlation, follows)
+        better = (correlation > np.maximum(best, FOLLOWS)) & (slope > 0.0)
+        best = np.where(better, correlation, best)
+        factors = np.where(better, slope, factors)
+    return factors
+
+
 def _described_friction(arm: ArmModel) -> list[str]:
     """Return a list with a note if the description states friction the model lacks."""
     robot = arm.robot
     there = {(effect.name, joint) for effect in arm.effects for joint in effect.joints}
+    kinds = [kind for kind in CATALOGUE.values() if kind.traits.urdf_attribute]
     stated = [
         joint
         for k, joint in enumerate(robot.joints)
         if any(
             getattr(robot, f'urdf_{kind.traits.urdf_attribute}')[k] > 0.0
             and (kind.name, joint) not in there
-            for kind in CATALOGUE.values()
-            if kind.traits.urdf_attribute
+            for kind in kinds
         )
     ]
     if not stated:

@@ -18,9 +18,12 @@ from typing import get_args, NamedTuple
 
 from armid_ros.arm import ArmModel
 from armid_ros.identification.assess.grade_limits import by_error, LIMITS, Word
-from armid_ros.identification.assess.joint_units import units_beyond_drives
-from armid_ros.identification.assess.mistakes import find_mistake, Mistake
-from armid_ros.identification.assess.sensor_faults import Fault, sensor_faults
+from armid_ros.identification.assess.mistakes import shared_mistakes
+from armid_ros.identification.assess.sensor_faults import (
+    Fault,
+    sensor_faults,
+    units_beyond_drives,
+)
 from armid_ros.identification.identify import Identification
 from armid_ros.identification.rows.checks import moving
 from armid_ros.identification.rows.damage import without_damage
@@ -134,22 +137,15 @@ def _mistakes(
     result: Identification, description: ArmModel, recordings: Sequence[Recording]
 ) -> list[Fault]:
     """Return mistakes in the recordings: names, signs, units, zeros, delays, gravity."""
-    robot, used = description.body, result.used
-    alike: dict[tuple[object, ...], list[tuple[str, Mistake]]] = {}
-    settings = SignalSettings(used.cutoff_hz, used.decimation)
-    for recording in without_damage(recordings, settings)[0] if recordings else ():
-        mistake = find_mistake(robot, recording, used)
-        if mistake is not None:
-            kind = (mistake.hypotheses[0].kind, *mistake.hypotheses[0].where)
-            alike.setdefault(kind, []).append((recording.source, mistake))
+    settings = SignalSettings(result.used.cutoff_hz, result.used.decimation)
+    repaired = without_damage(recordings, settings)[0] if recordings else []
     faults = []
-    for found in alike.values():
-        worst = max((one for _, one in found), key=lambda one: float(one.before.joints.max()))
-        text = worst.sentence(robot)
-        if len(found) < len(recordings):
-            text = f'in {", ".join(dict.fromkeys(source for source, _ in found))}: {text}'
+    for worst, sources in shared_mistakes(description.body, repaired, result.used):
+        text = worst.sentence(description.body)
+        if len(sources) < len(recordings):
+            text = f'in {", ".join(dict.fromkeys(sources))}: {text}'
         error = 100.0 * float(worst.before.joints[worst.joint])
-        certain = error > LIMITS.unusable and not worst.hypotheses[0].disputable
+        certain = error > LIMITS.unusable and worst.hypotheses[0].kind != 'scale'
         faults.append(Fault(text, 'unusable' if certain else 'poor'))
     return faults
 

@@ -14,6 +14,7 @@ from dataclasses import dataclass, replace
 from itertools import combinations
 from typing import Literal
 
+from armid_ros.arm import ArmModel
 from armid_ros.identification.assess.grade_limits import LIMITS
 from armid_ros.identification.assess.prediction_error import common_values, thinned
 from armid_ros.identification.rows.checks import (
@@ -34,9 +35,6 @@ _KNOWN = 0.3
 #: Correlation from which the factor of a joint is known: the residual is 15 % of torque or less.
 _CLEAR = 0.989
 
-Kind = Literal[
-    'nothing', 'body', 'gravity', 'scale', 'degrees', 'unit', 'sign', 'exchange', 'zero', 'delay'
-]
 Quantity = Literal['position', 'torque', 'position and torque']
 QUANTITIES: tuple[Quantity, ...] = ('position and torque', 'position', 'torque')
 
@@ -49,7 +47,8 @@ class Hypothesis:
     Attributes
     ----------
     kind : str
-        Kind of mistake.
+        Kind of mistake: body, gravity, scale (of all torques; units if it is that of a unit),
+        unit, degrees, sign, exchange, zero or delay.
     text : str
         Suspected mistake and remedy, without a full stop.
     motion : callable
@@ -62,29 +61,26 @@ class Hypothesis:
         Function that returns the description without the mistake.
     nearby : callable
         Function that returns neighbouring hypotheses in finer steps.
-    of_data : bool
-        Whether only the data, and no change of the arm, can explain it.
 
     """
 
-    kind: Kind
+    kind: str
     text: str
     motion: Callable[[Motion], Motion] = lambda motion: motion
     where: tuple[object, ...] = ()
     values: int = 1
     body: Callable[[Robot], Robot] = lambda robot: robot
     nearby: Callable[[], Sequence[Hypothesis]] = tuple
-    of_data: bool = False
 
     @property
     def of_masses(self) -> bool:
         """Whether a common factor of all masses explains the data as well."""
-        return self.kind in ('gravity', 'scale')
+        return self.kind in ('gravity', 'scale', 'units')
 
     @property
-    def disputable(self) -> bool:
-        """Whether other masses explain the data as well."""
-        return self.kind == 'scale' and not self.of_data
+    def of_data(self) -> bool:
+        """Whether only the data, and no change of the arm, can explain it."""
+        return self.kind in ('units', 'unit', 'degrees', 'sign', 'exchange')
 
 
 AS_RECORDED = Hypothesis('nothing', 'the data are as they should be', values=0)
@@ -147,9 +143,8 @@ def in_unit(robot: Robot, joint: int, unit: str) -> Hypothesis:
         'unit',
         f'the torque of {robot.joints[joint]} seems to be in {wrong} instead of {right}: '
         'convert it',
-        _times('torque', joint, 1.0 / TORQUE_UNITS[unit]),
+        _times(robot, 'torque', joint, 1.0 / TORQUE_UNITS[unit]),
         (joint, unit),
-        of_data=True,
     )
 
 
@@ -182,7 +177,9 @@ def shifted(motion: Motion, seconds: float) -> Motion:
 
 def other_gravity(robot: Robot, vector: FloatArray) -> Hypothesis | None:
     """
-    Return the hypothesis of another gravity vector.
+    Return the hypothesis of another gravity vector, a known one if one is near.
+
+    The described length along any axis is known, too.
 
     Parameters
     ----------
@@ -200,18 +197,27 @@ def other_gravity(robot: Robot, vector: FloatArray) -> Hypothesis | None:
     """
     told = robot.gravity
     size, length = (float(np.linalg.norm(one)) for one in (told, vector))
-    far = LIMITS.gravity_change * max(size, 1.0) < np.linalg.norm(vector - told)
     turned = np.linalg.norm(vector / max(length, 1e-9) - told / max(size, 1e-9))
     weighs = length / size if size > 0.0 else np.inf
+    if np.linalg.norm(vector - told) <= LIMITS.gravity_change * max(size, 1.0):
+        return None
     # 24.8 m/s^2 is the gravity of Jupiter, the largest of a planet
-    if not (far and length < 24.8):
+    if length >= 24.8 or (turned <= LIMITS.gravity_change and not _beyond_masses(weighs)):
         return None
-    if turned <= LIMITS.gravity_change and not _beyond_masses(weighs):
-        return None
-    known, option = known_gravity(vector, told)
-    direction = ', '.join(
-        f'{part + 0.0:.3g}' for part in known / max(float(np.linalg.norm(known)), 1e-9)
-    )
+    known = {name: np.array(value) for name, value in GRAVITIES.items()}
+    for axis in size * np.concatenate([np.eye(3), -np.eye(3)]):
+        known.setdefault(','.join(f'{part:.3g}' for part in axis + 0.0), axis)
+    off = {
+        name: float(np.linalg.norm(vector - value)) / max(float(np.linalg.norm(value)), 1e-9)
+        for name, value in known.items()
+    }
+    option, nearest = min(off, key=off.__getitem__), vector
+    if off[option] < _KNOWN:
+        nearest = known[option]
+    else:
+        option = ','.join(f'{part:.3g}' for part in vector + 0.0)
+    along = nearest / max(float(np.linalg.norm(nearest)), 1e-9)
+    direction = ', '.join(f'{part + 0.0:.3g}' for part in along)
     return Hypothesis(
         'gravity',
         f'gravity seems to act along ({direction}) of the base with {length:.3g} m/s^2: '
@@ -221,41 +227,9 @@ def other_gravity(robot: Robot, vector: FloatArray) -> Hypothesis | None:
     )
 
 
-def known_gravity(vector: FloatArray, told: FloatArray) -> tuple[FloatArray, str]:
-    """
-    Return a gravity vector, or a known one near it, and its --gravity option.
-
-    Parameters
-    ----------
-    vector, told : ndarray, shape (3,)
-        Estimated and described gravity [m/s^2]; the described length along any axis is known too.
-
-    Returns
-    -------
-    vector : ndarray, shape (3,)
-        The nearest known vector, or the estimated one if none is near [m/s^2].
-    option : str
-        Argument of --gravity.
-
-    """
-    known = {name: np.array(value) for name, value in GRAVITIES.items()}
-    size = float(np.linalg.norm(told))
-    for axis in size * np.concatenate([np.eye(3), -np.eye(3)]):
-        known.setdefault(','.join(f'{part:.3g}' for part in axis + 0.0), axis)
-    off = {
-        name: float(np.linalg.norm(vector - value)) / max(float(np.linalg.norm(value)), 1e-9)
-        for name, value in known.items()
-    }
-    name = min(off, key=off.__getitem__)
-    if off[name] < _KNOWN:
-        return known[name], name
-    return vector, ','.join(f'{part:.3g}' for part in vector + 0.0)
-
-
 def _other_scale(robot: Robot, factor: float, motions: Sequence[Motion]) -> Hypothesis:
     """Return the hypothesis that efforts differ from N m by a factor: a unit, or currents."""
-    torques = [motion.tau for motion in motions if motion.tau is not None]
-    factors, correlation = torque_factors(robot, motions, torques)
+    factors, correlation = torque_factors(ArmModel(robot), motions)
     known = (correlation > _CLEAR) & (factors > 0.0)
     unit = unit_of(factor, factors[known].tolist())
     text = (
@@ -270,8 +244,8 @@ def _other_scale(robot: Robot, factor: float, motions: Sequence[Motion]) -> Hypo
         hidden = ', '.join(robot.joints[k] for k in np.flatnonzero(~known))
         text += f'; for currents give --current-gain {gains}, as accurate as those masses'
         text += f'; that of {hidden} is not determined' if hidden else ''
-    scaled = _times('torque', slice(None), 1.0 / factor)
-    return Hypothesis('scale', text, scaled, of_data=bool(unit))
+    scaled = _times(robot, 'torque', slice(None), 1.0 / factor)
+    return Hypothesis('units' if unit else 'scale', text, scaled)
 
 
 def _reversed(robot: Robot, joint: int, quantity: Quantity) -> Hypothesis:
@@ -279,20 +253,19 @@ def _reversed(robot: Robot, joint: int, quantity: Quantity) -> Hypothesis:
     text = f'the {quantity} of {name} seems to have the opposite sign: negate it'
     if quantity == 'position and torque':
         text = f'position and torque of {name} seem to have the opposite sign: negate both'
-    change = _times(quantity, joint, -1.0)
-    return Hypothesis('sign', text, change, (joint, quantity), of_data=True)
+    change = _times(robot, quantity, joint, -1.0)
+    return Hypothesis('sign', text, change, (joint, quantity))
 
 
 def _exchanged(robot: Robot, first: int, second: int, quantity: Quantity) -> Hypothesis:
-    order = np.arange(robot.n_joints)
-    order[[first, second]] = order[[second, first]]
+    matrix = np.eye(robot.n_joints)
+    matrix[[first, second]] = matrix[[second, first]]
     return Hypothesis(
         'exchange',
         f'the {quantity} of {robot.joints[first]} and of {robot.joints[second]} seem to be '
         'exchanged: check the names of the joints',
-        lambda motion: _changed(motion, quantity, lambda values: values[:, order]),
+        _changed(quantity, matrix),
         (first, second, quantity),
-        of_data=True,
     )
 
 
@@ -316,8 +289,8 @@ def _in_degrees(robot: Robot, joint: int | None = None) -> Hypothesis:
     text = 'the positions seem to be in degrees: convert them to rad'
     if joint is not None:
         text = f'the position of {robot.joints[joint]} seems to be in degrees: convert it to rad'
-    change = _times('position', slice(None) if joint is None else joint, np.deg2rad(1.0))
-    return Hypothesis('degrees', text, change, (joint,), of_data=True)
+    change = _times(robot, 'position', slice(None) if joint is None else joint, np.deg2rad(1.0))
+    return Hypothesis('degrees', text, change, (joint,))
 
 
 def _beyond_masses(factor: float) -> bool:
@@ -325,24 +298,25 @@ def _beyond_masses(factor: float) -> bool:
     return not 1.0 / LIMITS.torque_factor < factor < LIMITS.torque_factor
 
 
-def _times(quantity: Quantity, joint: int | slice, factor: float) -> Callable[[Motion], Motion]:
+def _times(
+    robot: Robot, quantity: Quantity, joint: int | slice, factor: float
+) -> Callable[[Motion], Motion]:
     """Return a function that multiplies a quantity of one or several joints."""
-
-    def scaled(values: FloatArray) -> FloatArray:
-        scale = np.ones(values.shape[1])
-        scale[joint] = factor
-        return values * scale
-
-    return lambda motion: _changed(motion, quantity, scaled)
+    scale = np.ones(robot.n_joints)
+    scale[joint] = factor
+    return _changed(quantity, np.diag(scale))
 
 
-def _changed(
-    motion: Motion, quantity: Quantity, change: Callable[[FloatArray], FloatArray]
-) -> Motion:
-    """Return a motion with a change of a quantity."""
-    if quantity != 'torque':
-        motion = replace(motion, q=change(motion.q), dq=change(motion.dq), ddq=change(motion.ddq))
-    if quantity != 'position':
-        assert motion.tau is not None
-        motion = motion.with_torque(change(motion.tau))
-    return motion
+def _changed(quantity: Quantity, matrix: FloatArray) -> Callable[[Motion], Motion]:
+    """Return a function that multiplies a quantity of all joints by a matrix."""
+
+    def changed(motion: Motion) -> Motion:
+        if quantity != 'torque':
+            q, dq, ddq = (x @ matrix for x in (motion.q, motion.dq, motion.ddq))
+            motion = replace(motion, q=q, dq=dq, ddq=ddq)
+        if quantity != 'position':
+            assert motion.tau is not None
+            motion = motion.with_torque(motion.tau @ matrix)
+        return motion
+
+    return changed

@@ -13,7 +13,7 @@ masses; a factor of all torques is therefore judged with the body as described, 
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from operator import attrgetter
 from typing import NamedTuple
 
@@ -96,6 +96,42 @@ class Mistake:
         )
 
 
+def shared_mistakes(
+    robot: Robot, recordings: Sequence[Recording], used: Conditioning
+) -> list[tuple[Mistake, tuple[str, ...]]]:
+    """
+    Find the mistakes in recordings, those of one kind and place together.
+
+    Parameters
+    ----------
+    robot : Robot
+        Robot of the description.
+    recordings : sequence of Recording
+        Data with torques.
+    used : Conditioning
+        Filters that the recordings are identified with.
+
+    Returns
+    -------
+    list of (Mistake, tuple of str)
+        The mistake in the recording with the largest error, and the sources of all of them.
+
+    """
+    alike: dict[tuple[object, ...], list[tuple[str, Mistake]]] = {}
+    for recording in recordings:
+        mistake = find_mistake(robot, recording, used)
+        if mistake is not None:
+            kind = (mistake.hypotheses[0].kind, *mistake.hypotheses[0].where)
+            alike.setdefault(kind, []).append((recording.source, mistake))
+    return [
+        (
+            max((one for _, one in found), key=lambda one: float(one.before.joints.max())),
+            tuple(source for source, _ in found),
+        )
+        for found in alike.values()
+    ]
+
+
 class _Row(NamedTuple):
     """A hypothesis with its errors and its likelihood ratios over their limits."""
 
@@ -132,7 +168,7 @@ def find_mistake(robot: Robot, recording: Recording, used: Conditioning) -> Mist
     )
     if near is None or described is None or bare is None:
         return None
-    without = described.least(bare)
+    without = replace(described, joints=np.minimum(described.joints, bare.joints))
     # whether the residual with a fitted body alone is large enough to reveal a mistake
     alone = bool(100.0 * near.joints.max() >= LIMITS.poor)
     exact = PredictionError(np.zeros(robot.n_joints), without.torque)

@@ -11,20 +11,22 @@ or the most likely body near it.
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 from armid_ros.identification.assess.grade_limits import FREEDOM, LIMITS
 from armid_ros.identification.fitting.excited import near_deviation
 from armid_ros.identification.fitting.normal_equations import within
+from armid_ros.identification.rows.checks import joined, SLOW
 from armid_ros.model import inverse_dynamics, regressor
 from armid_ros.motion import FloatArray, Motion
 from armid_ros.robots import Robot
 import numpy as np
+from scipy.stats import t as student
 
 #: Number of own columns of each joint: offset, viscous and Coulomb friction, drive inertia.
 _OWN = 4
-#: Share of its top speed below which a joint may be held by friction with any torque.
-SLOW = 0.05
+#: Number of blocks of a recording whose scores give the deviation; nine degrees of freedom.
+_BLOCKS = 10
 
 
 @dataclass(frozen=True)
@@ -71,20 +73,14 @@ class PredictionError:
         before, after = (np.clip(x.joints, LIMITS.floor, 1.0) for x in (self, better))
         return float(np.prod(before / after))
 
-    def least(self, other: PredictionError) -> PredictionError:
-        """Return the smaller one of two errors for every joint."""
-        return replace(self, joints=np.minimum(self.joints, other.joints))
-
 
 def thinned(stretches: Sequence[Motion], rows: int) -> Motion | None:
     """Concatenate stretches with torques, and keep about `rows` evenly spaced samples."""
     parts = [motion for motion in stretches if motion.tau is not None and len(motion) > 2]
     if not parts:
         return None
-    names = ('t', 'q', 'dq', 'ddq', 'tau')
-    arrays = [np.concatenate([getattr(part, name) for part in parts]) for name in names]
-    step = max(1, len(arrays[0]) // rows)
-    return Motion(parts[0].joints, *(array[::step] for array in arrays))
+    motion = joined(parts)
+    return motion.select(slice(None, None, max(1, len(motion) // rows)))
 
 
 def prediction_error(robot: Robot, motion: Motion, *, near: bool) -> PredictionError:
@@ -138,8 +134,6 @@ def common_values(motion: Motion, fixed: FloatArray, columns: FloatArray) -> Flo
     """
     Fit values that all joints share, such as gravity, with friction and drives as nuisance.
 
-    Joints are weighted by their residuals, down to the floor.
-
     Parameters
     ----------
     motion : Motion
@@ -160,36 +154,60 @@ def common_values(motion: Motion, fixed: FloatArray, columns: FloatArray) -> Flo
     scale = root_mean_square(motion.tau)[:, np.newaxis]
     both = np.concatenate([columns, rest], axis=2) / scale * weight
     own = _own_columns(motion) * weight
-    both = beside(own.transpose(1, 0, 2), both.transpose(1, 0, 2))
-    values, size = np.empty(0), np.ones(len(both))
-    # residuals of a pass give the weights of the next one
-    for _ in range(4):
-        stacked = (both / size[:, np.newaxis, np.newaxis]).reshape(-1, both.shape[2])
-        values = np.asarray(np.linalg.lstsq(stacked[:, :-1], stacked[:, -1], rcond=None)[0])
-        left = both[:, :, -1] - both[:, :, :-1] @ values
-        size = np.maximum(np.sqrt(np.mean(left**2, axis=1)), LIMITS.floor)
-    return values
+    return shared_values(own.transpose(1, 0, 2), both.transpose(1, 0, 2))[0]
 
 
-def beside(own: FloatArray, shared: FloatArray) -> FloatArray:
+def shared_values(
+    own: FloatArray, shared: FloatArray, near: FloatArray | None = None
+) -> tuple[FloatArray, FloatArray]:
     """
-    Project the own columns of each joint out of shared columns (Frisch and Waugh 1933).
+    Fit values that all joints share, with own values of each joint and bodies as nuisance.
+
+    Own columns are projected out (Frisch and Waugh 1933). Joints are weighted by their residuals,
+    down to the floor. The interval allows for residuals that are correlated in time or within a
+    joint (Liang and Zeger 1986): scores are summed over blocks of the recording, or over joints,
+    whichever sums vary more.
 
     Parameters
     ----------
     own : ndarray, shape (n, M, k)
-        Columns with a mean square of about one.
-    shared : ndarray, shape (n, M, c)
-        Columns to project.
+        Own columns of each joint, with a mean square of about one.
+    shared : ndarray, shape (n, M, c + 1)
+        Columns of the c values, and the torque that they explain, as shares of the torque.
+    near : ndarray, shape (n, M, b), optional
+        Columns of bodies near the description, in prior deviations.
 
     Returns
     -------
-    ndarray, shape (n, M, c)
+    values, half_width : ndarray, shape (c,)
+        The values, and the half-widths of their 95 % intervals.
 
     """
+    n, rows, bodies = len(own), own.shape[1], 0 if near is None else near.shape[2]
+    both = shared if near is None else np.concatenate([near, shared], axis=2)
     turned = own.transpose(0, 2, 1)
     normal = turned @ own + LIMITS.floor**2 * np.eye(own.shape[2])
-    return np.asarray(shared - own @ np.linalg.solve(normal, turned @ shared))
+    both = both - own @ np.linalg.solve(normal, turned @ both)
+    prior = np.diag((np.arange(both.shape[2] - 1) < bodies) * rows / FREEDOM)
+    values, inverse, size = np.empty(0), prior, np.ones(n)
+    columns, left = both[:, :, :-1], both[:, :, -1]
+    # residuals of a pass give the weights of the next one
+    for _ in range(4):
+        columns, target = (one / size[:, None, None] for one in (both[:, :, :-1], both[:, :, -1:]))
+        stacked = columns.reshape(n * rows, -1)
+        inverse = np.linalg.pinv(stacked.T @ stacked + prior, 1e-12, hermitian=True)
+        values = inverse @ (stacked.T @ target.ravel())
+        left = target[:, :, 0] - columns @ values
+        size = np.maximum(size * np.sqrt(np.mean(left**2, axis=1)), LIMITS.floor)
+    scores = (columns * left[:, :, np.newaxis]) @ inverse
+    blocks = np.stack([part.sum(axis=(0, 1)) for part in np.array_split(scores, _BLOCKS, axis=1)])
+    # standard deviation of the total of several sums; zero if there is only one
+    spreads = [
+        np.sqrt(np.sum(sums**2, axis=0) * len(sums) / max(len(sums) - 1, 1))
+        for sums in (blocks, scores.sum(axis=1))
+    ]
+    half = student.ppf(0.975, _BLOCKS - 1) * np.max(spreads, axis=0)
+    return values[bodies:], half[bodies:]
 
 
 def root_mean_square(columns: FloatArray) -> FloatArray:

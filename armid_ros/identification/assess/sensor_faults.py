@@ -54,6 +54,10 @@ _TOLERANCE = 0.05
 #: Smallest correlation of a velocity with that of its position, and largest ratio to the factor of
 #: a unit, for a velocity in that unit: half of its power is explained, and other units are far.
 _FOLLOWS, _NEAR = 0.7, 1.25
+#: Ratio of the median reading of a joint to the limit of its drive from which it is in another
+#: unit. The smallest factor of a unit is a hundred, of which this is half in the logarithm, and no
+#: drive gives as much.
+_BEYOND_DRIVE = 10.0
 _DEGREE = float(np.deg2rad(1.0))
 #: Ratios of velocities to those of the positions, and the fault that each indicates.
 _RATIOS = {
@@ -165,28 +169,21 @@ def encoder_faults(recording: Recording, units: Sequence[str] | None = None) -> 
     way = np.ptp(recording.q - recording.dq * (t - t[0])[:, np.newaxis], axis=0)
     changes = np.ptp(recording.dq, axis=0) > 0.0
     measured = bool(np.any((moved > REST_RANGE) & changes))  # or the driver sends no velocities
-    for j, (joint, unit) in enumerate(zip(recording.joints, units, strict=True)):
+    for j, unit in enumerate(units):
         start, stop = _longest_same(recording.q[:, j])
         # range of a joint at rest, plus a step of the encoder
         steps = np.abs(np.diff(recording.q[:, j]))
         hidden = REST_RANGE + (float(steps[steps > 0.0].min()) if steps.any() else 0.0)
         goes = _distance(t[start:stop], recording.dq[start:stop, j])
         if goes > hidden:
-            when, remedy = _when(t, start, stop, 'record again')
-            yield Fault(
-                f'the position of {joint} stays at {recording.q[start, j]:.4g} {unit} {when}, '
-                f'while its velocity goes {goes:.3g} {unit}: its encoder is dead; {remedy}',
-                'unusable',
-                recording.source,
-            )
+            why = f', while its velocity goes {goes:.3g} {unit}: its encoder is dead'
+            value = f'{recording.q[start, j]:.4g} {unit}'
+            yield _stays(recording, j, 'position', value, (start, stop), why, 'record again')
         if measured and moved[j] > REST_RANGE and not changes[j] and way[j] > _WAY * moved[j]:
-            yield Fault(
-                f'the velocity of {joint} stays at {recording.dq[0, j] + 0.0:.4g} {unit}/s '
-                f'throughout, while its position goes {moved[j]:.3g} {unit}: one of the two is '
-                'dead. Record again, or leave velocities out if the positions are right',
-                'unusable',
-                recording.source,
-            )
+            why = f', while its position goes {moved[j]:.3g} {unit}: one of the two is dead'
+            remedy = 'record again, or leave velocities out if the positions are right'
+            value = f'{recording.dq[0, j] + 0.0:.4g} {unit}/s'
+            yield _stays(recording, j, 'velocity', value, (0, len(t)), why, remedy)
 
 
 def torque_faults(
@@ -198,7 +195,7 @@ def torque_faults(
         yield Fault(SILENT, 'unusable', recording.source)
         return
     t, least = recording.t, max(2, round(_LONG / recording.period))
-    for j, joint in enumerate(recording.joints):
+    for j in range(recording.n_joints):
         reading, q = recording.tau[:, j], recording.q[:, j]
         start, stop = _longest_same(reading, NOTHING)
         moved = float(np.ptp(q[start:stop])) > _FAR * float(np.ptp(q))
@@ -212,22 +209,66 @@ def torque_faults(
             load, weight = arm.load(part)[:, j], arm.load(part.at_rest())[:, j]
             largest = max(float(np.std(weight)), float(np.std(load - weight)))
             if float(np.std(load)) > _TAKEN * largest > 0.0:
-                when, remedy = _when(t, start, stop, 'record with the joint held still')
                 value = f'{reading[start] + 0.0:.4g} {arm.robot.torque_units[j]}'
-                yield Fault(
-                    f'the torque of {joint} stays at {value} {when} while the joint moves: its '
-                    f'channel is dead; {remedy}',
-                    'unusable',
-                    recording.source,
-                )
+                why = ' while the joint moves: its channel is dead'
+                remedy = 'record with the joint held still'
+                yield _stays(recording, j, 'torque', value, (start, stop), why, remedy)
                 break
 
 
-def _when(t: FloatArray, start: int, stop: int, always: str) -> tuple[str, str]:
-    """Describe when a channel is constant, and the remedy."""
-    if stop - start == len(t):
-        return 'throughout', always
-    return f'from {t[start]:.3f} s to {t[stop - 1]:.3f} s', 'leave that time out'
+def units_beyond_drives(
+    robot: Robot, recordings: Sequence[Recording], motions: Sequence[Motion]
+) -> Iterator[str]:
+    """
+    Yield notes on torques in another unit, by the limits of the drives.
+
+    No note is given if most joints are beyond their limits, or if the described body needs as
+    much: then the limits of the description are wrong.
+
+    Parameters
+    ----------
+    robot : Robot
+        Robot of the description.
+    recordings : sequence of Recording
+        Recordings to check, with torques.
+    motions : sequence of Motion
+        Filtered motions of the recordings.
+
+    """
+    measured = [recording.tau for recording in recordings if recording.tau is not None]
+    if not measured or not motions:
+        return
+    usual = np.median(np.abs(np.concatenate(measured)), axis=0)
+    known = np.isfinite(robot.torque_limit) & (robot.torque_limit > 0.0)
+    beyond = known & (usual > _BEYOND_DRIVE * robot.torque_limit)
+    if 2 * np.sum(beyond) > np.sum(known):
+        return
+    needed = np.max([np.abs(inverse_dynamics(robot, one)).max(axis=0) for one in motions], axis=0)
+    for joint in np.flatnonzero(beyond & (needed < robot.torque_limit)).tolist():
+        limit, unit = robot.torque_limit[joint], robot.torque_units[joint]
+        yield (
+            f'the torque of {robot.joints[joint]} seems to be in another unit than {unit}: '
+            f'half of its readings are beyond {usual[joint]:.3g}, its drive gives '
+            f'{limit:.4g} {unit}. Convert it, or correct the limit in the description'
+        )
+
+
+def _stays(
+    recording: Recording,
+    joint: int,
+    what: str,
+    value: str,
+    run: tuple[int, int],
+    why: str,
+    always: str,
+) -> Fault:
+    """Return the fault of a channel that is constant for a run, and its remedy if it always is."""
+    when, remedy = 'throughout', always
+    if run != (0, len(recording)):
+        first, last = recording.t[run[0]], recording.t[run[1] - 1]
+        when, remedy = f'from {first:.3f} s to {last:.3f} s', 'leave that time out'
+    text = f'the {what} of {recording.joints[joint]} stays at {value} {when}{why}; {remedy}'
+    return Fault(text, 'unusable', recording.source)
 
 
 def _longest_same(reading: FloatArray, step: float = 0.0) -> tuple[int, int]:

@@ -117,8 +117,8 @@ def forward_validation(
     recording: Recording,
     used: Conditioning,
     *,
-    nominal: ArmModel | None = None,
-    duration: float = _LONGEST,
+    nominal: ArmModel,
+    duration: float,
 ) -> ForwardScore:
     """
     Simulate an arm in closed loop along a recording, driven by the recorded torques.
@@ -131,9 +131,8 @@ def forward_validation(
         Held-out data.
     used : Conditioning
         Filters of the identification.
-    nominal : ArmModel, optional
-        Model with the inertia matrix of the feedback, the same for all compared models; by default
-        the model itself.
+    nominal : ArmModel
+        Model with the inertia matrix of the feedback, the same for all compared models.
     duration : float
         At most this much of the first unbroken stretch is simulated [s].
 
@@ -155,7 +154,7 @@ def forward_validation(
         raise IdentificationError(f'{recording.source}: no stretch is long enough to be filtered')
     motion = motion.select(motion.t <= motion.t[0] + duration)
     reference = replace(motion, t=motion.t - motion.t[0])
-    feedback = LinearFeedback.of(nominal or arm, bandwidth=_BANDWIDTH, weighs=False)
+    feedback = LinearFeedback.of(nominal, bandwidth=_BANDWIDTH, weighs=False)
     controller = _RecordedTorque(reference, feedback)
     along = arm.along(reference)
     # limits so far away that no joint reaches them [rad or m]

@@ -19,9 +19,14 @@ from armid_ros.identification.online.checks import MissingSamples, StreamChecks
 from armid_ros.identification.online.learner import Learner, OnlineSettings
 from armid_ros.identification.online.nuisance_rows import Row
 from armid_ros.identification.online.recursive import check_forgetting, WeightedSample
-from armid_ros.identification.rows.causal import CausalFilter, CausalMotion, check_gap, TripleLag
-from armid_ros.identification.rows.row_noise import RowNoise
-from armid_ros.identification.samples.joint_gate import joint_gate
+from armid_ros.identification.rows.causal import (
+    CausalFilter,
+    CausalMotion,
+    check_gap,
+    RowNoise,
+    TripleLag,
+)
+from armid_ros.identification.samples.spikes import SpikeGate
 from armid_ros.identification.samples.straight_line import StreamSample
 from armid_ros.model import BaseParameters
 from armid_ros.motion import FloatArray, Motion
@@ -142,7 +147,7 @@ class OnlineIdentifier:
             measured_velocity=settings.measured_velocity,
         )
         measured = 'qvt' if settings.measured_velocity else 'qt'
-        self._gate = joint_gate(
+        self._gate = SpikeGate(
             robot.prismatic,
             measured,
             torque_limit=robot.torque_limit,

@@ -23,8 +23,7 @@ from armid_ros.identification.online.change_watch import ChangeSettings, ChangeW
 from armid_ros.identification.online.nuisance_rows import NuisanceRows, Row
 from armid_ros.identification.online.recursive import RecursiveLeastSquares
 from armid_ros.identification.online.robust_covariance import RobustCovariance
-from armid_ros.identification.rows.causal import ROW_RATE_RATIO
-from armid_ros.identification.rows.row_noise import sensor_noise
+from armid_ros.identification.rows.causal import ROW_RATE_RATIO, sensor_noise
 from armid_ros.model import BaseParameters
 from armid_ros.motion import FloatArray
 import numpy as np

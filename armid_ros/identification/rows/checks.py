@@ -8,7 +8,7 @@ from collections.abc import Iterable, Sequence
 
 from armid_ros.arm import ArmModel
 from armid_ros.errors import IdentificationError
-from armid_ros.identification.rows.feedback import laws_of_controllers
+from armid_ros.identification.rows.feedback import laws_of_controllers, residual_of_fit
 from armid_ros.identification.rows.regression import Regression
 from armid_ros.identification.rows.signals import Conditioning, no_stretch, segments
 from armid_ros.identification.rows.stamps import uneven_stamps
@@ -41,21 +41,25 @@ _CLEAR = 0.8
 FOLLOWS = 0.9
 #: Units of torque that are mistaken for N m, with their number per N m.
 TORQUE_UNITS = {'N mm': 1e3, 'N cm': 1e2, 'kN m': 1e-3}
+#: The same and degrees for radians; units of a force on a lever, which apply to all joints at
+#: once, as a torque of a single joint that is ten times as large may be due to a load.
+_UNITS_OF_ALL = {
+    **TORQUE_UNITS,
+    'N m times 57.3 (degrees against radians)': float(np.rad2deg(1.0)),
+    'kgf m': 1.0 / 9.80665,
+    'kgf cm': 100.0 / 9.80665,
+    'lbf in': 1.0 / 0.1129848,
+}
 #: Largest ratio between a factor of torques and the factor of their unit: masses of a description
 #: are wrong by less.
 NEAR = 1.5
-#: Units of a force on a lever, with their number per N m. They apply to all joints at once; a
-#: torque of a single joint that is ten times as large may be due to a load.
-_LEVER_UNITS = {'kgf m': 1.0 / 9.80665, 'kgf cm': 100.0 / 9.80665, 'lbf in': 1.0 / 0.1129848}
 #: The same ratio for units of force, which are near gains of currents: 10 N m/A is 1.02 kgf m/A.
 #: Wrong masses of a description change the factor of one joint about as much.
 _NEAR_FORCE = 1.2
-_UNITS_OF_JOINTS = {
-    **TORQUE_UNITS,
-    'N m times 57.3 (degrees against radians)': float(np.rad2deg(1.0)),
-}
 #: Unit of force of a prismatic joint that corresponds to each unit of torque.
 _FORCE_UNITS = {'N m': 'N', 'N mm': 'mN', 'N cm': 'cN', 'kN m': 'kN'}
+#: Share of its top speed below which a joint may be held by friction with any torque.
+SLOW = 0.05
 #: Message on absent torques.
 SILENT = 'the torque of every joint is constant; fill in effort'
 
@@ -164,8 +168,8 @@ def check_torque(
     source = recordings[0].source
     if len(silent) == robot.n_joints:
         raise IdentificationError(f'{source}: {SILENT}')
-    motions, torques = [part.motion for part in problem], [part.tau for part in problem]
-    slope, correlation = torque_factors(robot, motions, torques)
+    motions = [part.motion for part in problem]
+    slope, correlation = torque_factors(ArmModel(robot), motions)
     clear = np.abs(correlation) > FOLLOWS
     if np.sum(clear) >= min(2, robot.n_joints):
         factors = slope[clear]
@@ -181,9 +185,9 @@ def check_torque(
                     f'{source}: torques of {joints} are {factor:g} times what the description '
                     f'takes; they seem to be in {unit}: convert them to N m'
                 )
-    driven = driven_by_friction(robot, motions, torques)
+    driven = driven_by_friction(robot, motions)
     if driven:
-        raise IdentificationError(f'{source}: {wrong_sign(driven)}')
+        raise IdentificationError(f'{source}: {driven}')
     for part in problem:
         for law in laws_of_controllers(robot, part.motion, part.informative):
             raise IdentificationError(f'{part.source or "recording"}: {law}')
@@ -192,19 +196,9 @@ def check_torque(
     return ()
 
 
-def wrong_sign(joints: Sequence[str]) -> str:
-    """Return the error on joints with negative friction power."""
-    return (
-        f'the torque of {", ".join(joints)} has the opposite sign of friction. Negate it '
-        '(positive is along the URDF joint axis), or somebody moved the arm'
-    )
-
-
-def driven_by_friction(
-    robot: Robot, motions: Sequence[Motion], torques: Sequence[FloatArray]
-) -> list[str]:
+def driven_by_friction(robot: Robot, motions: Sequence[Motion]) -> str:
     """
-    Return the joints whose torque clearly has the opposite sign of friction.
+    Return an error on joints whose torque clearly has the opposite sign of friction, or ''.
 
     Described torque, weight and inertia are fitted per joint and subtracted. The residual of a
     wrist is friction, which alone reveals the sign of its torque.
@@ -214,31 +208,26 @@ def driven_by_friction(
     robot : Robot
         The description.
     motions : sequence of Motion
-        Motions of the recordings.
-    torques : sequence of ndarray, shape (N, n)
-        Measured torques [N m].
+        Motions of the recordings, with torques.
 
     """
-    found = []
-    described = np.concatenate([inverse_dynamics(robot, motion) for motion in motions])
-    tau = np.concatenate(torques)
+    found, whole = [], joined(motions)
+    assert whole.tau is not None
+    described = inverse_dynamics(robot, whole)
     for joint, name in enumerate(robot.joints):
-        q, dq, ddq = (
-            np.concatenate([getattr(motion, which)[:, joint] for motion in motions])
-            for which in ('q', 'dq', 'ddq')
-        )
+        q, dq, ddq, tau = (x[:, joint] for x in (whole.q, whole.dq, whole.ddq, whole.tau))
         weight = [np.ones(len(q)), np.sin(q), np.cos(q)]
         held = np.column_stack([*weight, ddq, described[:, joint]])
-        rest = _rest(np.column_stack([np.sign(dq), tau[:, joint]]), held)
+        rest = residual_of_fit(np.column_stack([np.sign(dq), tau]), held)
         size = float(np.sqrt(np.prod(np.sum(rest**2, axis=0))))
         if size > 0.0 and rest[:, 0] @ rest[:, 1] < -_CLEAR * size:
             found.append(name)
-    return found
-
-
-def _rest(values: FloatArray, nuisance: FloatArray) -> FloatArray:
-    """Return the residual of a least-squares fit of values by nuisance columns, shape (N, K)."""
-    return np.asarray(values - nuisance @ np.linalg.lstsq(nuisance, values, rcond=None)[0])
+    if not found:
+        return ''
+    return (
+        f'the torque of {", ".join(found)} has the opposite sign of friction. Negate it '
+        '(positive is along the URDF joint axis), or somebody moved the arm'
+    )
 
 
 def check_positions(robot: Robot, source: str, lowest: FloatArray, highest: FloatArray) -> None:
@@ -299,43 +288,56 @@ def beyond_limits(robot: Robot, recordings: Sequence[Recording]) -> tuple[str, .
     )
 
 
-def torque_factors(
-    robot: Robot, motions: Sequence[Motion], torques: Sequence[FloatArray]
-) -> tuple[FloatArray, FloatArray]:
+def torque_factors(arm: ArmModel, motions: Sequence[Motion]) -> tuple[FloatArray, FloatArray]:
     """
-    Regress measured torques on those of a description, after friction and offset are removed.
+    Regress measured torques on those of a model, after an offset is removed.
+
+    If the model has no effects, friction is removed as well. Otherwise only samples in motion
+    count, as friction holds a joint at rest with any torque.
 
     Parameters
     ----------
-    robot : Robot
-        The description.
+    arm : ArmModel
+        The model, or the described body alone.
     motions : sequence of Motion
-        The data.
-    torques : sequence of ndarray, shape (N, n)
-        Measured torques [N m].
+        The data, with torques.
 
     Returns
     -------
     factor, correlation : ndarray, shape (n,)
-        Measured torque per described torque, and their correlation; 0 where there is no torque.
+        Measured torque per modelled torque, and their correlation; 0 where there is no torque.
 
     """
-    slope, correlation = np.zeros((2, robot.n_joints))
-    predicted = np.concatenate([inverse_dynamics(robot, motion) for motion in motions])
-    measured = np.concatenate(torques)
-    dq = np.concatenate([motion.dq for motion in motions])
-    for joint in range(robot.n_joints):
-        nuisance = np.column_stack([np.ones(len(dq)), dq[:, joint], np.sign(dq[:, joint])])
+    slope, correlation = np.zeros((2, arm.robot.n_joints))
+    predicted = np.concatenate([arm.torque(motion) for motion in motions])
+    whole = joined(motions)
+    measured, dq = whole.tau, whole.dq
+    assert measured is not None
+    moves = np.abs(dq) >= SLOW * np.abs(dq).max(axis=0)
+    for joint in range(arm.robot.n_joints):
         pair = np.column_stack([predicted[:, joint], measured[:, joint]])
-        rest = _rest(pair, nuisance)
-        product, own = rest[:, 0] @ rest[:, 1], rest[:, 0] @ rest[:, 0]
-        if own > 0.0 and rest[:, 1] @ rest[:, 1] > 0.0:
+        speed = dq[:, joint]
+        friction = [] if arm.effects else [speed, np.sign(speed)]
+        nuisance = np.column_stack([np.ones(len(dq)), *friction])
+        rows = moves[:, joint] if arm.effects else slice(None)
+        rest = residual_of_fit(pair[rows], nuisance[rows])
+        product, own, other = (float(rest[:, a] @ rest[:, b]) for a, b in ((0, 1), (0, 0), (1, 1)))
+        if own > 0.0 and other > 0.0:
             slope[joint] = product / own
-            correlation[joint] = product / np.sqrt(own * (rest[:, 1] @ rest[:, 1]))
+            correlation[joint] = product / np.sqrt(own * other)
     return slope, correlation
 
 
-def unit_of(factor: float, of_joints: Sequence[float] = ()) -> str:
+def joined(motions: Sequence[Motion]) -> Motion:
+    """Return all samples of motions with torques, in order."""
+    names = ('t', 'q', 'dq', 'ddq', 'tau')
+    arrays = [np.concatenate([getattr(motion, name) for motion in motions]) for name in names]
+    return Motion(motions[0].joints, *arrays)
+
+
+def unit_of(
+    factor: float, of_joints: Sequence[float] = (), near_force: float = _NEAR_FORCE
+) -> str:
     """
     Return the units that explain torques too large by a factor, joined by 'or'; '' if none.
 
@@ -345,30 +347,16 @@ def unit_of(factor: float, of_joints: Sequence[float] = ()) -> str:
         Factor of the torques of all joints together.
     of_joints : sequence of float
         Factors of single joints. A unit has to fit each of them; gains of currents differ.
-
-    """
-    fitting = [set(units_near(one)) for one in of_joints]
-    return ' or '.join(u for u in units_near(factor) if all(u in units for units in fitting))
-
-
-def units_near(factor: float, near_force: float = _NEAR_FORCE) -> dict[str, float]:
-    """
-    Return the possible units of torques with their factors, the nearest first.
-
-    Parameters
-    ----------
-    factor : float
-        Factor by which torques are too large.
     near_force : float
-        Largest ratio between the factor and that of a unit of force on a lever.
+        Largest ratio between a factor and that of a unit of force on a lever.
 
     """
     if factor <= 0.0:
-        return {}
-    known = {**_UNITS_OF_JOINTS, **_LEVER_UNITS}
-    off = {
-        unit: abs(float(np.log(factor / per))) / float(np.log(near))
-        for units, near in ((_UNITS_OF_JOINTS, NEAR), (_LEVER_UNITS, near_force))
-        for unit, per in units.items()
-    }
-    return {unit: known[unit] for unit in sorted(off, key=off.__getitem__) if off[unit] < 1.0}
+        return ''
+    off = {}
+    for unit, per in _UNITS_OF_ALL.items():
+        near = np.log(near_force if unit.startswith(('kgf', 'lbf')) else NEAR)
+        apart = np.abs(np.log(np.array([factor, *of_joints]) / per)) / near
+        if np.all(apart < 1.0):
+            off[unit] = float(apart[0])
+    return ' or '.join(sorted(off, key=off.__getitem__))

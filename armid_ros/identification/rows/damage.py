@@ -7,15 +7,17 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import replace
 
-from armid_ros.identification.rows.row_noise import NOISE_OF_TORQUE
-from armid_ros.identification.rows.signals import Conditioning, conditioning, SignalSettings
-from armid_ros.identification.samples.joint_gate import joint_gate
+from armid_ros.identification.rows.signals import conditioning, SignalSettings
 from armid_ros.identification.samples.spikes import FIRST, SpikeGate
 from armid_ros.identification.samples.straight_line import Excursion, StreamSample
 from armid_ros.motion import FloatArray
 from armid_ros.recording import Recording
 import numpy as np
-import numpy.typing as npt
+
+#: Noise of a torque over the spread of that torque, assumed before any fit.
+_NOISE_OF_TORQUE = 0.01
+#: Number of damaged samples that a note names.
+_NAMED = 3
 
 
 def without_damage(
@@ -36,51 +38,39 @@ def without_damage(
 
     """
     used = conditioning(list(recordings), settings)
+    peak = float(np.max(used.taps()) / np.sum(used.taps()))
     repaired, found = [], []
     for recording in recordings:
-        one = ''
-        if recording.tau is not None and len(recording) > 2:
-            one, bad = _damage(recording, used)
-        if one:
-            found.append(one)
-            t, good = recording.t, ~bad
-            q, dq, tau = (
-                x if x is None else np.column_stack([np.interp(t, t[good], c[good]) for c in x.T])
-                for x in (recording.q, recording.dq, recording.tau)
-            )
-            assert q is not None
-            recording = replace(recording, q=q, dq=dq, tau=tau)
         repaired.append(recording)
+        t, tau, joints = recording.t, recording.tau, recording.joints
+        if tau is None or len(t) <= 2:
+            continue
+        spread = 1.4826 * np.median(np.abs(tau - np.median(tau, axis=0)), axis=0)
+        floor = np.concatenate([np.zeros(len(joints)), _NOISE_OF_TORQUE * spread / peak])
+        gate = SpikeGate([True] * len(joints), 'qt')  # angles of a recording are not wrapped
+        excursions = impossible_excursions(gate, t, np.hstack([recording.q, tau]), floor)
+        damaged = [sample.t for one in excursions for sample in one.samples]
+        good = ~np.isin(t, damaged)
+        if not damaged or not good.any():
+            continue
+        names = [f'{what} of {joint}' for what in ('position', 'effort') for joint in joints]
+        named = [
+            f'{names[int(np.argmax(one.off))]} at {sample.t:.3f} s'
+            for one in excursions
+            for sample in one.samples
+        ]
+        named[_NAMED:] = ['...'] if len(damaged) > _NAMED else []
+        what = '1 sample jumps and comes back; it was'
+        if len(damaged) > 1:
+            what = f'{len(damaged)} samples jump and come back; they were'
+        found.append(f'{recording.source}: {what} interpolated across: {", ".join(named)}')
+        q, dq, tau = (
+            x if x is None else np.column_stack([np.interp(t, t[good], c[good]) for c in x.T])
+            for x in (recording.q, recording.dq, tau)
+        )
+        assert q is not None
+        repaired[-1] = replace(recording, q=q, dq=dq, tau=tau)
     return repaired, tuple(found)
-
-
-def _damage(recording: Recording, used: Conditioning) -> tuple[str, npt.NDArray[np.bool_]]:
-    """Return a note on the damage of a recording, and the mask of damaged samples, (N,)."""
-    assert recording.tau is not None
-    middle = np.median(recording.tau, axis=0)
-    spread = 1.4826 * np.median(np.abs(recording.tau - middle), axis=0)
-    peak = float(np.max(used.taps()) / np.sum(used.taps()))
-    floor = np.concatenate([np.zeros(recording.n_joints), NOISE_OF_TORQUE * spread / peak])
-    # angles of a recording are not wrapped
-    gate = joint_gate([True] * recording.n_joints, 'qt')
-    signals = np.hstack([recording.q, recording.tau])
-    excursions = impossible_excursions(gate, recording.t, signals, floor)
-    names = [f'{what} of {joint}' for what in ('position', 'effort') for joint in recording.joints]
-    worst = [
-        f'{names[int(np.argmax(one.off))]} at {sample.t:.3f} s'
-        for one in excursions
-        for sample in one.samples
-    ]
-    damaged = [sample.t for one in excursions for sample in one.samples]
-    bad = np.isin(recording.t, damaged)
-    if not excursions or bad.all():
-        return '', bad
-    what = '1 sample jumps and comes back; it was'
-    if len(damaged) > 1:
-        what = f'{len(damaged)} samples jump and come back; they were'
-    most = 3  # samples that the note names
-    named = ', '.join((*worst[:most], *(['...'] if len(damaged) > most else [])))
-    return f'{recording.source}: {what} interpolated across: {named}', bad
 
 
 def impossible_excursions(

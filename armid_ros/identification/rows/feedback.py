@@ -101,5 +101,9 @@ def _left(law: FloatArray, torque: FloatArray) -> float | None:
     rank = int(np.linalg.matrix_rank(law)) if len(law) else 0
     if len(law) < _ROWS_PER_COLUMN * max(rank, 1):
         return None
-    rest = torque - law @ np.linalg.lstsq(law, torque, rcond=None)[0]
-    return float(np.sqrt(np.sum(rest**2) / (len(law) - rank)))
+    return float(np.sqrt(np.sum(residual_of_fit(torque, law) ** 2) / (len(law) - rank)))
+
+
+def residual_of_fit(values: FloatArray, columns: FloatArray) -> FloatArray:
+    """Return the residual of a least-squares fit of values by columns, shape (N, ...)."""
+    return np.asarray(values - columns @ np.linalg.lstsq(columns, values, rcond=None)[0])

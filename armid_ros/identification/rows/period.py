@@ -4,7 +4,7 @@
 
 from __future__ import annotations
 
-from armid_ros.motion import FloatArray, Motion
+from armid_ros.motion import FloatArray
 import numpy as np
 
 #: Positions of two periods agree within this share of the range of motion.
@@ -13,13 +13,18 @@ _SAME = 0.02
 #: after any lag, but hardly moves by one unit in it. Of 108 recordings of 17 arms, 30 % more or
 #: less changes none.
 _FARTHER = 3.0
-#: Smallest variance of positions in a compared window, as a share of that of the whole motion.
-_MOVING = 0.3
 
 
-def find_period(motion: Motion) -> tuple[int, slice] | None:
+def find_period(t: FloatArray, positions: FloatArray) -> tuple[int, slice] | None:
     """
     Find a repeated period in the positions of a motion.
+
+    Parameters
+    ----------
+    t : ndarray, shape (N,)
+        Times at even steps [s].
+    positions : ndarray, shape (N, n)
+        Positions [rad or m].
 
     Returns
     -------
@@ -29,9 +34,9 @@ def find_period(motion: Motion) -> tuple[int, slice] | None:
         Samples that are repeated one period later.
 
     """
-    rate = 1.0 / float(motion.t[1] - motion.t[0])
+    rate = 1.0 / float(t[1] - t[0])
     stride = max(1, int(rate / 25.0))
-    q = motion.q[::stride]
+    q = positions[::stride]
     size = np.ptp(q, axis=0)
     if not np.any(size > 0.0):
         return None
@@ -57,43 +62,17 @@ def find_period(motion: Motion) -> tuple[int, slice] | None:
     if best is None:
         return None
     lag, start, stop = (value * stride for value in best)
-    part = slice(start, min(stop, len(motion) - lag - stride))
+    part = slice(start, min(stop, len(t) - lag - stride))
     lags = range(max(1, lag - 2 * stride), lag + 2 * stride + 1)
-    errors = []
-    for shift in lags:
-        end = min(part.stop, len(motion) - shift)
-        gap = motion.q[part.start + shift : end + shift] - motion.q[part.start : end]
-        errors.append(float(np.mean(gap**2)))
-    lag = lags[int(np.argmin(errors))]
-    return lag, slice(part.start, min(part.stop, len(motion) - lag))
+    lag = lags[int(np.argmin([mean_change(positions, shift, part) for shift in lags]))]
+    return lag, slice(part.start, min(part.stop, len(t) - lag))
 
 
-def least_change(q: FloatArray, lag: int) -> float:
-    """
-    Return the least mean square change of positions after a lag; infinite if all joints rest.
-
-    Parameters
-    ----------
-    q : ndarray, shape (N, n)
-        Positions, of zero mean and unit deviation.
-    lag : int
-        Lag in samples.
-
-    """
-    width = min(int(0.8 * lag), len(q) - lag)  # positions are compared over this share of a period
-    change = np.mean((q[lag:] - q[:-lag]) ** 2, axis=1) / 2.0
-    first, second = (_window_means(values[: len(change)], width) for values in (q, q**2))
-    spread = np.mean(second - first**2, axis=1)
-    moving = spread > _MOVING
-    if not moving.any():
-        return np.inf
-    return float(np.min(_window_means(change[:, np.newaxis], width)[moving, 0] / spread[moving]))
-
-
-def _window_means(values: FloatArray, width: int) -> FloatArray:
-    """Return the means of all windows of a width, shape (N - width + 1, k)."""
-    sums = np.cumsum(np.vstack([np.zeros((1, values.shape[1])), values]), axis=0)
-    return np.asarray((sums[width:] - sums[:-width]) / width)
+def mean_change(positions: FloatArray, lag: int, where: slice) -> float:
+    """Return the mean square change of positions (N, n) after a lag, from some samples on."""
+    end = min(where.stop, len(positions) - lag)
+    gap = positions[where.start + lag : end + lag] - positions[where.start : end]
+    return float(np.mean(gap**2))
 
 
 def parabola_minimum(before: float, least: float, after: float) -> float:

@@ -16,7 +16,6 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from functools import partial
-from typing import NamedTuple
 
 from armid_ros.arm import ArmModel
 from armid_ros.identification.rows.signals import (
@@ -159,9 +158,8 @@ def regressions(
     result = []
     for recording in recordings:
         for motion in segments(recording, used):
-            decimated, informative = _rows(arm, motion, used)
             stacked = filtered_columns(arm, columns, motion, used, tick)
-            result.append(Regression(recording.source, decimated, informative, stacked))
+            result.append(Regression(recording.source, *_rows(arm, motion, used), stacked))
     return result
 
 
@@ -248,9 +246,8 @@ def predictions(arm: ArmModel, recordings: Sequence[Recording], used: Conditioni
     found = []
     for recording in recordings:
         for motion in segments(recording, used):
-            rows, informative = _rows(arm, motion, used)
             torque = filtered_torque(arm, motion, used)
-            found.append(Fit(recording.source, rows, informative, torque))
+            found.append(Fit(recording.source, *_rows(arm, motion, used), torque))
     return found
 
 
@@ -263,9 +260,7 @@ def filtered_torque(arm: ArmModel, motion: Motion, used: Conditioning) -> FloatA
     ndarray, shape (M, n)
 
     """
-    local, first = all(effect.instantaneous for effect in arm.effects), np.zeros(1, dtype=np.intp)
-    torque = _Source(lambda part: arm.torque(part)[:, :, np.newaxis], first, first, local, False)
-    return _filtered(arm, [torque], motion, used)[:, :, 0]
+    return decimate(bridged(arm.torque(motion), unsure_samples(arm, motion)), used)
 
 
 def _rows(
@@ -307,67 +302,43 @@ def filtered_columns(
     ndarray, shape (M, n, r)
 
     """
+    result = np.empty((len(decimated_samples(len(motion), used)), motion.n_joints, len(columns)))
+    unsure = unsure_samples(arm, motion)
     parts = [(arm.rigid_columns, len(arm.robot.rigid_parameters), True)]
     parts += [
         (partial(arm.columns_of, effect), len(values), effect.instantaneous)
         for effect, values in zip(arm.effects, arm.values, strict=True)
     ]
-    sources, start = [], 0
-    for function, size, local in parts:
-        outer = np.flatnonzero((columns >= start) & (columns < start + size))
-        if len(outer):
-            inner = columns[outer] - start
-            sources.append(_Source(function, inner, outer, local, smooth=start == 0))
-        start += size
-    return _filtered(arm, sources, motion, used, tick)
-
-
-class _Source(NamedTuple):
-    """Source of regressor columns: the rigid body, which is smooth, or an effect."""
-
-    columns: Callable[[Motion], FloatArray]
-    inner: npt.NDArray[np.intp]  # indices of the wanted columns in the source
-    outer: npt.NDArray[np.intp]  # indices of the same columns in the result
-    instantaneous: bool  # computable from a part of the motion
-    smooth: bool  # computable from fewer samples
-
-
-def _filtered(
-    arm: ArmModel,
-    sources: Sequence[_Source],
-    motion: Motion,
-    used: Conditioning,
-    tick: Callable[[int], None] = lambda samples: None,
-) -> FloatArray:
-    """Filter and decimate the columns of a stretch, chunk by chunk, shape (M, n, r)."""
-    count = sum(len(source.outer) for source in sources)
-    result = np.empty((len(decimated_samples(len(motion), used)), motion.n_joints, count))
-    unsure = unsure_samples(arm, motion)
-    for source in sources:
-        if not source.instantaneous:
-            whole = bridged(source.columns(motion)[:, :, source.inner], unsure)
-            result[:, :, source.outer] = decimate(whole, used)
+    # functions of a part of the motion, with the indices of their columns there and in the result
+    local, first = [], 0
+    for function, size, instantaneous in parts:
+        outer = np.flatnonzero((columns >= first) & (columns < first + size))
+        inner = columns[outer] - first
+        if len(outer) and instantaneous:
+            local.append((function, inner, outer))
+        elif len(outer):
+            whole = bridged(function(motion)[:, :, inner], unsure)
+            result[:, :, outer] = decimate(whole, used)
+        first += size
     margin = arm.neighbours(1.0 / used.rate_hz)
     stride = used.smooth_stride if margin == 0 else 1
     sure = ~np.pad(unsure, ((1, 1), (0, 0)))
     longest = max(int(np.diff(np.flatnonzero(column)).max()) - 1 for column in sure.T)
-    margin, overlap, first = max(margin, longest), len(used.taps()) - 1, 0
+    margin, overlap, row = max(margin, longest), len(used.taps()) - 1, 0
     step = max(used.decimation, _CHUNK // used.decimation * used.decimation)
     for start in range(0, max(1, len(motion) - overlap), step):
         stop, before = min(len(motion), start + step + overlap), max(0, start - margin)
         around, inside = slice(before, stop + margin), slice(start - before, stop - before)
-        rows = slice(first, first + len(decimated_samples(stop - start, used)))
-        for source in sources:
-            if source.smooth and stride > 1:
-                few = motion.select(slice(start, stop, stride))
-                block = source.columns(few)  # smooth columns need no interpolation
-                result[rows, :, source.outer] = decimate(block[:, :, source.inner], used, stride)
-            elif source.instantaneous:
-                block = source.columns(motion.select(around))[:, :, source.inner]
-                result[rows, :, source.outer] = decimate(
-                    bridged(block, unsure[around])[inside], used
-                )
-        first = rows.stop
+        rows = slice(row, row + len(decimated_samples(stop - start, used)))
+        for function, inner, outer in local:
+            if function == arm.rigid_columns and stride > 1:
+                # smooth columns need no interpolation and fewer samples
+                block = function(motion.select(slice(start, stop, stride)))[:, :, inner]
+                result[rows, :, outer] = decimate(block, used, stride)
+            else:
+                block = function(motion.select(around))[:, :, inner]
+                result[rows, :, outer] = decimate(bridged(block, unsure[around])[inside], used)
+        row = rows.stop
         tick(stop - start)
     result.setflags(write=False)  # a read-only array is frozen without a copy
     return result

@@ -140,8 +140,6 @@ class Conditioning:
         Five samples per period of the cut-off are enough for the pass band of the decimation.
 
         """
-        # five samples per period of the cut-off describe a smooth function of the filtered
-        # positions
         widest = self.rate_hz / (_SMOOTH_SAMPLES * self.cutoff_hz)
         divisors = [d for d in range(1, self.decimation + 1) if self.decimation % d == 0]
         return max(d for d in divisors if d <= max(1.0, widest))

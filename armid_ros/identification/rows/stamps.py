@@ -7,7 +7,6 @@ from __future__ import annotations
 from armid_ros.motion import FloatArray
 from armid_ros.recording import Recording
 import numpy as np
-import numpy.typing as npt
 
 #: Share of uneven time steps above which stamps are uneven. A step is uneven if it differs by half
 #: of the median or more, or is less than half of the mean.
@@ -93,13 +92,6 @@ def _wander(t: FloatArray) -> float:
     return float(np.sqrt(np.median(np.mean((windows - line @ (line.T @ windows)) ** 2, axis=0))))
 
 
-def _steps(q: FloatArray) -> tuple[FloatArray, FloatArray, FloatArray, npt.NDArray[np.bool_]]:
-    """Return steps from before, across and from both sides of positions, and which are apart."""
-    before, after, across = q[1:-1] - q[:-2], q[1:-1] - q[2:], q[2:] - q[:-2]
-    step = np.where(before * after > 0.0, np.minimum(np.abs(before), np.abs(after)), 0.0)
-    return before, across, step, step > np.maximum(_LEAST_STEP, _CLOSER * np.abs(across))
-
-
 def two_senders(recording: Recording) -> str:
     """
     Return a message on positions that jump to and fro between two tracks; empty otherwise.
@@ -113,11 +105,12 @@ def two_senders(recording: Recording) -> str:
     if len(t) < 2 * _FEWEST:
         return ''
     fewest = max(_FEWEST, _SHARE_OF_MESSAGES * len(t))
-    # in parts that stay in the cache of the processor
-    parts = (_steps(q[k : k + 4098])[-1] for k in range(0, len(t) - 2, 4096))
-    if sum(map(np.count_nonzero, parts)) < fewest:
+    # steps from the message before and behind, and across; the same way from both is no motion
+    before, after, across = q[1:-1] - q[:-2], q[1:-1] - q[2:], q[2:] - q[:-2]
+    step = np.where(before * after > 0.0, np.minimum(np.abs(before), np.abs(after)), 0.0)
+    apart = step > np.maximum(_LEAST_STEP, _CLOSER * np.abs(across))
+    if np.count_nonzero(apart) < fewest:
         return ''
-    before, across, step, apart = _steps(q)
     # the speed that each joint seldom exceeds, from recorded velocities if there are any
     time = (t[2:] - t[:-2])[:, np.newaxis]
     usual = np.median(np.abs(across) / time, axis=0)

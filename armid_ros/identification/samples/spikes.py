@@ -33,12 +33,14 @@ from collections.abc import Sequence
 from dataclasses import replace
 import math
 
-from armid_ros.identification.samples.noise_level import line_errors, LineErrors, NoiseLevel
 from armid_ros.identification.samples.straight_line import (
     all_unwrapped,
     Excursion,
+    line_errors,
+    LineErrors,
     Missed,
     missed_by,
+    NoiseLevel,
     StreamSample,
     unwrapped,
     Usual,
@@ -54,30 +56,32 @@ FIRST = 20
 _NEARER = 0.5
 #: Gap in periods after which a sample is held until the next one, which may contradict its stamp.
 _LEAP = 1.5
+#: Best resolution of a position [rad or m], of a velocity (per second), and of a torque as a share
+#: of its limit: an encoder of 22 bits, a torque sensor of 17. A simulation without noise and an
+#: arm at rest have less noise, and a limit by that noise would leave out sound data.
+_FINEST = {'q': 1e-6, 'v': 1e-5, 't': 1e-5}
+#: Second derivative of each signal when an arm at rest begins to move, in these units per second
+#: squared: 2 rad/s^2, a jerk of 50 rad/s^3, and a torque at its limit that oscillates at 1 Hz.
+_ONSET = {'q': 2.0, 'v': 50.0, 't': 50.0}
 
 
 class SpikeGate:
     """
-    Gate that passes on the undamaged samples of a stream.
+    Gate that passes on the undamaged joint states of a stream.
 
     Parameters
     ----------
-    turning : array_like of bool, shape (m,)
-        Signals whose jumps by full turns are no damage.
+    prismatic : array_like of bool, shape (n,)
+        Whether each joint is prismatic; the angles of the others may jump by full turns.
+    signals : str
+        Signals of a sample, each for all joints: q for positions, which never step; v for
+        velocities; t for torques, which may jump and return; as in 'qt'. They are m in all.
+    torque_limit : array_like, shape (n,), optional
+        Largest torque of each joint [N m or N], infinite where unknown.
     max_gap : int
         Largest number of successive damaged samples; a longer deviation is real.
     false_alarm_time : float
         Mean time between two good samples left out by error, in normal noise [s].
-    continuous : array_like of bool, shape (m,), optional
-        Signals that never step, such as positions; none by default.
-    pulsing : array_like of bool, shape (m,), optional
-        Signals that may jump and return, such as torques; none by default.
-    finest : array_like, shape (m,), optional
-        Best resolution of the signals, in their units. A simulation without noise and an arm at
-        rest have less noise, and a limit by that noise would leave out sound data.
-    onset : array_like, shape (m,), optional
-        Assumed second derivative of the signals before the first motion, per second squared: an
-        arm at rest may begin to move.
 
     Attributes
     ----------
@@ -95,19 +99,25 @@ class SpikeGate:
 
     def __init__(
         self,
-        turning: npt.ArrayLike,
+        prismatic: npt.ArrayLike,
+        signals: str,
         *,
+        torque_limit: npt.ArrayLike = 0.0,
         max_gap: int = 10,
         false_alarm_time: float = 360000.0,
-        continuous: npt.ArrayLike = False,
-        pulsing: npt.ArrayLike = False,
-        finest: npt.ArrayLike = 0.0,
-        onset: npt.ArrayLike = 0.0,
     ) -> None:
-        self._turn = np.where(np.asarray(turning, dtype=bool), 2.0 * np.pi, 0.0)
-        self._continuous = np.broadcast_to(np.asarray(continuous, dtype=bool), self._turn.shape)
-        self._pulsing = np.broadcast_to(np.asarray(pulsing, dtype=bool), self._turn.shape)
-        self._least_seen = tuple(np.broadcast_to(one, self._turn.shape) for one in (finest, onset))
+        turning = ~np.asarray(prismatic, dtype=bool)
+        kind = np.repeat(list(signals), len(turning))
+        self._continuous, self._pulsing = kind == 'q', kind == 't'
+        revolute = np.tile(turning, len(signals))
+        self._turn = np.where(self._continuous & revolute, 2.0 * np.pi, 0.0)
+        limit = np.broadcast_to(np.asarray(torque_limit, dtype=float), turning.shape)
+        known = limit[np.isfinite(limit)]
+        limit = np.where(np.isfinite(limit), limit, known.min() if len(known) else 0.0)
+        scale = np.where(self._pulsing, np.tile(limit, len(signals)), 1.0)
+        self._least_seen = tuple(
+            scale * [least[one] for one in kind] for least in (_FINEST, _ONSET)
+        )
         self._max_gap = max_gap
         self._false_alarm_time = false_alarm_time
         self.reset()
@@ -117,6 +127,7 @@ class SpikeGate:
         self.spikes: Counter[int] = Counter()
         self.rejected: Counter[str] = Counter()
         self.left_out: list[Excursion] = []
+        self._floor: FloatArray | float = 0.0
         self._early: StreamSample | None = None
         self._last: FloatArray | None = None  # last good sample, also of an earlier stretch
         count = len(self._turn)
@@ -139,22 +150,22 @@ class SpikeGate:
             Negligible error of a sample.
 
         """
-        self.left_out = []
+        self.left_out, self._floor = [], floor
         early, self._early, tail = self._early, None, self._tail
         good: list[StreamSample] = []
         if early is not None and tail is not None:
             if tail.t < t < early.t:  # the sample that continues the earlier ones is kept
                 self.rejected['out_of_order'] += 1
             else:
-                good = self._take(early, floor)
+                good = self._take(early)
         ahead = 0.0 if self._tail is None else t - self._tail.t
         if _LEAP * self._period < ahead <= self._max_gap * self._period < math.inf:
             # samples seem to be lost before this one
             self._early = StreamSample(t, x)
             return good
-        return good + self._take(StreamSample(t, x), floor)
+        return good + self._take(StreamSample(t, x))
 
-    def _take(self, sample: StreamSample, floor: FloatArray | float) -> list[StreamSample]:
+    def _take(self, sample: StreamSample) -> list[StreamSample]:
         """Process a sample whose stamp is not contradicted by the next one."""
         if self._known:
             self._last = self._known[1].x
@@ -164,9 +175,9 @@ class SpikeGate:
         if not self._in_time(sample):
             return []
         if self._first is None:
-            return self._judge(sample, floor)
+            return self._judge(sample)
         self._first.append(sample)
-        return self._begin(floor) if len(self._first) == FIRST else []
+        return self._begin() if len(self._first) == FIRST else []
 
     def begin(
         self, usual: Usual, known: Sequence[StreamSample] = (), bent: FloatArray | float = 0.0
@@ -256,7 +267,7 @@ class SpikeGate:
             return True
         return False
 
-    def _begin(self, floor: FloatArray | float) -> list[StreamSample]:
+    def _begin(self) -> list[StreamSample]:
         """Learn noise and period from the first samples, and judge these."""
         raw, self._first = self._first or [], None
         first = all_unwrapped(raw, self._turn)
@@ -264,23 +275,23 @@ class SpikeGate:
         self._quantile = self._quantile_of(self._period)
         missed = self._lines_through(first)
         self._level.begin(missed, np.diff([s.x for s in first], axis=0), self._period)
-        straight = [bool(np.all(self._off_by(m, floor) <= 1.0)) for m in missed]
+        straight = [bool(np.all(self._off_by(m) <= 1.0)) for m in missed]
         if not any(straight):  # erratic, or the noise has changed: it is learned anew
-            off = np.max([self._off_by(m, floor) for m in missed], axis=0)
-            self._leave_out(Excursion(tuple(first), off, self._limits(missed[0], floor)), True)
+            off = np.max([self._off_by(m) for m in missed], axis=0)
+            self._leave_out(Excursion(tuple(first), off, self._limits(missed[0])), True)
             self._level.forget()
             self._restart([])
             return []
         start = straight.index(True)
         first = first[:start] + all_unwrapped(raw[start:], self._turn)  # from undamaged samples
         self._known = first[start], first[start + 1]
-        self._leave_out_ahead(first[:start], missed[0], floor)
+        self._leave_out_ahead(first[:start], missed[0])
         good = list(self._known)
         for sample in first[start + 2 :]:
-            good += self._judge(sample, floor)
+            good += self._judge(sample)
         return good
 
-    def _judge(self, sample: StreamSample, floor: FloatArray | float) -> list[StreamSample]:
+    def _judge(self, sample: StreamSample) -> list[StreamSample]:
         """Judge another sample; return the samples that are now known to be good."""
         if self._first is not None:  # the samples before were erratic
             self._first.append(sample)
@@ -289,53 +300,53 @@ class SpikeGate:
         # a smooth signal keeps its curvature
         bent = self._level.usual.smoothness * self._bent * missed.bend
         judged = missed._replace(error=missed.error - bent)
-        if not self._held and self._surely_in_line(judged, floor):
+        if not self._held and self._surely_in_line(judged):
             return self._accept([sample], missed)
-        off = self._off_by(judged, floor)
+        off = self._off_by(judged)
         if not self._held:
             if float(np.max(off)) <= 1.0:
                 return self._accept([sample], missed)
             self._held, self._went_on, self._off = [sample], 0, off
-            self._limit = self._limits(missed, floor)
+            self._limit = self._limits(missed)
             self._suspect = np.flatnonzero(off > 1.0)
             return []
-        goes_on = self._goes_on(sample, off, floor)
+        goes_on = self._goes_on(sample, off)
         if not goes_on and float(np.max(off[self._suspect])) <= 1.0:
             self._leave_out(Excursion(tuple(self._held), self._off, self._limit))
             self._held = []
-            return self._judge(sample, floor)
+            return self._judge(sample)
         self._held.append(sample)
         self._off = np.maximum(self._off, off)
         self._went_on += goes_on
         if len(self._held) <= self._max_gap:
             return []
         if 2 * self._went_on > self._max_gap:
-            if len(self._held) > 1 and self._stepped(floor):
+            if len(self._held) > 1 and self._stepped():
                 self._held[0] = replace(self._held[0], begins=True)
-            return self._go_on(floor)
+            return self._go_on()
         self._leave_out(Excursion(tuple(self._held), self._off, self._limit), True)
         self._restart([])
         return []
 
-    def _go_on(self, floor: FloatArray | float) -> list[StreamSample]:
+    def _go_on(self) -> list[StreamSample]:
         """Pass on the held samples, which are real; judge damaged ones among them again."""
         held, self._held = self._held, []
         missed = self._lines_through(held)
         steady = ~self._pulsing
-        straight = [bool(np.all(self._off_by(one, floor)[steady] <= 1.0)) for one in missed]
+        straight = [bool(np.all(self._off_by(one)[steady] <= 1.0)) for one in missed]
         if all(straight) or not any(straight):
             return self._accept(held)
         start = straight.index(True)
-        self._leave_out_ahead(held[:start], missed[0], floor)
+        self._leave_out_ahead(held[:start], missed[0])
         held[start] = replace(held[start], begins=held[0].begins)
         if all(straight[start:]):
             return self._accept(held[start:])
         good = self._accept(held[start : start + 2])
         for sample in held[start + 2 :]:
-            good = good + self._judge(sample, floor)
+            good = good + self._judge(sample)
         return good
 
-    def _goes_on(self, sample: StreamSample, off: FloatArray, floor: FloatArray | float) -> bool:
+    def _goes_on(self, sample: StreamSample, off: FloatArray) -> bool:
         """Return whether a sample continues the held samples, by the old slope or a new one."""
         last = self._held[-1]
         before = self._held[-2] if len(self._held) > 1 else self._known[1]
@@ -344,31 +355,31 @@ class SpikeGate:
         as_before = StreamSample(before.t, last.x - slope * (last.t - before.t))
         far_enough = max(1.0, _NEARER * float(np.max(off[self._suspect])))
         for one in (as_before, before):
-            rest = self._off_by(missed_by((one, last), sample, self._period), floor)
+            rest = self._off_by(missed_by((one, last), sample, self._period))
             if float(np.max(rest[self._suspect])) < far_enough:
                 return True
         return False
 
-    def _stepped(self, floor: FloatArray | float) -> bool:
+    def _stepped(self) -> bool:
         """Return whether a continuous signal has stepped between known and held samples."""
         # The lines before and behind a step do not intersect in between; those of a sudden turn,
         # as in a collision, do.
         ahead = missed_by(self._known, self._held[0], self._period)
         back = missed_by((self._held[1], self._held[0]), self._known[1], self._period)
-        far = np.minimum(self._off_by(ahead, floor), self._off_by(back, floor))
+        far = np.minimum(self._off_by(ahead), self._off_by(back))
         return bool(np.any(far[self._continuous & (ahead.error * back.error < 0.0)] > 1.0))
 
-    def _limits(self, missed: Missed, floor: FloatArray | float) -> FloatArray:
+    def _limits(self, missed: Missed) -> FloatArray:
         """Return the largest allowed prediction error of a sample, shape (m,)."""
         limits = self._level.usual.limits(self._quantile, missed.noise, missed.bend)
-        return np.maximum(limits, floor)
+        return np.maximum(limits, self._floor)
 
-    def _off_by(self, missed: Missed, floor: FloatArray | float) -> FloatArray:
+    def _off_by(self, missed: Missed) -> FloatArray:
         """Return the prediction error of a sample over its limit, shape (m,)."""
-        limit = np.maximum(self._limits(missed, floor), 1e-300)
+        limit = np.maximum(self._limits(missed), 1e-300)
         return np.asarray(np.abs(missed.error) / limit)
 
-    def _surely_in_line(self, missed: Missed, floor: FloatArray | float) -> bool:
+    def _surely_in_line(self, missed: Missed) -> bool:
         """Return whether a sample is within a lower bound of its limits, which is fast to test."""
         # Limits grow with the factors `noise` and `bend`, and in proportion if both grow alike. So
         # they are at least the limits over one period times the smaller factor.
@@ -376,7 +387,7 @@ class SpikeGate:
         if least is None or least[0] is not usual or least[1] != self._quantile:
             over_a_period = usual.limits(self._quantile, 1.0, 1.0)
             self._least = least = usual, self._quantile, over_a_period
-        limits = np.maximum(min(missed.noise, missed.bend) * least[2], floor)
+        limits = np.maximum(min(missed.noise, missed.bend) * least[2], self._floor)
         return bool((np.abs(missed.error) <= limits).all())
 
     def _accept(
@@ -399,12 +410,10 @@ class SpikeGate:
         pairs = range(len(samples) - 2)
         return [missed_by(samples[k : k + 2], samples[k + 2], self._period) for k in pairs]
 
-    def _leave_out_ahead(
-        self, samples: Sequence[StreamSample], missed: Missed, floor: FloatArray | float
-    ) -> None:
+    def _leave_out_ahead(self, samples: Sequence[StreamSample], missed: Missed) -> None:
         """Leave out samples, if any, ahead of the first ones that are in line."""
         if samples:
-            off, limit = self._off_by(missed, floor), self._limits(missed, floor)
+            off, limit = self._off_by(missed), self._limits(missed)
             self._leave_out(Excursion(tuple(samples), off, limit))
 
     def _leave_out(self, excursion: Excursion, erratic: bool = False) -> None:

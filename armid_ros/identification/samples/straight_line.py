@@ -1,17 +1,24 @@
 # Copyright 2026 The armid_ros developers
 # SPDX-License-Identifier: Apache-2.0
-"""Prediction of a sample of a stream by the straight line through the two before it."""
+"""
+Prediction of a sample of a stream by the straight line through the two before it.
+
+The usual prediction errors are the noise of a stream and the resolution of its signals. Every
+window of errors takes the same computing time, whether it is the second or the thousandth. One
+sample in a hundred completes a window, and a stream must not wait.
+
+"""
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
-import math
-from typing import NamedTuple
+from typing import NamedTuple, TypeVar
 
 from armid_ros.motion import FloatArray
 import numpy as np
+import numpy.typing as npt
 from scipy import special
 
 #: Correlation of successive errors of a straight line in white noise.
@@ -20,10 +27,21 @@ _NOISE_CORRELATION = -2.0 / 3.0
 _CLIPPED = 3.0
 #: Smallest jump that may be a full turn [rad].
 _HALF_A_TURN = np.pi
+#: Number of predictions in a window, whose usual error is computed together.
+_WINDOW = 100
+#: Number of windows kept: one minute at 1 kHz.
+_REMEMBERED = 600
+#: Share of predictions that define the usual error. Others may be steps of friction, or damage.
+_SHARE = 0.95
+#: Share for the first few samples, where one damaged sample spoils three predictions.
+_SHARE_FIRST = 0.75
+#: Number of occurrences of a step from which it is a step of the signal itself.
+_SEEN = 3
 
 
 #: Growth factor of errors over other times, of one sample or of each, shape (N, 1).
 Factor = float | FloatArray
+Time = TypeVar('Time', float, FloatArray)
 
 
 @dataclass(frozen=True, eq=False)
@@ -138,14 +156,19 @@ class Missed(NamedTuple):
     bend: float
 
 
+def growth_over(step: Time, ahead: Time, period: float) -> tuple[Time, Time]:
+    """Return the growth of errors by noise and by an acceleration, a time ahead of two samples."""
+    ratio = ahead / step
+    noise: Time = ((1.0 + (1.0 + ratio) ** 2 + ratio**2) / 6.0) ** 0.5
+    return noise, 0.5 * ahead * (ahead + step) / period**2
+
+
 def missed_by(known: Sequence[StreamSample], sample: StreamSample, period: float) -> Missed:
     """Return the error of the straight line through two samples at another one."""
     before, last = known
     step, ahead = last.t - before.t, sample.t - last.t
-    ratio = ahead / step
-    noise = math.sqrt((1.0 + (1.0 + ratio) ** 2 + ratio**2) / 6.0)
-    bend = 0.5 * ahead * (ahead + step) / period**2
-    return Missed(sample.x - last.x - ratio * (last.x - before.x), noise, bend)
+    error = sample.x - last.x - ahead / step * (last.x - before.x)
+    return Missed(error, *growth_over(step, ahead, period))
 
 
 def unwrapped(x: FloatArray, last: FloatArray, turn: FloatArray) -> FloatArray:
@@ -182,3 +205,199 @@ def share_of_noise(missed: FloatArray, size: FloatArray) -> FloatArray:
     correlation = np.divide(products, squares, where=squares > 0.0, out=np.ones_like(squares))
     share = (1.0 - correlation) / (1.0 - _NOISE_CORRELATION)
     return np.asarray(np.minimum(np.maximum(share, 0.0), 1.0))
+
+
+class NoiseLevel:
+    """
+    Estimator of the usual prediction error, from undamaged samples.
+
+    Parameters
+    ----------
+    count : int
+        Number of signals m.
+    together : int
+        Largest number of samples that are added before `settle`.
+    finest : ndarray, shape (m,)
+        Best resolution of the signals.
+    onset : ndarray, shape (m,)
+        Assumed second derivative before the first motion, per second squared.
+
+    Attributes
+    ----------
+    usual : Usual
+        Usual error in the noisiest window that is kept; at least the resolution.
+
+    """
+
+    def __init__(self, count: int, together: int, finest: FloatArray, onset: FloatArray) -> None:
+        self._finest, self._onset = finest, onset
+        self.usual = Usual(np.inf, np.zeros(count), np.zeros(count))
+        self._steps, self._most = np.full((_SEEN, count), np.inf), np.zeros(count)
+        self._sizes, self._shares = np.zeros((2, _REMEMBERED, count))
+        self._seen = 0
+        self._errors, self._moves = np.empty((2, _WINDOW + together, count))
+        self._growths = np.empty((_WINDOW + together, 2, 1))
+        self._waiting = 0
+
+    def set(self, usual: Usual) -> None:
+        """Set the usual prediction error."""
+        self.forget()
+        self._remember(usual.size, usual.noisy)
+        self.usual = usual
+
+    def forget(self) -> None:
+        """Clear the measured noise; the next `begin` measures it again."""
+        self._sizes[:] = 0.0
+        self._seen = 0
+
+    def begin(self, missed: Sequence[Missed], moves: FloatArray, period: float) -> None:
+        """
+        Learn from the first samples, of which some may be damaged.
+
+        Parameters
+        ----------
+        missed : sequence of Missed
+            The prediction errors.
+        moves : ndarray, shape (k, m)
+            Differences between successive samples.
+        period : float
+            Sampling period [s].
+
+        """
+        self.see_steps(moves)
+        self._most = np.maximum(self._most, np.max(np.abs([m.error for m in missed]), axis=0))
+        if not self._seen:
+            errors = np.array([m.error / max(m.noise, m.bend) for m in missed])
+            size = np.maximum(robust_scale(errors, _SHARE_FIRST), self._least(period))
+            self.usual = Usual(period, size, share_of_noise(errors, size))
+
+    def learn(self, missed: Missed, move: FloatArray) -> None:
+        """Add the prediction error of an undamaged sample, and its change, shape (m,)."""
+        self._errors[self._waiting] = missed.error
+        self._growths[self._waiting, :, 0] = missed.noise, missed.bend
+        self._moves[self._waiting] = move
+        self._waiting += 1
+
+    def settle(self, period: float) -> None:
+        """Compute the usual error again if a window of errors is complete."""
+        if self._waiting < _WINDOW:
+            return
+        growths, moves = self._growths[: self._waiting], self._moves[: self._waiting]
+        errors = self._errors[: self._waiting] / self.usual.growth(growths[:, 0], growths[:, 1])
+        self._waiting = 0
+        self._most = np.maximum(self._most, np.abs(errors).max(axis=0))
+        size = robust_scale(errors, _SHARE)
+        self._remember(size, share_of_noise(errors, size))
+        self.see_steps(moves)
+        usual = _loudest(period, self._sizes, self._shares)
+        self.usual = replace(usual, size=np.maximum(usual.size, self._least(period)))
+
+    def _remember(self, size: FloatArray, noisy: FloatArray) -> None:
+        place = self._seen % _REMEMBERED
+        self._sizes[place], self._shares[place] = size, noisy
+        self._seen += 1
+
+    def see_steps(self, moves: FloatArray) -> None:
+        """Learn the resolution from changes between samples, shape (k, m)."""
+        self._steps = _smallest(np.concatenate([self._steps, np.abs(moves)]))
+
+    def _least(self, period: float) -> FloatArray:
+        """Return the smallest step of every signal, at least the finest and that of an onset."""
+        # A fast signal has no small steps, but its resolution moves it off any line.
+        step = np.where(np.isfinite(self._steps[-1]), self._steps[-1], 0.0)
+        least = np.maximum(self._finest, self._onset * period**2)
+        return np.maximum(np.minimum(self._most, step), least)
+
+
+class LineErrors(NamedTuple):
+    """
+    Errors of samples against the straight line through the two samples before.
+
+    Attributes
+    ----------
+    stretch : ndarray of int, shape (N,)
+        First sample of the stretch that contains a sample; long gaps separate stretches.
+    off : ndarray, shape (N, m)
+        Error of each sample, if a smooth signal keeps its curvature, over the largest allowed
+        error; 0 for the first samples of a stretch.
+    bent : ndarray, shape (N, m)
+        Distance of each sample from the straight line, scaled to one period.
+    usual : Usual
+        Usual error in the noisiest part of the recording.
+
+    """
+
+    stretch: npt.NDArray[np.intp]
+    off: FloatArray
+    bent: FloatArray
+    usual: Usual
+
+
+def line_errors(
+    t: FloatArray,
+    x: FloatArray,
+    floor: FloatArray,
+    turn: FloatArray,
+    max_gap: int,
+    quantile: Callable[[float], float],
+) -> LineErrors:
+    """
+    Return the errors of straight lines through two samples at the next one, for all samples.
+
+    Parameters
+    ----------
+    t : ndarray, shape (N,)
+        Stamps, at least 3, each after the one before [s].
+    x : ndarray, shape (N, m)
+        Signals.
+    floor : ndarray, shape (m,)
+        Negligible error of a sample.
+    turn : ndarray, shape (m,)
+        Full turn of a signal, whose jumps are ignored; 0 without.
+    max_gap : int
+        Longest gap within a stretch, in periods.
+    quantile : callable
+        Function of the period [s] that returns the largest allowed error in standard deviations.
+
+    """
+    dt, moves = np.diff(t), np.diff(x, axis=0)
+    turns = np.flatnonzero(turn)
+    moves[:, turns] -= np.rint(moves[:, turns] / turn[turns]) * turn[turns]
+    period = float(np.median(dt))
+    gap = dt > max_gap * period
+    first = np.where(np.concatenate([[True], gap]), np.arange(len(t)), 0)
+    noise, bend = np.ones((2, len(t), 1))
+    noise[2:, 0], bend[2:, 0] = growth_over(dt[:-1], dt[1:], period)
+    error = np.zeros_like(x)
+    np.multiply((dt[1:] / dt[:-1])[:, np.newaxis], moves[:-1], out=error[2:])
+    np.subtract(moves[1:], error[2:], out=error[2:])
+    error[2:][gap[1:] | gap[:-1]] = 0.0
+    plain = error[2:] / np.maximum(noise, bend)[2:]
+    # windows of equal length are processed together; the last few samples are in none
+    count = max(1, len(plain) // _WINDOW)
+    size = len(plain) // count
+    windows = plain[: count * size].reshape(count, size, -1).swapaxes(0, 1)
+    sizes = robust_scale(windows, _SHARE)
+    usual = _loudest(period, sizes, share_of_noise(windows, sizes))
+    step = _smallest(np.abs(moves))[-1]
+    least = np.minimum(np.where(np.isfinite(step), step, 0.0), np.abs(error).max(axis=0))
+    usual = replace(usual, size=np.maximum(usual.size, least))
+    bent, off = error / bend, np.abs(error)
+    off[3:] = np.abs(error[3:] - usual.smoothness * bent[2:-1] * bend[3:])
+    floor = np.maximum(floor, np.finfo(float).tiny)
+    off /= np.maximum(usual.limits(quantile(period), noise, bend), floor)
+    return LineErrors(np.maximum.accumulate(first), off, bent, usual)
+
+
+def _loudest(period: float, sizes: FloatArray, shares: FloatArray) -> Usual:
+    """Return the usual error of the noisiest of K windows, given sizes and shares, (K, m)."""
+    loudest = np.argmax(sizes, axis=0)[np.newaxis]
+    size, noisy = (np.take_along_axis(one, loudest, 0)[0] for one in (sizes, shares))
+    return Usual(period, size, noisy)
+
+
+def _smallest(steps: FloatArray) -> FloatArray:
+    """Return the smallest nonzero steps of every signal, shape (_SEEN, m)."""
+    none = np.full((_SEEN, steps.shape[1]), np.inf)
+    steps = np.concatenate([none, np.where(steps > 0.0, steps, np.inf)])
+    return np.partition(steps, _SEEN - 1, axis=0)[:_SEEN]

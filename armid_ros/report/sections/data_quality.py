@@ -150,7 +150,7 @@ def repeatability(fits: Sequence[Fit]) -> tuple[float, FloatArray, FloatArray] |
     fit = max(fits, key=lambda one: len(one.motion))
     count = int(np.searchsorted(fit.motion.t, fit.motion.t[0] + _SEARCHED))
     motion = fit.motion.select(slice(count))
-    found = find_period(motion) if count > _FEWEST else None
+    found = find_period(motion.t, motion.q) if count > _FEWEST else None
     if found is None or found[1].stop - found[1].start < _FEWEST:
         return None
     lag, where = found

@@ -261,12 +261,3 @@ def test_a_wrist_with_a_coupling_is_good_with_it_and_unusable_without(real_data,
     (folder := tmp_path / 'coupled').mkdir()
     effects = (*FRICTION, 'coupled_joint_friction')
     assert of_machine('tx40', real_data, folder, effects).word == 'good'
-
-
-def test_a_position_that_jumps_and_does_not_come_back_at_once_is_poor(structure, run):
-    q = run.q.copy()
-    q[700:720, 1] += 2.0 * np.pi
-    found, _ = graded(structure, [replace(run, q=q)])
-    assert found.word != 'good'
-    joint = structure.robot.joints[1]
-    assert any(joint in one and '7.000 s' in one for one in found.faults)

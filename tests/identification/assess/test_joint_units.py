@@ -7,12 +7,8 @@ from dataclasses import replace
 from armid_ros.arm import ArmModel
 from armid_ros.effects import make_effect
 from armid_ros.identification import grade, identify
-from armid_ros.identification.assess.data_faults import check_data
-from armid_ros.identification.assess.joint_units import (
-    unit_faults,
-    units_beyond_drives,
-)
-from armid_ros.identification.rows.regression import Stretch
+from armid_ros.identification.assess.data_faults import unit_faults
+from armid_ros.identification.assess.sensor_faults import units_beyond_drives
 from armid_ros.identification.rows.signals import conditioning, segments, SignalSettings
 from armid_ros.robots import load_robot
 import numpy as np
@@ -100,12 +96,3 @@ def test_the_grade_of_a_fit_of_such_a_torque_is_poor(arm, run):
     found = grade(fitted, arm, [wrong], {})
     assert found.word == 'poor'
     assert arm.robot.joints[WRIST] in found.reasons[0]
-
-
-def test_such_data_are_not_diagnosed(arm, run):
-    wrong = times(run, 1e3)
-    used = conditioning([wrong], SignalSettings())
-    (motion,) = segments(wrong, used)
-    part = Stretch(wrong.source, motion, np.abs(motion.dq) > 0.1)
-    (fault,), _ = check_data(arm, [wrong], used, [part])
-    assert arm.robot.joints[WRIST] in fault and 'N mm' in fault

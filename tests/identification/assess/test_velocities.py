@@ -7,12 +7,7 @@ import re
 
 from armid_ros.arm import ArmModel
 from armid_ros.effects import make_effect
-from armid_ros.identification import grade, identify
-from armid_ros.identification.assess.data_faults import check_data
 from armid_ros.identification.assess.sensor_faults import velocity_faults
-from armid_ros.identification.rows.regression import Stretch
-from armid_ros.identification.rows.signals import conditioning, segments, SignalSettings
-from armid_ros.inspection import inspect
 from armid_ros.robots import load_robot
 import numpy as np
 import pytest
@@ -69,20 +64,3 @@ def jittering(run):
 )
 def test_what_noise_filters_and_units_make_is_no_wrong_time(run, change):
     assert time_faults(change(run)) == []
-
-
-def test_inspection_grade_and_diagnosis_say_it(arm, run):
-    wrong = replace(run, t=1.1 * run.t)
-    said = [
-        one for one in inspect(wrong, rng=np.random.default_rng(0)).remarks if '1.1' in one.text
-    ]
-    assert [one.weight for one in said] == ['bad']
-    fitted = identify(arm, [wrong], rng=np.random.default_rng(0))
-    found = grade(fitted, arm, [wrong], {})
-    assert found.word == 'poor'
-    assert '1.1 times' in found.reasons[0]
-    used = conditioning([wrong], SignalSettings())
-    (motion,) = segments(wrong, used)
-    part = Stretch('run', motion, np.abs(motion.dq) > 0.1)
-    (fault,) = check_data(arm, [wrong], used, [part])[0]
-    assert '1.1 times' in fault

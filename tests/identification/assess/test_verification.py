@@ -3,12 +3,16 @@
 from types import SimpleNamespace
 
 from armid_ros.arm import ArmModel
+from armid_ros.errors import IdentificationError
 from armid_ros.identification import IdentificationSettings, identify, PhysicalSettings, verify
-from armid_ros.identification.assess.verification import ForwardValidation
+from armid_ros.identification.assess.verification import forward_validation, ForwardValidation
+from armid_ros.identification.rows.signals import Conditioning
 import numpy as np
 import pytest
 
 from ..conftest import multisine, recorded
+
+USED = Conditioning(rate_hz=500.0, cutoff_hz=30.0, decimation=5)
 
 
 @pytest.fixture(scope='module')
@@ -72,3 +76,19 @@ def test_a_simulation_that_is_worse_is_said_to_be(before, after, worse):
     pair = ForwardValidation(before, after)
     assert pair.worse == worse
     assert bool(pair.comment()) == bool(worse)
+
+
+def test_missing_friction_moves_the_arm_by_its_torque_over_the_stiffness(arm):
+    """With 0.1 N m of friction more on the first joint; the true arm follows its own torques."""
+    exact = recorded(arm, multisine(arm.robot.joints, 6.0, 500.0, seed=3))
+    values = list(arm.values)
+    values[1] = values[1] + np.array([0.1, 0, 0, 0, 0, 0])
+    other = ArmModel(arm.robot, arm.effects, tuple(values))
+    right, wrong = (
+        forward_validation(one, exact, USED, nominal=arm, duration=30.0) for one in (arm, other)
+    )
+    assert 1e3 * right.position_error.max() < 2.0 and right.torque_error.max() < 2e-3
+    assert wrong.position_error[0] > 5.0 * right.position_error[0]
+    assert 0.02 < wrong.feedback_torque[0] < 0.2
+    with pytest.raises(IdentificationError, match='bag: no stretch'):
+        forward_validation(arm, exact.select(slice(0, 20)), USED, nominal=arm, duration=30.0)

@@ -10,7 +10,7 @@ from armid_ros.effects import make_effect
 from armid_ros.identification import identify
 from armid_ros.identification.rows.damage import impossible_excursions, without_damage
 from armid_ros.identification.rows.signals import SignalSettings
-from armid_ros.identification.samples.joint_gate import joint_gate
+from armid_ros.identification.samples.spikes import SpikeGate
 import numpy as np
 import pytest
 
@@ -83,8 +83,8 @@ def test_a_gate_that_takes_every_sample_finds_the_same(seed):
     ):
         x[start : start + length, signal] += 9.0
     x[1525:, 1] += 0.5  # a change that lasts is none
-    found = impossible_excursions(joint_gate([True], 'qt'), t, x, np.zeros(2))
-    gate = joint_gate([True], 'qt')
+    found = impossible_excursions(SpikeGate([True], 'qt'), t, x, np.zeros(2))
+    gate = SpikeGate([True], 'qt')
     passed = [s.t for stamp, row in zip(t, x, strict=True) for s in gate.take(float(stamp), row)]
     left = [sample.t for one in found for sample in one.samples]
     assert len(left) == len(set(left))

@@ -22,16 +22,16 @@ def stream(rng, count=COUNT):
     return t, np.stack([np.round(smooth / 1e-4) * 1e-4, steps], axis=1)
 
 
-def passed(t, x, **kwargs):
-    """Return the gate and the stamps that it passes on."""
-    gate = SpikeGate([True, False], **kwargs)
-    good = [s.t for stamp, row in zip(t, x, strict=True) for s in gate.take(float(stamp), row)]
-    return gate, np.array(good)
+def passed(t, x, floor=0.0):
+    """Return the gate of a position and a torque, the samples it passes on, and their stamps."""
+    gate = SpikeGate([False], 'qt')
+    good = [s for at, row in zip(t, x, strict=True) for s in gate.take(float(at), row, floor)]
+    return gate, good, np.array([s.t for s in good])
 
 
 def test_good_samples_all_pass_in_order():
     t, x = stream(np.random.default_rng(0))
-    gate, good = passed(t, x)
+    gate, _, good = passed(t, x)
     np.testing.assert_array_equal(good, t)
     assert not gate.rejected
 
@@ -42,9 +42,11 @@ def test_damage_costs_the_damaged_samples_alone(signal, size, length):
     t, x = stream(np.random.default_rng(1))
     damaged = slice(DAMAGED, DAMAGED + length)
     x[damaged, signal] += size
-    gate, good = passed(t, x)
+    gate, _, good = passed(t, x)
     np.testing.assert_array_equal(good, np.delete(t, damaged))
-    assert gate.spikes == {signal: length}
+    assert gate.rejected.total() == length
+    if size != 1.5:  # a torque within reach of the others may be of the arm
+        assert gate.spikes == {signal: length}
 
 
 @pytest.mark.parametrize(('where', 'sign'), [(630, -1.0), (880, 1.0), (DAMAGED, 1.0)])
@@ -53,7 +55,7 @@ def test_a_glitch_of_a_smooth_signal_does_not_hide_in_its_acceleration(where, si
     t, x = stream(np.random.default_rng(18))
     x[:, 0] = np.sin(9.0 * t)
     x[where, 0] += sign * 2.5 * (9.0 / RATE) ** 2
-    gate, good = passed(t, x)
+    gate, _, good = passed(t, x)
     assert t[where] not in good
     assert len(good) >= COUNT - 2  # so near its line, the next one may seem to go on from it
     assert set(gate.spikes) == {0}
@@ -63,7 +65,7 @@ def test_a_glitch_of_a_smooth_signal_does_not_hide_in_its_acceleration(where, si
 def test_damage_among_the_first_samples_is_no_measure_of_noise(where):
     t, x = stream(np.random.default_rng(2))
     x[where, 1] += 50.0
-    _, good = passed(t, x)
+    _, _, good = passed(t, x)
     assert t[where] not in good
     missing = np.delete(t, where)[~np.isin(np.delete(t, where), good)]
     assert len(missing) <= 2 and np.all(missing < t[where])  # a line needs two samples
@@ -73,7 +75,7 @@ def test_damage_among_the_first_samples_is_no_measure_of_noise(where):
 def test_a_step_that_lasts_passes_whole(size):
     t, x = stream(np.random.default_rng(3))
     x[DAMAGED:, 1] += size
-    gate, good = passed(t, x)
+    gate, _, good = passed(t, x)
     np.testing.assert_array_equal(good, t)
     assert not gate.rejected
 
@@ -85,8 +87,7 @@ def test_a_clock_that_is_set_a_little_begins_a_new_stretch(late):
     back = np.concatenate([t[:DAMAGED], t[DAMAGED:] - late / RATE])
     forth = np.concatenate([t[:DAMAGED], t[DAMAGED:] + late / RATE])
     for stamps, first in ((back, DAMAGED + late), (forth, DAMAGED)):
-        gate = SpikeGate([True, False], continuous=[True, False])
-        good = [s for a, b in zip(stamps, x, strict=True) for s in gate.take(float(a), b)]
+        _, good, _ = passed(stamps, x)
         assert [s.t for s in good if s.begins] == [stamps[first]]
         assert len(good) >= COUNT - late - 1
 
@@ -95,8 +96,7 @@ def test_a_step_of_a_torque_and_a_collision_begin_no_new_stretch():
     t, x = stream(np.random.default_rng(14))
     x[DAMAGED:, 1] += 30.0
     x[:, 0] += 2.0 * np.minimum(t, 2.0 * (t[DAMAGED // 2] + 0.3 / RATE) - t)
-    gate = SpikeGate([True, False], continuous=[True, False])
-    good = [s for stamp, row in zip(t, x, strict=True) for s in gate.take(float(stamp), row)]
+    _, good, _ = passed(t, x)
     assert len(good) == COUNT and not any(s.begins for s in good)
 
 
@@ -104,8 +104,7 @@ def test_a_step_of_a_torque_and_a_collision_begin_no_new_stretch():
 def test_a_torque_that_jumps_to_where_it_often_is_may_be_of_the_arm(height, reason):
     t, x = stream(np.random.default_rng(15))
     x[400:1900:100, 1] += height * np.sign(x[400:1900:100, 1])
-    gate = SpikeGate([True, False], pulsing=[False, True])
-    good = [s for stamp, row in zip(t, x, strict=True) for s in gate.take(float(stamp), row)]
+    gate, good, _ = passed(t, x)
     assert len(good) == COUNT - 15
     assert gate.rejected == {reason: 15}
     assert sum(gate.spikes.values()) == 15 * (reason == 'spike')
@@ -118,9 +117,8 @@ def test_full_turns_are_no_damage_and_undone(later):
     t[DAMAGED:] += later
     turned = 4.0 * t
     x[:, 0] = np.angle(np.exp(1j * turned))
-    gate = SpikeGate([True, False])
-    good = [s for stamp, row in zip(t, x, strict=True) for s in gate.take(float(stamp), row)]
-    assert [s.t for s in good] == t.tolist() and not gate.rejected
+    gate, good, stamps = passed(t, x)
+    assert stamps.tolist() == t.tolist() and not gate.rejected
     np.testing.assert_allclose([s.x[0] for s in good], turned, atol=1e-9)
 
 
@@ -130,18 +128,19 @@ def test_a_damaged_angle_turns_nothing_after_it(where, angle):
     t, x = stream(np.random.default_rng(17))
     spoiled = x.copy()
     spoiled[where, 0] += angle
-    gate = SpikeGate([True, False])
-    good = [s for a, b in zip(t, spoiled, strict=True) for s in gate.take(float(a), b)]
+    _, good, _ = passed(t, spoiled)
     assert all(np.array_equal(s.x, x[round(s.t * RATE)]) for s in good)
     assert len(good) >= COUNT - 3
 
 
 def test_an_arm_that_rested_may_begin_to_move():
-    t, x = stream(np.random.default_rng(6))
-    x[:DAMAGED] = 0.0
+    """Steps of a coarse encoder that were not seen before cost a tenth of a second at most."""
+    rng = np.random.default_rng(6)
+    t, x = stream(rng)
+    x[:DAMAGED] = np.stack([np.zeros(DAMAGED), NOISE * rng.normal(size=DAMAGED)], axis=1)
     x[DAMAGED:, 0] = np.round(0.5 * (t[DAMAGED:] - t[DAMAGED]) ** 2 / 1e-4) * 1e-4
-    _, good = passed(t, x)
-    np.testing.assert_array_equal(good, t)
+    _, _, good = passed(t, x)
+    assert len(good) >= COUNT - 0.1 * RATE
 
 
 def test_a_stamp_from_elsewhere_costs_one_sample_and_a_new_clock_none():
@@ -150,7 +149,7 @@ def test_a_stamp_from_elsewhere_costs_one_sample_and_a_new_clock_none():
     stamps[500] += 1000.0
     stamps[700] = -5.0
     stamps[DAMAGED:] -= 300.0
-    gate, good = passed(stamps, x)
+    gate, _, good = passed(stamps, x)
     np.testing.assert_array_equal(good, np.delete(stamps, [500, 700]))
     assert gate.rejected == {'stamp': 2}
 
@@ -160,7 +159,7 @@ def test_a_stamp_a_little_ahead_costs_its_own_sample_and_none_after_it(ahead, wh
     t, x = stream(np.random.default_rng(19))
     stamps = t.copy()
     stamps[where] = t[where] + (ahead + 0.5) / RATE
-    gate, good = passed(stamps, x)
+    gate, _, good = passed(stamps, x)
     np.testing.assert_array_equal(good, np.delete(t, where))
     assert gate.rejected.total() == 1
 
@@ -168,7 +167,4 @@ def test_a_stamp_a_little_ahead_costs_its_own_sample_and_none_after_it(ahead, wh
 def test_errors_without_consequence_are_let_through():
     t, x = stream(np.random.default_rng(10))
     x[DAMAGED, 1] += 5.0
-    gate = SpikeGate([True, False])
-    for stamp, row in zip(t, x, strict=True):
-        gate.take(float(stamp), row, np.array([0.0, 6.0]))
-    assert not gate.rejected
+    assert not passed(t, x, np.array([0.0, 6.0]))[0].rejected

@@ -12,8 +12,8 @@ from typing import Any
 from armid_msgs.msg import ParameterEstimate
 from armid_ros.errors import ArmidError, RecordingError
 from armid_ros.identification.rows.causal import LARGEST
-from armid_ros.identification.samples.joint_gate import joint_gate
 from armid_ros.identification.samples.joint_merge import joint_places
+from armid_ros.identification.samples.spikes import SpikeGate
 from armid_ros.identification.samples.straight_line import StreamSample
 from armid_ros.identification.ties.stiffness import Interaction
 from armid_ros.nodes.base import ArmidNode, LOOK_PERIOD
@@ -81,7 +81,7 @@ class InteractionIdentifierNode(ArmidNode):
         self._estimates = self.create_publisher(ParameterEstimate, '~/estimate', LATCHED)
         self._joints = pair.robot.joints, pair.other.joints
         self._gates = tuple(
-            joint_gate(robot.prismatic, signals, torque_limit=robot.torque_limit)
+            SpikeGate(robot.prismatic, signals, torque_limit=robot.torque_limit)
             for robot, signals in ((pair.robot, 'qt'), (pair.other, 'q'))
         )
         self._told: list[Counter[str]] = [Counter(), Counter()]

@@ -8,7 +8,7 @@ from armid_ros.arm import ArmModel
 from armid_ros.effects import make_effect
 from armid_ros.excitation import Excitation, Limits, random_feasible
 from armid_ros.identification.online.identifier import OnlineIdentifier
-from armid_ros.identification.samples.joint_gate import joint_gate
+from armid_ros.identification.samples.spikes import SpikeGate
 from armid_ros.robots import load_robot
 from armid_ros.simulation import Reference, SimulatedArm
 import numpy as np
@@ -33,7 +33,7 @@ def test_a_joint_that_begins_to_move_keeps_all_samples(
 ) -> None:
     t, signals = clean(rate, rest, move)
     signals = signals + rounding * np.random.default_rng(0).standard_normal(signals.shape)
-    gate = joint_gate([False], 'qt', torque_limit=[50.0])
+    gate = SpikeGate([False], 'qt', torque_limit=[50.0])
     good = [one for at, x in zip(t, signals, strict=True) for one in gate.take(at, x)]
     assert len(good) >= len(t) - 2  # the last ones wait
     assert not gate.rejected
@@ -43,7 +43,7 @@ def test_a_joint_that_begins_to_move_keeps_all_samples(
 def test_damage_of_a_clean_stream_is_left_out() -> None:
     t, signals = clean(500.0)
     signals[1000, 0] += 0.01
-    gate = joint_gate([False], 'qt', torque_limit=[50.0])
+    gate = SpikeGate([False], 'qt', torque_limit=[50.0])
     good = [one.t for at, x in zip(t, signals, strict=True) for one in gate.take(at, x)]
     assert t[1000] not in good and gate.rejected == {'spike': 1}
 
