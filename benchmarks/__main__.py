@@ -1,7 +1,7 @@
 # Copyright 2026 The armid_ros developers
 # SPDX-License-Identifier: Apache-2.0
 """
-Run benchmarks by name, or all but the longest: ``python -m benchmarks [NAME ...]``.
+Run benchmarks by name, or all: ``python -m benchmarks [NAME ...]``.
 
 The output of the benchmarks of speed is kept in results/speed.json; the docs show it.
 
@@ -32,8 +32,6 @@ LIBRARY = {
     'real_recordings',
     'two_days',
 }
-#: Benchmarks of an hour, which run only by name.
-LONG = {'endurance'}
 #: Benchmarks whose output is kept.
 SPEED = {'nodes', 'offline_speed', 'online', 'reading', 'simulation'}
 RESULTS = Path(__file__).parent / 'results' / 'speed.json'
@@ -61,7 +59,7 @@ def main() -> int:
     known = sorted(
         path.stem for path in Path(__file__).parent.glob('*.py') if path.stem not in LIBRARY
     )
-    names = sys.argv[1:] or [name for name in known if name not in LONG]
+    names = sys.argv[1:] or known
     unknown = [name for name in names if name not in known]
     if unknown:
         print(f"benchmarks: no '{unknown[0]}'; there are {', '.join(known)}", file=sys.stderr)

@@ -1,7 +1,7 @@
 # Copyright 2026 The armid_ros developers
 # SPDX-License-Identifier: Apache-2.0
 """
-Speed of the nodes: losses at 1 kHz, update times, lock step; for kills see benchmarks.endurance.
+Speed of the nodes: losses at 1 kHz, update times, lock step.
 
 ``python -m benchmarks.nodes [--seconds 60]``; the identifier runs in this process, the arm and the
 recorder in others. Losses are valid on an otherwise idle machine.
