@@ -34,6 +34,8 @@ from armid_ros.simulation.plant import Plant
 import numpy as np
 from scipy import signal
 
+from benchmarks.multisine import multisine
+
 
 def ball(mass: float) -> str:
     """Return the quantities of a ball of 3 cm, 5 cm from the wrist."""
@@ -118,15 +120,10 @@ def arm_with(*effects: str) -> ArmModel:
 def working_motion(duration: float, speed: float, rng: np.random.Generator) -> Reference:
     """Return a motion of three harmonics a joint, from rest to rest in the middle of the range."""
     robot = load_robot('humanoid_arm')
-    t = np.arange(0.0, duration + 1e-9, 0.01)[:, np.newaxis]
-    w = 2.0 * np.pi * 0.1 * speed * np.array([1.0, 2.0, 5.0])
     size = rng.uniform(0.3, 1.0, robot.n_joints) * 0.3
-    q, dq, ddq = np.zeros((3, len(t), robot.n_joints))
-    for rate, share in zip(w, (1.0, 0.6, 0.2), strict=True):
-        angle = rate * t + rng.uniform(0.0, 2.0 * np.pi, robot.n_joints)
-        q += share * size * np.sin(angle)
-        dq += share * size * rate * np.cos(angle)
-        ddq -= share * size * rate**2 * np.sin(angle)
+    tones = [(0.1 * speed * k, share * size) for k, share in ((1, 1.0), (2, 0.6), (5, 0.2))]
+    made = multisine(robot.joints, np.arange(0.0, duration + 1e-9, 0.01), rng, tones)
+    t, q, dq, ddq = made.t[:, np.newaxis], made.q, made.dq, made.ddq
     x = np.clip(np.minimum(t, t[-1] - t) / _RAMP, 0.0, 1.0)
     sign = np.where(t < t[-1] / 2.0, 1.0, -1.0) * (x < 1.0) / _RAMP
     fade = x**3 * (10.0 - 15.0 * x + 6.0 * x**2)

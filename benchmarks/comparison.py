@@ -26,7 +26,8 @@ from armid_ros.recording import Recording
 from armid_ros.robots import load_robot
 import numpy as np
 
-from benchmarks.coverage import coloured, FRICTION, multisine
+from benchmarks.coverage import coloured, FRICTION, RATE
+from benchmarks.multisine import multisine
 
 ENCODER, TORQUE, POLE = 2e-5, 0.02, 0.95
 LOAD = 0.1
@@ -35,7 +36,8 @@ WEAR = 1.5
 
 def identified(arm, structure, duration, rng):
     """Identify an arm from a new recording; return the parameters in its document."""
-    motion = multisine(arm.robot.joints, duration, rng)
+    t = np.arange(round(duration * RATE)) / RATE
+    motion = multisine(arm.robot.joints, t, rng)
     tau = arm.torque(motion)
     recording = Recording(
         joints=arm.robot.joints,

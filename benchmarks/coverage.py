@@ -19,11 +19,12 @@ from armid_ros.arm import ArmModel
 from armid_ros.effects import make_effect
 from armid_ros.identification import IdentificationSettings, identify, SignalSettings
 from armid_ros.identification.online.identifier import OnlineIdentifier
-from armid_ros.motion import Motion
 from armid_ros.recording import Recording
 from armid_ros.robots import load_robot
 import numpy as np
 from scipy.signal import lfilter
+
+from benchmarks.multisine import multisine
 
 FRICTION = {'viscous_friction': 0.08, 'coulomb_friction': 0.05, 'torque_offset': 0.02}
 RATE = 200.0
@@ -57,21 +58,6 @@ class Tally:
         )
 
 
-def multisine(joints, duration, rng, amplitude=0.5):
-    """Return an exciting motion with exact derivatives."""
-    t = np.arange(round(duration * RATE)) / RATE
-    w = 2 * np.pi * np.array([0.1, 0.2, 0.5])[:, None]
-    size = amplitude * np.array([1.0, 0.6, 0.2])[:, None]
-    angle = w[None] * t[:, None, None] + rng.uniform(0, 2 * np.pi, (3, len(joints)))
-    return Motion(
-        joints,
-        t,
-        np.sum(size * np.sin(angle), axis=1),
-        np.sum(size * w * np.cos(angle), axis=1),
-        np.sum(-size * w**2 * np.sin(angle), axis=1),
-    )
-
-
 def coloured(rng, shape, pole):
     """Return first-order autoregressive noise of unit variance."""
     white = rng.normal(size=(shape[0] + 500, shape[1]))
@@ -101,7 +87,8 @@ def coverage(identified, repeats, duration, encoder, torque, pole, seed=0):
     for name, value in FRICTION.items():
         arm = arm.with_effect(make_effect(name, robot), np.full(robot.n_joints, value))
     structure = ArmModel(robot, arm.effects)
-    motion, other = (multisine(robot.joints, duration, rng) for _ in range(2))
+    t = np.arange(round(duration * RATE)) / RATE
+    motion, other = (multisine(robot.joints, t, rng) for _ in range(2))
     tau = arm.torque(motion)
     other = other.select(slice(None, None, 20))
     tallies = {'base parameters': Tally(), 'effects': Tally(), 'predicted torque': Tally()}

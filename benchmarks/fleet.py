@@ -26,17 +26,18 @@ import tempfile
 
 from armid_ros.arm import ArmModel
 from armid_ros.effects import make_effect
-from armid_ros.motion import Motion
 from armid_ros.recording import write_recording
 from armid_ros.robots import load_robot
 import numpy as np
+
+from benchmarks.multisine import multisine
 
 ROBOT = Path(__file__).parents[1] / 'examples' / 'arm.urdf'
 EFFECTS = 'viscous_friction,coulomb_friction,torque_offset'
 RATE = 200.0
 FIRST_DAY = datetime.datetime(2026, 1, 1, 8, tzinfo=datetime.UTC)
 #: Frequencies of the motion [Hz] and their sizes [rad].
-HARMONICS = ((0.1, 0.5), (0.25, 0.3), (0.55, 0.12))
+TONES = ((0.1, 0.5), (0.25, 0.3), (0.55, 0.12))
 #: Noise of the torque sensors [N m].
 NOISE = np.array([0.05, 0.05, 0.02])
 VISCOUS, COULOMB = np.array([0.6, 0.6, 0.3]), np.array([0.5, 0.5, 0.25])
@@ -90,18 +91,11 @@ def lived(arm, truth, day, rng):
 def moved(arm, seconds, rng):
     """Return a motion in closed form with noisy torque."""
     t = np.arange(round(seconds * RATE)) / RATE
-    q, dq, ddq = np.zeros((3, len(t), arm.robot.n_joints))
-    for hz, size in HARMONICS:
-        w = 2 * np.pi * hz
-        angle = w * t[:, None] + rng.uniform(0, 2 * np.pi, arm.robot.n_joints)
-        q += size * np.sin(angle)
-        dq += size * w * np.cos(angle)
-        ddq -= size * w * w * np.sin(angle)
-    motion = Motion(arm.robot.joints, t, q, dq, ddq)
+    motion = multisine(arm.robot.joints, t, rng, TONES)
     rigid = len(arm.robot.rigid_parameters)
     coulomb = arm.theta[rigid + 3 : rigid + 6]
-    soft = coulomb * (np.tanh(dq / SLIDING) - np.sign(dq))
-    return motion.with_torque(arm.torque(motion) + soft + NOISE * rng.normal(size=q.shape))
+    soft = coulomb * (np.tanh(motion.dq / SLIDING) - np.sign(motion.dq))
+    return motion.with_torque(arm.torque(motion) + soft + NOISE * rng.normal(size=motion.q.shape))
 
 
 def draw(arms, bags, changed, damaged, seed=0):

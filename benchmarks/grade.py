@@ -32,7 +32,8 @@ from armid_ros.robots import load_robot
 import numpy as np
 
 from benchmarks import real_recordings
-from benchmarks.coverage import FRICTION, multisine
+from benchmarks.coverage import FRICTION
+from benchmarks.multisine import multisine
 
 #: Limits that decide whether a mistake is reported; the others are limits of grades.
 DECIDING = ('poor', 'unusable', 'floor', 'gain', 'free_body', 'torque_factor', 'gravity_change')
@@ -46,7 +47,7 @@ def simulated(seed):
     arm = ArmModel(robot.with_inertias(links.ravel()))
     for name, value in FRICTION.items():
         arm = arm.with_effect(make_effect(name, robot), np.full(6, value))
-    motion = multisine(robot.joints, 20.0, rng)
+    motion = multisine(robot.joints, np.arange(0.0, 20.0, 0.005), rng)
     tau = arm.torque(motion)
     tau += 0.02 * np.sqrt(np.mean(tau**2, axis=0)) * rng.normal(size=tau.shape)
     source = f'simulated {seed}'

@@ -84,19 +84,3 @@ def run(seed=0):
         truth = ArmModel(robot)
         errors[name] = np.array([held_out_error(result.arm, truth, test) for test in tests])
     return errors, load_between(*found)
-
-
-def main():
-    """Print the table."""
-    errors, load = run()
-    for name, table in errors.items():
-        joints = ' '.join(f'{error:5.2f}' for error in table.mean(axis=0))
-        print(
-            f'{name:20s} mean {table.mean():.2f} % of peak (wanted <= 1), joints {joints} '
-            f'(each <= 1.5); the paper: 5.5'
-        )
-    print(f'load {load:.4f} kg: {1e3 * abs(load - LOAD):.1f} g off (wanted <= 10)')
-
-
-if __name__ == '__main__':
-    main()

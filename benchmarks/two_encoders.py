@@ -14,11 +14,7 @@ import os
 from pathlib import Path
 import sys
 
-from armid_ros.papers.elastic.identification.joints import (
-    fit_transmission,
-    TransmissionFit,
-    TwoEncoders,
-)
+from armid_ros.papers.elastic.identification.joints import fit_transmission, TwoEncoders
 import numpy as np
 from scipy.io import loadmat
 
@@ -43,24 +39,6 @@ def kr300(data: Path, axis: int) -> list[TwoEncoders]:
     return records
 
 
-def named(fit: TransmissionFit) -> tuple[str, ...]:
-    """
-    Return the names of the causes of the twist of a joint that are significant.
-
-    Returns
-    -------
-    tuple of str
-        joint_elasticity, backlash, both, or none; one name with both in it if their estimates
-        are too correlated to separate them.
-
-    """
-    soft = bool(np.isfinite(fit.stiffness_alone[2]))
-    if soft and abs(fit.correlation) >= 0.95:
-        return ('joint_elasticity or backlash',)
-    names = (('joint_elasticity', soft), ('backlash', fit.backlash_seen))
-    return tuple(name for name, there in names if there)
-
-
 def main() -> int:
     """Print the table."""
     folder = os.environ.get('ARMID_DATA')
@@ -75,8 +53,7 @@ def main() -> int:
         print(
             f'axis {axis + 1}: K {value:.1f} [{low:.1f}, {high:.1f}] 1e6 N m/rad, backlash '
             f'[{play}] deg, correlation {fit.correlation:.2f}, {fit.reversals} reversals of load, '
-            f'encoders apart by [{delay}] ms, R2 {fit.explained:.3f}; '
-            f'named: {", ".join(named(fit)) or "nothing"}'
+            f'encoders apart by [{delay}] ms, R2 {fit.explained:.3f}'
         )
     return 0
 
