@@ -13,7 +13,6 @@ import json
 import time
 
 from armid_ros.arm import ArmModel
-from armid_ros.effects import make_effect
 from armid_ros.identification import (
     identification_document,
     IdentificationSettings,
@@ -22,11 +21,9 @@ from armid_ros.identification import (
 )
 from armid_ros.identification.assess.compare import compare
 from armid_ros.identification.parameters_file import parameters_of
-from armid_ros.recording import Recording
-from armid_ros.robots import load_robot
 import numpy as np
 
-from benchmarks.coverage import coloured, FRICTION, RATE
+from benchmarks.coverage import FRICTION, RATE, recorded
 from benchmarks.multisine import multisine
 
 ENCODER, TORQUE, POLE = 2e-5, 0.02, 0.95
@@ -38,14 +35,7 @@ def identified(arm, structure, duration, rng):
     """Identify an arm from a new recording; return the parameters in its document."""
     t = np.arange(round(duration * RATE)) / RATE
     motion = multisine(arm.robot.joints, t, rng)
-    tau = arm.torque(motion)
-    recording = Recording(
-        joints=arm.robot.joints,
-        t=motion.t,
-        q=motion.q + ENCODER * rng.normal(size=motion.q.shape),
-        tau=tau + TORQUE * coloured(rng, tau.shape, POLE),
-        source='repeat',
-    )
+    recording = recorded(motion, arm.torque(motion), rng, ENCODER, TORQUE, POLE)
     settings = IdentificationSettings(signals=SignalSettings(10.0, 4))
     result = identify(structure, [recording], settings, rng=np.random.default_rng(0))
     document = json.loads(json.dumps(identification_document(result, 'arm', {})))
@@ -54,10 +44,8 @@ def identified(arm, structure, duration, rng):
 
 def arms():
     """Return the unchanged arm, the arm with a load, and the arm with more elbow friction."""
-    robot = load_robot('humanoid_arm')
-    arm = ArmModel(robot)
-    for name, value in FRICTION.items():
-        arm = arm.with_effect(make_effect(name, robot), np.full(robot.n_joints, value))
+    arm = ArmModel.of('humanoid_arm', effects=FRICTION)
+    robot = arm.robot
     body = np.array([1.0, 0.0, 0.0, 0.06, 0.005, 0.0, 0.005, 0.0, 0.0, 0.001])
     pi = robot.rigid_parameters.copy()
     pi[-10:] += LOAD * body

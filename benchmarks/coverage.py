@@ -12,56 +12,63 @@ from a recording and online.
 """
 
 import argparse
-from dataclasses import dataclass, field
+from collections import defaultdict
 import time
 
 from armid_ros.arm import ArmModel
-from armid_ros.effects import make_effect
 from armid_ros.identification import IdentificationSettings, identify, SignalSettings
 from armid_ros.identification.online.identifier import OnlineIdentifier
 from armid_ros.recording import Recording
-from armid_ros.robots import load_robot
 import numpy as np
 from scipy.signal import lfilter
 
 from benchmarks.multisine import multisine
 
-FRICTION = {'viscous_friction': 0.08, 'coulomb_friction': 0.05, 'torque_offset': 0.02}
+FRICTION = (
+    'viscous_friction:viscous_coefficient=0.08',
+    'coulomb_friction:coulomb_torque=0.05',
+    'torque_offset:torque_offset=0.02',
+)
 RATE = 200.0
 HALF_WIDTH = 1.959964
 
 
-@dataclass
 class Tally:
-    """Hits, errors and stated standard deviations over repeats."""
+    """Errors and stated standard deviations over repeats, by parameter."""
 
-    hits: list = field(default_factory=list)
-    errors: list = field(default_factory=list)
-    stated: list = field(default_factory=list)
+    def __init__(self):
+        self._values = defaultdict(list)
 
-    def add(self, estimate, truth, std):
-        """Add one repeat."""
-        self.hits.append(np.abs(estimate - truth) <= HALF_WIDTH * std)
-        self.errors.append(estimate - truth)
-        self.stated.append(std)
+    def add(self, name, error, stated):
+        """Add a parameter of one repeat; one that is not excited is absent."""
+        self._values[name].append((error, stated))
 
     def line(self, what):
         """Return a row of the table."""
-        errors, stated = np.array(self.errors), np.array(self.stated)
-        bias = np.abs(errors.mean(axis=0)) / errors.std(axis=0)
-        ratio = np.median(np.sqrt(np.mean(stated**2, axis=0)) / errors.std(axis=0))
-        low, high = np.percentile(np.mean(self.hits, axis=0), [5, 95])
+        errors, stated = zip(*(np.array(one).T for one in self._values.values()), strict=True)
+        spread = np.array([one.std() for one in errors])
+        bias = np.abs([one.mean() for one in errors]) / spread
+        ratio = np.median(np.sqrt([np.mean(one**2) for one in stated]) / spread)
+        hits = [np.abs(e) <= HALF_WIDTH * s for e, s in zip(errors, stated, strict=True)]
+        low, high = np.percentile([np.mean(one) for one in hits], [5, 95])
         return (
-            f'    {what:18s}{100 * np.mean(self.hits):6.1f} %  wanted 93 to 97 %   '
+            f'    {what:18s}{100 * np.mean(np.concatenate(hits)):6.1f} %  wanted 93 to 97 %   '
             f'one by one {100 * low:.0f} to {100 * high:.0f} %, stated/true deviation '
             f'{ratio:.2f}, bias/deviation {np.median(bias):.2f} (largest {bias.max():.2f})'
         )
 
 
-def coloured(rng, shape, pole):
-    """Return first-order autoregressive noise of unit variance."""
-    white = rng.normal(size=(shape[0] + 500, shape[1]))
-    return lfilter([np.sqrt(1 - pole**2)], [1.0, -pole], white, axis=0)[500:]
+def recorded(motion, tau, rng, encoder, torque, pole):
+    """Return a recording with encoder noise [rad] and autoregressive torque noise [N m]."""
+    white = rng.normal(size=(len(tau) + 500, tau.shape[1]))
+    coloured = lfilter([np.sqrt(1 - pole**2)], [1.0, -pole], white, axis=0)[500:]
+    return Recording(
+        joints=motion.joints,
+        t=motion.t,
+        q=motion.q + encoder * rng.normal(size=tau.shape),
+        tau=tau + torque * coloured,
+        source='repeat',
+    )
 
 
 def from_recording(arm, recording):
@@ -82,36 +89,25 @@ def online(arm, recording):
 def coverage(identified, repeats, duration, encoder, torque, pole, seed=0):
     """Identify repeatedly and print a table of coverages."""
     rng = np.random.default_rng(seed)
-    robot = load_robot('humanoid_arm')
-    arm = ArmModel(robot)
-    for name, value in FRICTION.items():
-        arm = arm.with_effect(make_effect(name, robot), np.full(robot.n_joints, value))
-    structure = ArmModel(robot, arm.effects)
+    arm = ArmModel.of('humanoid_arm', effects=FRICTION)
+    structure = ArmModel(arm.robot, arm.effects)
     t = np.arange(round(duration * RATE)) / RATE
-    motion, other = (multisine(robot.joints, t, rng) for _ in range(2))
+    motion, other = (multisine(arm.robot.joints, t, rng) for _ in range(2))
     tau = arm.torque(motion)
     other = other.select(slice(None, None, 20))
     tallies = {'base parameters': Tally(), 'effects': Tally(), 'predicted torque': Tally()}
     start = time.perf_counter()
-    columns = None
     for _ in range(repeats):
-        recording = Recording(
-            joints=robot.joints,
-            t=motion.t,
-            q=motion.q + encoder * rng.normal(size=motion.q.shape),
-            tau=tau + torque * coloured(rng, tau.shape, pole),
-            source='repeat',
-        )
-        base, estimate = identified(structure, recording)
+        base, estimate = identified(structure, recorded(motion, tau, rng, encoder, torque, pole))
         truth = base.values(arm.theta)
-        if columns is None:
-            columns = arm.columns(other)[:, :, base.independent]
-            rigid = np.array(['_' not in p.name for p in estimate.parameters])
+        columns = arm.columns(other)[:, :, base.independent]
         flat = columns.reshape(-1, columns.shape[2])
         std = np.sqrt(np.sum((flat @ estimate.covariance) * flat, axis=1))
-        tallies['base parameters'].add(estimate.values[rigid], truth[rigid], estimate.std[rigid])
-        tallies['effects'].add(estimate.values[~rigid], truth[~rigid], estimate.std[~rigid])
-        tallies['predicted torque'].add(flat @ estimate.values, flat @ truth, std)
+        error = estimate.values - truth
+        for number, row in enumerate(zip(flat @ error, std, strict=True)):
+            tallies['predicted torque'].add(number, *row)
+        for name, *row in zip(estimate.parameters, error, estimate.std, strict=True):
+            tallies['effects' if '_' in name.name else 'base parameters'].add(name, *row)
     print(
         f'{identified.__name__}, {repeats} repeats of {duration:g} s, torque noise {torque:g} N m '
         f'with pole {pole:g} at {RATE:g} Hz, encoder noise {encoder:g} rad '

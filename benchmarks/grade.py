@@ -22,7 +22,6 @@ import time
 from unittest import mock
 
 from armid_ros.arm import ArmModel
-from armid_ros.effects import make_effect
 from armid_ros.identification.assess import hypotheses, mistakes, prediction_error
 from armid_ros.identification.assess.grade_limits import LIMITS
 from armid_ros.identification.assess.mistakes import find_mistake
@@ -44,9 +43,7 @@ def simulated(seed):
     rng = np.random.default_rng(seed)
     robot = load_robot('humanoid_arm')
     links = robot.rigid_parameters.reshape(-1, 10) * rng.uniform(0.8, 1.2, (6, 1))
-    arm = ArmModel(robot.with_inertias(links.ravel()))
-    for name, value in FRICTION.items():
-        arm = arm.with_effect(make_effect(name, robot), np.full(6, value))
+    arm = ArmModel.of(robot.with_inertias(links.ravel()), effects=FRICTION)
     motion = multisine(robot.joints, np.arange(0.0, 20.0, 0.005), rng)
     tau = arm.torque(motion)
     tau += 0.02 * np.sqrt(np.mean(tau**2, axis=0)) * rng.normal(size=tau.shape)
