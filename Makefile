@@ -105,7 +105,7 @@ bench: $(STAMPS)/armid_ros $(STAMPS)/bench  ## speed and accuracy, side by side 
 	$(BIN)/python -m benchmarks $(BENCH)
 
 benchmark: $(STAMPS)/armid_ros $(STAMPS)/test  ## name the effects hidden in the locked set, about 30 min
-	$(BIN)/python -m benchmarks.hidden_effects locked --out benchmark
+	$(BIN)/python -m benchmarks.hidden_effects locked
 
 # make lock UPGRADE=1 takes the newest of everything; without, what is locked stays if it can.
 UV = $(BIN)/uv pip compile --quiet --universal --python-version 3.11 --fork-strategy fewest \
