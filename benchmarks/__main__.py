@@ -15,8 +15,8 @@ import sys
 from benchmarks.reference_loop import processor
 
 BENCHMARKS = (
-    *('changes', 'comparison', 'coverage', 'excitation', 'exo', 'exo_diagnosis', 'fleet', 'grade'),
-    *('growth', 'healthy_arms', 'hidden_effects', 'live_diagnosis', 'lived', 'nodes'),
+    *('changes', 'coverage', 'excitation', 'exo', 'exo_diagnosis', 'fleet', 'growth'),
+    *('healthy_arms', 'hidden_effects', 'live_diagnosis', 'lived', 'nodes'),
     *('offline_speed', 'online', 'part_time', 'reading', 'real_changes', 'real_diagnosis'),
     *('simulation', 'two_encoders'),
 )

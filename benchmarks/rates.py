@@ -31,11 +31,10 @@ The decision is new since 2026-11-28. The locked laboratory and most development
 judged by the rules before.
 """
 
-#: Command, number of runs that together have all cases, and rows, of each locked set.
+#: Command and rows of each locked set.
 _LOCKED = {
     'lived, locked, 72 cases': (
         'python -m benchmarks.lived locked --cases 500:572',
-        1,
         {
             'cause named first': 'cause above the misfit named first',
             'cause named first: first or in a tie of 3': 'first, or in the stated tie',
@@ -48,7 +47,6 @@ _LOCKED = {
     ),
     'lived, locked/exact, 36 cases': (
         'python -m benchmarks.lived locked/exact',
-        1,
         {
             'cause named first': 'cause in an exact description named first',
             'nothing happened, silent': 'no change: no name',
@@ -56,7 +54,6 @@ _LOCKED = {
     ),
     'lived, locked/mounting, 20 cases': (
         'python -m benchmarks.lived locked/mounting',
-        1,
         {
             'cause named first': 'other mounting named first',
             'mounting within 1 deg and 2 %': 'gravity within 1 degree and 2 %',
@@ -64,7 +61,6 @@ _LOCKED = {
     ),
     'laboratory, locked': (
         'make benchmark',
-        1,
         {
             'top-1 name right': 'effect named first',
             'truth among the names': 'truth among the names',
@@ -89,11 +85,8 @@ def page(looks: str, rates: str) -> str:
         Contents of looks.jsonl and rates.json.
 
     """
-    runs: dict[str, list[dict[str, Any]]] = {}
-    for line in looks.splitlines():
-        run = json.loads(line)
-        if run.get('results'):
-            runs.setdefault(run['set'], []).append(run['results'])
+    runs = map(json.loads, looks.splitlines())
+    last = {run['set']: run['results'] for run in runs if run.get('results')}
     other = json.loads(rates)
     return '\n'.join(
         [
@@ -103,12 +96,8 @@ def page(looks: str, rates: str) -> str:
             '| command | question | right | 95 % interval |',
             '|---|---|---|---|',
             *(
-                _locked_row(
-                    f'`{command}`' if not index else '',
-                    question,
-                    [run[key] for run in runs[name][-count:]],
-                )
-                for name, (command, count, rows) in _LOCKED.items()
+                _locked_row('' if index else f'`{command}`', question, last[name][key])
+                for name, (command, rows) in _LOCKED.items()
                 for index, (key, question) in enumerate(rows.items())
             ),
             '',
@@ -147,10 +136,9 @@ def page(looks: str, rates: str) -> str:
     )
 
 
-def _locked_row(command: str, question: str, runs: list[dict[str, Any]]) -> str:
-    cases = sum(run['cases'] for run in runs)
-    hits = sum(round(run['value'] * run['cases']) for run in runs if run['cases'])
-    return f'| {command} | {question} | {_right([hits, cases])} |'
+def _locked_row(command: str, question: str, found: dict[str, Any]) -> str:
+    hits = round(found['value'] * found['cases'])
+    return f'| {command} | {question} | {_right([hits, found["cases"]])} |'
 
 
 def _command(row: dict[str, Any]) -> str:

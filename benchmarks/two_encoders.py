@@ -10,13 +10,13 @@ folder of the environment variable ARMID_DATA.
 
 from __future__ import annotations
 
-import os
 from pathlib import Path
-import sys
 
 from armid_ros.papers.elastic.identification.joints import fit_transmission, TwoEncoders
 import numpy as np
 from scipy.io import loadmat
+
+from benchmarks.real_recordings import folder
 
 GEAR = (1798 / 7, 1872 / 7, 757 / 3)
 PERIOD = 4e-3
@@ -39,14 +39,10 @@ def kr300(data: Path, axis: int) -> list[TwoEncoders]:
     return records
 
 
-def main() -> int:
+def main() -> None:
     """Print the table."""
-    folder = os.environ.get('ARMID_DATA')
-    if not folder:
-        print('two_encoders: ARMID_DATA names no folder with recordings', file=sys.stderr)
-        return 0
     for axis in range(3):
-        fit = fit_transmission(kr300(Path(folder), axis), np.random.default_rng(0))
+        fit = fit_transmission(kr300(folder(), axis), np.random.default_rng(0))
         value, low, high = (1e-6 * x for x in fit.stiffness)
         play = ', '.join(f'{np.degrees(x):.4f}' for x in fit.backlash)
         delay = ', '.join(f'{1e3 * x:.2f}' for x in fit.delay)
@@ -55,8 +51,7 @@ def main() -> int:
             f'[{play}] deg, correlation {fit.correlation:.2f}, {fit.reversals} reversals of load, '
             f'encoders apart by [{delay}] ms, R2 {fit.explained:.3f}'
         )
-    return 0
 
 
 if __name__ == '__main__':
-    sys.exit(main())
+    main()
