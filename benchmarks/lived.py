@@ -23,7 +23,6 @@ import traceback
 from benchmarks.lived_scoring import breakdown, LivedJudged, LivedTruth, probabilities, score
 from benchmarks.looks import judge_all, write_json
 from benchmarks.two_days import Answer, ask, identification_of, known_arm
-from tests.hidden.lived.adapter import recording_of, robot_of
 from tests.hidden.lived.cases import lived_case
 from tests.hidden.lived.specification import COUNTS, KINDS, specify
 
@@ -35,18 +34,18 @@ def judge(kind: str, index: int, *, again: bool = True) -> LivedJudged | None:
     except RuntimeError as error:
         print(f'{kind}/{index} left out: {error}', flush=True)
         return None
-    day_1, day_2 = ([recording_of(run) for run in day] for day in (case.day_1, case.day_2))
+    day_1, day_2 = ([run.recording for run in day] for day in (case.day_1, case.day_2))
     runs = [*case.day_2, case.held_out] if case.truth else []
     repeated = None
     try:
         if day_1:
-            arm = identification_of(robot_of(case), day_1).arm
+            arm = identification_of(case.robot, day_1).arm
         else:
-            arm = known_arm(robot_of(case), case.known)
+            arm = known_arm(case.robot, case.known)
         answer = ask(
             arm,
             day_2,
-            validate=[recording_of(case.held_out)],
+            validate=[case.held_out.recording],
             baseline=day_1,
             contributions=[run.contribution for run in runs],
         )
@@ -54,7 +53,7 @@ def judge(kind: str, index: int, *, again: bool = True) -> LivedJudged | None:
             repeated = ask(arm, day_1[:2], validate=day_1[2:], baseline=day_1)
     except Exception:
         answer = Answer(verdict='failed', error=traceback.format_exc(limit=-3))
-    return LivedJudged(LivedTruth.of(case, robot_of(case).gravity), answer, repeated)
+    return LivedJudged(LivedTruth.of(case), answer, repeated)
 
 
 def main() -> None:

@@ -13,7 +13,6 @@ from scipy.spatial.transform import Rotation
 from benchmarks.metrics import Metric, number, rate
 from benchmarks.two_days import Answer, Named, UNEXPLAINED
 from tests.hidden.arrays import FloatArray
-from tests.hidden.lived.arms import load_arm
 from tests.hidden.lived.cases import LivedCase
 from tests.hidden.lived.chain import Chain
 
@@ -77,7 +76,7 @@ class LivedTruth:
     felt: FloatArray = field(default_factory=lambda: np.eye(3))
 
     @classmethod
-    def of(cls, case: LivedCase, described: FloatArray) -> LivedTruth:
+    def of(cls, case: LivedCase) -> LivedTruth:
         """Return the truth of a case."""
         spec = case.spec
         (truth,) = case.truth or (None,)
@@ -95,9 +94,9 @@ class LivedTruth:
             in_catalogue=truth.in_catalogue if truth else False,
             gap=case.gap,
             gravity=case.gravity,
-            described=described,
+            described=case.robot.gravity,
             friction=spec.friction,
-            felt=felt_directions(Chain.of(load_arm(spec.arm))),
+            felt=felt_directions(Chain.of(case.robot)),
         )
 
     def among(self, named: Named) -> int | None:

@@ -24,7 +24,7 @@ import mujoco
 import numpy as np
 from scipy.interpolate import CubicHermiteSpline
 
-from tests.hidden.leg_pair import side_by_side
+from tests.hidden.descriptions import side_by_side
 
 #: Inertia of a prescribed joint [kg m^2].
 _HEAVY = 1e8

@@ -5,7 +5,8 @@ The page of success rates, generated from the recorded results.
 
     python -m benchmarks.rates        writes benchmarks/rates.md
 
-`results/looks.jsonl` has each run on a locked set, `results/rates.json` the rates of other sets.
+`results/looks.jsonl` has each run on a locked set; `results/rates.json` has the questions that are
+shown of them, and the rates of other sets.
 
 """
 
@@ -31,49 +32,6 @@ The decision is new since 2026-11-28. The locked laboratory and most development
 judged by the rules before.
 """
 
-#: Command and rows of each locked set.
-_LOCKED = {
-    'lived, locked, 72 cases': (
-        'python -m benchmarks.lived locked --cases 500:572',
-        {
-            'cause named first': 'cause above the misfit named first',
-            'cause named first: first or in a tie of 3': 'first, or in the stated tie',
-            'joint of the headline right': 'joint right',
-            'nothing happened, silent': 'no change: no name',
-            'same day again, silent': 'day 1 against itself: no name',
-            'outside the catalogue, said so': 'cause outside the catalogue: no substitute',
-            '95 % intervals with the truth': '95 % intervals that contain the truth',
-        },
-    ),
-    'lived, locked/exact, 36 cases': (
-        'python -m benchmarks.lived locked/exact',
-        {
-            'cause named first': 'cause in an exact description named first',
-            'nothing happened, silent': 'no change: no name',
-        },
-    ),
-    'lived, locked/mounting, 20 cases': (
-        'python -m benchmarks.lived locked/mounting',
-        {
-            'cause named first': 'other mounting named first',
-            'mounting within 1 deg and 2 %': 'gravity within 1 degree and 2 %',
-        },
-    ),
-    'laboratory, locked': (
-        'make benchmark',
-        {
-            'top-1 name right': 'effect named first',
-            'truth among the names': 'truth among the names',
-            'wrong names': 'wrong names (no more than 1 % wanted)',
-            'joint right': 'joint right',
-            'pairs exact': 'pairs of effects complete',
-            'unknown or partial': 'true name not in the library: `unknown` or `partial`',
-            '95 % intervals with the truth': '95 % intervals that contain the truth',
-            'false alarms': 'false alarms where nothing is hidden',
-        },
-    ),
-}
-
 
 def page(looks: str, rates: str) -> str:
     """
@@ -96,9 +54,9 @@ def page(looks: str, rates: str) -> str:
             '| command | question | right | 95 % interval |',
             '|---|---|---|---|',
             *(
-                _locked_row('' if index else f'`{command}`', question, last[name][key])
-                for name, (command, rows) in _LOCKED.items()
-                for index, (key, question) in enumerate(rows.items())
+                _locked_row('' if k else f'`{one["command"]}`', question, last[one['set']][key])
+                for one in other['locked']
+                for k, (key, question) in enumerate(one['rows'].items())
             ),
             '',
             '## Development sets',

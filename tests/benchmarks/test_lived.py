@@ -15,7 +15,9 @@ from benchmarks.lived_scoring import exact, gravity_of, LivedJudged, LivedTruth,
 from benchmarks.metrics import table
 from benchmarks.two_days import Answer, answer_of, Named
 from tests.hidden.lived.arms import load_arm
-from tests.hidden.lived.causes import CAUSES, Holding, Pulling, Scene
+from tests.hidden.lived.causes import CAUSES
+from tests.hidden.lived.causes.base import Scene
+from tests.hidden.lived.causes.contact import Holding, Pulling
 from tests.hidden.lived.chain import Chain
 from tests.hidden.lived.motions import draw_path, tracked
 from tests.hidden.lived.plant import LivedArm

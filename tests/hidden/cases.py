@@ -16,13 +16,12 @@ from armid_ros.robots import Robot
 import numpy as np
 import pinocchio as pin
 
-from tests.hidden.arrays import FloatArray
+from tests.hidden.arrays import FloatArray, KnownEffect
 from tests.hidden.base import HiddenEffect, Setting
-from tests.hidden.catalogue import HIDDEN
 from tests.hidden.machines import drive_size, load_machine, with_rigid_errors
 from tests.hidden.plant import Plant, run
 from tests.hidden.sensors import Sensors
-from tests.hidden.specification import CaseSpec
+from tests.hidden.specification import CaseSpec, HIDDEN
 from tests.hidden.trajectories import draw_orbit, Orbit, reference, SPEEDS
 
 SIZES = Path(__file__).with_name('sizes.json')
@@ -31,27 +30,6 @@ TRAINING, VALIDATION = ('slow', 'medium', 'fast'), ('other',)
 
 #: Below this gap of its worst joint an effect cannot be asked to be named.
 VISIBLE = 0.25
-
-
-@dataclass(frozen=True)
-class KnownEffect:
-    """
-    An effect that the nominal model has, with the values it has there.
-
-    Attributes
-    ----------
-    name : str
-        viscous_friction, coulomb_friction or rotor_inertia.
-    joints : tuple of str
-        The joints it is known of.
-    values : ndarray, shape (number of joints,)
-        Nominal values.
-
-    """
-
-    name: str
-    joints: tuple[str, ...]
-    values: FloatArray
 
 
 @dataclass(frozen=True)

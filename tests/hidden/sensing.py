@@ -10,9 +10,8 @@ from typing import Self
 
 from armid_ros.robots import Robot
 import numpy as np
-from scipy.signal import lfilter
 
-from tests.hidden.arrays import FloatArray, Parameter, Signals
+from tests.hidden.arrays import FloatArray, low_pass, Parameter, Signals
 from tests.hidden.base import HiddenEffect, InPair, OneJoint, pick, pick_loaded, Setting
 
 
@@ -139,12 +138,7 @@ class TorqueLag(_Reading):
         return cls(setting.robot.joints[j], j, 0.01)
 
     def reading(self, t: FloatArray, tau: FloatArray) -> FloatArray:
-        ratio = (t[1] - t[0]) / self.value
-        decay = np.exp(-ratio)
-        slope = 1.0 - (1.0 - decay) / ratio  # weight of the newest sample
-        numerator = np.array([slope, 1.0 - decay - slope])
-        start = [tau[0] * (1.0 - slope)]
-        return lfilter(numerator, [1.0, -decay], tau, zi=start)[0]
+        return low_pass(tau, self.value, t[1] - t[0])
 
 
 class EncoderOffset(OneJoint):

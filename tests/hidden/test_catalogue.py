@@ -19,8 +19,7 @@ from scipy.signal import butter, sosfiltfilt
 
 from benchmarks.hidden_effects import true_arm
 from tests.hidden.cases import Case, draw, simulate
-from tests.hidden.catalogue import CATALOGUED, HIDDEN
-from tests.hidden.specification import CaseSpec
+from tests.hidden.specification import CaseSpec, CATALOGUED, HIDDEN
 
 pytestmark = pytest.mark.long
 

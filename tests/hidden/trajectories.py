@@ -10,7 +10,7 @@ from armid_ros.robots import Robot
 import numpy as np
 import pinocchio as pin
 
-from tests.hidden.arrays import FloatArray
+from tests.hidden.arrays import FloatArray, smooth_step
 from tests.hidden.machines import position_range
 
 
@@ -115,8 +115,9 @@ def reference(orbit: Orbit, speed: str, dt: float, periods: int = 2) -> Referenc
     t = np.arange(round((2 * REST + moving) / dt) + 1) * dt
     s = np.clip(t - REST, 0.0, moving)
     rising, falling = np.minimum(s / RUN_IN, 1.0), np.clip((moving - s) / RUN_OUT, 0.0, 1.0)
-    pace = _smooth(rising) * _smooth(falling)
-    change = (_slope(rising) / RUN_IN - _slope(falling) / RUN_OUT) * ((s > 0.0) & (s < moving))
+    (rise, rate, _), (fall, fall_rate, _) = smooth_step(rising), smooth_step(falling)
+    pace = rise * fall
+    change = (rate / RUN_IN - fall_rate / RUN_OUT) * ((s > 0.0) & (s < moving))
     area = RUN_IN * (_area(rising) - _area(1.0)) + np.maximum(s - RUN_IN, 0.0)
     slowed = np.maximum(s - (moving - RUN_OUT), 0.0)
     phase = area - slowed + RUN_OUT * (_area(1.0) - _area(falling))
@@ -170,14 +171,6 @@ def _richness(robot: Robot, orbit: Orbit) -> float:
     columns = columns / np.maximum(np.linalg.norm(columns, axis=0), 1e-9)
     values = np.linalg.svd(columns, compute_uv=False)
     return float(np.sum(np.log(np.maximum(values, 1e-3))))
-
-
-def _smooth(x: FloatArray) -> FloatArray:
-    return x**3 * (10.0 - 15.0 * x + 6.0 * x**2)
-
-
-def _slope(x: FloatArray) -> FloatArray:
-    return 30.0 * x**2 * (1.0 - x) ** 2
 
 
 def _area(x: FloatArray | float) -> FloatArray | float:

@@ -99,6 +99,8 @@ class Cause(Sized, ABC):
 class JointCause(Cause):
     """A cause in one joint with one value that its size goes by."""
 
+    #: Attribute of the wear that grows by the value; empty for none.
+    worn: ClassVar[str] = ''
     joint: str
     index: int
     value: float
@@ -112,7 +114,9 @@ class JointCause(Cause):
         torque[:, self.index] = values
         return torque
 
-    def _more(self, wear: Wear, name: str) -> Wear:
-        values = getattr(wear, name).copy()
+    def wear(self, wear: Wear) -> Wear:
+        if not self.worn:
+            return wear
+        values = getattr(wear, self.worn).copy()
         values[self.index] += self.value
-        return replace(wear, **{name: values})
+        return replace(wear, **{self.worn: values})

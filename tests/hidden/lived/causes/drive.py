@@ -9,17 +9,16 @@ from typing import Self
 
 import numpy as np
 
-from tests.hidden.arrays import FloatArray, Parameter
+from tests.hidden.arrays import FloatArray, Parameter, spring_parameters
 from tests.hidden.lived.causes.base import JointCause, Scene
 from tests.hidden.lived.chain import Chain
 from tests.hidden.lived.motions import Path
-from tests.hidden.lived.wear import Wear
 
 
 class Coulomb(JointCause):
     """A gear that has become stiff."""
 
-    name = 'coulomb_friction'
+    name, worn = 'coulomb_friction', 'coulomb'
     stated = (('coulomb_torque', 'value', 'N m'),)
 
     @classmethod
@@ -27,23 +26,17 @@ class Coulomb(JointCause):
         j = scene.joint(rng)
         return cls(scene.chain.joints[j], j, 0.15 * scene.strength[j])
 
-    def wear(self, wear: Wear) -> Wear:
-        return self._more(wear, 'coulomb')
-
 
 class Viscous(JointCause):
     """A gear with other grease."""
 
-    name = 'viscous_friction'
+    name, worn = 'viscous_friction', 'viscous'
     stated = (('viscous_coefficient', 'value', 'N m s/rad'),)
 
     @classmethod
     def draw(cls, scene: Scene, rng: np.random.Generator) -> Self:
         j = scene.joint(rng)
         return cls(scene.chain.joints[j], j, 0.15 * scene.strength[j] / scene.speed[j])
-
-    def wear(self, wear: Wear) -> Wear:
-        return self._more(wear, 'viscous')
 
 
 @dataclass(frozen=True)
@@ -70,7 +63,7 @@ class Stribeck(JointCause):
 class LoadFriction(JointCause):
     """A gear in which dry friction grows with the load."""
 
-    name = 'load_dependent_friction'
+    name, worn = 'load_dependent_friction', 'load_share'
     stated = (('load_coefficient', 'value', ''),)
     factors = (0.02, 6.0)
 
@@ -79,23 +72,17 @@ class LoadFriction(JointCause):
         j = scene.joint(rng, loaded=True)
         return cls(scene.chain.joints[j], j, 0.1)
 
-    def wear(self, wear: Wear) -> Wear:
-        return self._more(wear, 'load_share')
-
 
 class Rotor(JointCause):
     """A drive exchanged for one with a heavier rotor."""
 
-    name = 'rotor_inertia'
+    name, worn = 'rotor_inertia', 'rotor'
     stated = (('rotor_inertia', 'value', 'kg m^2'),)
 
     @classmethod
     def draw(cls, scene: Scene, rng: np.random.Generator) -> Self:
         j = scene.joint(rng, first=1)
         return cls(scene.chain.joints[j], j, 0.05 * scene.strength[j] / scene.speed[j])
-
-    def wear(self, wear: Wear) -> Wear:
-        return self._more(wear, 'rotor')
 
 
 @dataclass(frozen=True)
@@ -114,10 +101,7 @@ class Spring(JointCause):
 
     @property
     def parameters(self) -> tuple[Parameter, ...]:
-        return (
-            Parameter('spring_stiffness', self.joint, self.value, 'N m/rad'),
-            Parameter('spring_preload', self.joint, -self.value * self.rest, 'N m'),
-        )
+        return spring_parameters(self.joint, self.value, self.rest)
 
     def torque(self, path: Path, chain: Chain) -> FloatArray:
         return self._column(path.q, self.value * (path.q[:, self.index] - self.rest))
