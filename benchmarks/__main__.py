@@ -18,10 +18,10 @@ BENCHMARKS = (
     *('changes', 'coverage', 'excitation', 'exo', 'exo_diagnosis', 'fleet', 'growth'),
     *('healthy_arms', 'hidden_effects', 'live_diagnosis', 'lived', 'nodes'),
     *('offline_speed', 'online', 'part_time', 'reading', 'real_changes', 'real_diagnosis'),
-    *('simulation', 'two_encoders'),
+    'two_encoders',
 )
 #: Benchmarks whose output is kept.
-SPEED = {'nodes', 'offline_speed', 'online', 'reading', 'simulation'}
+SPEED = {'nodes', 'offline_speed', 'online', 'reading'}
 RESULTS = Path(__file__).parent / 'results' / 'speed.json'
 
 

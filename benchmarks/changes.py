@@ -27,7 +27,7 @@ from armid_ros.effects import parse_effect
 from armid_ros.estimate import ParameterName
 from armid_ros.identification.online.change import Change
 from armid_ros.identification.online.identifier import OnlineIdentifier
-from armid_ros.motion import FloatArray
+from armid_ros.motion import FloatArray, Motion
 from armid_ros.robots import load_robot
 from armid_ros.simulation import Reference, Sensors, simulate, SimulatedArm
 from armid_ros.simulation.plant import Plant
@@ -117,7 +117,7 @@ def arm_with(*effects: str) -> ArmModel:
     return ArmModel.of('humanoid_arm', effects=effects)
 
 
-def working_motion(duration: float, speed: float, rng: np.random.Generator) -> Reference:
+def working_motion(duration: float, speed: float, rng: np.random.Generator) -> Motion:
     """Return a motion of three harmonics a joint, from rest to rest in the middle of the range."""
     robot = load_robot('humanoid_arm')
     size = rng.uniform(0.3, 1.0, robot.n_joints) * 0.3
@@ -130,7 +130,7 @@ def working_motion(duration: float, speed: float, rng: np.random.Generator) -> R
     slope = 30.0 * x**2 * (1.0 - x) ** 2 * sign
     bend = 60.0 * x * (1.0 - x) * (1.0 - 2.0 * x) * sign**2
     middle = robot.middle_pose
-    return Reference(
+    return Motion(
         robot.joints,
         t[:, 0],
         middle + fade * q,
@@ -152,7 +152,7 @@ def moving_arm(seed: int, duration: float, rate: float = RATE) -> tuple[Simulate
     motion = working_motion(duration + _RAMP, 1.0, rng)
     plant = Plant(arm_with(*IDENTIFIED, *LACKING), dt=1.0 / rate)
     simulated = SimulatedArm(plant, rng=rng, sensors=SENSORS, start=motion.q[0])
-    simulated.set_trajectory(motion)
+    simulated.set_trajectory(Reference.of(motion))
     return simulated, coloured(round(duration * rate), len(motion.joints), rate, rng)
 
 
@@ -193,7 +193,7 @@ def unchanging(minutes: int, seed: int, rate: float = RATE) -> Iterator[Sample]:
     plant = Plant(arm_with(*IDENTIFIED, *LACKING), dt=1.0 / rate)
     for minute in range(minutes):
         speed = rng.uniform(0.5, 2.0)
-        motion = working_motion(60.0, speed, rng)
+        motion = Reference.of(working_motion(60.0, speed, rng))
         if minute % 5 == 4:
             motion = Reference(motion.joints, motion.t[[0, -1]], motion.q[[0, -1]])
         duration = 60.0 - 1.0 / rate

@@ -3,11 +3,10 @@
 """
 The human-exoskeleton leg pair: gait by torque in MuJoCo, stiffness from noisy angles.
 
-Four tables: joints that follow their computed torque; the stiffness of one spring and of four;
-stated standard deviations over the scatter of repeats; and the motions that determine four
-springs, with the bound for 200 poses.
+Three tables: joints that follow their computed torque; the stiffness of one spring and of four;
+and the motions that determine four springs, with the bound for 200 poses.
 
-    python -m benchmarks.exo [--draws 8] [--repeats 400]
+    python -m benchmarks.exo [--draws 8]
 
 """
 
@@ -17,7 +16,6 @@ import argparse
 
 from armid_ros.errors import IdentificationError
 from armid_ros.identification.ties.problem import (
-    Inertias,
     interaction_problem,
     InteractionProblem,
     MachineNoise,
@@ -53,7 +51,6 @@ def main() -> None:
     """Print the tables."""
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[1])
     parser.add_argument('--draws', type=int, default=8, help='noise drawn so many times')
-    parser.add_argument('--repeats', type=int, default=400, help='for stated deviations')
     asked = parser.parse_args()
     gait_by_torque()
     sets = {
@@ -63,7 +60,6 @@ def main() -> None:
     }
     exact = {name: with_torques(PAIR, motions) for name, motions in sets.items()}
     stiffness(exact, asked.draws)
-    deviations(exact, asked.repeats)
     motions_of_four_springs()
 
 
@@ -157,33 +153,6 @@ def _planned(exact: PairMotion, degrees: float, separate: bool) -> InteractionPr
 def _truth(problem: InteractionProblem) -> FloatArray:
     springs = len(problem.segments)
     return np.concatenate([np.full(springs, STIFFNESS), problem.described[springs:]])
-
-
-def deviations(sets: dict[str, PairMotion], repeats: int) -> None:
-    """Print stated deviations over the scatter of repeats, and the coverage of intervals."""
-    print(
-        'stated deviation over scatter of repeats, 0.05 deg             measured  intervals hold'
-    )
-    rows: tuple[tuple[str, Inertias, bool, int], ...] = (
-        ('200 poses', 'known', False, repeats),
-        ('200 poses', 'free', False, repeats),
-        ('200 poses', 'known', True, repeats),
-        ('10 s 1 kHz', 'known', False, repeats // 4),
-        ('10 s 1 kHz', 'known', True, repeats // 4),
-        ('10 s 1 kHz', 'free', True, repeats // 8),
-    )
-    for data, inertias, separate, count in rows:
-        found = [
-            find_springs(PAIR, sets[data], 0.05, seed, inertias=inertias, separate=separate)
-            for seed in range(count)
-        ]
-        values = np.array([one.stiffness for one in found])
-        variance = np.mean([one.std**2 for one in found], axis=0)
-        ratio = np.mean(np.sqrt(variance) / values.std(axis=0, ddof=1))
-        hold = [np.prod(np.sign(one.interval() - STIFFNESS), axis=1) <= 0.0 for one in found]
-        sure = (2.0 * (count - 1)) ** -0.5  # as for one spring: those of a draw are correlated
-        what = f'{data}, inertias {inertias}, {"four" if separate else "one"} k, {count} times'
-        print(f'  {what:60s} {ratio:.2f} ± {sure:.2f}  {100.0 * np.mean(hold):.0f} %', flush=True)
 
 
 def motions_of_four_springs() -> None:

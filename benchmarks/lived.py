@@ -20,7 +20,7 @@ from functools import partial
 from pathlib import Path
 import traceback
 
-from benchmarks.lived_scoring import breakdown, LivedJudged, LivedTruth, probabilities, score
+from benchmarks.lived_scoring import LivedJudged, LivedTruth, probabilities, score
 from benchmarks.looks import judge_all, write_json
 from benchmarks.two_days import Answer, ask, identification_of, known_arm
 from tests.hidden.lived.cases import lived_case
@@ -78,8 +78,6 @@ def main() -> None:
         processes=options.processes,
         out=options.out,
     )
-    if not options.kind.startswith('locked'):
-        print(breakdown(judged))
     if options.probabilities:
         write_json(options.probabilities, probabilities(judged))
 

@@ -327,21 +327,6 @@ _OF_KIND: dict[str, Callable[[Sequence[LivedJudged]], tuple[Metric, ...]]] = {
 }
 
 
-def breakdown(judged: Sequence[LivedJudged]) -> str:
-    """Return the numbers of visible causes that are named first, by cause, style and size."""
-    seen = [j for j in judged if j.truth.name and j.truth.gap >= VISIBLE]
-    rows = []
-    for what in ('cause', 'style', 'size'):
-        groups = sorted({getattr(j.truth, what) for j in seen})
-        counts = []
-        for group in groups:
-            own = [j for j in seen if getattr(j.truth, what) == group]
-            hits = sum(j.first if nameable(j.truth) else j.admitted for j in own)
-            counts.append(f'{group} {hits}/{len(own)}')
-        rows.append(f'by {what}: {", ".join(counts)}')
-    return '\n'.join(rows)
-
-
 def nameable(truth: LivedTruth) -> bool:
     """Return whether the catalogue has a name for the cause."""
     return truth.in_catalogue or truth.name == 'gravity'
