@@ -101,8 +101,23 @@ class Sized:
 
     #: The attribute that is larger where the gap is to be.
     sized_by: ClassVar[str] = 'value'
+    #: Ordinary value over the drive's torque and the joint's speed, to these powers.
+    ordinary: ClassVar[float]
+    by_torque: ClassVar[int] = 1
+    by_speed: ClassVar[int] = 0
+    #: Whether the value has either sign.
+    signed: ClassVar[bool] = False
+    #: Whether it is in a joint that carries something, and the first joint that it may be in.
+    loaded: ClassVar[bool] = False
+    first_joint: ClassVar[int] = 0
     #: Name in the catalogue, attribute and unit of every true parameter.
     stated: ClassVar[tuple[tuple[str, str, str], ...]] = ()
+
+    @classmethod
+    def ordinary_value(cls, torque: float, speed: float, rng: np.random.Generator) -> float:
+        """Draw the value for a joint of some torque and speed [N m, rad/s]."""
+        sign = rng.choice([-1.0, 1.0]) if cls.signed else 1.0
+        return float(sign * cls.ordinary * torque**cls.by_torque / speed**cls.by_speed)
 
     def scaled(self, factor: float) -> Self:
         """Return it larger by a factor, or its like of which the gap grows with the factor."""

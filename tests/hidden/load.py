@@ -12,7 +12,7 @@ import mujoco
 import numpy as np
 
 from tests.hidden.arrays import body_vector, named_body, Parameter, Tilted
-from tests.hidden.base import HiddenEffect, InJoint, Live, OneJoint, pick, Setting
+from tests.hidden.base import HiddenEffect, InJoint, Live, OneJoint, Setting
 
 
 @dataclass(frozen=True)
@@ -106,13 +106,9 @@ class RotorInertia(OneJoint):
     """Inertia of the rotor: native armature."""
 
     name = 'rotor_inertia'
+    ordinary, first_joint = 1e-3, 1
     stated = (('rotor_inertia', 'value', 'kg m^2'),)
     replaces = ('rotor_inertia',)
-
-    @classmethod
-    def draw(cls, setting: Setting, rng: np.random.Generator) -> Self:
-        j = pick(setting, rng, first=1)
-        return cls(setting.robot.joints[j], j, 1e-3 * float(setting.drive[j]))
 
     def edit(self, spec: mujoco.MjSpec, robot: Robot) -> None:
         spec.joint(self.joint).armature += self.value

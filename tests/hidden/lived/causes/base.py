@@ -6,7 +6,7 @@ from __future__ import annotations
 
 from abc import ABC, abstractmethod
 from dataclasses import dataclass, replace
-from typing import ClassVar, Self
+from typing import Any, ClassVar, Self
 
 import numpy as np
 
@@ -108,6 +108,17 @@ class JointCause(Cause):
     @property
     def joints(self) -> tuple[str, ...]:
         return (self.joint,)
+
+    @classmethod
+    def draw(cls, scene: Scene, rng: np.random.Generator) -> Self:
+        j = scene.joint(rng, loaded=cls.loaded, first=cls.first_joint)
+        value = cls.ordinary_value(scene.strength[j], scene.speed[j], rng)
+        return cls(scene.chain.joints[j], j, value, *cls.drawn(scene, j, rng))
+
+    @classmethod
+    def drawn(cls, scene: Scene, j: int, rng: np.random.Generator) -> tuple[Any, ...]:
+        """Draw what it has beside its value."""
+        return ()
 
     def _column(self, like: FloatArray, values: FloatArray) -> FloatArray:
         torque = np.zeros_like(like)
