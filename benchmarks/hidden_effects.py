@@ -28,7 +28,9 @@ import numpy as np
 from benchmarks.looks import judge_all
 from benchmarks.metrics import Metric, number, rate
 from benchmarks.two_days import Answer, answer_of, known_arm, Named, UNEXPLAINED
+from tests.hidden.base import HiddenEffect
 from tests.hidden.cases import Case, make_case
+from tests.hidden.lived.causes.base import Cause
 from tests.hidden.specification import case_list, CaseSpec, SETS
 
 #: Interval of the cases of a kind that are in the slice.
@@ -152,16 +154,24 @@ def true_arm(case: Case) -> ArmModel:
             effect = CATALOGUE[name].on(arm.robot, joints)
             arm = arm.with_effect(effect, values[values != 0.0])
     for hidden in case.effects:
-        told = {(p.name, p.joint): p.value for p in hidden.parameters}
-        effect = CATALOGUE[hidden.name].on(arm.robot, hidden.joints)
+        arm = with_true_effect(arm, hidden)
+    return arm
+
+
+def with_true_effect(
+    arm: ArmModel, hidden: HiddenEffect | Cause, shape: Sequence[float] | None = None
+) -> ArmModel:
+    """Return an arm with the effect of the catalogue that a hidden one is."""
+    true = {(p.name, p.joint): p.value for p in hidden.parameters}
+    effect = CATALOGUE[hidden.name].on(arm.robot, hidden.joints or None)
+    if shape is None:
         shape = [
-            told.get((name.name, name.joint), value)
+            true.get((name.name, name.joint or ''), value)
             for name, value in zip(effect.shape_parameters(arm.robot), effect.shape, strict=True)
         ]
-        effect = effect.with_shape(np.reshape(shape, (len(effect.owners), -1)))
-        names = effect.parameters(arm.robot)
-        arm = arm.with_effect(effect, [told.get((n.name, n.joint), 0.0) for n in names])
-    return arm
+    effect = effect.with_shape(np.reshape(shape, (len(effect.owners), -1)))
+    names = effect.parameters(arm.robot)
+    return arm.with_effect(effect, [true.get((n.name, n.joint or ''), 0.0) for n in names])
 
 
 def run_diagnosis(case: Case) -> Answer:

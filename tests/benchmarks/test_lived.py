@@ -10,6 +10,7 @@ from armid_ros.motion import Motion
 import numpy as np
 import pytest
 
+from benchmarks.hidden_effects import with_true_effect
 from benchmarks.lived import judge
 from benchmarks.lived_scoring import exact, gravity_of, LivedJudged, LivedTruth, pairs, score
 from benchmarks.metrics import table
@@ -17,7 +18,6 @@ from benchmarks.two_days import Answer, answer_of, Named
 from tests.hidden.lived.arms import load_arm
 from tests.hidden.lived.causes import CAUSES
 from tests.hidden.lived.causes.base import Scene
-from tests.hidden.lived.causes.contact import Holding, Pulling
 from tests.hidden.lived.chain import Chain
 from tests.hidden.lived.motions import draw_path, tracked
 from tests.hidden.lived.plant import LivedArm
@@ -72,22 +72,6 @@ def test_causes_have_the_names_units_and_parameters_of_the_catalogue(word):
         assert {(p.name, p.joint, p.unit) for p in cause.parameters} <= names
 
 
-def catalogued(robot, cause):
-    """Return the arm of a robot with a cause as the package has it."""
-    told = {(p.name, p.joint): p.value for p in cause.parameters}
-    effect = CATALOGUE[cause.name].on(robot, cause.joints or None)
-    if isinstance(cause, Holding | Pulling):
-        effect = effect.with_shape(np.array([cause.attachment]))
-    elif effect.shape_parameters(robot):
-        shape = [
-            told.get((p.name, p.joint), value)
-            for p, value in zip(effect.shape_parameters(robot), effect.shape, strict=True)
-        ]
-        effect = effect.with_shape(np.reshape(shape, (len(effect.owners), -1)))
-    values = [told.get((p.name, p.joint or ''), 0.0) for p in effect.parameters(robot)]
-    return ArmModel(robot).with_effect(effect, values)
-
-
 @pytest.mark.parametrize(
     'word', sorted(word for word, cause in CAUSES.items() if cause.in_catalogue)
 )
@@ -106,7 +90,8 @@ def test_true_parameters_of_a_cause_make_its_torque_in_the_package(word):
     cause = cause.scaled({'delay': 0.2, 'encoder': 0.1}.get(word, 1.0))
     rows = slice(400, -400, 10)
     said = Motion(chain.joints, path.t, path.q, path.dq, path.ddq, None)
-    more = catalogued(robot, cause).torque(said) - ArmModel(robot).torque(said)
+    bare, shape = ArmModel(robot), getattr(cause, 'attachment', None)
+    more = with_true_effect(bare, cause, shape).torque(said) - bare.torque(said)
     true = arm.contribution(path, cause)
     moving = np.all(np.abs(path.dq) > 0.02, axis=1)[rows]
     error = np.linalg.norm((more - true)[rows][moving]) / np.linalg.norm(true[rows][moving])

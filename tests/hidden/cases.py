@@ -39,8 +39,6 @@ class Bag:
 
     Attributes
     ----------
-    speed : str
-        Speed class: slow, medium, fast, or other.
     recording : Recording
         What the instruments of the arm recorded.
     periods : tuple of (float, float)
@@ -50,7 +48,6 @@ class Bag:
 
     """
 
-    speed: str
     recording: Recording
     periods: tuple[tuple[float, float], ...]
     clean: Recording
@@ -172,19 +169,19 @@ def draw(spec: CaseSpec, attempt: int = 0) -> Draft:
     return Draft(spec, robot, known, orbits, sensors, effects)
 
 
-def simulate(draft: Draft, speeds: Sequence[str], periods: int = 2) -> tuple[Bag, ...]:
+def simulate(draft: Draft, speeds: Sequence[str]) -> tuple[Bag, ...]:
     """Run an arm through its motions and record it."""
     dt = min([1e-3, *(effect.dt for effect in draft.effects)])
     plant = Plant(draft.robot, draft.known, draft.effects, dt)
     bags = []
     for speed in speeds:
-        wanted = reference(draft.orbits[speed], speed, dt, periods)
+        wanted = reference(draft.orbits[speed], dt)
         signals = run(plant, wanted, _rng(draft.spec, 4))
         spans = tuple((start, start + wanted.period) for start in wanted.starts)
         joints = draft.robot.joints
         noise_rng = _rng(draft.spec, 5, list(SPEEDS).index(speed))
         recording = draft.sensors.record(signals, joints, noise_rng)
-        bags.append(Bag(speed, recording, spans, draft.sensors.perfect(signals, joints)))
+        bags.append(Bag(recording, spans, draft.sensors.perfect(signals, joints)))
     return tuple(bags)
 
 

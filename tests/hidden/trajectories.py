@@ -43,6 +43,7 @@ SPEEDS = {
 }
 
 REST, RUN_IN, RUN_OUT = 0.5, 1.5, 1.0  # s
+PERIODS = 2
 
 #: Acceleration limit as the time to top speed [s].
 TIME_TO_TOP_SPEED = 0.2
@@ -61,8 +62,6 @@ class Reference:
 
     Attributes
     ----------
-    speed : str
-        Speed class.
     period : float
         Duration of a period [s].
     starts : tuple of float
@@ -74,7 +73,6 @@ class Reference:
 
     """
 
-    speed: str
     period: float
     starts: tuple[float, ...]
     t: FloatArray
@@ -109,9 +107,9 @@ def draw_orbit(robot: Robot, speed: str, rng: np.random.Generator) -> Orbit:
     return max(orbits, key=lambda orbit: _richness(robot, orbit))
 
 
-def reference(orbit: Orbit, speed: str, dt: float, periods: int = 2) -> Reference:
+def reference(orbit: Orbit, dt: float) -> Reference:
     """Run through an orbit from rest to rest, sampled every dt [s]."""
-    moving = RUN_IN + periods * orbit.period + RUN_OUT
+    moving = RUN_IN + PERIODS * orbit.period + RUN_OUT
     t = np.arange(round((2 * REST + moving) / dt) + 1) * dt
     s = np.clip(t - REST, 0.0, moving)
     rising, falling = np.minimum(s / RUN_IN, 1.0), np.clip((moving - s) / RUN_OUT, 0.0, 1.0)
@@ -122,9 +120,9 @@ def reference(orbit: Orbit, speed: str, dt: float, periods: int = 2) -> Referenc
     slowed = np.maximum(s - (moving - RUN_OUT), 0.0)
     phase = area - slowed + RUN_OUT * (_area(1.0) - _area(falling))
     q, dq, ddq = orbit.at(phase)
-    starts = tuple(REST + RUN_IN + k * orbit.period for k in range(periods))
+    starts = tuple(REST + RUN_IN + k * orbit.period for k in range(PERIODS))
     pace, change = pace[:, np.newaxis], change[:, np.newaxis]
-    return Reference(speed, orbit.period, starts, t, q, dq * pace, ddq * pace**2 + dq * change)
+    return Reference(orbit.period, starts, t, q, dq * pace, ddq * pace**2 + dq * change)
 
 
 def _draw_orbit(robot: Robot, speed: SpeedClass, rng: np.random.Generator) -> Orbit:
