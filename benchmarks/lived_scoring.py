@@ -81,7 +81,7 @@ class LivedTruth:
         spec = case.spec
         (truth,) = case.truth or (None,)
         return cls(
-            key=case.key,
+            key=spec.key,
             cause=spec.cause,
             size=spec.size,
             style=case.held_out.style,

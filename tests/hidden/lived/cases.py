@@ -89,11 +89,6 @@ class LivedCase:
     misfit: FloatArray
     gap: float
 
-    @property
-    def key(self) -> str:
-        """Name of the case."""
-        return self.spec.key
-
 
 @lru_cache(maxsize=4)
 def lived_case(kind: str, index: int) -> LivedCase:
