@@ -33,7 +33,7 @@ MESSAGES := $(shell find msg_schemas -name __pycache__ -prune -o -type f -print)
 INTERFACES := $(shell find tests/interfaces -type f 2>/dev/null)
 
 .DEFAULT_GOAL := all
-.PHONY: all demo test test-fast test-long numeric docs fuzz chaos golden coverage lint bench endurance benchmark lock clean help check
+.PHONY: all demo test test-fast test-long numeric docs fuzz chaos golden coverage lint bench benchmark lock clean help check
 .DELETE_ON_ERROR:
 .NOTPARALLEL:
 
@@ -104,11 +104,8 @@ lint: $(STAMPS)/armid_ros $(STAMPS)/test  ## format, lint, layers, words, types
 bench: $(STAMPS)/armid_ros $(STAMPS)/bench  ## speed and accuracy, side by side with the peers
 	$(BIN)/python -m benchmarks $(BENCH)
 
-endurance: $(STAMPS)/armid_ros $(STAMPS)/test $(STAMPS)/bench  ## kill recorders at random, play and record for 30 min; about an hour
-	OMP_NUM_THREADS=1 OPENBLAS_NUM_THREADS=1 $(BIN)/python -m benchmarks.endurance
-
 benchmark: $(STAMPS)/armid_ros $(STAMPS)/test  ## name the effects hidden in the locked set, about 30 min
-	$(BIN)/python -m benchmarks.hidden_effects locked --out benchmark
+	$(BIN)/python -m benchmarks.hidden_effects locked
 
 # make lock UPGRADE=1 takes the newest of everything; without, what is locked stays if it can.
 UV = $(BIN)/uv pip compile --quiet --universal --python-version 3.11 --fork-strategy fewest \

@@ -1,7 +1,7 @@
 # Copyright 2026 The armid_ros developers
 # SPDX-License-Identifier: Apache-2.0
 """
-Run benchmarks by name, or all but the longest: ``python -m benchmarks [NAME ...]``.
+Run benchmarks by name, or all: ``python -m benchmarks [NAME ...]``.
 
 The output of the benchmarks of speed is kept in results/speed.json; the docs show it.
 
@@ -14,28 +14,14 @@ import sys
 
 from benchmarks.reference_loop import processor
 
-LIBRARY = {
-    '__init__',
-    '__main__',
-    'bic_selection',
-    'browser',
-    'elastic',
-    'exo_noise',
-    'exo_poses',
-    'laboratory_scoring',
-    'leg_pair_in_mujoco',
-    'lived_questions',
-    'lived_scoring',
-    'looks',
-    'metrics',
-    'real_days',
-    'real_recordings',
-    'two_days',
-}
-#: Benchmarks of an hour, which run only by name.
-LONG = {'endurance'}
+BENCHMARKS = (
+    *('changes', 'coverage', 'excitation', 'exo', 'exo_diagnosis', 'fleet', 'growth'),
+    *('healthy_arms', 'hidden_effects', 'live_diagnosis', 'lived', 'nodes'),
+    *('offline_speed', 'online', 'part_time', 'reading', 'real_changes', 'real_diagnosis'),
+    'two_encoders',
+)
 #: Benchmarks whose output is kept.
-SPEED = {'nodes', 'offline_speed', 'online', 'reading', 'simulation'}
+SPEED = {'nodes', 'offline_speed', 'online', 'reading'}
 RESULTS = Path(__file__).parent / 'results' / 'speed.json'
 
 
@@ -58,13 +44,10 @@ def run(name: str) -> int:
 
 def main() -> int:
     """Run the benchmarks named on the command line, or all."""
-    known = sorted(
-        path.stem for path in Path(__file__).parent.glob('*.py') if path.stem not in LIBRARY
-    )
-    names = sys.argv[1:] or [name for name in known if name not in LONG]
-    unknown = [name for name in names if name not in known]
+    names = sys.argv[1:] or BENCHMARKS
+    unknown = [name for name in names if name not in BENCHMARKS]
     if unknown:
-        print(f"benchmarks: no '{unknown[0]}'; there are {', '.join(known)}", file=sys.stderr)
+        print(f"benchmarks: no '{unknown[0]}'; there are {', '.join(BENCHMARKS)}", file=sys.stderr)
         return 2
     failed = 0
     for name in names:

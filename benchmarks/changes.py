@@ -27,12 +27,14 @@ from armid_ros.effects import parse_effect
 from armid_ros.estimate import ParameterName
 from armid_ros.identification.online.change import Change
 from armid_ros.identification.online.identifier import OnlineIdentifier
-from armid_ros.motion import FloatArray
+from armid_ros.motion import FloatArray, Motion
 from armid_ros.robots import load_robot
 from armid_ros.simulation import Reference, Sensors, simulate, SimulatedArm
 from armid_ros.simulation.plant import Plant
 import numpy as np
 from scipy import signal
+
+from benchmarks.multisine import multisine
 
 
 def ball(mass: float) -> str:
@@ -115,25 +117,20 @@ def arm_with(*effects: str) -> ArmModel:
     return ArmModel.of('humanoid_arm', effects=effects)
 
 
-def working_motion(duration: float, speed: float, rng: np.random.Generator) -> Reference:
+def working_motion(duration: float, speed: float, rng: np.random.Generator) -> Motion:
     """Return a motion of three harmonics a joint, from rest to rest in the middle of the range."""
     robot = load_robot('humanoid_arm')
-    t = np.arange(0.0, duration + 1e-9, 0.01)[:, np.newaxis]
-    w = 2.0 * np.pi * 0.1 * speed * np.array([1.0, 2.0, 5.0])
     size = rng.uniform(0.3, 1.0, robot.n_joints) * 0.3
-    q, dq, ddq = np.zeros((3, len(t), robot.n_joints))
-    for rate, share in zip(w, (1.0, 0.6, 0.2), strict=True):
-        angle = rate * t + rng.uniform(0.0, 2.0 * np.pi, robot.n_joints)
-        q += share * size * np.sin(angle)
-        dq += share * size * rate * np.cos(angle)
-        ddq -= share * size * rate**2 * np.sin(angle)
+    tones = [(0.1 * speed * k, share * size) for k, share in ((1, 1.0), (2, 0.6), (5, 0.2))]
+    made = multisine(robot.joints, np.arange(0.0, duration + 1e-9, 0.01), rng, tones)
+    t, q, dq, ddq = made.t[:, np.newaxis], made.q, made.dq, made.ddq
     x = np.clip(np.minimum(t, t[-1] - t) / _RAMP, 0.0, 1.0)
     sign = np.where(t < t[-1] / 2.0, 1.0, -1.0) * (x < 1.0) / _RAMP
     fade = x**3 * (10.0 - 15.0 * x + 6.0 * x**2)
     slope = 30.0 * x**2 * (1.0 - x) ** 2 * sign
     bend = 60.0 * x * (1.0 - x) * (1.0 - 2.0 * x) * sign**2
     middle = robot.middle_pose
-    return Reference(
+    return Motion(
         robot.joints,
         t[:, 0],
         middle + fade * q,
@@ -155,7 +152,7 @@ def moving_arm(seed: int, duration: float, rate: float = RATE) -> tuple[Simulate
     motion = working_motion(duration + _RAMP, 1.0, rng)
     plant = Plant(arm_with(*IDENTIFIED, *LACKING), dt=1.0 / rate)
     simulated = SimulatedArm(plant, rng=rng, sensors=SENSORS, start=motion.q[0])
-    simulated.set_trajectory(motion)
+    simulated.set_trajectory(Reference.of(motion))
     return simulated, coloured(round(duration * rate), len(motion.joints), rate, rng)
 
 
@@ -196,7 +193,7 @@ def unchanging(minutes: int, seed: int, rate: float = RATE) -> Iterator[Sample]:
     plant = Plant(arm_with(*IDENTIFIED, *LACKING), dt=1.0 / rate)
     for minute in range(minutes):
         speed = rng.uniform(0.5, 2.0)
-        motion = working_motion(60.0, speed, rng)
+        motion = Reference.of(working_motion(60.0, speed, rng))
         if minute % 5 == 4:
             motion = Reference(motion.joints, motion.t[[0, -1]], motion.q[[0, -1]])
         duration = 60.0 - 1.0 / rate

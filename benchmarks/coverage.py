@@ -4,84 +4,95 @@
 Coverage of 95 % intervals, over repeats with coloured torque noise and encoder noise.
 
 The arm is simulated, so the true base parameters, effects and torques along another motion are
-known. The intervals are those that an identification prints,
-from a recording and online.
+known. The intervals are those that an identification prints, from a recording and online. Two
+identifications from different motions are compared as well: of the unchanged arm, of one with a
+load, and of one with more friction in the elbow.
 
-    python -m benchmarks.coverage [--repeats 500] [--online-repeats 200] [--duration 20]
+    python -m benchmarks.coverage [--repeats 500] [--online-repeats 200] [--pairs 200]
 
 """
 
 import argparse
-from dataclasses import dataclass, field
+from collections import defaultdict
+import json
 import time
 
 from armid_ros.arm import ArmModel
-from armid_ros.effects import make_effect
-from armid_ros.identification import IdentificationSettings, identify, SignalSettings
+from armid_ros.identification import (
+    identification_document,
+    IdentificationSettings,
+    identify,
+    SignalSettings,
+)
+from armid_ros.identification.assess.compare import compare
 from armid_ros.identification.online.identifier import OnlineIdentifier
-from armid_ros.motion import Motion
+from armid_ros.identification.parameters_file import parameters_of
 from armid_ros.recording import Recording
-from armid_ros.robots import load_robot
 import numpy as np
 from scipy.signal import lfilter
 
-FRICTION = {'viscous_friction': 0.08, 'coulomb_friction': 0.05, 'torque_offset': 0.02}
-RATE = 200.0
+from benchmarks.multisine import multisine
+
+FRICTION = (
+    'viscous_friction:viscous_coefficient=0.08',
+    'coulomb_friction:coulomb_torque=0.05',
+    'torque_offset:torque_offset=0.02',
+)
+RATE, SECONDS = 200.0, 20.0
+T = np.arange(round(SECONDS * RATE)) / RATE
+#: Mass in the hand [kg], and factor on the friction of the elbow.
+LOAD, WEAR = 0.1, 1.5
 HALF_WIDTH = 1.959964
 
 
-@dataclass
 class Tally:
-    """Hits, errors and stated standard deviations over repeats."""
+    """Errors and stated standard deviations over repeats, by parameter."""
 
-    hits: list = field(default_factory=list)
-    errors: list = field(default_factory=list)
-    stated: list = field(default_factory=list)
+    def __init__(self):
+        self._values = defaultdict(list)
 
-    def add(self, estimate, truth, std):
-        """Add one repeat."""
-        self.hits.append(np.abs(estimate - truth) <= HALF_WIDTH * std)
-        self.errors.append(estimate - truth)
-        self.stated.append(std)
+    def add(self, name, error, stated):
+        """Add a parameter of one repeat; one that is not excited is absent."""
+        self._values[name].append((error, stated))
 
     def line(self, what):
         """Return a row of the table."""
-        errors, stated = np.array(self.errors), np.array(self.stated)
-        bias = np.abs(errors.mean(axis=0)) / errors.std(axis=0)
-        ratio = np.median(np.sqrt(np.mean(stated**2, axis=0)) / errors.std(axis=0))
-        low, high = np.percentile(np.mean(self.hits, axis=0), [5, 95])
+        repeated = (np.array(one).T for one in self._values.values() if len(one) > 1)
+        errors, stated = zip(*repeated, strict=True)
+        spread = np.array([one.std() for one in errors])
+        bias = np.abs([one.mean() for one in errors]) / spread
+        ratio = np.median(np.sqrt([np.mean(one**2) for one in stated]) / spread)
+        hits = [np.abs(e) <= HALF_WIDTH * s for e, s in zip(errors, stated, strict=True)]
+        low, high = np.percentile([np.mean(one) for one in hits], [5, 95])
         return (
-            f'    {what:18s}{100 * np.mean(self.hits):6.1f} %  wanted 93 to 97 %   '
+            f'    {what:18s}{100 * np.mean(np.concatenate(hits)):6.1f} %  wanted 93 to 97 %   '
             f'one by one {100 * low:.0f} to {100 * high:.0f} %, stated/true deviation '
-            f'{ratio:.2f}, bias/deviation {np.median(bias):.2f} (largest {bias.max():.2f})'
+            f'{ratio:.2f}, bias/deviation {np.median(bias):.2f}'
         )
 
 
-def multisine(joints, duration, rng, amplitude=0.5):
-    """Return an exciting motion with exact derivatives."""
-    t = np.arange(round(duration * RATE)) / RATE
-    w = 2 * np.pi * np.array([0.1, 0.2, 0.5])[:, None]
-    size = amplitude * np.array([1.0, 0.6, 0.2])[:, None]
-    angle = w[None] * t[:, None, None] + rng.uniform(0, 2 * np.pi, (3, len(joints)))
-    return Motion(
-        joints,
-        t,
-        np.sum(size * np.sin(angle), axis=1),
-        np.sum(size * w * np.cos(angle), axis=1),
-        np.sum(-size * w**2 * np.sin(angle), axis=1),
+def recorded(motion, tau, rng, encoder, torque, pole):
+    """Return a recording with encoder noise [rad] and autoregressive torque noise [N m]."""
+    white = rng.normal(size=(len(tau) + 500, tau.shape[1]))
+    coloured = lfilter([np.sqrt(1 - pole**2)], [1.0, -pole], white, axis=0)[500:]
+    return Recording(
+        joints=motion.joints,
+        t=motion.t,
+        q=motion.q + encoder * rng.normal(size=tau.shape),
+        tau=tau + torque * coloured,
+        source='repeat',
     )
 
 
-def coloured(rng, shape, pole):
-    """Return first-order autoregressive noise of unit variance."""
-    white = rng.normal(size=(shape[0] + 500, shape[1]))
-    return lfilter([np.sqrt(1 - pole**2)], [1.0, -pole], white, axis=0)[500:]
+def identified(arm, recording):
+    """Identify an arm offline."""
+    settings = IdentificationSettings(signals=SignalSettings(10.0, 4))
+    return identify(arm, [recording], settings, rng=np.random.default_rng(0))
 
 
 def from_recording(arm, recording):
     """Identify offline; return base parameters and estimate."""
-    settings = IdentificationSettings(signals=SignalSettings(10.0, 4))
-    result = identify(arm, [recording], settings, rng=np.random.default_rng(0))
+    result = identified(arm, recording)
     return result.base, result.estimate
 
 
@@ -93,40 +104,29 @@ def online(arm, recording):
     return identifier.base, identifier.estimate()
 
 
-def coverage(identified, repeats, duration, encoder, torque, pole, seed=0):
+def coverage(method, repeats, encoder, pole):
     """Identify repeatedly and print a table of coverages."""
-    rng = np.random.default_rng(seed)
-    robot = load_robot('humanoid_arm')
-    arm = ArmModel(robot)
-    for name, value in FRICTION.items():
-        arm = arm.with_effect(make_effect(name, robot), np.full(robot.n_joints, value))
-    structure = ArmModel(robot, arm.effects)
-    motion, other = (multisine(robot.joints, duration, rng) for _ in range(2))
+    rng = np.random.default_rng(0)
+    arm = ArmModel.of('humanoid_arm', effects=FRICTION)
+    structure = ArmModel(arm.robot, arm.effects)
+    motion, other = (multisine(arm.robot.joints, T, rng) for _ in range(2))
     tau = arm.torque(motion)
     other = other.select(slice(None, None, 20))
     tallies = {'base parameters': Tally(), 'effects': Tally(), 'predicted torque': Tally()}
     start = time.perf_counter()
-    columns = None
     for _ in range(repeats):
-        recording = Recording(
-            joints=robot.joints,
-            t=motion.t,
-            q=motion.q + encoder * rng.normal(size=motion.q.shape),
-            tau=tau + torque * coloured(rng, tau.shape, pole),
-            source='repeat',
-        )
-        base, estimate = identified(structure, recording)
+        base, estimate = method(structure, recorded(motion, tau, rng, encoder, 0.05, pole))
         truth = base.values(arm.theta)
-        if columns is None:
-            columns = arm.columns(other)[:, :, base.independent]
-            rigid = np.array(['_' not in p.name for p in estimate.parameters])
+        columns = arm.columns(other)[:, :, base.independent]
         flat = columns.reshape(-1, columns.shape[2])
         std = np.sqrt(np.sum((flat @ estimate.covariance) * flat, axis=1))
-        tallies['base parameters'].add(estimate.values[rigid], truth[rigid], estimate.std[rigid])
-        tallies['effects'].add(estimate.values[~rigid], truth[~rigid], estimate.std[~rigid])
-        tallies['predicted torque'].add(flat @ estimate.values, flat @ truth, std)
+        error = estimate.values - truth
+        for number, row in enumerate(zip(flat @ error, std, strict=True)):
+            tallies['predicted torque'].add(number, *row)
+        for name, *row in zip(estimate.parameters, error, estimate.std, strict=True):
+            tallies['effects' if '_' in name.name else 'base parameters'].add(name, *row)
     print(
-        f'{identified.__name__}, {repeats} repeats of {duration:g} s, torque noise {torque:g} N m '
+        f'{method.__name__}, {repeats} repeats of {SECONDS:g} s, torque noise 0.05 N m '
         f'with pole {pole:g} at {RATE:g} Hz, encoder noise {encoder:g} rad '
         f'({time.perf_counter() - start:.0f} s)'
     )
@@ -134,20 +134,64 @@ def coverage(identified, repeats, duration, encoder, torque, pole, seed=0):
         print(tally.line(what), flush=True)
 
 
+def parameters(arm, structure, rng):
+    """Identify an arm from a new motion; return the parameters in its document."""
+    motion = multisine(arm.robot.joints, T, rng)
+    result = identified(structure, recorded(motion, arm.torque(motion), rng, 2e-5, 0.02, 0.95))
+    document = json.loads(json.dumps(identification_document(result, 'arm', {})))
+    return parameters_of('repeat', document)
+
+
+def comparisons(pairs):
+    """Print how often two identifications of an unchanged, loaded or worn arm differ."""
+    rng = np.random.default_rng(0)
+    arm = ArmModel.of('humanoid_arm', effects=FRICTION)
+    structure = ArmModel(arm.robot, arm.effects)
+    body = np.array([1.0, 0.0, 0.0, 0.06, 0.005, 0.0, 0.005, 0.0, 0.0, 0.001])
+    theta = arm.theta.copy()
+    rigid = len(arm.robot.rigid_parameters)
+    theta[rigid - 10 : rigid] += LOAD * body
+    values = [value.copy() for value in arm.values]
+    for friction in values[:2]:
+        friction[3] *= WEAR
+    arms = (arm, arm, arm.with_theta(theta), ArmModel(arm.robot, arm.effects, tuple(values)))
+    alarms, sizes, wear = 0, [], 0
+    for _ in range(pairs):
+        first, *others = (parameters(one, structure, rng) for one in arms)
+        same, load, rubbed = (compare(first, other) for other in others)
+        alarms += same.anything
+        if load.load is not None and load.load.link == arm.robot.n_joints:
+            sizes.append((load.load.mass, load.load.mass_std))
+        joints = {c.parameter.joint for c in rubbed.changed}
+        joints |= {g.joint for g in rubbed.groups if g.changed}
+        wear += joints == {arm.robot.joints[3]}
+    mass, std = np.array(sizes).T
+    print(
+        f'{pairs} pairs: unchanged, reported to differ {100 * alarms / pairs:.1f} % (wanted: 5)\n'
+        f'    {1e3 * LOAD:g} g in the hand, found and placed {100 * len(sizes) / pairs:.1f} %, '
+        f'{1e3 * mass.mean():.1f} ± {1e3 * mass.std():.1f} g, 95 % intervals hold '
+        f'{100 * np.mean(np.abs(mass - LOAD) <= HALF_WIDTH * std):.1f} %\n'
+        f'    {100 * (WEAR - 1):.0f} % more friction in the elbow, and nothing else, reported '
+        f'{100 * wear / pairs:.1f} %'
+    )
+
+
 def main():
     """Print the tables."""
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument('--repeats', type=int, default=500)
     parser.add_argument('--online-repeats', type=int, default=200)
-    parser.add_argument('--duration', type=float, default=20.0)
+    parser.add_argument('--pairs', type=int, default=200)
     arguments = parser.parse_args()
-    for identified, repeats in (
+    for method, repeats in (
         (from_recording, arguments.repeats),
         (online, arguments.online_repeats),
     ):
         for encoder, pole in ((2e-5, 0.95), (2e-4, 0.95), (0.0, 0.0)):
             if repeats:
-                coverage(identified, repeats, arguments.duration, encoder, 0.05, pole)
+                coverage(method, repeats, encoder, pole)
+    if arguments.pairs:
+        comparisons(arguments.pairs)
 
 
 if __name__ == '__main__':

@@ -1,30 +1,20 @@
 # Copyright 2026 The armid_ros developers
 # SPDX-License-Identifier: Apache-2.0
 """
-Designed excitations against random ones, and against those of figaroh 1.0.2.
+Designed excitations against random ones.
 
-Three tables. The humanoid arm on the moon: 12 gravity parameters through the torque noise of the
+Two tables. The humanoid arm on the moon: 12 gravity parameters through the torque noise of the
 paper's Table 3, a designed trajectory against un-optimised ones that span 20 % of each joint's
 range (medians of 20), 3 harmonics in 20 s. The Panda and the UR10: all base parameters with
 viscous and Coulomb friction, 20 s, 5 harmonics, self-collision with 1 cm to spare, against the
-best of 1000 random feasible trajectories and figaroh's cubic splines (same limits, 20 s, 10
-waypoints, condition number minimised by Ipopt). The predicted standard deviation of every
-parameter against its scatter in 200 simulated repeats.
-
-figaroh and its solver, cyipopt, are installed into a temporary environment.
+best of 1000 random feasible trajectories.
 
 """
 
 import argparse
 from dataclasses import replace
-import json
-import os
-from pathlib import Path
 import resource
-import subprocess
-import tempfile
 import time
-import venv
 
 from armid_ros.arm import ArmModel
 from armid_ros.effects import make_effect
@@ -36,13 +26,13 @@ from armid_ros.excitation import (
     DesignSettings,
     evaluate,
     FourierTrajectory,
-    Limits,
     random_feasible,
 )
-from armid_ros.excitation.feasibility import feasible_pose, position_range
-from armid_ros.motion import Motion
+from armid_ros.excitation.feasibility import position_range
 from armid_ros.robots import collision_model, load_robot
 import numpy as np
+
+from benchmarks.real_recordings import example_robot
 
 URDF = {
     'panda': 'panda_description/urdf/panda.urdf',
@@ -55,7 +45,6 @@ REPEATS = 200
 HELD_OUT = 5
 #: Rate of the samples from which all trajectories of 20 s are evaluated [Hz].
 RATE = 100.0
-PEER_PACKAGES = ('figaroh==1.0.2', 'cyipopt-wheels==1.7.0.dev0')
 
 
 def main():
@@ -63,19 +52,10 @@ def main():
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument('--seed', type=int, default=0)
     parser.add_argument('--random', type=int, default=1000, help='random trajectories')
-    parser.add_argument('--no-peer', action='store_true', help='leave figaroh out')
-    parser.add_argument('--peer-iterations', type=int, default=100)
-    parser.add_argument('--peer', type=Path, help=argparse.SUPPRESS)
-    parser.add_argument('--out', type=Path, help=argparse.SUPPRESS)
     arguments = parser.parse_args()
-    if arguments.peer:
-        figaroh(arguments.peer, arguments.peer_iterations, arguments.seed, arguments.out)
-        return
     humanoid(arguments.seed)
-    with tempfile.TemporaryDirectory() as folder:
-        python = None if arguments.no_peer else peer_environment(Path(folder))
-        for name in URDF:
-            arm_table(name, arguments, python, Path(folder, f'{name}.npz'))
+    for name in URDF:
+        arm_table(name, arguments)
 
 
 def humanoid(seed):
@@ -117,7 +97,6 @@ def humanoid(seed):
     hits = int(np.sum(clearance.smallest(dense.q, 1.0) < 0.01))
     print(f'limits violated {limits}, samples with less than 1 cm clearance {hits} (wanted 0, 0)')
     print(f'{seconds:.1f} s, {cpu:.1f} s of processor time')
-    print_scatter(problem, result, rng)
 
 
 def narrow(arm, problem, clearance, rng):
@@ -148,9 +127,11 @@ def held_out_error(problem, trajectory, unseen, rng):
     return 100.0 * float(np.mean(shares))
 
 
-def arm_table(name, arguments, python, file):
-    """Compare designs for one arm with random trajectories and with figaroh's."""
-    arm = friction_arm(urdf_of(name))
+def arm_table(name, arguments):
+    """Compare designs for one arm with random trajectories."""
+    arm = ArmModel(load_robot(str(example_robot(URDF[name]))))
+    for effect in ('viscous_friction', 'coulomb_friction'):
+        arm = arm.with_effect(make_effect(effect, arm.robot))
     collision = collision_model(arm.robot)
     clearance = ClearanceModel.of(collision)
     settings = DesignSettings(period=20.0, harmonics=5, n_periods=1, rate=RATE)
@@ -183,9 +164,6 @@ def arm_table(name, arguments, python, file):
     for what, key in (('log det', lambda i: -i.log_det), ('condition', lambda i: i.condition)):
         best = draws[int(np.argmin([key(i) for i in found]))]
         row(f'random, best {what} of {arguments.random}', best.one_period(20000), seconds, cpu)
-    if python is not None:
-        peer_row(name, arguments, python, file, row)
-    result = None
     for label, balance in (('ours, D only (balance 0)', 0.0), ('ours', 1.0)):
         wanted = replace(settings, balance=balance)
         result, seconds, cpu = timed(
@@ -195,37 +173,6 @@ def arm_table(name, arguments, python, file):
         )
         row(label, result.excitation.trajectory.one_period(20000), seconds, cpu)
     print('wanted: both better than the rows above, 30 s on two idle cores, 0 violations')
-    print_scatter(problem, result, rng)
-
-
-def urdf_of(name):
-    """Return the file of an arm of example-robot-data."""
-    from benchmarks.real_recordings import example_robot  # not installed beside figaroh
-
-    return str(example_robot(URDF[name]))
-
-
-def friction_arm(urdf):
-    """Load an arm with viscous and Coulomb friction."""
-    arm = ArmModel(load_robot(urdf))
-    for effect in ('viscous_friction', 'coulomb_friction'):
-        arm = arm.with_effect(make_effect(effect, arm.robot))
-    return arm
-
-
-def print_scatter(problem, result, rng):
-    """Compare predicted standard deviations with the scatter over simulated repeats."""
-    settings = problem.settings
-    rate = settings.rate
-    run, slices = result.excitation.motion(rate), result.excitation.period_slices(rate)
-    motion = run.select(slice(slices[0].start, slices[-1].stop))
-    w = problem.columns(motion)[:, problem.base.independent]
-    scatter = (np.linalg.pinv(w) @ rng.normal(size=(len(w), REPEATS))).std(axis=1)
-    ratio = result.information.std / scatter
-    print(
-        f'predicted deviation / scatter of {REPEATS} repeats: {ratio.min():.2f} ... '
-        f'{ratio.max():.2f} (wanted 0.8 ... 1.2)'
-    )
 
 
 def timed(work):
@@ -238,110 +185,6 @@ def timed(work):
     start, before = time.perf_counter(), used()
     result = work()
     return result, time.perf_counter() - start, used() - before
-
-
-def peer_environment(folder):
-    """Install figaroh and its solver; return the interpreter, or print why and return None."""
-    venv.create(folder / 'venv', with_pip=True)
-    python = folder / 'venv' / 'bin' / 'python'
-    done = subprocess.run(
-        [python, '-m', 'pip', 'install', '-q', *PEER_PACKAGES], capture_output=True, text=True
-    )
-    if done.returncode:
-        reason = done.stderr.strip().splitlines()[-1:]
-        print(f'figaroh is left out: {" ".join(PEER_PACKAGES)} cannot be installed: {reason}')
-        return None
-    return python
-
-
-def peer_row(name, arguments, python, file, row):
-    """Run figaroh in its environment and print a row for its design."""
-    environment = {**os.environ, 'PYTHONPATH': str(Path(__file__).parents[1])}
-    command = [python, '-m', 'benchmarks.excitation', '--peer', urdf_of(name), '--out', file]
-    options = ['--peer-iterations', str(arguments.peer_iterations), '--seed', str(arguments.seed)]
-    done, seconds, cpu = timed(
-        lambda: subprocess.run(
-            list(map(str, [*command, *options])), capture_output=True, text=True, env=environment
-        )
-    )
-    if done.returncode or not file.exists():
-        lines = [line for line in done.stderr.splitlines() if 'ERROR' in line or 'Error' in line]
-        print(f'figaroh 1.0.2: no trajectory after {seconds:.0f} s: {"; ".join(lines[-2:])}')
-        return
-    with np.load(file) as found:
-        joints = friction_arm(urdf_of(name)).robot.joints
-        motion = Motion(joints, found['t'], found['q'], found['dq'], found['ddq'])
-    row('figaroh 1.0.2, condition number', motion, seconds, cpu)
-
-
-def figaroh(urdf, iterations, seed, out):
-    """Design with figaroh: two segments of 10 s, 6 waypoints each; runs in its environment."""
-    import logging
-
-    from figaroh.optimal import base_optimal_trajectory as peer
-    from figaroh.optimal.config import COLLISION_DEFAULTS
-    from pinocchio.robot_wrapper import RobotWrapper
-
-    logging.basicConfig(level=logging.ERROR)
-    arm = friction_arm(str(urdf))
-    robot, limits, collision = arm.robot, Limits.of(arm.robot), collision_model(arm.robot)
-    model = robot.model.copy()
-    model.lowerPositionLimit, model.upperPositionLimit = position_range(limits.lower, limits.upper)
-    model.velocityLimit, model.effortLimit = np.array(limits.velocity), np.array(limits.torque)
-    wrapper = RobotWrapper(model, collision.geometry.copy(), collision.geometry.copy())
-    wrapper.geom_model = wrapper.collision_model
-    axes = list(range(robot.n_joints))
-    trajectory = {
-        'n_wps': 6,
-        'freq': 10,
-        't_s': 2.0,
-        'soft_lim': 0.0,
-        'max_attempts': 1000,
-        'max_iterations': iterations,
-        'segment_attempts': 3,
-        **COLLISION_DEFAULTS,
-        'collision_checks_per_interval': 4,
-    }
-    parameters = {
-        'robot_name': robot.name,
-        'act_idxq': axes,
-        'act_idxv': axes,
-        'active_joints': list(robot.joints),
-        'has_friction': True,
-        'has_actuator_inertia': False,
-        'has_joint_offset': False,
-        'is_joint_torques': True,
-        'is_external_wrench': False,
-        'force_torque': None,
-        **dict.fromkeys(('fv', 'fs', 'Ia', 'off'), [0.0] * robot.n_joints),
-    }
-    peer.load_param = lambda robot, file: (trajectory, parameters)
-    clear = ClearanceModel.of(collision)
-    first = feasible_pose(arm, limits, np.random.default_rng(seed), clear, 0.01)
-
-    class Design(peer.BaseOptimalTrajectory):
-        def create_ipopt_problem(self, *arguments):
-            return peer.BaseTrajectoryIPOPTProblem(self, *arguments)
-
-        def _solve_segment(self, number, start, *rest):
-            if number == 0:
-                start[:] = first  # the drawn pose of figaroh may be in collision
-            return super()._solve_segment(number, start, *rest)
-
-    np.random.seed(seed)  # noqa: NPY002 - figaroh draws from the global generator
-    task = Design(wrapper, list(robot.joints), '')
-    task.initialize()
-    found = task.solve(stack_reps=2)
-    if len(found['T_F']) < 2:
-        raise SystemExit(f'Error: {len(found["T_F"])} of 2 segments designed')
-    print(json.dumps([float(d['obj_values'][-1]) for d in found['iteration_data']]))
-    t = np.concatenate([np.asarray(one).ravel() for one in found['T_F']])
-    keep = np.append(True, np.diff(t) > 1e-9)
-    arrays = {key: np.vstack(found[f'{letter}_F']) for key, letter in PEER_ARRAYS.items()}
-    np.savez(out, t=t[keep], **{key: values[keep] for key, values in arrays.items()})
-
-
-PEER_ARRAYS = {'q': 'P', 'dq': 'V', 'ddq': 'A'}
 
 
 if __name__ == '__main__':

@@ -75,12 +75,10 @@ def choose_poses(
     Raises
     ------
     IdentificationError
-        If there are fewer poses, or all of them do not determine every stiffness.
+        If all poses together do not determine every stiffness.
 
     """
     each = _information(problem, theta, torque_noise)
-    if count > len(each):
-        raise IdentificationError(f'{count} poses cannot be chosen of {len(each)}')
     size = np.sqrt(np.diag(each.sum(axis=0)))
     each = each / np.outer(size, size)
     springs = len(problem.segments)

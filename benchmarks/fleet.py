@@ -7,10 +7,7 @@ Arms of one kind differ in mass and friction, and have a different motion in eve
 day. Friction varies with the temperature of the day. Some arms change: friction steps up, a load
 stays in the hand, a joint wears, or an effect acts that the model lacks. Some bags are damaged.
 
-    python -m benchmarks.fleet generate DIR [--arms N] [--bags M] [--changed K] [--damaged D]
-    python -m benchmarks.fleet score DIR RESULTS     after `armid fleet identify` and `watch`
-
-Without arguments both parts run on a small fleet.
+    python -m benchmarks.fleet [--arms N] [--bags M] [--changed K] [--damaged D]
 
 """
 
@@ -26,17 +23,18 @@ import tempfile
 
 from armid_ros.arm import ArmModel
 from armid_ros.effects import make_effect
-from armid_ros.motion import Motion
 from armid_ros.recording import write_recording
 from armid_ros.robots import load_robot
 import numpy as np
+
+from benchmarks.multisine import multisine
 
 ROBOT = Path(__file__).parents[1] / 'examples' / 'arm.urdf'
 EFFECTS = 'viscous_friction,coulomb_friction,torque_offset'
 RATE = 200.0
 FIRST_DAY = datetime.datetime(2026, 1, 1, 8, tzinfo=datetime.UTC)
 #: Frequencies of the motion [Hz] and their sizes [rad].
-HARMONICS = ((0.1, 0.5), (0.25, 0.3), (0.55, 0.12))
+TONES = ((0.1, 0.5), (0.25, 0.3), (0.55, 0.12))
 #: Noise of the torque sensors [N m].
 NOISE = np.array([0.05, 0.05, 0.02])
 VISCOUS, COULOMB = np.array([0.6, 0.6, 0.3]), np.array([0.5, 0.5, 0.25])
@@ -90,18 +88,11 @@ def lived(arm, truth, day, rng):
 def moved(arm, seconds, rng):
     """Return a motion in closed form with noisy torque."""
     t = np.arange(round(seconds * RATE)) / RATE
-    q, dq, ddq = np.zeros((3, len(t), arm.robot.n_joints))
-    for hz, size in HARMONICS:
-        w = 2 * np.pi * hz
-        angle = w * t[:, None] + rng.uniform(0, 2 * np.pi, arm.robot.n_joints)
-        q += size * np.sin(angle)
-        dq += size * w * np.cos(angle)
-        ddq -= size * w * w * np.sin(angle)
-    motion = Motion(arm.robot.joints, t, q, dq, ddq)
+    motion = multisine(arm.robot.joints, t, rng, TONES)
     rigid = len(arm.robot.rigid_parameters)
     coulomb = arm.theta[rigid + 3 : rigid + 6]
-    soft = coulomb * (np.tanh(dq / SLIDING) - np.sign(dq))
-    return motion.with_torque(arm.torque(motion) + soft + NOISE * rng.normal(size=q.shape))
+    soft = coulomb * (np.tanh(motion.dq / SLIDING) - np.sign(motion.dq))
+    return motion.with_torque(arm.torque(motion) + soft + NOISE * rng.normal(size=motion.q.shape))
 
 
 def draw(arms, bags, changed, damaged, seed=0):
@@ -175,34 +166,21 @@ def score(folder, results):
 
 
 def main():
-    """Run one of the parts, or both on a small fleet."""
+    """Generate a fleet, identify and watch it, and compare with the truth."""
     parser = argparse.ArgumentParser(description=__doc__)
-    parser.add_argument('part', nargs='?', choices=['generate', 'score'])
-    parser.add_argument('folders', nargs='*', type=Path)
-    parser.add_argument('--arms', type=int, default=200)
+    parser.add_argument('--arms', type=int, default=20)
     parser.add_argument('--bags', type=int, default=10)
-    parser.add_argument('--changed', type=int, default=20)
-    parser.add_argument('--damaged', type=int, default=5)
+    parser.add_argument('--changed', type=int, default=4)
+    parser.add_argument('--damaged', type=int, default=2)
     parser.add_argument('--seconds', type=float, default=60.0)
     parser.add_argument('--seed', type=int, default=0)
     asked = parser.parse_args()
-    if asked.changed > asked.arms or asked.damaged > asked.arms * asked.bags:
-        parser.error('--changed and --damaged are at most the arms and their bags')
-    sizes = asked.arms, asked.bags, asked.changed, asked.damaged, asked.seconds, asked.seed
-    if asked.part == 'generate':
-        generate(asked.folders[0], *sizes)
-    elif asked.part == 'score':
-        score(*asked.folders)
-    else:
-        with tempfile.TemporaryDirectory() as folder:
-            generate(f'{folder}/bags', 20, 10, 4, 2, asked.seconds, asked.seed)
-            for command in (
-                ['identify', f'{folder}/bags/*/*', '--robot', str(ROBOT)],
-                ['watch'],
-            ):
-                told = [sys.executable, '-m', 'armid_ros.cli', 'fleet', *command]
-                subprocess.run([*told, '--out', f'{folder}/results'], check=True)
-            score(f'{folder}/bags', f'{folder}/results')
+    with tempfile.TemporaryDirectory() as folder:
+        generate(f'{folder}/bags', **vars(asked))
+        for command in (['identify', f'{folder}/bags/*/*', '--robot', str(ROBOT)], ['watch']):
+            told = [sys.executable, '-m', 'armid_ros.cli', 'fleet', *command]
+            subprocess.run([*told, '--out', f'{folder}/results'], check=True)
+        score(f'{folder}/bags', f'{folder}/results')
 
 
 if __name__ == '__main__':

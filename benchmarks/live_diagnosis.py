@@ -82,7 +82,7 @@ class Draw:
     right: bool
 
 
-class Unhurried:
+class Unhurried(InProcess):
     """
     Diagnoses in this process, whose answers are delayed by their processor time.
 
@@ -94,39 +94,23 @@ class Unhurried:
     """
 
     def __init__(self) -> None:
-        self._inner = InProcess()
-        self._due = 0.0
-        self.now = 0.0
-
-    @property
-    def busy(self) -> bool:
-        """Whether a diagnosis is running."""
-        return self._inner.busy
+        super().__init__()
+        self._due = self.now = 0.0
 
     def ask(self, job: Job) -> None:
         """Run a diagnosis, and set the time of its answer."""
         begun = time.process_time()
-        self._inner.ask(job)
+        super().ask(job)
         self._due = self.now + time.process_time() - begun
 
     def poll(self) -> Result | None:
         """Return the answer once its time has come; None before."""
-        return self._inner.poll() if self.now >= self._due else None
-
-    def close(self) -> None:
-        """Do nothing, as there is no other process."""
+        return super().poll() if self.now >= self._due else None
 
 
 def known_arm() -> ArmModel:
     """Return the arm with the effects that the diagnosis knows."""
     return ArmModel.of(ROBOT, effects=KNOWN)
-
-
-def motion(duration: float, rng: np.random.Generator) -> Motion:
-    """Return a motion of random harmonics."""
-    reference = working_motion(duration, rng.uniform(1.0, 2.0), rng)
-    assert reference.dq is not None and reference.ddq is not None
-    return Motion(reference.joints, reference.t, reference.q, reference.dq, reference.ddq)
 
 
 def drawn(arm: ArmModel, along: Motion, kind: tuple[str, str], rng: np.random.Generator) -> str:
@@ -214,7 +198,7 @@ def bench(along: Motion) -> Iterator[Bench]:
 def draw(number: int, seed: int) -> Draw:
     """Run one draw: an effect appears in a running arm."""
     rng = np.random.default_rng(number + 1000 * seed)
-    along = motion(BEFORE + WANTED + 6.0, rng)
+    along = working_motion(BEFORE + WANTED + 6.0, rng.uniform(1.0, 2.0), rng)
     arm = known_arm()
     effect = drawn(arm, along, KINDS[number % len(KINDS)], rng)
     name, _, place = effect.partition(':')[0].partition('@')
@@ -236,7 +220,7 @@ def quiet(minutes: float, seed: int) -> tuple[int, int, list[list[list[str]]]]:
     rng = np.random.default_rng([1000, seed])
     asked, said, proposed = 0, 0, []
     for _ in range(max(1, round(minutes / 5.0))):
-        with bench(motion(304.0, rng)) as nodes:
+        with bench(working_motion(304.0, rng.uniform(1.0, 2.0), rng)) as nodes:
             for _ in nodes.run(min(300.0, 60.0 * minutes)):
                 latest = nodes.live.latest
                 said += bool(latest is not None and latest.named)

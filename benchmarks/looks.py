@@ -1,7 +1,7 @@
 # Copyright 2026 The armid_ros developers
 # SPDX-License-Identifier: Apache-2.0
 """
-The record of runs on locked sets: commit, time and result.
+Runs on sets of cases, and the record of those on locked sets: commit, time and result.
 
 A locked set that is used often becomes a development set. So a benchmark records each run by
 itself, at its beginning and again with its results, and rejects uncommitted code. The record has
@@ -11,18 +11,77 @@ one JSON object per line; a run without results was interrupted.
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator
-from contextlib import contextmanager
+from collections.abc import Callable, Iterable, Iterator, Sequence
+from concurrent.futures import ProcessPoolExecutor
+from contextlib import contextmanager, nullcontext
+from dataclasses import asdict
 from datetime import datetime, UTC
 import json
 import math
+import multiprocessing
+import os
 from pathlib import Path
 import subprocess
 from typing import Any
 
-from benchmarks.metrics import Metric
+import numpy as np
+
+from benchmarks.metrics import Metric, table
 
 LOG = Path(__file__).parent / 'results' / 'looks.jsonl'
+
+
+def judge_all(
+    judge: Callable[[Any], Any],
+    cases: Sequence[Any],
+    what: str,
+    score: Callable[[Sequence[Any]], Sequence[Metric]],
+    *,
+    processes: int = 2,
+    out: Path | None = None,
+) -> list[Any]:
+    """
+    Judge cases in several processes, with a line of progress each; print the table.
+
+    Parameters
+    ----------
+    judge : callable
+        Returns a judged case, a dataclass with `line`, or None for one that cannot be made.
+    cases : sequence
+        Arguments of `judge`.
+    what : str
+        Name of the set, and of its part; a run on a locked one is recorded.
+    score : callable
+        Returns the metrics of judged cases.
+    processes : int
+        Number of processes.
+    out : Path, optional
+        File for all answers, as JSON.
+
+    """
+    for variable in ('OMP_NUM_THREADS', 'OPENBLAS_NUM_THREADS'):
+        os.environ.setdefault(variable, '1')  # the processes share the cores as it is
+    context = multiprocessing.get_context('spawn')
+    judged = []
+    with look(what) if 'locked' in what else nullcontext({}) as entry:
+        with ProcessPoolExecutor(processes, mp_context=context) as pool:
+            for one in filter(None, pool.map(judge, cases)):
+                judged.append(one)
+                print(one.line, flush=True)
+        metrics = score(judged)
+        print(f'\n{what}\n{table(metrics)}')
+        entry['results'] = results_of(metrics)
+    if out:
+        write_json(out, [asdict(one) for one in judged])
+    return judged
+
+
+def write_json(path: Path, content: object) -> None:
+    """Write a file with arrays as lists and other objects as numbers."""
+    text = json.dumps(
+        content, indent=1, default=lambda x: x.tolist() if isinstance(x, np.ndarray) else float(x)
+    )
+    path.write_text(f'{text}\n', encoding='utf-8')
 
 
 @contextmanager

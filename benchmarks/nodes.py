@@ -1,7 +1,7 @@
 # Copyright 2026 The armid_ros developers
 # SPDX-License-Identifier: Apache-2.0
 """
-Speed of the nodes: losses at 1 kHz, update times, lock step; for kills see benchmarks.endurance.
+Speed of the nodes: losses at 1 kHz, update times, lock step.
 
 ``python -m benchmarks.nodes [--seconds 60]``; the identifier runs in this process, the arm and the
 recorder in others. Losses are valid on an otherwise idle machine.
@@ -20,12 +20,10 @@ import tempfile
 import time
 
 from armid_ros.arm import ArmModel
-from armid_ros.effects import make_effect
 from armid_ros.excitation import Excitation, Limits, random_feasible, save_excitation
 from armid_ros.identification.online.identifier import OnlineIdentifier
 from armid_ros.nodes.lockstep import run_lockstep
 from armid_ros.nodes.online_identifier import OnlineIdentifierNode
-from armid_ros.nodes.qos import SAMPLES
 from armid_ros.nodes.running.domains import private_context
 from armid_ros.nodes.running.process import steady
 from armid_ros.recording import read_recording
@@ -33,8 +31,6 @@ from armid_ros.robots import load_robot
 from armid_ros.simulation import Reference, SimulatedArm
 import numpy as np
 from rclpy.experimental import EventsExecutor
-from rclpy.node import Node
-from sensor_msgs.msg import JointState
 
 from benchmarks.real_recordings import example_robot
 
@@ -45,14 +41,6 @@ MS = 10**6
 def panda():
     """Return the path of a URDF with seven joints and a gripper."""
     return str(example_robot('panda_description/urdf/panda.urdf'))
-
-
-def with_friction(robot):
-    """Return the arm with unknown friction and offset."""
-    arm = ArmModel(robot)
-    for name in EFFECTS:
-        arm = arm.with_effect(make_effect(name, robot))
-    return arm
 
 
 def short_run(robot, period, n_periods):
@@ -98,7 +86,9 @@ def at_one_kilohertz(seconds, folder):
     save_excitation(short_run(robot, 8.0, max(1, int(seconds / 8.0))), folder / 'run.yaml')
     with private_context() as context, steady():
         executor = EventsExecutor(context=context)
-        identifier = OnlineIdentifier(with_friction(robot), rng=np.random.default_rng(0))
+        identifier = OnlineIdentifier(
+            ArmModel.of(robot, effects=EFFECTS), rng=np.random.default_rng(0)
+        )
         node = OnlineIdentifierNode(identifier, context=context, use_global_arguments=False)
         node.update_times = deque()
         executor.add_node(node)
@@ -159,44 +149,16 @@ def at_one_kilohertz(seconds, folder):
     )
 
 
-def bare_step(steps=4000):
-    """Return the processor time of the messages alone of a step in lock step [s]."""
-    # a joint state that recorder, publisher and identifier take as bytes
-    names = ('plant', 'recorder', 'publisher', 'identifier')
-    with private_context() as context:
-        executor = EventsExecutor(context=context)
-        nodes = [Node(name, context=context, use_global_arguments=False) for name in names]
-        states = nodes[0].create_publisher(JointState, 'joint_states', SAMPLES)
-        heard = []
-        for node in nodes[1:]:
-            node.create_subscription(JointState, 'joint_states', heard.append, SAMPLES, raw=True)
-        message = JointState(name=[f'joint{k}' for k in range(6)])
-        message.position = message.velocity = message.effort = [0.1] * 6
-        for node in nodes:
-            executor.add_node(node)
-        while states.get_subscription_count() < len(nodes) - 1:
-            executor.spin_once(timeout_sec=0.1)
-        begun = time.process_time()
-        for _ in range(steps):
-            heard.clear()
-            states.publish(message)
-            while len(heard) < len(nodes) - 1:
-                executor.spin_once(timeout_sec=0.1)
-        used = time.process_time() - begun
-        executor.shutdown()
-    return used / steps
-
-
 def in_lock_step(rate, folder):
     """
     Print the speed of all nodes in lock step over real time.
 
     It is measured by the clock, which other processes slow down, and by processor time, as on an
-    idle machine. The speeds of the simulator alone and of the messages alone are printed as well.
+    idle machine. The speed of the simulator alone is printed as well.
 
     """
     robot = load_robot('humanoid_arm', gravity='moon')
-    arm, run = with_friction(robot), short_run(robot, 10.0, 1)
+    arm, run = ArmModel.of(robot, effects=EFFECTS), short_run(robot, 10.0, 1)
     rng = np.random.default_rng(0)
     plant = SimulatedArm(arm, rng=rng, start=run.at([0.0]).q[0])
     alone = SimulatedArm(arm, rng=rng, start=run.at([0.0]).q[0])
@@ -214,13 +176,11 @@ def in_lock_step(rate, folder):
         plant, run, folder / f'bag_{rate:.0f}', identifier, rate=rate, on_progress=tell
     )
     by_processor = 1.0 / np.diff(used)
-    bare = 1.0 / (rate * bare_step())
     wanted = 8 if rate <= 200.0 else 5
     print(
         f'lock step, joint_states at {rate:5.0f} Hz   {end.real_time_factor:.1f} x real time; '
         f'by processor time {np.median(by_processor):.1f}, in the best second '
-        f'{by_processor.max():.1f} (wanted: {wanted}; the simulator alone {simulator:.1f}, '
-        f'the bare messages {bare:.0f})'
+        f'{by_processor.max():.1f} (wanted: {wanted}; the simulator alone {simulator:.1f})'
     )
 
 

@@ -19,11 +19,11 @@ import time
 
 from armid_ros.arm import ArmModel
 from armid_ros.effects import make_effect
-from armid_ros.motion import Motion
 from armid_ros.recording import read_recording, write_recording
 from armid_ros.robots import load_robot
 import numpy as np
 
+from benchmarks.multisine import multisine
 from benchmarks.real_recordings import example_robot
 
 RATE = 1000.0
@@ -43,15 +43,8 @@ def panda():
 def motion(arm, minutes, rng):
     """Return a motion of three sines per joint with noisy torque."""
     t = np.arange(round(60 * minutes * RATE)) / RATE
-    q, dq, ddq = np.zeros((3, len(t), arm.robot.n_joints))
-    for hz, size in ((0.1, 0.5), (0.2, 0.3), (0.5, 0.1)):
-        w = 2 * np.pi * hz
-        angle = w * t[:, None] + rng.uniform(0, 2 * np.pi, arm.robot.n_joints)
-        q += size * np.sin(angle)
-        dq += size * w * np.cos(angle)
-        ddq -= size * w * w * np.sin(angle)
-    exact = Motion(arm.robot.joints, t, q, dq, ddq)
-    return exact.with_torque(arm.torque(exact) + 0.05 * rng.normal(size=q.shape))
+    exact = multisine(arm.robot.joints, t, rng)
+    return exact.with_torque(arm.torque(exact) + 0.05 * rng.normal(size=exact.q.shape))
 
 
 def ours(bag):

@@ -14,50 +14,28 @@ row of the regressor and of all updates, with the default rate of rows and a row
 from __future__ import annotations
 
 import argparse
+from dataclasses import replace
 import platform
 import time
 
 from armid_ros.arm import ArmModel
-from armid_ros.effects import make_effect
 from armid_ros.identification.online.change_watch import ChangeSettings
 from armid_ros.identification.online.identifier import OnlineIdentifier, OnlineSettings
-from armid_ros.motion import FloatArray, Motion
-from armid_ros.robots import load_robot, Robot
+from armid_ros.motion import Motion
 import numpy as np
 
-from benchmarks.real_recordings import example_robot
+from benchmarks.offline_speed import motion, panda, RATE
 
-FRICTION = {'viscous_friction': 1.0, 'coulomb_friction': 0.5, 'torque_offset': 0.3}
-RATE = 1000.0
 CUTOFF = 5.0
-TORQUE_NOISE = np.array([0.5, 0.5, 0.5, 0.5, 0.1, 0.1, 0.1])
 POSITION_NOISE = 1e-5
 
 
-def panda() -> ArmModel:
-    """Return the arm with friction."""
-    arm = ArmModel(load_robot(example_robot('panda_description/urdf/panda.urdf')))
-    for name, value in FRICTION.items():
-        arm = arm.with_effect(make_effect(name, arm.robot), np.full(7, value))
-    return arm
-
-
-def exciting_motion(robot: Robot, seconds: float, rng: np.random.Generator) -> Motion:
-    """Return a motion of five harmonics of 0.1 Hz per joint, up to 2 rad/s and 4 rad/s^2."""
-    t = np.arange(0.0, seconds, 1.0 / RATE)
-    w = 2.0 * np.pi * 0.1 * np.arange(1.0, 6.0)[:, None, None]
-    size = 0.5 * rng.normal(size=(5, 1, robot.n_joints))
-    angle = w * t[:, None] + rng.uniform(0.0, 2.0 * np.pi, (5, 1, robot.n_joints))
-    shares = (size / w * np.sin(angle), size * np.cos(angle), -size * w * np.sin(angle))
-    q, dq, ddq = (share.sum(axis=0) for share in shares)
-    return Motion(robot.joints, t, q + robot.middle_pose, dq, ddq)
-
-
-def update_times(arm: ArmModel, motion: Motion, tau: FloatArray, settings: OnlineSettings) -> str:
+def update_times(arm: ArmModel, measured: Motion, settings: OnlineSettings) -> str:
     """Identify online from all samples; return one line of the table of update times."""
     online = OnlineIdentifier(arm, settings, rng=np.random.default_rng(0))
     with_row, everything = [], []
-    for t, q, torque in zip(motion.t, motion.q, tau, strict=True):
+    assert measured.tau is not None
+    for t, q, torque in zip(measured.t, measured.q, measured.tau, strict=True):
         start = time.thread_time()
         sample = online.update(float(t), q, None, torque)
         elapsed = time.thread_time() - start
@@ -73,7 +51,7 @@ def update_times(arm: ArmModel, motion: Motion, tau: FloatArray, settings: Onlin
     return f'{row}  {online.samples:7d}  {len(estimate.values):4d}'
 
 
-def print_update_times(arm: ArmModel, motion: Motion, tau: FloatArray) -> None:
+def print_update_times(arm: ArmModel, measured: Motion) -> None:
     """Print update times with default rows and with a row per sample, and with forgetting."""
     print('\nmicroseconds of processor time per sample at 1 kHz')
     print(f'{"":31s}with a row                         all samples')
@@ -90,7 +68,7 @@ def print_update_times(arm: ArmModel, motion: Motion, tau: FloatArray) -> None:
             cutoff=CUTOFF, row_rate=rate, forgetting=forgetting, changes=changes
         )
         name = f'{title}, {forgetting:g}'
-        print(f'{name:20s}  {update_times(arm, motion, tau, settings)}', flush=True)
+        print(f'{name:20s}  {update_times(arm, measured, settings)}', flush=True)
 
 
 def main() -> None:
@@ -100,12 +78,10 @@ def main() -> None:
     seconds = parser.parse_args().seconds
     rng = np.random.default_rng(1)
     arm = panda()
-    exact = exciting_motion(arm.robot, seconds, rng)
-    tau = arm.torque(exact) + TORQUE_NOISE * rng.normal(size=exact.q.shape)
-    noisy_q = exact.q + POSITION_NOISE * rng.normal(size=exact.q.shape)
-    measured = Motion(exact.joints, exact.t, noisy_q, exact.dq, exact.ddq)
+    made = motion(arm, seconds / 60.0, rng)
+    measured = replace(made, q=made.q + POSITION_NOISE * rng.normal(size=made.q.shape))
     print(f'{arm.robot.name}, {seconds:g} s at 1 kHz; Python {platform.python_version()}, one run')
-    print_update_times(arm, measured, tau)
+    print_update_times(arm, measured)
 
 
 if __name__ == '__main__':

@@ -21,7 +21,6 @@ from armid_ros.diagnosis import diagnose, Diagnosis
 import numpy as np
 
 from benchmarks.two_days import identification_of
-from tests.hidden.lived.adapter import recording_of, robot_of
 from tests.hidden.lived.cases import lived_case, LivedCase
 from tests.hidden.lived.specification import specify
 
@@ -41,9 +40,9 @@ def payloads() -> Iterator[LivedCase]:
 def answer(case: LivedCase, seed: int) -> tuple[Diagnosis, list[tuple[float, float]]]:
     """Return the diagnosis of an arm, and the true span of the payload in each recording [s]."""
     rng = np.random.default_rng(seed)
-    day_1, recordings, spans = [recording_of(run) for run in case.day_1], [], []
+    day_1, recordings, spans = [run.recording for run in case.day_1], [], []
     for run in (*case.day_2, case.held_out):
-        whole = recording_of(run)
+        whole = run.recording
         length = whole.t[-1] - whole.t[0]
         start = whole.t[0] + length * rng.uniform(*BEGINS)
         stop = start + length * rng.uniform(*LASTS)
@@ -52,7 +51,7 @@ def answer(case: LivedCase, seed: int) -> tuple[Diagnosis, list[tuple[float, flo
         recordings.append(replace(whole, tau=tau))
         spans.append((float(start), float(stop)))
     found = diagnose(
-        identification_of(robot_of(case), day_1).arm,
+        identification_of(case.robot, day_1).arm,
         recordings[:-1],
         validate=recordings[-1:],
         baseline=day_1,

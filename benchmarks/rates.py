@@ -5,7 +5,8 @@ The page of success rates, generated from the recorded results.
 
     python -m benchmarks.rates        writes benchmarks/rates.md
 
-`results/looks.jsonl` has each run on a locked set, `results/rates.json` the rates of other sets.
+`results/looks.jsonl` has each run on a locked set; `results/rates.json` has the questions that are
+shown of them, and the rates of other sets.
 
 """
 
@@ -31,53 +32,6 @@ The decision is new since 2026-11-28. The locked laboratory and most development
 judged by the rules before.
 """
 
-#: Command, number of runs that together have all cases, and rows, of each locked set.
-_LOCKED = {
-    'lived, locked, 72 cases': (
-        'python -m benchmarks.lived locked --cases 500:572',
-        1,
-        {
-            'cause named first': 'cause above the misfit named first',
-            'cause named first: first or in a tie of 3': 'first, or in the stated tie',
-            'joint of the headline right': 'joint right',
-            'nothing happened, silent': 'no change: no name',
-            'same day again, silent': 'day 1 against itself: no name',
-            'outside the catalogue, said so': 'cause outside the catalogue: no substitute',
-            '95 % intervals with the truth': '95 % intervals that contain the truth',
-        },
-    ),
-    'lived, locked/exact, 36 cases': (
-        'python -m benchmarks.lived locked/exact',
-        1,
-        {
-            'cause named first': 'cause in an exact description named first',
-            'nothing happened, silent': 'no change: no name',
-        },
-    ),
-    'lived, locked/mounting, 20 cases': (
-        'python -m benchmarks.lived locked/mounting',
-        1,
-        {
-            'cause named first': 'other mounting named first',
-            'mounting within 1 deg and 2 %': 'gravity within 1 degree and 2 %',
-        },
-    ),
-    'laboratory, locked': (
-        'make benchmark',
-        1,
-        {
-            'top-1 name right': 'effect named first',
-            'truth among the names': 'truth among the names',
-            'wrong names': 'wrong names (no more than 1 % wanted)',
-            'joint right': 'joint right',
-            'pairs exact': 'pairs of effects complete',
-            'unknown or partial': 'true name not in the library: `unknown` or `partial`',
-            '95 % intervals with the truth': '95 % intervals that contain the truth',
-            'false alarms': 'false alarms where nothing is hidden',
-        },
-    ),
-}
-
 
 def page(looks: str, rates: str) -> str:
     """
@@ -89,11 +43,8 @@ def page(looks: str, rates: str) -> str:
         Contents of looks.jsonl and rates.json.
 
     """
-    runs: dict[str, list[dict[str, Any]]] = {}
-    for line in looks.splitlines():
-        run = json.loads(line)
-        if run.get('results'):
-            runs.setdefault(run['set'], []).append(run['results'])
+    runs = map(json.loads, looks.splitlines())
+    last = {run['set']: run['results'] for run in runs if run.get('results')}
     other = json.loads(rates)
     return '\n'.join(
         [
@@ -103,13 +54,9 @@ def page(looks: str, rates: str) -> str:
             '| command | question | right | 95 % interval |',
             '|---|---|---|---|',
             *(
-                _locked_row(
-                    f'`{command}`' if not index else '',
-                    question,
-                    [run[key] for run in runs[name][-count:]],
-                )
-                for name, (command, count, rows) in _LOCKED.items()
-                for index, (key, question) in enumerate(rows.items())
+                _locked_row('' if k else f'`{one["command"]}`', question, last[one['set']][key])
+                for one in other['locked']
+                for k, (key, question) in enumerate(one['rows'].items())
             ),
             '',
             '## Development sets',
@@ -147,10 +94,9 @@ def page(looks: str, rates: str) -> str:
     )
 
 
-def _locked_row(command: str, question: str, runs: list[dict[str, Any]]) -> str:
-    cases = sum(run['cases'] for run in runs)
-    hits = sum(round(run['value'] * run['cases']) for run in runs if run['cases'])
-    return f'| {command} | {question} | {_right([hits, cases])} |'
+def _locked_row(command: str, question: str, found: dict[str, Any]) -> str:
+    hits = round(found['value'] * found['cases'])
+    return f'| {command} | {question} | {_right([hits, found["cases"]])} |'
 
 
 def _command(row: dict[str, Any]) -> str:

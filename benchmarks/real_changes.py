@@ -12,7 +12,6 @@ The true changes are known: see benchmarks/real_days.py.
 
 from __future__ import annotations
 
-import os
 from pathlib import Path
 import sys
 import tempfile
@@ -21,6 +20,7 @@ from armid_ros.errors import ArmidError
 from armid_ros.recording import Recording
 
 from benchmarks.real_days import DAYS, RealDays
+from benchmarks.real_recordings import folder
 from benchmarks.two_days import Answer, ask, identification_of
 
 
@@ -41,18 +41,14 @@ def answers(days: RealDays) -> tuple[Answer, Answer]:
     return said(days.day_2, days.held_out), said(days.day_1, ())
 
 
-def main() -> int:
+def main() -> None:
     """Print the true changes, and the answers below them."""
-    folder = os.environ.get('ARMID_DATA')
-    if not folder:
-        print('real_changes: ARMID_DATA names no folder with recordings', file=sys.stderr)
-        return 0
     texts = sys.argv[1:]
     with tempfile.TemporaryDirectory() as out:
         for name, load in DAYS.items():
             if texts and not any(text in name for text in texts):
                 continue
-            days = load(Path(folder), Path(out))
+            days = load(folder(), Path(out))
             print(f'\n{days.name}\n    wanted   {days.wanted}')
             for what, answer in zip(('day 2', 'day 1'), answers(days), strict=True):
                 print(
@@ -64,8 +60,7 @@ def main() -> int:
                     print(f'             {answer.summary}')
                 if answer.minor:
                     print(f'             minor: {"; ".join(map(str, answer.minor))}')
-    return 0
 
 
 if __name__ == '__main__':
-    sys.exit(main())
+    main()

@@ -113,16 +113,10 @@ def pushes(data: Path, out: Path, torque: str = 'tau_con', task: str = 'acrobot'
 
 def payload(data: Path, out: Path) -> RealDays:
     """Return the simple pendulum with its plain bob and with one of 1 kg."""
-    return RealDays(
-        'simple pendulum, plain bob and 1 kg',
-        load_robot(str(_simple_pendulum(data)), gravity='earth'),
-        (
-            _swing(data, 'payload_0p5kg/energy_shaping', _SWING_UP),
-            _swing(data, 'other_runs/ddp_swingup'),
-            _swing(data, 'other_runs/dircol_swingup'),
-        ),
-        (_swing(data, 'payload_1kg/energy_shaping', _SWING_UP),),
-        (),
+    return _swings(
+        data,
+        'plain bob and 1 kg',
+        _swing(data, 'payload_1kg/energy_shaping', _SWING_UP),
         'payload at the same length (m g l 4.08 -> 8.49 N m), or refused: its torque is '
         'collinear with Coulomb friction',
     )
@@ -130,18 +124,24 @@ def payload(data: Path, out: Path) -> RealDays:
 
 def hand_guided(data: Path, out: Path) -> RealDays:
     """Return the simple pendulum alone, and guided by a hand while its motor holds its weight."""
-    return RealDays(
-        'simple pendulum, guided by a hand',
-        load_robot(str(_simple_pendulum(data)), gravity='earth'),
-        (
-            _swing(data, 'payload_0p5kg/energy_shaping', _SWING_UP),
-            _swing(data, 'other_runs/ddp_swingup'),
-            _swing(data, 'other_runs/dircol_swingup'),
-        ),
-        (_swing(data, 'other_runs/gravity_compensation_hand_guided'),),
-        (),
+    return _swings(
+        data,
+        'guided by a hand',
+        _swing(data, 'other_runs/gravity_compensation_hand_guided'),
         'a push from outside at all times, or unknown',
     )
+
+
+def _swings(data: Path, what: str, after: Recording, wanted: str) -> RealDays:
+    """Return the simple pendulum with its plain bob, and another recording of it."""
+    robot = data / 'dfki_simple_pendulum' / 'parameters' / 'dfki_simple_pendulum.urdf'
+    before = (
+        _swing(data, 'payload_0p5kg/energy_shaping', _SWING_UP),
+        _swing(data, 'other_runs/ddp_swingup'),
+        _swing(data, 'other_runs/dircol_swingup'),
+    )
+    name = f'simple pendulum, {what}'
+    return RealDays(name, load_robot(str(robot), gravity='earth'), before, (after,), (), wanted)
 
 
 def fr3(data: Path, out: Path, first: Sequence[int] = (0, 1)) -> RealDays:
@@ -246,7 +246,3 @@ def _double_pendulum(data: Path, out: Path, design: str) -> Robot:
     whole = out / f'{design}.urdf'
     whole.write_text(text.replace('"revolute"', '"continuous"'), encoding='utf-8')
     return load_robot(str(whole), gravity='earth')
-
-
-def _simple_pendulum(data: Path) -> Path:
-    return data / 'dfki_simple_pendulum' / 'parameters' / 'dfki_simple_pendulum.urdf'

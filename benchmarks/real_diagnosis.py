@@ -16,7 +16,6 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass, replace
-import os
 from pathlib import Path
 import sys
 import tempfile
@@ -230,15 +229,11 @@ def error_percent(found: Diagnosis) -> float:
     return float(100.0 * np.sqrt(squares[0] / squares[1]))
 
 
-def main() -> int:
+def main() -> None:
     """Print the table."""
-    folder = os.environ.get('ARMID_DATA')
-    if not folder:
-        print('real_diagnosis: ARMID_DATA names no folder with recordings', file=sys.stderr)
-        return 0
     texts = sys.argv[1:]
     with tempfile.TemporaryDirectory() as out:
-        machines = Machines(Path(folder), Path(out))
+        machines = Machines(real_recordings.folder(), Path(out))
         for question in questions(machines):
             if texts and not any(text in question.label for text in texts):
                 continue
@@ -254,8 +249,7 @@ def main() -> int:
                 f'{error_percent(found):5.2f} % {time.process_time() - begin:5.1f} s  {named}',
                 flush=True,
             )
-    return 0
 
 
 if __name__ == '__main__':
-    sys.exit(main())
+    main()

@@ -14,6 +14,7 @@ from dataclasses import dataclass
 from importlib.metadata import distribution
 import os
 from pathlib import Path
+import sys
 
 from armid_ros.recording import Recording, write_recording
 import numpy as np
@@ -63,7 +64,10 @@ class RealData:
 
 
 def folder() -> Path:
-    """Return the folder of the recordings."""
+    """Return the folder of the recordings; without one, end the program with a line."""
+    if 'ARMID_DATA' not in os.environ:
+        print('ARMID_DATA names no folder with recordings of real machines', file=sys.stderr)
+        raise SystemExit(0)
     return Path(os.environ['ARMID_DATA'])
 
 

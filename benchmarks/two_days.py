@@ -24,6 +24,8 @@ from armid_ros.recording import Recording
 from armid_ros.robots import Robot
 import numpy as np
 
+#: Verdicts of a gap that no known effect explains.
+UNEXPLAINED = ('unknown', 'partial')
 #: Effects in a model of day 1, the default of `armid identify`.
 EFFECTS = ('viscous_friction', 'coulomb_friction', 'torque_offset')
 
@@ -68,6 +70,29 @@ class Named:
     def joints_of(self, name: str) -> tuple[str, ...]:
         """Return the joints of the cause, or of its rival with a name."""
         return self.joints if name == self.name else dict(self.rivals).get(name, self.joints)
+
+    def parameter_errors(
+        self, truth: Sequence[tuple[str, str, float]]
+    ) -> list[tuple[float, bool]]:
+        """
+        Compare the parameters with true ones: names, joints and values.
+
+        Returns
+        -------
+        list of (float, bool)
+            Relative error, and whether the 95 % interval contains the truth. Parameters below a
+            third of the largest one are left out.
+
+        """
+        stated = {(name, joint): (value, std) for name, joint, value, std in self.parameters}
+        largest = max((abs(value) for _, _, value in truth), default=0.0)
+        errors = []
+        for name, joint, true in truth:
+            value, std = stated.get((name, joint), (np.nan, np.nan))
+            if np.isfinite(value) and 3.0 * abs(true) >= largest > 0.0:
+                error = abs(value - true)
+                errors.append((error / abs(true), bool(error <= 1.96 * std)))
+        return errors
 
     def __str__(self) -> str:
         """Return names, joints and share in a line."""

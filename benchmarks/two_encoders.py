@@ -10,17 +10,13 @@ folder of the environment variable ARMID_DATA.
 
 from __future__ import annotations
 
-import os
 from pathlib import Path
-import sys
 
-from armid_ros.papers.elastic.identification.joints import (
-    fit_transmission,
-    TransmissionFit,
-    TwoEncoders,
-)
+from armid_ros.papers.elastic.identification.joints import fit_transmission, TwoEncoders
 import numpy as np
 from scipy.io import loadmat
+
+from benchmarks.real_recordings import folder
 
 GEAR = (1798 / 7, 1872 / 7, 757 / 3)
 PERIOD = 4e-3
@@ -43,43 +39,19 @@ def kr300(data: Path, axis: int) -> list[TwoEncoders]:
     return records
 
 
-def named(fit: TransmissionFit) -> tuple[str, ...]:
-    """
-    Return the names of the causes of the twist of a joint that are significant.
-
-    Returns
-    -------
-    tuple of str
-        joint_elasticity, backlash, both, or none; one name with both in it if their estimates
-        are too correlated to separate them.
-
-    """
-    soft = bool(np.isfinite(fit.stiffness_alone[2]))
-    if soft and abs(fit.correlation) >= 0.95:
-        return ('joint_elasticity or backlash',)
-    names = (('joint_elasticity', soft), ('backlash', fit.backlash_seen))
-    return tuple(name for name, there in names if there)
-
-
-def main() -> int:
+def main() -> None:
     """Print the table."""
-    folder = os.environ.get('ARMID_DATA')
-    if not folder:
-        print('two_encoders: ARMID_DATA names no folder with recordings', file=sys.stderr)
-        return 0
     for axis in range(3):
-        fit = fit_transmission(kr300(Path(folder), axis), np.random.default_rng(0))
+        fit = fit_transmission(kr300(folder(), axis), np.random.default_rng(0))
         value, low, high = (1e-6 * x for x in fit.stiffness)
         play = ', '.join(f'{np.degrees(x):.4f}' for x in fit.backlash)
         delay = ', '.join(f'{1e3 * x:.2f}' for x in fit.delay)
         print(
             f'axis {axis + 1}: K {value:.1f} [{low:.1f}, {high:.1f}] 1e6 N m/rad, backlash '
             f'[{play}] deg, correlation {fit.correlation:.2f}, {fit.reversals} reversals of load, '
-            f'encoders apart by [{delay}] ms, R2 {fit.explained:.3f}; '
-            f'named: {", ".join(named(fit)) or "nothing"}'
+            f'encoders apart by [{delay}] ms, R2 {fit.explained:.3f}'
         )
-    return 0
 
 
 if __name__ == '__main__':
-    sys.exit(main())
+    main()

@@ -47,13 +47,13 @@ def lay_out(folder: Path) -> Path:
         arm = ar.ArmModel.of(urdf, effects=effects)
         runs[name] = ar.simulate(arm, plan, torque_noise=0.05, rng=seed)
         ar.write_recording(folder / name, runs[name], robot_description=urdf.read_text())
-    _write_log(folder / 'log.csv', runs['monday'])
+    write_log(folder / 'log.csv', runs['monday'])
     for name in ('monday', 'friday'):
         ar.identify(urdf, runs[name]).save(folder / f'{name}_result')
     return folder
 
 
-def _write_log(path: Path, run: ar.Recording) -> None:
+def write_log(path: Path, run: ar.Recording) -> None:
     """Write what a logger would: milliseconds, degrees, currents."""
     numbers = range(1, run.n_joints + 1)
     names = ['t_ms', *(f'angle_deg_{k}' for k in numbers), *(f'amps_{k}' for k in numbers)]

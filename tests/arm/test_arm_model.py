@@ -14,11 +14,6 @@ import pytest
 
 
 @pytest.fixture(scope='module')
-def robot():
-    return load_robot('humanoid_arm')
-
-
-@pytest.fixture(scope='module')
 def motion(robot):
     return random_motion(robot, np.random.default_rng(0), 40)
 

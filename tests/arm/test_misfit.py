@@ -5,15 +5,9 @@
 from armid_ros.arm import ArmModel, load_misfit, load_model, Misfit, save_model
 from armid_ros.arm.misfit import RowFilters
 from armid_ros.errors import ModelError
-from armid_ros.robots import load_robot
 import numpy as np
 import pytest
 import yaml
-
-
-@pytest.fixture(scope='module')
-def robot():
-    return load_robot('humanoid_arm')
 
 
 @pytest.fixture

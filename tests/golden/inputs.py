@@ -15,12 +15,12 @@ from pathlib import Path
 import shutil
 
 import armid_ros as ar
-from armid_ros.motion import Motion
 import numpy as np
 
 from benchmarks.fleet import generate
+from benchmarks.multisine import multisine
 from benchmarks.real_recordings import EMPS_URDF
-from docsite.desk import ARM, FRICTION, GAIN, LOAD
+from docsite.desk import ARM, FRICTION, LOAD, write_log
 
 SPRING = 'joint_spring@shoulder:spring_stiffness=2'
 DAYS = {
@@ -43,7 +43,7 @@ def lay_out(folder: Path) -> None:
         run = recorded(ar.ArmModel.of(urdf, effects=effects), seed)
         ar.write_recording(folder / day, run, robot_description=urdf.read_text())
         if day == 'monday':
-            _write_table(folder / 'log.csv', run)
+            write_log(folder / 'log.csv', run)
     (folder / 'emps.urdf').write_text(EMPS_URDF, encoding='utf-8')
     generate(folder / 'fleet', arms=2, bags=4, changed=0, damaged=1, seconds=12.0)
 
@@ -52,22 +52,13 @@ def recorded(arm: ar.ArmModel, seed: int) -> ar.Recording:
     """Return what noisy sensors record of a motion in closed form."""
     rng = np.random.default_rng(seed)
     t = np.arange(round(_RATE * _DURATION)) / _RATE
-    q, dq, ddq = np.zeros((3, len(t), arm.robot.n_joints))
-    for hertz, size in ((0.125, 0.9), (0.4375, 0.4), (0.9375, 0.08)):
-        w = 2.0 * np.pi * hertz
-        angle = w * t[:, None] + rng.uniform(0.0, 2.0 * np.pi, arm.robot.n_joints)
-        q += size * np.sin(angle)
-        dq += size * w * np.cos(angle)
-        ddq -= size * w * w * np.sin(angle)
-    motion = Motion(arm.robot.joints, t, q, dq, ddq)
-    tau = arm.torque(motion) + _NOISE * rng.normal(size=q.shape)
+    motion = multisine(arm.robot.joints, t, rng, ((0.125, 0.9), (0.4375, 0.4), (0.9375, 0.08)))
+    tau = arm.torque(motion) + _NOISE * rng.normal(size=motion.q.shape)
     return ar.Recording(
-        joints=arm.robot.joints, t=t, q=q, dq=dq, tau=tau, start_ns=1_700_000_000 * 10**9
+        joints=arm.robot.joints,
+        t=t,
+        q=motion.q,
+        dq=motion.dq,
+        tau=tau,
+        start_ns=1_700_000_000 * 10**9,
     )
-
-
-def _write_table(path: Path, run: ar.Recording) -> None:
-    numbers = range(1, run.n_joints + 1)
-    names = ['t_ms', *(f'angle_deg_{k}' for k in numbers), *(f'amps_{k}' for k in numbers)]
-    rows = np.column_stack([1e3 * run.t, np.degrees(run.q), run.tau / GAIN])
-    np.savetxt(path, rows, fmt='%.9g', delimiter=',', header=','.join(names), comments='')

@@ -10,8 +10,11 @@ from typing import ClassVar, Self
 import numpy as np
 import numpy.typing as npt
 from scipy.signal import lfilter
+from scipy.spatial.transform import Rotation
 
 FloatArray = npt.NDArray[np.float64]
+#: When recordings begin.
+START_NS = 1_700_000_000_000_000_000
 #: Name and unit of the ten parameters of a body.
 BODY = {
     **{'m': 'kg', 'mx': 'kg m', 'my': 'kg m', 'mz': 'kg m'},
@@ -72,13 +75,49 @@ class Parameter:
     unit: str
 
 
+@dataclass(frozen=True)
+class KnownEffect:
+    """
+    An effect that the model given to the diagnosis has.
+
+    Attributes
+    ----------
+    name : str
+        As in the catalogue.
+    joints : tuple of str
+        The joints it is known of.
+    values : ndarray, shape (number of joints,), or None
+        Values that the model has; None where it is given by name only.
+
+    """
+
+    name: str
+    joints: tuple[str, ...]
+    values: FloatArray | None
+
+
 class Sized:
     """What has true parameters and grows by one of its attributes; a base of dataclasses."""
 
     #: The attribute that is larger where the gap is to be.
     sized_by: ClassVar[str] = 'value'
+    #: Ordinary value over the drive's torque and the joint's speed, to these powers.
+    ordinary: ClassVar[float]
+    by_torque: ClassVar[int] = 1
+    by_speed: ClassVar[int] = 0
+    #: Whether the value has either sign.
+    signed: ClassVar[bool] = False
+    #: Whether it is in a joint that carries something, and the first joint that it may be in.
+    loaded: ClassVar[bool] = False
+    first_joint: ClassVar[int] = 0
     #: Name in the catalogue, attribute and unit of every true parameter.
     stated: ClassVar[tuple[tuple[str, str, str], ...]] = ()
+
+    @classmethod
+    def ordinary_value(cls, torque: float, speed: float, rng: np.random.Generator) -> float:
+        """Draw the value for a joint of some torque and speed [N m, rad/s]."""
+        sign = rng.choice([-1.0, 1.0]) if cls.signed else 1.0
+        return float(sign * cls.ordinary * torque**cls.by_torque / speed**cls.by_speed)
 
     def scaled(self, factor: float) -> Self:
         """Return it larger by a factor, or its like of which the gap grows with the factor."""
@@ -94,12 +133,82 @@ class Sized:
         )
 
 
+@dataclass(frozen=True)
+class Tilted(Sized):
+    """What turns the base about a horizontal axis by an angle along x and y [rad]."""
+
+    name = 'base_tilt'
+    tilt: tuple[float, float]
+
+    def scaled(self, factor: float) -> Self:
+        return replace(self, tilt=(self.tilt[0] * factor, self.tilt[1] * factor))
+
+    @property
+    def parameters(self) -> tuple[Parameter, ...]:
+        x, y = self.tilt
+        return Parameter('tilt_x', '', x, 'rad'), Parameter('tilt_y', '', y, 'rad')
+
+    def seen(self, gravity: FloatArray) -> FloatArray:
+        """Return gravity as the turned base sees it, shape (3,)."""
+        return Rotation.from_rotvec([*self.tilt, 0.0]).inv().apply(gravity)
+
+
+def spring_parameters(joint: str, stiffness: float, rest: float) -> tuple[Parameter, ...]:
+    """Return the parameters of a spring across a joint that is at rest at a position."""
+    return (
+        Parameter('spring_stiffness', joint, stiffness, 'N m/rad'),
+        Parameter('spring_preload', joint, -stiffness * rest, 'N m'),
+    )
+
+
+def holding_parameters(
+    joint: str, stiffness: float, damping_time: float, way: FloatArray
+) -> tuple[Parameter, ...]:
+    """Return the parameters of a spring and a damper to a place, for its way from the middle."""
+    return (
+        Parameter('interaction_stiffness', joint, stiffness, 'N/m'),
+        Parameter('interaction_damping', joint, stiffness * damping_time, 'N s/m'),
+        *force_parameters(joint, stiffness * way),
+    )
+
+
+def force_parameters(joint: str, force: FloatArray) -> tuple[Parameter, ...]:
+    """Return the parameters of a force on a link, shape (3,) [N]."""
+    return tuple(
+        Parameter(f'interaction_force_{axis}', joint, float(value), 'N')
+        for axis, value in zip('xyz', force, strict=True)
+    )
+
+
 def named_body(label: str, joint: str, values: FloatArray) -> tuple[Parameter, ...]:
     """Return the ten parameters of a body, named after a label with a place for each name."""
     return tuple(
         Parameter(label.format(name), joint, float(value), unit)
         for (name, unit), value in zip(BODY.items(), values, strict=True)
     )
+
+
+def body_vector(mass: float, centre: FloatArray, central: FloatArray) -> FloatArray:
+    """Return mass, first moments and inertia about the origin of the frame, shape (10,)."""
+    about = central + mass * (centre @ centre * np.eye(3) - np.outer(centre, centre))
+    return np.concatenate([[mass], mass * centre, about[[0, 0, 1, 0, 1, 2], [0, 1, 1, 2, 2, 2]]])
+
+
+def body_parts(body: FloatArray) -> tuple[float, FloatArray, FloatArray]:
+    """Return mass, centre and inertia about the centre of a body."""
+    mass = float(body[0])
+    centre = body[1:4] / mass if mass else np.zeros(3)
+    return (
+        mass,
+        centre,
+        symmetric(body[4:]) - mass * (centre @ centre * np.eye(3) - np.outer(centre, centre)),
+    )
+
+
+def symmetric(values: FloatArray) -> FloatArray:
+    """Return the symmetric matrix of xx, xy, yy, xz, yz, zz."""
+    xx, xy, yy, xz, yz, zz = values
+    return np.array([[xx, xy, xz], [xy, yy, yz], [xz, yz, zz]])
 
 
 def sampled(times: FloatArray, t: FloatArray, values: FloatArray) -> FloatArray:
@@ -114,3 +223,25 @@ def coloured_noise(shape: tuple[int, ...], lasting: float, rng: np.random.Genera
     steps = np.sqrt(1.0 - decay**2) * rng.normal(size=shape)
     slow, _ = lfilter([1.0], [1.0, -decay], steps, axis=0, zi=decay * start)
     return np.asarray(np.sqrt(0.5) * (slow + rng.normal(size=shape)))
+
+
+def low_pass(tau: FloatArray, lag: float, step: float) -> FloatArray:
+    """Return torques behind a first-order low-pass, exact if linear between the samples."""
+    if lag <= 0.0:
+        return tau
+    ratio = step / lag
+    decay = np.exp(-ratio)
+    newest = 1.0 - (1.0 - decay) / ratio
+    numerator = np.array([newest, 1.0 - decay - newest])
+    start = tau[:1] * (1.0 - newest)
+    filtered, _ = lfilter(numerator, [1.0, -decay], tau, axis=0, zi=start)
+    return filtered
+
+
+def smooth_step(x: FloatArray) -> tuple[FloatArray, FloatArray, FloatArray]:
+    """Return the smooth step and its derivatives."""
+    return (
+        x**3 * (10.0 - 15.0 * x + 6.0 * x**2),
+        30.0 * x**2 * (1.0 - x) ** 2,
+        60.0 * x * (1.0 - x) * (1.0 - 2.0 * x),
+    )

@@ -13,7 +13,7 @@ from __future__ import annotations
 
 from abc import ABC, abstractmethod
 from dataclasses import dataclass, field
-from typing import ClassVar, Self
+from typing import Any, ClassVar, Self
 
 from armid_ros.robots import Robot
 import mujoco
@@ -179,6 +179,17 @@ class OneJoint(InJoint):
 
     index: int
     value: float
+
+    @classmethod
+    def draw(cls, setting: Setting, rng: np.random.Generator) -> Self:
+        j = pick_loaded(setting, rng) if cls.loaded else pick(setting, rng, first=cls.first_joint)
+        value = cls.ordinary_value(setting.drive[j], setting.speed[j], rng)
+        return cls(setting.robot.joints[j], j, value, *cls.drawn(setting, j, rng))
+
+    @classmethod
+    def drawn(cls, setting: Setting, j: int, rng: np.random.Generator) -> tuple[Any, ...]:
+        """Draw what it has beside its value."""
+        return ()
 
 
 @dataclass(frozen=True)

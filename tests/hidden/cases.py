@@ -16,13 +16,12 @@ from armid_ros.robots import Robot
 import numpy as np
 import pinocchio as pin
 
-from tests.hidden.arrays import FloatArray
+from tests.hidden.arrays import FloatArray, KnownEffect
 from tests.hidden.base import HiddenEffect, Setting
-from tests.hidden.catalogue import HIDDEN
 from tests.hidden.machines import drive_size, load_machine, with_rigid_errors
 from tests.hidden.plant import Plant, run
 from tests.hidden.sensors import Sensors
-from tests.hidden.specification import CaseSpec
+from tests.hidden.specification import CaseSpec, HIDDEN
 from tests.hidden.trajectories import draw_orbit, Orbit, reference, SPEEDS
 
 SIZES = Path(__file__).with_name('sizes.json')
@@ -34,35 +33,12 @@ VISIBLE = 0.25
 
 
 @dataclass(frozen=True)
-class KnownEffect:
-    """
-    An effect that the nominal model has, with the values it has there.
-
-    Attributes
-    ----------
-    name : str
-        viscous_friction, coulomb_friction or rotor_inertia.
-    joints : tuple of str
-        The joints it is known of.
-    values : ndarray, shape (number of joints,)
-        Nominal values.
-
-    """
-
-    name: str
-    joints: tuple[str, ...]
-    values: FloatArray
-
-
-@dataclass(frozen=True)
 class Bag:
     """
     One recording.
 
     Attributes
     ----------
-    speed : str
-        Speed class: slow, medium, fast, or other.
     recording : Recording
         What the instruments of the arm recorded.
     periods : tuple of (float, float)
@@ -72,7 +48,6 @@ class Bag:
 
     """
 
-    speed: str
     recording: Recording
     periods: tuple[tuple[float, float], ...]
     clean: Recording
@@ -194,19 +169,19 @@ def draw(spec: CaseSpec, attempt: int = 0) -> Draft:
     return Draft(spec, robot, known, orbits, sensors, effects)
 
 
-def simulate(draft: Draft, speeds: Sequence[str], periods: int = 2) -> tuple[Bag, ...]:
+def simulate(draft: Draft, speeds: Sequence[str]) -> tuple[Bag, ...]:
     """Run an arm through its motions and record it."""
     dt = min([1e-3, *(effect.dt for effect in draft.effects)])
     plant = Plant(draft.robot, draft.known, draft.effects, dt)
     bags = []
     for speed in speeds:
-        wanted = reference(draft.orbits[speed], speed, dt, periods)
+        wanted = reference(draft.orbits[speed], dt)
         signals = run(plant, wanted, _rng(draft.spec, 4))
         spans = tuple((start, start + wanted.period) for start in wanted.starts)
         joints = draft.robot.joints
         noise_rng = _rng(draft.spec, 5, list(SPEEDS).index(speed))
         recording = draft.sensors.record(signals, joints, noise_rng)
-        bags.append(Bag(speed, recording, spans, draft.sensors.perfect(signals, joints)))
+        bags.append(Bag(recording, spans, draft.sensors.perfect(signals, joints)))
     return tuple(bags)
 
 

@@ -5,29 +5,24 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
-from typing import Self
+from typing import Any, Self
 
 from armid_ros.robots import Robot
 import mujoco
 import numpy as np
 
 from tests.hidden.arrays import Parameter
-from tests.hidden.base import InPair, Live, OneJoint, pick, pick_loaded, Setting
+from tests.hidden.base import InPair, Live, OneJoint, Setting
 
 
 class ViscousFriction(OneJoint):
     """The arm supplies value * dq: native damping."""
 
     name = 'viscous_friction'
+    ordinary, by_speed = 0.05, 1
     stated = (('viscous_coefficient', 'value', 'N m s/rad'),)
     replaces = ('viscous_friction',)
     limit_of = ('thermal_friction',)
-
-    @classmethod
-    def draw(cls, setting: Setting, rng: np.random.Generator) -> Self:
-        j = pick(setting, rng)
-        value = 0.05 * setting.drive[j] / setting.speed[j]
-        return cls(setting.robot.joints[j], j, value)
 
     def prepare(self, live: Live) -> None:
         live.model.dof_damping[live.dofs[self.index]] += self.value
@@ -37,14 +32,10 @@ class CoulombFriction(OneJoint):
     """The arm supplies value * sign(dq), and holds at rest: native dry friction."""
 
     name = 'coulomb_friction'
+    ordinary = 0.03
     stated = (('coulomb_torque', 'value', 'N m'),)
     replaces = ('coulomb_friction',)
     limit_of = ('stribeck_friction', 'presliding_hysteresis')
-
-    @classmethod
-    def draw(cls, setting: Setting, rng: np.random.Generator) -> Self:
-        j = pick(setting, rng)
-        return cls(setting.robot.joints[j], j, 0.03 * setting.drive[j])
 
     def prepare(self, live: Live) -> None:
         live.model.dof_frictionloss[live.dofs[self.index]] += self.value
@@ -55,6 +46,7 @@ class StribeckFriction(OneJoint):
     """Dry friction that is higher by value * exp(-(dq / velocity)^2) at low speed."""
 
     name = 'stribeck_friction'
+    ordinary = 0.03
     stated = (
         ('stribeck_torque', 'value', 'N m'),
         ('stribeck_velocity', 'velocity', 'rad/s'),
@@ -64,10 +56,8 @@ class StribeckFriction(OneJoint):
     velocity: float = 0.1
 
     @classmethod
-    def draw(cls, setting: Setting, rng: np.random.Generator) -> Self:
-        j = pick(setting, rng)
-        velocity = setting.speed[j] * rng.uniform(0.04, 0.12)
-        return cls(setting.robot.joints[j], j, 0.03 * setting.drive[j], velocity)
+    def drawn(cls, setting: Setting, j: int, rng: np.random.Generator) -> tuple[Any, ...]:
+        return (setting.speed[j] * rng.uniform(0.04, 0.12),)
 
     def act(self, live: Live) -> None:
         speed = live.data.qvel[live.dofs[self.index]]
@@ -79,15 +69,14 @@ class AsymmetricFriction(OneJoint):
     """Coulomb and viscous friction that differ between the directions."""
 
     name = 'asymmetric_friction'
+    ordinary, by_speed, signed = 0.03, 1, True
     needs = ('coulomb_friction', 'viscous_friction')
     acts = True
     coulomb_share: float = 0.3
 
     @classmethod
-    def draw(cls, setting: Setting, rng: np.random.Generator) -> Self:
-        j = pick(setting, rng)
-        value = rng.choice([-1.0, 1.0]) * 0.03 * setting.drive[j] / setting.speed[j]
-        return cls(setting.robot.joints[j], j, value, float(setting.speed[j]) * 0.2)
+    def drawn(cls, setting: Setting, j: int, rng: np.random.Generator) -> tuple[Any, ...]:
+        return (float(setting.speed[j]) * 0.2,)
 
     @property
     def parameters(self) -> tuple[Parameter, ...]:
@@ -105,13 +94,9 @@ class QuadraticFriction(OneJoint):
     """Drag that grows with the square of the speed."""
 
     name = 'quadratic_friction'
+    ordinary, by_speed = 0.05, 2
     stated = (('quadratic_coefficient', 'value', 'N m s^2/rad^2'),)
     acts = True
-
-    @classmethod
-    def draw(cls, setting: Setting, rng: np.random.Generator) -> Self:
-        j = pick(setting, rng)
-        return cls(setting.robot.joints[j], j, 0.05 * setting.drive[j] / setting.speed[j] ** 2)
 
     def act(self, live: Live) -> None:
         speed = live.data.qvel[live.dofs[self.index]]
@@ -122,13 +107,9 @@ class LoadDependentFriction(OneJoint):
     """Dry friction that is higher by a share of the torque the rigid arm takes."""
 
     name = 'load_dependent_friction'
+    ordinary, by_torque, loaded = 0.08, 0, True
     stated = (('load_coefficient', 'value', ''),)
     acts = True
-
-    @classmethod
-    def draw(cls, setting: Setting, rng: np.random.Generator) -> Self:
-        j = pick_loaded(setting, rng)
-        return cls(setting.robot.joints[j], j, 0.08)
 
     def act(self, live: Live) -> None:
         live.friction[self.index] += self.value * abs(live.load[self.index])
@@ -139,6 +120,7 @@ class PreslidingHysteresis(OneJoint):
     """Dahl friction: a spring that slips, with its state integrated exactly over each step."""
 
     name = 'presliding_hysteresis'
+    ordinary = 0.03
     stated = (
         ('presliding_torque', 'value', 'N m'),
         ('breakaway_distance', 'distance', 'rad'),
@@ -147,10 +129,8 @@ class PreslidingHysteresis(OneJoint):
     distance: float = 0.01
 
     @classmethod
-    def draw(cls, setting: Setting, rng: np.random.Generator) -> Self:
-        j = pick(setting, rng)
-        distance = (setting.high[j] - setting.low[j]) * rng.uniform(0.02, 0.06)
-        return cls(setting.robot.joints[j], j, 0.03 * setting.drive[j], distance)
+    def drawn(cls, setting: Setting, j: int, rng: np.random.Generator) -> tuple[Any, ...]:
+        return ((setting.high[j] - setting.low[j]) * rng.uniform(0.02, 0.06),)
 
     def act(self, live: Live) -> None:
         state = live.memory.setdefault(id(self), np.zeros(1))
@@ -165,6 +145,7 @@ class ThermalFriction(OneJoint):
     """Viscous friction that gets less as the joint warms up."""
 
     name = 'thermal_friction'
+    ordinary, by_speed = -0.02, 1
     stated = (
         ('viscous_change', 'value', 'N m s/rad'),
         ('warm_up_time', 'time_constant', 's'),
@@ -175,10 +156,8 @@ class ThermalFriction(OneJoint):
     time_constant: float = 10.0
 
     @classmethod
-    def draw(cls, setting: Setting, rng: np.random.Generator) -> Self:
-        j = pick(setting, rng)
-        value = -0.02 * setting.drive[j] / setting.speed[j]
-        return cls(setting.robot.joints[j], j, value, rng.uniform(6.0, 15.0))
+    def drawn(cls, setting: Setting, j: int, rng: np.random.Generator) -> tuple[Any, ...]:
+        return (rng.uniform(6.0, 15.0),)
 
     def act(self, live: Live) -> None:
         warmth = 1.0 - np.exp(-live.t / self.time_constant)

@@ -14,15 +14,14 @@ from __future__ import annotations
 from dataclasses import dataclass
 from importlib import resources
 from pathlib import Path
-from xml.etree import ElementTree
 
 from armid_ros.recording import BagWriter, write_joint_states
 import mujoco
 import numpy as np
-import numpy.typing as npt
 from scipy.interpolate import CubicSpline, make_interp_spline
 
-FloatArray = npt.NDArray[np.float64]
+from tests.hidden.arrays import FloatArray
+from tests.hidden.descriptions import side_by_side
 
 EXO, HUMAN = '/exo/joint_states', '/human/joint_states'
 #: Links that straps may be on, by what both descriptions call them.
@@ -123,26 +122,17 @@ def description(name: str) -> Path:
 
 def _angles(t: FloatArray, period: float) -> FloatArray:
     """Return the joint angles of the wearer, shape (N, 6) [rad]."""
+    gait = resources.files('armid_ros.robots').joinpath('human_legs', 'gait.csv').read_text()
     table = np.loadtxt(
-        (line for line in _gait().read_text().splitlines() if line[:1] in '0123456789.'),
-        delimiter=',',
+        (line for line in gait.splitlines() if line[:1] in '0123456789.'), delimiter=','
     )
-    leg = CubicSpline(np.append(table[:-1, 0], 1.0), _closed(table[:, 1:3]), bc_type='periodic')
+    table[-1, 1:3] = table[0, 1:3]
+    leg = CubicSpline(np.append(table[:-1, 0], 1.0), table[:, 1:3], bc_type='periodic')
     begin, end = SINGLE_SUPPORT
     phase = begin + (end - begin) / 2.0 * (1.0 - np.cos(2.0 * np.pi * t / period))
     hip, knee = np.radians(leg(phase)).T
     far_hip, far_knee = np.radians(leg((phase + 0.5) % 1.0)).T
     return np.column_stack([knee - hip, knee, hip, far_hip, far_knee, 0.1 * far_knee])
-
-
-def _closed(angles: FloatArray) -> FloatArray:
-    closed = angles.copy()
-    closed[-1] = closed[0]
-    return closed
-
-
-def _gait() -> Path:
-    return Path(str(resources.files('armid_ros.robots').joinpath('human_legs', 'gait.csv')))
 
 
 def _tied(straps: Straps, masses: FloatArray) -> mujoco.MjModel:
@@ -183,30 +173,3 @@ def _torques(
         mujoco.mj_inverse(model, data)
         tau[row] = data.qfrc_inverse[columns[: len(JOINTS)]]
     return tau
-
-
-def side_by_side(*descriptions: str) -> str:
-    """Put URDFs on one ground, without looks and limits, which are not dynamics."""
-    whole = ElementTree.Element('robot', name='pair')
-    ElementTree.SubElement(whole, 'link', name='ground')
-    for urdf in descriptions:
-        parts = ElementTree.fromstring(urdf)
-        moved = {joint.find('child').get('link') for joint in parts.findall('joint')}
-        for link in parts.findall('link'):
-            for element in [e for e in link if e.tag != 'inertial']:
-                link.remove(element)
-            if link.get('name') not in moved:
-                root = ElementTree.SubElement(
-                    whole, 'joint', name=f'{link.get("name")}_on_ground', type='fixed'
-                )
-                ElementTree.SubElement(root, 'parent', link='ground')
-                ElementTree.SubElement(root, 'child', link=link.get('name'))
-        for joint in parts.findall('joint'):
-            if joint.get('type') == 'revolute':
-                joint.set('type', 'continuous')
-            for limit in joint.findall('limit'):
-                joint.remove(limit)
-        whole.extend(parts)
-    settings = ElementTree.SubElement(whole, 'mujoco')
-    ElementTree.SubElement(settings, 'compiler', fusestatic='true', balanceinertia='false')
-    return ElementTree.tostring(whole, encoding='unicode')

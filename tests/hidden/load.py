@@ -4,17 +4,15 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from typing import ClassVar, Self
 
 from armid_ros.robots import Robot
 import mujoco
 import numpy as np
-from scipy.spatial.transform import Rotation
 
-from tests.hidden.arrays import named_body, Parameter
-from tests.hidden.base import HiddenEffect, InJoint, Live, OneJoint, pick, Setting
-from tests.hidden.lived.chain import body_vector
+from tests.hidden.arrays import body_vector, named_body, Parameter, Tilted
+from tests.hidden.base import HiddenEffect, InJoint, Live, OneJoint, Setting
 
 
 @dataclass(frozen=True)
@@ -89,32 +87,18 @@ class GravityMagnitude(HiddenEffect):
         gravity *= 1.0 + self.difference / np.linalg.norm(gravity)
 
 
-@dataclass(frozen=True)
-class BaseTilt(HiddenEffect):
+class BaseTilt(Tilted, HiddenEffect):
     """The base turned about a horizontal axis: gravity as it sees it turns the other way."""
 
-    name = 'base_tilt'
     rigid = True
-    tilt: tuple[float, float]
 
     @classmethod
     def draw(cls, setting: Setting, rng: np.random.Generator) -> Self:
         angle = rng.uniform(0.0, 2.0 * np.pi)
         return cls((0.01 * np.cos(angle), 0.01 * np.sin(angle)))
 
-    def scaled(self, factor: float) -> Self:
-        return replace(self, tilt=(self.tilt[0] * factor, self.tilt[1] * factor))
-
-    @property
-    def parameters(self) -> tuple[Parameter, ...]:
-        return (
-            Parameter('tilt_x', '', self.tilt[0], 'rad'),
-            Parameter('tilt_y', '', self.tilt[1], 'rad'),
-        )
-
     def prepare(self, live: Live) -> None:
-        turn = Rotation.from_rotvec([*self.tilt, 0.0])
-        live.model.opt.gravity[:] = turn.inv().apply(live.model.opt.gravity)
+        live.model.opt.gravity[:] = self.seen(live.model.opt.gravity)
 
 
 @dataclass(frozen=True)
@@ -122,13 +106,9 @@ class RotorInertia(OneJoint):
     """Inertia of the rotor: native armature."""
 
     name = 'rotor_inertia'
+    ordinary, first_joint = 1e-3, 1
     stated = (('rotor_inertia', 'value', 'kg m^2'),)
     replaces = ('rotor_inertia',)
-
-    @classmethod
-    def draw(cls, setting: Setting, rng: np.random.Generator) -> Self:
-        j = pick(setting, rng, first=1)
-        return cls(setting.robot.joints[j], j, 1e-3 * float(setting.drive[j]))
 
     def edit(self, spec: mujoco.MjSpec, robot: Robot) -> None:
         spec.joint(self.joint).armature += self.value

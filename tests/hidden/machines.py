@@ -10,7 +10,7 @@ from importlib.metadata import files
 from armid_ros.robots import load_robot, Robot
 import numpy as np
 
-from tests.hidden.arrays import FloatArray
+from tests.hidden.arrays import body_parts, body_vector, FloatArray
 
 #: Name, where its description is, and the gravity it stands in.
 MACHINES = {
@@ -30,6 +30,11 @@ LARGEST_DRIVE = 100.0
 def load_machine(name: str) -> Robot:
     """Load a robot with the rigid parameters of its description."""
     source, gravity = MACHINES[name]
+    return load_published(source, gravity)
+
+
+def load_published(source: str, gravity: str) -> Robot:
+    """Load a shipped robot, or a file of example-robot-data."""
     if source.endswith('.urdf'):
         found = (entry for entry in files('example-robot-data') or [])
         source = str(next(e for e in found if e.as_posix().endswith(source)).locate())
@@ -59,18 +64,9 @@ def with_rigid_errors(robot: Robot, rng: np.random.Generator) -> Robot:
         mass_scale, com_scale, inertia_scale = 1.0 + rng.choice([-1.0, 1.0], 3) * rng.uniform(
             0.03, 0.10, 3
         )
-        mass = values[0]
-        if mass <= 0.0:
-            continue
-        com = values[1:4] / mass
-        described = values[4:][np.array([[0, 1, 3], [1, 2, 4], [3, 4, 5]])]
-        central = described - mass * _steiner(com)
-        new_mass, new_com = mass * mass_scale, com * com_scale
-        inertia = central * mass_scale * inertia_scale + new_mass * _steiner(new_com)
-        values[0], values[1:4] = new_mass, new_mass * new_com
-        values[4:] = inertia[[0, 0, 1, 0, 1, 2], [0, 1, 1, 2, 2, 2]]
+        mass, centre, central = body_parts(values)
+        if mass > 0.0:
+            values[:] = body_vector(
+                mass * mass_scale, centre * com_scale, central * mass_scale * inertia_scale
+            )
     return robot.with_inertias(parameters.ravel())
-
-
-def _steiner(com: FloatArray) -> FloatArray:
-    return com @ com * np.eye(3) - np.outer(com, com)

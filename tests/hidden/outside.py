@@ -6,11 +6,11 @@ from __future__ import annotations
 
 from abc import abstractmethod
 from dataclasses import dataclass
-from typing import Self
+from typing import Any
 
 import numpy as np
 
-from tests.hidden.base import HiddenEffect, Live, OneJoint, pick, Setting
+from tests.hidden.base import HiddenEffect, Live, OneJoint, Setting
 
 
 @dataclass(frozen=True)
@@ -34,17 +34,15 @@ class DeadPatch(_Outside):
     """A place in the gear that pushes one way where it is entered, the other way where left."""
 
     name = 'dead_patch'
+    ordinary = 0.05
     centre: float = 0.0
     width: float = 0.1
 
     @classmethod
-    def draw(cls, setting: Setting, rng: np.random.Generator) -> Self:
-        j = pick(setting, rng)
+    def drawn(cls, setting: Setting, j: int, rng: np.random.Generator) -> tuple[Any, ...]:
         low, high = setting.low[j], setting.high[j]
         centre = float(rng.uniform(0.7 * low + 0.3 * high, 0.3 * low + 0.7 * high))
-        return cls(
-            setting.robot.joints[j], j, 0.05 * setting.drive[j], centre, 0.06 * (high - low)
-        )
+        return centre, 0.06 * (high - low)
 
     def shape(self, t: float, q: float, dq: float) -> float:
         x = (q - self.centre) / self.width
@@ -56,16 +54,14 @@ class Chirp(_Outside):
     """A machine nearby that speeds up while the arm moves."""
 
     name = 'chirp'
+    ordinary = 0.02
     repeats = False
     low: float = 0.5
     rate: float = 0.2
 
     @classmethod
-    def draw(cls, setting: Setting, rng: np.random.Generator) -> Self:
-        j = pick(setting, rng)
-        return cls(
-            setting.robot.joints[j], j, 0.02 * setting.drive[j], *rng.uniform([0.3, 0.1], [1, 0.3])
-        )
+    def drawn(cls, setting: Setting, j: int, rng: np.random.Generator) -> tuple[Any, ...]:
+        return tuple(rng.uniform([0.3, 0.1], [1, 0.3]))
 
     def shape(self, t: float, q: float, dq: float) -> float:
         return float(np.sin(2.0 * np.pi * (self.low + 0.5 * self.rate * t) * t))
@@ -76,22 +72,16 @@ class RandomContact(_Outside):
     """Knocks at times that have nothing to do with the motion."""
 
     name = 'random_contact'
+    ordinary = 0.05
     repeats = False
     times: tuple[float, ...] = ()
     lengths: tuple[float, ...] = ()
 
     @classmethod
-    def draw(cls, setting: Setting, rng: np.random.Generator) -> Self:
-        j = pick(setting, rng)
+    def drawn(cls, setting: Setting, j: int, rng: np.random.Generator) -> tuple[Any, ...]:
         times = np.sort(rng.uniform(1.0, 20.0, 8))
         lengths = rng.uniform(0.1, 0.5, 8) * rng.choice([-1.0, 1.0], 8)
-        return cls(
-            setting.robot.joints[j],
-            j,
-            0.05 * setting.drive[j],
-            tuple(times.tolist()),
-            tuple(lengths.tolist()),
-        )
+        return tuple(times.tolist()), tuple(lengths.tolist())
 
     def shape(self, t: float, q: float, dq: float) -> float:
         push = 0.0
@@ -107,6 +97,7 @@ class Muscle(_Outside):
     """A person who works along: stronger in the middle of the range, tired as time goes on."""
 
     name = 'muscle'
+    ordinary = 0.05
     repeats = False
     centre: float = 0.0
     width: float = 1.0
@@ -114,18 +105,10 @@ class Muscle(_Outside):
     rhythm: tuple[float, ...] = ()
 
     @classmethod
-    def draw(cls, setting: Setting, rng: np.random.Generator) -> Self:
-        j = pick(setting, rng)
+    def drawn(cls, setting: Setting, j: int, rng: np.random.Generator) -> tuple[Any, ...]:
         low, high = setting.low[j], setting.high[j]
-        return cls(
-            setting.robot.joints[j],
-            j,
-            0.05 * setting.drive[j],
-            (low + high) / 2.0,
-            0.3 * (high - low),
-            float(setting.speed[j]),
-            tuple(rng.uniform(0.3, 1.1, 3).tolist()),
-        )
+        rhythm = tuple(rng.uniform(0.3, 1.1, 3).tolist())
+        return (low + high) / 2.0, 0.3 * (high - low), float(setting.speed[j]), rhythm
 
     def shape(self, t: float, q: float, dq: float) -> float:
         a, b, c = self.rhythm

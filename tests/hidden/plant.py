@@ -14,7 +14,6 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from xml.etree import ElementTree
 
 from armid_ros.robots import Robot
 import mujoco
@@ -23,6 +22,7 @@ import pinocchio as pin
 
 from tests.hidden.arrays import FloatArray, Signals
 from tests.hidden.base import HiddenEffect, Live
+from tests.hidden.descriptions import bare_urdf
 from tests.hidden.machines import with_rigid_errors
 from tests.hidden.trajectories import Reference
 
@@ -208,23 +208,3 @@ def _controller_model(
     rotor = plant.known.get('rotor_inertia', zero)
     inertia = np.mean([np.diag(pin.crba(robot.model, data, s[0])) for s in states[::20]], axis=0)
     return torque + COMPENSATION * friction + rotor * reference.ddq, inertia + rotor
-
-
-def bare_urdf(robot: Robot) -> str:
-    """Return the robot's URDF without what is not dynamics, for MuJoCo to read by itself."""
-    root = ElementTree.fromstring(robot.urdf)
-    for link in root.iter('link'):
-        for element in [e for e in link if e.tag != 'inertial']:
-            link.remove(element)
-    for joint in root.findall('joint'):
-        if joint.get('name') not in robot.joints:
-            joint.set('type', 'fixed')
-        elif joint.get('type') == 'revolute':
-            joint.set('type', 'continuous')
-        for element in [e for e in joint if e.tag not in ('origin', 'parent', 'child', 'axis')]:
-            joint.remove(element)
-    for element in [e for e in root if e.tag not in ('link', 'joint')]:
-        root.remove(element)
-    compiler = ElementTree.SubElement(root, 'mujoco')
-    ElementTree.SubElement(compiler, 'compiler', fusestatic='true', balanceinertia='false')
-    return ElementTree.tostring(root, encoding='unicode')

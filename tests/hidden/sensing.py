@@ -6,14 +6,13 @@ from __future__ import annotations
 
 from abc import abstractmethod
 from dataclasses import dataclass, replace
-from typing import Self
+from typing import Any, Self
 
 from armid_ros.robots import Robot
 import numpy as np
-from scipy.signal import lfilter
 
-from tests.hidden.arrays import FloatArray, Parameter, Signals
-from tests.hidden.base import HiddenEffect, InPair, OneJoint, pick, pick_loaded, Setting
+from tests.hidden.arrays import FloatArray, low_pass, Parameter, Signals
+from tests.hidden.base import HiddenEffect, InPair, OneJoint, Setting
 
 
 class _Reading(OneJoint):
@@ -33,13 +32,9 @@ class TorqueOffset(_Reading):
     """The reading is too high by a constant."""
 
     name = 'torque_offset'
+    ordinary, signed = 0.02, True
     stated = (('torque_offset', 'value', 'N m'),)
     limit_of = ('torque_drift', 'joint_spring', 'asymmetric_friction')
-
-    @classmethod
-    def draw(cls, setting: Setting, rng: np.random.Generator) -> Self:
-        j = pick(setting, rng)
-        return cls(setting.robot.joints[j], j, rng.choice([-1.0, 1.0]) * 0.02 * setting.drive[j])
 
     def reading(self, t: FloatArray, tau: FloatArray) -> FloatArray:
         return tau + self.value
@@ -50,6 +45,7 @@ class TorqueDrift(_Reading):
     """The reading creeps towards a new zero while the sensor warms up."""
 
     name = 'torque_drift'
+    ordinary, signed = 0.02, True
     stated = (
         ('drift', 'value', 'N m'),
         ('drift_time', 'time_constant', 's'),
@@ -58,10 +54,8 @@ class TorqueDrift(_Reading):
     time_constant: float = 10.0
 
     @classmethod
-    def draw(cls, setting: Setting, rng: np.random.Generator) -> Self:
-        j = pick(setting, rng)
-        value = rng.choice([-1.0, 1.0]) * 0.02 * setting.drive[j]
-        return cls(setting.robot.joints[j], j, value, rng.uniform(6.0, 15.0))
+    def drawn(cls, setting: Setting, j: int, rng: np.random.Generator) -> tuple[Any, ...]:
+        return (rng.uniform(6.0, 15.0),)
 
     def reading(self, t: FloatArray, tau: FloatArray) -> FloatArray:
         return tau + self.value * (1.0 - np.exp(-t / self.time_constant))
@@ -71,12 +65,8 @@ class TorqueGain(_Reading):
     """The reading is too large by a share."""
 
     name = 'torque_gain'
+    ordinary, by_torque, loaded = 0.05, 0, True
     stated = (('gain_error', 'value', ''),)
-
-    @classmethod
-    def draw(cls, setting: Setting, rng: np.random.Generator) -> Self:
-        j = pick_loaded(setting, rng)
-        return cls(setting.robot.joints[j], j, 0.05)
 
     def reading(self, t: FloatArray, tau: FloatArray) -> FloatArray:
         return (1.0 + self.value) * tau
@@ -131,33 +121,20 @@ class TorqueLag(_Reading):
     """The reading is low-passed, first order, exact for a torque linear between the steps."""
 
     name = 'torque_lag'
+    ordinary, by_torque, loaded = 0.01, 0, True
     stated = (('lag', 'value', 's'),)
 
-    @classmethod
-    def draw(cls, setting: Setting, rng: np.random.Generator) -> Self:
-        j = pick_loaded(setting, rng)
-        return cls(setting.robot.joints[j], j, 0.01)
-
     def reading(self, t: FloatArray, tau: FloatArray) -> FloatArray:
-        ratio = (t[1] - t[0]) / self.value
-        decay = np.exp(-ratio)
-        slope = 1.0 - (1.0 - decay) / ratio  # weight of the newest sample
-        numerator = np.array([slope, 1.0 - decay - slope])
-        start = [tau[0] * (1.0 - slope)]
-        return lfilter(numerator, [1.0, -decay], tau, zi=start)[0]
+        return low_pass(tau, self.value, t[1] - t[0])
 
 
 class EncoderOffset(OneJoint):
     """The encoder reads too little by a constant."""
 
     name = 'encoder_offset'
+    ordinary, by_torque, signed, first_joint = 0.02, 0, True, 1
     stated = (('encoder_offset', 'value', 'rad'),)
     rigid = True
-
-    @classmethod
-    def draw(cls, setting: Setting, rng: np.random.Generator) -> Self:
-        j = pick(setting, rng, first=1)
-        return cls(setting.robot.joints[j], j, rng.choice([-1.0, 1.0]) * 0.02)
 
     def distort(self, signals: Signals, robot: Robot) -> Signals:
         q = signals.q.copy()

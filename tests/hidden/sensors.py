@@ -9,7 +9,7 @@ from dataclasses import dataclass
 from armid_ros.recording import Recording
 import numpy as np
 
-from tests.hidden.arrays import coloured_noise, FloatArray, sampled, Signals
+from tests.hidden.arrays import coloured_noise, FloatArray, sampled, Signals, START_NS
 
 
 @dataclass(frozen=True)
@@ -71,28 +71,43 @@ class Sensors:
             jitter=float(rng.choice([0.0, 5e-5, 2e-4])),
         )
 
+    def stamps(self, t: FloatArray) -> FloatArray:
+        """Return when samples are due within a time [s], shape (N,)."""
+        return np.arange(int(t[-1] * self.rate) - 1) / self.rate
+
+    def positions(self, q: FloatArray, rng: np.random.Generator) -> FloatArray:
+        """Return positions as the encoders count them."""
+        noisy = q + self.position_noise * rng.normal(size=q.shape)
+        return self.resolution * np.round(noisy / self.resolution)
+
+    def torques(self, tau: FloatArray, rng: np.random.Generator) -> FloatArray:
+        """Return torques with noise, half white and half coloured."""
+        noise = coloured_noise(tau.shape, self.rate * self.correlation_time, rng)
+        return tau + self.torque_noise * noise
+
+    @property
+    def speed_noise(self) -> float:
+        """Standard deviation of a velocity [rad/s]."""
+        return (self.position_noise + 0.3 * self.resolution) * self.rate
+
     def record(
         self, signals: Signals, joints: tuple[str, ...], rng: np.random.Generator
     ) -> Recording:
         """Sample the signals as these instruments do."""
-        stamps = np.arange(int(signals.t[-1] * self.rate) - 1) / self.rate
+        stamps = self.stamps(signals.t)
         taken = np.clip(stamps + self.jitter * rng.normal(size=len(stamps)), 0.0, signals.t[-1])
         q, dq, tau = (sampled(taken, signals.t, x) for x in (signals.q, signals.dq, signals.tau))
-        noisy = q + self.position_noise * rng.normal(size=q.shape)
-        counted = self.resolution * np.round(noisy / self.resolution)
-        lasting = self.rate * self.correlation_time
-        speed_noise = (self.position_noise + 0.3 * self.resolution) * self.rate
         return Recording(
             joints=joints,
             t=stamps,
-            q=counted,
-            dq=dq + speed_noise * rng.normal(size=dq.shape),
-            tau=tau + self.torque_noise * coloured_noise(tau.shape, lasting, rng),
-            start_ns=1_700_000_000_000_000_000,
+            q=self.positions(q, rng),
+            dq=dq + self.speed_noise * rng.normal(size=dq.shape),
+            tau=self.torques(tau, rng),
+            start_ns=START_NS,
         )
 
     def perfect(self, signals: Signals, joints: tuple[str, ...]) -> Recording:
         """Return what instruments without noise, steps and jitter would record."""
-        stamps = np.arange(int(signals.t[-1] * self.rate) - 1) / self.rate
+        stamps = self.stamps(signals.t)
         q, dq, tau = (sampled(stamps, signals.t, x) for x in (signals.q, signals.dq, signals.tau))
         return Recording(joints=joints, t=stamps, q=q, dq=dq, tau=tau)

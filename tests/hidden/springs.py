@@ -12,7 +12,7 @@ from armid_ros.robots import Robot
 import mujoco
 import numpy as np
 
-from tests.hidden.arrays import FloatArray, Parameter
+from tests.hidden.arrays import FloatArray, holding_parameters, Parameter, spring_parameters
 from tests.hidden.base import InJoint, InPair, Live, OneJoint, pick, pick_loaded, Setting
 
 
@@ -32,10 +32,7 @@ class JointSpring(OneJoint):
 
     @property
     def parameters(self) -> tuple[Parameter, ...]:
-        return (
-            Parameter('spring_stiffness', self.joint, self.value, 'N m/rad'),
-            Parameter('spring_preload', self.joint, -self.value * self.rest, 'N m'),
-        )
+        return spring_parameters(self.joint, self.value, self.rest)
 
     def edit(self, spec: mujoco.MjSpec, robot: Robot) -> None:
         joint = spec.joint(self.joint)
@@ -195,17 +192,8 @@ class HumanInteraction(_Strap):
 
     @property
     def parameters(self) -> tuple[Parameter, ...]:
-        force = self.stiffness * (np.array(self.anchor) - self.middle)
-        return (
-            Parameter('interaction_stiffness', self.joint, self.stiffness, 'N/m'),
-            Parameter(
-                'interaction_damping', self.joint, self.stiffness * self.damping_time, 'N s/m'
-            ),
-            *(
-                Parameter(f'interaction_force_{axis}', self.joint, float(value), 'N')
-                for axis, value in zip('xyz', force, strict=True)
-            ),
-        )
+        way = np.array(self.anchor) - self.middle
+        return holding_parameters(self.joint, self.stiffness, self.damping_time, way)
 
     def force(self, way: FloatArray, velocity: FloatArray) -> FloatArray:
         return -self.stiffness * (way + self.damping_time * velocity)

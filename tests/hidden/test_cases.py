@@ -9,8 +9,7 @@ import numpy as np
 import pytest
 
 from tests.hidden.cases import make_case
-from tests.hidden.catalogue import CATALOGUED
-from tests.hidden.specification import case_list, find_case, SETS
+from tests.hidden.specification import case_list, CATALOGUED, find_case, SETS
 
 pytestmark = pytest.mark.long
 

@@ -10,6 +10,7 @@ MuJoCo: two codes of one definition.
 
 from dataclasses import replace
 
+from armid_ros.effects import CATALOGUE
 from armid_ros.motion import Motion
 import numpy as np
 import pytest
@@ -18,8 +19,7 @@ from scipy.signal import butter, sosfiltfilt
 
 from benchmarks.hidden_effects import true_arm
 from tests.hidden.cases import Case, draw, simulate
-from tests.hidden.catalogue import CATALOGUED, HIDDEN
-from tests.hidden.specification import CaseSpec
+from tests.hidden.specification import CaseSpec, CATALOGUED, HIDDEN
 
 pytestmark = pytest.mark.long
 
@@ -48,6 +48,10 @@ def glides(speed):
     """Return where something moves, and does so for 0.15 s around, so that nothing holds it."""
     slow = np.abs(speed) < 0.05 * np.abs(speed).max(axis=0)
     return ~maximum_filter1d(slow, 61, axis=0)
+
+
+def test_every_effect_of_the_catalogue_is_hidden():
+    assert set(CATALOGUED) == {name for name, kind in CATALOGUE.items() if not kind.learned}
 
 
 @pytest.mark.parametrize('name', CATALOGUED)

@@ -32,7 +32,7 @@ def test_inverse_dynamics_of_both_engines_agree(machine):
 def test_references_keep_the_limits_and_repeat(speed):
     robot = load_machine('panda')
     rng = np.random.default_rng(1)
-    wanted = reference(draw_orbit(robot, speed, rng), speed, 1e-3)
+    wanted = reference(draw_orbit(robot, speed, rng), 1e-3)
     assert np.all((wanted.q > robot.lower) & (wanted.q < robot.upper))
     assert np.all(np.abs(wanted.dq) < 1.01 * SPEEDS[speed].share * robot.velocity_limit)
     assert not wanted.dq[[0, -1]].any()
@@ -48,7 +48,7 @@ def test_references_keep_the_limits_and_repeat(speed):
 def test_arm_follows_but_not_exactly():
     robot = load_machine('ur10')
     rng = np.random.default_rng(2)
-    wanted = reference(draw_orbit(robot, 'fast', rng), 'fast', 1e-3)
+    wanted = reference(draw_orbit(robot, 'fast', rng), 1e-3)
     error = np.abs(run(Plant(robot, {'rotor_inertia': np.full(6, 0.1)}), wanted, rng).q - wanted.q)
     assert 1e-4 < error.max() < 0.1
 
@@ -56,7 +56,7 @@ def test_arm_follows_but_not_exactly():
 def test_an_arm_that_falls_is_not_recorded():
     robot = load_machine('ur10')
     rng = np.random.default_rng(3)
-    wanted = reference(draw_orbit(robot, 'slow', rng), 'slow', 1e-3)
+    wanted = reference(draw_orbit(robot, 'slow', rng), 1e-3)
 
     class NoPower:
         acts = False

@@ -10,7 +10,7 @@ from armid_ros.robots import Robot
 import numpy as np
 import pinocchio as pin
 
-from tests.hidden.arrays import FloatArray
+from tests.hidden.arrays import FloatArray, smooth_step
 from tests.hidden.machines import position_range
 
 
@@ -43,6 +43,7 @@ SPEEDS = {
 }
 
 REST, RUN_IN, RUN_OUT = 0.5, 1.5, 1.0  # s
+PERIODS = 2
 
 #: Acceleration limit as the time to top speed [s].
 TIME_TO_TOP_SPEED = 0.2
@@ -61,8 +62,6 @@ class Reference:
 
     Attributes
     ----------
-    speed : str
-        Speed class.
     period : float
         Duration of a period [s].
     starts : tuple of float
@@ -74,7 +73,6 @@ class Reference:
 
     """
 
-    speed: str
     period: float
     starts: tuple[float, ...]
     t: FloatArray
@@ -109,21 +107,22 @@ def draw_orbit(robot: Robot, speed: str, rng: np.random.Generator) -> Orbit:
     return max(orbits, key=lambda orbit: _richness(robot, orbit))
 
 
-def reference(orbit: Orbit, speed: str, dt: float, periods: int = 2) -> Reference:
+def reference(orbit: Orbit, dt: float) -> Reference:
     """Run through an orbit from rest to rest, sampled every dt [s]."""
-    moving = RUN_IN + periods * orbit.period + RUN_OUT
+    moving = RUN_IN + PERIODS * orbit.period + RUN_OUT
     t = np.arange(round((2 * REST + moving) / dt) + 1) * dt
     s = np.clip(t - REST, 0.0, moving)
     rising, falling = np.minimum(s / RUN_IN, 1.0), np.clip((moving - s) / RUN_OUT, 0.0, 1.0)
-    pace = _smooth(rising) * _smooth(falling)
-    change = (_slope(rising) / RUN_IN - _slope(falling) / RUN_OUT) * ((s > 0.0) & (s < moving))
+    (rise, rate, _), (fall, fall_rate, _) = smooth_step(rising), smooth_step(falling)
+    pace = rise * fall
+    change = (rate / RUN_IN - fall_rate / RUN_OUT) * ((s > 0.0) & (s < moving))
     area = RUN_IN * (_area(rising) - _area(1.0)) + np.maximum(s - RUN_IN, 0.0)
     slowed = np.maximum(s - (moving - RUN_OUT), 0.0)
     phase = area - slowed + RUN_OUT * (_area(1.0) - _area(falling))
     q, dq, ddq = orbit.at(phase)
-    starts = tuple(REST + RUN_IN + k * orbit.period for k in range(periods))
+    starts = tuple(REST + RUN_IN + k * orbit.period for k in range(PERIODS))
     pace, change = pace[:, np.newaxis], change[:, np.newaxis]
-    return Reference(speed, orbit.period, starts, t, q, dq * pace, ddq * pace**2 + dq * change)
+    return Reference(orbit.period, starts, t, q, dq * pace, ddq * pace**2 + dq * change)
 
 
 def _draw_orbit(robot: Robot, speed: SpeedClass, rng: np.random.Generator) -> Orbit:
@@ -170,14 +169,6 @@ def _richness(robot: Robot, orbit: Orbit) -> float:
     columns = columns / np.maximum(np.linalg.norm(columns, axis=0), 1e-9)
     values = np.linalg.svd(columns, compute_uv=False)
     return float(np.sum(np.log(np.maximum(values, 1e-3))))
-
-
-def _smooth(x: FloatArray) -> FloatArray:
-    return x**3 * (10.0 - 15.0 * x + 6.0 * x**2)
-
-
-def _slope(x: FloatArray) -> FloatArray:
-    return 30.0 * x**2 * (1.0 - x) ** 2
 
 
 def _area(x: FloatArray | float) -> FloatArray | float:

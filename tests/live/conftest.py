@@ -8,7 +8,6 @@ from armid_ros.arm import ArmModel
 from armid_ros.effects import parse_effect
 from armid_ros.live import DiagnosisRequest, InProcess
 from armid_ros.recording import Recording
-from armid_ros.robots import load_robot
 from armid_ros.simulation import Reference, Sensors, SimulatedArm
 import numpy as np
 import pytest
@@ -16,13 +15,6 @@ import pytest
 RATE = 200.0
 KNOWN = ('viscous_friction:viscous_coefficient=0.3', 'coulomb_friction:coulomb_torque=0.2')
 MORE_FRICTION = 'viscous_friction@elbow_pitch:viscous_coefficient=0.3'
-
-
-def arm_with(*effects):
-    arm = ArmModel(load_robot('humanoid_arm'))
-    for text in effects:
-        arm = arm.with_effect(*parse_effect(text, arm.robot))
-    return arm
 
 
 def moving(robot, duration, rng):
@@ -45,7 +37,7 @@ def moving(robot, duration, rng):
 def recorded(before, after, then=None):
     """Record an arm that gets the effect `then` after `before` seconds."""
     rng = np.random.default_rng(5)
-    arm = arm_with(*KNOWN)
+    arm = ArmModel.of('humanoid_arm', effects=KNOWN)
     motion = moving(arm.robot, before + after + 4.0, rng)
     sensors = Sensors(torque_noise=0.05, resolution=2e-5)
     simulated = SimulatedArm(arm, rng=rng, sensors=sensors, start=motion.q[0])
@@ -62,7 +54,7 @@ def recorded(before, after, then=None):
 
 @pytest.fixture(scope='session')
 def known_arm():
-    return arm_with(*KNOWN)
+    return ArmModel.of('humanoid_arm', effects=KNOWN)
 
 
 @pytest.fixture(scope='session')

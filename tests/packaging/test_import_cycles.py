@@ -27,14 +27,3 @@ def circles(package):
 
 def test_no_module_needs_itself():
     assert circles('armid_ros') == []
-
-
-def test_a_circle_is_found_even_of_types(tmp_path, monkeypatch):
-    package = tmp_path / 'round_and_round'
-    package.mkdir()
-    (package / '__init__.py').write_text('')
-    (package / 'a.py').write_text('import round_and_round.b\n')
-    types = 'from typing import TYPE_CHECKING\nif TYPE_CHECKING:\n    import round_and_round.a\n'
-    (package / 'b.py').write_text(types)
-    monkeypatch.syspath_prepend(tmp_path)
-    assert circles('round_and_round') == [['round_and_round.a', 'round_and_round.b']]

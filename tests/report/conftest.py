@@ -14,7 +14,7 @@ from armid_ros.simulation import Sensors, simulate
 import numpy as np
 import pytest
 
-from benchmarks.browser import Browser, BROWSERS, find_browser
+from tests.report.browser import Browser, BROWSERS, find_browser
 
 RATE = 100.0
 

@@ -1,12 +1,6 @@
 # Copyright 2026 The armid_ros developers
 # SPDX-License-Identifier: Apache-2.0
-"""
-Limits that grade an identification, each with its reason.
-
-``benchmarks.grade`` measures how grades of real and simulated recordings change when each limit
-is 30 % larger or smaller; see docs/identification.md.
-
-"""
+"""Limits that grade an identification, each with its reason; see docs/identification.md."""
 
 from __future__ import annotations
 

@@ -5,7 +5,6 @@
 from __future__ import annotations
 
 from functools import cache
-from importlib.metadata import files
 import os
 from pathlib import Path
 import tempfile
@@ -13,8 +12,8 @@ import tempfile
 from armid_ros.robots import load_robot, Robot
 import numpy as np
 
-from tests.hidden.arrays import FloatArray
-from tests.hidden.lived.chain import body_parts, body_vector
+from tests.hidden.arrays import body_parts, body_vector, FloatArray
+from tests.hidden.machines import load_published
 
 #: Where the description of each arm is: a shipped name or a file of example-robot-data.
 PUBLISHED = {
@@ -57,11 +56,7 @@ def load_arm(name: str) -> Robot:
             beside.write_text(text, encoding='utf-8')
             beside.replace(path)
         return load_robot(str(path), gravity='earth')
-    source = PUBLISHED[name]
-    if source.endswith('.urdf'):
-        found = (entry for entry in files('example-robot-data') or [])
-        source = str(next(e for e in found if e.as_posix().endswith(source)).locate())
-    return load_robot(source, gravity='earth')
+    return load_published(PUBLISHED[name], 'earth')
 
 
 def drawn_urdf(name: str) -> str:

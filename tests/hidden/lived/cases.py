@@ -6,14 +6,16 @@ from __future__ import annotations
 
 from dataclasses import dataclass, replace
 from functools import lru_cache
-from pathlib import Path as FilePath
 
+from armid_ros.recording import Recording
 from armid_ros.robots import Robot
 import numpy as np
 
-from tests.hidden.arrays import FloatArray, Parameter, sampled
+from tests.hidden.arrays import FloatArray, KnownEffect, sampled, START_NS
 from tests.hidden.lived.arms import load_arm, worn_bodies
-from tests.hidden.lived.causes import Cause, CAUSES, Mounting, Scene
+from tests.hidden.lived.causes import CAUSES
+from tests.hidden.lived.causes.base import Cause, Scene
+from tests.hidden.lived.causes.rigid import Mounting
 from tests.hidden.lived.chain import Chain
 from tests.hidden.lived.instruments import Instruments
 from tests.hidden.lived.motions import draw_path, Path, tracked
@@ -33,77 +35,19 @@ class LivedRecording:
 
     Attributes
     ----------
-    joints : tuple of str
-        Names in column order, n of them.
-    t : ndarray, shape (N,)
-        Stamps [s].
-    q, tau : ndarray, shape (N, n)
-        Positions [rad] and efforts [N m].
-    dq : ndarray, shape (N, n), or None
-        Velocities [rad/s], if they were recorded.
+    recording : Recording
+        What a diagnosis gets.
     style : str
         What kind of motion it is.
     contribution : ndarray, shape (N, n)
         Part of the effort that the cause made, without noise: with it less without it, along the
         same recorded motion [N m]. Not for the diagnosis.
-    noise : ndarray, shape (n,)
-        Standard deviation of the noise of the efforts [N m]. Not for the diagnosis.
 
     """
 
-    joints: tuple[str, ...]
-    t: FloatArray
-    q: FloatArray
-    tau: FloatArray
-    dq: FloatArray | None
+    recording: Recording
     style: str
     contribution: FloatArray
-    noise: FloatArray
-
-
-@dataclass(frozen=True)
-class Truth:
-    """
-    What happened between the days.
-
-    Attributes
-    ----------
-    name : str
-        As in the catalogue, or of something the catalogue does not have.
-    joints : tuple of str
-        Where; empty for the whole arm.
-    parameters : tuple of Parameter
-        True values, as the catalogue names them.
-    in_catalogue : bool
-        Whether the catalogue has it.
-
-    """
-
-    name: str
-    joints: tuple[str, ...]
-    parameters: tuple[Parameter, ...]
-    in_catalogue: bool
-
-
-@dataclass(frozen=True)
-class Known:
-    """
-    Friction that the engineer's model has.
-
-    Attributes
-    ----------
-    name : str
-        As in the catalogue.
-    joints : tuple of str
-        Where.
-    values : ndarray, shape (number of joints,), or None
-        Values; None where it is given by name only.
-
-    """
-
-    name: str
-    joints: tuple[str, ...]
-    values: FloatArray | None
 
 
 @dataclass(frozen=True)
@@ -115,43 +59,35 @@ class LivedCase:
     ----------
     spec : LivedSpec
         What it was made of.
-    urdf : Path
-        The engineer's description: what a diagnosis gets, on a floor on earth.
-    known : tuple of Known
+    robot : Robot
+        As its engineer describes it, on a floor on earth: what a diagnosis gets.
+    known : tuple of KnownEffect
         Friction that the engineer's model has; empty where a model is identified from day 1.
     day_1, day_2 : tuple of LivedRecording
         Three each; day_1 is empty where the question is asked of a description alone.
     held_out : LivedRecording
         One more of day 2.
-    truth : tuple of Truth
+    truth : tuple of Cause
         What happened; empty for nothing.
     gravity : ndarray, shape (3,)
         True gravity of day 2 in the base frame [m/s^2].
     misfit : ndarray, shape (n,)
         What an ordinary model of day 1 leaves in each joint, rms; the noise without a day 1 [N m].
-    misfit_share : float
-        The same of all joints over the torque.
     gap : float
         Power of the cause over the squared misfit, in the joint where that is largest.
 
     """
 
     spec: LivedSpec
-    urdf: FilePath
-    known: tuple[Known, ...]
+    robot: Robot
+    known: tuple[KnownEffect, ...]
     day_1: tuple[LivedRecording, ...]
     day_2: tuple[LivedRecording, ...]
     held_out: LivedRecording
-    truth: tuple[Truth, ...]
+    truth: tuple[Cause, ...]
     gravity: FloatArray
     misfit: FloatArray
-    misfit_share: float
     gap: float
-
-    @property
-    def key(self) -> str:
-        """Name of the case."""
-        return self.spec.key
 
 
 @lru_cache(maxsize=4)
@@ -167,32 +103,20 @@ def lived_case(kind: str, index: int) -> LivedCase:
         Number, from 0.
 
     """
-    return _record_case(draw_case(specify(kind, index)))
-
-
-def _record_case(draft: Draft) -> LivedCase:
-    """Record all runs of a case."""
-    spec, robot, arm, paths = draft.spec, draft.robot, draft.arm, draft.paths
-    cause = draft.cause
-    recordings = {
-        run: _record(spec, run, draft.worn[run], paths[run], draft.instruments, cause)
-        for run in paths
-    }
-    reach = draft.gap(cause) if cause else 0.0
-    chain = cause.bodies(arm.chain) if cause else arm.chain
-    assert robot.path is not None
+    draft = draw_case(specify(kind, index))
+    spec, chain, cause = draft.spec, draft.arm.chain, draft.cause
+    recordings = {run: _record(draft, run) for run in draft.paths}
     return LivedCase(
         spec=spec,
-        urdf=robot.path,
-        known=_known(spec, arm.wear, robot),
+        robot=draft.robot,
+        known=_known(spec, draft.arm.wear, draft.robot),
         day_1=tuple(r for run, r in recordings.items() if run.startswith('day_1')),
         day_2=tuple(r for run, r in recordings.items() if run.startswith('day_2')),
         held_out=recordings['held_out'],
-        truth=_truth(cause),
-        gravity=chain.gravity,
+        truth=(cause,) if cause else (),
+        gravity=(cause.bodies(chain) if cause else chain).gravity,
         misfit=draft.floor,
-        misfit_share=draft.share,
-        gap=reach,
+        gap=draft.gap(cause) if cause else 0.0,
     )
 
 
@@ -247,7 +171,7 @@ def draw_case(spec: LivedSpec) -> Draft:
     paths = {
         run: _draw_run(spec, run, arm.chain, robot, style) for run, style in spec.styles.items()
     }
-    instruments = Instruments.draw(_strength(described, robot), spec.rng('instruments'))
+    instruments = Instruments.of(_strength(described, robot), spec.rng('instruments'))
     if spec.exact:
         instruments = replace(instruments, jitter=0.0, torque_noise=0.5 * instruments.torque_noise)
     worn = {run: replace(arm, wear=_wear_of(spec, arm.wear, run)) for run in paths}
@@ -256,12 +180,6 @@ def draw_case(spec: LivedSpec) -> Draft:
     if spec.second_of_pair:
         return replace(draft, cause=draw_case(specify(spec.kind, spec.index - 1)).cause)
     return replace(draft, cause=_draw_cause(draft, described))
-
-
-def _truth(cause: Cause | None) -> tuple[Truth, ...]:
-    if cause is None:
-        return ()
-    return (Truth(cause.name, cause.joints, cause.parameters, cause.in_catalogue),)
 
 
 def _strength(chain: Chain, robot: Robot) -> FloatArray:
@@ -346,16 +264,10 @@ def _draw_cause(draft: Draft, described: Chain) -> Cause | None:
     return cause if spec.wanted is None else sized(cause, spec.wanted, draft.gap)
 
 
-def _record(
-    spec: LivedSpec,
-    run: str,
-    arm: LivedArm,
-    path: Path,
-    instruments: Instruments,
-    cause: Cause | None,
-) -> LivedRecording:
-    rng = spec.rng('noise', run)
-    there = None if run.startswith('day_1') else cause
+def _record(draft: Draft, run: str) -> LivedRecording:
+    arm, path, instruments = draft.worn[run], draft.paths[run], draft.instruments
+    rng = draft.spec.rng('noise', run)
+    there = None if run.startswith('day_1') else draft.cause
     effort = arm.effort(path)
     contribution = np.zeros_like(effort) if there is None else arm.effort(path, there) - effort
     stamps = instruments.stamps(path.t)
@@ -364,23 +276,23 @@ def _record(
         sampled(taken, path.t, x) for x in (path.q, path.dq, effort + contribution, contribution)
     )
     counted = instruments.positions(q, rng)
-    return LivedRecording(
+    noisy = instruments.torques(tau, rng)
+    recording = Recording(
         joints=arm.chain.joints,
         t=stamps,
         q=counted,
-        tau=instruments.torques(tau, rng),
         dq=instruments.velocities(dq, counted, rng),
-        style=spec.styles[run],
-        contribution=part,
-        noise=instruments.torque_noise,
+        tau=noisy,
+        start_ns=START_NS,
     )
+    return LivedRecording(recording, draft.spec.styles[run], part)
 
 
-def _known(spec: LivedSpec, wear: Wear, robot: Robot) -> tuple[Known, ...]:
+def _known(spec: LivedSpec, wear: Wear, robot: Robot) -> tuple[KnownEffect, ...]:
     if spec.friction == 'unknown':
         return ()
     return tuple(
-        Known(name, robot.joints, values if spec.friction == 'values' else None)
+        KnownEffect(name, robot.joints, values if spec.friction == 'values' else None)
         for name, values in (
             ('viscous_friction', wear.viscous),
             ('coulomb_friction', wear.coulomb),

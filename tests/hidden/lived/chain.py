@@ -18,8 +18,8 @@ import mujoco
 import numpy as np
 import numpy.typing as npt
 
-from tests.hidden.arrays import FloatArray
-from tests.hidden.plant import bare_urdf
+from tests.hidden.arrays import body_vector, FloatArray, symmetric
+from tests.hidden.descriptions import bare_urdf
 
 PARAMETERS_PER_BODY = 10
 
@@ -222,29 +222,12 @@ class Chain:
         return force, moment + _cross(arm, force)
 
 
-def body_vector(mass: float, centre: FloatArray, central: FloatArray) -> FloatArray:
-    """Return mass, first moments and inertia about the origin of the frame, shape (10,)."""
-    about = central + mass * (centre @ centre * np.eye(3) - np.outer(centre, centre))
-    return np.concatenate([[mass], mass * centre, about[[0, 0, 1, 0, 1, 2], [0, 1, 1, 2, 2, 2]]])
-
-
-def body_parts(body: FloatArray) -> tuple[float, FloatArray, FloatArray]:
-    """Return mass, centre and inertia about the centre of a body."""
-    mass = float(body[0])
-    centre = body[1:4] / mass if mass else np.zeros(3)
-    return (
-        mass,
-        centre,
-        _symmetric(body[4:]) - mass * (centre @ centre * np.eye(3) - np.outer(centre, centre)),
-    )
-
-
 def _wrench(
     body: FloatArray, w: FloatArray, dw: FloatArray, a: FloatArray
 ) -> tuple[FloatArray, FloatArray]:
     """Return the force and the moment about the origin that move a body, each (3, N)."""
     mass, moment = body[0], body[1:4][:, np.newaxis]
-    inertia = _symmetric(body[4:])
+    inertia = symmetric(body[4:])
     force = mass * a + _cross(dw, moment) + _cross(w, _cross(w, moment))
     return force, inertia @ dw + _cross(w, inertia @ w) + _cross(moment, a)
 
@@ -253,11 +236,6 @@ def _cross(a: FloatArray, b: FloatArray) -> FloatArray:
     return np.array(
         [a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]]
     )
-
-
-def _symmetric(values: FloatArray) -> FloatArray:
-    xx, xy, yy, xz, yz, zz = values
-    return np.array([[xx, xy, xz], [xy, yy, yz], [xz, yz, zz]])
 
 
 def _matrix(quaternion: FloatArray) -> FloatArray:

@@ -9,43 +9,26 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.signal import lfilter
 
-from tests.hidden.arrays import coloured_noise, FloatArray
+from tests.hidden.arrays import FloatArray
+from tests.hidden.sensors import Sensors
 
 
 @dataclass(frozen=True)
-class Instruments:
+class Instruments(Sensors):
     """
     Encoders, torque readings and the clock.
 
     Attributes
     ----------
-    rate : float
-        Samples per second [Hz].
-    jitter : float
-        Standard deviation of a stamp [s].
-    resolution : float
-        Step of the encoders [rad].
-    position_noise : float
-        Standard deviation of a position before it is counted [rad].
-    torque_noise : ndarray, shape (n,)
-        Standard deviation of a torque [N m].
-    correlation_time : float
-        Of the coloured half of the torque noise [s].
     velocity : {'none', 'measured', 'differentiated'}
         What is recorded of the velocity.
 
     """
 
-    rate: float
-    jitter: float
-    resolution: float
-    position_noise: float
-    torque_noise: FloatArray
-    correlation_time: float
     velocity: str
 
     @classmethod
-    def draw(cls, strength: FloatArray, rng: np.random.Generator) -> Instruments:
+    def of(cls, strength: FloatArray, rng: np.random.Generator) -> Instruments:
         """Draw instruments for joints of some strength [N m]."""
         level = np.exp(rng.uniform(np.log(0.004), np.log(0.02)))
         return cls(
@@ -58,19 +41,10 @@ class Instruments:
             velocity=str(rng.choice(['none', 'measured', 'differentiated'])),
         )
 
-    def stamps(self, t: FloatArray) -> FloatArray:
-        """Return when samples are due within a time [s], shape (N,)."""
-        return np.arange(int(t[-1] * self.rate) - 1) / self.rate
-
     def taken(self, stamps: FloatArray, end: float, rng: np.random.Generator) -> FloatArray:
         """Return when samples are really taken [s], shape (N,)."""
         error = np.clip(rng.normal(size=len(stamps)), -3.0, 3.0)
         return np.clip(stamps + self.jitter * error, 0.0, end)
-
-    def positions(self, q: FloatArray, rng: np.random.Generator) -> FloatArray:
-        """Return positions as the encoders count them."""
-        noisy = q + self.position_noise * rng.normal(size=q.shape)
-        return self.resolution * np.round(noisy / self.resolution)
 
     def velocities(
         self, dq: FloatArray, counted: FloatArray, rng: np.random.Generator
@@ -80,12 +54,7 @@ class Instruments:
         if self.velocity == 'none':
             return None
         if self.velocity == 'measured':
-            return dq + (self.position_noise + 0.3 * self.resolution) * self.rate * 0.2 * noise
+            return dq + self.speed_noise * 0.2 * noise
         backward = np.zeros_like(counted)
         backward[1:] = np.diff(counted, axis=0) * self.rate
         return lfilter([0.4], [1.0, -0.6], backward, axis=0)
-
-    def torques(self, tau: FloatArray, rng: np.random.Generator) -> FloatArray:
-        """Return torques with noise, half white and half coloured."""
-        noise = coloured_noise(tau.shape, self.rate * self.correlation_time, rng)
-        return tau + self.torque_noise * noise

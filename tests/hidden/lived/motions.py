@@ -12,7 +12,7 @@ from armid_ros.robots import Robot
 import numpy as np
 from scipy.signal import cont2discrete, lfilter, ss2tf
 
-from tests.hidden.arrays import FloatArray
+from tests.hidden.arrays import FloatArray, smooth_step
 from tests.hidden.lived.chain import Chain
 from tests.hidden.machines import position_range
 
@@ -162,7 +162,7 @@ def dwells(room: Room, duration: float, rng: np.random.Generator) -> Path:
     t = _clock(duration)
     n = len(room.centre)
     q, dq, ddq = (np.zeros((len(t), n)) for _ in range(3))
-    profile = _quintic if rng.random() < 0.5 else _trapezoid
+    profile = smooth_step if rng.random() < 0.5 else _trapezoid
     here = room.centre + room.reach * rng.uniform(-0.9, 0.9, n)
     q[:] = here
     now = REST
@@ -242,7 +242,7 @@ def _windowed(t: FloatArray, wave: tuple[FloatArray, FloatArray, FloatArray], ro
     """Fade a wave in and out, and scale it to the room."""
     end = t[-1] - REST
     rise, fall = np.clip((t - REST) / _RUN, 0.0, 1.0), np.clip((end - t) / _RUN, 0.0, 1.0)
-    (a, da, dda), (b, db, ddb) = _quintic(rise), _quintic(fall)
+    (a, da, dda), (b, db, ddb) = smooth_step(rise), smooth_step(fall)
     da, dda, db, ddb = da / _RUN, dda / _RUN**2, -db / _RUN, ddb / _RUN**2
     w, dw, ddw = (
         x[:, np.newaxis] for x in (a * b, da * b + a * db, dda * b + 2.0 * da * db + a * ddb)
@@ -257,15 +257,6 @@ def _windowed(t: FloatArray, wave: tuple[FloatArray, FloatArray, FloatArray], ro
         ]
     )
     return Path(t, room.centre + size * q, size * dq, size * ddq)
-
-
-def _quintic(x: FloatArray) -> tuple[FloatArray, FloatArray, FloatArray]:
-    """Return the smooth step and its derivatives."""
-    return (
-        x**3 * (10.0 - 15.0 * x + 6.0 * x**2),
-        30.0 * x**2 * (1.0 - x) ** 2,
-        60.0 * x * (1.0 - x) * (1.0 - 2.0 * x),
-    )
 
 
 def _trapezoid(x: FloatArray) -> tuple[FloatArray, FloatArray, FloatArray]:

@@ -8,11 +8,11 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from tests.hidden.arrays import FloatArray
-from tests.hidden.lived.causes import Cause
+from tests.hidden.arrays import FloatArray, low_pass
+from tests.hidden.lived.causes.base import Cause
 from tests.hidden.lived.chain import Chain
 from tests.hidden.lived.motions import Path
-from tests.hidden.lived.wear import bristle, low_pass, Wear
+from tests.hidden.lived.wear import bristle, Wear
 
 
 @dataclass(frozen=True)

@@ -20,7 +20,7 @@ import numpy as np
 from scipy.signal import butter, sosfiltfilt
 
 from tests.hidden.arrays import FloatArray
-from tests.hidden.lived.causes import Cause
+from tests.hidden.lived.causes.base import Cause
 from tests.hidden.lived.chain import Chain
 from tests.hidden.lived.motions import Path, STEP
 from tests.hidden.lived.plant import LivedArm

@@ -7,9 +7,10 @@ from dataclasses import fields
 import numpy as np
 import pytest
 
+from tests.hidden.arrays import body_parts
 from tests.hidden.lived.arms import ARMS, load_arm
 from tests.hidden.lived.cases import draw_case, lived_case
-from tests.hidden.lived.chain import body_parts, Chain
+from tests.hidden.lived.chain import Chain
 from tests.hidden.lived.specification import KINDS, ORDER, SIZES, specify
 
 pytestmark = pytest.mark.long
@@ -22,7 +23,7 @@ def test_a_case_is_the_same_every_time_and_like_no_other():
     lived_case.cache_clear()
     again, other = lived_case('development', 5), lived_case('development', 5 + ROUND)
     assert first is not again
-    np.testing.assert_array_equal(first.held_out.tau, again.held_out.tau)
+    np.testing.assert_array_equal(first.held_out.recording.tau, again.held_out.recording.tau)
     assert first.truth == again.truth
     assert first.truth[0].parameters != other.truth[0].parameters
 
@@ -75,7 +76,7 @@ def test_only_day_2_has_the_cause_and_nothing_is_nothing():
     for run in case.day_1:
         assert not run.contribution.any()
     for run in (*case.day_2, case.held_out):
-        guilty = [joint in case.truth[0].joints for joint in run.joints]
+        guilty = [joint in case.truth[0].joints for joint in run.recording.joints]
         assert np.all(run.contribution.any(axis=0) == guilty)
     assert free.truth == ()
     assert not any(run.contribution.any() for run in (*free.day_2, free.held_out))
@@ -84,6 +85,6 @@ def test_only_day_2_has_the_cause_and_nothing_is_nothing():
 def test_the_second_of_a_pair_has_the_cause_of_the_first():
     periodic, pauses = (lived_case('development/pairs', k) for k in (2, 3))
     assert periodic.truth == pauses.truth
-    assert periodic.urdf == pauses.urdf
+    assert periodic.robot is pauses.robot
     assert {r.style for r in periodic.day_2} == {'periodic'}
     assert {r.style for r in pauses.day_2} == {'dwells'}

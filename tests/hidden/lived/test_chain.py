@@ -6,10 +6,10 @@ import mujoco
 import numpy as np
 import pytest
 
+from tests.hidden.descriptions import bare_urdf
 from tests.hidden.lived.arms import ARMS, load_arm
-from tests.hidden.lived.causes import Payload
+from tests.hidden.lived.causes.rigid import Payload
 from tests.hidden.lived.chain import Chain
-from tests.hidden.plant import bare_urdf
 
 NAMES = sorted({name for names in ARMS.values() for name in names})
 

@@ -7,12 +7,14 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from tests.hidden.arrays import low_pass
 from tests.hidden.lived.arms import load_arm
-from tests.hidden.lived.causes import Coulomb, LoadFriction, Mounting, Stribeck, Tilt
+from tests.hidden.lived.causes.drive import Coulomb, LoadFriction, Stribeck
+from tests.hidden.lived.causes.rigid import Mounting, Tilt
 from tests.hidden.lived.chain import Chain
 from tests.hidden.lived.motions import draw_path, tracked
 from tests.hidden.lived.plant import LivedArm
-from tests.hidden.lived.wear import bristle, low_pass, Wear
+from tests.hidden.lived.wear import bristle, Wear
 
 ROBOT = load_arm('ur5')
 CHAIN = Chain.of(ROBOT)

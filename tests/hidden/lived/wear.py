@@ -12,7 +12,6 @@ from __future__ import annotations
 from dataclasses import dataclass, replace
 
 import numpy as np
-from scipy.signal import lfilter
 
 from tests.hidden.arrays import FloatArray
 
@@ -152,16 +151,3 @@ def bristle(q: FloatArray, distance: FloatArray) -> FloatArray:
             state[begin + 1 : end + 1, j] = z_run
             z = float(z_run[-1])
     return state
-
-
-def low_pass(tau: FloatArray, lag: float, step: float) -> FloatArray:
-    """Return torques behind a first-order low-pass, exact if linear between the samples."""
-    if lag <= 0.0:
-        return tau
-    ratio = step / lag
-    decay = np.exp(-ratio)
-    newest = 1.0 - (1.0 - decay) / ratio
-    numerator = np.array([newest, 1.0 - decay - newest])
-    start = tau[:1] * (1.0 - newest)
-    filtered, _ = lfilter(numerator, [1.0, -decay], tau, axis=0, zi=start)
-    return filtered

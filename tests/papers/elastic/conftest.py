@@ -9,7 +9,14 @@ from armid_ros.simulation.elastic import two_link_loop
 import numpy as np
 import pytest
 
-from benchmarks.elastic import excitation, MANY, mujoco_arm, run_mujoco, SENSORS, steps
+from tests.papers.elastic.two_link_in_mujoco import (
+    excitation,
+    MANY,
+    mujoco_arm,
+    run_mujoco,
+    SENSORS,
+    steps,
+)
 from tests.report.conftest import browser, charts_drawn
 
 __all__ = ['browser', 'charts_drawn']

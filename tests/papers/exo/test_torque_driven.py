@@ -15,7 +15,7 @@ from armid_ros.papers.exo.plant.torque_driven import drive_by_torque, splined
 import numpy as np
 import pytest
 
-from benchmarks.leg_pair_in_mujoco import drive_in_mujoco
+from benchmarks.pair_in_mujoco import drive_in_mujoco
 
 RATE = 100.0
 #: How far joints are off with springs that are 20 % too soft [deg].

@@ -7,7 +7,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from types import MappingProxyType
 
-from tests.hidden.lived.causes.base import Cause, Scene
+from tests.hidden.lived.causes.base import Cause
 from tests.hidden.lived.causes.contact import Holding, Knocks, Pulling
 from tests.hidden.lived.causes.drive import (
     Bumps,
@@ -19,34 +19,8 @@ from tests.hidden.lived.causes.drive import (
     Stribeck,
     Viscous,
 )
-from tests.hidden.lived.causes.rigid import Link, Mounting, Payload, Tilt, Wall
+from tests.hidden.lived.causes.rigid import Link, Payload, Tilt, Wall
 from tests.hidden.lived.causes.sensing import Delay, Encoder, Gain, Offset
-
-__all__ = [
-    'CAUSES',
-    'Bumps',
-    'Cause',
-    'Coulomb',
-    'CubicDrag',
-    'Delay',
-    'Encoder',
-    'Gain',
-    'Holding',
-    'Knocks',
-    'Link',
-    'LoadFriction',
-    'Mounting',
-    'Offset',
-    'Payload',
-    'Pulling',
-    'Rotor',
-    'Scene',
-    'Spring',
-    'Stribeck',
-    'Tilt',
-    'Viscous',
-    'Wall',
-]
 
 #: What may have happened, by the word that cases are made of.
 CAUSES: Mapping[str, type[Cause]] = MappingProxyType(

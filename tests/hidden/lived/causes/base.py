@@ -6,7 +6,7 @@ from __future__ import annotations
 
 from abc import ABC, abstractmethod
 from dataclasses import dataclass, replace
-from typing import ClassVar, Self
+from typing import Any, ClassVar, Self
 
 import numpy as np
 
@@ -99,6 +99,8 @@ class Cause(Sized, ABC):
 class JointCause(Cause):
     """A cause in one joint with one value that its size goes by."""
 
+    #: Attribute of the wear that grows by the value; empty for none.
+    worn: ClassVar[str] = ''
     joint: str
     index: int
     value: float
@@ -107,12 +109,25 @@ class JointCause(Cause):
     def joints(self) -> tuple[str, ...]:
         return (self.joint,)
 
+    @classmethod
+    def draw(cls, scene: Scene, rng: np.random.Generator) -> Self:
+        j = scene.joint(rng, loaded=cls.loaded, first=cls.first_joint)
+        value = cls.ordinary_value(scene.strength[j], scene.speed[j], rng)
+        return cls(scene.chain.joints[j], j, value, *cls.drawn(scene, j, rng))
+
+    @classmethod
+    def drawn(cls, scene: Scene, j: int, rng: np.random.Generator) -> tuple[Any, ...]:
+        """Draw what it has beside its value."""
+        return ()
+
     def _column(self, like: FloatArray, values: FloatArray) -> FloatArray:
         torque = np.zeros_like(like)
         torque[:, self.index] = values
         return torque
 
-    def _more(self, wear: Wear, name: str) -> Wear:
-        values = getattr(wear, name).copy()
+    def wear(self, wear: Wear) -> Wear:
+        if not self.worn:
+            return wear
+        values = getattr(wear, self.worn).copy()
         values[self.index] += self.value
-        return replace(wear, **{name: values})
+        return replace(wear, **{self.worn: values})

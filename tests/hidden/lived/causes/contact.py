@@ -9,7 +9,7 @@ from typing import Self
 
 import numpy as np
 
-from tests.hidden.arrays import FloatArray, Parameter
+from tests.hidden.arrays import FloatArray, force_parameters, holding_parameters, Parameter
 from tests.hidden.lived.causes.base import JointCause, Scene
 from tests.hidden.lived.chain import Chain
 from tests.hidden.lived.motions import Path
@@ -39,12 +39,8 @@ class Holding(JointCause):
 
     @property
     def parameters(self) -> tuple[Parameter, ...]:
-        force = self.value * (np.array(self.anchor) - self.middle)
-        return (
-            Parameter('interaction_stiffness', self.joint, self.value, 'N/m'),
-            Parameter('interaction_damping', self.joint, self.value * self.damping_time, 'N s/m'),
-            *_forces(self.joint, force),
-        )
+        way = np.array(self.anchor) - self.middle
+        return holding_parameters(self.joint, self.value, self.damping_time, way)
 
     def torque(self, path: Path, chain: Chain) -> FloatArray:
         position, jacobian = chain.point(self.index, np.array(self.attachment), path.q)
@@ -79,7 +75,7 @@ class Pulling(JointCause):
 
     @property
     def parameters(self) -> tuple[Parameter, ...]:
-        return _forces(self.joint, self.value * np.array(self.direction))
+        return force_parameters(self.joint, self.value * np.array(self.direction))
 
     def torque(self, path: Path, chain: Chain) -> FloatArray:
         _, jacobian = chain.point(self.index, np.array(self.attachment), path.q)
@@ -128,10 +124,3 @@ def _grip(
     anchor = places.mean(axis=1) + 0.1 * rng.normal(size=3)
     middle, _ = scene.chain.point(j, point, scene.middle[np.newaxis])
     return tuple(point.tolist()), tuple(anchor.tolist()), tuple(middle[:, 0].tolist())
-
-
-def _forces(joint: str, force: FloatArray) -> tuple[Parameter, ...]:
-    return tuple(
-        Parameter(f'interaction_force_{axis}', joint, float(value), 'N')
-        for axis, value in zip('xyz', force, strict=True)
-    )

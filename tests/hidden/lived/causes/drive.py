@@ -5,45 +5,30 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Self
+from typing import Any, Self
 
 import numpy as np
 
-from tests.hidden.arrays import FloatArray, Parameter
+from tests.hidden.arrays import FloatArray, Parameter, spring_parameters
 from tests.hidden.lived.causes.base import JointCause, Scene
 from tests.hidden.lived.chain import Chain
 from tests.hidden.lived.motions import Path
-from tests.hidden.lived.wear import Wear
 
 
 class Coulomb(JointCause):
     """A gear that has become stiff."""
 
-    name = 'coulomb_friction'
+    name, worn = 'coulomb_friction', 'coulomb'
+    ordinary = 0.15
     stated = (('coulomb_torque', 'value', 'N m'),)
-
-    @classmethod
-    def draw(cls, scene: Scene, rng: np.random.Generator) -> Self:
-        j = scene.joint(rng)
-        return cls(scene.chain.joints[j], j, 0.15 * scene.strength[j])
-
-    def wear(self, wear: Wear) -> Wear:
-        return self._more(wear, 'coulomb')
 
 
 class Viscous(JointCause):
     """A gear with other grease."""
 
-    name = 'viscous_friction'
+    name, worn = 'viscous_friction', 'viscous'
+    ordinary, by_speed = 0.15, 1
     stated = (('viscous_coefficient', 'value', 'N m s/rad'),)
-
-    @classmethod
-    def draw(cls, scene: Scene, rng: np.random.Generator) -> Self:
-        j = scene.joint(rng)
-        return cls(scene.chain.joints[j], j, 0.15 * scene.strength[j] / scene.speed[j])
-
-    def wear(self, wear: Wear) -> Wear:
-        return self._more(wear, 'viscous')
 
 
 @dataclass(frozen=True)
@@ -51,6 +36,7 @@ class Stribeck(JointCause):
     """A gear that sticks at low speed."""
 
     name = 'stribeck_friction'
+    ordinary = 0.2
     stated = (
         ('stribeck_torque', 'value', 'N m'),
         ('stribeck_velocity', 'velocity', 'rad/s'),
@@ -58,10 +44,8 @@ class Stribeck(JointCause):
     velocity: float = 0.1
 
     @classmethod
-    def draw(cls, scene: Scene, rng: np.random.Generator) -> Self:
-        j = scene.joint(rng)
-        velocity = float(scene.speed[j] * rng.uniform(0.15, 0.5))
-        return cls(scene.chain.joints[j], j, 0.2 * scene.strength[j], velocity)
+    def drawn(cls, scene: Scene, j: int, rng: np.random.Generator) -> tuple[Any, ...]:
+        return (float(scene.speed[j] * rng.uniform(0.15, 0.5)),)
 
     def dry(self, dq: FloatArray) -> FloatArray:
         return self._column(dq, self.value * np.exp(-((dq[:, self.index] / self.velocity) ** 2)))
@@ -70,32 +54,18 @@ class Stribeck(JointCause):
 class LoadFriction(JointCause):
     """A gear in which dry friction grows with the load."""
 
-    name = 'load_dependent_friction'
+    name, worn = 'load_dependent_friction', 'load_share'
+    ordinary, by_torque, loaded = 0.1, 0, True
     stated = (('load_coefficient', 'value', ''),)
     factors = (0.02, 6.0)
-
-    @classmethod
-    def draw(cls, scene: Scene, rng: np.random.Generator) -> Self:
-        j = scene.joint(rng, loaded=True)
-        return cls(scene.chain.joints[j], j, 0.1)
-
-    def wear(self, wear: Wear) -> Wear:
-        return self._more(wear, 'load_share')
 
 
 class Rotor(JointCause):
     """A drive exchanged for one with a heavier rotor."""
 
-    name = 'rotor_inertia'
+    name, worn = 'rotor_inertia', 'rotor'
+    ordinary, by_speed, first_joint = 0.05, 1, 1
     stated = (('rotor_inertia', 'value', 'kg m^2'),)
-
-    @classmethod
-    def draw(cls, scene: Scene, rng: np.random.Generator) -> Self:
-        j = scene.joint(rng, first=1)
-        return cls(scene.chain.joints[j], j, 0.05 * scene.strength[j] / scene.speed[j])
-
-    def wear(self, wear: Wear) -> Wear:
-        return self._more(wear, 'rotor')
 
 
 @dataclass(frozen=True)
@@ -114,10 +84,7 @@ class Spring(JointCause):
 
     @property
     def parameters(self) -> tuple[Parameter, ...]:
-        return (
-            Parameter('spring_stiffness', self.joint, self.value, 'N m/rad'),
-            Parameter('spring_preload', self.joint, -self.value * self.rest, 'N m'),
-        )
+        return spring_parameters(self.joint, self.value, self.rest)
 
     def torque(self, path: Path, chain: Chain) -> FloatArray:
         return self._column(path.q, self.value * (path.q[:, self.index] - self.rest))
@@ -127,13 +94,9 @@ class CubicDrag(JointCause):
     """Drag that grows with the cube of the speed: in no catalogue."""
 
     name = 'cubic_drag'
+    ordinary, by_speed = 0.1, 3
     stated = (('cubic_coefficient', 'value', 'N m s^3/rad^3'),)
     in_catalogue = False
-
-    @classmethod
-    def draw(cls, scene: Scene, rng: np.random.Generator) -> Self:
-        j = scene.joint(rng)
-        return cls(scene.chain.joints[j], j, 0.1 * scene.strength[j] / scene.speed[j] ** 3)
 
     def torque(self, path: Path, chain: Chain) -> FloatArray:
         return self._column(path.q, self.value * path.dq[:, self.index] ** 3)
@@ -144,23 +107,17 @@ class Bumps(JointCause):
     """Places in a gear that push one way where they are entered, the other way where left."""
 
     name = 'bumps'
+    ordinary = 0.3
     stated = (('torque', 'value', 'N m'),)
     in_catalogue = False
     places: tuple[float, ...] = ()
     width: float = 0.1
 
     @classmethod
-    def draw(cls, scene: Scene, rng: np.random.Generator) -> Self:
-        j = scene.joint(rng)
+    def drawn(cls, scene: Scene, j: int, rng: np.random.Generator) -> tuple[Any, ...]:
         low, high = scene.low[j], scene.high[j]
         places = low + (high - low) * rng.uniform(0.15, 0.85, 3)
-        return cls(
-            scene.chain.joints[j],
-            j,
-            0.3 * scene.strength[j],
-            tuple(places.tolist()),
-            0.05 * float(high - low),
-        )
+        return tuple(places.tolist()), 0.05 * float(high - low)
 
     def torque(self, path: Path, chain: Chain) -> FloatArray:
         x = (path.q[:, self.index, np.newaxis] - np.array(self.places)) / self.width

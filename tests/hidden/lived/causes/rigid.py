@@ -4,15 +4,14 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from typing import ClassVar, Self
 
 import numpy as np
-from scipy.spatial.transform import Rotation
 
-from tests.hidden.arrays import FloatArray, named_body, Parameter
+from tests.hidden.arrays import body_vector, FloatArray, named_body, Parameter, Tilted
 from tests.hidden.lived.causes.base import Cause, JointCause, Scene
-from tests.hidden.lived.chain import body_vector, Chain
+from tests.hidden.lived.chain import Chain
 
 
 @dataclass(frozen=True)
@@ -68,13 +67,10 @@ class Link(Body):
         return cls(scene.chain.joints[j], j, mass, tuple(centre.tolist()), rng.uniform(0.03, 0.06))
 
 
-@dataclass(frozen=True)
-class Tilt(Cause):
+class Tilt(Tilted, Cause):
     """The base turned about a horizontal axis, so that gravity as it sees it turns back."""
 
-    name = 'base_tilt'
     factors = (0.02, 5.0)
-    tilt: tuple[float, float]
 
     @classmethod
     def draw(cls, scene: Scene, rng: np.random.Generator) -> Self:
@@ -82,17 +78,8 @@ class Tilt(Cause):
         turn = np.radians(np.exp(rng.uniform(0.0, np.log(10.0))))
         return cls((turn * np.cos(angle), turn * np.sin(angle)))
 
-    def scaled(self, factor: float) -> Self:
-        return replace(self, tilt=(self.tilt[0] * factor, self.tilt[1] * factor))
-
-    @property
-    def parameters(self) -> tuple[Parameter, ...]:
-        x, y = self.tilt
-        return Parameter('tilt_x', '', x, 'rad'), Parameter('tilt_y', '', y, 'rad')
-
     def bodies(self, chain: Chain) -> Chain:
-        turn = Rotation.from_rotvec([*self.tilt, 0.0])
-        return chain.with_gravity(turn.inv().apply(chain.gravity))
+        return chain.with_gravity(self.seen(chain.gravity))
 
 
 class Wall(Tilt):

@@ -18,13 +18,9 @@ class Gain(JointCause):
     """A torque reading of another scale."""
 
     name = 'torque_gain'
+    ordinary, by_torque, signed, loaded = 0.08, 0, True, True
     stated = (('gain_error', 'value', ''),)
     factors = (0.05, 6.0)
-
-    @classmethod
-    def draw(cls, scene: Scene, rng: np.random.Generator) -> Self:
-        j = scene.joint(rng, loaded=True)
-        return cls(scene.chain.joints[j], j, float(rng.choice([-1.0, 1.0])) * 0.08)
 
     def reading(self, t: FloatArray, tau: FloatArray) -> FloatArray:
         return tau + self._column(tau, self.value * tau[:, self.index])
@@ -34,14 +30,8 @@ class Offset(JointCause):
     """A torque reading of another zero."""
 
     name = 'torque_offset'
+    ordinary, signed = 0.1, True
     stated = (('torque_offset', 'value', 'N m'),)
-
-    @classmethod
-    def draw(cls, scene: Scene, rng: np.random.Generator) -> Self:
-        j = scene.joint(rng)
-        return cls(
-            scene.chain.joints[j], j, float(rng.choice([-1.0, 1.0])) * 0.1 * scene.strength[j]
-        )
 
     def reading(self, t: FloatArray, tau: FloatArray) -> FloatArray:
         return tau + self._column(tau, np.full(len(tau), self.value))
@@ -68,13 +58,9 @@ class Encoder(JointCause):
     """An encoder that reads too little by a constant."""
 
     name = 'encoder_offset'
+    ordinary, by_torque, signed, loaded, first_joint = 0.03, 0, True, True, 1
     stated = (('encoder_offset', 'value', 'rad'),)
     factors = (0.02, 6.0)
-
-    @classmethod
-    def draw(cls, scene: Scene, rng: np.random.Generator) -> Self:
-        j = scene.joint(rng, loaded=True, first=1)
-        return cls(scene.chain.joints[j], j, float(rng.choice([-1.0, 1.0])) * 0.03)
 
     def truth(self, path: Path) -> Path:
         q = path.q.copy()

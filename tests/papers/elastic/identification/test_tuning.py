@@ -19,7 +19,7 @@ from armid_ros.simulation.elastic import two_link_loop, two_link_plant
 import numpy as np
 import pytest
 
-from benchmarks.elastic import errors, steps
+from tests.papers.elastic.two_link_in_mujoco import errors, steps
 
 pytestmark = pytest.mark.long
 

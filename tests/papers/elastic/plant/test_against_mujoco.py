@@ -8,7 +8,7 @@ from armid_ros.simulation.elastic import two_link_loop, two_link_plant
 import numpy as np
 import pytest
 
-from benchmarks.elastic import MANY, mujoco_arm, run_mujoco, steps
+from tests.papers.elastic.two_link_in_mujoco import MANY, mujoco_arm, run_mujoco, steps
 
 
 @pytest.mark.parametrize('number', [0, 3])

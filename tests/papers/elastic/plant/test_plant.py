@@ -17,7 +17,7 @@ from armid_ros.simulation.elastic import two_link_loop, two_link_plant
 import numpy as np
 import pytest
 
-from benchmarks.elastic import FREE, LOCKED, modes
+from tests.papers.elastic.two_link_in_mujoco import FREE, LOCKED, modes
 
 SHIPPED = two_link_set('after')
 

@@ -13,7 +13,6 @@ from __future__ import annotations
 
 from armid_ros.motion import ElasticRun, FloatArray
 from armid_ros.papers.elastic.identification.response import unpack
-from armid_ros.papers.elastic.identification.three_steps import tune
 from armid_ros.papers.elastic.plant import (
     ElasticSensors,
     EXCITATION_RMS,
@@ -24,7 +23,7 @@ from armid_ros.papers.elastic.plant import (
     STEPS,
 )
 from armid_ros.robots import load_robot
-from armid_ros.robots.two_link import ROBOT, two_link_set, TwoLinkParameters
+from armid_ros.robots.two_link import ROBOT, TwoLinkParameters
 from armid_ros.simulation.controller import VelocityLoop
 from armid_ros.simulation.plant import Plant
 import numpy as np
@@ -37,7 +36,7 @@ MAIN, SPRING_DAMPING = slice(0, 7), slice(11, 13)
 FREE = {0: (31.5, 63.0), 45: (31.9, 55.7), 90: (33.3, 47.0), 135: (36.4, 42.9), 180: (38.9, 42.2)}
 LOCKED = {0: (14.6, 55.5), 45: (15.5, 47.1), 90: (18.3, 36.4), 180: (27.7, 29.4)}
 #: Steps of MuJoCo per sample: its error falls with the first power of the step.
-FEW, MANY = 20, 200
+MANY = 200
 
 
 def modes(plant: Plant, q: FloatArray, *, locked: bool = False) -> FloatArray:
@@ -89,7 +88,7 @@ def steps() -> list[Experiment]:
     return step_experiments(STEP_POSES, STEPS)
 
 
-def mujoco_arm(parameters: TwoLinkParameters, substeps: int = FEW):
+def mujoco_arm(parameters: TwoLinkParameters, substeps: int = 20):
     """Return a MuJoCo model of the arm: links, separate rotors, and tendons as springs."""
     import mujoco
 
@@ -168,16 +167,3 @@ def errors(found: TwoLinkParameters, truth: TwoLinkParameters) -> dict[str, floa
         'dg': float(share[SPRING_DAMPING].max()),
         'sum': float(total.max()),
     }
-
-
-def tuning(truth_runs: list[ElasticRun], noise: float, loop: VelocityLoop, seed: int):
-    """Tune the set 'before' to noisy steps; return errors [%] and the ratio of step errors."""
-    rng = np.random.default_rng(seed)
-    sensors = ElasticSensors(motor_velocity=noise, link_velocity=noise)
-    start = two_link_set('before').parameters
-    found = tune([sensors.measure(run, rng) for run in truth_runs], start, loop)
-    true = np.stack([run.link.dq[:, 0] for run in truth_runs], axis=1)
-    before, after = (
-        np.sqrt(np.mean((values[:, :, 2] - true) ** 2)) for values in (found.before, found.after)
-    )
-    return errors(found.parameters, two_link_set('after').parameters), float(before / after)
