@@ -51,13 +51,14 @@ from armid_ros.identification.assess.verification import ForwardValidation, simu
 from armid_ros.identification.rows.signals import conditioning
 from armid_ros.recording import Recording, require_once
 from armid_ros.recording.curves import draw_joints
-from armid_ros.report.diagnosis_report import diagnosis_report, Extras, LearnedResidual
+from armid_ros.report.diagnosis_report import diagnosis_report, Extras
 from armid_ros.report.notation import pretty
 from armid_ros.report.sections.diagnosed import named_rows
 import numpy as np
 import numpy.typing as npt
 
 if TYPE_CHECKING:
+    from armid_ros.residual import Residual
     import pandas
 
 _Made = TypeVar('_Made')
@@ -110,7 +111,7 @@ class DiagnosisResult(ShownModel):
     simulated: IdentificationResult | None = None
 
     @property
-    def residual(self) -> LearnedResidual | None:
+    def residual(self) -> Residual | None:
         """Return the learned map of the unexplained residual; None if none was learned."""
         return self.extras.residual
 
@@ -229,7 +230,7 @@ class DiagnosisResult(ShownModel):
             said = self.verdict.replace('_', ' ')
             return self._with_notes(f'nothing is learned where the verdict is {said}')
 
-        def learned() -> LearnedResidual | None:
+        def learned() -> Residual | None:
             require_residual()
             from armid_ros.residual import learn_residual
 

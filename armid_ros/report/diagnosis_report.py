@@ -6,11 +6,9 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
-from pathlib import Path
 import re
-from typing import Any, ClassVar, Protocol
+from typing import ClassVar, TYPE_CHECKING
 
-from armid_ros.arm import ArmModel
 from armid_ros.diagnosis import Diagnosis, Finding, NextRun
 from armid_ros.diagnosis.next_run.steps import MODEL, next_steps
 from armid_ros.diagnosis.verdict.document import detectable
@@ -47,6 +45,9 @@ from armid_ros.report.sections.frame import next_steps_section, Origin, VerdictS
 from armid_ros.report.sections.overlay import overlay_section, whole_overlays
 import numpy as np
 
+if TYPE_CHECKING:
+    from armid_ros.residual import Residual
+
 #: Colour of each verdict; the others are bad.
 _TONES = {'consistent': 'good', 'named': 'good', 'ambiguous': 'fair', 'partial': 'fair'}
 #: Joints of the gap that are listed one by one.
@@ -66,37 +67,6 @@ def tone_of(diagnosis: Diagnosis, worse: Sequence[str] = ()) -> str:
     return 'fair' if tone == 'good' and (any(open_ends) or worse) else tone
 
 
-class LearnedResidual(Protocol):
-    """Learned maps of an unexplained residual, as results and reports use them."""
-
-    @property
-    def arm(self) -> ArmModel:
-        """The model with the maps."""
-
-    @property
-    def gains(self) -> Mapping[str, float]:
-        """Share of the squared residual that the map of each joint predicts."""
-
-    @property
-    def table_file(self) -> str:
-        """Name of the file with the maps."""
-
-    def sentences(self) -> Sequence[str]:
-        """Return a sentence for each joint."""
-
-    def steps(self) -> Sequence[str]:
-        """Return what to do next about each joint."""
-
-    def section(self) -> Section:
-        """Return the section of a report with the maps."""
-
-    def document(self) -> dict[str, Any]:
-        """Return the entry of diagnosis.json."""
-
-    def write_table(self, folder: Path) -> None:
-        """Write the maps as a table into a folder."""
-
-
 @dataclass(frozen=True)
 class Extras:
     """
@@ -112,7 +82,7 @@ class Extras:
         Why there is no next run, where names are in doubt.
     notes : tuple of str
         Why there is not more.
-    residual : LearnedResidual or None
+    residual : Residual or None
         What is left without a name, learned.
 
     """
@@ -121,7 +91,7 @@ class Extras:
     next_run: NextRun | None = None
     no_run: str = ''
     notes: tuple[str, ...] = ()
-    residual: LearnedResidual | None = None
+    residual: Residual | None = None
 
     def steps(self, diagnosis: Diagnosis, model: str = MODEL) -> list[str]:
         """Return what to do next, for the page and the terminal, and where the model is."""
@@ -292,7 +262,7 @@ class Story(Section):
     ----------
     diagnosis : Diagnosis
         What was found.
-    residual : LearnedResidual or None
+    residual : Residual or None
         The learned residual.
 
     """
@@ -301,7 +271,7 @@ class Story(Section):
     template: ClassVar[str] = 'story.html'
 
     diagnosis: Diagnosis
-    residual: LearnedResidual | None = None
+    residual: Residual | None = None
 
     @property
     def drawing(self) -> ArmDrawing:
