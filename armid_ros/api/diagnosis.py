@@ -24,9 +24,7 @@ from armid_ros.api.identification import IdentificationResult
 from armid_ros.api.since import misfit_of, model_in_question, recordings_since
 from armid_ros.api.table import (
     data_frame,
-    DEFAULT_ORIGIN,
     residual_frame,
-    ResultOrigin,
     ShownModel,
     Summary,
 )
@@ -53,6 +51,7 @@ from armid_ros.recording import Recording, require_once
 from armid_ros.recording.curves import draw_joints
 from armid_ros.report.diagnosis_report import diagnosis_report, Extras
 from armid_ros.report.notation import pretty
+from armid_ros.report.provenance import DEFAULT_ORIGIN, ResultOrigin
 from armid_ros.report.sections.diagnosed import named_rows
 import numpy as np
 import numpy.typing as npt
@@ -194,11 +193,10 @@ class DiagnosisResult(ShownModel):
                 'baseline': self.baseline,
                 'simulator': self.simulated.recordings if self.simulated else (),
             },
-            robot=origin.of(self.description.robot).robot,
             everything=self.settings.everything,
             extras=self.extras,
             patch=patch,
-            provenance=origin.provenance,
+            origin=origin.of(self.description.robot),
         )
 
     def fill(self, folder: Path, origin: ResultOrigin = DEFAULT_ORIGIN) -> dict[str, Any]:

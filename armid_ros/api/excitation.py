@@ -10,7 +10,7 @@ from pathlib import Path
 import sys
 from typing import Any, TYPE_CHECKING
 
-from armid_ros.api.table import data_frame, DEFAULT_ORIGIN, ResultOrigin, Shown, Summary
+from armid_ros.api.table import data_frame, Shown, Summary
 from armid_ros.arm import ArmModel
 from armid_ros.diagnosis.next_run.isolability import Isolability, isolability
 from armid_ros.errors import TrajectoryError
@@ -33,7 +33,7 @@ from armid_ros.files import json_text, settled, write_file
 from armid_ros.motion import FloatArray, Motion
 from armid_ros.recording import write_joint_trajectory
 from armid_ros.recording.curves import draw_joints
-from armid_ros.report.provenance import Provenance
+from armid_ros.report.provenance import DEFAULT_ORIGIN, ResultOrigin
 import numpy as np
 import numpy.typing as npt
 
@@ -195,10 +195,9 @@ class ExcitationResult(Shown):
             self.arm,
             self.run,
             self.fitness,
-            robot=origin.of(self.arm.robot).robot,
             scene=self.scene,
             isolability=self.isolability if self.with_isolability else None,
-            provenance=replace(origin.provenance or Provenance(), step=self.next_step(origin)),
+            origin=self.stated(origin, self.arm.robot),
         )
 
     def fill(self, folder: Path, origin: ResultOrigin = DEFAULT_ORIGIN) -> dict[str, Any]:

@@ -25,9 +25,7 @@ from armid_ros.api.arguments import (
 from armid_ros.api.table import (
     aligned,
     data_frame,
-    DEFAULT_ORIGIN,
     residual_frame,
-    ResultOrigin,
     ShownModel,
     Summary,
 )
@@ -62,6 +60,7 @@ from armid_ros.identification.physical.fit_among_bodies import far_from_describe
 from armid_ros.identification.rows.checks import check_held_out
 from armid_ros.recording import Recording, require_once
 from armid_ros.recording.curves import draw_joints
+from armid_ros.report.provenance import DEFAULT_ORIGIN, ResultOrigin
 import numpy as np
 import numpy.typing as npt
 
@@ -243,12 +242,11 @@ class IdentificationResult(ShownModel):
         return identification_report(
             self.core,
             description=self.description,
-            robot=origin.of(self.description.robot).robot,
             recordings=self.recordings,
             validation=self.validation,
             validation_recordings=self.held_out,
             assessment=Assessment(self.verification, self.graded, exports=without_place),
-            provenance=origin.provenance,
+            origin=origin.of(self.description.robot),
         )
 
     def fill(self, folder: Path, origin: ResultOrigin = DEFAULT_ORIGIN) -> dict[str, Any]:

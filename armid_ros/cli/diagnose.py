@@ -173,10 +173,10 @@ def diagnose(
         raise click.UsageError('give --against without --model and --baseline')
     from armid_ros.api.diagnosis import diagnose as run
     from armid_ros.api.diagnosis import DiagnosisResult, require_residual
-    from armid_ros.api.table import ResultOrigin
     from armid_ros.arm import ArmModel
     from armid_ros.cli import options
     from armid_ros.identification.parameters_file import read_misfit
+    from armid_ros.report.provenance import ResultOrigin
 
     if residual is not None:
         require_residual()

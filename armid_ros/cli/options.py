@@ -12,7 +12,7 @@ import shlex
 import sys
 from typing import Any, TYPE_CHECKING
 
-from armid_ros.api.table import ResultOrigin, Shown, Summary
+from armid_ros.api.table import Shown, Summary
 from armid_ros.arm import ArmModel, load_model
 from armid_ros.cli import columns
 from armid_ros.cli.commands import NOTES
@@ -38,7 +38,7 @@ from armid_ros.recording import read_robot_description, ReadSettings, Recording
 from armid_ros.recording.anything import is_table, read_anything
 from armid_ros.recording.columns import numbers
 from armid_ros.recording.columns import per_joint as values_per_joint
-from armid_ros.report.provenance import hash_files, Provenance, versions
+from armid_ros.report.provenance import hash_files, Provenance, ResultOrigin, versions
 from armid_ros.report.sections.frame import VerdictSection
 from armid_ros.robots import (
     driven_in_words,

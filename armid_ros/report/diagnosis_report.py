@@ -28,7 +28,7 @@ from armid_ros.report.notation import (
     with_names,
 )
 from armid_ros.report.page import Page, Section
-from armid_ros.report.provenance import Provenance
+from armid_ros.report.provenance import DEFAULT_ORIGIN, ResultOrigin
 from armid_ros.report.sections.data_quality import data_quality_section
 from armid_ros.report.sections.diagnosed import (
     candidates_section,
@@ -137,11 +137,10 @@ def diagnosis_report(
     diagnosis: Diagnosis,
     read: Mapping[str, Sequence[Recording]],
     *,
-    robot: str,
     everything: bool = False,
     extras: Extras | None = None,
     patch: str = '',
-    provenance: Provenance | None = None,
+    origin: ResultOrigin = DEFAULT_ORIGIN,
 ) -> str:
     """
     Return report.html of a diagnosis.
@@ -153,16 +152,14 @@ def diagnosis_report(
     read : mapping of str to sequence of Recording
         Recordings by what they were used for: 'training', 'held-out',
         'baseline', 'simulator'.
-    robot : str
-        Shipped name or path of the description.
     everything : bool
         Whether negligible effects were added to the model.
     extras : Extras, optional
         What was made of it.
     patch : str
         model.yaml of the patched model.
-    provenance : Provenance, optional
-        Files, versions, settings, seed.
+    origin : ResultOrigin
+        Robot, files, versions, settings, seed.
 
     Returns
     -------
@@ -209,13 +206,13 @@ def diagnosis_report(
     sections.append(data_quality_section(quality, at_fault=at_fault, names=names))
     if patched and not diagnosis.harmful:
         sections.append(patch_section(diagnosis.findings, patch))
-    sections.append(Origin(provenance or Provenance()))
+    sections.append(Origin(origin.provenance))
     used = [
         kind.format(counted(len(read[role]), noun))
         for role, noun, kind in _ROLES
         if read.get(role)
     ]
-    subtitle = ' · '.join([robot_label(robot), *used])
+    subtitle = ' · '.join([robot_label(origin.robot), *used])
     joints = (*arm.robot.joints, *arm.robot.links)
     return Page(f'Diagnosis of {arm.robot.name}', subtitle, sections, names=joints).html()
 

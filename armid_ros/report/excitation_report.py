@@ -45,7 +45,7 @@ from armid_ros.report.families import effects_in_words, full_label, parameter_fo
 from armid_ros.report.judgement import GOOD_CONDITION, WEAK_CONDITION
 from armid_ros.report.notation import counted, digits, plain, pretty, robot_label
 from armid_ros.report.page import Page, Section
-from armid_ros.report.provenance import Provenance
+from armid_ros.report.provenance import ResultOrigin
 from armid_ros.report.sections.diagnosed import isolability_section, SHADE
 from armid_ros.report.sections.fit import ZOOM
 from armid_ros.report.sections.frame import Origin, VerdictSection
@@ -60,10 +60,9 @@ def excitation_report(
     run: Run,
     checked: Fitness,
     *,
-    robot: str,
     scene: CollisionScene,
     isolability: Isolability | None = None,
-    provenance: Provenance,
+    origin: ResultOrigin,
 ) -> str:
     """
     Return report.html of a design.
@@ -78,14 +77,12 @@ def excitation_report(
         The design with the way there and back.
     checked : Fitness
         What was checked of it.
-    robot : str
-        Shipped name or path of the description.
     scene : CollisionScene
         Bodies of the arm, its floor, and what stands around it.
     isolability : Isolability, optional
         What it shows of the effects of the catalogue.
-    provenance : Provenance
-        Files, versions, settings, seed, and the command that follows.
+    origin : ResultOrigin
+        Robot, files, versions, settings, seed, and the command that follows.
 
     Returns
     -------
@@ -123,7 +120,7 @@ def excitation_report(
     sections: list[Section] = [
         replace(
             _verdict(design, arm.robot.links, shares, checked, collision.notes),
-            step=provenance.step,
+            step=origin.step,
         ),
         ContentSection('Poses', [poses, Legend(colours)]),
         _foreseen_section(design, arm.robot.links),
@@ -131,11 +128,11 @@ def excitation_report(
         _motion_section(limits, motion, shares),
         _clearance_section(motion.t, curves, design.settings.clearance, said),
         _harmonics_section(excitation.trajectory),
-        _asked(design, arm, robot, obstacles, run),
-        Origin(provenance),
+        _asked(design, arm, origin.robot, obstacles, run),
+        Origin(origin.provenance),
     ]
     subtitle = (
-        f'{robot_label(robot)} · {run.duration:.4g} s · {excitation.n_periods} periods · '
+        f'{robot_label(origin.robot)} · {run.duration:.4g} s · {excitation.n_periods} periods · '
         f'{design.settings.speed}'
     )
     names = (*arm.robot.joints, *arm.robot.links)

@@ -22,7 +22,7 @@ from armid_ros.report.blocks import (
 from armid_ros.report.charts import Chart, Level, Series, thinned
 from armid_ros.report.notation import counted, digits, measured, plain, robot_label
 from armid_ros.report.page import Page, Section
-from armid_ros.report.provenance import Provenance
+from armid_ros.report.provenance import DEFAULT_ORIGIN, ResultOrigin
 from armid_ros.report.sections.frame import Origin, VerdictSection
 import numpy as np
 
@@ -47,9 +47,7 @@ _MOST = 2000
 _FINEST = 1e-7
 
 
-def inspection_report(
-    found: Inspection, *, robot: str = '', step: str = '', provenance: Provenance | None = None
-) -> str:
+def inspection_report(found: Inspection, origin: ResultOrigin = DEFAULT_ORIGIN) -> str:
     """
     Return the page of an inspection, with all curves.
 
@@ -57,12 +55,8 @@ def inspection_report(
     ----------
     found : Inspection
         What was found.
-    robot : str
-        Name or path of the description.
-    step : str
-        What to do next.
-    provenance : Provenance, optional
-        Files, versions.
+    origin : ResultOrigin
+        Name or path of the description, files, versions, and what to do next.
 
     Returns
     -------
@@ -77,15 +71,19 @@ def inspection_report(
     texts.insert(first - 1, found.verdict)  # below the worst remark
     sentences = [text[0].upper() + text[1:].replace('`', '').rstrip('.') + '.' for text in texts]
     sections: list[Section] = [
-        VerdictSection(grade, _TONES[grade], sentences[:first], sentences[first:], step=step),
+        VerdictSection(
+            grade, _TONES[grade], sentences[:first], sentences[first:], step=origin.step
+        ),
         _contents_section(found),
         _joints_section(found),
         _curves_section(found),
-        Origin(provenance or Provenance()),
+        Origin(origin.provenance),
     ]
     name = Path(recording.source).name or 'recording'
     subtitle = ' · '.join(
-        filter(None, (Path(robot).name, recording.topic, counted(recording.n_joints, 'joint')))
+        filter(
+            None, (Path(origin.robot).name, recording.topic, counted(recording.n_joints, 'joint'))
+        )
     )
     return Page(f'Inspection of {name}', subtitle, sections, names=recording.joints).html()
 
@@ -171,17 +169,13 @@ def _interval(values: FloatArray, std: FloatArray) -> str:
 
 
 def description_check_report(
-    robot: str,
-    remarks: Sequence[Remark],
-    links: LinkCheck | None,
-    step: str = '',
-    provenance: Provenance | None = None,
+    remarks: Sequence[Remark], links: LinkCheck | None, origin: ResultOrigin
 ) -> str:
     """Return the page of a check, one HTML file that loads nothing."""
     first, *others = headline(remarks, links)
     grade, texts = check_word(remarks, links), [one.text for one in remarks]
     sections: list[Section] = [
-        VerdictSection(grade, _TONES[grade], [first, *others], texts, step=step)
+        VerdictSection(grade, _TONES[grade], [first, *others], texts, step=origin.step)
     ]
     if links is not None:
         said = (
@@ -191,9 +185,9 @@ def description_check_report(
         )
         table = DataTable(HEADS, link_rows(links), kind='tight')
         sections.append(ContentSection('Links', [table, Paragraph(said, 'hint')]))
-    sections.append(Origin(provenance or Provenance()))
+    sections.append(Origin(origin.provenance))
     names = () if links is None else (*links.joints, *links.links)
-    title = f'Check of {robot_label(robot)}'
+    title = f'Check of {robot_label(origin.robot)}'
     return Page(title, '', sections, charts=False, names=names).html()
 
 

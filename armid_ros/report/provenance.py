@@ -5,13 +5,15 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 import hashlib
 from importlib import metadata
 from pathlib import Path
 import platform
 
 from armid_ros.files import settled
+from armid_ros.robots import Robot, shipped_robots
+from armid_ros.robots.load import shipped_path
 
 #: Packages whose version can change a result.
 _PACKAGES = ('armid_ros', 'numpy', 'scipy', 'pin', 'clarabel', 'mcap')
@@ -57,8 +59,6 @@ class Provenance:
         Command line; empty when there was none.
     created : str
         When, as the caller's clock has it; empty to leave it out.
-    step : str
-        Command that follows; empty to leave it out.
 
     """
 
@@ -68,7 +68,47 @@ class Provenance:
     seed: int | None = None
     command: str = ''
     created: str = ''
+
+
+@dataclass(frozen=True)
+class ResultOrigin:
+    """
+    Provenance of a result, as its files and its report state it.
+
+    Attributes
+    ----------
+    robot : str
+        What documents call the robot; by default its shipped name or its path.
+    source : str
+        How model.yaml refers to its description; by default the same.
+    provenance : Provenance
+        Files, versions and settings that the report names.
+    step : str
+        Command that follows, for the report; by default without arguments.
+
+    """
+
+    robot: str = ''
+    source: str = ''
+    provenance: Provenance = Provenance()
     step: str = ''
+
+    def of(self, robot: Robot) -> ResultOrigin:
+        """Fill in defaults."""
+        known = source_of(robot)
+        return replace(self, robot=self.robot or known, source=self.source or known)
+
+
+#: Shipped names and paths, without provenance.
+DEFAULT_ORIGIN = ResultOrigin()
+
+
+def source_of(robot: Robot) -> str:
+    """Return how files refer to a robot: by its shipped name, its path, or its name."""
+    for name in shipped_robots():
+        if robot.path == shipped_path(name):
+            return name
+    return robot.name if robot.path is None else str(Path(robot.path).resolve())
 
 
 def hash_files(paths: Iterable[str | Path]) -> tuple[FileHash, ...]:

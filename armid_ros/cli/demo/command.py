@@ -143,6 +143,7 @@ def _page(
 ) -> str:
     """Return report.html, with the truth and the convergence of the online estimate."""
     from armid_ros.report.identification_report import Assessment, identification_report
+    from armid_ros.report.provenance import ResultOrigin
     from armid_ros.report.sections.convergence import convergence_section
     import numpy as np
 
@@ -156,7 +157,7 @@ def _page(
     return identification_report(
         found.core,
         description=truth,
-        robot=truth.robot.name,
+        origin=ResultOrigin(truth.robot.name),
         recordings=found.recordings,
         validation={},
         assessment=Assessment(grade=found.graded, reference='truth', sections=[convergence]),
