@@ -38,8 +38,8 @@ from armid_ros.recording import read_robot_description, ReadSettings, Recording
 from armid_ros.recording.anything import is_table, read_anything
 from armid_ros.recording.columns import numbers
 from armid_ros.recording.columns import per_joint as values_per_joint
+from armid_ros.report.blocks import VerdictSection
 from armid_ros.report.provenance import hash_files, Provenance, ResultOrigin, versions
-from armid_ros.report.sections.frame import VerdictSection
 from armid_ros.robots import (
     driven_in_words,
     load_robot,

@@ -22,14 +22,15 @@ from armid_ros.report.blocks import (
     FactList,
     IntervalTrack,
     Legend,
+    Origin,
     Paragraph,
     TableCell,
+    VerdictSection,
 )
 from armid_ros.report.families import estimate_text, full_label, parameter_folds
 from armid_ros.report.notation import counted, digits, measured, pretty, robot_label
 from armid_ros.report.page import Page, Section
 from armid_ros.report.provenance import ResultOrigin
-from armid_ros.report.sections.frame import Origin, VerdictSection
 
 #: Columns of what changed.
 HEADS = ('parameter', 'before', 'after', 'difference, 95 %')

@@ -17,6 +17,7 @@ from armid_ros.estimate import name_in_words
 from armid_ros.identification.assess.verification import ForwardValidation
 from armid_ros.recording import Recording
 from armid_ros.report.arm_drawing import ArmDrawing, draw_arm
+from armid_ros.report.blocks import next_steps_section, Origin, VerdictSection
 from armid_ros.report.notation import (
     counted,
     digits,
@@ -41,7 +42,6 @@ from armid_ros.report.sections.diagnosed import (
     share_bars,
 )
 from armid_ros.report.sections.fit import forward_section
-from armid_ros.report.sections.frame import next_steps_section, Origin, VerdictSection
 from armid_ros.report.sections.overlay import overlay_section, whole_overlays
 import numpy as np
 

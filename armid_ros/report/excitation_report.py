@@ -34,21 +34,21 @@ from armid_ros.report.blocks import (
     DataTable,
     FactList,
     Legend,
-    PageBlock,
+    Origin,
     Panels,
     Paragraph,
     ShareBar,
     TableCell,
+    VerdictSection,
 )
 from armid_ros.report.charts import Chart, Level, Role, Series
 from armid_ros.report.families import effects_in_words, full_label, parameter_folds
 from armid_ros.report.judgement import GOOD_CONDITION, WEAK_CONDITION
 from armid_ros.report.notation import counted, digits, plain, pretty, robot_label
-from armid_ros.report.page import Page, Section
+from armid_ros.report.page import Page, Section, Templated
 from armid_ros.report.provenance import ResultOrigin
 from armid_ros.report.sections.diagnosed import isolability_section, SHADE
 from armid_ros.report.sections.fit import ZOOM
-from armid_ros.report.sections.frame import Origin, VerdictSection
 import numpy as np
 
 _SAMPLES, _POSES, _WAY = 600, 6, 150
@@ -314,7 +314,7 @@ def _clearance_section(
 ) -> ContentSection:
     """Return the distances of bodies, from each other and from the environment."""
     roles: tuple[Role, ...] = ('residual', 'before')
-    blocks: list[PageBlock] = [
+    blocks: list[Templated] = [
         Chart(
             t,
             [

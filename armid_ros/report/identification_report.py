@@ -20,8 +20,11 @@ from armid_ros.report.blocks import (
     DataTable,
     FactList,
     Fold,
+    next_steps_section,
+    Origin,
     Paragraph,
     TableCell,
+    VerdictSection,
 )
 from armid_ros.report.charts import Chart, Series
 from armid_ros.report.families import effects_in_words, full_label, parameter_section
@@ -31,7 +34,6 @@ from armid_ros.report.page import Page, Section
 from armid_ros.report.provenance import DEFAULT_ORIGIN, ResultOrigin
 from armid_ros.report.sections.data_quality import data_quality_section
 from armid_ros.report.sections.fit import by_recording, error_bars, fit_section, forward_section
-from armid_ros.report.sections.frame import next_steps_section, Origin, VerdictSection
 from armid_ros.report.statistics import (
     directions,
     residual_section,
@@ -188,10 +190,10 @@ def _excitation_section(result: Identification) -> ContentSection:
     """Return how well a motion determines the parameters."""
     rows, links = [], result.arm.robot.links
     worst = directions(result.estimate, torque_scale(result))
-    for direction in worst[:_WORST]:
-        parts = [f'{full_label(one, links)} {100.0 * x:.0f} %' for one, x in direction.parts]
-        rows.append((', '.join(parts), digits(direction.uncertainty)))
-    values = np.array([direction.uncertainty for direction in worst])
+    for uncertainty, parts in worst[:_WORST]:
+        named = [f'{full_label(one, links)} {100.0 * x:.0f} %' for one, x in parts]
+        rows.append((', '.join(named), digits(uncertainty)))
+    values = np.array([uncertainty for uncertainty, _ in worst])
     return ContentSection(
         'Excitation',
         [

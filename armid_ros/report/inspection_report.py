@@ -15,15 +15,15 @@ from armid_ros.report.blocks import (
     ContentSection,
     DataTable,
     FactList,
-    PageBlock,
+    Origin,
     Panels,
     Paragraph,
+    VerdictSection,
 )
 from armid_ros.report.charts import Chart, Level, Series, thinned
 from armid_ros.report.notation import counted, digits, measured, plain, robot_label
-from armid_ros.report.page import Page, Section
+from armid_ros.report.page import Page, Section, Templated
 from armid_ros.report.provenance import DEFAULT_ORIGIN, ResultOrigin
-from armid_ros.report.sections.frame import Origin, VerdictSection
 import numpy as np
 
 #: Links that explain less than this share of the difference are not named as the cause.
@@ -216,7 +216,7 @@ def recording_facts(found: Inspection) -> list[tuple[str, str]]:
 
 def _contents_section(found: Inspection) -> ContentSection:
     """Return the topics of a bag, and how it is sampled."""
-    blocks: list[PageBlock] = [FactList(recording_facts(found))]
+    blocks: list[Templated] = [FactList(recording_facts(found))]
     if found.topics:
         rows = [
             (
@@ -251,7 +251,7 @@ def _joints_section(found: Inspection) -> ContentSection:
 def _curves_section(found: Inspection) -> ContentSection:
     """Return all recorded curves over time."""
     recording, robot = found.recording, found.robot
-    blocks: list[PageBlock] = [
+    blocks: list[Templated] = [
         Paragraph(
             'Unfiltered signals. Long recordings are drawn by the extremes of short intervals. '
             'Drag to zoom all curves.',
@@ -273,7 +273,7 @@ def _curves_section(found: Inspection) -> ContentSection:
             ('velocity', f'{unit}/s', recording.dq, levels[:0]),
             ('effort', 'N' if unit == 'm' else 'N m', recording.tau, levels[:0]),
         )
-        panels: list[tuple[str, str, list[PageBlock]]] = []
+        panels: list[tuple[str, str, list[Templated]]] = []
         for quantity, own, values, lines in quantities:
             if values is not None:
                 chosen = thinned(values[:, k], most=_MOST)

@@ -30,15 +30,15 @@ from armid_ros.report.blocks import (
     ContentSection,
     DataTable,
     FactList,
-    PageBlock,
+    Origin,
     Panels,
     Paragraph,
+    VerdictSection,
 )
 from armid_ros.report.charts import Chart, Mark, Role, Series
 from armid_ros.report.notation import counted, digits, measured, pretty
-from armid_ros.report.page import Page, Section
+from armid_ros.report.page import Page, Section, Templated
 from armid_ros.report.provenance import Provenance
-from armid_ros.report.sections.frame import Origin, VerdictSection
 from armid_ros.robots.two_link import TwoLinkParameters
 import numpy as np
 import numpy.typing as npt
@@ -220,7 +220,7 @@ def decibels_apart(result: TwoInertiaIdentification, joint: int) -> float:
 
 def _joint(
     result: TwoInertiaIdentification, k: int
-) -> Iterator[tuple[str, str, Sequence[PageBlock]]]:
+) -> Iterator[tuple[str, str, Sequence[Templated]]]:
     """Yield panels of one joint: decoupled, and from motor torque alone."""
     measured, joint, parameters = result.measured[k], result.joints[k], result.parameters
     seen = (measured.frequency >= _SHOWN[0]) & (measured.frequency <= _SHOWN[1])

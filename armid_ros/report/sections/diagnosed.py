@@ -27,7 +27,6 @@ from armid_ros.report.blocks import (
     ContentSection,
     DataTable,
     Fold,
-    PageBlock,
     Panels,
     Paragraph,
     TableCell,
@@ -42,6 +41,7 @@ from armid_ros.report.notation import (
     value_of,
     with_interval,
 )
+from armid_ros.report.page import Templated
 from armid_ros.robots import Robot
 import numpy as np
 
@@ -145,7 +145,7 @@ def evidence_section(places: Sequence[Where], share_of: str = 'the gap') -> Cont
     """
     folds = []
     for number, place in enumerate(places[:_JOINTS]):
-        blocks: list[PageBlock] = []
+        blocks: list[Templated] = []
         if place.axes and place.mean_share >= _MEAN_SAID:
             blocks.append(
                 Paragraph(

@@ -21,14 +21,15 @@ from armid_ros.report.blocks import (
     DataTable,
     FactList,
     Fold,
+    Origin,
     Panels,
     Paragraph,
+    VerdictSection,
 )
 from armid_ros.report.charts import Chart, Role, Series
 from armid_ros.report.notation import measured
 from armid_ros.report.page import Page, Section
 from armid_ros.report.provenance import Provenance
-from armid_ros.report.sections.frame import Origin, VerdictSection
 from armid_ros.robots import Robot
 import numpy as np
 
