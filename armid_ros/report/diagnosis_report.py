@@ -40,6 +40,7 @@ from armid_ros.report.sections.diagnosed import (
     named_section,
     patch_section,
     share_bars,
+    share_of,
 )
 from armid_ros.report.sections.fit import forward_section
 from armid_ros.report.sections.overlay import overlay_section, whole_overlays
@@ -178,18 +179,18 @@ def diagnosis_report(
     curves = whole_overlays(diagnosis, [one for one, _ in recordings])
     if curves is not None and diagnosis.gap is not None:
         sections += [
-            overlay_section(arm.robot, curves, patched, names, diagnosis.spans),
+            overlay_section(diagnosis, curves, names),
             Story(diagnosis, residual),
-            gap_section(arm.robot, diagnosis.gap, diagnosis.baseline, patched, diagnosis.harmful),
+            gap_section(diagnosis, diagnosis.gap),
             *([named_section(diagnosis.findings)] if patched else []),
         ]
         if diagnosis.where:
-            sections.append(evidence_section(diagnosis.where, share_of(diagnosis)))
+            sections.append(evidence_section(diagnosis))
     if residual is not None:
         sections.append(residual.section())
     sections.append(next_steps_section(steps))
     if diagnosis.minor:
-        sections.append(minor_section(diagnosis.minor, everything, patched))
+        sections.append(minor_section(diagnosis, everything))
     if diagnosis.gap is not None:
         sizes = detectable(diagnosis.explanation)
         sections += [candidates_section(diagnosis), detectable_section(sizes)]
@@ -362,8 +363,3 @@ class Story(Section):
                 for joint, gain in self._gains.items()
             ),
         ]
-
-
-def share_of(diagnosis: Diagnosis) -> str:
-    """Return what the shares of joints refer to: the gap, or what the named causes explain."""
-    return 'the explained part' if diagnosis.findings else 'the gap'

@@ -41,7 +41,7 @@ from armid_ros.report.blocks import (
     TableCell,
     VerdictSection,
 )
-from armid_ros.report.charts import Chart, Level, Role, Series
+from armid_ros.report.charts import Chart, Role, Series
 from armid_ros.report.families import effects_in_words, full_label, parameter_folds
 from armid_ros.report.judgement import GOOD_CONDITION, WEAK_CONDITION
 from armid_ros.report.notation import counted, digits, plain, pretty, robot_label
@@ -288,7 +288,7 @@ def _motion_section(
                 f'{name} [{pretty(limits.unit(name, j))}]',
                 height=180 if name == 'torque' else 145,
                 link='planned',
-                levels=[Level(float(e[j])) for e in (lower, upper) if np.isfinite(e[j])],
+                levels=[(float(e[j]), '') for e in (lower, upper) if np.isfinite(e[j])],
                 legend=False,
             )
             for name, values, lower, upper in quantities
@@ -325,7 +325,7 @@ def _clearance_section(
             'distance [cm]',
             height=240,
             link='planned',
-            levels=[Level(100.0 * margin, f'{100.0 * margin:g} cm to keep')],
+            levels=[(100.0 * margin, f'{100.0 * margin:g} cm to keep')],
         )
     ]
     if not curves:

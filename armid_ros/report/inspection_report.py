@@ -20,7 +20,7 @@ from armid_ros.report.blocks import (
     Paragraph,
     VerdictSection,
 )
-from armid_ros.report.charts import Chart, Level, Series, thinned
+from armid_ros.report.charts import Chart, Series, thinned
 from armid_ros.report.notation import counted, digits, measured, plain, robot_label
 from armid_ros.report.page import Page, Section, Templated
 from armid_ros.report.provenance import DEFAULT_ORIGIN, ResultOrigin
@@ -259,12 +259,12 @@ def _curves_section(found: Inspection) -> ContentSection:
         )
     ]
     for k, (name, unit) in enumerate(zip(recording.joints, found.units, strict=True)):
-        levels: list[Level] = []
+        levels: list[tuple[float, str]] = []
         if robot is not None:
             low, high = recording.q[:, k].min(), recording.q[:, k].max()
             reach = max(high - low, 1e-6)
             levels = [
-                Level(float(limit), 'limit')
+                (float(limit), 'limit')
                 for limit in (robot.lower[k], robot.upper[k])
                 if np.isfinite(limit) and low - reach < limit < high + reach
             ]

@@ -20,35 +20,14 @@ _PACKAGES = ('armid_ros', 'numpy', 'scipy', 'pin', 'clarabel', 'mcap')
 
 
 @dataclass(frozen=True)
-class FileHash:
-    """
-    A file and its digest.
-
-    Attributes
-    ----------
-    path : str
-        Path as it was given.
-    size : int
-        [bytes].
-    sha256 : str
-        In hexadecimal digits.
-
-    """
-
-    path: str
-    size: int
-    sha256: str
-
-
-@dataclass(frozen=True)
 class Provenance:
     """
     What is needed to reproduce the result.
 
     Attributes
     ----------
-    files : tuple of FileHash
-        What was read.
+    files : tuple of (str, int, str)
+        What was read: path as it was given, size [bytes], SHA-256 in hexadecimal digits.
     versions : mapping of str to str
         Software and its version.
     settings : mapping of str to str
@@ -62,7 +41,7 @@ class Provenance:
 
     """
 
-    files: tuple[FileHash, ...] = ()
+    files: tuple[tuple[str, int, str], ...] = ()
     versions: Mapping[str, str] = field(default_factory=dict)
     settings: Mapping[str, str] = field(default_factory=dict)
     seed: int | None = None
@@ -111,7 +90,7 @@ def source_of(robot: Robot) -> str:
     return robot.name if robot.path is None else str(Path(robot.path).resolve())
 
 
-def hash_files(paths: Iterable[str | Path]) -> tuple[FileHash, ...]:
+def hash_files(paths: Iterable[str | Path]) -> tuple[tuple[str, int, str], ...]:
     """Hash files, and all files in folders such as bags; skip what is no file."""
     found = []
     for path in map(Path, paths):
@@ -119,7 +98,7 @@ def hash_files(paths: Iterable[str | Path]) -> tuple[FileHash, ...]:
         for file in filter(Path.is_file, inside):
             with file.open('rb') as stream:
                 digest = hashlib.file_digest(stream, 'sha256').hexdigest()
-            found.append(FileHash(str(settled(file)), file.stat().st_size, digest))
+            found.append((str(settled(file)), file.stat().st_size, digest))
     return tuple(found)
 
 

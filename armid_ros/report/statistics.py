@@ -20,7 +20,7 @@ from armid_ros.report.blocks import (
     Paragraph,
     TableCell,
 )
-from armid_ros.report.charts import Chart, Level, Series
+from armid_ros.report.charts import Chart, Series
 from armid_ros.robots import Robot
 import numpy as np
 
@@ -244,7 +244,7 @@ def whiteness_section(robot: Robot, fits: Sequence[Fit], role: str) -> ContentSe
             'lag [s]',
             'autocorrelation',
             height=150,
-            levels=[Level(found.band, '99 %'), Level(-found.band)],
+            levels=[(found.band, '99 %'), (-found.band, '')],
             symmetric=True,
             legend=False,
         )

@@ -25,4 +25,4 @@ def test_parameters_are_drawn_with_interval_and_truth(case):
         assert drawn[-1]
         np.testing.assert_allclose(curve.y[drawn], values[drawn, k])
         np.testing.assert_allclose((band.upper - band.y)[drawn], 3.92 * std[drawn, k], rtol=1e-3)
-        assert chart.levels[0].y == estimate.values[k]
+        assert chart.levels[0][0] == estimate.values[k]

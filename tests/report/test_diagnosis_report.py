@@ -198,21 +198,22 @@ def test_seconds_of_a_cause_are_marked_in_the_curve_of_the_whole_recording(found
     acts = (whole.trajectory.t >= 2.0) & (whole.trajectory.t <= 3.0)
     differs = np.any(whole.after != whole.before, axis=1)
     assert differs[acts].any() and not differs[~acts].any()
-    _, torque, residual, _ = overlay_section(found.arm.robot, gap, True, {}, some.spans).blocks
+    _, torque, residual, _ = overlay_section(some, gap, {}).blocks
     for chart in (torque, residual):
-        assert [mark.x for mark in chart.marks] == [2.0, 3.0]
+        assert [x for x, *_ in chart.marks] == [2.0, 3.0]
     assert {'2.0', '3.0'} <= set(dict(Story(some).rows)['When'][0].split())
 
 
 def test_curves_of_where_it_lives_are_without_the_mean_which_is_said(found):
     place = replace(found.where[0], mean=2.0, mean_share=0.9)
-    said, panels = evidence_section([place]).blocks[0].blocks
+    said, panels = evidence_section(replace(found, where=(place,))).blocks[0].blocks
     assert '2.0 N' in said.text and '90 %' in said.text
     for axis, (caption, _, (chart,)) in zip(place.axes, panels.panels, strict=True):
         np.testing.assert_allclose(chart.series[0].y, axis.means - 2.0)
         share = 100.0 * max(axis.share - 0.9, 0.0) / 0.1
         assert f'{share:.0f} %' in caption or share < 2.0
-    assert len(evidence_section([replace(place, mean_share=0.0)]).blocks[0].blocks) == 1
+    still = replace(found, where=(replace(place, mean_share=0.0),))
+    assert len(evidence_section(still).blocks[0].blocks) == 1
 
 
 @pytest.mark.parametrize(

@@ -35,7 +35,7 @@ from armid_ros.report.blocks import (
     Paragraph,
     VerdictSection,
 )
-from armid_ros.report.charts import Chart, Mark, Role, Series
+from armid_ros.report.charts import Chart, Role, Series
 from armid_ros.report.notation import counted, digits, measured, pretty
 from armid_ros.report.page import Page, Section, Templated
 from armid_ros.report.provenance import Provenance
@@ -234,8 +234,8 @@ def _joint(
     points[at], alone[at] = measured.decoupled[seen, 0], measured.coupled[seen, 0]
     low, high = (float(both[k]) for both in frequencies(parameters))
     marks = [
-        Mark(low, f'antiresonance {low:.1f} Hz', before=True),
-        Mark(high, f'resonance {high:.1f} Hz'),
+        (low, f'antiresonance {low:.1f} Hz', True),
+        (high, f'resonance {high:.1f} Hz', False),
     ]
     modelled = [('subspace model', subspaces), ('physical model', decoupled)]
     within = (own >= _COMPARED[0]) & (own <= _COMPARED[1])
@@ -279,7 +279,7 @@ def _chart(
     part: Callable[[npt.NDArray[np.complex128]], FloatArray],
     ylabel: str,
     height: int,
-    marks: Sequence[Mark],
+    marks: Sequence[tuple[float, str, bool]],
     *,
     last: bool = False,
 ) -> Chart:
@@ -294,7 +294,7 @@ def _chart(
         ylabel,
         height=height,
         link='frequency',
-        marks=marks if ylabel == _SIZE else [Mark(mark.x) for mark in marks],
+        marks=marks if ylabel == _SIZE else [(x, '', left) for x, _, left in marks],
         logarithmic=True,
         legend=ylabel == _SIZE,
     )

@@ -8,7 +8,7 @@ from armid_ros.estimate import ParameterName
 from armid_ros.identification.fitting.identifiability import HALF_WIDTH
 from armid_ros.motion import FloatArray
 from armid_ros.report.blocks import ContentSection, Panels, Paragraph
-from armid_ros.report.charts import Chart, Level, Series
+from armid_ros.report.charts import Chart, Series
 from armid_ros.report.families import full_label, parameter_families
 from armid_ros.report.notation import pretty
 import numpy as np
@@ -64,7 +64,7 @@ def convergence_section(
             f'estimate [{pretty(parameters[k].unit)}]',
             height=170,
             link='convergence',
-            levels=[Level(float(truth[k]), 'truth')],
+            levels=[(float(truth[k]), 'truth')],
             legend=False,
         )
         panels.append((full_label(parameters[k]), '', [chart]))
