@@ -145,15 +145,8 @@ def _page(
     from armid_ros.report.identification_report import Assessment, identification_report
     from armid_ros.report.provenance import ResultOrigin
     from armid_ros.report.sections.convergence import convergence_section
-    import numpy as np
 
-    convergence = convergence_section(
-        np.array([t for t, _ in history]),
-        np.array([estimate.values for _, estimate in history]),
-        np.array([estimate.std for _, estimate in history]),
-        target,
-        history[-1][1].parameters,
-    )
+    convergence = convergence_section(history, target)
     return identification_report(
         found.core,
         description=truth,

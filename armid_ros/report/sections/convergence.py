@@ -4,7 +4,9 @@
 
 from __future__ import annotations
 
-from armid_ros.estimate import ParameterName
+from collections.abc import Sequence
+
+from armid_ros.estimate import Estimate
 from armid_ros.identification.fitting.identifiability import HALF_WIDTH
 from armid_ros.motion import FloatArray
 from armid_ros.report.blocks import ContentSection, Panels, Paragraph
@@ -18,27 +20,22 @@ _SHOWN = 6
 
 
 def convergence_section(
-    t: FloatArray,
-    values: FloatArray,
-    std: FloatArray,
-    truth: FloatArray,
-    parameters: tuple[ParameterName, ...],
+    history: Sequence[tuple[float, Estimate]], truth: FloatArray
 ) -> ContentSection:
     """
     Return online estimates over time with their 95 % intervals and the true values.
 
     Parameters
     ----------
-    t : ndarray, shape (K,)
-        Time since the start [s].
-    values, std : ndarray, shape (K, P)
-        Estimates and their standard deviations.
+    history : sequence of (float, Estimate)
+        Times since the start [s], and estimates of P parameters.
     truth : ndarray, shape (P,)
         True values.
-    parameters : tuple of ParameterName
-        P names.
 
     """
+    t, parameters = np.array([at for at, _ in history]), history[-1][1].parameters
+    values = np.array([estimate.values for _, estimate in history])
+    std = np.array([estimate.std for _, estimate in history])
     certainty = np.abs(truth) / np.maximum(std[-1], 1e-300)
     kinds = [
         sorted(members, key=lambda k: -certainty[k])

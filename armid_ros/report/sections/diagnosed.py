@@ -367,9 +367,7 @@ def gap_section(diagnosis: Diagnosis, gap: Gap) -> ContentSection:
         ]
         rows.append((name, bars))
     where = 'recordings that were not used' if gap.predicted else gap.data
-    kept = ' "After" includes the named effect, which model.yaml does not have.' * bool(
-        diagnosis.harmful
-    )
+    kept = ' "After" includes the named effect, which model.yaml does not have.' * harmful
     return ContentSection(
         'Gap',
         [
