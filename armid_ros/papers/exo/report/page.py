@@ -12,7 +12,7 @@ from armid_ros.identification.fitting.identifiability import HALF_WIDTH
 from armid_ros.identification.ties.stiffness import Interaction
 from armid_ros.model import LinkFrames
 from armid_ros.motion import FloatArray
-from armid_ros.papers.exo.assumptions import read_assumptions
+from armid_ros.papers.exo.plant.gait import read_assumptions
 from armid_ros.papers.exo.plant.leg_pair import pair_torques, PairMotion, TiedPair
 from armid_ros.papers.exo.report.walk import by_torque_section, feet_section, SimulatedWalk, Walk
 from armid_ros.report.arm_drawing import flat, SIDE, Strip, svg_points
