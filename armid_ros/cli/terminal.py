@@ -35,9 +35,25 @@ def progress(what: str) -> Iterator[Tick]:
 
     console = Console(stderr=True)
     if not console.is_terminal:
-        lines = ProgressLines(what, lambda line: click.echo(line, err=True), time.monotonic)
-        with lines.watched():
-            yield lines.tick
+        done, start = threading.Event(), time.monotonic()
+        shares, steps = [0.0], [what]
+
+        def watch() -> None:
+            while not done.wait(10.0):
+                line = progress_line(steps[0], shares[0], time.monotonic() - start)
+                click.echo(line, err=True)
+
+        def note(share: float, what: str | None = None) -> None:
+            shares[0] = share
+            steps[0] = steps[0] if what is None else what
+
+        thread = threading.Thread(target=watch, daemon=True)
+        thread.start()
+        try:
+            yield note
+        finally:
+            done.set()
+            thread.join()
         return
     columns = (TextColumn('{task.description}'), BarColumn(), TimeElapsedColumn())
     with Progress(*columns, console=console, transient=True) as bar:
@@ -51,52 +67,10 @@ def progress(what: str) -> Iterator[Tick]:
         yield tick
 
 
-class ProgressLines:
-    """Progress as a line of text every ten seconds, for logs and pipes; `write` gets each."""
-
-    #: Time between two lines [s].
-    EVERY = 10.0
-
-    def __init__(
-        self, what: str, write: Callable[[str], None], clock: Callable[[], float]
-    ) -> None:
-        self._what, self._share = what, 0.0
-        self._write, self._clock = write, clock
-        self._start = self._last = clock()
-
-    def tick(self, share: float, what: str | None = None) -> None:
-        """Update the share that is done and the current step."""
-        self._share = share
-        if what is not None:
-            self._what = what
-
-    def look(self) -> None:
-        """Write a line if one is due."""
-        now = self._clock()
-        if now - self._last >= self.EVERY:
-            self._last = now
-            spent, share = now - self._start, self._share
-            rest = (
-                f', about {spent * (1.0 / share - 1.0):.0f} s to go' if 0.0 < share < 1.0 else ''
-            )
-            self._write(f'{self._what}: {100.0 * share:.0f} %, {spent:.0f} s{rest}')
-
-    @contextmanager
-    def watched(self) -> Iterator[None]:
-        """Call `look` every second in a thread while the work runs."""
-        done = threading.Event()
-
-        def watch() -> None:
-            while not done.wait(1.0):
-                self.look()
-
-        thread = threading.Thread(target=watch, daemon=True)
-        thread.start()
-        try:
-            yield
-        finally:
-            done.set()
-            thread.join()
+def progress_line(what: str, share: float, spent: float) -> str:
+    """Return progress as a line of text, for logs and pipes; time spent in s."""
+    rest = f', about {spent * (1.0 / share - 1.0):.0f} s to go' if 0.0 < share < 1.0 else ''
+    return f'{what}: {100.0 * share:.0f} %, {spent:.0f} s{rest}'
 
 
 def print_rows(
