@@ -24,7 +24,7 @@ from armid_ros.api.identification import IdentificationResult
 from armid_ros.api.since import misfit_of, model_in_question, recordings_since
 from armid_ros.api.table import (
     data_frame,
-    residual_frame,
+    ResidualPart,
     ShownModel,
     Summary,
 )
@@ -150,20 +150,8 @@ class DiagnosisResult(ShownModel):
         }
         return draw_joints(self.arm.robot.joints, curves, 'residual torque [N m or N]')
 
-    def residual_table(self) -> pandas.DataFrame:
-        """
-        Return the residual torque with the named effects as a pandas table.
-
-        Columns are recording, t [s], and every joint [N m or N].
-
-        Raises
-        ------
-        IdentificationError
-            If the data were refused, so that there is no residual.
-
-        """
-        parts = [(o.source, o.trajectory.t, o.measured - o.after) for o in self.core.overlays]
-        return residual_frame(self.description.robot.joints, parts)
+    def _residuals(self) -> list[ResidualPart]:
+        return [(o.source, o.trajectory.t, o.measured - o.after) for o in self.core.overlays]
 
     def to_dataframe(self) -> pandas.DataFrame:
         """Return the named effects as a pandas table, one row per parameter."""

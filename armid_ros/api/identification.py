@@ -25,7 +25,7 @@ from armid_ros.api.arguments import (
 from armid_ros.api.table import (
     aligned,
     data_frame,
-    residual_frame,
+    ResidualPart,
     ShownModel,
     Summary,
 )
@@ -204,18 +204,11 @@ class IdentificationResult(ShownModel):
         """Return the parameters as a pandas table: name, joint, value, std, unit."""
         return data_frame(self.document()['parameters'])
 
-    def residual_table(self) -> pandas.DataFrame:
-        """
-        Return measured minus predicted torques [N m or N] as a pandas table.
-
-        Columns are recording, t [s], and every joint; held-out recordings come last.
-
-        """
+    def _residuals(self) -> list[ResidualPart]:
         held_out = [fit for fits in self.validation.values() for fit in fits]
-        parts = [
+        return [
             (fit.source, fit.motion.t, fit.residual) for fit in (*self.core.training, *held_out)
         ]
-        return residual_frame(self.arm.robot.joints, parts)
 
     @cached_property
     def exports(self) -> dict[str, Exported]:

@@ -102,14 +102,6 @@ def data_frame(rows: Any) -> pandas.DataFrame:
     return DataFrame(rows)
 
 
-def residual_frame(joints: Sequence[str], parts: Iterable[ResidualPart]) -> pandas.DataFrame:
-    """Return residual torques as a pandas table: recording, t, and a column for each joint."""
-    names, times, residuals = zip(*parts, strict=True)
-    columns = dict(zip(joints, np.concatenate(residuals).T, strict=True))
-    sources = np.repeat(names, [len(t) for t in times])
-    return data_frame({'recording': sources, 't': np.concatenate(times), **columns})
-
-
 class Shown(ABC):
     """
     A result that prints as its summary and is written as the commands write it.
@@ -184,7 +176,28 @@ class Shown(ABC):
 
 
 class ShownModel(Shown):
-    """A result with a model of an arm."""
+    """A result with a model of an arm, and residual torques."""
+
+    @abstractmethod
+    def _residuals(self) -> Iterable[ResidualPart]:
+        """Return source, times [s] and residual torques [N m or N] of each stretch."""
+
+    def residual_table(self) -> pandas.DataFrame:
+        """
+        Return measured minus predicted torques [N m or N] as a pandas table, held-out ones last.
+
+        Columns are recording, t [s], and every joint.
+
+        Raises
+        ------
+        IdentificationError
+            If the data of a diagnosis were refused, so that there is no residual.
+
+        """
+        names, times, residuals = zip(*self._residuals(), strict=True)
+        columns = dict(zip(self.arm.robot.joints, np.concatenate(residuals).T, strict=True))
+        sources = np.repeat(names, [len(t) for t in times])
+        return data_frame({'recording': sources, 't': np.concatenate(times), **columns})
 
     @property
     @abstractmethod
