@@ -27,7 +27,7 @@ from armid_ros.nodes.parameters.live import (
 )
 from armid_ros.nodes.qos import LATCHED
 from armid_ros.nodes.running.process import run
-from armid_ros.report.provenance import source_of
+from armid_ros.robots.load import source_of
 from diagnostic_msgs.msg import DiagnosticStatus
 from std_msgs.msg import String
 

@@ -12,8 +12,8 @@ from pathlib import Path
 import platform
 
 from armid_ros.files import settled
-from armid_ros.robots import Robot, shipped_robots
-from armid_ros.robots.load import shipped_path
+from armid_ros.robots import Robot
+from armid_ros.robots.load import source_of
 
 #: Packages whose version can change a result.
 _PACKAGES = ('armid_ros', 'numpy', 'scipy', 'pin', 'clarabel', 'mcap')
@@ -80,14 +80,6 @@ class ResultOrigin:
 
 #: Shipped names and paths, without provenance.
 DEFAULT_ORIGIN = ResultOrigin()
-
-
-def source_of(robot: Robot) -> str:
-    """Return how files refer to a robot: by its shipped name, its path, or its name."""
-    for name in shipped_robots():
-        if robot.path == shipped_path(name):
-            return name
-    return robot.name if robot.path is None else str(Path(robot.path).resolve())
 
 
 def hash_files(paths: Iterable[str | Path]) -> tuple[tuple[str, int, str], ...]:
