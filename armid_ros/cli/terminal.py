@@ -4,11 +4,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 import threading
 import time
-from typing import Any
 
 from armid_ros.errors import visible
 import click
@@ -71,41 +70,3 @@ def progress_line(what: str, share: float, spent: float) -> str:
     """Return progress as a line of text, for logs and pipes; time spent in s."""
     rest = f', about {spent * (1.0 / share - 1.0):.0f} s to go' if 0.0 < share < 1.0 else ''
     return f'{what}: {100.0 * share:.0f} %, {spent:.0f} s{rest}'
-
-
-def print_rows(
-    rows: Sequence[dict[str, Any]],
-    as_json: bool,
-) -> None:
-    """
-    Print rows as a table, or as JSON.
-
-    Parameters
-    ----------
-    rows : sequence of dict
-        Cells by the heads of their columns.
-    as_json : bool
-        Whether for programs, with all columns.
-
-    """
-    from armid_ros.files import json_text
-    from rich.console import Console
-    from rich.table import Table
-    from rich.text import Text
-
-    if as_json:
-        click.echo(json_text(list(rows), indent=1))
-        return
-    console = Console()
-    heads = list(rows[0]) if rows else []
-    table = Table(box=None, header_style='bold')
-    for head in heads:
-        table.add_column(
-            Text(head),
-            no_wrap=head == 'name',
-            overflow='fold',
-        )
-    for row in rows:
-        cells = [', '.join(one) if isinstance(one, list) else one for one in row.values()]
-        table.add_row(*(Text(visible(cell)) for cell in cells))
-    console.print(table)
