@@ -225,18 +225,14 @@ class CheckResult(Shown):
 
     def document(self, origin: ResultOrigin = DEFAULT_ORIGIN) -> dict[str, Any]:
         """Return what ``armid check --json`` prints."""
-        links = None if self.links is None else asdict(self.links)
-        if links is not None:
-            arrays = {name: v.tolist() for name, v in links.items() if hasattr(v, 'tolist')}
-            links.update(arrays)
-        remarks = [asdict(one) for one in self.remarks]
-        finding, robot = self.finding, self.robot.name
+        links = {} if self.links is None else asdict(self.links)
+        numbers = {name: v.tolist() for name, v in links.items() if hasattr(v, 'tolist')}
         return {
             'schema': self.schema,
-            'robot': robot,
-            'finding': finding,
-            'remarks': remarks,
-            'check': links,
+            'robot': self.robot.name,
+            'finding': self.finding,
+            'remarks': [asdict(one) for one in self.remarks],
+            'check': links | numbers or None,
         }
 
     def page(self, origin: ResultOrigin = DEFAULT_ORIGIN) -> str:

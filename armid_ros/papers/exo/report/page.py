@@ -39,9 +39,7 @@ _NARROW = 0.1
 
 def exo_report(
     pair: TiedPair,
-    motions: PairMotion,
-    abscissa: FloatArray,
-    name: str,
+    shown: tuple[PairMotion, FloatArray, str],
     found: Sequence[Interaction],
     walked: SimulatedWalk | None,
     provenance: Provenance,
@@ -53,12 +51,8 @@ def exo_report(
     ----------
     pair : TiedPair
         Both machines, with the estimated stiffness.
-    motions : PairMotion
-        The motion of both machines to show.
-    abscissa : ndarray, shape (N,)
-        Abscissa of the plots.
-    name : str
-        Name and unit of the abscissa.
+    shown : (PairMotion, ndarray, str)
+        The motion of both machines, and abscissa of the plots, shape (N,), with name and unit.
     found : sequence of Interaction
         Estimates with one stiffness for all ties, then with one for each.
     walked : SimulatedWalk or None
@@ -67,6 +61,7 @@ def exo_report(
         Files, versions, settings, seed.
 
     """
+    motions, abscissa, name = shown
     samples = np.linspace(0, len(abscissa) - 1, 6).astype(int).tolist()
     captions = [f'{abscissa[k]:.2f}' for k in samples]
     sections: list[Section] = [
