@@ -23,6 +23,7 @@ from armid_ros.recording.columns import ColumnSettings, numbers
 from armid_ros.recording.reader import bag_contents
 from armid_ros.recording.source import DEFAULT
 from armid_ros.robots import joints_beside_arms, load_robot, Robot, shipped_robots
+from armid_ros.robots.load import shipped_path
 import numpy as np
 
 #: A robot: as it is, as part of a model, by a shipped name, or by the path of its description or
@@ -88,6 +89,14 @@ def describes_robot(one: RobotLike | RecordingLike) -> bool:
         return not isinstance(one, Recording)
     path = Path(str(one).split(' ')[0])
     return path.suffix in _DESCRIPTIONS or is_model(path) or str(one) in shipped_robots()
+
+
+def source_of(robot: Robot) -> str:
+    """Return how files refer to a robot: by its shipped name, its path, or its name."""
+    for name in shipped_robots():
+        if robot.path == shipped_path(name):
+            return name
+    return robot.name if robot.path is None else str(Path(robot.path).resolve())
 
 
 def arm_of(arm: RobotLike, effects: str = USUAL) -> ArmModel:

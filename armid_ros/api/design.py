@@ -138,11 +138,7 @@ def design_excitation(
     """
     model = drivable(arm)
     if joint_limits is not None:
-        named = joint_limits if isinstance(joint_limits, Mapping) else {}
-        file = None if isinstance(joint_limits, Mapping) else joint_limits
-        velocity = [f'{joint}:={limit}' for joint, limit in named.items()]
-        robot, known = with_joint_limits(model.robot, file, velocity)
-        model = replace(model, robot=robot)
+        model, known = _limited(model, joint_limits)
         acceleration = known if acceleration is None else acceleration
     # one search of an arm of many joints: each step of it takes seconds
     searches, seconds = (1, 25.0) if model.robot.n_joints > 20 else (4, 120.0)
@@ -203,6 +199,17 @@ def _searched(
     )
     names = tuple(one.source for one in earlier)
     return ExcitationResult(found, model, scene, start, names, rng if isinstance(rng, int) else 0)
+
+
+def _limited(
+    model: ArmModel, given: str | Path | Mapping[str, float]
+) -> tuple[ArmModel, FloatArray | None]:
+    """Apply the joint limits of a file or mapping; return the model and acceleration limits."""
+    named = given if isinstance(given, Mapping) else {}
+    file = None if isinstance(given, Mapping) else given
+    velocity = [f'{joint}:={limit}' for joint, limit in named.items()]
+    robot, acceleration = with_joint_limits(model.robot, file, velocity)
+    return replace(model, robot=robot), acceleration
 
 
 def _information(

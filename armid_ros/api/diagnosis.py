@@ -17,6 +17,7 @@ from armid_ros.api.arguments import (
     Rng,
     RobotLike,
     some_recordings_of,
+    source_of,
     spelled,
     with_sources_apart,
 )
@@ -184,13 +185,13 @@ class DiagnosisResult(ShownModel):
             everything=self.settings.everything,
             extras=self.extras,
             patch=patch,
-            origin=origin.of(self.description.robot),
+            origin=origin.of(source_of(self.description.robot)),
         )
 
     def fill(self, folder: Path, origin: ResultOrigin = DEFAULT_ORIGIN) -> dict[str, Any]:
         """Write diagnosis.json, model.yaml and report.html into a folder, numbers first."""
         model, document = folder / 'model.yaml', self.document()
-        source = origin.of(self.description.robot).source
+        source = origin.of(source_of(self.description.robot)).source
         save_model(model, self.arm, source, self.core.estimate, self.misfit)
         write_file(folder / 'diagnosis.json', json_text(document, indent=1))
         if self.residual is not None:

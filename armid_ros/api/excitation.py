@@ -10,6 +10,7 @@ from pathlib import Path
 import sys
 from typing import Any, TYPE_CHECKING
 
+from armid_ros.api.arguments import source_of
 from armid_ros.api.table import data_frame, Shown, Summary
 from armid_ros.arm import ArmModel
 from armid_ros.diagnosis.next_run.isolability import Isolability, isolability
@@ -156,7 +157,7 @@ class ExcitationResult(Shown):
         nearest, low, floor = self.fitness.nearest, self.fitness.lowest, self.scene.floor
         return {
             'schema': self.schema,
-            'robot': origin.of(self.arm.robot).robot,
+            'robot': origin.of(source_of(self.arm.robot)).robot,
             'verdict': self.fitness.word,
             'summary': str(self.fitness),
             'not_checked': list(self.fitness.unchecked),

@@ -18,6 +18,7 @@ from armid_ros.api.arguments import (
     Rng,
     RobotLike,
     some_recordings_of,
+    source_of,
     spelled,
     USUAL,
     with_sources_apart,
@@ -219,7 +220,7 @@ class IdentificationResult(ShownModel):
 
     def document(self, origin: ResultOrigin = DEFAULT_ORIGIN) -> dict[str, Any]:
         """Return the content of identification.json, without exports and digests of recordings."""
-        robot = origin.of(self.description.robot).robot
+        robot = origin.of(source_of(self.description.robot)).robot
         document = identification_document(
             self.core, robot, self.validation, self.verification, self.graded
         )
@@ -239,13 +240,13 @@ class IdentificationResult(ShownModel):
             validation=self.validation,
             validation_recordings=self.held_out,
             assessment=Assessment(self.verification, self.graded, exports=without_place),
-            origin=origin.of(self.description.robot),
+            origin=origin.of(source_of(self.description.robot)),
         )
 
     def fill(self, folder: Path, origin: ResultOrigin = DEFAULT_ORIGIN) -> dict[str, Any]:
         """Write model.yaml, identification.json, report.html and the exports into a folder."""
         document = self.document(origin)
-        source = origin.of(self.description.robot).source
+        source = origin.of(source_of(self.description.robot)).source
         save_model(folder / 'model.yaml', self.arm, source, self.estimate, self._misfit)
         for name, one in self.exports.items():
             write_file(folder / name, one.text)

@@ -11,6 +11,7 @@ from pathlib import Path
 import textwrap
 from typing import Any, ClassVar, TYPE_CHECKING
 
+from armid_ros.api.arguments import source_of
 from armid_ros.arm import ArmModel
 from armid_ros.arm.export import arm_urdf
 from armid_ros.errors import ArmidError
@@ -126,7 +127,7 @@ class Shown(ABC):
 
     def stated(self, origin: ResultOrigin, robot: Robot | None = None) -> ResultOrigin:
         """Fill in the robot, and what to do next: a sentence or the command."""
-        shown, known = self.summary(), origin if robot is None else origin.of(robot)
+        shown, known = self.summary(), origin if robot is None else origin.of(source_of(robot))
         step = origin.step or ''.join(shown.steps[:1]) or f'armid {shown.then}'
         return replace(known, step=step)
 

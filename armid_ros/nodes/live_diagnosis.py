@@ -9,6 +9,7 @@ from functools import partial
 from typing import Any
 
 from armid_msgs.msg import Diagnosis
+from armid_ros.api.arguments import source_of
 from armid_ros.arm.model_file import model_text
 from armid_ros.diagnosis import Finding
 from armid_ros.errors import IdentificationError
@@ -27,7 +28,6 @@ from armid_ros.nodes.parameters.live import (
 )
 from armid_ros.nodes.qos import LATCHED
 from armid_ros.nodes.running.process import run
-from armid_ros.robots.load import source_of
 from diagnostic_msgs.msg import DiagnosticStatus
 from std_msgs.msg import String
 

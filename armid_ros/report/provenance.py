@@ -12,8 +12,6 @@ from pathlib import Path
 import platform
 
 from armid_ros.files import settled
-from armid_ros.robots import Robot
-from armid_ros.robots.load import source_of
 
 #: Packages whose version can change a result.
 _PACKAGES = ('armid_ros', 'numpy', 'scipy', 'pin', 'clarabel', 'mcap')
@@ -72,9 +70,8 @@ class ResultOrigin:
     provenance: Provenance = Provenance()
     step: str = ''
 
-    def of(self, robot: Robot) -> ResultOrigin:
-        """Fill in defaults."""
-        known = source_of(robot)
+    def of(self, known: str) -> ResultOrigin:
+        """Fill in what files call the robot, where nothing else is given."""
         return replace(self, robot=self.robot or known, source=self.source or known)
 
 

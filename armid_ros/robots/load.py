@@ -379,11 +379,3 @@ def read_mounting(robot: Robot) -> tuple[float | None, Path] | None:
     if isinstance(floor, bool) or not isinstance(floor, int | float) or not math.isfinite(floor):
         raise RobotError(f'{path}: has to say floor: HEIGHT [m], or floor: none')
     return float(floor), path
-
-
-def source_of(robot: Robot) -> str:
-    """Return how files refer to a robot: by its shipped name, its path, or its name."""
-    for name in shipped_robots():
-        if robot.path == shipped_path(name):
-            return name
-    return robot.name if robot.path is None else str(Path(robot.path).resolve())

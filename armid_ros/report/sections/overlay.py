@@ -42,14 +42,7 @@ def overlay_section(diagnosis: Diagnosis, gap: Gap, names: Mapping[str, str]) ->
 
     shown = max(gap.overlays, key=size)
     source = names.get(shown.source, shown.source) or 'the recording'
-    # all stretches of the recording
-    here = shown.source, shown.trajectory.fold
-    own = [one for one in gap.overlays if (one.source, one.trajectory.fold) == here]
-    t = joined_time([one.trajectory.t for one in own])
-    measured, before, after = (
-        joined([part[:, j] for part in parts])
-        for parts in zip(*((one.measured, one.before, one.after) for one in own), strict=True)
-    )
+    t, measured, before, after = _of_recording(gap, shown, j)
     unit = robot.torque_units[j]
     acting = [one for one in diagnosis.spans if one.source == shown.source and not one.whole]
     marks = [(one.start, f'from {one.start:.1f} s', True) for one in acting]
@@ -95,6 +88,15 @@ def overlay_section(diagnosis: Diagnosis, gap: Gap, names: Mapping[str, str]) ->
             ),
         ],
     )
+
+
+def _of_recording(gap: Gap, shown: Overlay, joint: int) -> tuple[FloatArray, ...]:
+    """Return time, measured torque and both models for all stretches of a recording."""
+    here = shown.source, shown.trajectory.fold
+    own = [one for one in gap.overlays if (one.source, one.trajectory.fold) == here]
+    curves = zip(*((one.measured, one.before, one.after) for one in own), strict=True)
+    t = joined_time([one.trajectory.t for one in own])
+    return t, *(joined([part[:, joint] for part in parts]) for parts in curves)
 
 
 def whole_overlays(diagnosis: Diagnosis, recordings: Sequence[Recording]) -> Gap | None:

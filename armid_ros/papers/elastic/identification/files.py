@@ -91,14 +91,7 @@ def read_runs(
     ]
     assert motor.dq is not None and motor.tau is not None
     assert link.dq is not None and asked.dq is not None
-    # angular accelerations of the joints from sideways accelerations
-    r, length = (
-        np.asarray(radius, dtype=float),
-        np.hypot(*robot.model.jointPlacements[2].translation[:2]),
-    )
-    first = sideways[0] / r[0]
-    carried = length * (first * np.cos(link.q[:, 1]) + link.dq[:, 0] ** 2 * np.sin(link.q[:, 1]))
-    ddq = np.column_stack([first, (sideways[1] - carried) / r[1] - first])
+    ddq = _accelerations(robot, np.asarray(radius, dtype=float), link.q, link.dq, sideways)
     period = float(np.median(np.diff(motor.t)))
     left = asked.q - motor.q
     runs = []
@@ -120,6 +113,17 @@ def read_runs(
             'of the velocity loops'
         )
     return runs
+
+
+def _accelerations(
+    robot: Robot, radius: FloatArray, q: FloatArray, dq: FloatArray, sideways: Sequence[FloatArray]
+) -> FloatArray:
+    """Return angular accelerations of the joints from sideways accelerations, shape (N, 2)."""
+    offset = np.asarray(robot.model.jointPlacements[2].translation)
+    length = np.hypot(offset[0], offset[1])
+    first = sideways[0] / radius[0]
+    carried = length * (first * np.cos(q[:, 1]) + dq[:, 0] ** 2 * np.sin(q[:, 1]))
+    return np.column_stack([first, (sideways[1] - carried) / radius[1] - first])
 
 
 def read_sides(
