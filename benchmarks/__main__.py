@@ -18,7 +18,6 @@ BENCHMARKS = (
     *('changes', 'coverage', 'excitation', 'exo', 'exo_diagnosis', 'fleet', 'growth'),
     *('healthy_arms', 'hidden_effects', 'live_diagnosis', 'lived', 'nodes'),
     *('offline_speed', 'online', 'part_time', 'reading', 'real_changes', 'real_diagnosis'),
-    'two_encoders',
 )
 #: Benchmarks whose output is kept.
 SPEED = {'nodes', 'offline_speed', 'online', 'reading'}

@@ -77,7 +77,7 @@ def gait_by_torque() -> None:
             aim = ' ' * 10 if believed else f'<= {wanted:4.2f} deg'
             print(f'  {what:45s} {paper:4.1f} deg {aim:11s}  {error:.3g} deg')
     pair = leg_pair()
-    whole = walking(pair, read_gait(), np.linspace(0.0, 1.2, 1201), 0.0)
+    whole = walking(pair, read_gait(), np.linspace(0.0, 1.2, 1201))
     for rate, share in ((50.0, 1.0), (100.0, 1.0), (400.0, 1.0), (400.0, 1.01)):
         torque = splined(whole.own.t, share * pair_torques(pair, *whole).tau, rate)
         path = drive_in_mujoco(pair, whole, pair.robot.joints, torque)

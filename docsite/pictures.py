@@ -23,7 +23,7 @@ from armid_ros.live.belief import LiveDiagnosis, LiveSettings
 from armid_ros.live.request import answer
 from armid_ros.papers.elastic.identification.interaction import ideal_response
 from armid_ros.papers.elastic.identification.three_steps import identify_two_inertia
-from armid_ros.papers.elastic.plant import EXCITATION_RMS, resonance_experiments, run_all, WEAK
+from armid_ros.papers.elastic.plant import EXCITATION_RMS, resonance_experiments, run_elastic, WEAK
 from armid_ros.papers.elastic.work import SENSORS
 from armid_ros.papers.exo.plant.gait import read_gait
 from armid_ros.papers.exo.plant.gait_cycle import check_cycle, gait_cycle
@@ -331,7 +331,8 @@ def springs() -> Figure:
     shipped, rng = two_link_set('after'), np.random.default_rng(0)
     plant, loop = two_link_plant(shipped.parameters), two_link_loop(shipped, WEAK)
     plans = resonance_experiments(8, rms=EXCITATION_RMS, rng=rng)
-    runs = [SENSORS.measure(run, rng) for run in run_all(plant, loop, plans)]
+    clean = [run_elastic(plant, loop, plan) for plan in plans]
+    runs = [SENSORS.measure(run, rng) for run in clean]
     found = identify_two_inertia(runs, shipped.parameters, loop=loop)
     figure = Figure(figsize=(WIDTH, 2.8), layout='constrained')
     panels = figure.subplots(1, 2, sharey=True)

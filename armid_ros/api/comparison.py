@@ -9,10 +9,11 @@ from pathlib import Path
 from typing import Any, TYPE_CHECKING
 
 from armid_ros.api.identification import IdentificationResult
-from armid_ros.api.table import data_frame, DEFAULT_ORIGIN, ResultOrigin, Shown, Summary
+from armid_ros.api.table import data_frame, Shown, Summary
 from armid_ros.identification.assess.compare import compare as run
 from armid_ros.identification.assess.comparison import Comparison, SCHEMA
 from armid_ros.identification.parameters_file import ParameterFile, parameters_of, read_parameters
+from armid_ros.report.provenance import DEFAULT_ORIGIN, ResultOrigin
 
 if TYPE_CHECKING:
     import pandas
@@ -65,7 +66,7 @@ class ComparisonResult(Shown):
         """Return report.html."""
         from armid_ros.report.compare_report import compare_report
 
-        return compare_report(self.core, origin.provenance, self.next_step(origin))
+        return compare_report(self.core, self.stated(origin))
 
     def summary(self) -> Summary:
         """Return the changes, most significant first."""

@@ -17,6 +17,7 @@ from armid_ros.api.arguments import (
     Rng,
     RobotLike,
     some_recordings_of,
+    source_of,
     spelled,
     with_sources_apart,
 )
@@ -24,9 +25,7 @@ from armid_ros.api.identification import IdentificationResult
 from armid_ros.api.since import misfit_of, model_in_question, recordings_since
 from armid_ros.api.table import (
     data_frame,
-    DEFAULT_ORIGIN,
-    residual_frame,
-    ResultOrigin,
+    ResidualPart,
     ShownModel,
     Summary,
 )
@@ -51,13 +50,15 @@ from armid_ros.identification.assess.verification import ForwardValidation, simu
 from armid_ros.identification.rows.signals import conditioning
 from armid_ros.recording import Recording, require_once
 from armid_ros.recording.curves import draw_joints
-from armid_ros.report.diagnosis_report import diagnosis_report, Extras, LearnedResidual
+from armid_ros.report.diagnosis_report import diagnosis_report, Extras
 from armid_ros.report.notation import pretty
+from armid_ros.report.provenance import DEFAULT_ORIGIN, ResultOrigin
 from armid_ros.report.sections.diagnosed import named_rows
 import numpy as np
 import numpy.typing as npt
 
 if TYPE_CHECKING:
+    from armid_ros.residual import Residual
     import pandas
 
 _Made = TypeVar('_Made')
@@ -110,7 +111,7 @@ class DiagnosisResult(ShownModel):
     simulated: IdentificationResult | None = None
 
     @property
-    def residual(self) -> LearnedResidual | None:
+    def residual(self) -> Residual | None:
         """Return the learned map of the unexplained residual; None if none was learned."""
         return self.extras.residual
 
@@ -150,20 +151,8 @@ class DiagnosisResult(ShownModel):
         }
         return draw_joints(self.arm.robot.joints, curves, 'residual torque [N m or N]')
 
-    def residual_table(self) -> pandas.DataFrame:
-        """
-        Return the residual torque with the named effects as a pandas table.
-
-        Columns are recording, t [s], and every joint [N m or N].
-
-        Raises
-        ------
-        IdentificationError
-            If the data were refused, so that there is no residual.
-
-        """
-        parts = [(o.source, o.trajectory.t, o.measured - o.after) for o in self.core.overlays]
-        return residual_frame(self.description.robot.joints, parts)
+    def _residuals(self) -> list[ResidualPart]:
+        return [(o.source, o.trajectory.t, o.measured - o.after) for o in self.core.overlays]
 
     def to_dataframe(self) -> pandas.DataFrame:
         """Return the named effects as a pandas table, one row per parameter."""
@@ -193,17 +182,16 @@ class DiagnosisResult(ShownModel):
                 'baseline': self.baseline,
                 'simulator': self.simulated.recordings if self.simulated else (),
             },
-            robot=origin.of(self.description.robot).robot,
             everything=self.settings.everything,
             extras=self.extras,
             patch=patch,
-            provenance=origin.provenance,
+            origin=origin.of(source_of(self.description.robot)),
         )
 
     def fill(self, folder: Path, origin: ResultOrigin = DEFAULT_ORIGIN) -> dict[str, Any]:
         """Write diagnosis.json, model.yaml and report.html into a folder, numbers first."""
         model, document = folder / 'model.yaml', self.document()
-        source = origin.of(self.description.robot).source
+        source = origin.of(source_of(self.description.robot)).source
         save_model(model, self.arm, source, self.core.estimate, self.misfit)
         write_file(folder / 'diagnosis.json', json_text(document, indent=1))
         if self.residual is not None:
@@ -229,7 +217,7 @@ class DiagnosisResult(ShownModel):
             said = self.verdict.replace('_', ' ')
             return self._with_notes(f'nothing is learned where the verdict is {said}')
 
-        def learned() -> LearnedResidual | None:
+        def learned() -> Residual | None:
             require_residual()
             from armid_ros.residual import learn_residual
 

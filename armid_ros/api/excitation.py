@@ -10,7 +10,8 @@ from pathlib import Path
 import sys
 from typing import Any, TYPE_CHECKING
 
-from armid_ros.api.table import data_frame, DEFAULT_ORIGIN, ResultOrigin, Shown, Summary
+from armid_ros.api.arguments import source_of
+from armid_ros.api.table import data_frame, Shown, Summary
 from armid_ros.arm import ArmModel
 from armid_ros.diagnosis.next_run.isolability import Isolability, isolability
 from armid_ros.errors import TrajectoryError
@@ -34,7 +35,7 @@ from armid_ros.files import json_text, settled, write_file
 from armid_ros.motion import FloatArray, Motion
 from armid_ros.recording import write_joint_trajectory
 from armid_ros.recording.curves import draw_joints
-from armid_ros.report.provenance import Provenance
+from armid_ros.report.provenance import DEFAULT_ORIGIN, ResultOrigin
 import numpy as np
 import numpy.typing as npt
 
@@ -159,7 +160,7 @@ class ExcitationResult(Shown):
         nearest, low, floor = self.fitness.nearest, self.fitness.lowest, self.scene.floor
         return {
             'schema': self.schema,
-            'robot': origin.of(self.arm.robot).robot,
+            'robot': origin.of(source_of(self.arm.robot)).robot,
             'verdict': self.fitness.word,
             'summary': str(self.fitness),
             'not_checked': list(self.fitness.unchecked),
@@ -198,12 +199,10 @@ class ExcitationResult(Shown):
             self.arm,
             self.run,
             self.fitness,
-            robot=origin.of(self.arm.robot).robot,
             scene=self.scene,
             isolability=self.isolability if self.with_isolability else None,
-            provenance=replace(
-                origin.provenance or Provenance(),
-                step=self.fitness.remedy or self.next_step(origin),
+            origin=self.stated(
+                replace(origin, step=self.fitness.remedy or origin.step), self.arm.robot
             ),
         )
 

@@ -18,6 +18,7 @@ from armid_ros.api.arguments import (
     Rng,
     RobotLike,
     some_recordings_of,
+    source_of,
     spelled,
     USUAL,
     with_sources_apart,
@@ -25,9 +26,7 @@ from armid_ros.api.arguments import (
 from armid_ros.api.table import (
     aligned,
     data_frame,
-    DEFAULT_ORIGIN,
-    residual_frame,
-    ResultOrigin,
+    ResidualPart,
     ShownModel,
     Summary,
 )
@@ -62,6 +61,7 @@ from armid_ros.identification.physical.fit_among_bodies import far_from_describe
 from armid_ros.identification.rows.checks import check_held_out
 from armid_ros.recording import Recording, require_once
 from armid_ros.recording.curves import draw_joints
+from armid_ros.report.provenance import DEFAULT_ORIGIN, ResultOrigin
 import numpy as np
 import numpy.typing as npt
 
@@ -205,18 +205,11 @@ class IdentificationResult(ShownModel):
         """Return the parameters as a pandas table: name, joint, value, std, unit."""
         return data_frame(self.document()['parameters'])
 
-    def residual_table(self) -> pandas.DataFrame:
-        """
-        Return measured minus predicted torques [N m or N] as a pandas table.
-
-        Columns are recording, t [s], and every joint; held-out recordings come last.
-
-        """
+    def _residuals(self) -> list[ResidualPart]:
         held_out = [fit for fits in self.validation.values() for fit in fits]
-        parts = [
+        return [
             (fit.source, fit.motion.t, fit.residual) for fit in (*self.core.training, *held_out)
         ]
-        return residual_frame(self.arm.robot.joints, parts)
 
     @cached_property
     def exports(self) -> dict[str, Exported]:
@@ -227,7 +220,7 @@ class IdentificationResult(ShownModel):
 
     def document(self, origin: ResultOrigin = DEFAULT_ORIGIN) -> dict[str, Any]:
         """Return the content of identification.json, without exports and digests of recordings."""
-        robot = origin.of(self.description.robot).robot
+        robot = origin.of(source_of(self.description.robot)).robot
         document = identification_document(
             self.core, robot, self.validation, self.verification, self.graded
         )
@@ -243,18 +236,17 @@ class IdentificationResult(ShownModel):
         return identification_report(
             self.core,
             description=self.description,
-            robot=origin.of(self.description.robot).robot,
             recordings=self.recordings,
             validation=self.validation,
             validation_recordings=self.held_out,
             assessment=Assessment(self.verification, self.graded, exports=without_place),
-            provenance=origin.provenance,
+            origin=origin.of(source_of(self.description.robot)),
         )
 
     def fill(self, folder: Path, origin: ResultOrigin = DEFAULT_ORIGIN) -> dict[str, Any]:
         """Write model.yaml, identification.json, report.html and the exports into a folder."""
         document = self.document(origin)
-        source = origin.of(self.description.robot).source
+        source = origin.of(source_of(self.description.robot)).source
         save_model(folder / 'model.yaml', self.arm, source, self.estimate, self._misfit)
         for name, one in self.exports.items():
             write_file(folder / name, one.text)

@@ -21,7 +21,7 @@ from armid_ros.api.arguments import (
     USUAL,
 )
 from armid_ros.api.identification import identify
-from armid_ros.api.table import data_frame, DEFAULT_ORIGIN, ResultOrigin, Shown, Summary
+from armid_ros.api.table import data_frame, Shown, Summary
 from armid_ros.arm import ArmModel
 from armid_ros.errors import RecordingError
 from armid_ros.inspection import (
@@ -36,6 +36,7 @@ from armid_ros.inspection import inspect as look
 from armid_ros.inspection.inspect import SCHEMA
 from armid_ros.recording import Recording, Topic
 from armid_ros.recording.anything import read_anything
+from armid_ros.report.provenance import DEFAULT_ORIGIN, ResultOrigin
 from armid_ros.robots import Robot
 import numpy as np
 
@@ -89,12 +90,7 @@ class InspectionResult(Shown):
         """Return inspection.html with all curves."""
         from armid_ros.report.inspection_report import inspection_report
 
-        return inspection_report(
-            self.core,
-            robot=origin.robot,
-            step=self.next_step(origin),
-            provenance=origin.provenance,
-        )
+        return inspection_report(self.core, self.stated(origin))
 
     def summary(self) -> Summary:
         """Return verdict, table of joints, remarks and sampling."""
@@ -229,26 +225,21 @@ class CheckResult(Shown):
 
     def document(self, origin: ResultOrigin = DEFAULT_ORIGIN) -> dict[str, Any]:
         """Return what ``armid check --json`` prints."""
-        links = None if self.links is None else asdict(self.links)
-        if links is not None:
-            arrays = {name: v.tolist() for name, v in links.items() if hasattr(v, 'tolist')}
-            links.update(arrays)
-        remarks = [asdict(one) for one in self.remarks]
-        finding, robot = self.finding, self.robot.name
+        links = {} if self.links is None else asdict(self.links)
+        numbers = {name: v.tolist() for name, v in links.items() if hasattr(v, 'tolist')}
         return {
             'schema': self.schema,
-            'robot': robot,
-            'finding': finding,
-            'remarks': remarks,
-            'check': links,
+            'robot': self.robot.name,
+            'finding': self.finding,
+            'remarks': [asdict(one) for one in self.remarks],
+            'check': links | numbers or None,
         }
 
     def page(self, origin: ResultOrigin = DEFAULT_ORIGIN) -> str:
         """Return report.html with a table of the links."""
         from armid_ros.report.inspection_report import description_check_report
 
-        name, step = origin.of(self.robot).robot, self.next_step(origin)
-        return description_check_report(name, self.remarks, self.links, step, origin.provenance)
+        return description_check_report(self.remarks, self.links, self.stated(origin, self.robot))
 
     def summary(self) -> Summary:
         """Return the finding, and the links: what was measured where any of them is wrong."""

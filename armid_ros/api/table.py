@@ -17,12 +17,12 @@ from armid_ros.arm.export import arm_urdf
 from armid_ros.errors import ArmidError
 from armid_ros.files import json_text, result_folder, staged, write_file
 from armid_ros.motion import FloatArray
+from armid_ros.report.provenance import DEFAULT_ORIGIN, ResultOrigin
 from armid_ros.robots import Robot
 from markupsafe import escape
 import numpy as np
 
 if TYPE_CHECKING:
-    from armid_ros.report.provenance import Provenance
     import pandas
 
 #: Lines of a result in a terminal.
@@ -90,39 +90,8 @@ class Summary:
         return f'{self.badge.upper()}: {self.title}' if self.badge else self.title
 
 
-@dataclass(frozen=True)
-class ResultOrigin:
-    """
-    Provenance of a result, as its files state it.
-
-    Attributes
-    ----------
-    robot : str
-        What documents call the robot; by default its shipped name or its path.
-    source : str
-        How model.yaml refers to its description; by default the same.
-    provenance : Provenance or None
-        Files, versions and settings that the report names.
-    step : str
-        Command that follows, for the report; by default without arguments.
-
-    """
-
-    robot: str = ''
-    source: str = ''
-    provenance: Provenance | None = None
-    step: str = ''
-
-    def of(self, robot: Robot) -> ResultOrigin:
-        """Fill in defaults."""
-        known = source_of(robot)
-        return replace(self, robot=self.robot or known, source=self.source or known)
-
-
 #: Source of a recording, times [s] and residual torques [N m or N], shapes (M,) and (M, n).
 ResidualPart = tuple[str, FloatArray, FloatArray]
-#: Shipped names and paths, without provenance.
-DEFAULT_ORIGIN = ResultOrigin()
 
 
 def data_frame(rows: Any) -> pandas.DataFrame:
@@ -132,14 +101,6 @@ def data_frame(rows: Any) -> pandas.DataFrame:
     except ModuleNotFoundError:
         raise ArmidError('a table needs pandas: pip install pandas') from None
     return DataFrame(rows)
-
-
-def residual_frame(joints: Sequence[str], parts: Iterable[ResidualPart]) -> pandas.DataFrame:
-    """Return residual torques as a pandas table: recording, t, and a column for each joint."""
-    names, times, residuals = zip(*parts, strict=True)
-    columns = dict(zip(joints, np.concatenate(residuals).T, strict=True))
-    sources = np.repeat(names, [len(t) for t in times])
-    return data_frame({'recording': sources, 't': np.concatenate(times), **columns})
 
 
 class Shown(ABC):
@@ -164,10 +125,11 @@ class Shown(ABC):
     def summary(self) -> Summary:
         """Return a summary."""
 
-    def next_step(self, origin: ResultOrigin) -> str:
-        """Return what to do next, as the report shows it: a sentence or the command."""
-        shown = self.summary()
-        return origin.step or ''.join(shown.steps[:1]) or f'armid {shown.then}'
+    def stated(self, origin: ResultOrigin, robot: Robot | None = None) -> ResultOrigin:
+        """Fill in the robot, and what to do next: a sentence or the command."""
+        shown, known = self.summary(), origin if robot is None else origin.of(source_of(robot))
+        step = origin.step or ''.join(shown.steps[:1]) or f'armid {shown.then}'
+        return replace(known, step=step)
 
     @abstractmethod
     def document(self, origin: ResultOrigin = DEFAULT_ORIGIN) -> dict[str, Any]:
@@ -215,7 +177,28 @@ class Shown(ABC):
 
 
 class ShownModel(Shown):
-    """A result with a model of an arm."""
+    """A result with a model of an arm, and residual torques."""
+
+    @abstractmethod
+    def _residuals(self) -> Iterable[ResidualPart]:
+        """Return source, times [s] and residual torques [N m or N] of each stretch."""
+
+    def residual_table(self) -> pandas.DataFrame:
+        """
+        Return measured minus predicted torques [N m or N] as a pandas table, held-out ones last.
+
+        Columns are recording, t [s], and every joint.
+
+        Raises
+        ------
+        IdentificationError
+            If the data of a diagnosis were refused, so that there is no residual.
+
+        """
+        names, times, residuals = zip(*self._residuals(), strict=True)
+        columns = dict(zip(self.arm.robot.joints, np.concatenate(residuals).T, strict=True))
+        sources = np.repeat(names, [len(t) for t in times])
+        return data_frame({'recording': sources, 't': np.concatenate(times), **columns})
 
     @property
     @abstractmethod

@@ -7,7 +7,7 @@ from __future__ import annotations
 import textwrap
 
 from armid_ros.cli import parameters
-from armid_ros.cli.terminal import print_rows, say
+from armid_ros.cli.terminal import say
 import click
 
 #: Stands for a blank at which no line ends.
@@ -18,10 +18,21 @@ _JOINED = '\u00a0'
 @parameters.as_json
 def robots(as_json: bool) -> None:
     """List the robots that are shipped."""
+    from armid_ros.files import json_text
     from armid_ros.robots import shipped_robots
+    from rich.console import Console
+    from rich.table import Table
 
     rows = [{'name': name, 'what it is': text} for name, text in shipped_robots().items()]
-    print_rows(rows, as_json)
+    if as_json:
+        click.echo(json_text(rows, indent=1))
+        return
+    table = Table(box=None, header_style='bold')
+    table.add_column('name', no_wrap=True)
+    table.add_column('what it is', overflow='fold')
+    for row in rows:
+        table.add_row(*row.values())
+    Console().print(table)
 
 
 @click.command(epilog='Example: armid effects --json')
@@ -29,6 +40,7 @@ def robots(as_json: bool) -> None:
 def effects(as_json: bool) -> None:
     """List the effects that can be simulated and estimated."""
     from armid_ros.effects import CATALOGUE
+    from armid_ros.files import json_text
 
     rows = [
         {
@@ -40,7 +52,7 @@ def effects(as_json: bool) -> None:
         for name, effect in CATALOGUE.items()
     ]
     if as_json:
-        print_rows(rows, as_json)
+        click.echo(json_text(rows, indent=1))
         return
     lines = textwrap.TextWrapper(80, '', '    ', break_long_words=False, break_on_hyphens=False)
     for row in rows:

@@ -25,8 +25,8 @@ def compare(before: Path, after: Path, out: Path, strict: bool, as_json: bool) -
     """
     from armid_ros.api.comparison import compare as run
     from armid_ros.api.comparison import ComparisonResult
-    from armid_ros.api.table import ResultOrigin
     from armid_ros.cli import options
+    from armid_ros.report.provenance import ResultOrigin
 
     staged = options.stage(out, ComparisonResult.schema)
     result = run(before, after)

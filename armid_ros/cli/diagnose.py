@@ -24,24 +24,17 @@ if TYPE_CHECKING:
     from armid_ros.robots import Robot
 
 
-class Percent(click.ParamType):  # type: ignore[type-arg]
-    """A percentage, with or without the sign."""
-
-    name = 'percent'
-
-    def convert(
-        self, value: str | float, param: click.Parameter | None, ctx: click.Context | None
-    ) -> float:
-        """Return the share, 0 to 1."""
-        if isinstance(value, float):
-            return value
-        try:
-            share = float(value.removesuffix('%')) / 100.0
-        except ValueError:
-            share = math.nan
-        if not 0.0 <= share < 1.0:
-            self.fail(f"'{value}' is not a percentage from 0% to 100%", param, ctx)
-        return share
+def share_of_percent(
+    ctx: click.Context | None, param: click.Parameter | None, value: str
+) -> float:
+    """Return the share, 0 to 1, of a percentage with or without the sign."""
+    try:
+        share = float(value.removesuffix('%')) / 100.0
+    except ValueError:
+        share = math.nan
+    if not 0.0 <= share < 1.0:
+        raise click.BadParameter(f"'{value}' is not a percentage from 0% to 100%", ctx, param)
+    return share
 
 
 _partner_options = parameters.together(
@@ -97,7 +90,7 @@ _partner_options = parameters.together(
 )
 @click.option(
     '--material',
-    type=Percent(),
+    callback=share_of_percent,
     default='1%',
     show_default=True,
     metavar='PERCENT',
@@ -173,10 +166,10 @@ def diagnose(
         raise click.UsageError('give --against without --model and --baseline')
     from armid_ros.api.diagnosis import diagnose as run
     from armid_ros.api.diagnosis import DiagnosisResult, require_residual
-    from armid_ros.api.table import ResultOrigin
     from armid_ros.arm import ArmModel
     from armid_ros.cli import options
     from armid_ros.identification.parameters_file import read_misfit
+    from armid_ros.report.provenance import ResultOrigin
 
     if residual is not None:
         require_residual()

@@ -231,13 +231,13 @@ def excite(
     """Design a trajectory that shows the parameters, inside all limits and free of collisions."""
     from armid_ros.api.design import design_excitation
     from armid_ros.api.excitation import ExcitationResult
-    from armid_ros.api.table import ResultOrigin
     from armid_ros.arm import ArmModel
     from armid_ros.cli import options
     from armid_ros.effects import parse_effect
     from armid_ros.excitation import CollisionScene, with_joint_limits
     from armid_ros.excitation.search.local import INTERRUPTED
     from armid_ros.files.cells import parted
+    from armid_ros.report.provenance import ResultOrigin
 
     _refuse_other_options(click.get_current_context(), kind)
     robot = _driven(robot_source, gravity, joints, after)

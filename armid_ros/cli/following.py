@@ -93,19 +93,16 @@ def _subject(
         more = ['--trajectory', out / 'excitation.yaml']
     elif isinstance(result, DiagnosisResult) and then == 'simulate':
         plans = [out / name for name in result.files if name == EXPERIMENT_FILE]
-        more = [*_each('--trajectory', plans), '--model', out / 'model.yaml']
+        more = [*chain(*(('--trajectory', plan) for plan in plans)), '--model', out / 'model.yaml']
     elif then == 'diagnose':
-        more = [*_each('--validate', given['validate']), '--effects', given['effects']]
+        held_out = chain(*(('--validate', bag) for bag in given['validate']))
+        more = [*held_out, '--effects', given['effects']]
     elif isinstance(result, InspectionResult) and robot is None:
         topics = [topic.name for topic in result.core.topics]
         robot = '-' if '/robot_description' in topics else 'ROBOT.urdf'
     if robot == '-' and then in _ALONE:
         robot = out / 'robot.urdf'
     return robot or '', bags[:1] if then == 'inspect' else bags, more
-
-
-def _each(option: str, values: Iterable[Any]) -> Iterator[Any]:
-    return chain.from_iterable((option, value) for value in values)
 
 
 def _typed(context: click.Context, kept: Iterable[str]) -> Iterator[str]:

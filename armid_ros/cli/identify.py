@@ -91,11 +91,11 @@ def identify(
     """Fit a model with uncertainties to recordings."""
     from armid_ros.api.identification import IdentificationResult
     from armid_ros.api.identification import identify as run
-    from armid_ros.api.table import ResultOrigin
     from armid_ros.arm import ArmModel
     from armid_ros.cli import options
     from armid_ros.errors import IdentificationError
     from armid_ros.identification import PhysicalSettings
+    from armid_ros.report.provenance import ResultOrigin
 
     staged = options.stage(out, IdentificationResult.schema, robot_source)
     robot = options.open_robot(robot_source, gravity, joints, bags, tell=False)

@@ -44,10 +44,10 @@ def inspect(
     from armid_ros.api.arguments import topics_of
     from armid_ros.api.inspection import inspect as run
     from armid_ros.api.inspection import InspectionResult
-    from armid_ros.api.table import ResultOrigin
     from armid_ros.cli import options
     from armid_ros.files.cells import listed
     from armid_ros.recording.anything import read_anything
+    from armid_ros.report.provenance import ResultOrigin
 
     staged = (
         None if out is None else options.stage(out, InspectionResult.schema, robot_source or '')
@@ -119,8 +119,8 @@ def check(
     from armid_ros.api.arguments import describes_robot
     from armid_ros.api.inspection import check as run
     from armid_ros.api.inspection import CheckResult
-    from armid_ros.api.table import ResultOrigin
     from armid_ros.cli import options
+    from armid_ros.report.provenance import ResultOrigin
 
     context = click.get_current_context()
     given = context.get_parameter_source('robot_source')

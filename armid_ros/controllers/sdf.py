@@ -5,7 +5,7 @@
 from __future__ import annotations
 
 from armid_ros.arm import ArmModel
-from armid_ros.arm.export import arm_mjcf, arm_urdf, Exported
+from armid_ros.arm.export import arm_mjcf, arm_urdf
 from armid_ros.motion import FloatArray
 from armid_ros.report.page import render
 from armid_ros.robots import held_joints
@@ -13,17 +13,9 @@ import numpy as np
 import pinocchio as pin
 
 
-def urdf_of(arm: ArmModel, source: str) -> tuple[str, tuple[str, ...]]:
-    """Return the URDF of an arm, and what is not in it; see `arm_urdf`."""
-    return _with_source(arm_urdf(arm), '<robot', source)
-
-
-def mjcf_of(arm: ArmModel, source: str) -> tuple[str, tuple[str, ...]]:
-    """Return the MJCF of an arm, and what is not in it; see `arm_mjcf`."""
-    return _with_source(arm_mjcf(arm), '<mujoco', source)
-
-
-def _with_source(exported: Exported, root: str, source: str) -> tuple[str, tuple[str, ...]]:
+def urdf_or_mjcf(arm: ArmModel, kind: str, source: str) -> tuple[str, tuple[str, ...]]:
+    """Return the 'urdf' or 'mjcf' of an arm, with a comment, and what is not in it."""
+    exported, root = (arm_urdf(arm), '<robot') if kind == 'urdf' else (arm_mjcf(arm), '<mujoco')
     comment = f'<!-- written by armid export, from {source.replace("--", "- -")} -->'
     return exported.text.replace(root, f'{comment}\n{root}', 1), exported.without_place
 

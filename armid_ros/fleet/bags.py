@@ -66,11 +66,6 @@ def digest(*parts: str, size: int = 16) -> str:
     return hashlib.sha256('\n'.join(parts).encode()).hexdigest()[:size]
 
 
-def part_of(data_set: str, bag: BagFile, day: str) -> str:
-    """Return the path of the file of a bag in a data set with partitions by arm and day."""
-    return f'{data_set}/{folder_of(bag.arm)}/day={day}/{bag.name}.parquet'
-
-
 def folder_of(arm: str) -> str:
     """Return the folder of an arm's partition."""
     return f'arm={file_name(arm)}'
@@ -143,6 +138,11 @@ def _bags(
     filesystem: Any, listed: Mapping[str, Mapping[str, Any]]
 ) -> Iterator[tuple[str, int, str]]:
     """Yield path, size and version of all bags; files of a listed directory are parts of it."""
+
+    def version(info: Mapping[str, Any]) -> str:
+        found = [str(info[name]) for name in _VERSIONS if info.get(name)][:1]
+        return '/'.join([str(info.get('name')), str(info.get('size')), *found])
+
     whole: list[str] = []
     for path, info in sorted(listed.items()):
         path = path.rstrip('/')
@@ -154,16 +154,11 @@ def _bags(
             ]
             if inside:
                 whole.append(path)
-                versions = [_version(one) for one in sorted(inside, key=lambda one: one['name'])]
+                versions = [version(one) for one in sorted(inside, key=lambda one: one['name'])]
                 size = sum(int(one.get('size') or 0) for one in inside)
                 yield path, size, digest(*versions)
         elif path.endswith(SUFFIXES):
-            yield path, int(info.get('size') or 0), digest(_version(info))
-
-
-def _version(info: Mapping[str, Any]) -> str:
-    found = [str(info[name]) for name in _VERSIONS if info.get(name)][:1]
-    return '/'.join([str(info.get('name')), str(info.get('size')), *found])
+            yield path, int(info.get('size') or 0), digest(version(info))
 
 
 def _arm(pattern: str, path: str) -> str:

@@ -73,7 +73,7 @@ def fleet() -> None:
 @contextmanager
 def _results(out: str, doing: str) -> Iterator[tuple[Store, Callable[..., None]]]:
     """Lock a folder of results while a command runs, and show the progress."""
-    from armid_ros.cli.options import hold
+    from armid_ros.files import result_folder
     from armid_ros.fleet.plan import SCHEMA
     from armid_ros.fleet.store import Store, StoreError
 
@@ -81,7 +81,9 @@ def _results(out: str, doing: str) -> Iterator[tuple[Store, Callable[..., None]]
     try:
         with progress(doing) as tick:
             if store.local is not None:
-                hold(store.local, SCHEMA)
+                context = click.get_current_context()
+                forced = bool(context.meta.get(options.FORCE, False))
+                context.with_resource(result_folder(store.local, SCHEMA, force=forced))
             yield store, tick
     except StoreError as error:
         raise FleetError(f'{error}; is --out a folder that can be read and written?') from error

@@ -21,12 +21,12 @@ from typing import Any
 from armid_ros.api.diagnosis import diagnose
 from armid_ros.api.identification import identify
 from armid_ros.arm import ArmModel
-from armid_ros.errors import ArmidError
+from armid_ros.errors import ArmidError, FleetError
 from armid_ros.fleet.bags import folder_of
 from armid_ros.fleet.plan import document, kind_arm
 from armid_ros.fleet.run import RETRIES
 from armid_ros.fleet.store import fetched, Store
-from armid_ros.fleet.watch import arm_of, Watch
+from armid_ros.fleet.watch import Watch
 from armid_ros.identification import Conditioning
 from armid_ros.recording import read_recording
 from distributed import as_completed, Client
@@ -76,7 +76,11 @@ def cases(found: Watch, arms: Sequence[str] = (), everyone: bool = False) -> lis
         If there is no arm of one of these names.
 
     """
-    chosen = [arm_of(found, name) for name in arms]
+    by_name = {arm.arm: arm for arm in found.arms}
+    for name in set(arms) - by_name.keys():
+        known = ', '.join(sorted(by_name)[:5])
+        raise FleetError(f"there is no arm '{name}'; there are {known} ...")
+    chosen = [by_name[name] for name in arms]
     if not arms:
         chosen = [arm for arm in found.arms if arm.named or everyone]
     some = []

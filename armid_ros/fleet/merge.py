@@ -56,10 +56,6 @@ class Refused:
     reason: str
     failed: bool = False
 
-    def merged(self) -> MergedBags:
-        """Return a group that consists of this bag."""
-        return MergedBags(refused=(self,))
-
 
 @dataclass(frozen=True, eq=False)
 class FleetEstimate:
@@ -170,7 +166,18 @@ class MergedBags:
     refused: tuple[Refused, ...] = ()
 
     @classmethod
-    def of(cls, parts: Sequence[MergedBags]) -> MergedBags:
+    def of(cls, bags: Sequence[BagSummary | Refused]) -> MergedBags:
+        """Merge bags, in order."""
+        used = [one for one in bags if isinstance(one, BagSummary)]
+        parts = [
+            cls(one.normal, one.seconds, ((one.bag.url, one.bag.version),), not one.computed)
+            for one in used
+        ]
+        refused = tuple(one for one in bags if isinstance(one, Refused))
+        return cls.together([*parts, cls(refused=refused)])
+
+    @classmethod
+    def together(cls, parts: Sequence[MergedBags]) -> MergedBags:
         """Merge several groups of bags, in order."""
         known = [part.normal for part in parts if part.normal is not None]
         return cls(
@@ -219,11 +226,6 @@ class BagSummary:
     motion: Mapping[str, object] = field(default_factory=dict)
     computed: bool = True
     rows: tuple[Regression, ...] | None = None
-
-    def merged(self) -> MergedBags:
-        """Return a group that consists of this bag."""
-        version = self.bag.url, self.bag.version
-        return MergedBags(self.normal, self.seconds, (version,), 0 if self.computed else 1)
 
     def rows_again(self, job: Job) -> Iterator[Regression]:
         """Yield the rows of the bag from memory, or read the bag again."""

@@ -32,13 +32,12 @@ from armid_ros.report.blocks import (
     ContentSection,
     DataTable,
     Fold,
-    PageBlock,
     Paragraph,
     SmallMultiples,
+    VerdictSection,
 )
 from armid_ros.report.notation import counted, digits, pretty, with_interval
-from armid_ros.report.page import Page, Section
-from armid_ros.report.sections.frame import VerdictSection
+from armid_ros.report.page import Page, Section, Templated
 from markupsafe import escape, Markup
 import numpy as np
 
@@ -119,7 +118,7 @@ def _arm_page(found: Watch, arm: WatchedArm, diagnoses: Diagnoses) -> str:
         'axis.'
     )
     first, rest = ([_curve(arm, one) for one in part] for part in (shown[:cut], shown[cut:]))
-    curves: list[PageBlock] = [SmallMultiples(first)] if first else []
+    curves: list[Templated] = [SmallMultiples(first)] if first else []
     if rest:
         line = f'{counted(len(rest), "parameter")} without a change'
         curves.append(Fold(line, [SmallMultiples(rest)]))

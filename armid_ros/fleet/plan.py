@@ -100,11 +100,6 @@ def filters_at(filters: Conditioning, rate_hz: float, source: str) -> Conditioni
     return Conditioning(rate_hz, filters.cutoff_hz, decimation)
 
 
-def _filter_facts(filters: Conditioning) -> dict[str, Any]:
-    """Return filters as an entry of fleet.json: the arguments of a ``Conditioning``."""
-    return {name: getattr(filters, name) for name in ('cutoff_hz', 'decimation', 'rate_hz')}
-
-
 @dataclass(frozen=True)
 class Job:
     """
@@ -136,23 +131,26 @@ class Job:
 
     @cached_property
     def facts(self) -> dict[str, Any]:
-        """Return the facts on which results depend, except the bag."""
-        robot = self.arm.robot
+        """Return the entry of fleet.json: what results depend on, beside bag and kinematics."""
+        robot, effects = self.arm.robot, self.arm.effects
         return {
             'robot': robot.name,
-            'joints': list(robot.joints),
-            'kinematics': kinematics_digest(robot),
             'gravity': [float(g) for g in robot.gravity],
-            'effects': [[effect.name, list(effect.joints)] for effect in self.arm.effects],
-            'weighted': self.settings.weighted,
+            'joints': list(robot.joints),
+            'effects': [f'{effect.name}@{"+".join(effect.joints)}' for effect in effects],
+            'method': 'wls' if self.settings.weighted else 'ols',
             'topic': self.settings.topic,
-            **_filter_facts(self.filters),
+            'filters': {
+                name: getattr(self.filters, name)
+                for name in ('cutoff_hz', 'decimation', 'rate_hz')
+            },
         }
 
     @cached_property
     def digest(self) -> str:
         """Return a hash of the facts."""
-        return digest(json.dumps(self.facts, sort_keys=True))
+        facts = {**self.facts, 'kinematics': kinematics_digest(self.arm.robot)}
+        return digest(json.dumps(facts, sort_keys=True))
 
     @property
     def samples(self) -> int:
@@ -265,11 +263,10 @@ def plan_fleet(
     jobs: dict[str, Job] = {}
     for entry, some in bags_of.items():
         model = _model(entry, settings)
+        effects = [effect.name + '@' + '+'.join(effect.joints) for effect in model.effects]
         robot = model.robot
-        effects = [f'{effect.name}@{"+".join(effect.joints)}' for effect in model.effects]
-        gravity, joints = [float(g) for g in robot.gravity], list(robot.joints)
-        facts = json.dumps([robot.urdf, gravity, joints, effects])
-        key = digest(facts, size=12)
+        facts = [robot.urdf, robot.gravity.tolist(), list(robot.joints), effects]
+        key = digest(json.dumps(facts), size=12)
         theory = model.base_parameters(np.random.default_rng(settings.seed))
         if key in before.get('kinds', {}) and settings.signals == SignalSettings():
             filters = Conditioning(**before['kinds'][key]['filters'])
@@ -277,15 +274,7 @@ def plan_fleet(
             filters = choose_filters(model, theory, some, settings)
         job = Job(model, theory, filters, store.url, run, settings)
         store.write(f'robots/{key}.urdf', robot.urdf)
-        kinds[key] = {
-            'robot': robot.name,
-            'gravity': gravity,
-            'joints': joints,
-            'effects': effects,
-            'method': 'wls' if settings.weighted else 'ols',
-            'topic': settings.topic,
-            'filters': _filter_facts(filters),
-        }
+        kinds[key] = job.facts
         for bag in some:
             arms[bag.arm], jobs[bag.arm] = key, job
     text = json_text({'schema': SCHEMA, 'kinds': kinds, 'arms': arms}, indent=1)

@@ -19,8 +19,7 @@ from collections.abc import Sequence
 import datetime
 
 from armid_ros.arm import parameter_table
-from armid_ros.errors import FleetError
-from armid_ros.fleet.bags import BagFile, digest, folder_of, part_of
+from armid_ros.fleet.bags import BagFile, digest, folder_of
 from armid_ros.fleet.merge import BagSummary, FleetEstimate, MergedBags, Refused
 from armid_ros.fleet.plan import Job
 from armid_ros.fleet.store import Store
@@ -88,6 +87,11 @@ REFUSED = pa.schema(
 )
 
 
+def _part(data_set: str, bag: BagFile, day: str) -> str:
+    """Return the path of the file of a bag in a data set with partitions by arm and day."""
+    return f'{data_set}/{folder_of(bag.arm)}/day={day}/{bag.name}.parquet'
+
+
 def write_summary(store: Store, summary: BagSummary, job: Job) -> None:
     """Write the summary of a bag to the tables."""
     bag, own = summary.bag, summary.own
@@ -97,7 +101,7 @@ def write_summary(store: Store, summary: BagSummary, job: Job) -> None:
     table = pa.Table.from_pylist(
         [{'bag': bag.url, 'start': start, **row} for row in rows], PARAMETERS
     )
-    store.write_table(part_of('parameters', bag, summary.day), table)
+    store.write_table(_part('parameters', bag, summary.day), table)
     row = {
         'bag': bag.url,
         'version': bag.version,
@@ -114,11 +118,11 @@ def write_summary(store: Store, summary: BagSummary, job: Job) -> None:
         'normal_equations': summary.normal.packed(),
         **summary.motion,
     }
-    store.write_table(part_of('bags', bag, summary.day), pa.Table.from_pylist([row], BAGS))
+    store.write_table(_part('bags', bag, summary.day), pa.Table.from_pylist([row], BAGS))
     for day in [] if bag.day else _days(store, bag):
         if day != summary.day:  # the same bag, recorded again on another day
-            store.remove(part_of('bags', bag, day))
-            store.remove(part_of('parameters', bag, day))
+            store.remove(_part('bags', bag, day))
+            store.remove(_part('parameters', bag, day))
     store.remove(_refused(bag))
 
 
@@ -136,7 +140,7 @@ def find_summary(store: Store, bag: BagFile, job: Job) -> BagSummary | Refused |
             return Refused(bag, row['reason'])
     days = [bag.day] if bag.day else _days(store, bag) if job.settings.resume else []
     for day in days:
-        table = store.read_table(part_of('bags', bag, day))
+        table = store.read_table(_part('bags', bag, day))
         row = {} if table is None else table.to_pylist()[0]
         if row and _same(row, bag, job):
             return BagSummary(
@@ -163,7 +167,7 @@ def write_refused(store: Store, refused: Refused, job: Job) -> None:
     store.write_table(_refused(refused.bag), pa.Table.from_pylist([row], REFUSED))
     for data_set in ('bags', 'parameters'):  # results of an earlier version of the bag
         for day in _days(store, refused.bag, data_set):
-            store.remove(part_of(data_set, refused.bag, day))
+            store.remove(_part(data_set, refused.bag, day))
 
 
 def write_arm(
@@ -207,22 +211,6 @@ def arm_is_done(store: Store, arm: str, bags: Sequence[BagFile], job: Job) -> li
     out = {one.bag.url for one in refused}
     used = [(bag.url, bag.version) for bag in bags if bag.url not in out]
     return refused if row['versions'] == _versions(used) else None
-
-
-def table_of(store: Store, data_set: str) -> pa.Table:
-    """
-    Return a data set as one table.
-
-    Raises
-    ------
-    FleetError
-        If there is no such data set.
-
-    """
-    table = store.data_set(data_set)
-    if table is None:
-        raise FleetError(f'{store.url}: holds no {data_set}; run `armid fleet identify` first')
-    return table
 
 
 def _versions(versions: Sequence[tuple[str, str]]) -> str:

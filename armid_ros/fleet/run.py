@@ -122,14 +122,9 @@ def same(job: Job) -> Job:
     return job
 
 
-def merge(taken: Sequence[BagSummary | Refused]) -> MergedBags:
-    """Task: merge the normal equations of a group; the rows of its bags stay on their worker."""
-    return MergedBags.of([one.merged() for one in taken])
-
-
 def fit(groups: Sequence[MergedBags], job: Job) -> Fitted:
     """Task: merge the groups of an arm, and fit all its bags."""
-    merged = MergedBags.of(groups)
+    merged = MergedBags.together(groups)
     return merged, None if merged.normal is None else FleetFit.of(merged.normal, job)
 
 
@@ -315,7 +310,7 @@ class _Run:
                     self._count(group)
 
             future.add_done_callback(ended)
-        fitted = self._submit(fit, [self._submit(merge, one) for one in prepared], job)
+        fitted = self._submit(fit, [self._submit(MergedBags.of, one) for one in prepared], job)
         products = [self._submit(noise, one, fitted, job, retries=RETRIES) for one in prepared]
         last = self._submit(finish, arm.arm, fitted, products, job, retries=RETRIES)
         return _UnderWay(arm, prepared, fitted, products, last)
@@ -338,11 +333,15 @@ class _Run:
                 groups.append(group)
             elif len(group) > 1:
                 groups.extend((bag,) for bag in group)
-            elif isinstance(future.exception(), KilledWorker) and self._read(group, arm.arm):
-                groups.append(group)
-                hit = True
             else:
-                failed.append(Refused(group[0], _reason(future.exception()), failed=True))
+                if isinstance(future.exception(), KilledWorker):  # once more, without the others
+                    future = self._submit(take, group, self._job(arm.arm), 1, retries=RETRIES)
+                    next(as_completed([future], raise_errors=False))
+                if future.status != 'error':
+                    groups.append(group)
+                    hit = True
+                else:
+                    failed.append(Refused(group[0], _reason(future.exception()), failed=True))
         for one in failed:
             write_refused(Store(job.out), one, job)
         left = _Waiting(
@@ -356,12 +355,6 @@ class _Run:
         else:
             problem = 'none of its bags can be used' if failed else _reason(error)
             self.outcomes.append(ArmOutcome(left.arm, refused=left.refused, problem=problem))
-
-    def _read(self, group: Group, arm: str) -> bool:
-        """Return whether a group can be read while no other task of its arm runs."""
-        future = self._submit(take, group, self._job(arm), 1, retries=RETRIES)
-        ended: Future = next(as_completed([future], raise_errors=False))
-        return bool(ended.status != 'error')
 
 
 def _reason(error: BaseException | None) -> str:

@@ -12,7 +12,7 @@ A fleet over time: histories of its results, changes and alarms.
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Mapping
 from dataclasses import dataclass
 import datetime
 import json
@@ -30,7 +30,6 @@ from armid_ros.errors import FleetError
 from armid_ros.estimate import name_in_words, ParameterName
 from armid_ros.fleet.bags import DAY_NS
 from armid_ros.fleet.plan import document, kind_arm
-from armid_ros.fleet.results import table_of
 from armid_ros.fleet.store import Store
 from armid_ros.identification.fitting.identifiability import HALF_WIDTH
 from armid_ros.report.families import full_label
@@ -171,12 +170,12 @@ def watch_fleet(store: Store, alpha: float = ALPHA) -> Watch:
     kind_of: Mapping[str, str] = facts.get('arms', {})
     if not kind_of:
         raise FleetError(f'{store.url}: holds no fleet; run `armid fleet identify` first')
-    bags = _by_arm(table_of(store, 'bags').drop_columns(['normal_equations']))
+    bags = _by_arm(_table(store, 'bags').drop_columns(['normal_equations']))
     for rows in bags.values():
         rows.sort(key=lambda row: (row['start_ns'], row['bag']))
     refused = _by_arm(store.data_set('refused'))
     by_kind: dict[str, list[ParameterHistory]] = {}
-    for one in _series(table_of(store, 'parameters'), bags):
+    for one in _series(_table(store, 'parameters'), bags):
         by_kind.setdefault(kind_of.get(one.arm, ''), []).append(one)
     wearing: set[str] = set()
     for key, kind in facts['kinds'].items():
@@ -192,8 +191,8 @@ def watch_fleet(store: Store, alpha: float = ALPHA) -> Watch:
         kinds.append((without, spread))
         for one, other in zip(group, without, strict=True):
             own.setdefault(one.arm, []).append(one)
-            if one.name in wearing:
-                worn.setdefault(one.arm, []).extend(_wear_row(other, spread))
+            if one.name in wearing and len(other.values) > 1:
+                worn.setdefault(one.arm, []).append(_wear_row(other, spread[other.parameter]))
     for judged in judge(kinds):
         name = judged.arm
         arms.append(
@@ -205,27 +204,10 @@ def watch_fleet(store: Store, alpha: float = ALPHA) -> Watch:
                 judged,
                 named(judged, alpha),
                 tuple(refused.get(name, ())),
-                tuple(worn.get(name, ())),
+                tuple(row for row in worn.get(name, ()) if np.isfinite(row['upper'])),
             )
         )
     return Watch(tuple(arms), alpha)
-
-
-def arm_of(found: Watch, name: str) -> WatchedArm:
-    """
-    Return an arm by its name.
-
-    Raises
-    ------
-    FleetError
-        If there is no arm of this name.
-
-    """
-    by_name = {arm.arm: arm for arm in found.arms}
-    if name not in by_name:
-        known = ', '.join(sorted(by_name)[:5])
-        raise FleetError(f"there is no arm '{name}'; there are {known} ...")
-    return by_name[name]
 
 
 def write_watch(store: Store, found: Watch) -> None:
@@ -279,23 +261,17 @@ def change_rows(arm: WatchedArm) -> list[dict[str, Any]]:
     return rows
 
 
-def _wear_row(
-    series: ParameterHistory, spread: Mapping[tuple[str, str], Spread]
-) -> Iterator[dict[str, Any]]:
-    """Yield the slope of a parameter as a row, if its standard deviation is finite."""
-    if len(series.values) < 2:
-        return
-    slope, std = wear(series, spread[series.parameter])
-    if np.isfinite(std):
-        yield {
-            'arm': series.arm,
-            'name': series.name,
-            'joint': series.joint,
-            'unit': series.unit,
-            'per_month': slope,
-            'lower': slope - HALF_WIDTH * std,
-            'upper': slope + HALF_WIDTH * std,
-        }
+def _wear_row(series: ParameterHistory, spread: Spread) -> dict[str, Any]:
+    slope, std = wear(series, spread)
+    return {
+        'arm': series.arm,
+        'name': series.name,
+        'joint': series.joint,
+        'unit': series.unit,
+        'per_month': slope,
+        'lower': slope - HALF_WIDTH * std,
+        'upper': slope + HALF_WIDTH * std,
+    }
 
 
 def sentence(change: HistoryChange) -> str:
@@ -330,6 +306,13 @@ def parameter_label(name: str, joint: str) -> str:
     if name.isidentifier() and '_' in name:
         return f'{name_in_words(name)} of {joint}'
     return full_label(ParameterName(name, joint, ''))
+
+
+def _table(store: Store, data_set: str) -> pa.Table:
+    table = store.data_set(data_set)
+    if table is None:
+        raise FleetError(f'{store.url}: holds no {data_set}; run `armid fleet identify` first')
+    return table
 
 
 def _by_arm(table: pa.Table | None) -> dict[str, list[dict[str, Any]]]:

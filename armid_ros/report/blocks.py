@@ -1,23 +1,17 @@
 # Copyright 2026 The armid_ros developers
 # SPDX-License-Identifier: Apache-2.0
-"""What sections are made of: paragraphs, tables, facts, lists, folds and panels."""
+"""What pages are made of: blocks, and the sections that every page has."""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import ClassVar, Protocol
+from typing import ClassVar
 
 from armid_ros.report.charts import Role
 from armid_ros.report.page import Section, Templated
+from armid_ros.report.provenance import Provenance
 from markupsafe import Markup
-
-
-class PageBlock(Protocol):
-    """Something that can be shown on a page."""
-
-    def html(self) -> Markup:
-        """Return it as HTML, everything in it escaped."""
 
 
 @dataclass(frozen=True)
@@ -29,7 +23,7 @@ class ContentSection(Section):
     ----------
     title : str
         Heading; empty for none.
-    blocks : sequence of PageBlock
+    blocks : sequence of Templated
         Its content in order.
 
     """
@@ -37,7 +31,7 @@ class ContentSection(Section):
     template: ClassVar[str] = 'content.html'
 
     title: str  # type: ignore[misc]  # of an instance, not of a class
-    blocks: Sequence[PageBlock]
+    blocks: Sequence[Templated]
 
 
 @dataclass(frozen=True)
@@ -203,7 +197,7 @@ class Fold(Templated):
     ----------
     summary : str
         The line.
-    blocks : sequence of PageBlock
+    blocks : sequence of Templated
         What is below it.
     opened : bool
         Whether it is open at first.
@@ -213,7 +207,7 @@ class Fold(Templated):
     template: ClassVar[str] = 'fold.html'
 
     summary: str
-    blocks: Sequence[PageBlock]
+    blocks: Sequence[Templated]
     opened: bool = False
 
 
@@ -224,7 +218,7 @@ class Panels(Templated):
 
     Attributes
     ----------
-    panels : sequence of (str, str, sequence of PageBlock)
+    panels : sequence of (str, str, sequence of Templated)
         Heading, small print beside it, and content.
     three : bool
         Whether there is room for three in a row, and not for two.
@@ -234,7 +228,7 @@ class Panels(Templated):
     template: ClassVar[str] = 'panels.html'
     short_names: ClassVar[bool] = True
 
-    panels: Sequence[tuple[str, str, Sequence[PageBlock]]]
+    panels: Sequence[tuple[str, str, Sequence[Templated]]]
     three: bool = False
 
 
@@ -331,3 +325,51 @@ class BarChart(Templated):
     def legend(self) -> Legend:
         """Return the legend of the colours."""
         return Legend(self.roles)
+
+
+@dataclass(frozen=True)
+class VerdictSection(Section):
+    """
+    The verdict box of a page.
+
+    Attributes
+    ----------
+    grade : str
+        One word, shown as a badge; empty for none.
+    tone : {'good', 'fair', 'bad', ''}
+        Colour of the badge.
+    sentences : sequence of str
+        What was found; the first stands out.
+    beware : sequence of str
+        What not to overlook.
+    bars : BarChart or None
+        The number of the verdict for each joint.
+    step : str
+        What to do next; empty for nothing.
+
+    """
+
+    title: ClassVar[str] = 'Verdict'
+    template: ClassVar[str] = 'verdict.html'
+
+    grade: str
+    tone: str
+    sentences: Sequence[str]
+    beware: Sequence[str] = ()
+    bars: BarChart | None = None
+    step: str = ''
+
+
+def next_steps_section(steps: Sequence[str]) -> ContentSection:
+    """Return the next steps, most useful first."""
+    return ContentSection('What to do next', [BulletList([(step, '') for step in steps], True)])
+
+
+@dataclass(frozen=True)
+class Origin(Section):
+    """Files with their hashes, versions, settings, seed."""
+
+    title: ClassVar[str] = 'Provenance'
+    template: ClassVar[str] = 'origin.html'
+
+    provenance: Provenance

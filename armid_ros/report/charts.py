@@ -12,7 +12,7 @@ from __future__ import annotations
 
 from base64 import b64encode
 from collections.abc import Sequence
-from dataclasses import asdict, dataclass
+from dataclasses import dataclass
 from io import BytesIO
 import json
 from typing import Any, ClassVar, Literal
@@ -59,45 +59,6 @@ class Series:
 
 
 @dataclass(frozen=True)
-class Level:
-    """
-    A horizontal line.
-
-    Attributes
-    ----------
-    y : float
-        Where.
-    label : str
-        What it is; written at its right end.
-
-    """
-
-    y: float
-    label: str = ''
-
-
-@dataclass(frozen=True)
-class Mark:
-    """
-    A vertical line.
-
-    Attributes
-    ----------
-    x : float
-        Where.
-    label : str
-        What it is; written beside its foot.
-    before : bool
-        Whether that is to its left.
-
-    """
-
-    x: float
-    label: str = ''
-    before: bool = False
-
-
-@dataclass(frozen=True)
 class Chart(Templated):
     """
     Curves over a common axis that a reader can zoom into.
@@ -114,10 +75,10 @@ class Chart(Templated):
         [CSS pixel].
     link : str
         Charts with the same name zoom together; empty for none.
-    levels : sequence of Level
-        Horizontal lines.
-    marks : sequence of Mark
-        Vertical lines.
+    levels : sequence of (float, str)
+        Horizontal lines: ordinate, and what is written at the right end.
+    marks : sequence of (float, str, bool)
+        Vertical lines: abscissa, what is written beside the foot, and whether to the left of it.
     logarithmic : bool
         Whether the abscissa is; it has to be positive.
     symmetric : bool
@@ -136,8 +97,8 @@ class Chart(Templated):
     ylabel: str
     height: int = 220
     link: str = ''
-    levels: Sequence[Level] = ()
-    marks: Sequence[Mark] = ()
+    levels: Sequence[tuple[float, str]] = ()
+    marks: Sequence[tuple[float, str, bool]] = ()
     logarithmic: bool = False
     symmetric: bool = False
     legend: bool = True
@@ -159,8 +120,8 @@ class Chart(Templated):
             'symmetric': self.symmetric,
             'legend': self.legend,
             'logarithmic': self.logarithmic,
-            'levels': [{'y': level.y, 'label': level.label} for level in self.levels],
-            'marks': [asdict(mark) for mark in self.marks],
+            'levels': [{'y': y, 'label': label} for y, label in self.levels],
+            'marks': [{'x': x, 'label': s, 'before': left} for x, s, left in self.marks],
             'series': [
                 {
                     'label': series.label,

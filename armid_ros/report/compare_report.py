@@ -22,14 +22,15 @@ from armid_ros.report.blocks import (
     FactList,
     IntervalTrack,
     Legend,
+    Origin,
     Paragraph,
     TableCell,
+    VerdictSection,
 )
 from armid_ros.report.families import estimate_text, full_label, parameter_folds
 from armid_ros.report.notation import counted, digits, measured, pretty, robot_label
 from armid_ros.report.page import Page, Section
-from armid_ros.report.provenance import Provenance
-from armid_ros.report.sections.frame import Origin, VerdictSection
+from armid_ros.report.provenance import ResultOrigin
 
 #: Columns of what changed.
 HEADS = ('parameter', 'before', 'after', 'difference, 95 %')
@@ -43,7 +44,7 @@ _WHY = {
 }
 
 
-def compare_report(comparison: Comparison, provenance: Provenance | None, step: str = '') -> str:
+def compare_report(comparison: Comparison, origin: ResultOrigin) -> str:
     """
     Return the page of a comparison.
 
@@ -51,10 +52,8 @@ def compare_report(comparison: Comparison, provenance: Provenance | None, step: 
     ----------
     comparison : Comparison
         Two identifications.
-    provenance : Provenance or None
-        Files, versions.
-    step : str
-        What to do next.
+    origin : ResultOrigin
+        Files, versions, and what to do next.
 
     Returns
     -------
@@ -69,11 +68,13 @@ def compare_report(comparison: Comparison, provenance: Provenance | None, step: 
         facts.append((heading, f'{side.source}: {robot_label(side.robot)}{said}'))
     rows = change_rows(comparison)
     sections: list[Section] = [
-        VerdictSection(*verdict(comparison), tell(comparison), _beware(comparison), step=step),
+        VerdictSection(
+            *verdict(comparison), tell(comparison), _beware(comparison), step=origin.step
+        ),
         *([ContentSection('What changed', [DataTable(HEADS, rows, kind='both')])] if rows else []),
         changes_section(comparison),
         ContentSection('Input', [FactList(facts)]),
-        Origin(provenance or Provenance()),
+        Origin(origin.provenance),
     ]
     robot = robot_label(comparison.after.robot)
     title = f'Comparison of two identifications of {robot}'

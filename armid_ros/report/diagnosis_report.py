@@ -6,11 +6,9 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
-from pathlib import Path
 import re
-from typing import Any, ClassVar, Protocol
+from typing import ClassVar, TYPE_CHECKING
 
-from armid_ros.arm import ArmModel
 from armid_ros.diagnosis import Diagnosis, Finding, NextRun
 from armid_ros.diagnosis.next_run.steps import MODEL, next_steps
 from armid_ros.diagnosis.verdict.document import detectable
@@ -19,6 +17,7 @@ from armid_ros.estimate import name_in_words
 from armid_ros.identification.assess.verification import ForwardValidation
 from armid_ros.recording import Recording
 from armid_ros.report.arm_drawing import ArmDrawing, draw_arm
+from armid_ros.report.blocks import next_steps_section, Origin, VerdictSection
 from armid_ros.report.notation import (
     counted,
     digits,
@@ -30,7 +29,7 @@ from armid_ros.report.notation import (
     with_names,
 )
 from armid_ros.report.page import Page, Section
-from armid_ros.report.provenance import Provenance
+from armid_ros.report.provenance import DEFAULT_ORIGIN, ResultOrigin
 from armid_ros.report.sections.data_quality import data_quality_section
 from armid_ros.report.sections.diagnosed import (
     candidates_section,
@@ -41,11 +40,14 @@ from armid_ros.report.sections.diagnosed import (
     named_section,
     patch_section,
     share_bars,
+    share_of,
 )
 from armid_ros.report.sections.fit import forward_section
-from armid_ros.report.sections.frame import next_steps_section, Origin, VerdictSection
 from armid_ros.report.sections.overlay import overlay_section, whole_overlays
 import numpy as np
+
+if TYPE_CHECKING:
+    from armid_ros.residual import Residual
 
 #: Colour of each verdict; the others are bad.
 _TONES = {'consistent': 'good', 'named': 'good', 'ambiguous': 'fair', 'partial': 'fair'}
@@ -66,37 +68,6 @@ def tone_of(diagnosis: Diagnosis, worse: Sequence[str] = ()) -> str:
     return 'fair' if tone == 'good' and (any(open_ends) or worse) else tone
 
 
-class LearnedResidual(Protocol):
-    """Learned maps of an unexplained residual, as results and reports use them."""
-
-    @property
-    def arm(self) -> ArmModel:
-        """The model with the maps."""
-
-    @property
-    def gains(self) -> Mapping[str, float]:
-        """Share of the squared residual that the map of each joint predicts."""
-
-    @property
-    def table_file(self) -> str:
-        """Name of the file with the maps."""
-
-    def sentences(self) -> Sequence[str]:
-        """Return a sentence for each joint."""
-
-    def steps(self) -> Sequence[str]:
-        """Return what to do next about each joint."""
-
-    def section(self) -> Section:
-        """Return the section of a report with the maps."""
-
-    def document(self) -> dict[str, Any]:
-        """Return the entry of diagnosis.json."""
-
-    def write_table(self, folder: Path) -> None:
-        """Write the maps as a table into a folder."""
-
-
 @dataclass(frozen=True)
 class Extras:
     """
@@ -112,7 +83,7 @@ class Extras:
         Why there is no next run, where names are in doubt.
     notes : tuple of str
         Why there is not more.
-    residual : LearnedResidual or None
+    residual : Residual or None
         What is left without a name, learned.
 
     """
@@ -121,7 +92,7 @@ class Extras:
     next_run: NextRun | None = None
     no_run: str = ''
     notes: tuple[str, ...] = ()
-    residual: LearnedResidual | None = None
+    residual: Residual | None = None
 
     def steps(self, diagnosis: Diagnosis, model: str = MODEL) -> list[str]:
         """Return what to do next, for the page and the terminal, and where the model is."""
@@ -167,11 +138,10 @@ def diagnosis_report(
     diagnosis: Diagnosis,
     read: Mapping[str, Sequence[Recording]],
     *,
-    robot: str,
     everything: bool = False,
     extras: Extras | None = None,
     patch: str = '',
-    provenance: Provenance | None = None,
+    origin: ResultOrigin = DEFAULT_ORIGIN,
 ) -> str:
     """
     Return report.html of a diagnosis.
@@ -183,16 +153,14 @@ def diagnosis_report(
     read : mapping of str to sequence of Recording
         Recordings by what they were used for: 'training', 'held-out',
         'baseline', 'simulator'.
-    robot : str
-        Shipped name or path of the description.
     everything : bool
         Whether negligible effects were added to the model.
     extras : Extras, optional
         What was made of it.
     patch : str
         model.yaml of the patched model.
-    provenance : Provenance, optional
-        Files, versions, settings, seed.
+    origin : ResultOrigin
+        Robot, files, versions, settings, seed.
 
     Returns
     -------
@@ -211,18 +179,18 @@ def diagnosis_report(
     curves = whole_overlays(diagnosis, [one for one, _ in recordings])
     if curves is not None and diagnosis.gap is not None:
         sections += [
-            overlay_section(arm.robot, curves, patched, names, diagnosis.spans),
+            overlay_section(diagnosis, curves, names),
             Story(diagnosis, residual),
-            gap_section(arm.robot, diagnosis.gap, diagnosis.baseline, patched, diagnosis.harmful),
+            gap_section(diagnosis, diagnosis.gap),
             *([named_section(diagnosis.findings)] if patched else []),
         ]
         if diagnosis.where:
-            sections.append(evidence_section(diagnosis.where, share_of(diagnosis)))
+            sections.append(evidence_section(diagnosis))
     if residual is not None:
         sections.append(residual.section())
     sections.append(next_steps_section(steps))
     if diagnosis.minor:
-        sections.append(minor_section(diagnosis.minor, everything, patched))
+        sections.append(minor_section(diagnosis, everything))
     if diagnosis.gap is not None:
         sizes = detectable(diagnosis.explanation)
         sections += [candidates_section(diagnosis), detectable_section(sizes)]
@@ -239,13 +207,13 @@ def diagnosis_report(
     sections.append(data_quality_section(quality, at_fault=at_fault, names=names))
     if patched and not diagnosis.harmful:
         sections.append(patch_section(diagnosis.findings, patch))
-    sections.append(Origin(provenance or Provenance()))
+    sections.append(Origin(origin.provenance))
     used = [
         kind.format(counted(len(read[role]), noun))
         for role, noun, kind in _ROLES
         if read.get(role)
     ]
-    subtitle = ' · '.join([robot_label(robot), *used])
+    subtitle = ' · '.join([robot_label(origin.robot), *used])
     joints = (*arm.robot.joints, *arm.robot.links)
     return Page(f'Diagnosis of {arm.robot.name}', subtitle, sections, names=joints).html()
 
@@ -292,7 +260,7 @@ class Story(Section):
     ----------
     diagnosis : Diagnosis
         What was found.
-    residual : LearnedResidual or None
+    residual : Residual or None
         The learned residual.
 
     """
@@ -301,7 +269,7 @@ class Story(Section):
     template: ClassVar[str] = 'story.html'
 
     diagnosis: Diagnosis
-    residual: LearnedResidual | None = None
+    residual: Residual | None = None
 
     @property
     def drawing(self) -> ArmDrawing:
@@ -395,8 +363,3 @@ class Story(Section):
                 for joint, gain in self._gains.items()
             ),
         ]
-
-
-def share_of(diagnosis: Diagnosis) -> str:
-    """Return what the shares of joints refer to: the gap, or what the named causes explain."""
-    return 'the explained part' if diagnosis.findings else 'the gap'

@@ -34,21 +34,21 @@ from armid_ros.report.blocks import (
     DataTable,
     FactList,
     Legend,
-    PageBlock,
+    Origin,
     Panels,
     Paragraph,
     ShareBar,
     TableCell,
+    VerdictSection,
 )
-from armid_ros.report.charts import Chart, Level, Role, Series
+from armid_ros.report.charts import Chart, Role, Series
 from armid_ros.report.families import effects_in_words, full_label, parameter_folds
 from armid_ros.report.judgement import GOOD_CONDITION, WEAK_CONDITION
 from armid_ros.report.notation import counted, digits, plain, pretty, robot_label
-from armid_ros.report.page import Page, Section
-from armid_ros.report.provenance import Provenance
+from armid_ros.report.page import Page, Section, Templated
+from armid_ros.report.provenance import ResultOrigin
 from armid_ros.report.sections.diagnosed import isolability_section, SHADE
 from armid_ros.report.sections.fit import ZOOM
-from armid_ros.report.sections.frame import Origin, VerdictSection
 import numpy as np
 
 _SAMPLES, _POSES, _WAY = 600, 6, 150
@@ -60,10 +60,9 @@ def excitation_report(
     run: Run,
     checked: Fitness,
     *,
-    robot: str,
     scene: CollisionScene,
     isolability: Isolability | None = None,
-    provenance: Provenance,
+    origin: ResultOrigin,
 ) -> str:
     """
     Return report.html of a design.
@@ -78,14 +77,12 @@ def excitation_report(
         The design with the way there and back.
     checked : Fitness
         What was checked of it.
-    robot : str
-        Shipped name or path of the description.
     scene : CollisionScene
         Bodies of the arm, its floor, and what stands around it.
     isolability : Isolability, optional
         What it shows of the effects of the catalogue.
-    provenance : Provenance
-        Files, versions, settings, seed, and the command that follows.
+    origin : ResultOrigin
+        Robot, files, versions, settings, seed, and the command that follows.
 
     Returns
     -------
@@ -123,7 +120,7 @@ def excitation_report(
     sections: list[Section] = [
         replace(
             _verdict(design, arm.robot.links, shares, checked, collision.notes),
-            step=provenance.step,
+            step=origin.step,
         ),
         ContentSection('Poses', [poses, Legend(colours)]),
         _foreseen_section(design, arm.robot.links),
@@ -131,11 +128,11 @@ def excitation_report(
         _motion_section(limits, motion, shares),
         _clearance_section(motion.t, curves, design.settings.clearance, said),
         _harmonics_section(excitation.trajectory),
-        _asked(design, arm, robot, obstacles, run),
-        Origin(provenance),
+        _asked(design, arm, origin.robot, obstacles, run),
+        Origin(origin.provenance),
     ]
     subtitle = (
-        f'{robot_label(robot)} · {run.duration:.4g} s · {excitation.n_periods} periods · '
+        f'{robot_label(origin.robot)} · {run.duration:.4g} s · {excitation.n_periods} periods · '
         f'{design.settings.speed}'
     )
     names = (*arm.robot.joints, *arm.robot.links)
@@ -288,7 +285,7 @@ def _motion_section(
                 f'{name} [{pretty(limits.unit(name, j))}]',
                 height=180 if name == 'torque' else 145,
                 link='planned',
-                levels=[Level(float(e[j])) for e in (lower, upper) if np.isfinite(e[j])],
+                levels=[(float(e[j]), '') for e in (lower, upper) if np.isfinite(e[j])],
                 legend=False,
             )
             for name, values, lower, upper in quantities
@@ -314,7 +311,7 @@ def _clearance_section(
 ) -> ContentSection:
     """Return the distances of bodies, from each other and from the environment."""
     roles: tuple[Role, ...] = ('residual', 'before')
-    blocks: list[PageBlock] = [
+    blocks: list[Templated] = [
         Chart(
             t,
             [
@@ -325,7 +322,7 @@ def _clearance_section(
             'distance [cm]',
             height=240,
             link='planned',
-            levels=[Level(100.0 * margin, f'{100.0 * margin:g} cm to keep')],
+            levels=[(100.0 * margin, f'{100.0 * margin:g} cm to keep')],
         )
     ]
     if not curves:

@@ -21,11 +21,11 @@ from armid_ros.report.blocks import (
     Fold,
     IntervalTrack,
     Legend,
-    PageBlock,
     Paragraph,
     TableCell,
 )
 from armid_ros.report.notation import counted, digits, measured, pretty
+from armid_ros.report.page import Templated
 import numpy as np
 
 #: A parameter of a rigid body, and the number of its link.
@@ -210,7 +210,7 @@ def parameter_section(
         )
 
     count = int(changed.sum())
-    blocks: list[PageBlock] = [
+    blocks: list[Templated] = [
         Paragraph(
             f'The {reference} has values of {sum(known)} of these '
             f'{counted(len(names), "parameter")}; {count} of them {"is" if count == 1 else "are"} '

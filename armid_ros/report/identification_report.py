@@ -20,18 +20,20 @@ from armid_ros.report.blocks import (
     DataTable,
     FactList,
     Fold,
+    next_steps_section,
+    Origin,
     Paragraph,
     TableCell,
+    VerdictSection,
 )
 from armid_ros.report.charts import Chart, Series
 from armid_ros.report.families import effects_in_words, full_label, parameter_section
 from armid_ros.report.judgement import judge
 from armid_ros.report.notation import counted, digits, plain, pretty, robot_label
 from armid_ros.report.page import Page, Section
-from armid_ros.report.provenance import Provenance
+from armid_ros.report.provenance import DEFAULT_ORIGIN, ResultOrigin
 from armid_ros.report.sections.data_quality import data_quality_section
 from armid_ros.report.sections.fit import by_recording, error_bars, fit_section, forward_section
-from armid_ros.report.sections.frame import next_steps_section, Origin, VerdictSection
 from armid_ros.report.statistics import (
     directions,
     residual_section,
@@ -79,12 +81,11 @@ def identification_report(
     result: Identification,
     *,
     description: ArmModel,
-    robot: str,
     recordings: Sequence[Recording],
     validation: Mapping[str, Sequence[Fit]],
     validation_recordings: Sequence[Recording] = (),
     assessment: Assessment | None = None,
-    provenance: Provenance | None = None,
+    origin: ResultOrigin = DEFAULT_ORIGIN,
 ) -> str:
     """
     Return report.html of an identification.
@@ -95,8 +96,6 @@ def identification_report(
         What was found.
     description : ArmModel
         The model before the identification, to compare parameters with.
-    robot : str
-        Shipped name or path of the description.
     recordings : sequence of Recording
         Training data.
     validation : mapping of str to sequence of Fit
@@ -105,8 +104,8 @@ def identification_report(
         Those recordings.
     assessment : Assessment, optional
         What the identification was put to.
-    provenance : Provenance, optional
-        Files, versions, settings, seed.
+    origin : ResultOrigin
+        Robot, files, versions, settings, seed.
 
     Returns
     -------
@@ -154,10 +153,10 @@ def identification_report(
         *([] if noise is None else [_noise_section(described, noise)]),
         *assessment.sections,
         data_quality_section(read, described),
-        _asked(result, robot, list(training), list(validation)),
-        Origin(provenance or Provenance()),
+        _asked(result, origin.robot, list(training), list(validation)),
+        Origin(origin.provenance),
     ]
-    subtitle = f'{robot_label(robot)} · {counted(len(training), "training recording")}'
+    subtitle = f'{robot_label(origin.robot)} · {counted(len(training), "training recording")}'
     if validation:
         subtitle += f' · {counted(len(validation), "held-out recording")}'
     names = (*described.joints, *described.links)
@@ -191,10 +190,10 @@ def _excitation_section(result: Identification) -> ContentSection:
     """Return how well a motion determines the parameters."""
     rows, links = [], result.arm.robot.links
     worst = directions(result.estimate, torque_scale(result))
-    for direction in worst[:_WORST]:
-        parts = [f'{full_label(one, links)} {100.0 * x:.0f} %' for one, x in direction.parts]
-        rows.append((', '.join(parts), digits(direction.uncertainty)))
-    values = np.array([direction.uncertainty for direction in worst])
+    for uncertainty, parts in worst[:_WORST]:
+        named = [f'{full_label(one, links)} {100.0 * x:.0f} %' for one, x in parts]
+        rows.append((', '.join(named), digits(uncertainty)))
+    values = np.array([uncertainty for uncertainty, _ in worst])
     return ContentSection(
         'Excitation',
         [

@@ -15,15 +15,15 @@ from armid_ros.report.blocks import (
     ContentSection,
     DataTable,
     FactList,
-    PageBlock,
+    Origin,
     Panels,
     Paragraph,
+    VerdictSection,
 )
-from armid_ros.report.charts import Chart, Level, Series, thinned
+from armid_ros.report.charts import Chart, Series, thinned
 from armid_ros.report.notation import counted, digits, measured, plain, robot_label
-from armid_ros.report.page import Page, Section
-from armid_ros.report.provenance import Provenance
-from armid_ros.report.sections.frame import Origin, VerdictSection
+from armid_ros.report.page import Page, Section, Templated
+from armid_ros.report.provenance import DEFAULT_ORIGIN, ResultOrigin
 import numpy as np
 
 #: Links that explain less than this share of the difference are not named as the cause.
@@ -47,9 +47,7 @@ _MOST = 2000
 _FINEST = 1e-7
 
 
-def inspection_report(
-    found: Inspection, *, robot: str = '', step: str = '', provenance: Provenance | None = None
-) -> str:
+def inspection_report(found: Inspection, origin: ResultOrigin = DEFAULT_ORIGIN) -> str:
     """
     Return the page of an inspection, with all curves.
 
@@ -57,12 +55,8 @@ def inspection_report(
     ----------
     found : Inspection
         What was found.
-    robot : str
-        Name or path of the description.
-    step : str
-        What to do next.
-    provenance : Provenance, optional
-        Files, versions.
+    origin : ResultOrigin
+        Name or path of the description, files, versions, and what to do next.
 
     Returns
     -------
@@ -77,15 +71,19 @@ def inspection_report(
     texts.insert(first - 1, found.verdict)  # below the worst remark
     sentences = [text[0].upper() + text[1:].replace('`', '').rstrip('.') + '.' for text in texts]
     sections: list[Section] = [
-        VerdictSection(grade, _TONES[grade], sentences[:first], sentences[first:], step=step),
+        VerdictSection(
+            grade, _TONES[grade], sentences[:first], sentences[first:], step=origin.step
+        ),
         _contents_section(found),
         _joints_section(found),
         _curves_section(found),
-        Origin(provenance or Provenance()),
+        Origin(origin.provenance),
     ]
     name = Path(recording.source).name or 'recording'
     subtitle = ' · '.join(
-        filter(None, (Path(robot).name, recording.topic, counted(recording.n_joints, 'joint')))
+        filter(
+            None, (Path(origin.robot).name, recording.topic, counted(recording.n_joints, 'joint'))
+        )
     )
     return Page(f'Inspection of {name}', subtitle, sections, names=recording.joints).html()
 
@@ -171,17 +169,13 @@ def _interval(values: FloatArray, std: FloatArray) -> str:
 
 
 def description_check_report(
-    robot: str,
-    remarks: Sequence[Remark],
-    links: LinkCheck | None,
-    step: str = '',
-    provenance: Provenance | None = None,
+    remarks: Sequence[Remark], links: LinkCheck | None, origin: ResultOrigin
 ) -> str:
     """Return the page of a check, one HTML file that loads nothing."""
     first, *others = headline(remarks, links)
     grade, texts = check_word(remarks, links), [one.text for one in remarks]
     sections: list[Section] = [
-        VerdictSection(grade, _TONES[grade], [first, *others], texts, step=step)
+        VerdictSection(grade, _TONES[grade], [first, *others], texts, step=origin.step)
     ]
     if links is not None:
         said = (
@@ -191,9 +185,9 @@ def description_check_report(
         )
         table = DataTable(HEADS, link_rows(links), kind='tight')
         sections.append(ContentSection('Links', [table, Paragraph(said, 'hint')]))
-    sections.append(Origin(provenance or Provenance()))
+    sections.append(Origin(origin.provenance))
     names = () if links is None else (*links.joints, *links.links)
-    title = f'Check of {robot_label(robot)}'
+    title = f'Check of {robot_label(origin.robot)}'
     return Page(title, '', sections, charts=False, names=names).html()
 
 
@@ -222,7 +216,7 @@ def recording_facts(found: Inspection) -> list[tuple[str, str]]:
 
 def _contents_section(found: Inspection) -> ContentSection:
     """Return the topics of a bag, and how it is sampled."""
-    blocks: list[PageBlock] = [FactList(recording_facts(found))]
+    blocks: list[Templated] = [FactList(recording_facts(found))]
     if found.topics:
         rows = [
             (
@@ -257,7 +251,7 @@ def _joints_section(found: Inspection) -> ContentSection:
 def _curves_section(found: Inspection) -> ContentSection:
     """Return all recorded curves over time."""
     recording, robot = found.recording, found.robot
-    blocks: list[PageBlock] = [
+    blocks: list[Templated] = [
         Paragraph(
             'Unfiltered signals. Long recordings are drawn by the extremes of short intervals. '
             'Drag to zoom all curves.',
@@ -265,12 +259,12 @@ def _curves_section(found: Inspection) -> ContentSection:
         )
     ]
     for k, (name, unit) in enumerate(zip(recording.joints, found.units, strict=True)):
-        levels: list[Level] = []
+        levels: list[tuple[float, str]] = []
         if robot is not None:
             low, high = recording.q[:, k].min(), recording.q[:, k].max()
             reach = max(high - low, 1e-6)
             levels = [
-                Level(float(limit), 'limit')
+                (float(limit), 'limit')
                 for limit in (robot.lower[k], robot.upper[k])
                 if np.isfinite(limit) and low - reach < limit < high + reach
             ]
@@ -279,7 +273,7 @@ def _curves_section(found: Inspection) -> ContentSection:
             ('velocity', f'{unit}/s', recording.dq, levels[:0]),
             ('effort', 'N' if unit == 'm' else 'N m', recording.tau, levels[:0]),
         )
-        panels: list[tuple[str, str, list[PageBlock]]] = []
+        panels: list[tuple[str, str, list[Templated]]] = []
         for quantity, own, values, lines in quantities:
             if values is not None:
                 chosen = thinned(values[:, k], most=_MOST)

@@ -26,18 +26,26 @@ def topic_prefix(namespace: str) -> str:
     return '/' + (namespace.strip('/') + '/' if namespace.strip('/') else '')
 
 
-def plotjuggler_layout(robot: str, joints: Sequence[str], namespace: str = '') -> str:
+def plotter_layouts(
+    robot: str, joints: Sequence[str], namespace: str = '', base: str = 'base_link'
+) -> dict[str, str]:
     """
-    Return a layout of PlotJuggler: motion, torque, residual, convergence.
+    Return layouts of PlotJuggler, Foxglove and RViz by the names of their files.
+
+    PlotJuggler and Foxglove show motion, torque, residual and convergence, Foxglove the arm and
+    the diagnosis as well. RViz shows the model of the arm, which moves with the transforms of
+    robot_state_publisher, and the residual on its joints; these markers need no transforms.
 
     Parameters
     ----------
     robot : str
         Name of the robot, as /diagnostics has it.
     joints : sequence of str
-        Its driven joints.
+        Driven joints, in the order in which joint_states has them.
     namespace : str
         Of the nodes; empty for none.
+    base : str
+        Base link, in whose frame the arm and what is drawn on it are shown.
 
     """
     at = topic_prefix(namespace)
@@ -55,53 +63,23 @@ def plotjuggler_layout(robot: str, joints: Sequence[str], namespace: str = '') -
         'residual': [residual, rms],
         'convergence': [[f'{status}/condition_number'], [f'{status}/samples']],
     }
-    return str(render('plotjuggler.xml', {'schema': SCHEMA, 'tabs': tabs, 'colours': _COLOURS}))
-
-
-def foxglove_layout(joints: Sequence[str], namespace: str = '', base: str = 'base_link') -> str:
-    """
-    Return a layout of Foxglove: the arm, torque, residual, condition number, diagnosis as text.
-
-    Parameters
-    ----------
-    joints : sequence of str
-        Driven joints, in the order in which joint_states has them.
-    namespace : str
-        Of the nodes; empty for none.
-    base : str
-        Base link, in whose frame the arm and what is drawn on it are shown.
-
-    """
-    at = topic_prefix(namespace)
-    measured = _paths(f'{at}joint_states.effort', joints)
-    predicted = _paths(f'{at}{_PREDICTED}.effort', joints, ' predicted')
+    torques = _paths(f'{at}joint_states.effort', joints)
+    torques += _paths(f'{at}{_PREDICTED}.effort', joints, ' predicted')
     condition = _path(f'{at}{_IDENTIFIER}/estimate.condition_number', 'condition number')
     plots = [
         ('motion', 'Position [rad]', _paths(f'{at}joint_states.position', joints)),
-        ('torque', 'Torque, measured and predicted [N m]', measured + predicted),
+        ('torque', 'Torque, measured and predicted [N m]', torques),
         ('residual', 'Residual [N m]', _paths(f'{at}{_RESIDUAL}.effort', joints)),
         ('condition', 'Condition number', [condition]),
     ]
-    text = render('foxglove.json', {'schema': SCHEMA, 'at': at, 'base': base, 'plots': plots})
-    return json.dumps(json.loads(text), indent=2) + '\n'
-
-
-def rviz_config(base: str, namespace: str = '') -> str:
-    """
-    Return a configuration of RViz, with the model of the arm and the residual on its joints.
-
-    The model moves with the transforms of robot_state_publisher; the markers need none.
-
-    Parameters
-    ----------
-    base : str
-        Base link, which is the fixed frame.
-    namespace : str
-        Of the nodes; empty for none.
-
-    """
-    at = topic_prefix(namespace)
-    return f'{render("arm.rviz", {"schema": SCHEMA, "base": base, "at": at})}\n'
+    common = {'schema': SCHEMA, 'at': at, 'base': base}
+    foxglove = json.loads(render('foxglove.json', {**common, 'plots': plots}))
+    curves = {'schema': SCHEMA, 'tabs': tabs, 'colours': _COLOURS}
+    return {
+        'plotjuggler.xml': str(render('plotjuggler.xml', curves)),
+        'foxglove.json': json.dumps(foxglove, indent=2) + '\n',
+        'arm.rviz': f'{render("arm.rviz", common)}\n',
+    }
 
 
 def _path(value: str, label: str) -> dict[str, Any]:

@@ -118,7 +118,11 @@ class Page:
         token = _names.set(self.names)
         text = render('page.html', {'page': self, 'prefix': common_prefix(self.names), **assets})
         _names.reset(token)
-        return _visible(_without_secrets(str(text)))
+        # passwords: values of arguments named so, and those in addresses
+        shown = re.sub(r'(\w*(?:passw|token|secret)\w*:?=)[^\s<"&]+', r'\1***', str(text))
+        shown = re.sub(r'://[^/\s@<>"]+:[^/\s@<>"]+@', '://***@', shown)
+        # control characters, which names of files may have, are spelled out
+        return re.sub(r'[\x00-\x08\x0b\x0c\x0e-\x1f\x7f-\x9f]', lambda c: repr(c[0])[1:-1], shown)
 
 
 def _short(text: str) -> Markup:
@@ -128,17 +132,6 @@ def _short(text: str) -> Markup:
 
 def _few(text: str) -> Markup:
     return Markup(many_counted(text, _names.get())) if _names.get() else Markup(text)
-
-
-def _without_secrets(text: str) -> str:
-    """Mask passwords: values of arguments named so, and those in addresses."""
-    text = re.sub(r'(\w*(?:passw|token|secret)\w*:?=)[^\s<"&]+', r'\1***', text)
-    return re.sub(r'://[^/\s@<>"]+:[^/\s@<>"]+@', '://***@', text)
-
-
-def _visible(text: str) -> str:
-    """Spell out control characters, which names of files may have."""
-    return re.sub(r'[\x00-\x08\x0b\x0c\x0e-\x1f\x7f-\x9f]', lambda c: repr(c[0])[1:-1], text)
 
 
 def render(template: str, values: Mapping[str, Any], package: str = 'armid_ros.report') -> Markup:

@@ -5,7 +5,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 import hashlib
 from importlib import metadata
 from pathlib import Path
@@ -18,35 +18,14 @@ _PACKAGES = ('armid_ros', 'numpy', 'scipy', 'pin', 'clarabel', 'mcap')
 
 
 @dataclass(frozen=True)
-class FileHash:
-    """
-    A file and its digest.
-
-    Attributes
-    ----------
-    path : str
-        Path as it was given.
-    size : int
-        [bytes].
-    sha256 : str
-        In hexadecimal digits.
-
-    """
-
-    path: str
-    size: int
-    sha256: str
-
-
-@dataclass(frozen=True)
 class Provenance:
     """
     What is needed to reproduce the result.
 
     Attributes
     ----------
-    files : tuple of FileHash
-        What was read.
+    files : tuple of (str, int, str)
+        What was read: path as it was given, size [bytes], SHA-256 in hexadecimal digits.
     versions : mapping of str to str
         Software and its version.
     settings : mapping of str to str
@@ -57,21 +36,50 @@ class Provenance:
         Command line; empty when there was none.
     created : str
         When, as the caller's clock has it; empty to leave it out.
-    step : str
-        Command that follows; empty to leave it out.
 
     """
 
-    files: tuple[FileHash, ...] = ()
+    files: tuple[tuple[str, int, str], ...] = ()
     versions: Mapping[str, str] = field(default_factory=dict)
     settings: Mapping[str, str] = field(default_factory=dict)
     seed: int | None = None
     command: str = ''
     created: str = ''
+
+
+@dataclass(frozen=True)
+class ResultOrigin:
+    """
+    Provenance of a result, as its files and its report state it.
+
+    Attributes
+    ----------
+    robot : str
+        What documents call the robot; by default its shipped name or its path.
+    source : str
+        How model.yaml refers to its description; by default the same.
+    provenance : Provenance
+        Files, versions and settings that the report names.
+    step : str
+        Command that follows, for the report; by default without arguments.
+
+    """
+
+    robot: str = ''
+    source: str = ''
+    provenance: Provenance = Provenance()
     step: str = ''
 
+    def of(self, known: str) -> ResultOrigin:
+        """Fill in what files call the robot, where nothing else is given."""
+        return replace(self, robot=self.robot or known, source=self.source or known)
 
-def hash_files(paths: Iterable[str | Path]) -> tuple[FileHash, ...]:
+
+#: Shipped names and paths, without provenance.
+DEFAULT_ORIGIN = ResultOrigin()
+
+
+def hash_files(paths: Iterable[str | Path]) -> tuple[tuple[str, int, str], ...]:
     """Hash files, and all files in folders such as bags; skip what is no file."""
     found = []
     for path in map(Path, paths):
@@ -79,7 +87,7 @@ def hash_files(paths: Iterable[str | Path]) -> tuple[FileHash, ...]:
         for file in filter(Path.is_file, inside):
             with file.open('rb') as stream:
                 digest = hashlib.file_digest(stream, 'sha256').hexdigest()
-            found.append(FileHash(str(settled(file)), file.stat().st_size, digest))
+            found.append((str(settled(file)), file.stat().st_size, digest))
     return tuple(found)
 
 

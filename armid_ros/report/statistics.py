@@ -20,7 +20,7 @@ from armid_ros.report.blocks import (
     Paragraph,
     TableCell,
 )
-from armid_ros.report.charts import Chart, Level, Series
+from armid_ros.report.charts import Chart, Series
 from armid_ros.robots import Robot
 import numpy as np
 
@@ -107,25 +107,6 @@ class Whiteness:
         return Whiteness(lag_times, correlation, POINT_99 / np.sqrt(max(count, 1)))
 
 
-@dataclass(frozen=True)
-class Direction:
-    """
-    A combination of parameters with its uncertainty.
-
-    Attributes
-    ----------
-    uncertainty : float
-        Standard deviation of the combination as the torque it makes on this motion, in standard
-        deviations of the residual.
-    parts : tuple of (ParameterName, float)
-        The parameters that make it up and their shares of it, largest first.
-
-    """
-
-    uncertainty: float
-    parts: tuple[tuple[ParameterName, float], ...]
-
-
 def torque_scale(result: Identification) -> FloatArray:
     """Return the rms torque of a unit of each parameter in residual deviations, shape (r,)."""
     columns = _some_columns(result, result.training)
@@ -145,8 +126,16 @@ def torque_reach(result: Identification, fits: Sequence[Fit]) -> FloatArray:
     return np.asarray(HALF_WIDTH * np.sqrt(variance.mean(axis=0)))
 
 
-def directions(estimate: Estimate, scale: FloatArray) -> tuple[Direction, ...]:
-    """Return uncorrelated combinations of the parameters, worst known first."""
+def directions(
+    estimate: Estimate, scale: FloatArray
+) -> list[tuple[float, list[tuple[ParameterName, float]]]]:
+    """
+    Return uncorrelated combinations of the parameters, worst known first.
+
+    Each is the standard deviation of the torque that it makes on this motion, in standard
+    deviations of the residual, and the parameters with their shares of it, largest first.
+
+    """
     covariance = estimate.covariance * np.outer(scale, scale)
     variances, vectors = np.linalg.eigh(covariance)
     found = []
@@ -154,9 +143,9 @@ def directions(estimate: Estimate, scale: FloatArray) -> tuple[Direction, ...]:
         weights = vectors[:, column] ** 2
         order = np.argsort(-weights)
         enough = 1 + int(np.searchsorted(np.cumsum(weights[order]), 0.8))
-        parts = tuple((estimate.parameters[k], float(weights[k])) for k in order[:enough][:6])
-        found.append(Direction(float(np.sqrt(max(variances[column], 0.0))), parts))
-    return tuple(found)
+        parts = [(estimate.parameters[k], float(weights[k])) for k in order[:enough][:6]]
+        found.append((float(np.sqrt(max(variances[column], 0.0))), parts))
+    return found
 
 
 def _some_columns(result: Identification, fits: Sequence[Fit]) -> FloatArray:
@@ -255,7 +244,7 @@ def whiteness_section(robot: Robot, fits: Sequence[Fit], role: str) -> ContentSe
             'lag [s]',
             'autocorrelation',
             height=150,
-            levels=[Level(found.band, '99 %'), Level(-found.band)],
+            levels=[(found.band, '99 %'), (-found.band, '')],
             symmetric=True,
             legend=False,
         )

@@ -7,7 +7,7 @@ import re
 import shutil
 
 from armid_ros.arm import load_model, save_model
-from armid_ros.cli.diagnose import Percent
+from armid_ros.cli.diagnose import share_of_percent
 from armid_ros.diagnosis import Diagnosis
 from armid_ros.model import inverse_dynamics
 from armid_ros.recording import write_recording
@@ -114,7 +114,7 @@ def test_a_script_learns_from_the_code_whether_to_go_on(
 
 @pytest.mark.parametrize(('text', 'share'), [('2%', 0.02), ('0.5', 0.005), ('0 %', 0.0)])
 def test_what_matters_is_a_percentage(text, share):
-    assert Percent().convert(text, None, None) == pytest.approx(share)
+    assert share_of_percent(None, None, text) == pytest.approx(share)
 
 
 @pytest.mark.parametrize('text', ['much', '-1%', '100%', 'nan'])

@@ -4,25 +4,20 @@
 
 import re
 
-from armid_ros.cli.terminal import ProgressLines, say
+from armid_ros.cli.terminal import progress_line, say
 import click
 from click.testing import CliRunner
 import pytest
 
 
-def test_progress_without_a_terminal_is_a_line_every_ten_seconds():
-    now, lines = [100.0], []
-    progress = ProgressLines('reading', lines.append, lambda: now[0])
-    for second in range(1, 31):
-        now[0] = 100.0 + second
-        progress.tick(second / 40.0, 'identifying' if second > 5 else None)
-        progress.look()
-    now[0] += 25.0  # work that says nothing is still shown to go on
-    progress.look()
-    progress.look()
-    shown = [tuple(map(int, re.findall(r'\d+', line))) for line in lines]
-    assert shown == [(25, 10, 30), (50, 20, 20), (75, 30, 10), (75, 55, 18)]  # %, s, s to go
-    assert all(line.startswith('identifying: ') for line in lines)
+@pytest.mark.parametrize(
+    ('share', 'numbers'),
+    [(0.25, (25, 10, 30)), (0.5, (50, 10, 10)), (0.0, (0, 10)), (1.0, (100, 10))],
+)
+def test_a_line_of_progress_has_share_time_and_time_to_go(share, numbers):
+    line = progress_line('identifying', share, 10.0)
+    assert line.startswith('identifying: ')
+    assert tuple(map(int, re.findall(r'\d+', line))) == numbers
 
 
 @pytest.mark.parametrize(

@@ -2,6 +2,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """The convergence of an online estimate is drawn with its intervals and the true values."""
 
+from armid_ros.estimate import Estimate
 from armid_ros.report.families import full_label
 from armid_ros.report.sections.convergence import convergence_section
 import numpy as np
@@ -12,7 +13,11 @@ def test_parameters_are_drawn_with_interval_and_truth(case):
     t = np.linspace(0.5, 10.0, 50)
     std = estimate.std * np.sqrt(10.0 / t)[:, np.newaxis]
     values = estimate.values + std
-    section = convergence_section(t, values, std, estimate.values, estimate.parameters)
+    history = [
+        (at, Estimate(estimate.parameters, v, np.diag(s**2)))
+        for at, v, s in zip(t, values, std, strict=True)
+    ]
+    section = convergence_section(history, estimate.values)
     _, panels = section.blocks
     shown = {full_label(name): k for k, name in enumerate(estimate.parameters)}
     assert len(panels.panels) == 6
@@ -25,4 +30,4 @@ def test_parameters_are_drawn_with_interval_and_truth(case):
         assert drawn[-1]
         np.testing.assert_allclose(curve.y[drawn], values[drawn, k])
         np.testing.assert_allclose((band.upper - band.y)[drawn], 3.92 * std[drawn, k], rtol=1e-3)
-        assert chart.levels[0].y == estimate.values[k]
+        assert chart.levels[0][0] == estimate.values[k]

@@ -20,6 +20,7 @@ from armid_ros.report.notation import (
     with_interval,
     with_names,
 )
+from armid_ros.report.provenance import ResultOrigin
 from armid_ros.report.sections.diagnosed import (
     candidates_section,
     evidence_section,
@@ -62,7 +63,7 @@ def html(found, recordings):
     return diagnosis_report(
         found,
         {'training': recordings},
-        robot='/home/me/two_links.urdf',
+        origin=ResultOrigin('/home/me/two_links.urdf'),
         patch='effects:\n- name: <b>x</b>\n',
     )
 
@@ -73,7 +74,7 @@ def quiet():
     bench = Bench()
     recordings = bench.recordings()
     found = diagnose(bench.arm, recordings, rng=np.random.default_rng(0))
-    return diagnosis_report(found, {'training': recordings}, robot='two_links')
+    return diagnosis_report(found, {'training': recordings}, origin=ResultOrigin('two_links'))
 
 
 def test_the_story_comes_first_and_what_was_looked_at_last(html):
@@ -134,7 +135,9 @@ def test_a_model_that_simulates_worse_is_not_green(found, recordings, html):
     wrong = found.arm.with_effect(spring, np.array([30.0, 0.0]))
     pairs, *_ = simulate_held_out(found.arm, wrong, used, recordings[:1])
     extras = Extras(forward=pairs)
-    page = diagnosis_report(found, {'training': recordings}, robot='arm', extras=extras)
+    page = diagnosis_report(
+        found, {'training': recordings}, origin=ResultOrigin('arm'), extras=extras
+    )
     assert 'elbow' in extras.worse
     assert (tone_of(found), tone_of(found, extras.worse)) == ('good', 'fair')
     assert 'class="verdict fair"' in page and 'class="verdict good"' in html
@@ -145,7 +148,7 @@ def test_bad_data_have_no_green_tick():
     turned = [replace(r, tau=-r.tau) for r in bench.recordings()]
     found = diagnose(bench.arm, turned, rng=np.random.default_rng(0))
     assert found.verdict == 'bad_data'
-    page = diagnosis_report(found, {'training': turned}, robot='two_links')
+    page = diagnosis_report(found, {'training': turned}, origin=ResultOrigin('two_links'))
     assert 'class="fine"' not in page
     sources = 'before', 'speed 1', f'{turned[0].source}5'  # the last two begin as those at fault
     sound = [
@@ -153,7 +156,7 @@ def test_bad_data_have_no_green_tick():
         for source, one in zip(sources, bench.recordings(seed=1), strict=True)
     ]
     both = {'training': turned, 'baseline': sound}
-    beside = diagnosis_report(found, both, robot='two_links')
+    beside = diagnosis_report(found, both, origin=ResultOrigin('two_links'))
     assert beside.count('class="fine"') == len(sound)
 
 
@@ -195,21 +198,22 @@ def test_seconds_of_a_cause_are_marked_in_the_curve_of_the_whole_recording(found
     acts = (whole.trajectory.t >= 2.0) & (whole.trajectory.t <= 3.0)
     differs = np.any(whole.after != whole.before, axis=1)
     assert differs[acts].any() and not differs[~acts].any()
-    _, torque, residual, _ = overlay_section(found.arm.robot, gap, True, {}, some.spans).blocks
+    _, torque, residual, _ = overlay_section(some, gap, {}).blocks
     for chart in (torque, residual):
-        assert [mark.x for mark in chart.marks] == [2.0, 3.0]
+        assert [x for x, *_ in chart.marks] == [2.0, 3.0]
     assert {'2.0', '3.0'} <= set(dict(Story(some).rows)['When'][0].split())
 
 
 def test_curves_of_where_it_lives_are_without_the_mean_which_is_said(found):
     place = replace(found.where[0], mean=2.0, mean_share=0.9)
-    said, panels = evidence_section([place]).blocks[0].blocks
+    said, panels = evidence_section(replace(found, where=(place,))).blocks[0].blocks
     assert '2.0 N' in said.text and '90 %' in said.text
     for axis, (caption, _, (chart,)) in zip(place.axes, panels.panels, strict=True):
         np.testing.assert_allclose(chart.series[0].y, axis.means - 2.0)
         share = 100.0 * max(axis.share - 0.9, 0.0) / 0.1
         assert f'{share:.0f} %' in caption or share < 2.0
-    assert len(evidence_section([replace(place, mean_share=0.0)]).blocks[0].blocks) == 1
+    still = replace(found, where=(replace(place, mean_share=0.0),))
+    assert len(evidence_section(still).blocks[0].blocks) == 1
 
 
 @pytest.mark.parametrize(

@@ -18,7 +18,7 @@ from armid_ros.motion import Motion
 from armid_ros.report.families import parameter_section
 from armid_ros.report.identification_report import Assessment, identification_report
 from armid_ros.report.judgement import judge
-from armid_ros.report.provenance import hash_files, Provenance, versions
+from armid_ros.report.provenance import hash_files, Provenance, ResultOrigin, versions
 from armid_ros.report.sections.data_quality import repeatability
 from armid_ros.report.sections.fit import fit_section
 import numpy as np
@@ -71,15 +71,14 @@ class Reader(HTMLParser):
 
 def report_of(case, **changes):
     """Return the report of a case, or of one with something changed."""
+    files = hash_files([recording.source for recording in case.recordings])
+    made = Provenance(files, versions(), seed=5)
     given = {
         'description': case.description,
-        'robot': 'humanoid_arm',
         'recordings': case.recordings[:1],
         'validation': case.validation,
         'validation_recordings': case.recordings[1:],
-        'provenance': Provenance(
-            hash_files([recording.source for recording in case.recordings]), versions(), seed=5
-        ),
+        'origin': ResultOrigin('humanoid_arm', provenance=made),
         **changes,
     }
     named = [field.name for field in fields(Assessment)]
@@ -118,14 +117,14 @@ def hostile():
     bench = Bench(URDF.replace('"elbow"', quoteattr(HOSTILE)))
     run, held_out = (replace(one, source=HOSTILE) for one in bench.recordings()[:2])
     result = identify(bench.named_friction(), [run], rng=np.random.default_rng(0))
+    made = Provenance(settings={HOSTILE: HOSTILE}, command=HOSTILE)
     return identification_report(
         result,
         description=bench.named_friction(),
-        robot=HOSTILE,
         recordings=[run],
         validation={HOSTILE: result.predict([held_out])},
         validation_recordings=[held_out],
-        provenance=Provenance(settings={HOSTILE: HOSTILE}, command=HOSTILE),
+        origin=ResultOrigin(HOSTILE, provenance=made),
     )
 
 
@@ -135,8 +134,8 @@ def test_everything_asked_for_is_there_in_order(case, page):
         assert joint in page.text
     for parameter in case.result.estimate.parameters:
         assert parameter.name in page.text or parameter.joint in page.text
-    for file in hash_files([case.recordings[0].source]):
-        assert file.sha256 in page.text
+    for *_, digest in hash_files([case.recordings[0].source]):
+        assert digest in page.text
     assert case.recordings[0].report.describe() in page.text
     assert f'{case.result.condition_number:.3g}' in page.text
 

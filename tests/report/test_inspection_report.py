@@ -19,7 +19,7 @@ def html():
     t = np.delete(np.arange(0.0, 20.0, 0.01), slice(500, 600))
     q = np.column_stack([np.sin(t), np.cos(1.3 * t)])
     recording = Recording(joints=JOINTS, t=t, q=q, tau=3 * q, source='<i>run</i>.mcap')
-    return inspection_report(inspect(recording, rng=np.random.default_rng(0)), robot='a/b.urdf')
+    return inspection_report(inspect(recording, rng=np.random.default_rng(0)))
 
 
 def test_every_column_of_the_joints_has_its_unit_in_one_piece(html):

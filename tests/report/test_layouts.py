@@ -8,7 +8,7 @@ import re
 from xml.etree import ElementTree
 
 from armid_ros.files.output import is_own
-from armid_ros.report.layouts import foxglove_layout, plotjuggler_layout, rviz_config
+from armid_ros.report.layouts import plotter_layouts
 from armid_ros.robots import load_robot
 import yaml
 
@@ -19,21 +19,24 @@ BASE = load_robot('humanoid_arm').base
 
 def test_layouts_of_the_shipped_arm_are_the_shipped_layouts():
     """What somebody tried in the plotters is what everybody gets."""
-    made = plotjuggler_layout('humanoid_arm', JOINTS)
+    layouts = plotter_layouts('humanoid_arm', JOINTS, base=BASE)
     shipped = (CONFIG / 'plotjuggler_layout.xml').read_text()
     same = {'strip_text': True}
-    assert ElementTree.canonicalize(made, **same) == ElementTree.canonicalize(shipped, **same)
+    assert ElementTree.canonicalize(
+        layouts['plotjuggler.xml'], **same
+    ) == ElementTree.canonicalize(shipped, **same)
     shipped = json.loads((CONFIG / 'foxglove_layout.json').read_text())
-    assert json.loads(foxglove_layout(JOINTS, base=BASE)) == shipped
+    assert json.loads(layouts['foxglove.json']) == shipped
 
 
 def test_a_namespace_is_before_every_topic_of_the_nodes():
-    text = plotjuggler_layout('arm', ('a', 'b'), '/left/')
-    curves = [curve.get('name') for curve in ElementTree.fromstring(text).iter('curve')]
+    layouts = plotter_layouts('arm', ('a', 'b'), '/left/')
+    plotjuggler = ElementTree.fromstring(layouts['plotjuggler.xml'])
+    curves = [curve.get('name') for curve in plotjuggler.iter('curve')]
     assert '/left/joint_states/a/effort' in curves
     assert '/diagnostics/arm/left/online_identifier: state/samples' in curves
     assert all(name.startswith(('/left/', '/diagnostics/arm/left/')) for name in curves)
-    layout = json.loads(foxglove_layout(('a', 'b'), 'left'))['configById']
+    layout = json.loads(layouts['foxglove.json'])['configById']
     assert layout['RawMessages!estimate']['topicPath'] == '/left/online_identifier/estimate'
     values = [path['value'] for path in layout['Plot!torque']['paths']]
     assert values[0] == '/left/joint_states.effort[0]'
@@ -49,7 +52,7 @@ def test_panels_of_foxglove_have_the_settings_that_foxglove_reads():
         'RawMessages': 'topicPath diffEnabled diffMethod diffTopicPath showFullMessageForDiff',
         'DiagnosticSummary': 'minLevel pinnedIds hardwareIdFilter topicToRender sortByLevel',
     }
-    layout = json.loads(foxglove_layout(('a',)))
+    layout = json.loads(plotter_layouts('arm', ('a',))['foxglove.json'])
     shown = set(re.findall(r'[\w]+![\w]+', json.dumps(layout['layout'])))
     assert shown == set(layout['configById'])
     for panel, settings in layout['configById'].items():
@@ -57,7 +60,8 @@ def test_panels_of_foxglove_have_the_settings_that_foxglove_reads():
 
 
 def test_the_arm_and_what_is_drawn_on_it_are_shown_in_the_frame_of_its_base():
-    configured = json.loads(foxglove_layout(('a',), 'left', 'foot'))['configById']
+    layouts = plotter_layouts('arm', ('a',), 'left', 'foot')
+    configured = json.loads(layouts['foxglove.json'])['configById']
     scene = configured['3D!arm']
     assert scene['followTf'] == 'foot'
     assert set(scene['topics']) == {'/left/residual_markers/markers'}
@@ -65,7 +69,7 @@ def test_the_arm_and_what_is_drawn_on_it_are_shown_in_the_frame_of_its_base():
     assert scene['layers']['arm']['sourceType'] == 'topic'
     assert scene['layers']['arm']['topic'] == '/left/robot_description'
     assert configured['RawMessages!diagnosis']['topicPath'].startswith('/left/live_diagnosis/')
-    manager = yaml.safe_load(rviz_config('foot', 'left'))['Visualization Manager']
+    manager = yaml.safe_load(layouts['arm.rviz'])['Visualization Manager']
     assert manager['Global Options']['Fixed Frame'] == 'foot'
     _, arm, markers = manager['Displays']
     assert arm['Description Topic']['Value'] == '/left/robot_description'
@@ -74,11 +78,7 @@ def test_the_arm_and_what_is_drawn_on_it_are_shown_in_the_frame_of_its_base():
 
 
 def test_layouts_say_that_they_may_be_written_over(tmp_path):
-    for name, text in {
-        'plotjuggler.xml': plotjuggler_layout('arm', ('a',)),
-        'foxglove.json': foxglove_layout(('a',)),
-        'arm.rviz': rviz_config('foot'),
-    }.items():
+    for name, text in plotter_layouts('arm', ('a',)).items():
         (tmp_path / name).write_text(text)
         assert is_own(tmp_path / name)
         (tmp_path / name).write_text('<root/>')

@@ -2,10 +2,9 @@
 # SPDX-License-Identifier: Apache-2.0
 """Labels leave out what all names of an arm begin with, and nothing else."""
 
-from armid_ros.report.blocks import BarChart, DataTable, Paragraph
+from armid_ros.report.blocks import BarChart, ContentSection, DataTable, Paragraph
 from armid_ros.report.notation import common_prefix
 from armid_ros.report.page import Page
-from armid_ros.report.sections.frame import ContentSection
 import pytest
 
 PANDA = tuple(f'panda_joint{number}' for number in range(1, 8))

@@ -53,8 +53,8 @@ def test_worst_known_direction_is_the_largest_variance_of_the_torque(case):
     estimate, scale = case.result.estimate, torque_scale(case.result)
     found = directions(estimate, scale)
     scaled = estimate.covariance * np.outer(scale, scale)
-    assert found[0].uncertainty == pytest.approx(np.sqrt(np.linalg.norm(scaled, 2)))
-    values = [direction.uncertainty for direction in found]
+    assert found[0][0] == pytest.approx(np.sqrt(np.linalg.norm(scaled, 2)))
+    values = [uncertainty for uncertainty, _ in found]
     assert values == sorted(values, reverse=True) and len(values) == case.result.base.rank
 
 

@@ -8,6 +8,7 @@ import sys
 from armid_ros.diagnosis import diagnose
 from armid_ros.errors import IdentificationError
 from armid_ros.report.diagnosis_report import diagnosis_report, Extras
+from armid_ros.report.provenance import ResultOrigin
 from armid_ros.residual import learn_residual, lookup_table
 from armid_ros.residual.gaussian_process import learn_map
 from armid_ros.residual.law import suggest_law
@@ -120,7 +121,9 @@ def test_what_has_no_name_is_learned_and_becomes_part_of_the_model(unknown, lear
 def test_a_map_that_harms_held_out_recordings_says_so(unknown, learned):
     harmful = replace(learned, joints=(replace(learned.joints[0], held_out=-140.0),))
     assert 'get worse' in harmful.sentences()[0]
-    page = diagnosis_report(unknown, {}, robot='two_links', extras=Extras(residual=harmful))
+    page = diagnosis_report(
+        unknown, {}, origin=ResultOrigin('two_links'), extras=Extras(residual=harmful)
+    )
     assert '>worse<' in page
     assert '-14000' not in page
 

@@ -143,20 +143,14 @@ def _page(
 ) -> str:
     """Return report.html, with the truth and the convergence of the online estimate."""
     from armid_ros.report.identification_report import Assessment, identification_report
+    from armid_ros.report.provenance import ResultOrigin
     from armid_ros.report.sections.convergence import convergence_section
-    import numpy as np
 
-    convergence = convergence_section(
-        np.array([t for t, _ in history]),
-        np.array([estimate.values for _, estimate in history]),
-        np.array([estimate.std for _, estimate in history]),
-        target,
-        history[-1][1].parameters,
-    )
+    convergence = convergence_section(history, target)
     return identification_report(
         found.core,
         description=truth,
-        robot=truth.robot.name,
+        origin=ResultOrigin(truth.robot.name),
         recordings=found.recordings,
         validation={},
         assessment=Assessment(grade=found.graded, reference='truth', sections=[convergence]),

@@ -9,7 +9,6 @@ from pathlib import Path
 from typing import Any
 
 from armid_ros.api.diagnosis import diagnose
-from armid_ros.api.table import ResultOrigin
 from armid_ros.arm import ArmModel
 from armid_ros.cli.terminal import progress, say
 from armid_ros.diagnosis import Diagnosis
@@ -21,6 +20,7 @@ from armid_ros.motion import FloatArray
 from armid_ros.nodes.lockstep import run_lockstep
 from armid_ros.recording import read_recording, Recording
 from armid_ros.report.notation import digits, pretty
+from armid_ros.report.provenance import ResultOrigin
 from armid_ros.robots import collision_model, Robot
 from armid_ros.robots.load import shipped_path
 from armid_ros.simulation import Sensors, SimulatedArm

@@ -4,7 +4,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 from armid_ros.errors import TrajectoryError
@@ -110,20 +110,6 @@ def run_elastic(plant: Plant, loop: VelocityLoop, experiment: Experiment) -> Ela
     q, dq, _ = trace.motors
     motor = Motion(joints, t, q, dq, still, trace.tau)
     return ElasticRun(motor, Motion(joints, t, *trace.links), experiment.velocity)
-
-
-def run_all(
-    plant: Plant,
-    loop: VelocityLoop,
-    experiments: list[Experiment],
-    progress: Callable[[float], None] = lambda share: None,
-) -> list[ElasticRun]:
-    """Run experiments one after the other."""
-    runs = []
-    for number, experiment in enumerate(experiments):
-        runs.append(run_elastic(plant, loop, experiment))
-        progress((number + 1) / len(experiments))
-    return runs
 
 
 #: For the shipped two-link arm: torque of the multisine [N m] rms, the share of the loop's gains

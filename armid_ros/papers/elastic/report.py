@@ -30,15 +30,15 @@ from armid_ros.report.blocks import (
     ContentSection,
     DataTable,
     FactList,
-    PageBlock,
+    Origin,
     Panels,
     Paragraph,
+    VerdictSection,
 )
-from armid_ros.report.charts import Chart, Mark, Role, Series
+from armid_ros.report.charts import Chart, Role, Series
 from armid_ros.report.notation import counted, digits, measured, pretty
-from armid_ros.report.page import Page, Section
+from armid_ros.report.page import Page, Section, Templated
 from armid_ros.report.provenance import Provenance
-from armid_ros.report.sections.frame import Origin, VerdictSection
 from armid_ros.robots.two_link import TwoLinkParameters
 import numpy as np
 import numpy.typing as npt
@@ -221,7 +221,7 @@ def decibels_apart(result: TwoInertiaIdentification, joint: int) -> float:
 
 def _joint(
     result: TwoInertiaIdentification, k: int
-) -> Iterator[tuple[str, str, Sequence[PageBlock]]]:
+) -> Iterator[tuple[str, str, Sequence[Templated]]]:
     """Yield panels of one joint: decoupled, and from motor torque alone."""
     measured, joint, parameters = result.measured[k], result.joints[k], result.parameters
     seen = (measured.frequency >= _SHOWN[0]) & (measured.frequency <= _SHOWN[1])
@@ -235,8 +235,8 @@ def _joint(
     points[at], alone[at] = measured.decoupled[seen, 0], measured.coupled[seen, 0]
     low, high = (float(both[k]) for both in frequencies(parameters))
     marks = [
-        Mark(low, f'antiresonance {low:.1f} Hz', before=True),
-        Mark(high, f'resonance {high:.1f} Hz'),
+        (low, f'antiresonance {low:.1f} Hz', True),
+        (high, f'resonance {high:.1f} Hz', False),
     ]
     modelled = [('any linear model', subspaces), ('motor, spring and link', decoupled)]
     within = (own >= _COMPARED[0]) & (own <= _COMPARED[1])
@@ -280,7 +280,7 @@ def _chart(
     part: Callable[[npt.NDArray[np.complex128]], FloatArray],
     ylabel: str,
     height: int,
-    marks: Sequence[Mark],
+    marks: Sequence[tuple[float, str, bool]],
     *,
     last: bool = False,
 ) -> Chart:
@@ -295,7 +295,7 @@ def _chart(
         ylabel,
         height=height,
         link='frequency',
-        marks=marks if ylabel == _SIZE else [Mark(mark.x) for mark in marks],
+        marks=marks if ylabel == _SIZE else [(x, '', left) for x, _, left in marks],
         logarithmic=True,
         legend=ylabel == _SIZE,
     )

@@ -15,10 +15,9 @@ from armid_ros.errors import RecordingError
 from armid_ros.papers.elastic.identification.files import read_sides
 from armid_ros.papers.elastic.identification.joints import fit_springs, SpringEstimate
 from armid_ros.recording.elastic import LINK
-from armid_ros.report.blocks import ContentSection, DataTable, Paragraph
+from armid_ros.report.blocks import ContentSection, DataTable, Origin, Paragraph, VerdictSection
 from armid_ros.report.notation import counted
 from armid_ros.report.page import Page, Section
-from armid_ros.report.sections.frame import Origin, VerdictSection
 from armid_ros.robots import Robot
 import numpy as np
 

@@ -19,7 +19,7 @@ from armid_ros.papers.elastic.plant import (
     ElasticSensors,
     EXCITATION_RMS,
     resonance_experiments,
-    run_all,
+    run_elastic,
     step_experiments,
     STEP_POSES,
     STEPS,
@@ -92,8 +92,11 @@ def simulate(
         (steps, two_link_loop(shipped), step_experiments(STEP_POSES, STEPS), STEP_SENSORS),
     )
     for path, loop, plan, noise in plans:
-        tick(0.0, f'simulating {path.name}')
-        runs = [noise.measure(run, rng) for run in run_all(plant, loop, plan, tick)]
+        runs = []
+        for number, experiment in enumerate(plan):
+            tick(number / len(plan), f'simulating {path.name}')
+            runs.append(run_elastic(plant, loop, experiment))
+        runs = [noise.measure(run, rng) for run in runs]
         write_runs(path, runs, robot, sensors)
     return [resonances], [steps]
 

@@ -110,17 +110,12 @@ def exo(
         found = work.identify_ties(pair, machine, wearer, inertias, tick)
         walked = work.walk(pair, gait, stiffness, tick) if bag is None else None
     asked = {'inertias': inertias, 'topics': topics}
-    page = exo_report(
-        pair.with_stiffness(found[0].stiffness[0].clip(0.0)),
-        *(
-            work.single_support(pair, gait)
-            if bag is None
-            else work.recorded_motions(pair, machine, wearer)
-        ),
-        found,
-        walked,
-        provenance([path], asked, seed if bag is None else None),
-    )
+    origin = provenance([path], asked, seed if bag is None else None)
+    shown = work.recorded_motions(pair, machine, wearer)
+    if bag is None:
+        shown = work.single_support(pair, gait)
+    stiff = pair.with_stiffness(found[0].stiffness[0].clip(0.0))
+    page = exo_report(stiff, shown, found, walked, origin)
     document = work.exo_document(found, walked, source)
     rows = [
         (row['segment'], f'{row["value"]:.1f}', f'{row["std"]:.1f}')

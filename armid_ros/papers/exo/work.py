@@ -12,8 +12,7 @@ from armid_ros.cli.terminal import Tick
 from armid_ros.identification.ties.recorded import recorded_interaction_problem
 from armid_ros.identification.ties.stiffness import identify_interaction, Interaction
 from armid_ros.motion import FloatArray, Motion
-from armid_ros.papers.exo.assumptions import read_assumptions
-from armid_ros.papers.exo.plant.gait import Gait
+from armid_ros.papers.exo.plant.gait import Gait, read_assumptions
 from armid_ros.papers.exo.plant.gait_cycle import (
     check_cycle,
     gait_cycle,

@@ -11,12 +11,19 @@ from typing import Any
 from armid_ros.identification.fitting.identifiability import HALF_WIDTH
 from armid_ros.motion import FloatArray
 from armid_ros.papers.lunar.reproduction import Composite, LOAD, Repeated, Reproduction
-from armid_ros.report.blocks import ContentSection, DataTable, Fold, Panels, Paragraph
+from armid_ros.report.blocks import (
+    ContentSection,
+    DataTable,
+    Fold,
+    Origin,
+    Panels,
+    Paragraph,
+    VerdictSection,
+)
 from armid_ros.report.charts import Chart, Series, thinned
 from armid_ros.report.notation import digits, measured
 from armid_ros.report.page import Page, Section
 from armid_ros.report.provenance import Provenance
-from armid_ros.report.sections.frame import Origin, VerdictSection
 import numpy as np
 
 SCHEMA = 'armid/lunar/1'

@@ -4,11 +4,13 @@
 
 from __future__ import annotations
 
-from armid_ros.estimate import ParameterName
+from collections.abc import Sequence
+
+from armid_ros.estimate import Estimate
 from armid_ros.identification.fitting.identifiability import HALF_WIDTH
 from armid_ros.motion import FloatArray
 from armid_ros.report.blocks import ContentSection, Panels, Paragraph
-from armid_ros.report.charts import Chart, Level, Series
+from armid_ros.report.charts import Chart, Series
 from armid_ros.report.families import full_label, parameter_families
 from armid_ros.report.notation import pretty
 import numpy as np
@@ -18,27 +20,22 @@ _SHOWN = 6
 
 
 def convergence_section(
-    t: FloatArray,
-    values: FloatArray,
-    std: FloatArray,
-    truth: FloatArray,
-    parameters: tuple[ParameterName, ...],
+    history: Sequence[tuple[float, Estimate]], truth: FloatArray
 ) -> ContentSection:
     """
     Return online estimates over time with their 95 % intervals and the true values.
 
     Parameters
     ----------
-    t : ndarray, shape (K,)
-        Time since the start [s].
-    values, std : ndarray, shape (K, P)
-        Estimates and their standard deviations.
+    history : sequence of (float, Estimate)
+        Times since the start [s], and estimates of P parameters.
     truth : ndarray, shape (P,)
         True values.
-    parameters : tuple of ParameterName
-        P names.
 
     """
+    t, parameters = np.array([at for at, _ in history]), history[-1][1].parameters
+    values = np.array([estimate.values for _, estimate in history])
+    std = np.array([estimate.std for _, estimate in history])
     certainty = np.abs(truth) / np.maximum(std[-1], 1e-300)
     kinds = [
         sorted(members, key=lambda k: -certainty[k])
@@ -64,7 +61,7 @@ def convergence_section(
             f'estimate [{pretty(parameters[k].unit)}]',
             height=170,
             link='convergence',
-            levels=[Level(float(truth[k]), 'truth')],
+            levels=[(float(truth[k]), 'truth')],
             legend=False,
         )
         panels.append((full_label(parameters[k]), '', [chart]))

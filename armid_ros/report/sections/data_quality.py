@@ -15,11 +15,11 @@ from armid_ros.report.blocks import (
     ContentSection,
     DataTable,
     Fold,
-    PageBlock,
     Paragraph,
     TableCell,
 )
 from armid_ros.report.notation import digits, plain, with_names
+from armid_ros.report.page import Templated
 from armid_ros.robots import Robot
 import numpy as np
 
@@ -80,7 +80,7 @@ def data_quality_section(
             )
         notes.append((f'{source}: {said}', 'fine' if clean and not faulty else 'warn'))
     heads = ('Recording', 'Used for', 'Duration', 'Rate', 'Jitter', 'Longest step', 'Clock')
-    blocks: list[PageBlock] = [DataTable(heads, rows, (0, 1, 6)), BulletList(notes)]
+    blocks: list[Templated] = [DataTable(heads, rows, (0, 1, 6)), BulletList(notes)]
     if robot is not None:
         blocks += _repeatability(read, robot)
     return ContentSection('Data quality', blocks)
@@ -88,8 +88,8 @@ def data_quality_section(
 
 def _repeatability(
     read: Sequence[tuple[Recording, str, Sequence[Fit]]], robot: Robot
-) -> list[PageBlock]:
-    folds: list[PageBlock] = []
+) -> list[Templated]:
+    folds: list[Templated] = []
     for recording, _, fits in read:
         found = repeatability(fits) if fits else None
         if found is None:

@@ -13,7 +13,6 @@ from armid_ros.diagnosis.search.patch import room
 from armid_ros.diagnosis.search.trial import Trial
 from armid_ros.diagnosis.verdict.document import Detectable
 from armid_ros.diagnosis.verdict.finding import Gap
-from armid_ros.diagnosis.verdict.where import Where
 from armid_ros.diagnosis.verdict.words import by_cause, share_interval_in_words
 from armid_ros.effects import CATALOGUE
 from armid_ros.estimate import name_in_words
@@ -27,7 +26,6 @@ from armid_ros.report.blocks import (
     ContentSection,
     DataTable,
     Fold,
-    PageBlock,
     Panels,
     Paragraph,
     TableCell,
@@ -42,7 +40,7 @@ from armid_ros.report.notation import (
     value_of,
     with_interval,
 )
-from armid_ros.robots import Robot
+from armid_ros.report.page import Templated
 import numpy as np
 
 #: Joints that are shown, and candidates.
@@ -59,6 +57,11 @@ _DETECTABLE = (
     'At the worst joint from',
     'Not detectable with this motion in',
 )
+
+
+def share_of(diagnosis: Diagnosis) -> str:
+    """Return what the shares of joints refer to: the gap, or what the named causes explain."""
+    return 'the explained part' if diagnosis.findings else 'the gap'
 
 
 def share_bars(diagnosis: Diagnosis) -> BarChart:
@@ -131,21 +134,11 @@ def named_section(findings: Sequence[Finding]) -> ContentSection:
     )
 
 
-def evidence_section(places: Sequence[Where], share_of: str = 'the gap') -> ContentSection:
-    """
-    Return the residuals without what was named, in the worst joints.
-
-    Parameters
-    ----------
-    places : sequence of Where
-        Joints, the worst first.
-    share_of : str
-        What their shares are of.
-
-    """
+def evidence_section(diagnosis: Diagnosis) -> ContentSection:
+    """Return the residuals without what was named, in the worst joints."""
     folds = []
-    for number, place in enumerate(places[:_JOINTS]):
-        blocks: list[PageBlock] = []
+    for number, place in enumerate(diagnosis.where[:_JOINTS]):
+        blocks: list[Templated] = []
         if place.axes and place.mean_share >= _MEAN_SAID:
             blocks.append(
                 Paragraph(
@@ -168,7 +161,7 @@ def evidence_section(places: Sequence[Where], share_of: str = 'the gap') -> Cont
                 legend=False,
             )
             panels.append((f'{axis.name}: {share} of the mean square', '', [chart]))
-        share = f'{100 * place.share_of_gap:.0f} % of {share_of}'
+        share = f'{100 * place.share_of_gap:.0f} % of {share_of(diagnosis)}'
         folds.append(
             Fold(
                 f'{place.joint}: {share}, {place.signature}',
@@ -179,20 +172,8 @@ def evidence_section(places: Sequence[Where], share_of: str = 'the gap') -> Cont
     return ContentSection('Where it shows', folds)
 
 
-def minor_section(minor: Sequence[Finding], patched: bool, named: bool) -> ContentSection:
-    """
-    Return the effects that are significant, and negligible or not confirmed.
-
-    Parameters
-    ----------
-    minor : sequence of Finding
-        The effects.
-    patched : bool
-        Whether they were added to the model all the same.
-    named : bool
-        Whether the headline names anything.
-
-    """
+def minor_section(diagnosis: Diagnosis, patched: bool) -> ContentSection:
+    """Return the effects that are significant, and negligible or not confirmed, or added too."""
     rows = [
         (
             name_in_words(one.name),
@@ -201,9 +182,9 @@ def minor_section(minor: Sequence[Finding], patched: bool, named: bool) -> Conte
             percent(one.share),
             probability(one.p),
         )
-        for one in minor
+        for one in diagnosis.minor
     ]
-    share = 'Share of the gap' if named else 'Share of the remaining error'
+    share = 'Share of the gap' if diagnosis.findings else 'Share of the remaining error'
     outside = '' if patched else ' None of them is in model.yaml.'
     return ContentSection(
         'Minor effects',
@@ -363,32 +344,15 @@ def _candidate_value(diagnosis: Diagnosis, trial: Trial) -> str:
     return with_interval(float(trial.values[0]), float(trial.std[0]), name.unit)
 
 
-def gap_section(
-    robot: Robot, gap: Gap, floor: str, patched: bool, harmful: bool = False
-) -> ContentSection:
-    """
-    Return the errors of each joint before and after, in units of its noise floor.
-
-    Parameters
-    ----------
-    robot : Robot
-        Gives joints and units.
-    gap : Gap
-        The numbers.
-    floor : str
-        What the floor is, in words.
-    patched : bool
-        Whether anything was added to the model.
-    harmful : bool
-        Whether it was not kept, as it makes the model worse in some joint.
-
-    """
+def gap_section(diagnosis: Diagnosis, gap: Gap) -> ContentSection:
+    """Return the errors of each joint before and after, in units of its noise floor."""
+    robot, floor, harmful = diagnosis.arm.robot, diagnosis.baseline, bool(diagnosis.harmful)
     roles: list[tuple[Role, str, FloatArray]] = [
         ('before', 'before', gap.before),
         ('after', 'after', gap.after),
         ('floor', 'floor', gap.floor),
     ]
-    if not patched:
+    if not diagnosis.findings:
         roles = [('before', 'error', gap.after), roles[-1]]
     rows, first = [], roles[0][2]
     for joint in np.argsort(-first / np.maximum(gap.floor, 1e-12)):

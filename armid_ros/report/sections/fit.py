@@ -15,12 +15,12 @@ from armid_ros.report.blocks import (
     ContentSection,
     DataTable,
     Fold,
-    PageBlock,
     Panels,
     Paragraph,
 )
 from armid_ros.report.charts import Chart, joined, joined_time, Role, Series, thinned
 from armid_ros.report.notation import counted, digits
+from armid_ros.report.page import Templated
 from armid_ros.robots import Robot
 import numpy as np
 
@@ -79,7 +79,7 @@ def fit_section(
     groups = {'held-out': validation, 'training': training}
     least = int(np.argmax(reach))
     certainty = f'±{digits(float(reach[least]))} {robot.torque_units[least]}'
-    blocks: list[PageBlock] = []
+    blocks: list[Templated] = []
     errors = [
         (name, role, error)
         for role, group in groups.items()
@@ -190,7 +190,7 @@ def forward_section(
         What both models are called.
 
     """
-    blocks: list[PageBlock] = [
+    blocks: list[Templated] = [
         Paragraph(
             f'Root mean square errors of position of two models, {labels[0]} and {labels[1]}, the '
             'worst joint first. The recorded torques drive both. The same 8 Hz feedback keeps '
@@ -201,7 +201,7 @@ def forward_section(
         models: list[tuple[Role, str, ForwardScore]] = [('after', labels[1], pair.after)]
         if pair.before is not None:
             models.insert(0, ('before', labels[0], pair.before))
-        own: list[PageBlock] = []
+        own: list[Templated] = []
         if pair.before is None:
             inconsistent = 'its inertias are not physically consistent'
             own.append(Paragraph(f'The model before cannot be simulated: {inconsistent}.'))
@@ -230,7 +230,7 @@ def forward_section(
 
 def _worst_joint(
     robot: Robot, pair: ForwardValidation, models: Sequence[tuple[Role, str, ForwardScore]]
-) -> list[PageBlock]:
+) -> list[Templated]:
     """Return the position error over time of the joint with the largest error."""
     farthest = max((score for *_, score in models), key=lambda one: one.position_error.max())
     worst, motion = int(farthest.position_error.argmax()), pair.after.motion

@@ -9,42 +9,31 @@ from dataclasses import replace
 
 from armid_ros.diagnosis import Diagnosis
 from armid_ros.diagnosis.data.trajectory import trajectories
-from armid_ros.diagnosis.search.spans import Span
 from armid_ros.diagnosis.verdict.finding import Gap, Overlay
 from armid_ros.identification.rows.signals import conditioning, SignalSettings
 from armid_ros.motion import FloatArray
 from armid_ros.recording import Recording
 from armid_ros.report.blocks import ContentSection, Paragraph
-from armid_ros.report.charts import Chart, joined, joined_time, Mark, Series, thinned
+from armid_ros.report.charts import Chart, joined, joined_time, Series, thinned
 from armid_ros.report.sections.fit import ZOOM
-from armid_ros.robots import Robot
 import numpy as np
 
 
-def overlay_section(
-    robot: Robot,
-    gap: Gap,
-    patched: bool,
-    names: Mapping[str, str],
-    spans: Sequence[Span] = (),
-) -> ContentSection:
+def overlay_section(diagnosis: Diagnosis, gap: Gap, names: Mapping[str, str]) -> ContentSection:
     """
     Return measured and modelled torque, in the joint and recording where the gap was largest.
 
     Parameters
     ----------
-    robot : Robot
-        Gives joints and units.
+    diagnosis : Diagnosis
+        What was found, and the seconds in which the causes act.
     gap : Gap
         The curves.
-    patched : bool
-        Whether anything was added to the model.
     names : mapping of str to str
         What each recording is called.
-    spans : sequence of Span
-        Seconds in which the causes act; none if they act throughout.
 
     """
+    robot, patched = diagnosis.arm.robot, bool(diagnosis.findings)
     j = int(np.argmax(gap.chi2_before))
 
     def size(overlay: Overlay) -> float:
@@ -55,7 +44,9 @@ def overlay_section(
     source = names.get(shown.source, shown.source) or 'the recording'
     t, measured, before, after = _of_recording(gap, shown, j)
     unit = robot.torque_units[j]
-    marks = _marks([span for span in spans if span.source == shown.source and not span.whole])
+    acting = [one for one in diagnosis.spans if one.source == shown.source and not one.whole]
+    marks = [(one.start, f'from {one.start:.1f} s', True) for one in acting]
+    marks += [(one.stop, f'to {one.stop:.1f} s', False) for one in acting]
     kept = thinned(measured, measured - before, measured - after)
     band: FloatArray = np.full(len(kept), 2.0 * shown.sigma[j])
 
@@ -106,11 +97,6 @@ def _of_recording(gap: Gap, shown: Overlay, joint: int) -> tuple[FloatArray, ...
     curves = zip(*((one.measured, one.before, one.after) for one in own), strict=True)
     t = joined_time([one.trajectory.t for one in own])
     return t, *(joined([part[:, joint] for part in parts]) for parts in curves)
-
-
-def _marks(spans: Sequence[Span]) -> list[Mark]:
-    starts = [Mark(span.start, f'from {span.start:.1f} s', before=True) for span in spans]
-    return [*starts, *(Mark(span.stop, f'to {span.stop:.1f} s') for span in spans)]
 
 
 def whole_overlays(diagnosis: Diagnosis, recordings: Sequence[Recording]) -> Gap | None:

@@ -2,7 +2,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """The man, his exoskeleton, and what was assumed of both."""
 
-from armid_ros.papers.exo.assumptions import read_assumptions
+from armid_ros.papers.exo.plant.gait import read_assumptions
 from armid_ros.robots import load_robot, Robot
 import numpy as np
 import pytest

@@ -4,15 +4,12 @@
 Springs of any arm, joint by joint, from encoders on both sides of its transmissions.
 
 The twist of motor against link is compliance times the torque in the transmission, plus half the
-backlash to the side of the flank that carries the load. If the torque is that of the motor, less
-friction and rotor acceleration, parts of the twist in proportion to sign of velocity, velocity and
-acceleration are fitted as well. Two pairs are not identifiable apart: Coulomb friction over
-stiffness and lost motion by direction of travel; viscous friction over stiffness and a delay
-between the encoders.
+backlash to the side of the flank that carries the load. A part of the twist in proportion to the
+velocity is fitted as well, for a delay between the encoders.
 
-For a whole arm, the torque of a spring is that of inverse dynamics along the motion of the links.
-The rest of the motor torque is rotor inertia, viscous and Coulomb friction. Both models are
-linear, and slow motion is sufficient. The resonances follow from inertia and stiffness.
+The torque of a spring is that of inverse dynamics along the motion of the links. The rest of the
+motor torque is rotor inertia, viscous and Coulomb friction. Both models are linear, and slow
+motion is sufficient. The resonances follow from inertia and stiffness.
 
 """
 
@@ -37,29 +34,9 @@ IntArray = npt.NDArray[np.intp]
 CUTOFF = 8.0
 
 
-@dataclass(frozen=True, eq=False)
-class TwoEncoders:
-    """
-    Signals of one joint: two encoders and a torque.
-
-    Attributes
-    ----------
-    dt : float
-        Time between samples [s].
-    motor, link : ndarray, shape (N,)
-        Positions on either side, both at the joint [rad].
-    torque : ndarray, shape (N,)
-        Torque of the motor at the joint, or torque of the spring if known [N m].
-    carried : bool
-        Whether the torque is that of the spring, so that it needs no correction.
-
-    """
-
-    dt: float
-    motor: FloatArray
-    link: FloatArray
-    torque: FloatArray
-    carried: bool = False
+#: Time between samples [s], positions of motor and link at the joint [rad], and torque of the
+#: spring [N m], each of shape (N,).
+TwoEncoders = tuple[float, FloatArray, FloatArray, FloatArray]
 
 
 @dataclass(frozen=True, eq=False)
@@ -71,8 +48,6 @@ class TransmissionFit:
     ----------
     stiffness : tuple of float
         Value, lower and upper bound with free play as a part of the model [N m/rad].
-    stiffness_alone : tuple of float
-        The same without free play.
     backlash : tuple of float
         Total free play [rad]; NaN with infinite bounds if the load changes flanks too rarely.
     delay : tuple of float
@@ -87,7 +62,6 @@ class TransmissionFit:
     """
 
     stiffness: tuple[float, float, float]
-    stiffness_alone: tuple[float, float, float]
     backlash: tuple[float, float, float]
     delay: tuple[float, float, float]
     correlation: float
@@ -124,48 +98,44 @@ def fit_transmission(records: Sequence[TwoEncoders], rng: np.random.Generator) -
     reversals = sum(count for _, _, _, count in pieces)
     # number of draws of bootstrap blocks
     draws = [rng.choice(len(blocks), len(blocks)) for _ in range(400)]
-    bare = np.delete(table, 1, axis=1)
-    found_alone, spread_alone = _drawn(bare, twist, blocks, draws)
-    alone = _inverse(found_alone[0], spread_alone[:, 0])
+    backlash, correlation = (np.nan, -np.inf, np.inf), np.nan
     # least number of flank changes for an estimate of free play
     if reversals < 4:
-        found, spread = (np.insert(x, 1, np.nan, axis=-1) for x in (found_alone, spread_alone))
-        backlash, correlation = (np.nan, -np.inf, np.inf), np.nan
-        explained = _explained(bare, twist, found_alone)
-    else:
-        found, spread = _drawn(table, twist, blocks, draws)
+        table[:, 1] = 0.0
+    found, spread = _drawn(table, twist, blocks, draws)
+    if reversals >= 4:
         backlash = _interval(2.0 * found[1], 2.0 * spread[:, 1])
         correlation = float(np.corrcoef(spread[:, 0], spread[:, 1])[0, 1])
-        explained = _explained(table, twist, found)
+    left = twist - table @ found
+    # the interval of a stiffness has no end if that of the compliance contains zero
+    compliance, lower, upper = _interval(found[0], spread[:, 0])
+    stiffness = [1.0 / c if c > 0.0 else np.inf for c in (compliance, upper, lower)]
     return TransmissionFit(
-        _inverse(found[0], spread[:, 0]),
-        alone,
+        (stiffness[0], stiffness[1], stiffness[2]),
         backlash,
         _interval(found[2], spread[:, 2]),
         correlation,
         reversals,
-        explained,
+        1.0 - float(left @ left / np.sum((twist - twist.mean()) ** 2)),
     )
 
 
 def _columns(record: TwoEncoders) -> tuple[FloatArray, FloatArray, FloatArray, int]:
     """Return columns, twist, times and the number of flank changes of one recording."""
-    sections = butter(4, CUTOFF, fs=1.0 / record.dt, output='sos')
-    motor, link, torque = (
-        sosfiltfilt(sections, x) for x in (record.motor, record.link, record.torque)
-    )
-    velocity = np.gradient(motor, record.dt)
+    dt, *signals = record
+    sections = butter(4, CUTOFF, fs=1.0 / dt, output='sos')
+    motor, link, torque = (sosfiltfilt(sections, x) for x in signals)
+    velocity = np.gradient(motor, dt)
     # velocity below which a joint is at rest, as a share of the largest velocity
     moving = np.abs(velocity) > 0.02 * np.abs(velocity).max()
-    ends = round(0.3 / record.dt)
+    ends = round(0.3 / dt)
     moving[:ends] = moving[-ends:] = False
-    moving &= np.arange(len(moving)) % max(round(0.25 / CUTOFF / record.dt), 1) == 0
+    moving &= np.arange(len(moving)) % max(round(0.25 / CUTOFF / dt), 1) == 0
     # torque range in which the flank changes, as a share of the median torque
     flank = np.tanh(torque / (0.05 * np.median(np.abs(torque))))
-    beside = [] if record.carried else [np.sign(velocity), np.gradient(velocity, record.dt)]
-    own = np.column_stack([torque, flank, velocity, *beside, motor, np.ones(len(motor))])
+    own = np.column_stack([torque, flank, velocity, motor, np.ones(len(motor))])
     changes = int(np.count_nonzero(np.diff(np.sign(torque[moving]))))
-    times = np.asarray(record.dt * np.flatnonzero(moving), dtype=np.float64)
+    times = np.asarray(dt * np.flatnonzero(moving), dtype=np.float64)
     return own[moving], np.asarray((motor - link)[moving]), times, changes
 
 
@@ -195,6 +165,7 @@ def _drawn(
 ) -> tuple[FloatArray, FloatArray]:
     """Return the least-squares solution, and the solutions of random sets of blocks."""
     scale = np.linalg.norm(table, axis=0)
+    scale[scale <= 0.0] = 1.0
     scaled = table / scale
     normal = np.array([scaled[b].T @ scaled[b] for b in blocks])
     right = np.array([scaled[b].T @ twist[b] for b in blocks])
@@ -211,18 +182,6 @@ def _drawn(
 def _interval(value: float, spread: FloatArray) -> tuple[float, float, float]:
     lower, upper = np.quantile(spread, [0.025, 0.975])
     return float(value), float(lower), float(upper)
-
-
-def _inverse(value: float, spread: FloatArray) -> tuple[float, float, float]:
-    """Convert a compliance into a stiffness; infinite if the interval contains zero."""
-    compliance, lower, upper = _interval(value, spread)
-    bounds = [1.0 / c if c > 0.0 else np.inf for c in (compliance, upper, lower)]
-    return bounds[0], bounds[1], bounds[2]
-
-
-def _explained(table: FloatArray, twist: FloatArray, values: FloatArray) -> float:
-    left = twist - table @ values
-    return 1.0 - float(left @ left / np.sum((twist - twist.mean()) ** 2))
 
 
 #: Shortest stretch without a pause that is used [s].
@@ -310,7 +269,7 @@ def fit_springs(
     found = []
     for j, joint in enumerate(robot.joints):
         records = [
-            TwoEncoders(motor.t[1] - motor.t[0], motor.q[:, j], link.q[:, j], load[:, j], True)
+            (float(motor.t[1] - motor.t[0]), motor.q[:, j], link.q[:, j], load[:, j])
             for (motor, link), load in zip(stretches, loads, strict=True)
         ]
         try:

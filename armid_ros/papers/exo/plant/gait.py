@@ -3,6 +3,8 @@
 """
 Walking: hip, knee and ankle over a gait cycle, and the joint motion of both legs from it.
 
+The values that the source of the shipped leg pair does not give are assumptions with reasons.
+
 The phase of a leg is 0 at heel strike; the other leg is half a cycle later. The stance foot stays
 flat and the trunk upright, so that the stance ankle is knee - hip.
 
@@ -10,18 +12,52 @@ flat and the trunk upright, so that the stance ankle is knee - hip.
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass
+from importlib import resources
 from pathlib import Path
+from typing import Any
 
 from armid_ros.errors import TrajectoryError
-from armid_ros.files import read_text
+from armid_ros.files import load_yaml, read_text
 from armid_ros.motion import FloatArray, freeze, Motion
-from armid_ros.papers.exo.assumptions import leg_pair_file
 import numpy as np
 
 #: Number of harmonics of a gait; higher ones are negligible in walking.
 _HARMONICS = 6
 _COLUMNS = ['phase', 'hip_deg', 'knee_deg', 'ankle_deg']
+
+
+@dataclass(frozen=True)
+class Assumption:
+    """
+    One assumption.
+
+    Attributes
+    ----------
+    value : float, list, dict or str
+        Assumed value.
+    unit : str
+        Its unit.
+    reason : str
+        Why.
+
+    """
+
+    value: Any
+    unit: str
+    reason: str
+
+
+def read_assumptions() -> Mapping[str, Assumption]:
+    """Read the assumptions of the human-exoskeleton leg pair."""
+    text = leg_pair_file('exoskeleton_legs/assumptions.yaml').read_text(encoding='utf-8')
+    return {name: Assumption(**entry) for name, entry in load_yaml(text).items()}
+
+
+def leg_pair_file(name: str) -> Path:
+    """Return a file that is shipped with the leg pair, such as 'human_legs/gait.csv'."""
+    return Path(str(resources.files('armid_ros.robots').joinpath(name)))
 
 
 @dataclass(frozen=True)

@@ -21,8 +21,7 @@ from dataclasses import dataclass, replace
 
 from armid_ros.model.kinematics import points_motion
 from armid_ros.motion import FloatArray, Motion, read_only
-from armid_ros.papers.exo.assumptions import read_assumptions
-from armid_ros.papers.exo.plant.gait import Gait
+from armid_ros.papers.exo.plant.gait import Gait, read_assumptions
 from armid_ros.papers.exo.plant.leg_pair import pair_torques, PairMotion, PairTorques, TiedPair
 from armid_ros.papers.exo.plant.torque_driven import (
     drive_by_torque,

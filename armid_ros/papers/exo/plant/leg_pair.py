@@ -29,9 +29,9 @@ from armid_ros.model.spring_ties import (
     TieGeometry,
 )
 from armid_ros.motion import FloatArray, Motion, read_only
-from armid_ros.papers.exo.assumptions import read_assumptions
 from armid_ros.papers.exo.plant.gait import (
     Gait,
+    read_assumptions,
     read_gait,
     stance_motion,
 )
@@ -206,9 +206,11 @@ def leg_pair(
     return TiedPair(exo, human, ties, np.asarray(stiffness, dtype=float))
 
 
-def walking(pair: TiedPair, gait: Gait, t: FloatArray, start: float | None = None) -> PairMotion:
+def walking(pair: TiedPair, gait: Gait, t: FloatArray) -> PairMotion:
     """
     Return the motion of the walking pair: the wearer follows the gait, the exoskeleton nearly.
+
+    At t = 0 single support begins.
 
     Parameters
     ----------
@@ -218,13 +220,10 @@ def walking(pair: TiedPair, gait: Gait, t: FloatArray, start: float | None = Non
         Gait of one leg.
     t : ndarray, shape (N,)
         Time [s].
-    start : float, optional
-        Phase of the stance leg at t = 0; by default at the beginning of single support.
 
     """
     known = read_assumptions()
-    begin = known['single_support'].value[0] if start is None else start
-    cycle = known['cycle_time'].value
+    begin, cycle = known['single_support'].value[0], known['cycle_time'].value
 
     def wearer(joints: tuple[str, ...], time: FloatArray) -> Motion:
         phase = [begin + time / cycle, np.full_like(time, 1.0 / cycle), np.zeros_like(time)]

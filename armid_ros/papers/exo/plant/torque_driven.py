@@ -16,8 +16,7 @@ from dataclasses import dataclass, replace
 
 from armid_ros.errors import TrajectoryError
 from armid_ros.motion import FloatArray, Motion
-from armid_ros.papers.exo.assumptions import read_assumptions
-from armid_ros.papers.exo.plant.gait import Gait
+from armid_ros.papers.exo.plant.gait import Gait, read_assumptions
 from armid_ros.papers.exo.plant.leg_pair import pair_torques, PairMotion, stepping, TiedPair
 from armid_ros.papers.exo.plant.walkers import contacts, Ground
 import numpy as np

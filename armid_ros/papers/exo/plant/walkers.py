@@ -24,8 +24,7 @@ from dataclasses import dataclass, replace
 
 from armid_ros.model.spring_ties import centroid_ties
 from armid_ros.motion import FloatArray
-from armid_ros.papers.exo.assumptions import read_assumptions
-from armid_ros.papers.exo.plant.gait import Gait
+from armid_ros.papers.exo.plant.gait import Gait, read_assumptions
 from armid_ros.papers.exo.plant.leg_pair import TiedPair
 from armid_ros.robots import load_robot, Robot
 from armid_ros.robots.load import robot_from_urdf

@@ -12,7 +12,7 @@ from armid_ros.identification.fitting.identifiability import HALF_WIDTH
 from armid_ros.identification.ties.stiffness import Interaction
 from armid_ros.model import LinkFrames
 from armid_ros.motion import FloatArray
-from armid_ros.papers.exo.assumptions import read_assumptions
+from armid_ros.papers.exo.plant.gait import read_assumptions
 from armid_ros.papers.exo.plant.leg_pair import pair_torques, PairMotion, TiedPair
 from armid_ros.papers.exo.report.walk import by_torque_section, feet_section, SimulatedWalk, Walk
 from armid_ros.report.arm_drawing import flat, SIDE, Strip, svg_points
@@ -21,14 +21,15 @@ from armid_ros.report.blocks import (
     DataTable,
     FactList,
     Fold,
+    Origin,
     Panels,
     Paragraph,
+    VerdictSection,
 )
 from armid_ros.report.charts import Chart, Role, Series
 from armid_ros.report.notation import measured
 from armid_ros.report.page import Page, Section
 from armid_ros.report.provenance import Provenance
-from armid_ros.report.sections.frame import Origin, VerdictSection
 from armid_ros.robots import Robot
 import numpy as np
 
@@ -38,9 +39,7 @@ _NARROW = 0.1
 
 def exo_report(
     pair: TiedPair,
-    motions: PairMotion,
-    abscissa: FloatArray,
-    name: str,
+    shown: tuple[PairMotion, FloatArray, str],
     found: Sequence[Interaction],
     walked: SimulatedWalk | None,
     provenance: Provenance,
@@ -52,12 +51,8 @@ def exo_report(
     ----------
     pair : TiedPair
         Both machines, with the estimated stiffness.
-    motions : PairMotion
-        The motion of both machines to show.
-    abscissa : ndarray, shape (N,)
-        Abscissa of the plots.
-    name : str
-        Name and unit of the abscissa.
+    shown : (PairMotion, ndarray, str)
+        The motion of both machines, and abscissa of the plots, shape (N,), with name and unit.
     found : sequence of Interaction
         Estimates with one stiffness for all ties, then with one for each.
     walked : SimulatedWalk or None
@@ -66,6 +61,7 @@ def exo_report(
         Files, versions, settings, seed.
 
     """
+    motions, abscissa, name = shown
     samples = np.linspace(0, len(abscissa) - 1, 6).astype(int).tolist()
     captions = [f'{abscissa[k]:.2f}' for k in samples]
     sections: list[Section] = [

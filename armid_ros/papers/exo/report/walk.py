@@ -14,7 +14,7 @@ from armid_ros.papers.exo.plant.gait_cycle import feet_by_shares, GaitCycle, wei
 from armid_ros.papers.exo.plant.torque_driven import GaitCheck
 from armid_ros.papers.exo.plant.walkers import columns, contacts, floating, leg_length, SIDES
 from armid_ros.report.blocks import ContentSection, DataTable, Panels, Paragraph
-from armid_ros.report.charts import Chart, Mark, Role, script_json, Series
+from armid_ros.report.charts import Chart, Role, script_json, Series
 from armid_ros.report.page import Section
 from armid_ros.robots import Robot
 from markupsafe import Markup
@@ -186,7 +186,7 @@ def feet_section(cycle: GaitCycle) -> ContentSection:
             Series('right, source', np.where(two, rule[:, 0], np.nan), 'measured'),
             Series('left, source', np.where(two, rule[:, 1], np.nan), 'before'),
         ]
-        marks = [Mark(float(cycle.phase[k])) for k in np.flatnonzero(np.diff(two)) + 1]
+        marks = [(float(cycle.phase[k]), '', False) for k in np.flatnonzero(np.diff(two)) + 1]
         chart = Chart(
             cycle.phase, series, _ABSCISSA, 'force up [N]', height=240, link='feet', marks=marks
         )

@@ -77,7 +77,6 @@ def test_free_play_is_told_from_the_spring(found):
     assert fit.backlash_seen
     assert fit.backlash[0] == pytest.approx(GAP[3], rel=0.1)
     assert fit.stiffness[0] == pytest.approx(STIFFNESS[3], rel=0.05)
-    assert abs(fit.stiffness_alone[0] / STIFFNESS[3] - 1.0) > 0.15  # a spring alone would be wrong
     assert not found[0].transmission.backlash[0] > 2e-4
 
 
