@@ -1,6 +1,7 @@
 # Copyright 2026 The armid_ros developers
 # SPDX-License-Identifier: Apache-2.0
 import re
+from xml.etree import ElementTree
 
 from armid_ros.arm import ArmModel
 from armid_ros.arm.export import arm_mjcf, arm_urdf
@@ -138,8 +139,8 @@ def test_pinocchio_and_mujoco_agree_with_the_model_friction_and_rotors_included(
 def rest(urdf):
     """Return a description without inertials, dynamics and the remarks at its end."""
     for pattern in (r'<inertial>.*?</inertial>', r'<dynamics[^>]*/>', r'<!--\s*a - - b\s*-->'):
-        urdf = re.sub(r'\s*' + pattern, '', urdf, flags=re.DOTALL)
-    return re.sub(r'>\s*</(link|joint|robot)>', r'></\1>', re.sub(r'/>', '></link>', urdf))
+        urdf = re.sub(pattern, '', urdf, flags=re.DOTALL)
+    return ElementTree.canonicalize(urdf, with_comments=True, strip_text=True)
 
 
 def test_only_inertials_and_dynamics_change(robot):
