@@ -77,9 +77,9 @@ def export_urdf(
     own = dict(zip(robot.links, body - others, strict=True))
 
     document, root = _parsed(text)
-    for link in _children(root, 'link'):
-        if link.getAttribute('name') in own:
-            _set_inertial(link, own[link.getAttribute('name')])
+    links = {link.getAttribute('name'): link for link in _children(root, 'link')}
+    for name, parameters in own.items():
+        _set_inertial(links[name], parameters)
     for joint in _children(root, 'joint'):
         for key, table in (('damping', damping or {}), ('friction', friction or {})):
             if joint.getAttribute('name') in table:
@@ -88,11 +88,9 @@ def export_urdf(
     for element in list(_children(root, 'ros2_control')):  # hosts and passwords of drives
         root.removeChild(element)
     for mesh in root.getElementsByTagName('mesh'):  # the file will be in another folder
-        found = None
-        if '://' not in mesh.getAttribute('filename'):
-            found = find_mesh(mesh.getAttribute('filename'), robot.path)
-        if found is not None:
-            mesh.setAttribute('filename', f'file://{found}')
+        name = mesh.getAttribute('filename')
+        found = None if '://' in name else find_mesh(name, robot.path)
+        mesh.setAttribute('filename', name if found is None else f'file://{found}')
     if remarks:
         lines = ''.join(f'\n    {line.replace("--", "- -")}' for line in remarks)
         root.appendChild(document.createComment(f'{lines}\n  '))
@@ -127,13 +125,18 @@ def _child(parent: minidom.Element, name: str) -> minidom.Element:
     """Return the first child with a tag; it is added, indented as the others, if it is missing."""
     found = next(_children(parent, name), None)
     if found is None:
-        found, ends = minidom.Document().createElement(name), [parent.firstChild, parent.lastChild]
-        first, last = (
-            end if isinstance(end, minidom.Text) and end.data.isspace() else None for end in ends
-        )
-        if first is not None:
-            parent.insertBefore(first.cloneNode(False), last)
-        parent.insertBefore(found, last)
+        document = minidom.Document()
+        found = document.createElement(name)
+        space = [
+            node
+            for node in (parent.firstChild, parent.lastChild)
+            if isinstance(node, minidom.Text) and node.data.isspace()
+        ]
+        if space:
+            parent.insertBefore(document.createTextNode(space[0].data), space[-1])
+            parent.insertBefore(found, space[-1])
+        else:
+            parent.appendChild(found)
     return found
 
 
