@@ -13,9 +13,8 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 from armid_ros.effects.action import Action
-from armid_ros.effects.base import Arm, Effect
+from armid_ros.effects.base import Arm, Effect, Kind
 from armid_ros.effects.quantities import Quantity
-from armid_ros.effects.registry import Kind
 from armid_ros.errors import ModelError
 from armid_ros.motion import FloatArray, Motion
 from armid_ros.robots import Robot

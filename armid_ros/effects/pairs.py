@@ -8,9 +8,8 @@ from collections.abc import Iterable
 from dataclasses import dataclass
 from itertools import combinations, pairwise, permutations
 
-from armid_ros.effects.action import Action, DryFriction
+from armid_ros.effects.action import Action, direction, DryFriction
 from armid_ros.effects.base import Arm, Effect
-from armid_ros.effects.direction import direction
 from armid_ros.effects.quantities import pair_unit, Quantity
 from armid_ros.effects.readings import TorqueReading
 from armid_ros.errors import ModelError
