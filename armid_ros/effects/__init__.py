@@ -19,7 +19,7 @@ from armid_ros.effects.action import (
     TorqueLaw,
     Transmission,
 )
-from armid_ros.effects.base import Effect, joint_columns, Kind, scatter
+from armid_ros.effects.base import Effect, Kind
 from armid_ros.effects.catalogue import (
     CATALOGUE,
     make_effect,
@@ -27,6 +27,7 @@ from armid_ros.effects.catalogue import (
     register,
     USUAL_EFFECTS,
 )
+from armid_ros.effects.layout import joint_columns, scatter
 from armid_ros.effects.quantities import Quantity, Shape
 from armid_ros.effects.readings import Displacing, TorqueReading
 from armid_ros.effects.slipping import Hysteresis

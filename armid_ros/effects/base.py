@@ -20,25 +20,19 @@ from abc import ABC, abstractmethod
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import lru_cache
-from typing import Any, ClassVar, Protocol, Self, TYPE_CHECKING
+from typing import Any, ClassVar, Protocol, Self
 
-from armid_ros.effects.action import Action
+from armid_ros.effects.action import Action, Displacement
 from armid_ros.effects.quantities import joint_unit, Quantity, Shape
 from armid_ros.effects.traits import TRAITS, Traits
 from armid_ros.effects.unexplained import Unexplained
 from armid_ros.errors import meant, ModelError
 from armid_ros.estimate import ParameterName
+from armid_ros.model import LinkFrames
 from armid_ros.motion import FloatArray, Motion, read_only
 from armid_ros.robots import Robot
 import numpy as np
 import numpy.typing as npt
-
-if TYPE_CHECKING:  # the arm has effects, and stands in a layer above
-    from armid_ros.arm import ArmModel
-
-    Arm = ArmModel
-else:
-    Arm = Any
 
 
 @dataclass(frozen=True)
@@ -349,47 +343,6 @@ class Effect(ABC):
         return list(_places(self.joints, motion_joints))
 
 
-def joint_columns(effect: Effect, motion: Motion, *quantities: FloatArray) -> FloatArray:
-    """
-    Return the columns of an effect that acts on each of its joints separately.
-
-    Parameters
-    ----------
-    effect : Effect
-        Effect with the joints.
-    motion : Motion
-        Motion with the joint order.
-    *quantities : ndarray, shape (N, n)
-        One array per quantity of the effect: dtau_j / dtheta_j for all joints of the motion.
-
-    Returns
-    -------
-    ndarray, shape (N, n, P)
-        Zero where a parameter belongs to another joint.
-
-    """
-    own, places = _flat_places(effect.joints, motion.joints, len(quantities))
-    size = len(quantities) * len(own)
-    columns = np.zeros((len(motion), motion.n_joints * size))
-    for place, values in zip(places, quantities, strict=True):
-        columns[:, place] = values[:, own]
-    return columns.reshape(len(motion), motion.n_joints, size)
-
-
-def scatter(effect: Effect, values: FloatArray, robot: Robot) -> FloatArray:
-    """
-    Spread the values of a joint effect over all joints of the robot, zero elsewhere.
-
-    Returns
-    -------
-    ndarray, shape (number of quantities, n)
-
-    """
-    spread = np.zeros((len(effect.quantities), robot.n_joints))
-    spread[:, effect.indices(robot.joints)] = values.reshape(len(effect.joints), -1).T
-    return spread
-
-
 @lru_cache(maxsize=1024)
 def _places(joints: tuple[str, ...], among: tuple[str, ...]) -> tuple[int, ...]:
     """Return the indices of joints; cached, because streams repeat the call per sample."""
@@ -409,14 +362,59 @@ def _spread_shape(
     return read_only(spread)
 
 
-@lru_cache(maxsize=1024)
-def _flat_places(
-    joints: tuple[str, ...], among: tuple[str, ...], count: int
-) -> tuple[npt.NDArray[np.intp], tuple[npt.NDArray[np.intp], ...]]:
-    """Return indices of joints, and of each quantity in the flattened columns of a sample."""
-    own = np.array(_places(joints, among), dtype=np.intp)
-    size = count * len(own)
-    return own, tuple(own * size + np.arange(first, size, count) for first in range(count))
+class Arm(Protocol):
+    """A rigid body with effects; `armid_ros.arm.ArmModel` is one."""
+
+    @property
+    def robot(self) -> Robot:
+        """The described robot."""
+
+    @property
+    def body(self) -> Robot:
+        """Return the rigid body with effects, such as a payload or a changed gravity."""
+
+    @property
+    def middle_frames(self) -> LinkFrames:
+        """Frames of all links in the middle of the range of motion."""
+
+    def values_of(self, effect: Effect) -> FloatArray:
+        """Return the values of an effect, shape (P_e,)."""
+
+    def action(self) -> Action:
+        """Return the merged action of all effects."""
+
+    def link_motion(self, motion: Motion) -> Motion:
+        """Return the true motion of the links for a recorded motion."""
+
+    def link_frames(self, motion: Motion) -> LinkFrames:
+        """Return the frames of all links along a recorded motion."""
+
+    def smoothed(self, motion: Motion) -> Motion:
+        """Return a recorded motion without frequencies beyond its band."""
+
+    def load(self, motion: Motion) -> FloatArray:
+        """Return the torque of the rigid body along a motion of the links, (N, n) [N m]."""
+
+    def load_derivatives(self, motion: Motion) -> tuple[FloatArray, FloatArray, FloatArray]:
+        """Differentiate the load by position, velocity, acceleration, each (N, n, n)."""
+
+    def body_columns(self, motion: Motion) -> FloatArray:
+        """Return the regressor of the load along a recorded motion, (N, n, 10 n)."""
+
+    def gravity_columns(self, motion: Motion) -> FloatArray:
+        """Differentiate the load along a recorded motion by gravity, (N, n, 3)."""
+
+    def joint_torque(self, motion: Motion) -> FloatArray:
+        """Return the true torques of a recorded motion, (N, n) [N m]."""
+
+    def torque_before(self, effect: Effect, motion: Motion) -> FloatArray:
+        """Return the torque before the action of an effect on readings, (N, n) [N m]."""
+
+    def torque_change(self, motion: Motion, change: Displacement) -> FloatArray:
+        """Return the change of the true torque due to changes of the links' motion."""
+
+    def columns_of(self, effect: Effect, motion: Motion) -> FloatArray:
+        """Return the sensitivities of the torque readings to the parameters of an effect."""
 
 
 class Kind(Protocol):

@@ -8,7 +8,8 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 from armid_ros.effects.action import Action
-from armid_ros.effects.base import Arm, Effect, joint_columns, scatter
+from armid_ros.effects.base import Arm, Effect
+from armid_ros.effects.layout import joint_columns, scatter
 from armid_ros.effects.quantities import Quantity, Shape
 from armid_ros.effects.readings import TorqueReading
 from armid_ros.effects.unexplained import Unexplained, wave_orders

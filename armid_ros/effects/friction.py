@@ -8,7 +8,8 @@ from dataclasses import dataclass, replace
 from typing import ClassVar
 
 from armid_ros.effects.action import Action, direction, DryFriction, merge_actions
-from armid_ros.effects.base import Arm, Effect, joint_columns, scatter
+from armid_ros.effects.base import Arm, Effect
+from armid_ros.effects.layout import joint_columns, scatter
 from armid_ros.effects.quantities import Quantity, Shape, SURELY
 from armid_ros.motion import FloatArray, Motion
 import numpy as np

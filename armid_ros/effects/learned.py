@@ -17,7 +17,8 @@ from functools import cached_property
 from typing import Any, Self
 
 from armid_ros.effects.action import Action
-from armid_ros.effects.base import Arm, Effect, joint_columns, scatter
+from armid_ros.effects.base import Arm, Effect
+from armid_ros.effects.layout import joint_columns, scatter
 from armid_ros.effects.quantities import Quantity
 from armid_ros.errors import ModelError
 from armid_ros.files import finite

@@ -7,7 +7,8 @@ from __future__ import annotations
 from abc import abstractmethod
 from dataclasses import dataclass, replace
 
-from armid_ros.effects.base import Arm, joint_columns
+from armid_ros.effects.base import Arm
+from armid_ros.effects.layout import joint_columns
 from armid_ros.effects.quantities import Quantity
 from armid_ros.effects.readings import TorqueReading
 from armid_ros.errors import ModelError

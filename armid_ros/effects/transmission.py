@@ -14,7 +14,8 @@ from __future__ import annotations
 from dataclasses import dataclass, replace
 
 from armid_ros.effects.action import Action, Displacement, Transmission
-from armid_ros.effects.base import Arm, joint_columns, scatter
+from armid_ros.effects.base import Arm
+from armid_ros.effects.layout import joint_columns, scatter
 from armid_ros.effects.quantities import Quantity, Shape
 from armid_ros.effects.readings import Displacing
 from armid_ros.effects.timing import low_pass, rate_of_change, within_band
