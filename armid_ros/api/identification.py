@@ -32,8 +32,7 @@ from armid_ros.api.table import (
     Summary,
 )
 from armid_ros.arm import ArmModel, Misfit, save_model
-from armid_ros.arm.export import arm_mjcf, arm_urdf, Exported
-from armid_ros.arm.export_check import torque_check
+from armid_ros.arm.export import arm_mjcf, arm_urdf, Exported, torque_check
 from armid_ros.diagnosis import known_misfit
 from armid_ros.estimate import Estimate
 from armid_ros.files import write_file

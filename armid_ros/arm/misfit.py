@@ -15,12 +15,10 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass
-from pathlib import Path
 from typing import Any, NamedTuple
 
-from armid_ros.arm.model_check import checked_model
 from armid_ros.errors import ModelError
-from armid_ros.files import finite, read_text, reading
+from armid_ros.files import finite
 from armid_ros.motion import FloatArray
 from armid_ros.robots import Robot
 import numpy as np
@@ -120,28 +118,6 @@ class Misfit:
 def louder(now: FloatArray, before: FloatArray) -> FloatArray:
     """Return the ratio of the rms torque now to that before, at least 1, (n,)."""
     return np.asarray(np.maximum(now / np.maximum(before, 1e-12), 1.0))
-
-
-def load_misfit(path: str | Path) -> Misfit | None:
-    """
-    Read the misfit of a model from model.yaml; None if the file has none.
-
-    Parameters
-    ----------
-    path : str or Path
-        model.yaml.
-
-    Raises
-    ------
-    ModelError
-        If the file is invalid; the message names the file and the fault.
-
-    """
-    path = Path(path)
-    text = read_text(path, ModelError)
-    with reading(path, ModelError):
-        block = checked_model(text).get('misfit')
-        return None if block is None else misfit_of_block(block)
 
 
 def misfit_of_block(block: Any) -> Misfit:

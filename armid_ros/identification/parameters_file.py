@@ -10,9 +10,8 @@ from pathlib import Path
 from typing import Any
 
 from armid_ros.arm import ArmModel, load_misfit, Misfit
-from armid_ros.arm.model_check import checked_model
-from armid_ros.arm.model_check import SCHEMA as MODEL
-from armid_ros.arm.model_file import read_model
+from armid_ros.arm.model_file import checked_model, read_model
+from armid_ros.arm.model_file import SCHEMA as MODEL
 from armid_ros.errors import ArmidError, ModelError
 from armid_ros.estimate import ParameterName
 from armid_ros.files import finite, is_file, load_json, load_yaml, read_text, reading
