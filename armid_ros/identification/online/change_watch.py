@@ -24,13 +24,7 @@ from typing import TypeVar
 from armid_ros.estimate import Estimate
 from armid_ros.identification.online.background import at_once, Background, Job, Pieces
 from armid_ros.identification.online.change import Change, ChangeCandidate
-from armid_ros.identification.online.change_score import Block
-from armid_ros.identification.online.change_search import (
-    BLOCK,
-    ChangeSearch,
-    ChangeSettings,
-    FoundChange,
-)
+from armid_ros.identification.online.change_search import Block, ChangeSearch, FoundChange
 from armid_ros.identification.online.nuisance_rows import NuisanceRows, Row
 from armid_ros.identification.online.null_calibration import ResidualScale
 from armid_ros.identification.online.recursive import (
@@ -41,8 +35,8 @@ from armid_ros.identification.online.recursive import (
 from armid_ros.motion import FloatArray
 import numpy as np
 
-__all__ = ['BLOCK', 'ChangeSettings', 'ChangeWatch']
-
+#: Length of a block [s].
+BLOCK = 0.25
 #: Smallest residual scale where only the ratios of the noise between joints are known: 0.01 of the
 #: assumed noise, which is 1e-4 of the torque limit [-].
 _LEAST_NOISE = 0.01
@@ -78,8 +72,8 @@ class ChangeWatch:
         Source of the nuisance columns, which only the tests use.
     candidates : sequence of ChangeCandidate
         Candidate changes to search for.
-    settings : ChangeSettings
-        Settings of change detection.
+    false_alarm_time : float
+        Mean time between two alarms of an arm that does not change [s].
     work : Background
         Queue for long computations.
 
@@ -95,7 +89,7 @@ class ChangeWatch:
         estimator: RecursiveLeastSquares,
         nuisance: NuisanceRows,
         candidates: Sequence[ChangeCandidate],
-        settings: ChangeSettings,
+        false_alarm_time: float,
         work: Background,
     ) -> None:
         self._estimator = estimator
@@ -106,7 +100,7 @@ class ChangeWatch:
         self._search = ChangeSearch(
             candidates,
             self._among_all(np.hstack([c.directions for c in candidates])),
-            BLOCK / settings.false_alarm_time,
+            BLOCK / false_alarm_time,
             self._work,
         )
         self.reset()
@@ -125,20 +119,19 @@ class ChangeWatch:
         self._late: list[Row] | None = None
         self._searching = False
 
-    def use(self, settings: ChangeSettings | None, forgetting: float) -> None:
+    def use(self, false_alarm_time: float | None, forgetting: float) -> None:
         """
         Change settings and keep the estimate.
 
         Parameters
         ----------
-        settings : ChangeSettings or None
-            Settings of change detection; None disables it.
+        false_alarm_time : float or None
+            Mean time between two false alarms [s]; None disables the detection.
         forgetting : float
             Forgetting factor of the estimator.
 
         """
-        chance = 0.0 if settings is None else BLOCK / settings.false_alarm_time
-        self._search.believe(chance)
+        self._search.believe(0.0 if false_alarm_time is None else BLOCK / false_alarm_time)
         self._wider.forgetting = forgetting
 
     def interrupt(self) -> None:

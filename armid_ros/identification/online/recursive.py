@@ -122,6 +122,10 @@ class RecursiveLeastSquares:
 
     """
 
+    _root: FloatArray
+    _right: FloatArray
+    _values: FloatArray
+
     def __init__(
         self,
         parameters: tuple[ParameterName, ...],
@@ -170,12 +174,12 @@ class RecursiveLeastSquares:
         weights: npt.ArrayLike | None = None,
     ) -> FloatArray:
         """
-        Add one sample.
+        Add one sample, or several at once.
 
         Parameters
         ----------
         rows : ndarray, shape (m, P)
-            Sensitivity of the torques to the parameters.
+            Sensitivity of the torques to the parameters; of several samples one after the other.
         tau : ndarray, shape (m,)
             Measured torque [N m].
         weights : array_like, shape (m,), optional
@@ -190,38 +194,10 @@ class RecursiveLeastSquares:
         """
         counts = np.ones(len(tau)) if weights is None else np.asarray(weights)
         innovation = tau - rows @ self._values
-        if counts.any():
-            self._absorb(rows, tau, innovation, counts, self.scale(counts))
-            self.samples += 1
-        return innovation
-
-    def update_together(self, samples: Sequence[WeightedSample]) -> None:
-        """
-        Add several samples at once, which is faster than one by one.
-
-        Without forgetting, the estimate is the same. With forgetting, samples are added one by
-        one, as the forgotten information depends on the order.
-
-        """
-        if self._forgetting < 1.0:
-            for sample in samples:
-                self.update(*sample)
-            return
-        rows, tau, weights = (np.concatenate(part) for part in zip(*samples, strict=True))
-        if weights.any():
-            scale = self.scale(weights.reshape(len(samples), -1)).reshape(-1)
-            self._absorb(rows, tau, tau - rows @ self._values, weights, scale)
-            self.samples += sum(bool(sample.weights.any()) for sample in samples)
-
-    def _absorb(
-        self,
-        rows: FloatArray,
-        tau: FloatArray,
-        innovation: FloatArray,
-        counts: FloatArray,
-        scale: FloatArray,
-    ) -> None:
-        """Add rows of one or several samples."""
+        if not counts.any():
+            return innovation
+        by_sample = counts.reshape(-1, len(self._noise))
+        scale = self.scale(by_sample).reshape(-1)
         rows = rows * scale[:, np.newaxis]
         if self._forgetting < 1.0:
             self._root = replaced(self._root, rows, self._forgetting)
@@ -244,6 +220,22 @@ class RecursiveLeastSquares:
         after = tau * scale - rows @ self._values
         self._squares += float(innovation * scale @ after)
         self._freedom += float(counts.sum())
+        self.samples += int(np.count_nonzero(by_sample.any(axis=1)))
+        return innovation
+
+    def update_together(self, samples: Sequence[WeightedSample]) -> None:
+        """
+        Add several samples at once, which is faster than one by one.
+
+        Without forgetting, the estimate is the same. With forgetting, samples are added one by
+        one, as the forgotten information depends on the order.
+
+        """
+        if self._forgetting < 1.0:
+            for sample in samples:
+                self.update(*sample)
+        else:
+            self.update(*(np.concatenate(part) for part in zip(*samples, strict=True)))
 
     def scale(self, weights: FloatArray) -> FloatArray:
         """Return the factors that whiten rows of given weights, shape (m,) [1/(N m)]."""
