@@ -245,7 +245,7 @@ def _model_of(path: Path, robot: Robot) -> ArmModel:
     """Read a model; ArmidError if its description is still there, and is of another arm."""
     from armid_ros.arm import load_model
     from armid_ros.cli import options
-    from armid_ros.identification.description import kinematics_digest
+    from armid_ros.identification.output import kinematics_digest
 
     arm = options.model_of(path, robot)
     try:

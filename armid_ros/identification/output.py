@@ -5,6 +5,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+import hashlib
 from pathlib import Path
 import re
 from typing import Any
@@ -14,10 +15,10 @@ from armid_ros.files import json_text, write_file
 from armid_ros.identification.assess.consistency import NoiseCheck
 from armid_ros.identification.assess.grade import Grade
 from armid_ros.identification.assess.verification import Verification
-from armid_ros.identification.description import kinematics_digest
 from armid_ros.identification.identify import Identification
 from armid_ros.identification.rows.regression import Fit, Score
 from armid_ros.motion import FloatArray
+from armid_ros.robots import Robot
 import numpy as np
 
 SCHEMA = 'armid/identification/1'
@@ -97,6 +98,32 @@ def identification_document(
             'left_out': list(verification.left_out),
         }
     return document
+
+
+def kinematics_digest(robot: Robot) -> str:
+    """
+    Return a digest of the joints of a description, in hexadecimal.
+
+    The digest covers names, kinds, axes and placements of joints, and names of links, to a
+    micrometre. It does not cover masses and gravity, which may be corrected later.
+
+    """
+    digest = hashlib.sha256()
+    model = robot.model
+    for index, (joint, link) in enumerate(zip(robot.joints, robot.links, strict=True), start=1):
+        place = model.jointPlacements[index]
+        numbers = np.concatenate([place.rotation.ravel(), place.translation])
+        rounded = np.round(numbers, 6) + 0.0  # no negative zero
+        kind = model.joints[index].shortname()
+        parts = (
+            joint,
+            link,
+            kind,
+            str(model.parents[index]),
+            ' '.join(f'{x:.6f}' for x in rounded),
+        )
+        digest.update('\n'.join(parts).encode())
+    return digest.hexdigest()[:16]
 
 
 def write_document(path: str | Path, document: Mapping[str, Any]) -> None:
