@@ -4,7 +4,7 @@ import re
 from xml.etree import ElementTree
 
 from armid_ros.arm import ArmModel
-from armid_ros.arm.export import arm_mjcf, arm_urdf
+from armid_ros.arm.export import arm_mjcf, arm_urdf, torque_check
 from armid_ros.effects import make_effect
 from armid_ros.errors import ModelError
 from armid_ros.model import inverse_dynamics, random_motion
@@ -67,35 +67,6 @@ def read(text, robot):
     return robot_from_urdf(text, joints=robot.joints)
 
 
-def without_shapes(urdf):
-    """Return a description without what needs mesh files."""
-    urdf = re.sub(r'<(visual|collision)\b.*?</\1>', '', urdf, flags=re.DOTALL)
-    return re.sub(r'<(visual|collision)[^>]*/>', '', urdf)
-
-
-def mujoco_torque(text, robot, motion):
-    """Return MuJoCo's inverse dynamics without dry friction, which it smooths."""
-    model = mujoco.MjModel.from_xml_string(text)
-    model.opt.gravity[:] = robot.gravity
-    flags = mujoco.mjtDisableBit
-    model.opt.disableflags |= flags.mjDSBL_FRICTIONLOSS | flags.mjDSBL_LIMIT
-    data = mujoco.MjData(model)
-    rows = [model.joint(name).dofadr[0] for name in robot.joints]
-    tau = np.empty(motion.q.shape)
-    for joint in range(model.njnt):
-        low, high = model.jnt_range[joint]
-        data.qpos[model.jnt_qposadr[joint]] = min(max(0.0, low), high)
-    for k in range(len(motion)):
-        data.qpos[rows], data.qvel[rows], data.qacc[rows] = (
-            motion.q[k],
-            motion.dq[k],
-            motion.ddq[k],
-        )
-        mujoco.mj_inverse(model, data)
-        tau[k] = data.qfrc_inverse[rows]
-    return tau
-
-
 @pytest.fixture(
     params=[
         'humanoid_arm',
@@ -119,20 +90,17 @@ def test_description_read_again_has_the_parameters(robot):
 
 
 def test_pinocchio_and_mujoco_agree_with_the_model_friction_and_rotors_included(robot):
-    """But for dry friction, which MuJoCo smooths."""
     arm = ArmModel(robot)
     for name, value in (('viscous_friction', 0.3), ('rotor_inertia', 0.02)):
         arm = arm.with_effect(make_effect(name, robot), np.full(robot.n_joints, value))
     motion = random_motion(robot, np.random.default_rng(1), 30)
-    tau = arm.torque(motion)
-    without_rotors = tau - 0.02 * motion.ddq
-    bound = 1e-9 * np.abs(tau).max()
-    mjcf, urdf = arm_mjcf(arm).text, arm_urdf(arm).text
-    np.testing.assert_allclose(mujoco_torque(mjcf, robot, motion), tau, atol=bound)
-    in_mujoco = mujoco_torque(without_shapes(urdf), robot, motion)
-    np.testing.assert_allclose(in_mujoco, without_rotors, atol=bound)
-    again = read(urdf, robot)
+    without_rotors = arm.torque(motion) - 0.02 * motion.ddq
+    assert torque_check(arm_mjcf(arm), arm)['share'] < 1e-9
+    urdf = arm_urdf(arm)
+    assert torque_check(urdf, arm)['share'] < 1e-9
+    again = read(urdf.text, robot)
     in_pinocchio = inverse_dynamics(again, motion) + again.urdf_damping * motion.dq
+    bound = 1e-9 * np.abs(without_rotors).max()
     np.testing.assert_allclose(in_pinocchio, without_rotors, atol=bound)
 
 

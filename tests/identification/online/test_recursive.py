@@ -177,18 +177,6 @@ def test_resting_arm_neither_forgets_nor_drifts(forgetting, size):
         assert np.all(rested.std > 1e-3 * moved.std)
 
 
-def test_reset_returns_to_the_beginning():
-    rows, tau, _ = linear_data(np.random.default_rng(12))
-    estimator = feed(RecursiveLeastSquares(names(8), NOISE), rows, tau)
-    once = estimator.estimate
-    estimator.reset()
-    assert estimator.samples == 0
-    np.testing.assert_allclose(estimator.estimate.std, PRIOR_STD)
-    again = feed(estimator, rows, tau).estimate
-    np.testing.assert_array_equal(again.values, once.values)
-    np.testing.assert_array_equal(again.covariance, once.covariance)
-
-
 def test_bad_settings_are_refused():
     with pytest.raises(IdentificationError, match='forgetting factor'):
         RecursiveLeastSquares(names(2), [1.0], forgetting=1.1)
