@@ -131,7 +131,7 @@ def _remarks(form: str, missing: tuple[str, ...]) -> tuple[str, ...]:
     return (f'identified by armid_ros; {form} has no place for', *missing)
 
 
-def torque_check(exported: Exported, arm: ArmModel, seed: int = 0) -> dict[str, Any]:
+def torque_check(exported: Exported, arm: ArmModel) -> dict[str, Any]:
     """
     Compare the torque of an exported file in MuJoCo with that of the arm, in random states.
 
@@ -141,8 +141,6 @@ def torque_check(exported: Exported, arm: ArmModel, seed: int = 0) -> dict[str, 
         A URDF or MJCF of the arm.
     arm : ArmModel
         The arm.
-    seed : int
-        Seed of the states.
 
     Returns
     -------
@@ -157,7 +155,7 @@ def torque_check(exported: Exported, arm: ArmModel, seed: int = 0) -> dict[str, 
     except ImportError:
         return {'not_checked': 'MuJoCo is not installed'}
     robot = arm.body
-    motion = random_motion(robot, np.random.default_rng(seed), STATES)
+    motion = random_motion(robot, np.random.default_rng(0), STATES)
     placed = {
         key: np.array([exported.values.get(key, {}).get(joint, 0.0) for joint in robot.joints])
         for key in ('damping', 'friction', 'armature')

@@ -21,9 +21,9 @@ from typing import Any
 
 from armid_ros.arm.arm_model import ArmModel
 from armid_ros.arm.misfit import Misfit, misfit_of_block
-from armid_ros.effects import CATALOGUE, Effect, Kind, Quantity, Shape
+from armid_ros.effects import CATALOGUE, Effect, Quantity, Shape
 from armid_ros.effects.quantities import written_units
-from armid_ros.effects.tied import tied_kind
+from armid_ros.effects.tied import tied_as_written
 from armid_ros.errors import ModelError
 from armid_ros.estimate import Estimate, ParameterName
 from armid_ros.files import (
@@ -404,10 +404,12 @@ def _arm(document: dict[str, Any], robot: Robot) -> ArmModel:
         ) from None
     arm = arm.with_theta(_values(document['rigid_parameters'], arm.parameters))
     for entry in document['effects']:
-        kind: Kind = CATALOGUE.find(str(entry['name']))
+        kind = CATALOGUE.find(str(entry['name']))
+        effect: Effect
         if 'ties' in entry:
-            kind = tied_kind(kind.name, entry)
-        effect = kind.on(robot, tuple(entry['joints'])).with_particulars(entry)
+            effect = tied_as_written(entry, robot)
+        else:
+            effect = kind.on(robot, tuple(entry['joints'])).with_particulars(entry)
         if 'shapes' in entry:
             shape = _values(entry['shapes'], effect.shape_parameters(robot))
             effect = effect.with_shape(shape.reshape(effect.shape_values.shape))

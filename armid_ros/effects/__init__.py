@@ -19,7 +19,7 @@ from armid_ros.effects.action import (
     TorqueLaw,
     Transmission,
 )
-from armid_ros.effects.base import Effect, Kind
+from armid_ros.effects.base import Effect
 from armid_ros.effects.catalogue import (
     CATALOGUE,
     make_effect,
@@ -40,7 +40,6 @@ __all__ = [
     'make_effect',
     'parse_effect',
     'Effect',
-    'Kind',
     'Quantity',
     'Shape',
     'Traits',

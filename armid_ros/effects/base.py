@@ -17,7 +17,7 @@ depend on them.
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from functools import lru_cache
 from typing import Any, ClassVar, Protocol, Self
@@ -209,8 +209,8 @@ class Effect(ABC):
             ) from None
         return replace(self, shape=tuple(spread.ravel().tolist()))
 
-    def spread(self, robot: Robot, found: Sequence[FloatArray] | None = None) -> FloatArray:
-        """Return the largest expected values, shape (P,); found values and std reduce them."""
+    def spread(self, robot: Robot) -> FloatArray:
+        """Return the largest expected values, shape (P,)."""
         return np.full(len(self.parameters(robot)), np.inf)
 
     def shape_parameters(self, robot: Robot) -> tuple[ParameterName, ...]:
@@ -415,20 +415,3 @@ class Arm(Protocol):
 
     def columns_of(self, effect: Effect, motion: Motion) -> FloatArray:
         """Return the sensitivities of the torque readings to the parameters of an effect."""
-
-
-class Kind(Protocol):
-    """A kind of effect: a class of the catalogue, or an object with the same methods."""
-
-    @property
-    def name(self) -> str:
-        """Return the name of the effects."""
-
-    def on(self, robot: Robot, joints: tuple[str, ...] | None = None) -> Effect:
-        """Make the effect for a robot."""
-
-    def places(self, robot: Robot) -> tuple[tuple[str, ...], ...]:
-        """Return the sets of joints of single causes."""
-
-    def as_change(self) -> Kind:
-        """Return the kind for a change between two days."""

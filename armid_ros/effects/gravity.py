@@ -13,7 +13,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 from armid_ros.effects.action import Action
-from armid_ros.effects.base import Arm, Effect, Kind
+from armid_ros.effects.base import Arm, Effect
 from armid_ros.effects.quantities import Quantity
 from armid_ros.errors import ModelError
 from armid_ros.motion import FloatArray, Motion
@@ -142,7 +142,7 @@ class GravityVector(_GravityEffect):
         )
 
 
-def with_exact_vector(kinds: Sequence[Kind]) -> list[Kind]:
+def with_exact_vector(kinds: Sequence[type[Effect]]) -> list[type[Effect]]:
     """Return kinds for a search; with both tilt and magnitude, the vector replaces the tilt."""
     both = BaseTilt in kinds and GravityMagnitude in kinds
     return [GravityVector if both and kind is BaseTilt else kind for kind in kinds]

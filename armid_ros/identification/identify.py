@@ -23,8 +23,8 @@ from armid_ros.identification.fitting.nonlinear import (
     through,
     torques,
     ungrouped,
+    with_uncertain_inertia,
 )
-from armid_ros.identification.fitting.quasi_static import with_uncertain_inertia
 from armid_ros.identification.physical.fit_among_bodies import fit_to_bodies, PhysicalSettings
 from armid_ros.identification.physical.physical_certificate import PhysicalCertificate
 from armid_ros.identification.rows.checks import (
