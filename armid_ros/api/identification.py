@@ -419,7 +419,7 @@ def identify(
     gains = None
     if payloads:
         every = [*training, *held_out]
-        loaded = payloads_of(payloads, [Path(one.source) for one in every], every, model.robot)
+        loaded = payloads_of(payloads, every, model.robot)
         gains = drive_gains(model, training, loaded, settings.signals, source)
         training, held_out = (
             list(corrected(model, some, loaded, gains, settings.signals))

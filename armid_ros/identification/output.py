@@ -12,7 +12,6 @@ from typing import Any
 
 from armid_ros.arm import parameter_table
 from armid_ros.files import json_text, write_file
-from armid_ros.identification.assess.consistency import NoiseCheck
 from armid_ros.identification.assess.grade import Grade
 from armid_ros.identification.assess.verification import Verification
 from armid_ros.identification.identify import Identification
@@ -71,11 +70,11 @@ def identification_document(
         'rank': result.base.rank,
         'training': {
             'bags': list(dict.fromkeys(fit.source for fit in result.training)),
-            **_score(result.training),
+            **_score(result, result.training),
             'halves_error_percent': result.halves.whole,
             'joint_halves_error_percent': _by_joint(result, result.halves.joints),
         },
-        'validation': [{'bag': bag, **_score(fits)} for bag, fits in validation.items()],
+        'validation': [{'bag': bag, **_score(result, fits)} for bag, fits in validation.items()],
         'residual_std': _by_joint(result, result.joint_std),
         'settings': {
             'method': result.settings.method,
@@ -90,10 +89,21 @@ def identification_document(
     if result.physical is not None:
         document['physical'] = result.physical.document()
     if verification is not None:
+        noise = verification.noise
         document['verification'] = {
             'encoder_noise': None
-            if verification.noise is None
-            else _noise(result, verification.noise),
+            if noise is None
+            else {
+                'statistic': noise.statistic,
+                'degrees_of_freedom': noise.freedom,
+                'p_value': noise.p_value,
+                'position_noise': _by_joint(result, noise.position_noise),
+                'bias': noise.bias.tolist(),
+                'bias_std': noise.bias_std.tolist(),
+                'largest_bias_in_deviations': float(
+                    np.max(np.abs(noise.relative_bias), initial=0.0)
+                ),
+            },
             'forward': [pair.document() for pair in verification.forward],
             'left_out': list(verification.left_out),
         }
@@ -133,27 +143,12 @@ def write_document(path: str | Path, document: Mapping[str, Any]) -> None:
     write_file(path, rows + '\n')
 
 
-def _noise(result: Identification, noise: NoiseCheck) -> dict[str, Any]:
-    return {
-        'statistic': noise.statistic,
-        'degrees_of_freedom': noise.freedom,
-        'p_value': noise.p_value,
-        'position_noise': _by_joint(result, noise.position_noise),
-        'bias': noise.bias.tolist(),
-        'bias_std': noise.bias_std.tolist(),
-        'largest_bias_in_deviations': float(np.max(np.abs(noise.relative_bias), initial=0.0)),
-    }
-
-
-def _score(fits: Sequence[Fit]) -> dict[str, Any]:
+def _score(result: Identification, fits: Sequence[Fit]) -> dict[str, Any]:
     score = Score.of(fits)
-    joints = fits[0].motion.joints
     return {
         'relative_error_percent': score.relative_error_percent,
-        'joint_relative_error_percent': dict(
-            zip(joints, score.joint_relative_error_percent.tolist(), strict=True)
-        ),
-        'rms': dict(zip(joints, score.rms.tolist(), strict=True)),
+        'joint_relative_error_percent': _by_joint(result, score.joint_relative_error_percent),
+        'rms': _by_joint(result, score.rms),
     }
 
 
