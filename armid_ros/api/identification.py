@@ -53,9 +53,8 @@ from armid_ros.identification import identify as run
 from armid_ros.identification import verify as run_checks
 from armid_ros.identification.fitting.identifiability import excludes_zero
 from armid_ros.identification.fitting.least_squares import Estimator
-from armid_ros.identification.identified_from import with_contents
 from armid_ros.identification.known_payload import corrected, drive_gains, DriveGains, payloads_of
-from armid_ros.identification.output import SCHEMA
+from armid_ros.identification.output import SCHEMA, with_contents
 from armid_ros.identification.parameters_file import parameters_of
 from armid_ros.identification.physical.fit_among_bodies import far_from_described
 from armid_ros.identification.rows.checks import check_held_out

@@ -167,7 +167,12 @@ def torque_check(exported: Exported, arm: ArmModel) -> dict[str, Any]:
         with warnings.catch_warnings():
             warnings.simplefilter('ignore')
             spec = mujoco.MjSpec.from_string(exported.text)
-            shapes = _shapes(spec) if exported.text.startswith('<mujoco') else {}
+            shapes: dict[str, str] = {}
+            if exported.text.startswith('<mujoco'):
+                try:
+                    spec.compile()
+                except (ValueError, RuntimeError) as error:
+                    shapes = {'shapes': f'not loaded: {" ".join(str(error).split())}'}
             for element in (*spec.geoms, *spec.meshes, *spec.materials, *spec.textures):
                 spec.delete(element)
             spec.option.gravity = robot.gravity
@@ -182,15 +187,6 @@ def torque_check(exported: Exported, arm: ArmModel) -> dict[str, Any]:
         'share': difference / float(np.abs(wanted).max()),
         **shapes,
     }
-
-
-def _shapes(spec: Any) -> dict[str, str]:
-    """Return the reason why MuJoCo does not load the shapes of a file; empty if it does."""
-    try:
-        spec.compile()
-    except (ValueError, RuntimeError) as error:
-        return {'shapes': f'not loaded: {" ".join(str(error).split())}'}
-    return {}
 
 
 def _inverse(mujoco: Any, model: Any, motion: Motion, held: dict[str, float]) -> FloatArray:

@@ -126,7 +126,16 @@ def misfit_of_block(block: Any) -> Misfit:
         rms, torque = _torques(block['rms']), block.get('torque_rms')
         loud = None if torque is None else _torques(torque)
         data, error = str(block['data']), block['relative_error_percent']
-        filters = None if 'filters' not in block else _filters(block['filters'])
+        filters = None
+        if 'filters' in block:
+            found = {
+                name: finite(block['filters'][name], f'misfit: {name}')
+                for name in RowFilters._fields
+            }
+            for name, value in found.items():
+                if value <= 0.0:
+                    raise ModelError(f'misfit: {name} is {value:g}, not above zero')
+            filters = RowFilters(found['rate_hz'], found['cutoff_hz'], round(found['decimation']))
     except (AttributeError, KeyError, TypeError) as fault:
         raise ModelError(f'misfit: {type(fault).__name__} {fault}') from fault
     if data not in _DATA:
@@ -135,14 +144,6 @@ def misfit_of_block(block: Any) -> Misfit:
         raise ModelError('misfit: torque_rms lacks joints of rms')
     relative = finite(error, 'relative_error_percent of the misfit')
     return Misfit(data, rms, relative, loud, filters=filters)
-
-
-def _filters(block: Any) -> RowFilters:
-    values = {name: finite(block[name], f'misfit: {name}') for name in RowFilters._fields}
-    wrong = [name for name, value in values.items() if value <= 0.0]
-    if wrong:
-        raise ModelError(f'misfit: {wrong[0]} is {values[wrong[0]]:g}, not above zero')
-    return RowFilters(values['rate_hz'], values['cutoff_hz'], round(values['decimation']))
 
 
 def _torques(block: Any) -> dict[str, float]:

@@ -230,7 +230,7 @@ def diagnose(
 
 def _identified_from(model: Path, asked: list[Path]) -> tuple[Path, ...]:
     """Return the recordings of the identification as baseline; none if one is diagnosed."""
-    from armid_ros.identification.identified_from import identified_from, require_as_identified
+    from armid_ros.identification.output import identified_from, require_as_identified
 
     found = identified_from(model)
     if not found or {path.resolve() for path in found} & {path.resolve() for path in asked}:

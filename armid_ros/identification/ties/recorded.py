@@ -262,14 +262,13 @@ class SensorNoise:
             if isinstance(effect, TiedSlack):
                 slack.update(zip(effect.joints, effect.slacks.tolist(), strict=True))
         if any(slack.values()):
-            problem = self._problem(np.array(list(slack.values())))
+            problem = together_interaction_problem(
+                *(self.robot, self.recording, self.used),
+                separate=True,
+                slack=np.array(list(slack.values())),
+            )
         return problem.deviation(np.array(list(stiffness.values())))
 
     @cached_property
     def _taut(self) -> InteractionProblem:
-        return self._problem(0.0)
-
-    def _problem(self, slack: float | FloatArray) -> InteractionProblem:
-        return together_interaction_problem(
-            self.robot, self.recording, self.used, separate=True, slack=slack
-        )
+        return together_interaction_problem(self.robot, self.recording, self.used, separate=True)
