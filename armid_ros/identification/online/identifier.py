@@ -21,9 +21,8 @@ from armid_ros.errors import IdentificationError
 from armid_ros.estimate import Estimate
 from armid_ros.identification.online.background import Background
 from armid_ros.identification.online.change import Change, change_candidates
-from armid_ros.identification.online.change_watch import ChangeWatch
+from armid_ros.identification.online.change_watch import ChangeWatch, NuisanceRows, Row
 from armid_ros.identification.online.checks import MissingSamples, StreamChecks
-from armid_ros.identification.online.nuisance_rows import NuisanceRows, Row
 from armid_ros.identification.online.recursive import (
     check_forgetting,
     RecursiveLeastSquares,

@@ -14,8 +14,7 @@ from armid_ros.identification.online.change_search import (
     ScoreStatistics,
     weighing,
 )
-from armid_ros.identification.online.change_watch import ChangeWatch
-from armid_ros.identification.online.nuisance_rows import Row
+from armid_ros.identification.online.change_watch import ChangeWatch, Row
 from armid_ros.identification.online.null_calibration import NullCalibration
 from armid_ros.identification.online.recursive import RecursiveLeastSquares, WeightedSample
 from armid_ros.identification.online.settings import FALSE_ALARM_TIME
