@@ -60,12 +60,7 @@ def arm_urdf(arm: ArmModel) -> Exported:
 
     """
     found, missing = place_values(arm, lambda effect: effect.traits.urdf_attribute)
-    text = export_urdf(
-        arm.body,
-        damping=found.get('damping'),
-        friction=found.get('friction'),
-        remarks=_remarks('a URDF', missing),
-    )
+    text = export_urdf(arm.body, found, _remarks('a URDF', missing))
     left_out = ('ros2_control',) if '<ros2_control' in arm.robot.urdf else ()
     robot = arm.robot  # friction that was not identified keeps its described values
     described = {'damping': robot.urdf_damping, 'friction': robot.urdf_friction}
@@ -87,14 +82,8 @@ def arm_mjcf(arm: ArmModel) -> Exported:
 
     """
     found, missing = place_values(arm, lambda effect: effect.traits.mjcf_attribute)
+    text, left_out = export_mjcf(arm.body, found, _remarks('MuJoCo', missing))
     found['friction'] = found.pop('frictionloss', {})
-    text, left_out = export_mjcf(
-        arm.body,
-        damping=found.get('damping'),
-        friction=found.get('friction'),
-        armature=found.get('armature'),
-        remarks=_remarks('MuJoCo', missing),
-    )
     return Exported(text, missing, left_out, found)
 
 

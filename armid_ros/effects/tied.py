@@ -14,9 +14,8 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import Any, Self
 
-from armid_ros.effects.base import Arm, Effect
+from armid_ros.effects.base import Arm, Effect, Unexplained
 from armid_ros.effects.interaction import Anchor, Attached, HumanInteraction, InterfaceSlack
-from armid_ros.effects.unexplained import Unexplained
 from armid_ros.errors import ModelError
 from armid_ros.files import finite
 from armid_ros.model.spring_ties import Tie

@@ -27,12 +27,7 @@ _CLASSES: dict[Literal['visual', 'collision'], dict[str, str]] = {
 
 
 def export_mjcf(
-    robot: Robot,
-    *,
-    damping: Mapping[str, float] | None = None,
-    friction: Mapping[str, float] | None = None,
-    armature: Mapping[str, float] | None = None,
-    remarks: Sequence[str] = (),
+    robot: Robot, values: Mapping[str, Mapping[str, float]], remarks: Sequence[str] = ()
 ) -> tuple[str, tuple[str, ...]]:
     """
     Return a MuJoCo model of a robot: base, bodies with their shapes, joints and motors.
@@ -41,8 +36,8 @@ def export_mjcf(
     ----------
     robot : Robot
         The arm, with its gravity.
-    damping, friction, armature : mapping of str to float, optional
-        Viscous coefficient [N m s/rad], Coulomb torque [N m] and rotor inertia [kg m^2] by joint.
+    values : mapping of str to mapping of str to float
+        'damping' [N m s/rad], 'frictionloss' [N m] and 'armature' [kg m^2], each by joint.
     remarks : sequence of str
         Lines of a comment in the file.
 
@@ -66,9 +61,9 @@ def export_mjcf(
     ElementTree.SubElement(root, 'compiler', angle='radian')
     ElementTree.SubElement(root, 'option', gravity=_numbers(robot.gravity))
     defaults = ElementTree.SubElement(root, 'default')
-    for of, values in _CLASSES.items():
+    for of, contacts in _CLASSES.items():
         default = ElementTree.SubElement(defaults, 'default', {'class': of})
-        ElementTree.SubElement(default, 'geom', values)
+        ElementTree.SubElement(default, 'geom', contacts)
     assets = ElementTree.SubElement(root, 'asset')
     world = ElementTree.SubElement(root, 'worldbody')
     model = robot.model
@@ -87,12 +82,8 @@ def export_mjcf(
         mass = {'pos': _numbers(inertia.lever), 'mass': repr(float(inertia.mass))}
         ElementTree.SubElement(body, 'inertial', mass | {'fullinertia': _numbers(upper)})
         ElementTree.SubElement(body, 'joint', _joint(robot, index))
-        for key, table in (
-            ('damping', damping),
-            ('frictionloss', friction),
-            ('armature', armature),
-        ):
-            if table and table.get(joint):
+        for key, table in values.items():
+            if table.get(joint):
                 body[-1].set(key, repr(float(table[joint])))
     left_out = [
         *_shapes(robot, bodies, assets),

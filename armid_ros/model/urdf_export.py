@@ -35,11 +35,7 @@ ROUNDING = 1e-11
 
 
 def export_urdf(
-    robot: Robot,
-    *,
-    damping: Mapping[str, float] | None = None,
-    friction: Mapping[str, float] | None = None,
-    remarks: Sequence[str] = (),
+    robot: Robot, values: Mapping[str, Mapping[str, float]], remarks: Sequence[str] = ()
 ) -> str:
     """
     Return the robot's description with its present inertial parameters.
@@ -48,8 +44,8 @@ def export_urdf(
     ----------
     robot : Robot
         The arm; ``robot.urdf`` is the description that is changed.
-    damping, friction : mapping of str to float, optional
-        Viscous coefficient [N m s/rad] and Coulomb torque [N m] by joint, for <dynamics>.
+    values : mapping of str to mapping of str to float
+        'damping' [N m s/rad] and 'friction' [N m] of <dynamics>, each by joint.
     remarks : sequence of str
         Lines of a comment at the end, such as parameters that a URDF cannot contain.
 
@@ -81,7 +77,7 @@ def export_urdf(
     for name, parameters in own.items():
         _set_inertial(links[name], parameters)
     for joint in _children(root, 'joint'):
-        for key, table in (('damping', damping or {}), ('friction', friction or {})):
+        for key, table in values.items():
             if joint.getAttribute('name') in table:
                 value = repr(float(table[joint.getAttribute('name')]))
                 _child(joint, 'dynamics').setAttribute(key, value)

@@ -84,7 +84,7 @@ def robot(request):
 
 
 def test_description_read_again_has_the_parameters(robot):
-    found = read(export_urdf(robot), robot).rigid_parameters
+    found = read(export_urdf(robot, {}), robot).rigid_parameters
     scale = np.abs(robot.rigid_parameters).max()
     np.testing.assert_allclose(found, robot.rigid_parameters, rtol=0, atol=1e-13 * scale)
 
@@ -114,7 +114,7 @@ def rest(urdf):
 def test_only_inertials_and_dynamics_change(robot):
     damping = dict.fromkeys(robot.joints, 0.25)
     friction = dict.fromkeys(robot.joints, 0.125)
-    text = export_urdf(robot, damping=damping, friction=friction, remarks=('a -- b',))
+    text = export_urdf(robot, {'damping': damping, 'friction': friction}, ('a -- b',))
     assert rest(text) == rest(robot.urdf)
     again = read(text, robot)
     np.testing.assert_array_equal(again.urdf_damping, 0.25)
@@ -127,7 +127,7 @@ def test_links_that_leave_no_body_for_the_driven_one_are_scaled():
     pi = robot.rigid_parameters.copy()
     pi[10:] *= 0.1
     robot = robot.with_inertias(pi)
-    text = export_urdf(robot)
+    text = export_urdf(robot, {})
     np.testing.assert_allclose(read(text, robot).rigid_parameters, pi, atol=1e-15)
     assert mujoco.MjModel.from_xml_string(text).nv == 3
 
@@ -139,4 +139,4 @@ def test_what_no_body_has_is_refused():
     robot = robot.with_inertias(pi)
     for export in (export_urdf, export_mjcf):
         with pytest.raises(ModelError, match=f"link '{robot.links[0]}'"):
-            export(robot)
+            export(robot, {})

@@ -26,8 +26,8 @@ from armid_ros.diagnosis.search.odds import CauseInformation, odds
 from armid_ros.diagnosis.search.priors import HOW_OFTEN, log_prior
 from armid_ros.diagnosis.search.setting import Marginal
 from armid_ros.effects import Effect, Shape
+from armid_ros.effects.base import Unexplained
 from armid_ros.effects.gravity import with_exact_vector
-from armid_ros.effects.unexplained import Unexplained
 from armid_ros.errors import ModelError
 from armid_ros.motion import FloatArray, Motion
 from armid_ros.robots import Robot
