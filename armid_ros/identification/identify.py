@@ -5,6 +5,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
+from contextlib import nullcontext, suppress
 from dataclasses import dataclass, field, replace
 
 from armid_ros.arm import ArmModel
@@ -235,7 +236,7 @@ def identify(
     _require_samples(theory, recordings, columns, used)
     base, problem = excited(theory, columns)
     notes += check_torque(arm, recordings, problem)
-    proof: PhysicalCertificate | None = None
+    bodies = None
     if described:
         problem = through(problem, torques(whole, recordings, used), base.values(whole.theta))
         free = ungrouped(whole, whole.base_parameters(rng))
@@ -244,19 +245,10 @@ def identify(
         notes += remarks
     else:
         data = base, problem, recordings, used
-        asked, required = settings, settings.physical is not None
-        if required or (settings.prefers_bodies and settings.method != 'iv'):
-            known = settings.physical or PhysicalSettings()
-            asked = replace(settings, physical=known)
-            own, fit = _fitted(arm, theory, data, asked, rng)
-            try:
-                fit, proof = fit_to_bodies(arm, fit, *data[2:], asked.least_squares, known, rng)
-            except IdentificationError:
-                if required:
-                    raise
-        if proof is not None and (required or proof.cost <= _CHEAP):
-            settings, theory = asked, own
-            notes += proof.sentences()
+        bodies = _among_bodies(arm, theory, data, settings, rng)
+        if bodies is not None and (settings.physical or bodies[3].cost <= _CHEAP):
+            settings, theory, fit, _ = bodies
+            notes += bodies[3].sentences()
         else:
             theory, fit = _fitted(arm, theory, data, settings, rng)
     if settings.method == 'iv':
@@ -275,11 +267,30 @@ def identify(
         settings=settings,
         notes=notes + _remarks(fit, theory),
         halves=halves_error(fit.problem, fit.solution.weights, prior, spread),
-        physical=None if settings.physical is None else proof,
-        bodies_cost=None if proof is None else proof.cost,
+        physical=None if bodies is None or settings.physical is None else bodies[3],
+        bodies_cost=None if bodies is None else bodies[3].cost,
         passes=fit.passes,
         scatter=scatter(fit.problem, fit.solution.weights, fit.solution.values),
     )
+
+
+def _among_bodies(
+    arm: ArmModel,
+    theory: BaseParameters,
+    data: tuple[BaseParameters, Sequence[Regression], Sequence[Recording], Conditioning],
+    settings: IdentificationSettings,
+    rng: np.random.Generator,
+) -> tuple[IdentificationSettings, BaseParameters, FittedValues, PhysicalCertificate] | None:
+    """Fit physically consistent links; None if not asked for, or impossible and not required."""
+    if settings.method == 'iv' or not (settings.physical or settings.prefers_bodies):
+        return None
+    known = settings.physical or PhysicalSettings()
+    asked = replace(settings, physical=known)
+    theory, fit = _fitted(arm, theory, data, asked, rng)
+    with nullcontext() if settings.physical is not None else suppress(IdentificationError):
+        found = fit_to_bodies(arm, fit, *data[2:], asked.least_squares, known, rng)
+        return asked, theory, *found
+    return None
 
 
 def _fitted(

@@ -112,14 +112,13 @@ class OnlineIdentifier:
     ) -> None:
         settings = settings or OnlineSettings()
         robot = arm.robot
-        for effect in arm.effects:
-            if not effect.instantaneous:
-                raise IdentificationError(
-                    f'{effect.name} depends on earlier motion, which single samples do not '
-                    'contain; identify it from a recording'
-                )
-        self.arm = arm
-        self.settings = settings
+        past = [effect.name for effect in arm.effects if not effect.instantaneous]
+        if past:
+            raise IdentificationError(
+                f'{past[0]} depends on earlier motion, which single samples do not contain; '
+                'identify it from a recording'
+            )
+        self.arm, self.settings = arm, settings
         self.base: BaseParameters = arm.base_parameters(rng)
         self._filter = CausalFilter(
             robot.n_joints,
@@ -127,17 +126,15 @@ class OnlineIdentifier:
             max_gap=settings.max_gap,
             measured_velocity=settings.measured_velocity,
         )
-        measured = 'qvt' if settings.measured_velocity else 'qt'
         self._gate = joint_gate(
             robot.prismatic,
-            measured,
+            'qvt' if settings.measured_velocity else 'qt',
             torque_limit=robot.torque_limit,
             max_gap=_LONGEST_DAMAGE,
             false_alarm_time=settings.false_alarm_time or FALSE_ALARM_TIME,
         )
         self._checks = StreamChecks(robot, self._gate)
         self._missing = MissingSamples()
-        self.latest: tuple[OnlineSample, ...] = ()
         self._row_filter = TripleLag(settings.cutoff)
         self._row_period = 1.0 / settings.rows_per_second()
         self._work = Background()
@@ -149,16 +146,13 @@ class OnlineIdentifier:
             start=self.base.values(arm.theta),
             scale_covariance=settings.torque_noise is None,
         )
-        window = max(1, round(_WINDOW * settings.rows_per_second()))
+        window = max(1, round(_WINDOW / self._row_period))
         self._scores = RobustCovariance(window, settings.forgetting, self._work)
         self._watch = None
         if settings.false_alarm_time is not None:
+            watched = NuisanceRows(arm, settings.cutoff), change_candidates(arm, self.base)
             self._watch = ChangeWatch(
-                self._estimator,
-                NuisanceRows(arm, settings.cutoff),
-                change_candidates(arm, self.base),
-                settings.false_alarm_time,
-                self._work,
+                self._estimator, *watched, settings.false_alarm_time, self._work
             )
         self._forget()
         self._data = robot.model.createData()
@@ -177,13 +171,13 @@ class OnlineIdentifier:
         self._filter.reset()
         self._checks.reset()
         self._missing.reset()
-        self.latest = ()
         self._gate.reset()
 
     def _forget(self) -> None:
         """Clear the estimate; no background job may be pending."""
         self._waiting: tuple[Row, FloatArray] | None = None  # with its innovation
         self._reopened = 0
+        self.latest: tuple[OnlineSample, ...] = ()
         # of residuals: weighted squares, their weights, and the standard deviation
         self._squares, self._counts, self._deviation = np.zeros((3, self.arm.robot.n_joints))
         self._estimator.reset()

@@ -217,11 +217,7 @@ def interaction_problem(
     names = tuple(tie.name for tie in ties) if separate else ('all',)
     count = springs_by.shape[3] // 3
     if inertias == 'known':
-        by = np.stack(inverse_dynamics_derivatives(robot, slow), axis=2)
-        none = np.zeros((len(motion), robot.n_joints, 0))
-        none_by = np.zeros((len(slow), robot.n_joints, 0, 3 * count))
-        torque = inverse_dynamics(robot, motion), _placed(by, count)
-        body = _Body(*torque, none, none_by, (), np.zeros(0), np.zeros((0, 0)))
+        body = _known_body(robot, motion, slow, count)
     else:
         body = _free_body(
             robot, motion, slow, springs, count, names if separate else ('the springs',)
@@ -263,6 +259,14 @@ class _Body(NamedTuple):
     parameters: tuple[ParameterName, ...]
     described: FloatArray
     precision: FloatArray
+
+
+def _known_body(robot: Robot, motion: Motion, slow: Motion, count: int) -> _Body:
+    """Return the body as described, without columns."""
+    by_motion = _placed(np.stack(inverse_dynamics_derivatives(robot, slow), axis=2), count)
+    none, none_by = np.zeros((*motion.q.shape, 0)), np.zeros((*slow.q.shape, 0, 3 * count))
+    torque = inverse_dynamics(robot, motion)
+    return _Body(torque, by_motion, none, none_by, (), np.zeros(0), np.zeros((0, 0)))
 
 
 def _free_body(
