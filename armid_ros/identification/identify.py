@@ -5,7 +5,6 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from contextlib import nullcontext, suppress
 from dataclasses import dataclass, field, replace
 
 from armid_ros.arm import ArmModel
@@ -287,10 +286,13 @@ def _among_bodies(
     known = settings.physical or PhysicalSettings()
     asked = replace(settings, physical=known)
     theory, fit = _fitted(arm, theory, data, asked, rng)
-    with nullcontext() if settings.physical is not None else suppress(IdentificationError):
+    try:
         found = fit_to_bodies(arm, fit, *data[2:], asked.least_squares, known, rng)
-        return asked, theory, *found
-    return None
+    except IdentificationError:
+        if settings.physical is not None:
+            raise
+        return None
+    return asked, theory, *found
 
 
 def _fitted(
