@@ -19,8 +19,8 @@ import platform
 import time
 
 from armid_ros.arm import ArmModel
-from armid_ros.identification.online.change_watch import ChangeSettings
 from armid_ros.identification.online.identifier import OnlineIdentifier, OnlineSettings
+from armid_ros.identification.online.settings import FALSE_ALARM_TIME
 from armid_ros.motion import Motion
 import numpy as np
 
@@ -58,14 +58,14 @@ def print_update_times(arm: ArmModel, measured: Motion) -> None:
     columns = 2 * ('p50', 'p99', 'p99.9', 'mean') + ('rows', 'par.')
     print(' ' * 20 + ''.join(f'{name:>9s}' for name in columns))
     cases = (
-        (None, 'default', 1.0, ChangeSettings()),
+        (None, 'default', 1.0, FALSE_ALARM_TIME),
         (None, 'no search', 1.0, None),
-        (None, 'default', 0.999, ChangeSettings()),
-        (RATE, 'every sample', 1.0, ChangeSettings()),
+        (None, 'default', 0.999, FALSE_ALARM_TIME),
+        (RATE, 'every sample', 1.0, FALSE_ALARM_TIME),
     )
-    for rate, title, forgetting, changes in cases:
+    for rate, title, forgetting, alarms in cases:
         settings = OnlineSettings(
-            cutoff=CUTOFF, row_rate=rate, forgetting=forgetting, changes=changes
+            cutoff=CUTOFF, row_rate=rate, forgetting=forgetting, false_alarm_time=alarms
         )
         name = f'{title}, {forgetting:g}'
         print(f'{name:20s}  {update_times(arm, measured, settings)}', flush=True)

@@ -31,8 +31,7 @@ from armid_ros.api.table import (
     Summary,
 )
 from armid_ros.arm import ArmModel, Misfit, save_model
-from armid_ros.arm.export import arm_mjcf, arm_urdf, Exported
-from armid_ros.arm.export_check import torque_check
+from armid_ros.arm.export import arm_mjcf, arm_urdf, Exported, torque_check
 from armid_ros.diagnosis import known_misfit
 from armid_ros.estimate import Estimate
 from armid_ros.files import write_file
@@ -53,9 +52,8 @@ from armid_ros.identification import identify as run
 from armid_ros.identification import verify as run_checks
 from armid_ros.identification.fitting.identifiability import excludes_zero
 from armid_ros.identification.fitting.least_squares import Estimator
-from armid_ros.identification.identified_from import with_contents
 from armid_ros.identification.known_payload import corrected, drive_gains, DriveGains, payloads_of
-from armid_ros.identification.output import SCHEMA
+from armid_ros.identification.output import SCHEMA, with_contents
 from armid_ros.identification.parameters_file import parameters_of
 from armid_ros.identification.physical.fit_among_bodies import far_from_described
 from armid_ros.identification.rows.checks import check_held_out
@@ -412,7 +410,7 @@ def identify(
     gains = None
     if payloads:
         every = [*training, *held_out]
-        loaded = payloads_of(payloads, [Path(one.source) for one in every], every, model.robot)
+        loaded = payloads_of(payloads, every, model.robot)
         gains = drive_gains(model, training, loaded, settings.signals, source)
         training, held_out = (
             list(corrected(model, some, loaded, gains, settings.signals))

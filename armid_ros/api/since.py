@@ -21,7 +21,7 @@ from armid_ros.api.identification import IdentificationResult, identify
 from armid_ros.arm import ArmModel, Misfit
 from armid_ros.effects import CATALOGUE
 from armid_ros.errors import IdentificationError
-from armid_ros.identification.identified_from import identified_from, require_as_identified
+from armid_ros.identification.output import identified_from, require_as_identified
 from armid_ros.identification.parameters_file import read_misfit
 from armid_ros.recording import Recording
 from armid_ros.simulation.plant import require_any_mass

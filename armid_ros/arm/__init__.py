@@ -3,8 +3,8 @@
 """The arm model (rigid body plus effects), and its file model.yaml."""
 
 from armid_ros.arm.arm_model import ArmModel
-from armid_ros.arm.misfit import load_misfit, Misfit
-from armid_ros.arm.model_file import load_model, parameter_table, save_model
+from armid_ros.arm.misfit import Misfit
+from armid_ros.arm.model_file import load_misfit, load_model, parameter_table, save_model
 from armid_ros.arm.torque_slope import TorqueSlope
 
 __all__ = [

@@ -1,17 +1,25 @@
 # Copyright 2026 The armid_ros developers
 # SPDX-License-Identifier: Apache-2.0
-"""Export of an identified arm as URDF and MJCF."""
+"""Export of an identified arm as URDF and MJCF, and a check of the torque in MuJoCo."""
 
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
+from typing import Any
+import warnings
 
 from armid_ros.arm.arm_model import ArmModel
 from armid_ros.effects import Effect
+from armid_ros.model import inverse_dynamics, random_motion
 from armid_ros.model.mjcf_export import export_mjcf
 from armid_ros.model.urdf_export import export_urdf
+from armid_ros.motion import FloatArray, Motion
+from armid_ros.robots import held_joints
 import numpy as np
+
+#: Number of random states in which torques are compared.
+STATES = 50
 
 
 @dataclass(frozen=True)
@@ -52,12 +60,7 @@ def arm_urdf(arm: ArmModel) -> Exported:
 
     """
     found, missing = place_values(arm, lambda effect: effect.traits.urdf_attribute)
-    text = export_urdf(
-        arm.body,
-        damping=found.get('damping'),
-        friction=found.get('friction'),
-        remarks=_remarks('a URDF', missing),
-    )
+    text = export_urdf(arm.body, found, _remarks('a URDF', missing))
     left_out = ('ros2_control',) if '<ros2_control' in arm.robot.urdf else ()
     robot = arm.robot  # friction that was not identified keeps its described values
     described = {'damping': robot.urdf_damping, 'friction': robot.urdf_friction}
@@ -79,14 +82,8 @@ def arm_mjcf(arm: ArmModel) -> Exported:
 
     """
     found, missing = place_values(arm, lambda effect: effect.traits.mjcf_attribute)
+    text, left_out = export_mjcf(arm.body, found, _remarks('MuJoCo', missing))
     found['friction'] = found.pop('frictionloss', {})
-    text, left_out = export_mjcf(
-        arm.body,
-        damping=found.get('damping'),
-        friction=found.get('friction'),
-        armature=found.get('armature'),
-        remarks=_remarks('MuJoCo', missing),
-    )
     return Exported(text, missing, left_out, found)
 
 
@@ -121,3 +118,81 @@ def _remarks(form: str, missing: tuple[str, ...]) -> tuple[str, ...]:
     if not missing:
         return ()
     return (f'identified by armid_ros; {form} has no place for', *missing)
+
+
+def torque_check(exported: Exported, arm: ArmModel) -> dict[str, Any]:
+    """
+    Compare the torque of an exported file in MuJoCo with that of the arm, in random states.
+
+    Parameters
+    ----------
+    exported : Exported
+        A URDF or MJCF of the arm.
+    arm : ArmModel
+        The arm.
+
+    Returns
+    -------
+    dict
+        'program', 'states', the largest 'difference' [N m or N] and its 'share' of the largest
+        torque, and 'shapes' with the reason if MuJoCo cannot load the shapes of an MJCF; or
+        'not_checked' with the reason. Dry friction has its value in motion.
+
+    """
+    try:
+        import mujoco
+    except ImportError:
+        return {'not_checked': 'MuJoCo is not installed'}
+    robot = arm.body
+    motion = random_motion(robot, np.random.default_rng(0), STATES)
+    placed = {
+        key: np.array([exported.values.get(key, {}).get(joint, 0.0) for joint in robot.joints])
+        for key in ('damping', 'friction', 'armature')
+    }
+    wanted = inverse_dynamics(robot, motion) + placed['damping'] * motion.dq
+    wanted = wanted + placed['armature'] * motion.ddq + placed['friction'] * np.sign(motion.dq)
+    held = {joint.name: joint.position for joint in held_joints(robot)}
+    try:
+        with warnings.catch_warnings():
+            warnings.simplefilter('ignore')
+            spec = mujoco.MjSpec.from_string(exported.text)
+            shapes: dict[str, str] = {}
+            if exported.text.startswith('<mujoco'):
+                try:
+                    spec.compile()
+                except (ValueError, RuntimeError) as error:
+                    shapes = {'shapes': f'not loaded: {" ".join(str(error).split())}'}
+            for element in (*spec.geoms, *spec.meshes, *spec.materials, *spec.textures):
+                spec.delete(element)
+            spec.option.gravity = robot.gravity
+            found = _inverse(mujoco, spec.compile(), motion, held)
+    except (ValueError, RuntimeError) as error:
+        return {'not_checked': f'MuJoCo: {" ".join(str(error).split())}'}
+    difference = float(np.abs(found - wanted).max())
+    return {
+        'program': f'MuJoCo {mujoco.__version__}',
+        'states': STATES,
+        'difference': difference,
+        'share': difference / float(np.abs(wanted).max()),
+        **shapes,
+    }
+
+
+def _inverse(mujoco: Any, model: Any, motion: Motion, held: dict[str, float]) -> FloatArray:
+    """Return torques of MuJoCo's inverse dynamics, shape (N, n), without contacts and limits."""
+    model.opt.disableflags |= mujoco.mjtDisableBit.mjDSBL_CONSTRAINT
+    data = mujoco.MjData(model)
+    kind = mujoco.mjtObj.mjOBJ_JOINT
+    joints = [mujoco.mj_name2id(model, kind, joint) for joint in motion.joints]
+    dofs, places = model.jnt_dofadr[joints], model.jnt_qposadr[joints]
+    for name, position in held.items():
+        joint = mujoco.mj_name2id(model, kind, name)
+        if joint >= 0:
+            data.qpos[model.jnt_qposadr[joint]] = position
+    torque = np.empty_like(motion.q)
+    for k in range(len(motion)):
+        data.qpos[places], data.qvel[dofs] = motion.q[k], motion.dq[k]
+        data.qacc[dofs] = motion.ddq[k]
+        mujoco.mj_inverse(model, data)
+        torque[k] = data.qfrc_inverse[dofs]
+    return np.asarray(torque + model.dof_frictionloss[dofs] * np.sign(motion.dq))

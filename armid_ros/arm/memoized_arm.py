@@ -16,52 +16,29 @@ import numpy as np
 
 _Result = TypeVar('_Result')
 
+#: Memory of the cached regressors [bytes]; regressors beyond it are not kept.
+_MEMORY = 1_000_000_000
 
-class Regressors:
-    """
-    Cache of the regressors of recorded motions, by motion and gravity.
 
-    Regressors do not depend on inertial parameters, so arms of one description share them.
+@dataclass
+class _Regressor:
+    """A regressor of a recorded motion, and its filtered rows; each has only one filter."""
 
-    """
-
-    def __init__(self) -> None:
-        self._known: dict[tuple[object, ...], tuple[Motion, FloatArray]] = {}
-        self._in_rows: dict[int, FloatArray | None] = {}
-        # remaining memory of the cache [bytes]; regressors beyond it are not kept
-        self._room = 1_000_000_000
-
-    def of(self, arm: ArmModel, motion: Motion) -> FloatArray | None:
-        """Return the regressor of a motion, shape (N, n, 10 n); None if memory is exhausted."""
-        path = (motion.q, motion.dq, motion.ddq)
-        gravity = tuple(np.asarray(arm.body.gravity).tolist())
-        key = *(array.ctypes.data for array in path), len(motion), gravity, arm.quasi_static
-        if key not in self._known:
-            size = 10 * motion.q.nbytes * motion.n_joints
-            if size > self._room:
-                return None
-            self._room -= size
-            self._known[key] = motion, regressor(arm.body, arm.felt(motion))
-            self._in_rows[id(self._known[key][1])] = None
-        return self._known[key][1]
-
-    def in_rows(
-        self, columns: FloatArray, reduce: Callable[[FloatArray], FloatArray]
-    ) -> FloatArray:
-        """Return filtered columns, cached for a known regressor; each has only one filter."""
-        if id(columns) not in self._in_rows:
-            return reduce(columns)
-        rows = self._in_rows[id(columns)]
-        if rows is None:
-            rows = self._in_rows[id(columns)] = reduce(columns)
-        return rows
+    motion: Motion
+    columns: FloatArray
+    rows: FloatArray | None = None
 
 
 @dataclass(frozen=True, repr=False)
 class _Memoized(ArmModel):
-    """An arm with caches of torques and regressors; copies of it share the regressors."""
+    """
+    An arm with caches of torques and regressors.
 
-    regressors: Regressors = field(default_factory=Regressors, compare=False)
+    Regressors depend on motion and gravity, not on inertial parameters, so copies share them.
+
+    """
+
+    regressors: dict[tuple[object, ...], _Regressor] = field(default_factory=dict, compare=False)
 
     @cached_property
     def _known(self) -> dict[tuple[str, int], tuple[Motion, Any]]:
@@ -84,11 +61,18 @@ class _Memoized(ArmModel):
         """Return the frames of all links along a recorded motion."""
         return self._once('frames', motion, super().link_frames)
 
-    def _regressor(self, motion: Motion) -> FloatArray | None:
+    def regressor(self, motion: Motion) -> _Regressor | None:
         """Return the cached regressor; None if links move otherwise, or memory is exhausted."""
         if self.action().displacement is not None:
             return None
-        return self.regressors.of(self, motion)
+        places = (array.ctypes.data for array in (motion.q, motion.dq, motion.ddq))
+        key = *places, len(motion), tuple(self.body.gravity.tolist()), self.quasi_static
+        if key not in self.regressors:
+            used = sum(one.columns.nbytes for one in self.regressors.values())
+            if used + 10 * motion.q.nbytes * motion.n_joints > _MEMORY:
+                return None
+            self.regressors[key] = _Regressor(motion, regressor(self.body, self.felt(motion)))
+        return self.regressors[key]
 
     def load(self, motion: Motion) -> FloatArray:
         """Return the torque of the rigid body along a motion of the links, (N, n) [N m]."""
@@ -96,8 +80,8 @@ class _Memoized(ArmModel):
 
     def body_columns(self, motion: Motion) -> FloatArray:
         """Return the regressor of the load along a recorded motion, shape (N, n, 10 n)."""
-        known = self._regressor(motion)
-        return self._once('body', motion, super().body_columns) if known is None else known
+        known = self.regressor(motion)
+        return self._once('body', motion, super().body_columns) if known is None else known.columns
 
     def gravity_columns(self, motion: Motion) -> FloatArray:
         """Differentiate the load along a recorded motion by gravity, shape (N, n, 3)."""
@@ -137,6 +121,9 @@ def rigid_rows(
 ) -> FloatArray:
     """Return the filtered sensitivities to the rigid parameters, (M, n, 10 n)."""
     columns = arm.rigid_columns(motion)
-    return (
-        arm.regressors.in_rows(columns, reduce) if isinstance(arm, _Memoized) else reduce(columns)
-    )
+    known = arm.regressor(motion) if isinstance(arm, _Memoized) else None
+    if known is None or known.columns is not columns:
+        return reduce(columns)
+    if known.rows is None:
+        known.rows = reduce(columns)
+    return known.rows

@@ -15,12 +15,10 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass
-from pathlib import Path
 from typing import Any, NamedTuple
 
-from armid_ros.arm.model_check import checked_model
 from armid_ros.errors import ModelError
-from armid_ros.files import finite, read_text, reading
+from armid_ros.files import finite
 from armid_ros.motion import FloatArray
 from armid_ros.robots import Robot
 import numpy as np
@@ -122,35 +120,22 @@ def louder(now: FloatArray, before: FloatArray) -> FloatArray:
     return np.asarray(np.maximum(now / np.maximum(before, 1e-12), 1.0))
 
 
-def load_misfit(path: str | Path) -> Misfit | None:
-    """
-    Read the misfit of a model from model.yaml; None if the file has none.
-
-    Parameters
-    ----------
-    path : str or Path
-        model.yaml.
-
-    Raises
-    ------
-    ModelError
-        If the file is invalid; the message names the file and the fault.
-
-    """
-    path = Path(path)
-    text = read_text(path, ModelError)
-    with reading(path, ModelError):
-        block = checked_model(text).get('misfit')
-        return None if block is None else misfit_of_block(block)
-
-
 def misfit_of_block(block: Any) -> Misfit:
     """Parse the block ``misfit`` of a model.yaml."""
     try:
         rms, torque = _torques(block['rms']), block.get('torque_rms')
         loud = None if torque is None else _torques(torque)
         data, error = str(block['data']), block['relative_error_percent']
-        filters = None if 'filters' not in block else _filters(block['filters'])
+        filters = None
+        if 'filters' in block:
+            found = {
+                name: finite(block['filters'][name], f'misfit: {name}')
+                for name in RowFilters._fields
+            }
+            for name, value in found.items():
+                if value <= 0.0:
+                    raise ModelError(f'misfit: {name} is {value:g}, not above zero')
+            filters = RowFilters(found['rate_hz'], found['cutoff_hz'], round(found['decimation']))
     except (AttributeError, KeyError, TypeError) as fault:
         raise ModelError(f'misfit: {type(fault).__name__} {fault}') from fault
     if data not in _DATA:
@@ -159,14 +144,6 @@ def misfit_of_block(block: Any) -> Misfit:
         raise ModelError('misfit: torque_rms lacks joints of rms')
     relative = finite(error, 'relative_error_percent of the misfit')
     return Misfit(data, rms, relative, loud, filters=filters)
-
-
-def _filters(block: Any) -> RowFilters:
-    values = {name: finite(block[name], f'misfit: {name}') for name in RowFilters._fields}
-    wrong = [name for name, value in values.items() if value <= 0.0]
-    if wrong:
-        raise ModelError(f'misfit: {wrong[0]} is {values[wrong[0]]:g}, not above zero')
-    return RowFilters(values['rate_hz'], values['cutoff_hz'], round(values['decimation']))
 
 
 def _torques(block: Any) -> dict[str, float]:

@@ -14,23 +14,39 @@ model also has ``misfit``; see `Misfit`.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Collection, Iterator, Mapping, Sequence
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
 from armid_ros.arm.arm_model import ArmModel
-from armid_ros.arm.misfit import Misfit
-from armid_ros.arm.model_check import checked_model, SCHEMA, wrong_unit
-from armid_ros.arm.words import in_words
-from armid_ros.effects import CATALOGUE, Kind
-from armid_ros.effects.tied import tied_kind
+from armid_ros.arm.misfit import Misfit, misfit_of_block
+from armid_ros.effects import CATALOGUE, Effect, Quantity, Shape
+from armid_ros.effects.quantities import written_units
+from armid_ros.effects.tied import tied_as_written
 from armid_ros.errors import ModelError
 from armid_ros.estimate import Estimate, ParameterName
-from armid_ros.files import finite, is_file, read_text, reading, write_file
+from armid_ros.files import (
+    finite,
+    is_file,
+    parsed_yaml,
+    read_text,
+    reading,
+    write_file,
+    yaml_line,
+)
+from armid_ros.model.rigid_body import link_unit
 from armid_ros.motion import FloatArray
 from armid_ros.robots import load_robot, Robot
 import numpy as np
 import yaml
+
+SCHEMA = 'armid/model/1'
+_NEEDED = 'schema', 'robot', 'gravity', 'rigid_parameters', 'effects'
+_KEYS = *_NEEDED, 'misfit'
+_NEEDED_OF_PARAMETER = 'name', 'joint', 'value'
+_KEYS_OF_PARAMETER = *_NEEDED_OF_PARAMETER, 'std', 'unit'
+_NEEDED_OF_EFFECT = 'name', 'joints', 'parameters'
 
 
 def parameter_table(
@@ -190,6 +206,28 @@ def load_model(path: str | Path, robot: Robot | ArmModel | str | Path | None = N
         return _arm(document, robot)
 
 
+def load_misfit(path: str | Path) -> Misfit | None:
+    """
+    Read the misfit of a model from model.yaml; None if the file has none.
+
+    Parameters
+    ----------
+    path : str or Path
+        model.yaml.
+
+    Raises
+    ------
+    ModelError
+        If the file is invalid; the message names the file and the fault.
+
+    """
+    path = Path(path)
+    text = read_text(path, ModelError)
+    with reading(path, ModelError):
+        block = checked_model(text).get('misfit')
+        return None if block is None else misfit_of_block(block)
+
+
 def read_model(text: str, robot: Robot, source: str) -> ArmModel:
     """
     Return the arm model that the text of a model.yaml describes.
@@ -213,25 +251,165 @@ def read_model(text: str, robot: Robot, source: str) -> ArmModel:
         return _arm(checked_model(text), robot)
 
 
-def _gravity(given: Any) -> FloatArray:
-    try:
-        x, y, z = given
-        return np.array([finite(part, 'gravity') for part in (x, y, z)])
-    except (TypeError, ValueError):
+def with_named(arm: ArmModel, effect: Effect, values: FloatArray) -> ArmModel:
+    """Return the arm with an effect added; its values add to existing ones."""
+    there = place_in(arm, effect)
+    if there is None:
+        words = effect.named_as(values, arm)
+        if all(said.linear and place_in(arm, said) for said, _ in words):
+            for said, theirs in words:
+                arm = with_named(arm, said, theirs)
+            return arm
+        return arm.with_effect(effect, values)
+    position, rows = there
+    changed = arm.values[position].copy()
+    changed[rows] += values
+    return replace(arm, values=(*arm.values[:position], changed, *arm.values[position + 1 :]))
+
+
+def place_in(arm: ArmModel, effect: Effect) -> tuple[int, list[int]] | None:
+    """Return the index of an effect and rows of its parameters; None if any is missing."""
+    wanted = [(p.name, p.joint) for p in effect.parameters(arm.robot)]
+    for position, own in enumerate(arm.effects):
+        if isinstance(effect, type(own)) and not own.shapes and not own.points:
+            names = [(p.name, p.joint) for p in own.parameters(arm.robot)]
+            if set(wanted) <= set(names):
+                return position, [names.index(name) for name in wanted]
+    return None
+
+
+def in_words(arm: ArmModel) -> ArmModel:
+    """
+    Return the arm with its effects translated into those of the catalogue.
+
+    An effect that only a search uses, such as a gravity vector, becomes several effects: a tilted
+    base and the magnitude of gravity.
+
+    """
+    said = replace(arm, effects=(), values=())
+    for effect, values in zip(arm.effects, arm.values, strict=True):
+        words = effect.named_as(values, arm)
+        if len(words) == 1 and words[0][0] == effect:
+            said = said.with_effect(effect, values)
+            continue
+        for word, theirs in words:
+            said = with_named(said, word, theirs)
+    return said
+
+
+def checked_model(text: str) -> dict[str, Any]:
+    """
+    Return a validated document of a model.yaml: keys, numbers and units.
+
+    Parameters
+    ----------
+    text : str
+        Content of the file.
+
+    Raises
+    ------
+    ModelError
+        If the document is invalid; the message names the line, and the parameter with its joint.
+
+    """
+    document = parsed_yaml(text, ModelError)
+    if not isinstance(document, dict) or document.get('schema') != SCHEMA:
+        raise ModelError(f"not an arm model; its 'schema' has to be {SCHEMA}")
+    strange = [key for key in document if key not in _KEYS]
+    if strange:
+        line = yaml_line(text, (strange[0],))
         raise ModelError(
-            "'gravity' has to be three finite numbers [m/s^2] in the frame of the base, as "
-            f'[0, 0, -9.81], not {str(given)[:40]!r}'
-        ) from None
+            f"line {line}: no key '{str(strange[0])[:40]}' is known; a model has "
+            f'{", ".join(_KEYS)}'
+        )
+    _require(document, _NEEDED, 'a model')
+    for place, row, units in _rows(document, text):
+        key, fault = _fault(row, units)
+        if fault:
+            raise ModelError(f'line {yaml_line(text, (*place, key))}: {fault}')
+    return document
+
+
+def _wrong_unit(row: Mapping[str, Any], units: Collection[str]) -> str:
+    """Return the error on a wrong unit of a parameter; empty if right or not given."""
+    if not units or row.get('unit', next(iter(units))) in units:
+        return ''
+    expected = ' or '.join(f"'{unit}'" for unit in units)
+    return f"{_called(row)} has the unit '{row['unit']}'; it has to be {expected}"
+
+
+def _rows(
+    document: Mapping[str, Any], text: str
+) -> Iterator[tuple[tuple[str | int, ...], Any, tuple[str, ...]]]:
+    """Yield the place of each parameter, the parameter, and its permitted units (empty: any)."""
+    for k, row in enumerate(document['rigid_parameters']):
+        yield ('rigid_parameters', k), row, link_unit(_name(row))
+    for k, entry in enumerate(document['effects']):
+        if not isinstance(entry, dict):
+            line = yaml_line(text, ('effects', k))
+            raise ModelError(f'line {line}: an effect has {", ".join(_NEEDED_OF_EFFECT)}')
+        _require(entry, _NEEDED_OF_EFFECT, f"effect '{str(entry.get('name'))[:40]}'")
+        kind = CATALOGUE.find(str(entry['name']))
+        known: tuple[Quantity | Shape, ...] = (*kind.quantities, *kind.shapes)
+        units = {one.name: written_units(one.unit) for one in known}
+        for part in ('parameters', 'shapes'):
+            for place, row in enumerate(entry.get(part, ())):
+                yield ('effects', k, part, place), row, units.get(_name(row), ())
+
+
+def _fault(row: Any, units: tuple[str, ...]) -> tuple[str, str]:
+    """Return the key and error of a wrong parameter; the error is empty if it is right."""
+    if not isinstance(row, dict):
+        keys = ', '.join(_KEYS_OF_PARAMETER)
+        return '', f'a parameter has {keys}; here is {str(row)[:40]!r}'
+    called = _called(row)
+    strange = [str(key) for key in row if key not in _KEYS_OF_PARAMETER]
+    if strange:
+        known = ', '.join(_KEYS_OF_PARAMETER)
+        return strange[0], (
+            f"{called}: no key '{strange[0][:40]}' is known; a parameter has {known}"
+        )
+    missing = [key for key in _NEEDED_OF_PARAMETER if key not in row]
+    if missing:
+        return 'name', f"{called}: no '{missing[0]}'"
+    try:
+        finite(row['value'], called)
+    except ValueError as fault:
+        return 'value', str(fault)
+    return 'unit', _wrong_unit(row, units)
+
+
+def _require(content: Mapping[str, Any], keys: Collection[str], whose: str) -> None:
+    missing = [key for key in keys if key not in content]
+    if missing:
+        raise ModelError(f"{whose}: no '{missing[0]}'; it needs {', '.join(keys)}")
+
+
+def _name(row: Any) -> str:
+    return str(row.get('name')) if isinstance(row, dict) else ''
+
+
+def _called(row: Mapping[str, Any]) -> str:
+    return f"parameter '{row.get('name')}' of joint '{row.get('joint')}'"
 
 
 def _arm(document: dict[str, Any], robot: Robot) -> ArmModel:
-    arm = ArmModel(robot.with_gravity(_gravity(document['gravity'])))
+    try:
+        gravity = [finite(part, 'gravity') for part in document['gravity']]
+        arm = ArmModel(robot.with_gravity(np.array(gravity).reshape(3)))
+    except (TypeError, ValueError):
+        raise ModelError(
+            "'gravity' has to be three finite numbers [m/s^2] in the frame of the base, as "
+            f'[0, 0, -9.81], not {str(document["gravity"])[:40]!r}'
+        ) from None
     arm = arm.with_theta(_values(document['rigid_parameters'], arm.parameters))
     for entry in document['effects']:
-        kind: Kind = CATALOGUE.find(str(entry['name']))
+        kind = CATALOGUE.find(str(entry['name']))
+        effect: Effect
         if 'ties' in entry:
-            kind = tied_kind(kind.name, entry)
-        effect = kind.on(robot, tuple(entry['joints'])).with_particulars(entry)
+            effect = tied_as_written(entry, robot)
+        else:
+            effect = kind.on(robot, tuple(entry['joints'])).with_particulars(entry)
         if 'shapes' in entry:
             shape = _values(entry['shapes'], effect.shape_parameters(robot))
             effect = effect.with_shape(shape.reshape(effect.shape_values.shape))
@@ -240,21 +418,20 @@ def _arm(document: dict[str, Any], robot: Robot) -> ArmModel:
 
 
 def _values(rows: Sequence[dict[str, Any]], names: Sequence[ParameterName]) -> FloatArray:
-    table: dict[tuple[str, str], float] = {}
+    """Return the values of parameters, each of which has to be given once, in its unit."""
+    table: dict[tuple[str, str], dict[str, Any]] = {}
+    units = {(name.name, name.joint): [name.unit] for name in names}
     for row in rows:
         key = str(row['name']), str(row['joint'])
         if key in table:
-            raise ModelError(f"parameter '{key[0]}' of joint '{key[1]}' is given twice")
-        table[key] = finite(row['value'], f"parameter '{key[0]}' of joint '{key[1]}'")
+            raise ModelError(f'{_called(row)} is given twice')
+        table[key] = row
+        if wrong := _wrong_unit(row, units.get(key, ())):
+            raise ModelError(wrong)
     missing = [name for name in names if (name.name, name.joint) not in table]
     if missing:
         raise ModelError(
             f"parameter '{missing[0].name}' of joint '{missing[0].joint}' is missing; "
             'is the file of another robot?'
         )
-    units = {(name.name, name.joint): [name.unit] for name in names}
-    for row in rows:
-        said = wrong_unit(row, units.get((str(row['name']), str(row['joint'])), ()))
-        if said:
-            raise ModelError(said)
-    return np.array([table[name.name, name.joint] for name in names])
+    return np.array([float(table[name.name, name.joint]['value']) for name in names])

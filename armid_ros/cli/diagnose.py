@@ -223,7 +223,7 @@ def diagnose(
 
 def _identified_from(model: Path, asked: list[Path]) -> tuple[Path, ...]:
     """Return the recordings of the identification as baseline; none if one is diagnosed."""
-    from armid_ros.identification.identified_from import identified_from, require_as_identified
+    from armid_ros.identification.output import identified_from, require_as_identified
 
     found = identified_from(model)
     if not found or {path.resolve() for path in found} & {path.resolve() for path in asked}:
@@ -238,7 +238,7 @@ def _model_of(path: Path, robot: Robot) -> ArmModel:
     """Read a model; ArmidError if its description is still there, and is of another arm."""
     from armid_ros.arm import load_model
     from armid_ros.cli import options
-    from armid_ros.identification.description import kinematics_digest
+    from armid_ros.identification.output import kinematics_digest
 
     arm = options.model_of(path, robot)
     try:

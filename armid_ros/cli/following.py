@@ -20,7 +20,7 @@ from armid_ros.cli import columns
 from armid_ros.cli.commands import TYPED
 from armid_ros.diagnosis import EXPERIMENT_FILE
 from armid_ros.errors import ModelError
-from armid_ros.identification.identified_from import identified_from
+from armid_ros.identification.output import identified_from
 import click
 
 #: What a command fills, beside the folder of the command before.

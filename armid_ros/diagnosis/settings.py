@@ -8,7 +8,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 
 from armid_ros.diagnosis.search.priors import HOW_OFTEN
-from armid_ros.effects import CATALOGUE, Kind
+from armid_ros.effects import CATALOGUE, Effect
 from armid_ros.effects.tied import Partner, TiedInteraction, TiedSlack
 from armid_ros.errors import meant, ModelError
 from armid_ros.identification import SignalSettings
@@ -93,7 +93,7 @@ class DiagnosisSettings:
     ----------
     library : tuple of str
         Effects of the catalogue that may be named.
-    own : tuple of Kind
+    own : tuple of type of Effect
         Effects of the user that may be named as well.
     partner : Partner or None
         Another machine that was recorded with the arm, to which it may be tied. Springs and
@@ -121,7 +121,7 @@ class DiagnosisSettings:
     library: tuple[str, ...] = field(
         default_factory=lambda: tuple(name for name, kind in CATALOGUE.items() if not kind.learned)
     )
-    own: tuple[Kind, ...] = ()
+    own: tuple[type[Effect], ...] = ()
     partner: Partner | None = None
     signals: SignalSettings = field(default_factory=SignalSettings)
     material: float = 0.01
@@ -147,7 +147,7 @@ class DiagnosisSettings:
         return replace(self, material=0.0, everything=False, thresholds=thresholds)
 
     @property
-    def kinds(self) -> tuple[Kind, ...]:
+    def kinds(self) -> tuple[type[Effect], ...]:
         """All effects that may be named."""
         tied = () if self.partner is None else (TiedInteraction.name, TiedSlack.name)
         return (*(CATALOGUE[name] for name in self.library if name not in tied), *self.own)

@@ -30,7 +30,6 @@ from armid_ros.effects.catalogue import (
 from armid_ros.effects.layout import joint_columns, scatter
 from armid_ros.effects.quantities import Quantity, Shape
 from armid_ros.effects.readings import Displacing, TorqueReading
-from armid_ros.effects.registry import Kind
 from armid_ros.effects.slipping import Hysteresis
 from armid_ros.effects.traits import Traits
 
@@ -41,7 +40,6 @@ __all__ = [
     'make_effect',
     'parse_effect',
     'Effect',
-    'Kind',
     'Quantity',
     'Shape',
     'Traits',

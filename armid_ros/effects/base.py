@@ -17,7 +17,7 @@ depend on them.
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from functools import lru_cache
 from typing import Any, ClassVar, Protocol, Self
@@ -25,7 +25,6 @@ from typing import Any, ClassVar, Protocol, Self
 from armid_ros.effects.action import Action, Displacement
 from armid_ros.effects.quantities import joint_unit, Quantity, Shape
 from armid_ros.effects.traits import TRAITS, Traits
-from armid_ros.effects.unexplained import Unexplained
 from armid_ros.errors import meant, ModelError
 from armid_ros.estimate import ParameterName
 from armid_ros.model import LinkFrames
@@ -209,8 +208,8 @@ class Effect(ABC):
             ) from None
         return replace(self, shape=tuple(spread.ravel().tolist()))
 
-    def spread(self, robot: Robot, found: Sequence[FloatArray] | None = None) -> FloatArray:
-        """Return the largest expected values, shape (P,); found values and std reduce them."""
+    def spread(self, robot: Robot) -> FloatArray:
+        """Return the largest expected values, shape (P,)."""
         return np.full(len(self.parameters(robot)), np.inf)
 
     def shape_parameters(self, robot: Robot) -> tuple[ParameterName, ...]:
@@ -341,6 +340,33 @@ class Effect(ABC):
     def indices(self, motion_joints: tuple[str, ...]) -> list[int]:
         """Return the indices of the effect's joints among the joints of a motion or robot."""
         return list(_places(self.joints, motion_joints))
+
+
+@dataclass(frozen=True)
+class Unexplained:
+    """
+    Torque residual of a model, in rows of all recordings.
+
+    Attributes
+    ----------
+    motion : Motion
+        All samples, with the recordings concatenated.
+    q : ndarray, shape (M, n)
+        Positions of the rows [rad or m].
+    residual : ndarray, shape (M, n)
+        Residual torque [N m].
+    weight : ndarray, shape (M, n)
+        One over the standard deviation of the noise, zero for a row without information [1/(N m)].
+    beside : ndarray, shape (M, n, f)
+        Columns of parameters that are fitted together with any effect.
+
+    """
+
+    motion: Motion
+    q: FloatArray
+    residual: FloatArray
+    weight: FloatArray
+    beside: FloatArray
 
 
 @lru_cache(maxsize=1024)

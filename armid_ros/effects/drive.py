@@ -8,11 +8,10 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 from armid_ros.effects.action import Action
-from armid_ros.effects.base import Arm, Effect
+from armid_ros.effects.base import Arm, Effect, Unexplained
 from armid_ros.effects.layout import joint_columns, scatter
 from armid_ros.effects.quantities import Quantity, Shape
 from armid_ros.effects.readings import TorqueReading
-from armid_ros.effects.unexplained import Unexplained, wave_orders
 from armid_ros.motion import FloatArray, Motion
 import numpy as np
 
@@ -47,6 +46,8 @@ class RotorInertia(Effect):
 
 #: Lowest order of a ripple [1/rev] (gravity has lower ones); factor by which fits exceed it.
 _SLOWEST, _EDGE = 1.5, 1.05
+#: Number of returned orders, of likely orders that are refined, and of finer steps per step.
+_MOST_PEAKS, _LIKELY, _FINER = 3, 12, 8
 
 
 @dataclass(frozen=True)
@@ -106,6 +107,59 @@ class TorqueRipple(Effect):
             return np.asarray(sine * np.sin(order * q) + cosine * np.cos(order * q))
 
         return Action(torque=torque)
+
+
+def wave_orders(unexplained: Unexplained, joint: int, between: tuple[float, float]) -> FloatArray:
+    """
+    Return the orders of waves over a joint position that explain most of the residual, (K,).
+
+    All recordings are used together, because a ripple has the same order and phase in each.
+
+    Parameters
+    ----------
+    unexplained : Unexplained
+        The residual.
+    joint : int
+        The joint.
+    between : (float, float)
+        The lowest and the highest order [1/rad or 1/m].
+
+    """
+    weight = unexplained.weight[:, joint]
+    rows = weight > 0.0
+    if not rows.any():
+        return np.full(_MOST_PEAKS, between[0])
+    angle, scale = unexplained.q[rows, joint], weight[rows]
+    rest = unexplained.residual[rows, joint] * scale
+    step = 0.5 * np.pi / max(float(np.ptp(angle)), 0.3 / between[0])
+    orders = np.arange(*between, step)
+    gain = wave_gains(angle, rest, scale, orders)
+    padded = np.concatenate([[0.0], gain, [0.0]])
+    peaks = np.flatnonzero((gain >= padded[:-2]) & (gain > padded[2:]))
+    likely = orders[peaks[np.argsort(-gain[peaks])[:_LIKELY]]]
+    likely = likely if len(likely) else orders[:1]
+    fine = likely[:, np.newaxis] + step * np.linspace(-1.0, 1.0, 2 * _FINER + 1)
+    gain = wave_gains(angle, rest, scale, fine.ravel()).reshape(fine.shape)
+    best = np.argsort(-gain.max(axis=1))[:_MOST_PEAKS]
+    return np.resize(fine[best, np.argmax(gain[best], axis=1)], _MOST_PEAKS)
+
+
+def wave_gains(
+    angle: FloatArray, rest: FloatArray, weight: FloatArray, orders: FloatArray
+) -> FloatArray:
+    """
+    Return the reduction of the squared residual by a sine and cosine of each order, (K,).
+
+    With few cycles, orders leak into each other; least squares separate them better than a
+    spectrum.
+
+    """
+    wave = np.exp(1j * np.outer(orders, angle))
+    aim, twice, count = wave @ (weight * rest), wave**2 @ weight**2, np.sum(weight**2)
+    cosines, sines, mixed = count + twice.real, count - twice.real, twice.imag
+    determinant = np.maximum(cosines * sines - mixed**2, 1e-6 * count**2)
+    squares = sines * aim.real**2 - 2.0 * mixed * aim.real * aim.imag + cosines * aim.imag**2
+    return np.asarray(2.0 * squares / determinant)
 
 
 @dataclass(frozen=True)

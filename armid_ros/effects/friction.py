@@ -7,9 +7,8 @@ from __future__ import annotations
 from dataclasses import dataclass, replace
 from typing import ClassVar
 
-from armid_ros.effects.action import Action, DryFriction, merge_actions
+from armid_ros.effects.action import Action, direction, DryFriction, merge_actions
 from armid_ros.effects.base import Arm, Effect
-from armid_ros.effects.direction import direction
 from armid_ros.effects.layout import joint_columns, scatter
 from armid_ros.effects.quantities import Quantity, Shape, SURELY
 from armid_ros.motion import FloatArray, Motion

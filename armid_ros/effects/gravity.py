@@ -15,7 +15,6 @@ from dataclasses import dataclass
 from armid_ros.effects.action import Action
 from armid_ros.effects.base import Arm, Effect
 from armid_ros.effects.quantities import Quantity
-from armid_ros.effects.registry import Kind
 from armid_ros.errors import ModelError
 from armid_ros.motion import FloatArray, Motion
 from armid_ros.robots import Robot
@@ -136,27 +135,20 @@ class GravityVector(_GravityEffect):
         """Return base_tilt and gravity_magnitude with their values."""
         before = np.array(arm.robot.gravity)
         after = before + values
-        magnitude = np.linalg.norm(after) - np.linalg.norm(before)
-        return (
-            (BaseTilt(), _tilt(before, after)),
-            (GravityMagnitude(), np.array([magnitude])),
-        )
+        lengths = np.linalg.norm(before), np.linalg.norm(after)
+        # the rotation vector of the base
+        axis = np.cross(after, before)
+        sine, cosine = float(np.linalg.norm(axis)), float(after @ before)
+        tilt = np.array([0.0 if cosine >= 0.0 else np.pi, 0.0])
+        if sine > 1e-12 * max(float(lengths[0] * lengths[1]), 1e-300):
+            tilt = np.arctan2(sine, cosine) * (_horizontal_axes(before) @ axis) / sine
+        return (BaseTilt(), tilt), (GravityMagnitude(), np.array([lengths[1] - lengths[0]]))
 
 
-def with_exact_vector(kinds: Sequence[Kind]) -> list[Kind]:
+def with_exact_vector(kinds: Sequence[type[Effect]]) -> list[type[Effect]]:
     """Return kinds for a search; with both tilt and magnitude, the vector replaces the tilt."""
     both = BaseTilt in kinds and GravityMagnitude in kinds
     return [GravityVector if both and kind is BaseTilt else kind for kind in kinds]
-
-
-def _tilt(before: FloatArray, after: FloatArray) -> FloatArray:
-    """Return the rotation vector of the base, (2,) [rad], for a gravity vector."""
-    axes = _horizontal_axes(before)
-    axis = np.cross(after, before)
-    sine, cosine = float(np.linalg.norm(axis)), float(after @ before)
-    if sine <= 1e-12 * max(float(np.linalg.norm(after) * np.linalg.norm(before)), 1e-300):
-        return np.array([0.0 if cosine >= 0.0 else np.pi, 0.0])
-    return np.asarray(np.arctan2(sine, cosine) * (axes @ axis) / sine)
 
 
 def _turned(gravity: FloatArray, tilt: FloatArray) -> FloatArray:

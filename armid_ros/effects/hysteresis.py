@@ -6,9 +6,8 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from armid_ros.effects.action import Action, DryFriction
+from armid_ros.effects.action import Action, direction, DryFriction
 from armid_ros.effects.base import Arm, Effect
-from armid_ros.effects.direction import direction
 from armid_ros.effects.layout import joint_columns, scatter
 from armid_ros.effects.quantities import Quantity, Shape
 from armid_ros.effects.slipping import Hysteresis

@@ -17,9 +17,8 @@ from dataclasses import dataclass
 from itertools import product
 
 from armid_ros.effects.action import Action
-from armid_ros.effects.base import Arm, Effect
+from armid_ros.effects.base import Arm, Effect, Unexplained
 from armid_ros.effects.quantities import Quantity, Shape
-from armid_ros.effects.unexplained import Unexplained
 from armid_ros.model import LinkFrames
 from armid_ros.motion import FloatArray, Motion
 from armid_ros.robots import Robot
@@ -177,15 +176,23 @@ class InterfaceSlack(Attached):
 
     def shape_starts(self, unexplained: Unexplained, arm: Arm) -> tuple[FloatArray, ...]:
         """Return the anchors and slacks that explain most of the residual."""
-        thin = unexplained.thinned(400)
-        target = thin.rest(thin.residual[:, :, np.newaxis])[:, 0]
-        starts, frames = [], LinkFrames.of(arm.robot, thin.q)
+        rows = np.unique(np.linspace(0, len(unexplained.q) - 1, 400).astype(int))
+        weight = unexplained.weight[rows, :, np.newaxis]
+        basis = np.linalg.qr((unexplained.beside[rows] * weight).reshape(weight.size, -1))[0]
+
+        def rest(values: FloatArray) -> FloatArray:
+            """Return values (M, n, A), weighted and orthogonal to `beside`, shape (M n, A)."""
+            flat = (values * weight).reshape(weight.size, -1)
+            return np.asarray(flat - basis @ (basis.T @ flat))
+
+        target = rest(unexplained.residual[rows, :, np.newaxis])[:, 0]
+        starts, frames = [], LinkFrames.of(arm.robot, unexplained.q[rows])
         for joint, shape in zip(self.joints, self.shape_values, strict=True):
             places = frames.places(joint, shape[:3])
             anchors, slacks = _proposals(places)
             pulls = [_pulls(places - a, slack) for a, slack in zip(anchors, slacks, strict=True)]
             straps = np.stack([frames.torques(joint, places, pull) for pull in pulls], axis=2)
-            columns = thin.rest(straps)
+            columns = rest(straps)
             own, aim = np.sum(columns**2, axis=0), columns.T @ target
             gain = np.maximum(aim, 0.0) ** 2 / np.maximum(own, max(1e-12 * own.max(), 1e-300))
             best = np.argsort(-gain)[:2]  # both are compared with other causes

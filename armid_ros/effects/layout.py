@@ -5,7 +5,6 @@
 from __future__ import annotations
 
 from functools import lru_cache
-from typing import NamedTuple
 
 from armid_ros.effects.base import Effect
 from armid_ros.motion import FloatArray, Motion
@@ -33,30 +32,12 @@ def joint_columns(effect: Effect, motion: Motion, *quantities: FloatArray) -> Fl
         Zero where a parameter belongs to another joint.
 
     """
-    places = _places(tuple(effect.indices(motion.joints)), motion.n_joints, len(quantities))
-    size = len(quantities) * len(places.joints)
+    own, places = _flat_places(effect.joints, motion.joints, len(quantities))
+    size = len(quantities) * len(own)
     columns = np.zeros((len(motion), motion.n_joints * size))
-    for place, values in zip(places.of_quantity, quantities, strict=True):
-        columns[:, place] = values[:, places.joints]
+    for place, values in zip(places, quantities, strict=True):
+        columns[:, place] = values[:, own]
     return columns.reshape(len(motion), motion.n_joints, size)
-
-
-class _Places(NamedTuple):
-    """Joints of an effect, and indices of its values in the flattened columns of a sample."""
-
-    joints: npt.NDArray[np.intp]
-    of_quantity: tuple[npt.NDArray[np.intp], ...]
-
-
-@lru_cache(maxsize=1024)
-def _places(joints: tuple[int, ...], n_joints: int, count: int) -> _Places:
-    """Return the indices of the values; cached, because streams repeat the call."""
-    own = np.array(joints, dtype=np.intp)
-    size = count * len(own)
-    return _Places(
-        own,
-        tuple(own * size + np.arange(offset, size, count) for offset in range(count)),
-    )
 
 
 def scatter(effect: Effect, values: FloatArray, robot: Robot) -> FloatArray:
@@ -71,3 +52,13 @@ def scatter(effect: Effect, values: FloatArray, robot: Robot) -> FloatArray:
     spread = np.zeros((len(effect.quantities), robot.n_joints))
     spread[:, effect.indices(robot.joints)] = values.reshape(len(effect.joints), -1).T
     return spread
+
+
+@lru_cache(maxsize=1024)
+def _flat_places(
+    joints: tuple[str, ...], among: tuple[str, ...], count: int
+) -> tuple[npt.NDArray[np.intp], tuple[npt.NDArray[np.intp], ...]]:
+    """Return indices of joints, and of each quantity in the flattened columns of a sample."""
+    own = np.array([among.index(joint) for joint in joints], dtype=np.intp)
+    size = count * len(own)
+    return own, tuple(own * size + np.arange(first, size, count) for first in range(count))

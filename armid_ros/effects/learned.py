@@ -210,31 +210,13 @@ class LearnedTorque(Effect):
         maps = tuple(TorqueMap.of_document(found[joint], joint) for joint in self.joints)
         return replace(self, maps=maps)
 
-    def inputs(self, robot: Robot, q: FloatArray, dq: FloatArray) -> FloatArray:
-        """
-        Return the inputs of the maps for all joints.
-
-        Parameters
-        ----------
-        robot : Robot
-            Robot for the load.
-        q, dq : ndarray, shape (..., n)
-            Position and velocity of the links.
-
-        Returns
-        -------
-        ndarray, shape (..., n, 3)
-
-        """
-        loads = any(own.takes_load for own in self.maps)
-        load = weight(robot, q) if loads else np.zeros(np.shape(q))
-        return np.stack([q, dq, load], axis=-1)
-
     def torque(self, robot: Robot, q: FloatArray, dq: FloatArray) -> FloatArray:
         """Return the torque of the maps, zero for other joints, shape (..., n) [N m]."""
         tau = np.zeros(np.shape(q))
         if self.maps:
-            inputs = self.inputs(robot, q, dq)
+            loads = any(own.takes_load for own in self.maps)
+            load = weight(robot, q) if loads else np.zeros(np.shape(q))
+            inputs = np.stack([q, dq, load], axis=-1)
             for joint, own in zip(self.indices(robot.joints), self.maps, strict=True):
                 tau[..., joint] = own.torque(inputs[..., joint, :])
         return tau

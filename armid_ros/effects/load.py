@@ -4,7 +4,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 from armid_ros.effects.action import Action
@@ -42,7 +41,7 @@ class _LinkBody(Effect):
         parameters[list(self.adds_to(arm.robot))] += values
         return Action(robot=arm.robot.with_inertias(parameters))
 
-    def spread(self, robot: Robot, found: Sequence[FloatArray] | None = None) -> FloatArray:
+    def spread(self, robot: Robot) -> FloatArray:
         """Return the largest expected errors of the description of the links, shape (P,)."""
         return described_spread(robot).ravel()[list(self.adds_to(robot))]
 
@@ -128,7 +127,7 @@ class Payload(_LinkBody):
         heaviest = np.maximum(values[0] + SURELY * std[0], 0.0)
         return bool(most * heaviest < np.maximum(aside, 0.0) ** 2)
 
-    def spread(self, robot: Robot, found: Sequence[FloatArray] | None = None) -> FloatArray:
+    def spread(self, robot: Robot) -> FloatArray:
         """
         Return the largest payload: the mass of the arm, with a small offset, shape (P,).
 
@@ -136,9 +135,6 @@ class Payload(_LinkBody):
 
         """
         mass = float(robot.rigid_parameters[:: len(LINK_PARAMETERS)].sum())
-        if found is not None:
-            values, std = found
-            mass = min(mass, float(np.abs(values[0]) + SURELY * std[0]))
         return np.asarray(mass * np.array([1.0] + 3 * [_REACH] + 6 * [_REACH**2]))
 
 

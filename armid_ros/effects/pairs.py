@@ -6,11 +6,10 @@ from __future__ import annotations
 
 from collections.abc import Iterable
 from dataclasses import dataclass
-from itertools import combinations, pairwise, permutations
+from itertools import chain, combinations, pairwise, permutations
 
-from armid_ros.effects.action import Action, DryFriction
+from armid_ros.effects.action import Action, direction, DryFriction
 from armid_ros.effects.base import Arm, Effect
-from armid_ros.effects.direction import direction
 from armid_ros.effects.quantities import pair_unit, Quantity
 from armid_ros.effects.readings import TorqueReading
 from armid_ros.errors import ModelError
@@ -46,15 +45,11 @@ class _Pairs(Effect):
             raise ModelError(
                 f'{cls.name}: {robot.name} has only one joint, so that no pair exists'
             )
-        return cls._default_pairs(robot.joints)
+        return tuple(chain.from_iterable(pairwise(robot.joints)))
 
     def in_usual_place(self, robot: Robot) -> bool:
         """Return True: no pair of joints is more usual than another."""
         return True
-
-    @classmethod
-    def _default_pairs(cls, joints: tuple[str, ...]) -> tuple[str, ...]:
-        return joints[-2:]
 
     @classmethod
     def places(cls, robot: Robot) -> tuple[tuple[str, ...], ...]:
@@ -108,6 +103,10 @@ class CoupledJointFriction(_Pairs):
         Quantity('coupled_coulomb_torque', 'N m', lower=0.0),
     )
     holds_at_rest = True
+
+    @classmethod
+    def _default_joints(cls, robot: Robot) -> tuple[str, ...]:
+        return super()._default_joints(robot)[-2:]
 
     def columns(self, motion: Motion, arm: Arm) -> FloatArray:
         """Return dtau/d(Ia, Fv, Fc) of every pair, shape (N, n, P)."""
@@ -163,10 +162,6 @@ class JointCoupling(_Pairs):
                 f'{self.name}: {twice[0]} is first in two pairs; put it second in one of them'
             )
 
-    @classmethod
-    def _default_pairs(cls, joints: tuple[str, ...]) -> tuple[str, ...]:
-        return tuple(joint for pair in pairwise(joints) for joint in pair)
-
     @staticmethod
     def _likely_pairs(joints: tuple[str, ...]) -> Iterable[tuple[str, str]]:
         return combinations(joints, 2)
@@ -197,8 +192,9 @@ class TorqueCrosstalk(_Pairs, TorqueReading):
     quantities = (Quantity('crosstalk', '', lower=-1.0, upper=1.0, typical=(0.001, 0.05)),)
 
     @classmethod
-    def _default_pairs(cls, joints: tuple[str, ...]) -> tuple[str, ...]:
-        return tuple(joint for i in joints for k in joints if i != k for joint in (i, k))
+    def _default_joints(cls, robot: Robot) -> tuple[str, ...]:
+        super()._default_joints(robot)  # which needs two joints
+        return tuple(chain.from_iterable(cls._likely_pairs(robot.joints)))
 
     @staticmethod
     def _likely_pairs(joints: tuple[str, ...]) -> Iterable[tuple[str, str]]:

@@ -7,11 +7,10 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 from armid_ros.effects.action import Action, Displacement
-from armid_ros.effects.base import Arm, Effect
+from armid_ros.effects.base import Arm, Effect, Unexplained
 from armid_ros.effects.layout import joint_columns, scatter
 from armid_ros.effects.quantities import Quantity, Shape
 from armid_ros.effects.readings import Displacing, TorqueReading
-from armid_ros.effects.unexplained import Unexplained
 from armid_ros.motion import FloatArray, Motion
 import numpy as np
 

@@ -7,10 +7,9 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 from armid_ros.effects.action import Action
-from armid_ros.effects.base import Arm, Effect
+from armid_ros.effects.base import Arm, Effect, Unexplained
 from armid_ros.effects.layout import joint_columns, scatter
 from armid_ros.effects.quantities import Quantity, Shape, SURELY
-from armid_ros.effects.unexplained import Unexplained
 from armid_ros.motion import FloatArray, Motion
 from armid_ros.robots import Robot
 import numpy as np

@@ -22,9 +22,8 @@ from dataclasses import dataclass
 import pickle
 
 from armid_ros.arm import ArmModel
-from armid_ros.effects.base import Effect
-from armid_ros.effects.registry import check_kind
-from armid_ros.effects.unexplained import Unexplained
+from armid_ros.effects.base import Effect, Unexplained
+from armid_ros.effects.catalogue import check_kind
 from armid_ros.motion import FloatArray, Motion
 from armid_ros.robots import load_robot, Robot
 import numpy as np

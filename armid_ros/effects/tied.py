@@ -14,9 +14,8 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import Any, Self
 
-from armid_ros.effects.base import Arm, Effect
+from armid_ros.effects.base import Arm, Effect, Unexplained
 from armid_ros.effects.interaction import Anchor, Attached, HumanInteraction, InterfaceSlack
-from armid_ros.effects.unexplained import Unexplained
 from armid_ros.errors import ModelError
 from armid_ros.files import finite
 from armid_ros.model.spring_ties import Tie
@@ -130,104 +129,84 @@ class TiedSlack(Tied, InterfaceSlack):
     )
 
 
-@dataclass(frozen=True)
-class TiedKind:
+def tied_effect(
+    name: str,
+    ties: Sequence[Tie],
+    partner: str,
+    robot: Robot,
+    joints: Sequence[str] | None = None,
+) -> Tied:
     """
-    A kind of tied effect with its ties, with the interface of a class of the catalogue.
+    Make a tied effect on the joints named, or on all that have a tie.
 
-    Attributes
+    Parameters
     ----------
-    effect : type of Tied
-        The class.
-    ties : tuple of Tie
+    name : str
+        Name of the effect in the catalogue.
+    ties : sequence of Tie
         Possible springs, at most one on each joint.
     partner : str
         The description of the other machine.
-
-    """
-
-    effect: type[Tied]
-    ties: tuple[Tie, ...]
-    partner: str = ''
-
-    def __post_init__(self) -> None:
-        """Raise a ModelError for two ties on one joint, whose parameter names would be equal."""
-        joints = [tie.joint for tie in self.ties]
-        twice = [joint for joint in joints if joints.count(joint) > 1]
-        if twice:
-            raise ModelError(
-                f'{self.name}: two ties on {twice[0]}; only one on each joint is identifiable'
-            )
-
-    @property
-    def name(self) -> str:
-        """Name of the effect in the catalogue."""
-        return self.effect.name
-
-    def places(self, robot: Robot) -> tuple[tuple[str, ...], ...]:
-        """Return the joints that have a tie, one by one."""
-        return tuple((tie.joint,) for tie in self.ties)
-
-    def as_change(self) -> TiedKind:
-        """Return the kind itself, which is used for changes as well."""
-        return self
-
-    def on(self, robot: Robot, joints: Sequence[str] | None = None) -> Effect:
-        """
-        Make the effect on the joints named, or on all that have a tie.
-
-        Raises
-        ------
-        ModelError
-            If a joint has no tie.
-
-        """
-        by_joint = {tie.joint: tie for tie in self.ties}
-        chosen = tuple(by_joint) if joints is None else tuple(joints)
-        missing = [joint for joint in chosen if joint not in by_joint]
-        if missing:
-            raise ModelError(
-                f"{self.name}: no tie on joint '{missing[0]}'; there are ties on "
-                f'{", ".join(by_joint)}'
-            )
-        for joint in chosen:
-            robot.index(joint)
-        return self.effect(
-            chosen, ties=tuple(by_joint[joint] for joint in chosen), partner=self.partner
-        )
-
-
-def tied_kind(name: str, particulars: Mapping[str, Any]) -> TiedKind:
-    """
-    Return the kind of a tied effect from the ``particulars`` of an effect.
+    robot : Robot
+        The arm.
+    joints : sequence of str, optional
+        Joints with a tie.
 
     Raises
     ------
     ModelError
-        If effects of that name are not tied.
-    ValueError
-        If a coordinate is not a number.
+        If effects of that name are not tied, a joint has no tie, or it has two, whose parameter
+        names would be equal.
 
     """
     known = {kind.name: kind for kind in (TiedInteraction, TiedSlack)}
     if name not in known:
         raise ModelError(f"{name} has 'ties'; effects that can have ties are {', '.join(known)}")
+    by_joint: dict[str, Tie] = {}
+    for tie in ties:
+        if tie.joint in by_joint:
+            raise ModelError(
+                f'{name}: two ties on {tie.joint}; only one on each joint is identifiable'
+            )
+        by_joint[tie.joint] = tie
+    chosen = tuple(by_joint if joints is None else joints)
+    for joint in chosen:
+        if joint not in by_joint:
+            raise ModelError(
+                f"{name}: no tie on joint '{joint}'; there are ties on {', '.join(by_joint)}"
+            )
+        robot.index(joint)
+    return known[name](chosen, ties=tuple(by_joint[joint] for joint in chosen), partner=partner)
+
+
+def tied_as_written(entry: Mapping[str, Any], robot: Robot) -> Tied:
+    """
+    Make a tied effect from an entry of model.yaml, with its ``particulars``.
+
+    Raises
+    ------
+    ModelError
+        If the effect is impossible; see `tied_effect`.
+    ValueError
+        If a coordinate is not a number.
+
+    """
+
+    def point(values: Sequence[float]) -> tuple[float, float, float]:
+        x, y, z = (finite(value, 'a coordinate of a tie') for value in values)
+        return x, y, z
+
     ties = [
         Tie(
             str(row['name']),
             str(row['joint']),
             str(row['partner_joint']),
-            _point(row['point']),
-            _point(row['partner_point']),
+            point(row['point']),
+            point(row['partner_point']),
         )
-        for row in particulars['ties']
+        for row in entry['ties']
     ]
-    return TiedKind(known[name], tuple(ties), str(particulars['partner']))
-
-
-def _point(values: Sequence[float]) -> tuple[float, float, float]:
-    x, y, z = (finite(value, 'a coordinate of a tie') for value in values)
-    return x, y, z
+    return tied_effect(str(entry['name']), ties, str(entry['partner']), robot, entry['joints'])
 
 
 @dataclass(frozen=True)
@@ -250,12 +229,7 @@ class Partner:
     ties: tuple[Tie, ...]
     source: str = ''
 
-    @property
-    def interaction(self) -> TiedKind:
-        """Return the kind of springs and dampers."""
-        return TiedKind(TiedInteraction, self.ties, self.source or self.robot.name)
-
-    @property
-    def slack(self) -> TiedKind:
-        """Return the kind of straps with slack."""
-        return TiedKind(TiedSlack, self.ties, self.source or self.robot.name)
+    def tied(self, arm: Robot, joints: Sequence[str] | None = None, *, slack: bool) -> Effect:
+        """Make springs and dampers, or straps with slack, on joints of an arm; all by default."""
+        name = (TiedSlack if slack else TiedInteraction).name
+        return tied_effect(name, self.ties, self.source or self.robot.name, arm, joints)

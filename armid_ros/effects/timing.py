@@ -15,8 +15,8 @@ from armid_ros.errors import ModelError
 from armid_ros.motion import FloatArray, Motion
 from armid_ros.robots import Robot
 import numpy as np
+from scipy.interpolate import CubicHermiteSpline
 from scipy.signal import butter, lfilter, sosfiltfilt
-from scipy.sparse import csr_array
 
 
 @dataclass(frozen=True)
@@ -63,6 +63,7 @@ class TimeDelay(LateReading):
     """
     Torque readings older than the positions they are recorded with, reading(t) = tau(t - delay).
 
+    The torque is cubic between samples, with the slopes of `rate_of_change` (Hermite's spline).
     By default, the whole arm has one delay, as with one late clock or bus; named joints have one
     delay each. The first order is -dtau/dt. At low frequency it looks like viscous friction of a
     loaded joint, at high frequency like negative viscous friction. Confounded with torque_lag,
@@ -83,8 +84,7 @@ class TimeDelay(LateReading):
 
     def sensitivity(self, values: FloatArray, motion: Motion, tau: FloatArray) -> FloatArray:
         """Return -dtau/dt at the earlier time [N m/s], shape (N, n, P)."""
-        slope = -self._late(values, motion, tau, derivative=1)
-        return _by_owner(self, motion, slope)
+        return _by_owner(self, motion, -self._late(values, motion, tau, derivative=1))
 
     def memory(self, values: FloatArray) -> float:
         """Return the longest delay [s]."""
@@ -93,13 +93,12 @@ class TimeDelay(LateReading):
     def _late(
         self, values: FloatArray, motion: Motion, x: FloatArray, derivative: int = 0
     ) -> FloatArray:
-        earlier = rate_of_change(motion.t, x) if derivative else x
-        shifted = earlier.copy()
+        rate = rate_of_change(motion.t, x)
+        shifted = rate.copy() if derivative else x.copy()
         for delay, rows in zip(values, self._owned(motion), strict=True):
             if delay:
-                weights = earlier_samples(motion.t, float(delay), derivative)
-                own = x[:, rows]
-                shifted[:, rows] = (weights @ own.reshape(len(x), -1)).reshape(own.shape)
+                curve = CubicHermiteSpline(motion.t, x[:, rows], rate[:, rows])
+                shifted[:, rows] = curve(motion.t - float(delay), derivative)
         return np.asarray(shifted)
 
 
@@ -145,61 +144,12 @@ class TorqueLag(LateReading):
 
 def rate_of_change(t: FloatArray, x: FloatArray) -> FloatArray:
     """Differentiate samples along the first axis."""
-    _require_change(t)
-    return np.asarray(np.gradient(x, t, axis=0))
-
-
-def _require_change(t: FloatArray) -> None:
     if len(t) < 2:
         raise ModelError(
             'delay, lag, elasticity and backlash depend on the rate of the torque: they need a '
             'motion of two samples or more'
         )
-
-
-def earlier_samples(t: FloatArray, delay: float, derivative: int = 0) -> csr_array:
-    """
-    Return the interpolation matrix for earlier samples, or their derivative, shape (N, N).
-
-    The interpolation is cubic between neighbours, with the slopes of `rate_of_change` at both.
-    Beyond the ends, the first and the last cubic are extrapolated. All columns of a model have the
-    same delay, so that the matrix is computed once.
-
-    """
-    _require_change(t)
-    count = len(t)
-    at = np.clip(np.searchsorted(t, t - delay, side='right') - 1, 0, count - 2)
-    step = t[at + 1] - t[at]
-    u = (t - delay - t[at]) / step
-    if derivative:
-        rise = 6.0 * u * (1.0 - u) / step
-        value, slope = (-rise, rise), ((1.0 - u) * (1.0 - 3.0 * u), u * (3.0 * u - 2.0))
-    else:
-        rise = u**2 * (3.0 - 2.0 * u)
-        value = 1.0 - rise, rise
-        slope = step * u * (1.0 - u) ** 2, -step * u**2 * (1.0 - u)
-    lower, middle, upper = _slopes(t)
-    weights = (
-        slope[0] * lower[at],
-        value[0] + slope[0] * middle[at] + slope[1] * lower[at + 1],
-        value[1] + slope[0] * upper[at] + slope[1] * middle[at + 1],
-        slope[1] * upper[at + 1],
-    )
-    samples = np.clip(at[:, np.newaxis] + np.arange(-1, 3), 0, count - 1)
-    starts = 4 * np.arange(count + 1)
-    return csr_array(
-        (np.column_stack(weights).ravel(), samples.ravel(), starts), shape=(count, count)
-    )
-
-
-def _slopes(t: FloatArray) -> tuple[FloatArray, FloatArray, FloatArray]:
-    """Return the weights of the previous, same and next sample in `rate_of_change`, (N,)."""
-    before, after = np.diff(t)[:-1], np.diff(t)[1:]
-    first, last = 1.0 / (t[1] - t[0]), 1.0 / (t[-1] - t[-2])
-    lower = np.concatenate([[0.0], -after / (before * (before + after)), [-last]])
-    middle = np.concatenate([[-first], (after - before) / (before * after), [last]])
-    upper = np.concatenate([[first], before / (after * (before + after)), [0.0]])
-    return lower, middle, upper
+    return np.asarray(np.gradient(x, t, axis=0))
 
 
 def within_band(motion: Motion, x: FloatArray) -> FloatArray:

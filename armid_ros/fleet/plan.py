@@ -27,9 +27,9 @@ from armid_ros.files.cells import listed
 from armid_ros.fleet.bags import BagFile, digest
 from armid_ros.fleet.store import fetched, opened, Store, StoreError
 from armid_ros.identification import Conditioning, SignalSettings
-from armid_ros.identification.description import kinematics_digest
 from armid_ros.identification.fitting.held_out import cutoff_of_torques
 from armid_ros.identification.fitting.nonlinear import curved
+from armid_ros.identification.output import kinematics_digest
 from armid_ros.identification.rows.damage import without_damage
 from armid_ros.identification.rows.signals import conditioning
 from armid_ros.model import BaseParameters, random_motion

@@ -6,7 +6,6 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field, replace
-from typing import NamedTuple
 
 from armid_ros.arm import ArmModel
 from armid_ros.errors import IdentificationError
@@ -23,8 +22,8 @@ from armid_ros.identification.fitting.nonlinear import (
     through,
     torques,
     ungrouped,
+    with_uncertain_inertia,
 )
-from armid_ros.identification.fitting.quasi_static import with_uncertain_inertia
 from armid_ros.identification.physical.fit_among_bodies import fit_to_bodies, PhysicalSettings
 from armid_ros.identification.physical.physical_certificate import PhysicalCertificate
 from armid_ros.identification.rows.checks import (
@@ -236,7 +235,7 @@ def identify(
     _require_samples(theory, recordings, columns, used)
     base, problem = excited(theory, columns)
     notes += check_torque(arm, recordings, problem)
-    bodies: _Bodies | None = None
+    bodies = None
     if described:
         problem = through(problem, torques(whole, recordings, used), base.values(whole.theta))
         free = ungrouped(whole, whole.base_parameters(rng))
@@ -245,13 +244,12 @@ def identify(
         notes += remarks
     else:
         data = base, problem, recordings, used
-        if settings.physical is not None or settings.prefers_bodies:
-            bodies = _bodies(arm, theory, data, settings, rng)
-        if bodies is None or (bodies.cost > _CHEAP and settings.physical is None):
-            theory, fit = _fitted(arm, theory, data, settings, rng)
+        bodies = _among_bodies(arm, theory, data, settings, rng)
+        if bodies is not None and (settings.physical or bodies[3].cost <= _CHEAP):
+            settings, theory, fit, _ = bodies
+            notes += bodies[3].sentences()
         else:
-            settings, theory, fit = bodies.settings, bodies.theory, bodies.fit
-            notes += bodies.certificate.sentences()
+            theory, fit = _fitted(arm, theory, data, settings, rng)
     if settings.method == 'iv':
         fit = fit_by_instruments(fit, recordings, used)
     spread = base_spread(whole, fit.base) if settings.holds_description else None
@@ -268,43 +266,33 @@ def identify(
         settings=settings,
         notes=notes + _remarks(fit, theory),
         halves=halves_error(fit.problem, fit.solution.weights, prior, spread),
-        physical=None if bodies is None or settings.physical is None else bodies.certificate,
-        bodies_cost=None if bodies is None else bodies.cost,
+        physical=None if bodies is None or settings.physical is None else bodies[3],
+        bodies_cost=None if bodies is None else bodies[3].cost,
         passes=fit.passes,
         scatter=scatter(fit.problem, fit.solution.weights, fit.solution.values),
     )
 
 
-class _Bodies(NamedTuple):
-    """A fit with physically consistent links, and the relative increase of its error."""
-
-    settings: IdentificationSettings
-    theory: BaseParameters
-    fit: FittedValues
-    certificate: PhysicalCertificate
-    cost: float
-
-
-def _bodies(
+def _among_bodies(
     arm: ArmModel,
     theory: BaseParameters,
     data: tuple[BaseParameters, Sequence[Regression], Sequence[Recording], Conditioning],
     settings: IdentificationSettings,
     rng: np.random.Generator,
-) -> _Bodies | None:
-    """Fit physically consistent links; None if impossible and not required."""
-    if settings.method == 'iv':
+) -> tuple[IdentificationSettings, BaseParameters, FittedValues, PhysicalCertificate] | None:
+    """Fit physically consistent links; None if not asked for, or impossible and not required."""
+    if settings.method == 'iv' or not (settings.physical or settings.prefers_bodies):
         return None
     known = settings.physical or PhysicalSettings()
     asked = replace(settings, physical=known)
     theory, fit = _fitted(arm, theory, data, asked, rng)
     try:
-        fit, proof = fit_to_bodies(arm, fit, *data[2:], asked.least_squares, known, rng)
+        found = fit_to_bodies(arm, fit, *data[2:], asked.least_squares, known, rng)
     except IdentificationError:
         if settings.physical is not None:
             raise
         return None
-    return _Bodies(asked, theory, fit, proof, max(proof.misfit_ratio, proof.held_out_ratio) - 1.0)
+    return asked, theory, *found
 
 
 def _fitted(

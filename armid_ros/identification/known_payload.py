@@ -62,16 +62,15 @@ class DriveGains:
 
     def document(self) -> list[dict[str, object]]:
         """Return the gains for identification.json; null if not identified."""
-        rows: list[dict[str, object]] = []
-        for joint, gain, std, width in zip(
-            self.joints, self.values, self.std, self.half_width, strict=True
-        ):
-            row: dict[str, object] = {'joint': joint, 'gain': None}
-            if np.isfinite(std):
-                interval = [float(gain - width), float(gain + width)]
-                row |= {'gain': float(gain), 'std': float(std), 'interval': interval}
-            rows.append(row)
-        return rows
+        numbers = zip(
+            *(array.tolist() for array in (self.values, self.std, self.half_width)), strict=True
+        )
+        return [
+            {'joint': joint, 'gain': gain, 'std': std, 'interval': [gain - width, gain + width]}
+            if np.isfinite(std)
+            else {'joint': joint, 'gain': None}
+            for joint, (gain, std, width) in zip(self.joints, numbers, strict=True)
+        ]
 
     def sentences(self) -> tuple[str, ...]:
         """Return the gains as sentences."""
@@ -95,7 +94,7 @@ class DriveGains:
 
 
 def payloads_of(
-    texts: Sequence[str], bags: Sequence[Path], recordings: Sequence[Recording], robot: Robot
+    texts: Sequence[str], recordings: Sequence[Recording], robot: Robot
 ) -> Mapping[str, Robot]:
     """
     Return the robot with its payload, by source, for each recording with a payload.
@@ -107,17 +106,16 @@ def payloads_of(
 
     """
     found: dict[str, Robot] = {}
-    sources = {str(bag): r.source for bag, r in zip(bags, recordings, strict=True)}
+    bags = {recording.source: Path(recording.source) for recording in recordings}
     for text in texts:
         name, link, payload = parse_payload(text)
-        named = [bag for bag in bags if name in (str(bag), bag.name, bag.stem)]
+        named = [source for source, bag in bags.items() if name in (str(bag), bag.name, bag.stem)]
         if len(named) != 1:
             raise IdentificationError(
                 f"--payload '{text}' names {len(named)} recordings; they are "
-                f'{", ".join(map(str, bags))}'
+                f'{", ".join(map(str, bags.values()))}'
             )
-        source = sources[str(named[0])]
-        found[source] = with_payload(found.get(source, robot), link, payload)
+        found[named[0]] = with_payload(found.get(named[0], robot), link, payload)
     return found
 
 
@@ -201,22 +199,15 @@ def drive_gains(
     """
     used = conditioning(list(recordings), signals)
     rows = regressions(arm, arm.base_parameters(rng).independent, recordings, used)
-    known = np.concatenate(
-        [
-            _torque_of_payload(arm, recording, loaded, used, filtered=True)
-            for recording in recordings
-        ]
+    torques = [_torque_of_payload(arm, one, loaded, used, filtered=True) for one in recordings]
+    known = np.concatenate(torques)
+    columns, tau, informative = (
+        np.concatenate([getattr(part, name) for part in rows])
+        for name in ('columns', 'tau', 'informative')
     )
-    columns = np.concatenate([part.columns for part in rows])
-    tau = np.concatenate([part.tau for part in rows])
-    informative = np.concatenate([part.informative for part in rows])
-    most = 20  # blocks that count as independent
-    blocks = np.concatenate(
-        [
-            number * most + np.arange(len(part.tau)) * most // len(part.tau)
-            for number, part in enumerate(rows)
-        ]
-    )
+    # blocks that count as independent, twenty of each stretch
+    counts = [len(part.tau) for part in rows]
+    blocks = np.concatenate([20 * k + np.arange(n) * 20 // n for k, n in enumerate(counts)])
     gains = [
         _gain(columns[use, j], known[use, j], tau[use, j], blocks[use])
         for j, use in enumerate(informative.T)

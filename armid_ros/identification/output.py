@@ -1,26 +1,36 @@
 # Copyright 2026 The armid_ros developers
 # SPDX-License-Identifier: Apache-2.0
-"""Document of an identification in the file identification.json."""
+"""
+Document of an identification in the file identification.json, and the recordings that it names.
+
+They are the baseline of a diagnosis. The file has a size and a digest of each, as another
+recording may have replaced it at the same path.
+
+"""
 
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+import hashlib
 from pathlib import Path
 import re
 from typing import Any
 
 from armid_ros.arm import parameter_table
-from armid_ros.files import json_text, write_file
+from armid_ros.errors import ModelError
+from armid_ros.files import is_file, json_text, load_json, read_text, reading, write_file
 from armid_ros.identification.assess.consistency import NoiseCheck
 from armid_ros.identification.assess.grade import Grade
 from armid_ros.identification.assess.verification import Verification
-from armid_ros.identification.description import kinematics_digest
 from armid_ros.identification.identify import Identification
 from armid_ros.identification.rows.regression import Fit, Score
 from armid_ros.motion import FloatArray
+from armid_ros.robots import Robot
 import numpy as np
 
 SCHEMA = 'armid/identification/1'
+#: File that tools rewrite without changing the data.
+_NOT_DATA = 'metadata.yaml'
 
 
 def identification_document(
@@ -70,11 +80,11 @@ def identification_document(
         'rank': result.base.rank,
         'training': {
             'bags': list(dict.fromkeys(fit.source for fit in result.training)),
-            **_score(result.training),
+            **_score(result, result.training),
             'halves_error_percent': result.halves.whole,
             'joint_halves_error_percent': _by_joint(result, result.halves.joints),
         },
-        'validation': [{'bag': bag, **_score(fits)} for bag, fits in validation.items()],
+        'validation': [{'bag': bag, **_score(result, fits)} for bag, fits in validation.items()],
         'residual_std': _by_joint(result, result.joint_std),
         'settings': {
             'method': result.settings.method,
@@ -89,14 +99,39 @@ def identification_document(
     if result.physical is not None:
         document['physical'] = result.physical.document()
     if verification is not None:
+        noise = verification.noise
         document['verification'] = {
-            'encoder_noise': None
-            if verification.noise is None
-            else _noise(result, verification.noise),
+            'encoder_noise': None if noise is None else _noise(result, noise),
             'forward': [pair.document() for pair in verification.forward],
             'left_out': list(verification.left_out),
         }
     return document
+
+
+def kinematics_digest(robot: Robot) -> str:
+    """
+    Return a digest of the joints of a description, in hexadecimal.
+
+    The digest covers names, kinds, axes and placements of joints, and names of links, to a
+    micrometre. It does not cover masses and gravity, which may be corrected later.
+
+    """
+    digest = hashlib.sha256()
+    model = robot.model
+    for index, (joint, link) in enumerate(zip(robot.joints, robot.links, strict=True), start=1):
+        place = model.jointPlacements[index]
+        numbers = np.concatenate([place.rotation.ravel(), place.translation])
+        rounded = np.round(numbers, 6) + 0.0  # no negative zero
+        kind = model.joints[index].shortname()
+        parts = (
+            joint,
+            link,
+            kind,
+            str(model.parents[index]),
+            ' '.join(f'{x:.6f}' for x in rounded),
+        )
+        digest.update('\n'.join(parts).encode())
+    return digest.hexdigest()[:16]
 
 
 def write_document(path: str | Path, document: Mapping[str, Any]) -> None:
@@ -104,6 +139,101 @@ def write_document(path: str | Path, document: Mapping[str, Any]) -> None:
     text = json_text(document, indent=1)
     rows = re.sub(r'\[\n[^][{}"]*\]', lambda row: ' '.join(row[0].split()), text)
     write_file(path, rows + '\n')
+
+
+def with_contents(document: Mapping[str, Any]) -> dict[str, Any]:
+    """Return identification.json with sizes and digests of existing recordings."""
+    there = [(name, Path(name)) for name in _names(document)]
+    rows = [{'bag': name, **_content(path)} for name, path in there if path.exists()]
+    return {**document, 'recordings': rows}
+
+
+def identified_from(path: str | Path) -> tuple[Path, ...]:
+    """
+    Return the existing recordings of an identification, held-out ones included.
+
+    Parameters
+    ----------
+    path : str or Path
+        Path of model.yaml; the identification.json in its folder names the recordings. Relative
+        paths start in the working directory, in that folder, or in its parent.
+
+    Raises
+    ------
+    ModelError
+        If identification.json cannot be read.
+
+    """
+    return tuple(_found(Path(path)))
+
+
+def require_as_identified(path: str | Path) -> None:
+    """
+    Raise an error if recordings changed since the identification.
+
+    Parameters
+    ----------
+    path : str or Path
+        Path of model.yaml. Recordings without size and digest in the file are not checked.
+
+    Raises
+    ------
+    ModelError
+        With the recording and the remedy.
+
+    """
+    for place, known in _found(Path(path)).items():
+        if known is not None and _content(place) != known:
+            raise ModelError(
+                f'{place}: is not the recording any more that {path} was identified from, its '
+                'content is another. Name the baseline (--baseline), ask without one '
+                '(--no-baseline), or identify the arm again'
+            )
+
+
+def _content(path: Path) -> dict[str, Any]:
+    """Return size of a file or folder [bytes], and SHA-256 of the ends of its files."""
+    inside = sorted(path.rglob('*')) if path.is_dir() else [path]
+    digest, total = hashlib.sha256(), 0
+    end = 1 << 20  # bytes, enough for time stamps at the begin and the index at the end
+    for file in inside:
+        if not file.is_file() or file.name == _NOT_DATA:
+            continue
+        size = file.stat().st_size
+        total += size
+        digest.update(f'{size};'.encode())
+        with file.open('rb') as stream:
+            digest.update(stream.read(end))
+            stream.seek(max(end, size - end))
+            digest.update(stream.read(end))
+    return {'size': total, 'digest': digest.hexdigest()}
+
+
+def _found(model: Path) -> dict[Path, dict[str, Any] | None]:
+    """Return the existing recordings of a model, with their digests if known."""
+    beside = model.with_name('identification.json')
+    if not is_file(beside):
+        return {}
+    text = read_text(beside, ModelError)
+    with reading(beside, ModelError):
+        document = load_json(text)
+        known = {
+            str(row['bag']): {'size': int(row['size']), 'digest': str(row['digest'])}
+            for row in document.get('recordings', [])
+        }
+        starts = (Path(), beside.parent, beside.parent.parent)
+        places = [(name, [start / name for start in starts]) for name in _names(document)]
+    return {
+        place: known.get(name)
+        for name, some in places
+        if (place := next((one for one in some if one.exists()), None)) is not None
+    }
+
+
+def _names(document: Mapping[str, Any]) -> list[str]:
+    """Return the recordings that a document names, held-out ones last."""
+    validation = (row['bag'] for row in document.get('validation', []))
+    return [str(name) for name in (*document['training']['bags'], *validation) if name]
 
 
 def _noise(result: Identification, noise: NoiseCheck) -> dict[str, Any]:
@@ -118,15 +248,12 @@ def _noise(result: Identification, noise: NoiseCheck) -> dict[str, Any]:
     }
 
 
-def _score(fits: Sequence[Fit]) -> dict[str, Any]:
+def _score(result: Identification, fits: Sequence[Fit]) -> dict[str, Any]:
     score = Score.of(fits)
-    joints = fits[0].motion.joints
     return {
         'relative_error_percent': score.relative_error_percent,
-        'joint_relative_error_percent': dict(
-            zip(joints, score.joint_relative_error_percent.tolist(), strict=True)
-        ),
-        'rms': dict(zip(joints, score.rms.tolist(), strict=True)),
+        'joint_relative_error_percent': _by_joint(result, score.joint_relative_error_percent),
+        'rms': _by_joint(result, score.rms),
     }
 
 

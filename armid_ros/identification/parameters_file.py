@@ -10,16 +10,16 @@ from pathlib import Path
 from typing import Any
 
 from armid_ros.arm import ArmModel, load_misfit, Misfit
-from armid_ros.arm.model_check import checked_model
-from armid_ros.arm.model_check import SCHEMA as MODEL
-from armid_ros.arm.model_file import read_model
+from armid_ros.arm.misfit import misfit_of_block
+from armid_ros.arm.model_file import checked_model, read_model
+from armid_ros.arm.model_file import SCHEMA as MODEL
 from armid_ros.errors import ArmidError, ModelError
 from armid_ros.estimate import ParameterName
 from armid_ros.files import finite, is_file, load_json, load_yaml, read_text, reading
-from armid_ros.identification.description import kinematics_digest
+from armid_ros.identification.assess.grade_limits import by_error
 from armid_ros.identification.fitting.identifiability import NOT_SHOWN
 from armid_ros.identification.fitting.normal_equations import scaled_inverse
-from armid_ros.identification.known_fit import known_fit, KnownFit
+from armid_ros.identification.output import kinematics_digest, SCHEMA
 from armid_ros.model.base_parameters import symbol
 from armid_ros.motion import FloatArray
 from armid_ros.robots import load_robot
@@ -28,8 +28,47 @@ import yaml
 
 #: Remainder of a grouping, as a share of it, below which it is a combination of others.
 _SAME_GROUPING = 1e-6
-_IDENTIFICATION = 'armid/identification/1'
-_SCHEMAS = (_IDENTIFICATION, MODEL)
+_SCHEMAS = (SCHEMA, MODEL)
+
+
+@dataclass(frozen=True)
+class KnownFit:
+    """
+    Torque error and grade of a model, as its file states them.
+
+    Attributes
+    ----------
+    grade : str
+        'good', 'poor' or 'unusable'; by the worst joint if the file has no grade.
+    reason : str
+        Reason of the grade.
+    rms : mapping of str to float
+        Root mean square residual of each joint [N m]; empty if unknown.
+    errors : mapping of str to float
+        Residual of each joint over its torque [%].
+    recordings : int
+        Number of recordings with this residual, at least one.
+    as_diagnosed : bool
+        Whether it is the misfit of model.yaml, which excludes rows at rest.
+
+    """
+
+    grade: str
+    reason: str
+    rms: Mapping[str, float]
+    errors: Mapping[str, float]
+    recordings: int = 1
+    as_diagnosed: bool = False
+
+    @property
+    def unusable(self) -> bool:
+        """Whether the model does not describe the arm."""
+        return self.grade == 'unusable'
+
+    def torque(self, joint: str) -> float:
+        """Return the rms torque of a joint, zero if unknown [N m]."""
+        error = self.errors.get(joint, 0.0)
+        return 100.0 * self.rms[joint] / error if error > 0.0 else 0.0
 
 
 @dataclass(frozen=True)
@@ -196,9 +235,18 @@ def read_parameters(path: str | Path) -> ParameterFile:
             raise ModelError(f"its 'schema' has to be {' or '.join(_SCHEMAS)}")
         document = checked_model(text) if document['schema'] == MODEL else document
         read = parameters_of(str(path), document)
-    if document['schema'] == MODEL:
-        return _beside(path, document) or _with_robot(read, path, text)
-    return read if read.kinematics else _with_robot(read, path)
+    if document['schema'] != MODEL:
+        return read
+    beside = _beside(path, document)
+    if beside is not None:
+        return beside
+    described = path.parent / read.robot
+    try:
+        robot = load_robot(str(described) if is_file(described) else read.robot)
+    except ArmidError:
+        return read
+    read_model(text, robot, str(path))  # it has to contain all parameters of the robot
+    return replace(read, joints=robot.joints, kinematics=kinematics_digest(robot))
 
 
 def _beside(path: Path, model: Mapping[str, Any]) -> ParameterFile | None:
@@ -211,7 +259,7 @@ def _beside(path: Path, model: Mapping[str, Any]) -> ParameterFile | None:
     text = read_text(file, ModelError)
     with reading(file, ModelError):
         document = load_json(text)
-        if not isinstance(document, dict) or document.get('schema') != _IDENTIFICATION:
+        if not isinstance(document, dict) or document.get('schema') != SCHEMA:
             return None
         found = parameters_of(str(file), document)
         rows = [*model['rigid_parameters']]
@@ -228,7 +276,7 @@ def _beside(path: Path, model: Mapping[str, Any]) -> ParameterFile | None:
         made = sum(factor * values[key] for key, factor in row.items())
         if abs(made - value) > _SAME_GROUPING * (std + abs(value)):
             return None
-    return found if found.kinematics else _with_robot(found, file)
+    return found
 
 
 def read_misfit(path: str | Path, arm: ArmModel) -> Misfit | None:
@@ -254,20 +302,6 @@ def read_misfit(path: str | Path, arm: ArmModel) -> Misfit | None:
     known = read_parameters(beside)
     unusable = known.fit is not None and known.fit.unusable
     return replace(misfit, information=known.information(arm.parameters), unusable=unusable)
-
-
-def _with_robot(found: ParameterFile, path: Path, model: str = '') -> ParameterFile:
-    """Add joints and kinematics of the robot that a file names, if its description exists."""
-    # The text of a model.yaml must contain all parameters of the robot.
-    beside = path.parent / found.robot
-    source = str(beside) if is_file(beside) else found.robot
-    try:
-        robot = load_robot(source)
-    except ArmidError:
-        return found
-    if model:
-        read_model(model, robot, str(path))
-    return replace(found, joints=robot.joints, kinematics=kinematics_digest(robot))
 
 
 def parameters_of(source: str, document: dict[str, Any]) -> ParameterFile:
@@ -355,3 +389,51 @@ def _covariance(rows: list[list[float]] | None, size: int) -> FloatArray | None:
     if (np.diag(matrix) < 0.0).any() or (np.abs(matrix) > largest * (1.0 + 1e-9)).any():
         raise ValueError('a covariance with a negative variance or a correlation beyond one')
     return matrix
+
+
+def known_fit(document: Mapping[str, Any]) -> KnownFit | None:
+    """
+    Read the fit from identification.json or model.yaml; None if absent.
+
+    Raises
+    ------
+    KeyError, TypeError or ValueError
+        If a key or value is missing or wrong.
+
+    """
+    if document.get('misfit') is not None:
+        known = misfit_of_block(document['misfit'])
+        torque = known.torque_rms or {}
+        errors = {j: 100.0 * left / torque[j] for j, left in known.rms.items() if torque.get(j)}
+        overall = known.relative_error_percent
+        reason = _worst(errors, overall, f'{known.data} data')
+        grade = by_error(max(errors.values(), default=overall))
+        return KnownFit(grade, reason, known.rms, errors, as_diagnosed=True)
+    training = document.get('training')
+    if not training:
+        return None
+    rms, errors = (_by_joint(training, key) for key in ('rms', 'joint_relative_error_percent'))
+    overall = finite(training['relative_error_percent'], 'an error')
+    reasons = document.get('reasons') or [_worst(errors, overall, 'data that it was fitted to')]
+    grade = document.get('grade', by_error(max(errors.values(), default=overall)))
+    count = max(len(training.get('bags', ())), 1)
+    return KnownFit(str(grade), str(reasons[0]), rms, errors, count)
+
+
+def _worst(errors: Mapping[str, float], overall: float, data: str) -> str:
+    """Return a sentence on the joint with the largest error."""
+    if not errors:
+        return f'Torque error on {data}: {overall:.3g} %.'
+    joint = max(errors, key=lambda one: errors[one])
+    where = f' (worst joint: {joint})' if len(errors) > 1 else ''
+    return f'Torque error on {data}: {errors[joint]:.3g} %{where}.'
+
+
+def _by_joint(score: Mapping[str, Any], key: str) -> dict[str, float]:
+    """Return the values of a score by joint; empty if absent."""
+    values = {}
+    for joint, value in (score.get(key) or {}).items():
+        values[str(joint)] = finite(value, f'{key} of {joint}')
+        if values[str(joint)] < 0.0:
+            raise ValueError(f'{key} of {joint} is negative')
+    return values

@@ -149,10 +149,17 @@ def group_columns(
         Identifiable combinations.
 
     """
-    order = _keep_order(standard)
+
+    def kept_first(position: int) -> tuple[int, int]:
+        name = _symbol_of(standard[position])
+        number = standard[position].name[len(name) :]
+        if name in _KEEP_ORDER and number:
+            return int(number), _KEEP_ORDER.index(name)
+        return len(standard), position
+
     scale = np.linalg.norm(w, axis=0)
     seen = scale > RANK_TOLERANCE * scale.max(initial=1e-300)
-    candidates = [j for j in order if seen[j]]
+    candidates = sorted(np.flatnonzero(seen).tolist(), key=kept_first)
     triangle = np.asarray(np.linalg.qr(w[:, candidates] / scale[candidates], mode='r'))
 
     basis = np.empty((len(triangle), 0))
@@ -239,17 +246,6 @@ def gravity_composites(robot: Robot, rng: np.random.Generator) -> BaseParameters
 def _symbol_of(parameter: ParameterName) -> str:
     """Return the name of a parameter without the number of its link."""
     return parameter.name.rstrip('0123456789')
-
-
-def _keep_order(standard: tuple[ParameterName, ...]) -> list[int]:
-    def key(position: int) -> tuple[int, int]:
-        name = _symbol_of(standard[position])
-        number = standard[position].name[len(name) :]
-        if name in _KEEP_ORDER and number:
-            return int(number), _KEEP_ORDER.index(name)
-        return len(standard), position
-
-    return sorted(range(len(standard)), key=key)
 
 
 def symbol(parameter: ParameterName) -> str:

@@ -12,7 +12,7 @@ from xml.etree import ElementTree
 from armid_ros.model.pseudo_inertia import require_consistent
 from armid_ros.motion import FloatArray
 from armid_ros.robots import held_joints, Robot
-from armid_ros.robots.geometry import LinkShape, shapes_of
+from armid_ros.robots.geometry import shapes_of
 import numpy as np
 import pinocchio as pin
 
@@ -27,12 +27,7 @@ _CLASSES: dict[Literal['visual', 'collision'], dict[str, str]] = {
 
 
 def export_mjcf(
-    robot: Robot,
-    *,
-    damping: Mapping[str, float] | None = None,
-    friction: Mapping[str, float] | None = None,
-    armature: Mapping[str, float] | None = None,
-    remarks: Sequence[str] = (),
+    robot: Robot, values: Mapping[str, Mapping[str, float]], remarks: Sequence[str] = ()
 ) -> tuple[str, tuple[str, ...]]:
     """
     Return a MuJoCo model of a robot: base, bodies with their shapes, joints and motors.
@@ -41,8 +36,8 @@ def export_mjcf(
     ----------
     robot : Robot
         The arm, with its gravity.
-    damping, friction, armature : mapping of str to float, optional
-        Viscous coefficient [N m s/rad], Coulomb torque [N m] and rotor inertia [kg m^2] by joint.
+    values : mapping of str to mapping of str to float
+        'damping' [N m s/rad], 'frictionloss' [N m] and 'armature' [kg m^2], each by joint.
     remarks : sequence of str
         Lines of a comment in the file.
 
@@ -66,9 +61,9 @@ def export_mjcf(
     ElementTree.SubElement(root, 'compiler', angle='radian')
     ElementTree.SubElement(root, 'option', gravity=_numbers(robot.gravity))
     defaults = ElementTree.SubElement(root, 'default')
-    for of, values in _CLASSES.items():
+    for of, contacts in _CLASSES.items():
         default = ElementTree.SubElement(defaults, 'default', {'class': of})
-        ElementTree.SubElement(default, 'geom', values)
+        ElementTree.SubElement(default, 'geom', contacts)
     assets = ElementTree.SubElement(root, 'asset')
     world = ElementTree.SubElement(root, 'worldbody')
     model = robot.model
@@ -82,14 +77,13 @@ def export_mjcf(
             {'name': robot.links[index]} | _place(model.jointPlacements[identity]),
         )
         bodies[identity] = body
-        ElementTree.SubElement(body, 'inertial', _inertial(model.inertias[identity]))
+        inertia = model.inertias[identity]
+        upper = inertia.inertia[[0, 1, 2, 0, 0, 1], [0, 1, 2, 1, 2, 2]]
+        mass = {'pos': _numbers(inertia.lever), 'mass': repr(float(inertia.mass))}
+        ElementTree.SubElement(body, 'inertial', mass | {'fullinertia': _numbers(upper)})
         ElementTree.SubElement(body, 'joint', _joint(robot, index))
-        for key, table in (
-            ('damping', damping),
-            ('frictionloss', friction),
-            ('armature', armature),
-        ):
-            if table and table.get(joint):
+        for key, table in values.items():
+            if table.get(joint):
                 body[-1].set(key, repr(float(table[joint])))
     left_out = [
         *_shapes(robot, bodies, assets),
@@ -117,8 +111,12 @@ def _shapes(
     files: dict[tuple[Path, tuple[float, ...]], str] = {}
     for of in _CLASSES:
         for shape in shapes_of(robot, of):
-            size = _size(shape)
-            if shape.kind == 'mesh':
+            if shape.kind in ('box', 'sphere'):  # half edges, or the radius
+                share = 0.5 if shape.kind == 'box' else 1.0
+                size = {'size': _numbers([share * x for x in shape.size])}
+            elif shape.kind != 'mesh':  # radius and half length
+                size = {'size': _numbers([shape.size[0], 0.5 * shape.size[1]])}
+            else:
                 if shape.path is None or shape.path.suffix.lower() not in _MESHES:
                     left_out[f'{of} mesh {shape.mesh.rsplit("/", 1)[-1]}'] = None
                     continue
@@ -134,25 +132,9 @@ def _shapes(
     return list(left_out)
 
 
-def _size(shape: LinkShape) -> dict[str, str]:
-    """Return the size attribute of a geom: half edges, radius, or radius and half length."""
-    if shape.kind in ('box', 'sphere'):
-        return {'size': _numbers([(0.5 if shape.kind == 'box' else 1.0) * x for x in shape.size])}
-    return {'size': _numbers([shape.size[0], 0.5 * shape.size[1]])}
-
-
 def _place(placement: pin.SE3) -> dict[str, str]:
     x, y, z, w = pin.Quaternion(placement.rotation).coeffs()
     return {'pos': _numbers(placement.translation), 'quat': _numbers([w, x, y, z])}
-
-
-def _inertial(inertia: pin.Inertia) -> dict[str, str]:
-    tensor = inertia.inertia
-    return {
-        'pos': _numbers(inertia.lever),
-        'mass': repr(float(inertia.mass)),
-        'fullinertia': _numbers(tensor[[0, 1, 2, 0, 0, 1], [0, 1, 2, 1, 2, 2]]),
-    }
 
 
 def _joint(robot: Robot, index: int) -> dict[str, str]:

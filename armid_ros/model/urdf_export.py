@@ -11,9 +11,8 @@ the remainder, so that the file, when read again, has exactly the given paramete
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
-from pathlib import Path
-from xml.sax.saxutils import escape
+from collections.abc import Iterator, Mapping, Sequence
+from xml.dom import expatbuilder, minidom
 
 from armid_ros.errors import ModelError
 from armid_ros.model.pseudo_inertia import (
@@ -22,7 +21,6 @@ from armid_ros.model.pseudo_inertia import (
     pseudo_inertia,
     require_consistent,
 )
-from armid_ros.model.xml_edit import Element, XmlText
 from armid_ros.motion import FloatArray
 from armid_ros.robots import Robot, robot_from_urdf
 from armid_ros.robots.meshes import find_mesh
@@ -37,11 +35,7 @@ ROUNDING = 1e-11
 
 
 def export_urdf(
-    robot: Robot,
-    *,
-    damping: Mapping[str, float] | None = None,
-    friction: Mapping[str, float] | None = None,
-    remarks: Sequence[str] = (),
+    robot: Robot, values: Mapping[str, Mapping[str, float]], remarks: Sequence[str] = ()
 ) -> str:
     """
     Return the robot's description with its present inertial parameters.
@@ -50,8 +44,8 @@ def export_urdf(
     ----------
     robot : Robot
         The arm; ``robot.urdf`` is the description that is changed.
-    damping, friction : mapping of str to float, optional
-        Viscous coefficient [N m s/rad] and Coulomb torque [N m] by joint, for <dynamics>.
+    values : mapping of str to mapping of str to float
+        'damping' [N m s/rad] and 'friction' [N m] of <dynamics>, each by joint.
     remarks : sequence of str
         Lines of a comment at the end, such as parameters that a URDF cannot contain.
 
@@ -59,7 +53,7 @@ def export_urdf(
     -------
     str
         URDF. Only <inertial>, <dynamics> and the comment at the end differ; paths of meshes become
-        absolute, and <ros2_control> is left out.
+        absolute, and <ros2_control> is left out. Other comments stay.
 
     Raises
     ------
@@ -78,31 +72,68 @@ def export_urdf(
         others = _parameters(robot, _without_inertials(text, robot.links))
     own = dict(zip(robot.links, body - others, strict=True))
 
-    document = XmlText(text)
-    for link in document.root.all('link'):
-        if link.attributes['name'] in own:
-            _set_inertial(document, link, own[link.attributes['name']])
-    for joint in document.root.all('joint'):
-        values = {
-            key: repr(float(table[joint.attributes['name']]))
-            for key, table in (('damping', damping or {}), ('friction', friction or {}))
-            if joint.attributes['name'] in table
-        }
-        element = joint.find('dynamics')
-        if element is not None:
-            document.set_attributes(element, values)
-        elif values:
-            row = ' '.join(f'{key}="{value}"' for key, value in values.items())
-            document.append(joint, [f'<dynamics {row}/>'])
-    for element in document.root.all('ros2_control'):  # hosts and passwords of drives
-        document.remove(element)
-    _set_meshes(document, document.root, robot.path)
+    document, root = _parsed(text)
+    links = {link.getAttribute('name'): link for link in _children(root, 'link')}
+    for name, parameters in own.items():
+        _set_inertial(links[name], parameters)
+    for joint in _children(root, 'joint'):
+        for key, table in values.items():
+            if joint.getAttribute('name') in table:
+                value = repr(float(table[joint.getAttribute('name')]))
+                _child(joint, 'dynamics').setAttribute(key, value)
+    for element in list(_children(root, 'ros2_control')):  # hosts and passwords of drives
+        root.removeChild(element)
+    for mesh in root.getElementsByTagName('mesh'):  # the file will be in another folder
+        name = mesh.getAttribute('filename')
+        found = None if '://' in name else find_mesh(name, robot.path)
+        mesh.setAttribute('filename', name if found is None else f'file://{found}')
     if remarks:
-        lines = [line.replace('--', '- -') for line in remarks]
-        document.append(document.root, ['<!--', *(f'  {line}' for line in lines), '-->'])
-    result = document.text()
+        lines = ''.join(f'\n    {line.replace("--", "- -")}' for line in remarks)
+        root.appendChild(document.createComment(f'{lines}\n  '))
+    result = _text(document)
     _check(robot, result)
     return result
+
+
+def _parsed(urdf: str) -> tuple[minidom.Document, minidom.Element]:
+    """Return a description, whose comments and prefixes stay, and its root."""
+    document = expatbuilder.parseString(urdf, namespaces=False)
+    assert document.documentElement is not None
+    return document, document.documentElement
+
+
+def _text(document: minidom.Document) -> str:
+    return '\n'.join(
+        ['<?xml version="1.0"?>', *(node.toxml() for node in document.childNodes), '']
+    )
+
+
+def _children(parent: minidom.Element, name: str) -> Iterator[minidom.Element]:
+    """Return the children with a tag."""
+    return (
+        child
+        for child in parent.childNodes
+        if isinstance(child, minidom.Element) and child.tagName == name
+    )
+
+
+def _child(parent: minidom.Element, name: str) -> minidom.Element:
+    """Return the first child with a tag; it is added, indented as the others, if it is missing."""
+    found = next(_children(parent, name), None)
+    if found is None:
+        document = minidom.Document()
+        found = document.createElement(name)
+        space = [
+            node
+            for node in (parent.firstChild, parent.lastChild)
+            if isinstance(node, minidom.Text) and node.data.isspace()
+        ]
+        if space:
+            parent.insertBefore(document.createTextNode(space[0].data), space[-1])
+            parent.insertBefore(found, space[-1])
+        else:
+            parent.appendChild(found)
+    return found
 
 
 def _parameters(robot: Robot, urdf: str) -> FloatArray:
@@ -112,12 +143,12 @@ def _parameters(robot: Robot, urdf: str) -> FloatArray:
 
 def _without_inertials(urdf: str, links: Sequence[str]) -> str:
     """Return a URDF without the inertials of some links."""
-    document = XmlText(urdf)
-    for link in document.root.all('link'):
-        inertial = link.find('inertial')
-        if link.attributes['name'] in links and inertial is not None:
-            document.remove(inertial)
-    return document.text()
+    document, root = _parsed(urdf)
+    for link in _children(root, 'link'):
+        for inertial in list(_children(link, 'inertial')):
+            if link.getAttribute('name') in links:
+                link.removeChild(inertial)
+    return _text(document)
 
 
 def _share(body: FloatArray, others: FloatArray) -> float:
@@ -132,91 +163,47 @@ def _share(body: FloatArray, others: FloatArray) -> float:
 
 def _scaled(robot: Robot, shares: FloatArray) -> str:
     """Return the URDF with scaled mass and inertia of links that are fixed to driven ones."""
-    document = XmlText(robot.urdf)
-    carriers = _carriers(robot, document.root)
-    for link in document.root.all('link'):
-        name, inertial = link.attributes['name'], link.find('inertial')
-        if inertial is None or name in robot.links or name not in carriers:
-            continue
-        share = float(shares[carriers[name]])
-        if share >= 1.0:
-            continue
-        for element, keys in (
-            (inertial.find('mass'), ('value',)),
-            (inertial.find('inertia'), ('ixx', 'ixy', 'ixz', 'iyy', 'iyz', 'izz')),
-        ):
-            assert element is not None
-            known = {key: element.attributes[key] for key in keys if key in element.attributes}
-            values = {key: repr(share * float(value)) for key, value in known.items()}
-            document.set_attributes(element, values)
-    return document.text()
-
-
-def _carriers(robot: Robot, root: Element) -> dict[str, int]:
-    """Return the nearest driven joint of every link that a driven joint moves."""
+    document, root = _parsed(robot.urdf)
     parents: dict[str, tuple[str, str]] = {}
-    for joint in root.all('joint'):
-        parent, child = joint.find('parent'), joint.find('child')
-        if parent is not None and child is not None:
-            names = parent.attributes['link'], joint.attributes['name']
-            parents[child.attributes['link']] = names
-    carriers = {}
-    for link in parents:
-        at: str | None = link
-        while at in parents:
-            above, joint_name = parents[at]
-            if joint_name in robot.joints:
-                carriers[link] = robot.joints.index(joint_name)
-                break
-            at = above
-    return carriers
+    for joint in _children(root, 'joint'):
+        for parent, child in zip(
+            _children(joint, 'parent'), _children(joint, 'child'), strict=False
+        ):
+            names = parent.getAttribute('link'), joint.getAttribute('name')
+            parents[child.getAttribute('link')] = names
+    for link in _children(root, 'link'):
+        name, inertial = link.getAttribute('name'), next(_children(link, 'inertial'), None)
+        if inertial is None or name in robot.links:
+            continue
+        # up to the nearest driven joint
+        at, moved_by = name, ''
+        while at in parents and moved_by not in robot.joints:
+            at, moved_by = parents[at]
+        if moved_by not in robot.joints:
+            continue
+        share = float(shares[robot.joints.index(moved_by)])
+        for element in (_child(inertial, 'mass'), _child(inertial, 'inertia')):
+            for key, value in element.attributes.items() if share < 1.0 else ():
+                element.setAttribute(key, repr(share * float(value)))
+    return _text(document)
 
 
-def _set_inertial(document: XmlText, link: Element, parameters: FloatArray) -> None:
+def _set_inertial(link: minidom.Element, parameters: FloatArray) -> None:
     """Write ten parameters as mass, centre and inertia about it, in the axes of the link."""
     body = pin.Inertia.FromDynamicParameters(parameters)
-    tensor = body.inertia
     values = {
         'origin': {'xyz': ' '.join(map(repr, body.lever.tolist())), 'rpy': '0 0 0'},
         'mass': {'value': repr(float(body.mass))},
         'inertia': {
-            'ixx': repr(float(tensor[0, 0])),
-            'ixy': repr(float(tensor[0, 1])),
-            'ixz': repr(float(tensor[0, 2])),
-            'iyy': repr(float(tensor[1, 1])),
-            'iyz': repr(float(tensor[1, 2])),
-            'izz': repr(float(tensor[2, 2])),
+            f'i{"xyz"[i]}{"xyz"[j]}': repr(float(body.inertia[i, j]))
+            for i in range(3)
+            for j in range(i, 3)
         },
     }
-    tags = {
-        name: f'<{name} ' + ' '.join(f'{key}="{value}"' for key, value in row.items()) + '/>'
-        for name, row in values.items()
-    }
-    inertial = link.find('inertial')
-    if inertial is None:
-        inner = [f'  {tag}' for tag in tags.values()]
-        document.append(link, ['<inertial>', *inner, '</inertial>'])
-        return
-    missing = []
+    inertial = _child(link, 'inertial')
     for name, row in values.items():
-        element = inertial.find(name)
-        if element is None:
-            missing.append(tags[name])
-        else:
-            document.set_attributes(element, row)
-    if missing:
-        document.append(inertial, missing)
-
-
-def _set_meshes(document: XmlText, element: Element, urdf: Path | None) -> None:
-    """Replace paths of meshes by absolute ones, as the file will be in another folder."""
-    for child in element.children:
-        name = child.attributes.get('filename', '')
-        if child.name == 'mesh' and '://' not in name:
-            found = find_mesh(name, urdf)
-            if found is not None:
-                document.set_attributes(child, {'filename': f'file://{escape(str(found))}'})
-        _set_meshes(document, child, urdf)
+        for key, value in row.items():
+            _child(inertial, name).setAttribute(key, value)
 
 
 def _check(robot: Robot, urdf: str) -> None:

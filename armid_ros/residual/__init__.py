@@ -8,13 +8,13 @@ maps and laws predict. ``lookup_table`` returns the maps as a table for other pr
 
 """
 
-from armid_ros.residual.joint_residual import JointResidual
 from armid_ros.residual.learn import (
     learn_residual,
     lookup_table,
     require_libraries,
     Residual,
 )
+from armid_ros.residual.section import JointResidual
 
 __all__ = [
     'JointResidual',

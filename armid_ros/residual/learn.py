@@ -20,10 +20,9 @@ from armid_ros.files import write_file
 from armid_ros.files.cells import csv_cell
 from armid_ros.report.blocks import ContentSection
 from armid_ros.residual.gaussian_process import learn_map
-from armid_ros.residual.joint_residual import JointResidual
 from armid_ros.residual.law import share_of, suggest_law
 from armid_ros.residual.rows import BLOCKS, joint_rows, JointRows
-from armid_ros.residual.section import residual_map_section
+from armid_ros.residual.section import JointResidual, residual_map_section
 import numpy as np
 import numpy.typing as npt
 from threadpoolctl import threadpool_limits

@@ -5,8 +5,11 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import dataclass
 
 from armid_ros.arm import ArmModel
+from armid_ros.effects.learned import TorqueMap
+from armid_ros.motion import FloatArray
 from armid_ros.report.blocks import (
     ContentSection,
     DataTable,
@@ -17,11 +20,50 @@ from armid_ros.report.blocks import (
 from armid_ros.report.charts import image_data
 from armid_ros.report.notation import digits, percent
 from armid_ros.report.page import render
-from armid_ros.residual.joint_residual import JointResidual
+from armid_ros.residual.law import Law
 from markupsafe import Markup
 import numpy as np
 
 _POSITIVE, _NEGATIVE, _UNSURE = (0.0, 0.447, 0.698), (0.835, 0.369, 0.0), (0.5, 0.5, 0.5)
+
+
+@dataclass(frozen=True)
+class JointResidual:
+    """
+    The learned map and the suggested law of one joint.
+
+    Attributes
+    ----------
+    joint : str
+        The joint.
+    learned : TorqueMap
+        The map.
+    ranges : ndarray, shape (3, 2)
+        Smallest and largest position, velocity and load in the data.
+    before, after : float
+        Root mean square of the residual without and with the map [N m].
+    gain : float
+        Share of the squared residual that the map predicts in held-out data: blocks left out in
+        turn, and samples of held-out recordings near the training data.
+    held_out : float or None
+        The same share for held-out recordings alone; None if none is near the training data.
+    law : Law or None
+        Suggested law; None if no law approximates the residual.
+
+    """
+
+    joint: str
+    learned: TorqueMap
+    ranges: FloatArray
+    before: float
+    after: float
+    gain: float
+    held_out: float | None
+    law: Law | None
+
+    def axis(self, number: int, count: int) -> FloatArray:
+        """Return evenly spaced values over the range of an input, shape (count,)."""
+        return np.linspace(float(self.ranges[number, 0]), float(self.ranges[number, 1]), count)
 
 
 def residual_map_section(

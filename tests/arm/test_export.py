@@ -4,8 +4,7 @@ from dataclasses import replace
 import re
 
 from armid_ros.arm import ArmModel
-from armid_ros.arm.export import arm_mjcf, arm_urdf
-from armid_ros.arm.export_check import torque_check
+from armid_ros.arm.export import arm_mjcf, arm_urdf, torque_check
 from armid_ros.effects import make_effect
 from armid_ros.robots import load_robot, robot_from_urdf
 import mujoco

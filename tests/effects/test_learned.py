@@ -9,7 +9,6 @@ from armid_ros.effects.testing import CHECKS, EffectCase, sines
 from armid_ros.errors import ModelError
 from armid_ros.model import inverse_dynamics
 from armid_ros.motion import Motion
-from armid_ros.simulation import simulate
 import numpy as np
 import pytest
 import yaml
@@ -100,23 +99,6 @@ def test_a_damaged_file_is_refused_with_the_joint(robot, learned, tmp_path, chan
     path.write_text(yaml.safe_dump(document))
     with pytest.raises(ModelError, match=said):
         load_model(path)
-
-
-def test_the_simulator_applies_it(robot, learned):
-    """Along a simulated run the drives give what the bare arm takes, and the map."""
-    arm = ArmModel(robot).with_effect(learned, [1.0, 1.0])
-    t = np.arange(0.0, 1.0, 0.005)
-    angle = 2.0 * t[:, np.newaxis] + np.arange(robot.n_joints)
-    middle = np.clip(0.0, robot.lower + 0.5, robot.upper - 0.5)
-    waves = (middle + 0.3 * np.sin(angle), 0.6 * np.cos(angle), -1.2 * np.sin(angle))
-    slow = Motion(robot.joints, t, *waves)
-    run = simulate(arm, slow, rng=np.random.default_rng(0))
-    inner = slice(20, -20)
-    bare = ArmModel(robot).torque(run.truth)[inner]
-    extra = run.truth.tau[inner] - bare
-    wanted = learned.torque(robot, run.truth.q, run.truth.dq)[inner]
-    assert np.abs(wanted).max() > 0.05
-    np.testing.assert_allclose(extra, wanted, atol=0.02 * np.abs(run.truth.tau).max())
 
 
 def test_no_diagnosis_names_it(robot):

@@ -4,13 +4,11 @@
 
 from armid_ros.arm import ArmModel
 from armid_ros.effects import make_effect
-from armid_ros.effects.timing import earlier_samples
 from armid_ros.errors import ModelError
 from armid_ros.model import inverse_dynamics
 from armid_ros.motion import Motion
 import numpy as np
 import pytest
-from scipy.interpolate import CubicHermiteSpline
 
 
 def test_one_gain_for_all_joints_is_all_masses_and_friction_scaled(robot, motion):
@@ -57,19 +55,6 @@ def test_a_delay_shifts_the_torque_of_each_joint_by_its_own(robot, sines, with_v
     np.testing.assert_allclose(read[3:, 3], tau[:-3, 3], atol=1e-9)
     np.testing.assert_allclose(read[:-2, 5], tau[2:, 5], atol=1e-9)
     np.testing.assert_array_equal(read[:, :3], tau[:, :3])
-
-
-@pytest.mark.parametrize('derivative', [0, 1])
-@pytest.mark.parametrize('delay', [0.013, -0.02, 0.3])
-@pytest.mark.parametrize('even', [True, False])
-def test_samples_of_earlier_are_of_the_cubic_between_samples(even, delay, derivative):
-    rng = np.random.default_rng(0)
-    t = np.linspace(0.0, 1.0, 80) if even else np.sort(rng.uniform(0.0, 1.0, 80))
-    x = rng.normal(size=(80, 3))
-    curve = CubicHermiteSpline(t, x, np.gradient(x, t, axis=0))
-    wanted = curve(t - delay, derivative)
-    found = earlier_samples(t, delay, derivative) @ x
-    np.testing.assert_allclose(found, wanted, rtol=1e-9, atol=1e-9 * np.abs(wanted).max())
 
 
 @pytest.mark.parametrize('lag', [0.0003, 0.002, 0.05])

@@ -53,23 +53,24 @@ def truth(pair: TiedPair, motion: Motion, motions: PairMotion) -> np.ndarray:
 
 
 def test_springs_to_recorded_points_are_those_of_the_pair(pair, motions, together) -> None:
-    kind = Partner(pair.other, pair.ties).interaction
+    springs = Partner(pair.other, pair.ties).tied(pair.robot, slack=False)
     values = np.column_stack([STIFFNESS, np.zeros(4)]).ravel()
-    arm = ArmModel(pair.robot).with_effect(kind.on(pair.robot), values)
+    arm = ArmModel(pair.robot).with_effect(springs, values)
     np.testing.assert_allclose(
         arm.torque(together), truth(pair, together, motions), rtol=1e-4, atol=2e-2
     )
 
 
 def test_slack_straps_to_recorded_points_are_those_of_the_pair(pair, motions, together) -> None:
-    straps = Partner(pair.other, pair.ties).slack.on(pair.robot).with_shape(SLACK[:, np.newaxis])
+    straps = Partner(pair.other, pair.ties).tied(pair.robot, slack=True)
+    straps = straps.with_shape(SLACK[:, np.newaxis])
     arm = ArmModel(pair.robot).with_effect(straps, STIFFNESS)
     expected = truth(pair.with_slack(SLACK), together, motions)
     np.testing.assert_allclose(arm.torque(together), expected, rtol=1e-4, atol=2e-2)
 
 
 def test_a_motion_without_the_partner_is_refused_by_name(pair, motions) -> None:
-    effect = Partner(pair.other, pair.ties, 'human_legs').interaction.on(pair.robot)
+    effect = Partner(pair.other, pair.ties, 'human_legs').tied(pair.robot, slack=False)
     arm = ArmModel(pair.robot).with_effect(effect)
     with pytest.raises(ModelError, match=r'human_legs.*swing_shank.*--partner'):
         arm.torque(motions.own)
@@ -78,16 +79,16 @@ def test_a_motion_without_the_partner_is_refused_by_name(pair, motions) -> None:
 def test_two_ties_on_a_joint_and_joints_without_any_are_refused(pair) -> None:
     with pytest.raises(ModelError, match='exo_swing_knee'):
         twice = (pair.ties[0], replace(pair.ties[0], name='again'))
-        Partner(pair.other, twice).interaction.on(pair.robot)
+        Partner(pair.other, twice).tied(pair.robot, slack=False)
     with pytest.raises(ModelError, match="'exo_stance_hip'"):
-        Partner(pair.other, pair.ties).slack.on(pair.robot, ('exo_stance_hip',))
+        Partner(pair.other, pair.ties).tied(pair.robot, ('exo_stance_hip',), slack=True)
 
 
 def test_a_model_file_keeps_ties_and_slack(pair, together, tmp_path) -> None:
     partner = Partner(pair.other, pair.ties, 'human_legs')
-    straps = partner.slack.on(pair.robot, ('exo_swing_hip',)).with_shape([0.002])
+    straps = partner.tied(pair.robot, ('exo_swing_hip',), slack=True).with_shape([0.002])
     arm = ArmModel(pair.robot).with_effect(straps, [4e3])
-    springs = partner.interaction.on(pair.robot, ('exo_stance_ankle', 'exo_swing_knee'))
+    springs = partner.tied(pair.robot, ('exo_stance_ankle', 'exo_swing_knee'), slack=False)
     arm = arm.with_effect(springs, [1e4, 5.0, 2e4, 0.0])
     save_model(tmp_path / 'model.yaml', arm, 'exoskeleton_legs')
     again = load_model(tmp_path / 'model.yaml')

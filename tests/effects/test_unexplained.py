@@ -4,7 +4,8 @@
 
 from armid_ros.arm import ArmModel
 from armid_ros.effects import make_effect
-from armid_ros.effects.unexplained import Unexplained, wave_gains
+from armid_ros.effects.base import Unexplained
+from armid_ros.effects.drive import wave_gains
 from armid_ros.motion import Motion
 from armid_ros.robots import robot_from_urdf
 import numpy as np

@@ -132,7 +132,7 @@ def learned(damage: dict[int, tuple], velocity: bool = False) -> OnlineIdentifie
     for state in stream(damage):
         for sample in reader.read(serialize_message(state)):
             online.update(*sample)
-            assert np.all(np.isfinite(online._learner.values))
+            assert np.all(np.isfinite(online.estimate().values))
     return online
 
 

@@ -2,7 +2,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """How well a model fits, as identification.json and model.yaml say."""
 
-from armid_ros.identification.known_fit import known_fit
+from armid_ros.identification.parameters_file import known_fit
 import pytest
 
 

@@ -3,7 +3,6 @@
 """A payload of known mass in one recording fixes the gains of the drives."""
 
 from dataclasses import replace
-from pathlib import Path
 
 from armid_ros.arm import ArmModel
 from armid_ros.effects import make_effect
@@ -24,7 +23,7 @@ from .conftest import multisine, recorded
 
 GAINS = np.array([1.05, 1.08, 1.1, 1.06, 1.09, 1.07])
 SIGNALS = SignalSettings()
-BAGS = [Path('a.mcap'), Path('b.mcap'), Path('c.mcap')]
+BAGS = ['a.mcap', 'b.mcap', 'c.mcap']
 
 
 @pytest.fixture(scope='module')
@@ -46,7 +45,7 @@ def ladder(arm):
             robot = with_payload(robot, link, payload)
         motion = multisine(robot.joints, 30.0, 200.0, number, amplitude=0.7)
         recording = recorded(
-            replace(arm, robot=robot), motion, number, torque_noise=0.05, source=BAGS[number].stem
+            replace(arm, robot=robot), motion, number, torque_noise=0.05, source=BAGS[number]
         )
         recordings.append(replace(recording, tau=recording.tau * GAINS))
     return recordings
@@ -55,7 +54,7 @@ def ladder(arm):
 def payloads(arm, recordings, masses=(1.0, 2.6)):
     link = arm.robot.links[-1]
     texts = [f'{bag}={mass}@{link}:0,0,-0.05' for bag, mass in zip('bc', masses, strict=True)]
-    return payloads_of(texts, BAGS, recordings, arm.robot)
+    return payloads_of(texts, recordings, arm.robot)
 
 
 def test_gains_come_out_with_their_intervals(arm, ladder):
@@ -114,4 +113,4 @@ def test_without_a_difference_of_payload_nothing_is_determined(arm, ladder):
 )
 def test_a_payload_that_is_none_is_refused(arm, ladder, text, said):
     with pytest.raises(IdentificationError, match=said):
-        payloads_of([text], BAGS, ladder, arm.robot)
+        payloads_of([text], ladder, arm.robot)

@@ -73,11 +73,3 @@ def test_tx40_needs_the_coupling_of_its_wrist(tx40):
     for name, (value, std) in published.items():
         found = estimate.values[estimate.index(name, 'joint_1')]
         assert abs(found - value) < 2 * std
-
-
-def test_ur10_from_its_own_bag(real_data):
-    data = real_recordings.ur10(real_data)
-    robot = load_robot(str(data.robot))
-    result = fit(robot, data.bags[0], FRICTION)
-    assert error(result.training) <= 6.6
-    assert error(fit(robot, data.bags[0], FRICTION, decimation=1).training) <= 6.6

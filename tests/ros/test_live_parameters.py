@@ -102,7 +102,7 @@ def test_the_identifier_goes_on_with_other_forgetting_and_thresholds(bench):
         (result,) = node.set_parameters([Parameter(name, value=value)])
         assert result.successful, result.reason
     assert (core.settings.forgetting, core.settings.max_gap) == (0.999, 20)
-    assert core.settings.changes is None
+    assert core.settings.false_alarm_time is None
     for name, value in (('forgetting', 0.5), ('cutoff', 7.0)):  # the second is read-only
         (result,) = node.set_parameters([Parameter(name, value=value)])
         assert not result.successful and result.reason

@@ -25,9 +25,9 @@ from armid_ros.diagnosis.search.nuisance import Nuisance
 from armid_ros.diagnosis.search.odds import CauseInformation, odds
 from armid_ros.diagnosis.search.priors import HOW_OFTEN, log_prior
 from armid_ros.diagnosis.search.setting import Marginal
-from armid_ros.effects import Effect, Kind, Shape
+from armid_ros.effects import Effect, Shape
+from armid_ros.effects.base import Unexplained
 from armid_ros.effects.gravity import with_exact_vector
-from armid_ros.effects.unexplained import Unexplained
 from armid_ros.errors import ModelError
 from armid_ros.motion import FloatArray, Motion
 from armid_ros.robots import Robot
@@ -51,7 +51,7 @@ class Causes:
 
     Attributes
     ----------
-    kinds : tuple of Kind
+    kinds : tuple of type of Effect
         Classes of effects that may be named.
     nuisance : Nuisance
         Data and nuisance columns, without accepted causes.
@@ -64,7 +64,7 @@ class Causes:
 
     """
 
-    kinds: tuple[Kind, ...]
+    kinds: tuple[type[Effect], ...]
     nuisance: Nuisance
     changed: bool
     fitted: frozenset[tuple[str, tuple[str, ...]]]
@@ -312,7 +312,7 @@ def _unexplained(nuisance: Nuisance, under: Marginal) -> Unexplained:
 
 
 def candidate_effects(
-    robot: Robot, kinds: Sequence[Kind]
+    robot: Robot, kinds: Sequence[type[Effect]]
 ) -> Iterator[tuple[Effect, list[Effect]]]:
     """Yield each effect on all joints, with its candidates on single joints."""
     for kind in with_exact_vector(kinds):

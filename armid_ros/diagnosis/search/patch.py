@@ -9,7 +9,7 @@ from functools import cached_property
 
 from armid_ros.arm import ArmModel
 from armid_ros.arm.memoized_arm import memoized_arm
-from armid_ros.arm.words import with_named
+from armid_ros.arm.model_file import with_named
 from armid_ros.diagnosis.data.trajectory import Trajectory
 from armid_ros.diagnosis.search.cause import SelectedEffect
 from armid_ros.effects import Effect, TorqueReading

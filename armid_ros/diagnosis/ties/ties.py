@@ -131,10 +131,9 @@ class _Ties:
             if not problem.segments:
                 return [], []
             found = identify_interaction(problem)
-        kind = self.partner.slack if slack else self.partner.interaction
         named, values = list[SelectedEffect](), list[FloatArray]()
         for joint, stiffness in zip(problem.spring_joints, found.stiffness, strict=True):
-            effect = kind.on(arm.robot, (joint,))
+            effect = self.partner.tied(arm.robot, (joint,), slack=bool(slack))
             effect = effect.with_shape([slack]) if slack else effect
             named.append(SelectedEffect(effect, (0,)))
             values.append(stiffness * np.eye(len(effect.parameters(arm.robot)))[0])
@@ -247,8 +246,7 @@ def _as_one_cause(
     comparison = explainer.comparison(Rows.over_noise(evidence), free)
     result = comparison.first()
     loose = any(own.effect.shapes for own in fitted.named)
-    kind = partner.slack if loose else partner.interaction
-    whole = kind.on(robot, [own.effect.joints[0] for own in fitted.named])
+    whole = partner.tied(robot, [own.effect.joints[0] for own in fitted.named], slack=loose)
     if loose:
         whole = whole.with_shape([own.effect.shape for own in fitted.named])
     each = len(whole.quantities)

@@ -20,7 +20,7 @@ from collections.abc import Callable, Sequence
 from dataclasses import replace
 
 from armid_ros.arm import TorqueSlope
-from armid_ros.effects.direction import BlurredMotion
+from armid_ros.effects.action import BlurredMotion
 from armid_ros.excitation.fourier import fourier_basis, FourierTrajectory, MARGIN
 from armid_ros.excitation.geometry.clearance import ClearanceModel
 from armid_ros.excitation.problem import DesignProblem, marked

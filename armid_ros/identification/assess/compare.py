@@ -41,8 +41,7 @@ from armid_ros.identification.assess.comparison import (
 )
 from armid_ros.identification.assess.grade_limits import FREEDOM
 from armid_ros.identification.fitting.identifiability import HALF_WIDTH
-from armid_ros.identification.known_fit import KnownFit
-from armid_ros.identification.parameters_file import ParameterFile
+from armid_ros.identification.parameters_file import KnownFit, ParameterFile
 from armid_ros.model import LINK_PARAMETERS
 from armid_ros.motion import FloatArray
 import numpy as np

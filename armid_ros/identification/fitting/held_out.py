@@ -101,15 +101,10 @@ def halves_error(
         # a half does not determine would be arbitrary. With a residual near zero, these
         # parameters stay as described
         own = weight[fitted]
-        stacked = (columns[fitted] * own[:, :, np.newaxis]).reshape(-1, columns.shape[2])
-        size = np.sqrt(np.mean(stacked**2, axis=0))
-        size = np.where(size > 0.0, size, 1.0)
+        size = np.sqrt(np.mean((columns[fitted] * own[:, :, np.newaxis]) ** 2, axis=(0, 1)))
         torque = np.sqrt(np.mean((tau[fitted] * own) ** 2))
-        stacked = stacked / size
-        normal = stacked.T @ stacked
-        normal[np.diag_indices_from(normal)] += 1.0 / max(torque, 1.0) ** 2 + (most * size) ** -2.0
-        aim = stacked.T @ (rest[fitted] * own).ravel()
-        change = informative_solution(normal, aim) / size
+        share = np.where(size > 0.0, size, 1.0) / max(torque, 1.0)
+        change = _fit(columns[fitted], rest[fitted], own, share**2 + most**-2.0)
         left[predicted] = rest[predicted] - columns[predicted] @ change
     error, length = (np.linalg.norm(told * rows, axis=0) for rows in (left, tau))
     whole = float(np.linalg.norm(length))
@@ -219,11 +214,11 @@ def _losses(problem: Sequence[Regression]) -> FloatArray:
     x, _, y, told = _some_rows(problem, _OF_CUTOFFS)
     stretch = np.arange(len(y)) * _STRETCHES // len(y)
     left = np.zeros_like(y)
-    whole = _fit(x, y, told, np.ones(y.shape[1]))
+    whole = _fit(x, y, told)
     weight = 1.0 / np.maximum(_rms(y - x @ whole, told), 1e-12)
     for odd in (0, 1):
         chosen = stretch % 2 == odd
-        value = _fit(x[chosen], y[chosen], told[chosen], weight)
+        value = _fit(x[chosen], y[chosen], told[chosen] * weight)
         left[~chosen] = y[~chosen] - x[~chosen] @ value
     rms = np.array([_rms(left[stretch == k], told[stretch == k]) for k in range(_STRETCHES)])
     least = np.maximum(TORQUE_RESOLUTION * _rms(y, told), 1e-12)
@@ -237,12 +232,16 @@ def _rms(values: FloatArray, told: npt.NDArray[np.bool_]) -> FloatArray:
 
 
 def _fit(
-    x: FloatArray, y: FloatArray, told: npt.NDArray[np.bool_], weight: FloatArray
+    x: FloatArray,
+    y: FloatArray,
+    weights: npt.NDArray[np.floating] | npt.NDArray[np.bool_],
+    precision: FloatArray | float = 0.0,
 ) -> FloatArray:
-    """Fit weighted rows by least squares, shape (r,)."""
-    weights = told * weight
+    """Fit weighted rows by least squares, with the precision of a prior at zero, shape (r,)."""
     rows = (x * weights[:, :, np.newaxis]).reshape(-1, x.shape[2])
-    return informative_solution(rows.T @ rows, rows.T @ (y * weights).ravel())
+    normal = rows.T @ rows
+    normal[np.diag_indices_from(normal)] += precision
+    return informative_solution(normal, rows.T @ (y * weights).ravel())
 
 
 def _step(problem: Sequence[Regression], most: int) -> int:

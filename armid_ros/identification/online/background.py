@@ -34,33 +34,34 @@ def at_once(work: Pieces[Result]) -> Result:
 
 
 class Background:
-    """Queue of jobs that run in pieces: urgent ones first, otherwise in order."""
+    """Queue of jobs that run in pieces: an urgent one first, otherwise in order."""
 
     def __init__(self) -> None:
-        self._urgent: deque[Job] = deque()
-        self._patient: deque[Job] = deque()
+        self._jobs: deque[Job] = deque()
 
     def begin(self, job: Job, *, urgent: bool = False) -> None:
         """Add a job."""
-        (self._urgent if urgent else self._patient).append(job)
+        if urgent:
+            self._jobs.appendleft(job)
+        else:
+            self._jobs.append(job)
 
     @property
     def busy(self) -> bool:
         """Whether any job is pending."""
-        return bool(self._urgent or self._patient)
+        return bool(self._jobs)
 
     def advance(self, pieces: int = 1) -> None:
         """Run up to a number of pieces."""
         for _ in range(pieces):
-            waiting = self._urgent or self._patient
-            if not waiting:
+            if not self._jobs:
                 return
-            job = waiting.popleft()  # a job that fails is not tried again
+            job = self._jobs.popleft()  # a job that fails is not tried again
             try:
                 next(job)
             except StopIteration:
                 continue
-            waiting.appendleft(job)
+            self._jobs.appendleft(job)
 
     def finish(self) -> None:
         """Finish all jobs."""
@@ -69,7 +70,6 @@ class Background:
 
     def clear(self) -> None:
         """Drop all jobs."""
-        for job in (*self._urgent, *self._patient):
+        for job in self._jobs:
             job.close()
-        self._urgent.clear()
-        self._patient.clear()
+        self._jobs.clear()

@@ -153,7 +153,11 @@ def _candidate(
 ) -> ChangeCandidate:
     """Return the candidate of an effect, or of a body whose parameters add to a link's."""
     columns = base.grouping[:, added_to]
-    independent = _independent(columns)
+    # a maximal set of independent columns, in order
+    lengths = np.linalg.norm(columns, axis=0)
+    unit = columns / np.where(lengths > 0.0, lengths, 1.0)
+    ranks = [np.linalg.matrix_rank(unit[:, :k], _INDEPENDENT) for k in range(len(lengths) + 1)]
+    independent = np.flatnonzero(np.diff(ranks)).tolist()
     kept = [k for k in independent if not names or k < _REPORTED]
     parameters = names or [base.standard[k] for k in added_to]
     return ChangeCandidate(
@@ -164,11 +168,3 @@ def _candidate(
         columns[:, independent],
         common=bool(names),
     )
-
-
-def _independent(columns: FloatArray) -> list[int]:
-    """Return the indices of a maximal set of independent columns, in order."""
-    lengths = np.linalg.norm(columns, axis=0)
-    unit = columns / np.where(lengths > 0.0, lengths, 1.0)
-    ranks = [np.linalg.matrix_rank(unit[:, :k], _INDEPENDENT) for k in range(len(lengths) + 1)]
-    return [int(k) for k in np.flatnonzero(np.diff(ranks))]

@@ -19,30 +19,26 @@ from collections import deque
 from collections.abc import Iterator, Sequence
 from copy import copy
 from dataclasses import dataclass, field, replace
-from typing import TypeVar
+from typing import NamedTuple, TypeVar
 
+from armid_ros.arm import ArmModel
+from armid_ros.effects import CATALOGUE
 from armid_ros.estimate import Estimate
 from armid_ros.identification.online.background import at_once, Background, Job, Pieces
 from armid_ros.identification.online.change import Change, ChangeCandidate
-from armid_ros.identification.online.change_score import Block
-from armid_ros.identification.online.change_search import (
-    BLOCK,
-    ChangeSearch,
-    ChangeSettings,
-    FoundChange,
-)
-from armid_ros.identification.online.nuisance_rows import NuisanceRows, Row
+from armid_ros.identification.online.change_search import Block, ChangeSearch, FoundChange
 from armid_ros.identification.online.null_calibration import ResidualScale
 from armid_ros.identification.online.recursive import (
     Learned,
     RecursiveLeastSquares,
     WeightedSample,
 )
-from armid_ros.motion import FloatArray
+from armid_ros.identification.rows.causal import CausalMotion, TripleLag
+from armid_ros.motion import FloatArray, Motion
 import numpy as np
 
-__all__ = ['BLOCK', 'ChangeSettings', 'ChangeWatch']
-
+#: Length of a block [s].
+BLOCK = 0.25
 #: Smallest residual scale where only the ratios of the noise between joints are known: 0.01 of the
 #: assumed noise, which is 1e-4 of the torque limit [-].
 _LEAST_NOISE = 0.01
@@ -54,6 +50,94 @@ _TOGETHER, _ONE_BY_ONE = 10, 4
 #: Rows whose nuisance columns are computed in one piece of work.
 _WIDENED = 3
 Item = TypeVar('Item')
+
+
+class Row(NamedTuple):
+    """
+    A filtered row, and the state from which its friction columns are computed.
+
+    Attributes
+    ----------
+    t : float
+        Time of the row [s].
+    sample : WeightedSample
+        Rows, torques and weights for the estimator.
+    motion : CausalMotion
+        Output of the motion filter.
+    step : float
+        Time since the row before [s].
+    gain : float
+        Divisor of the rows: gain of the filters for white noise [-].
+    begins : bool
+        Whether the row begins a new stretch.
+
+    """
+
+    t: float
+    sample: WeightedSample
+    motion: CausalMotion
+    step: float
+    gain: float
+    begins: bool = False
+
+
+class NuisanceRows:
+    """
+    Filtered regressor columns of friction that the model lacks, as nuisance parameters.
+
+    Such friction biases the identified parameters, and the bias varies with the motion. A search
+    for changes would mistake this for a change, or for a part of its size. The friction law does
+    not vary, so it is estimated too: viscous and Coulomb friction, if the model lacks them, and
+    friction in proportion to the load. A sum of humps at low velocities is a curve over velocity.
+
+    Parameters
+    ----------
+    arm : ArmModel
+        The arm, whose own effects are left out.
+    cutoff : float
+        Cut-off frequency of the row filter [Hz].
+
+    Attributes
+    ----------
+    parameters : tuple of ParameterName
+        Nuisance parameters, by quantity and then by joint.
+
+    """
+
+    def __init__(self, arm: ArmModel, cutoff: float) -> None:
+        known = {effect.name for effect in arm.effects}
+        self._arm = arm
+        self._filter = TripleLag(cutoff)
+        self._effects = [
+            kind.on(arm.robot).with_shape(shape) if shape else kind.on(arm.robot)
+            for kind in CATALOGUE.values()
+            for shape in kind.traits.nuisance
+            if kind.name not in known
+        ]
+        self.parameters = tuple(
+            replace(name, name=f'{name.name}_beside_{number}')
+            for number, effect in enumerate(self._effects)
+            for name in effect.parameters(arm.robot)
+        )
+
+    def columns(self, some: Sequence[Row]) -> FloatArray:
+        """Return the columns of N successive rows, shape (N, n, K n)."""
+        moved = [(row.motion.q, row.motion.dq, row.motion.ddq) for row in some]
+        q, dq, ddq = (np.stack(part) for part in zip(*moved, strict=True))
+        t = np.array([row.motion.t for row in some])
+        motion = Motion(self._arm.robot.joints, t, q, dq, ddq)
+        # friction per unit of each quantity; every quantity acts on its own joint only
+        torques = np.empty((len(some), motion.n_joints, len(self._effects)))
+        for k, effect in enumerate(self._effects):
+            torques[:, :, k] = np.diagonal(effect.columns(motion, self._arm), axis1=1, axis2=2)
+        columns = np.zeros((*torques.shape, motion.n_joints))
+        own = np.einsum('sjkj->sjk', columns)
+        for row, raw, place in zip(some, torques, own, strict=True):
+            if row.begins:
+                self._filter.reset()
+            smooth = self._filter.update(row.step, raw.reshape(-1))[2]
+            np.divide(smooth.reshape(raw.shape), row.gain, out=place)
+        return columns.reshape(len(some), motion.n_joints, -1)
 
 
 @dataclass(eq=False)
@@ -78,8 +162,8 @@ class ChangeWatch:
         Source of the nuisance columns, which only the tests use.
     candidates : sequence of ChangeCandidate
         Candidate changes to search for.
-    settings : ChangeSettings
-        Settings of change detection.
+    false_alarm_time : float
+        Mean time between two alarms of an arm that does not change [s].
     work : Background
         Queue for long computations.
 
@@ -95,7 +179,7 @@ class ChangeWatch:
         estimator: RecursiveLeastSquares,
         nuisance: NuisanceRows,
         candidates: Sequence[ChangeCandidate],
-        settings: ChangeSettings,
+        false_alarm_time: float,
         work: Background,
     ) -> None:
         self._estimator = estimator
@@ -106,7 +190,7 @@ class ChangeWatch:
         self._search = ChangeSearch(
             candidates,
             self._among_all(np.hstack([c.directions for c in candidates])),
-            BLOCK / settings.false_alarm_time,
+            BLOCK / false_alarm_time,
             self._work,
         )
         self.reset()
@@ -125,20 +209,19 @@ class ChangeWatch:
         self._late: list[Row] | None = None
         self._searching = False
 
-    def use(self, settings: ChangeSettings | None, forgetting: float) -> None:
+    def use(self, false_alarm_time: float | None, forgetting: float) -> None:
         """
         Change settings and keep the estimate.
 
         Parameters
         ----------
-        settings : ChangeSettings or None
-            Settings of change detection; None disables it.
+        false_alarm_time : float or None
+            Mean time between two false alarms [s]; None disables the detection.
         forgetting : float
             Forgetting factor of the estimator.
 
         """
-        chance = 0.0 if settings is None else BLOCK / settings.false_alarm_time
-        self._search.believe(chance)
+        self._search.believe(0.0 if false_alarm_time is None else BLOCK / false_alarm_time)
         self._wider.forgetting = forgetting
 
     def interrupt(self) -> None:

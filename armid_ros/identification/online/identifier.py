@@ -1,29 +1,41 @@
 # Copyright 2026 The armid_ros developers
 # SPDX-License-Identifier: Apache-2.0
-"""Online identification: an estimate that is updated with one joint state at a time."""
+"""
+Online identification: an estimate that is updated with one joint state at a time.
+
+A row is taken in two steps. Its prediction by the estimate before it is needed at once. The update
+with the row may wait for the next sample, which usually brings no row, so no sample has to do
+both. Reading the estimate runs a pending update first.
+
+"""
 
 from __future__ import annotations
 
 from collections import Counter
 from collections.abc import Mapping
-from dataclasses import dataclass, fields
+from dataclasses import fields, replace
 from typing import Any, ClassVar
 
 from armid_ros.arm import ArmModel
 from armid_ros.errors import IdentificationError
 from armid_ros.estimate import Estimate
 from armid_ros.identification.online.background import Background
-from armid_ros.identification.online.change import Change
-from armid_ros.identification.online.change_watch import ChangeSettings
+from armid_ros.identification.online.change import Change, change_candidates
+from armid_ros.identification.online.change_watch import ChangeWatch, NuisanceRows, Row
 from armid_ros.identification.online.checks import MissingSamples, StreamChecks
-from armid_ros.identification.online.learner import Learner, OnlineSettings
-from armid_ros.identification.online.nuisance_rows import Row
-from armid_ros.identification.online.recursive import check_forgetting, WeightedSample
+from armid_ros.identification.online.recursive import (
+    check_forgetting,
+    RecursiveLeastSquares,
+    WeightedSample,
+)
+from armid_ros.identification.online.robust_covariance import RobustCovariance
+from armid_ros.identification.online.settings import FALSE_ALARM_TIME, OnlineSample, OnlineSettings
 from armid_ros.identification.rows.causal import (
     CausalFilter,
     CausalMotion,
     check_gap,
     RowNoise,
+    sensor_noise,
     TripleLag,
 )
 from armid_ros.identification.samples.spikes import SpikeGate
@@ -48,35 +60,10 @@ _PIECES = 400.0
 #: Samples per row from which the update with a row has a sample to itself. With fewer samples, the
 #: update shares its sample with pieces of background work.
 _SPARE = 4.0
-
-
-@dataclass(frozen=True)
-class OnlineSample:
-    """
-    Measured and predicted torques of one row, and which of them the estimator used.
-
-    Attributes
-    ----------
-    t : float
-        Time of the row [s]: the stamp of the newest joint state minus the delay of the filters.
-    measured : ndarray, shape (n,)
-        Filtered measured torque [N m].
-    predicted : ndarray, shape (n,)
-        Torque that the estimate before this sample predicts, filtered alike [N m].
-    used : ndarray of bool, shape (n,)
-        False for a joint at rest, which friction may hold with any torque.
-
-    """
-
-    t: float
-    measured: FloatArray
-    predicted: FloatArray
-    used: npt.NDArray[np.bool_]
-
-    @property
-    def residual(self) -> FloatArray:
-        """Measured minus predicted torque, shape (n,) [N m]."""
-        return self.measured - self.predicted
+#: Length of the windows for the spectrum of the errors [s], beyond their correlation time.
+_WINDOW = 4.0
+#: Lower bound of a divisor.
+_SMALLEST = float(np.finfo(float).tiny)
 
 
 class OnlineIdentifier:
@@ -120,7 +107,7 @@ class OnlineIdentifier:
     """
 
     #: Settings that can change without a restart.
-    CHANGEABLE: ClassVar = ('forgetting', 'max_gap', 'changes')
+    CHANGEABLE: ClassVar = ('forgetting', 'max_gap', 'false_alarm_time')
 
     def __init__(
         self,
@@ -131,14 +118,13 @@ class OnlineIdentifier:
     ) -> None:
         settings = settings or OnlineSettings()
         robot = arm.robot
-        for effect in arm.effects:
-            if not effect.instantaneous:
-                raise IdentificationError(
-                    f'{effect.name} depends on earlier motion, which single samples do not '
-                    'contain; identify it from a recording'
-                )
-        self.arm = arm
-        self.settings = settings
+        past = [effect.name for effect in arm.effects if not effect.instantaneous]
+        if past:
+            raise IdentificationError(
+                f'{past[0]} depends on earlier motion, which single samples do not contain; '
+                'identify it from a recording'
+            )
+        self.arm, self.settings = arm, settings
         self.base: BaseParameters = arm.base_parameters(rng)
         self._filter = CausalFilter(
             robot.n_joints,
@@ -146,22 +132,35 @@ class OnlineIdentifier:
             max_gap=settings.max_gap,
             measured_velocity=settings.measured_velocity,
         )
-        measured = 'qvt' if settings.measured_velocity else 'qt'
         self._gate = SpikeGate(
             robot.prismatic,
-            measured,
+            'qvt' if settings.measured_velocity else 'qt',
             torque_limit=robot.torque_limit,
             max_gap=_LONGEST_DAMAGE,
-            false_alarm_time=(settings.changes or ChangeSettings()).false_alarm_time,
+            false_alarm_time=settings.false_alarm_time or FALSE_ALARM_TIME,
         )
         self._checks = StreamChecks(robot, self._gate)
         self._missing = MissingSamples()
-        self.latest: tuple[OnlineSample, ...] = ()
         self._row_filter = TripleLag(settings.cutoff)
         self._row_period = 1.0 / settings.rows_per_second()
         self._work = Background()
         self._crowded = False
-        self._learner = Learner(arm, self.base, settings, self._work)
+        self._estimator = RecursiveLeastSquares(
+            self.base.parameters,
+            sensor_noise(robot, settings.torque_noise),
+            forgetting=settings.forgetting,
+            start=self.base.values(arm.theta),
+            scale_covariance=settings.torque_noise is None,
+        )
+        window = max(1, round(_WINDOW / self._row_period))
+        self._scores = RobustCovariance(window, settings.forgetting, self._work)
+        self._watch = None
+        if settings.false_alarm_time is not None:
+            watched = NuisanceRows(arm, settings.cutoff), change_candidates(arm, self.base)
+            self._watch = ChangeWatch(
+                self._estimator, *watched, settings.false_alarm_time, self._work
+            )
+        self._forget()
         self._data = robot.model.createData()
         held = {joint for e in arm.effects if e.holds_at_rest for joint in e.joints}
         self._held = np.array([joint in held for joint in robot.joints])
@@ -174,12 +173,23 @@ class OnlineIdentifier:
     def reset(self) -> None:
         """Clear the estimate and all counters."""
         self._work.clear()
-        self._learner.reset()
+        self._forget()
         self._filter.reset()
         self._checks.reset()
         self._missing.reset()
-        self.latest = ()
         self._gate.reset()
+
+    def _forget(self) -> None:
+        """Clear the estimate; no background job may be pending."""
+        self._waiting: tuple[Row, FloatArray] | None = None  # with its innovation
+        self._reopened = 0
+        self.latest: tuple[OnlineSample, ...] = ()
+        # of residuals: weighted squares, their weights, and the standard deviation
+        self._squares, self._counts, self._deviation = np.zeros((3, self.arm.robot.n_joints))
+        self._estimator.reset()
+        self._scores.reset()
+        if self._watch is not None:
+            self._watch.reset()
 
     def update(
         self, t: float, q: npt.ArrayLike, dq: npt.ArrayLike | None, tau: npt.ArrayLike
@@ -202,7 +212,7 @@ class OnlineIdentifier:
             None between rows, while the filters settle, and for a sample that is left out.
 
         """
-        learned = self._learner.settle()
+        learned = self._settle()
         signal = self._filter.signal(t, q, dq, tau)
         self.latest = ()
         if signal is not None:
@@ -217,14 +227,14 @@ class OnlineIdentifier:
         else:
             busy = learned and _SPARE * period <= self._row_period
         if not busy:
-            self._learner.settle()
+            self._settle()
             self._work.advance(max(1, round(_PIECES * period)))
         self._crowded = bool(self.latest)
         return self.latest[-1] if self.latest else None
 
     def __getstate__(self) -> dict[str, Any]:
         """Finish pending jobs, as generators cannot be copied."""
-        self._learner.settle()
+        self._settle()
         self._work.finish()
         return self.__dict__
 
@@ -239,7 +249,10 @@ class OnlineIdentifier:
         if self._filter.generation != self._generation:
             # the row filter starts anew, together with the motion filter
             self._row_filter.reset()
-            self._learner.interrupt()
+            self._settle()
+            self._scores.interrupt()
+            if self._watch is not None:
+                self._watch.interrupt()
             self._generation = self._filter.generation
             self._last_row = self._noise = None
             self._last_moving[:] = -np.inf
@@ -258,11 +271,15 @@ class OnlineIdentifier:
 
     def estimate(self) -> Estimate:
         """Return base parameters and covariance, with autocorrelated errors included."""
-        return self._learner.estimate
+        self._settle()
+        estimate = self._estimator.estimate
+        covariance = self._scores.covariance(self._estimator.learned().root)
+        return estimate if covariance is None else replace(estimate, covariance=covariance)
 
     def model(self) -> ArmModel:
         """Return the arm with the estimate; unidentified directions stay unchanged."""
-        return self.arm.with_theta(self.base.lift(self._learner.values, self.arm.theta))
+        self._settle()
+        return self.arm.with_theta(self.base.lift(self._estimator.values, self.arm.theta))
 
     def check(self, settings: OnlineSettings) -> None:
         """
@@ -280,7 +297,7 @@ class OnlineIdentifier:
                 raise IdentificationError(
                     f'{part.name} cannot change during identification: restart it'
                 )
-        if not self._learner.watches and settings.changes is not None:
+        if self._watch is None and settings.false_alarm_time is not None:
             raise IdentificationError(
                 'change detection was off from the start: restart the identification'
             )
@@ -305,22 +322,27 @@ class OnlineIdentifier:
         self.check(settings)
         self.settings = settings
         self._filter.max_gap = settings.max_gap
-        self._learner.use(settings)
+        self._settle()
+        self._estimator.forgetting = self._scores.forgetting = settings.forgetting
+        if self._watch is not None:
+            self._watch.use(settings.false_alarm_time, settings.forgetting)
 
     @property
     def changes(self) -> tuple[Change, ...]:
         """Return the detected changes since the last reset, oldest first."""
-        return tuple(self._learner.changes)
+        return () if self._watch is None else tuple(self._watch.changes)
 
     @property
     def condition_number(self) -> float:
         """Condition number of the weighted regressor so far; takes a millisecond."""
-        return self._learner.condition_number
+        self._settle()
+        return self._estimator.condition_number
 
     @property
     def samples(self) -> int:
         """Return the number of samples in the estimate."""
-        return self._learner.samples
+        self._settle()
+        return self._estimator.samples
 
     @property
     def missing(self) -> int:
@@ -375,8 +397,32 @@ class OnlineIdentifier:
         stamp = motion.t - (self.delay or 0.0)
         weights = np.asarray(used * independent)
         sample = WeightedSample(rows / gain, measured / gain, weights)
-        innovation = self._learner.predict(Row(stamp, sample, motion, step, gain, begins))
+        self._settle()
+        innovation = sample.tau - sample.rows @ self._estimator.values
+        self._waiting = Row(stamp, sample, motion, step, gain, begins), innovation
         return OnlineSample(stamp, measured, measured - innovation * gain, used)
+
+    def _settle(self) -> bool:
+        """Update the estimate with the pending row; return whether there was one."""
+        if self._waiting is None:
+            return False
+        (row, innovation), self._waiting = self._waiting, None
+        sample, estimator = row.sample, self._estimator
+        if self._watch is None:
+            estimator.update(*sample)
+        else:
+            self._watch.update(row)
+            for change in self._watch.changes[self._reopened :]:
+                self._scores.reopen(change.reopened, estimator.values)
+                self._reopened += 1
+        left = sample.tau - sample.rows @ estimator.values
+        self._squares = estimator.forgetting * self._squares + sample.weights * innovation * left
+        self._counts = estimator.forgetting * self._counts + sample.weights
+        known = np.maximum(self._counts, _SMALLEST)
+        self._deviation = np.sqrt(np.maximum(self._squares, 0.0) / known)
+        scale = estimator.scale(sample.weights)
+        self._scores.add(sample.rows * scale[:, None], sample.tau * scale, estimator.values)
+        return True
 
     @property
     def _without_consequence(self) -> FloatArray:
@@ -384,7 +430,7 @@ class OnlineIdentifier:
         n = self.arm.robot.n_joints
         floor = np.zeros((3 if self.settings.measured_velocity else 2) * n)
         if self._filter.pole is not None:
-            np.multiply(self._learner.residual_deviation, self._row_noise().single, out=floor[-n:])
+            np.multiply(self._deviation, self._row_noise().single, out=floor[-n:])
         return floor
 
     def _row_noise(self) -> RowNoise:

@@ -29,14 +29,12 @@ _BEGUN = 0.5
 _CERTAIN = 2.0
 #: Largest number of joints in the message.
 _NAMED = 3
-_WORDS = {'kg m^2': 'inertia', 'kg m': 'balance', 'kg': 'mass'}
-#: Motion that identifies each kind of parameter.
-_ADVICE = {
-    'inertia': 'accelerate it harder',
-    'balance': 'move it through more of its range',
-    'mass': 'move it through more of its range',
+#: Unit of a kind of rigid parameter, its name, and the motion that identifies it.
+_OF_BODY = {
+    'kg m^2': ('inertia', 'accelerate it harder'),
+    'kg m': ('balance', 'move it through more of its range'),
+    'kg': ('mass', 'move it through more of its range'),
 }
-_OTHER_ADVICE = 'move it both ways at several speeds'
 
 
 @dataclass(frozen=True)
@@ -61,8 +59,16 @@ class Unlearned:
 
     def __str__(self) -> str:
         """Return the unidentified quantities, and the motion that identifies them."""
-        words = list(dict.fromkeys(_word(p) for p in self.parameters))
-        advice = list(dict.fromkeys(_ADVICE.get(word, _OTHER_ADVICE) for word in words))
+        friction = {
+            'viscous_coefficient': 'viscous friction',
+            'coulomb_torque': 'Coulomb friction',
+        }
+        found = []
+        for one in self.parameters:
+            rigid = _OF_BODY.get(one.unit) if one.name[:1] in 'Im' else None
+            word = friction.get(one.name, name_in_words(one.name))
+            found.append(rigid or (word, 'move it both ways at several speeds'))
+        words, advice = (list(dict.fromkeys(part)) for part in zip(*found, strict=True))
         return f'{self.joint or "the arm"} ({", ".join(words)}): {" and ".join(advice)}'
 
 
@@ -137,9 +143,3 @@ def too_little_motion(unlearned: Sequence[Unlearned]) -> str:
     rest = len(unlearned) - _NAMED
     more = f'; and {rest} more joint{"s" if rest > 1 else ""}' if rest > 0 else ''
     return f'too little motion to learn from: {"; ".join(map(str, unlearned[:_NAMED]))}{more}'
-
-
-def _word(parameter: ParameterName) -> str:
-    words = {'viscous_coefficient': 'viscous friction', 'coulomb_torque': 'Coulomb friction'}
-    rigid = _WORDS.get(parameter.unit) if parameter.name[:1] in 'Im' else None
-    return rigid or words.get(parameter.name, name_in_words(parameter.name))

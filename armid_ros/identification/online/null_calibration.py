@@ -63,7 +63,7 @@ class History:
     """
 
     def __init__(self, width: int, most: int) -> None:
-        self._rows = np.empty((16, width))
+        self._rows = np.empty((2 * most, width))  # the latest rows move to the front when full
         self._most = most
         self._end = 0
 
@@ -74,11 +74,8 @@ class History:
     def append(self, row: FloatArray) -> None:
         """Append a row."""
         if self._end == len(self._rows):
-            kept = self.values
-            size = min(2 * len(self._rows), 2 * self._most)
-            self._rows = np.empty((size, self._rows.shape[1]))
-            self._rows[: len(kept)] = kept
-            self._end = len(kept)
+            kept, self._rows = self.values, np.empty_like(self._rows)
+            self._rows[: self._most], self._end = kept, self._most
         self._rows[self._end] = row
         self._end += 1
 

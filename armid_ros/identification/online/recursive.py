@@ -5,7 +5,8 @@ Recursive least squares in square-root information form.
 
 The state is the triangle R and the vector z of the QR factorisation of all weighted rows so far.
 Without forgetting, the estimate equals the batch solution at any number of samples. The covariance
-R^-1 R^-T cannot lose its symmetry or become negative (Bierman 1977, chapter V).
+R^-1 R^-T cannot lose its symmetry or become negative (Bierman 1977, chapter V): Householder
+reflections add rows and keep R^T R exact.
 
 Forgetting is directional (Kulhavy and Karny 1984): old information is given up only where a new
 sample brings information, and never more than the sample brings. So the covariance never grows,
@@ -23,13 +24,23 @@ from typing import NamedTuple
 
 from armid_ros.errors import IdentificationError
 from armid_ros.estimate import Estimate, ParameterName
-from armid_ros.identification.online import square_root
 from armid_ros.motion import FloatArray, read_only
 import numpy as np
 import numpy.typing as npt
+from scipy.linalg import lapack
 
 #: A smaller forgetting factor forgets within ten samples, which is not identification.
 SMALLEST_FORGETTING = 0.9
+#: Standard deviation of every parameter before the first sample, in its SI unit. Robots have
+#: parameters of 1e-4 to 1e3; a parameter that the data do not identify keeps this deviation.
+PRIOR_STD = 1e6
+#: Loss of information over that of exponential forgetting, as samples with little information lose
+#: less. A step of the Coulomb friction of a moving 7-joint arm is followed as with exponential
+#: forgetting: 63 % in 8 s and 90 % in 28 s with a memory of 10 s.
+_LOSS_RATIO = 2.0
+#: Largest share of the old information that one sample may remove in any direction [-].
+_LARGEST_LOSS = 0.5
+_BLOCK = 8  # columns of a Householder block; the fastest for 60 to 120 parameters
 
 
 @dataclass(frozen=True, eq=False)
@@ -98,7 +109,7 @@ class RecursiveLeastSquares:
     Raises
     ------
     IdentificationError
-        If the noise, the forgetting factor or the start cannot be used.
+        If the noise or the forgetting factor cannot be used.
 
     Attributes
     ----------
@@ -110,6 +121,10 @@ class RecursiveLeastSquares:
         Samples used since the last reset.
 
     """
+
+    _root: FloatArray
+    _right: FloatArray
+    _values: FloatArray
 
     def __init__(
         self,
@@ -132,8 +147,6 @@ class RecursiveLeastSquares:
         self.noise_is_relative = scale_covariance
         count = len(parameters)
         values = np.zeros(count) if start is None else np.asarray(start, dtype=np.float64)
-        if values.shape != (count,) or not np.all(np.isfinite(values)):
-            raise IdentificationError(f'start {values}: has to be {count} finite values')
         self._start = values
         self.reset()
 
@@ -148,12 +161,11 @@ class RecursiveLeastSquares:
     def reset(self) -> None:
         """Reset to the initial state."""
         self.samples = 0
-        self._root = np.asfortranarray(np.eye(len(self._start)) / square_root.PRIOR_STD)
-        self._right = np.asfortranarray(self._start[:, np.newaxis] / square_root.PRIOR_STD)
+        root = np.asfortranarray(np.eye(len(self._start)) / PRIOR_STD)
+        self._take(root, self._start)
         self._squares = 0.0
         # the first P observations fit exactly and do not show the noise
         self._freedom = -float(len(self._start))
-        self._values = square_root.solved(self._root, self._right)
 
     def update(
         self,
@@ -162,12 +174,12 @@ class RecursiveLeastSquares:
         weights: npt.ArrayLike | None = None,
     ) -> FloatArray:
         """
-        Add one sample.
+        Add one sample, or several at once.
 
         Parameters
         ----------
         rows : ndarray, shape (m, P)
-            Sensitivity of the torques to the parameters.
+            Sensitivity of the torques to the parameters; of several samples one after the other.
         tau : ndarray, shape (m,)
             Measured torque [N m].
         weights : array_like, shape (m,), optional
@@ -179,17 +191,36 @@ class RecursiveLeastSquares:
         ndarray, shape (m,)
             Innovation: the torque minus its prediction from the samples before [N m].
 
-        Raises
-        ------
-        IdentificationError
-            If shapes do not agree or a number is not finite; the estimate is unchanged.
-
         """
-        rows, tau, counts = self._checked(rows, tau, weights)
+        counts = np.ones(len(tau)) if weights is None else np.asarray(weights)
         innovation = tau - rows @ self._values
-        if counts.any():
-            self._absorb(rows, tau, innovation, counts, self.scale(counts))
-            self.samples += 1
+        if not counts.any():
+            return innovation
+        by_sample = counts.reshape(-1, len(self._noise))
+        scale = self.scale(by_sample).reshape(-1)
+        rows = rows * scale[:, np.newaxis]
+        if self._forgetting < 1.0:
+            self._root = replaced(self._root, rows, self._forgetting)
+            gradient = rows.T @ (innovation * scale)
+            half, _ = lapack.dtrtrs(self._root, gradient[:, np.newaxis], trans=1)
+            self._values = self._values + lapack.dtrtrs(self._root, half)[0][:, 0]
+            self._squares *= self._forgetting
+            self._freedom *= self._forgetting
+        else:
+            # Householder reflections add the rows to R theta = z
+            self._root, reflectors, factors, _ = lapack.dtpqrt(
+                0, min(_BLOCK, len(self._root)), self._root, rows, overwrite_a=1
+            )
+            self._right, _, _ = lapack.dtpmqrt(
+                *(0, reflectors, factors, self._right, (tau * scale)[:, np.newaxis]),
+                trans='T',
+                overwrite_a=1,
+            )
+            self._values = lapack.dtrtrs(self._root, self._right)[0][:, 0]
+        after = tau * scale - rows @ self._values
+        self._squares += float(innovation * scale @ after)
+        self._freedom += float(counts.sum())
+        self.samples += int(np.count_nonzero(by_sample.any(axis=1)))
         return innovation
 
     def update_together(self, samples: Sequence[WeightedSample]) -> None:
@@ -203,38 +234,8 @@ class RecursiveLeastSquares:
         if self._forgetting < 1.0:
             for sample in samples:
                 self.update(*sample)
-            return
-        rows, tau, weights = (np.concatenate(part) for part in zip(*samples, strict=True))
-        if weights.any():
-            scale = self.scale(weights.reshape(len(samples), -1)).reshape(-1)
-            self._absorb(rows, tau, tau - rows @ self._values, weights, scale)
-            self.samples += sum(bool(sample.weights.any()) for sample in samples)
-
-    def _absorb(
-        self,
-        rows: FloatArray,
-        tau: FloatArray,
-        innovation: FloatArray,
-        counts: FloatArray,
-        scale: FloatArray,
-    ) -> None:
-        """Add rows of one or several samples."""
-        rows = rows * scale[:, np.newaxis]
-        if self._forgetting < 1.0:
-            self._root = square_root.replaced(self._root, rows, self._forgetting)
-            self._values = self._values + square_root.step_along(
-                self._root, rows.T @ (innovation * scale)
-            )
-            self._squares *= self._forgetting
-            self._freedom *= self._forgetting
         else:
-            self._root, self._right = square_root.absorbed(
-                self._root, self._right, rows, tau * scale
-            )
-            self._values = square_root.solved(self._root, self._right)
-        after = tau * scale - rows @ self._values
-        self._squares += float(innovation * scale @ after)
-        self._freedom += float(counts.sum())
+            self.update(*(np.concatenate(part) for part in zip(*samples, strict=True)))
 
     def scale(self, weights: FloatArray) -> FloatArray:
         """Return the factors that whiten rows of given weights, shape (m,) [1/(N m)]."""
@@ -262,7 +263,7 @@ class RecursiveLeastSquares:
             Independent combinations of parameters that may have changed.
 
         """
-        self._take(square_root.reopened(self._root, directions), self._values)
+        self._take(reopened(self._root, directions), self._values)
         self._freedom -= directions.shape[1]
 
     @property
@@ -285,7 +286,8 @@ class RecursiveLeastSquares:
     def covariance(self) -> FloatArray:
         """Covariance of the values, shape (P, P)."""
         factor = self.variance_factor if self.noise_is_relative else 1.0
-        return square_root.inverse_products(self._root) * factor
+        inverse, _ = lapack.dtrtri(self._root)
+        return np.asarray(inverse @ inverse.T * factor)
 
     @property
     def variance_factor(self) -> float:
@@ -312,25 +314,56 @@ class RecursiveLeastSquares:
         self._root, self._values = root, values
         self._right = np.asfortranarray((root @ values)[:, np.newaxis])
 
-    def _checked(
-        self, rows: FloatArray, tau: FloatArray, weights: npt.ArrayLike | None
-    ) -> tuple[FloatArray, FloatArray, FloatArray]:
-        rows = np.asarray(rows, dtype=np.float64)
-        tau = np.asarray(tau, dtype=np.float64)
-        count = len(self._noise)
-        expected = (count, len(self.parameters))
-        if rows.shape != expected or tau.shape != expected[:1]:
-            raise IdentificationError(
-                f'update: rows of shape {rows.shape} and torques of shape {tau.shape}, '
-                f'where {expected} and {expected[:1]} were expected'
-            )
-        counts = np.ones(count) if weights is None else np.asarray(weights, dtype=np.float64)
-        if counts.shape != (count,) or not np.all(counts >= 0.0):
-            raise IdentificationError(f'update: weights {counts} have to be {count} numbers >= 0')
-        # one sum instead of isfinite: any NaN or infinity survives in it
-        if not np.isfinite(rows.sum() + tau.sum() + counts.sum()):
-            raise IdentificationError('update: rows, torques and weights have to be finite')
-        return rows, tau, counts
+
+def replaced(root: FloatArray, rows: FloatArray, forgetting: float) -> FloatArray:
+    """
+    Return R with new information, discounting old information in the same directions.
+
+    In the directions b of U = rows R^-1 = A diag(s) B^T the old information, 1, becomes
+    1 - f + s^2 with f = min(s^2, level). It never falls, so the new triangle is the old one
+    with rows A^T rows, shortened, annihilated. The level is such that the losses add up to
+    the loss of exponential forgetting in all P directions, if the sample brings that much.
+
+    Parameters
+    ----------
+    root : ndarray, shape (P, P)
+        R in Fortran order; it is overwritten.
+    rows : ndarray, shape (m, P)
+        Rows to add, with noise of variance 1.
+    forgetting : float
+        Forgetting factor, below 1.
+
+    """
+    whitened, _ = lapack.dtrtrs(root, rows.T, trans=1)
+    gains, directions = np.linalg.eigh(whitened.T @ whitened)
+    budget = _LOSS_RATIO * (1.0 - forgetting) * len(root)
+    # the level at which the gains, ascending and limited to it, add up to the budget
+    some = np.maximum(gains, 0.0)
+    levels = (budget - np.append(0.0, np.cumsum(some[:-1]))) / np.arange(len(some), 0, -1)
+    above = some >= levels
+    level = min(float(levels[np.argmax(above)]), _LARGEST_LOSS) if above.any() else _LARGEST_LOSS
+    kept = np.sqrt(np.maximum(1.0 - level / np.maximum(gains, level), 0.0))
+    if np.any(kept > 0.0):
+        root, *_ = lapack.dtpqrt(
+            0, min(_BLOCK, len(root)), root, (directions * kept).T @ rows, overwrite_a=1
+        )
+    return root
+
+
+def reopened(root: FloatArray, directions: FloatArray) -> FloatArray:
+    """
+    Return R without its information on parameters along some directions (P, k).
+
+    The parameters become theta + directions delta, where nothing is known of delta: R theta = z
+    is stacked with delta = 0 within PRIOR_STD, and delta is eliminated by reflections.
+
+    """
+    size, count = directions.shape
+    unit = directions / np.linalg.norm(directions, axis=0)
+    stacked = np.zeros((size + count, count + size))
+    stacked[:size, :count], stacked[:size, count:] = -root @ unit, root
+    stacked[size:, :count] = np.eye(count) / PRIOR_STD
+    return np.asfortranarray(np.asarray(np.linalg.qr(stacked, mode='r'))[count:, count:])
 
 
 def check_forgetting(factor: float) -> None:

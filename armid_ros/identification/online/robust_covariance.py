@@ -21,7 +21,7 @@ from itertools import pairwise
 
 from armid_ros.identification.fitting.covariance import LEAST_LEFT
 from armid_ros.identification.online.background import Background, Job, Pieces
-from armid_ros.identification.online.square_root import PRIOR_STD
+from armid_ros.identification.online.recursive import PRIOR_STD
 from armid_ros.motion import FloatArray
 import numpy as np
 from scipy import linalg, stats

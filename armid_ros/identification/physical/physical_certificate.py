@@ -73,6 +73,11 @@ class PhysicalCertificate:
         return dict(self.tried)[self.weight]
 
     @property
+    def cost(self) -> float:
+        """Relative increase of the torque error by the constraints, the larger of both."""
+        return max(self.misfit_ratio, self.held_out_ratio) - 1.0
+
+    @property
     def active(self) -> tuple[str, ...]:
         """Links at the limit of physical consistency."""
         near = self.shares < ACTIVE_SHARE

@@ -23,6 +23,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass
 from functools import cached_property
+from itertools import combinations_with_replacement
 from typing import Any
 
 from armid_ros.errors import IdentificationError
@@ -152,8 +153,12 @@ class PhysicalProgram:
         for link in range(self.n_links):
             values = self.prior[PER_LINK * link : PER_LINK * (link + 1)]
             root = np.linalg.cholesky(pseudo_inertia(values))
-            units = [root @ _smat(unit) @ root.T for unit in np.eye(PER_LINK)]
-            blocks.append(np.transpose([link_parameters(unit) for unit in units]))
+            # symmetric matrices of a stacked triangle, off-diagonals times sqrt 2
+            units = np.zeros((PER_LINK, 4, 4))
+            for i, j in combinations_with_replacement(range(4), 2):
+                share = 1.0 if i == j else np.sqrt(0.5)
+                units[_packed(i, j), i, j] = units[_packed(i, j), j, i] = share
+            blocks.append(link_parameters(root @ units @ root.T).T)
         return np.asarray(sparse.block_diag(blocks).toarray())
 
     def _first(self, link: int) -> int:
@@ -252,13 +257,3 @@ def box_conditions(box: Box) -> FloatArray:
 def _packed(i: int, j: int) -> int:
     """Return the index of an entry of the upper triangle with stacked columns."""
     return j * (j + 1) // 2 + i
-
-
-def _smat(vector: FloatArray) -> FloatArray:
-    """Return the symmetric 4x4 matrix of a stacked triangle, off-diagonals times sqrt 2."""
-    matrix = np.zeros((4, 4))
-    for j in range(4):
-        for i in range(j + 1):
-            share = 1.0 if i == j else np.sqrt(0.5)
-            matrix[i, j] = matrix[j, i] = share * vector[_packed(i, j)]
-    return matrix

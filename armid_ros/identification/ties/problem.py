@@ -5,8 +5,8 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, field, replace
-from typing import Literal
+from dataclasses import dataclass, replace
+from typing import Literal, NamedTuple
 
 from armid_ros.effects.load import described_spread
 from armid_ros.errors import IdentificationError
@@ -217,13 +217,13 @@ def interaction_problem(
     names = tuple(tie.name for tie in ties) if separate else ('all',)
     count = springs_by.shape[3] // 3
     if inertias == 'known':
-        by = np.stack(inverse_dynamics_derivatives(robot, slow), axis=2)
-        body = _Body(inverse_dynamics(robot, motion), _placed(by, count))
+        body = _known_body(robot, motion, slow, count)
     else:
         body = _free_body(
             robot, motion, slow, springs, count, names if separate else ('the springs',)
         )
-    columns, columns_by = body.beside(springs, springs_by)
+    columns = np.concatenate([springs, body.columns], axis=2)
+    columns_by = np.concatenate([springs_by, body.columns_by], axis=2)
     tau, known = motion.tau, body.known
     passed, left = np.diag([1.0, 0.0, 0.0])[np.newaxis], np.ones(1)
     if used is not None:
@@ -249,29 +249,24 @@ def interaction_problem(
     )
 
 
-@dataclass(frozen=True)
-class _Body:
-    """
-    Rigid body in a problem: its known torque, or columns of free inertias.
-
-    Attributes are those of an InteractionProblem, without its springs.
-
-    """
+class _Body(NamedTuple):
+    """Rigid body in a problem: its known torque, or columns of free inertias with their prior."""
 
     known: FloatArray
     known_by: FloatArray
-    columns: FloatArray | None = None
-    columns_by: FloatArray | None = None
-    parameters: tuple[ParameterName, ...] = ()
-    described: FloatArray = field(default_factory=lambda: np.zeros(0))
-    precision: FloatArray = field(default_factory=lambda: np.zeros((0, 0)))
+    columns: FloatArray
+    columns_by: FloatArray
+    parameters: tuple[ParameterName, ...]
+    described: FloatArray
+    precision: FloatArray
 
-    def beside(self, springs: FloatArray, springs_by: FloatArray) -> tuple[FloatArray, FloatArray]:
-        """Return the columns of springs and body, and their derivatives."""
-        if self.columns is None or self.columns_by is None:
-            return springs, springs_by
-        columns = np.concatenate([springs, self.columns], axis=2)
-        return columns, np.concatenate([springs_by, self.columns_by], axis=2)
+
+def _known_body(robot: Robot, motion: Motion, slow: Motion, count: int) -> _Body:
+    """Return the body as described, without columns."""
+    by_motion = _placed(np.stack(inverse_dynamics_derivatives(robot, slow), axis=2), count)
+    none, none_by = np.zeros((*motion.q.shape, 0)), np.zeros((*slow.q.shape, 0, 3 * count))
+    torque = inverse_dynamics(robot, motion)
+    return _Body(torque, by_motion, none, none_by, (), np.zeros(0), np.zeros((0, 0)))
 
 
 def _free_body(

@@ -203,21 +203,18 @@ def band_of_motion(
 
     """
     if settings.cutoff_hz is None:
-        crossing = max(_crossing(recording, used.rate_hz) for recording in recordings)
-        used = replace(used, cutoff_hz=min(used.cutoff_hz, margin * crossing))
+        ends = []  # frequencies at which the motion of an angle falls below its noise [Hz]
+        for recording in recordings:
+            # spectra of pieces of 4 s are averaged
+            frequency, power = mean_spectrum([recording.q], used.rate_hz, 'linear', 4.0)
+            above = power > _ABOVE * 2.0 * _white(recording.q) ** 2 / used.rate_hz
+            above[-1] = False
+            ends += [float(frequency[2:][np.argmin(column)]) for column in above[2:].T]
+        used = replace(used, cutoff_hz=min(used.cutoff_hz, margin * max(ends)))
     if settings.decimation is None:
         factor = int(used.rate_hz / (2.0 * used.cutoff_hz))
         used = replace(used, decimation=max(used.decimation, factor))
     return used
-
-
-def _crossing(recording: Recording, rate: float) -> float:
-    """Return the frequency at which the motion of the fastest angle falls below its noise [Hz]."""
-    # spectra of pieces of 4 s are averaged
-    frequency, power = mean_spectrum([recording.q], rate, 'linear', 4.0)
-    above = power > _ABOVE * 2.0 * _white(recording.q) ** 2 / rate
-    above[-1] = False
-    return max(float(frequency[2:][np.argmin(column)]) for column in above[2:].T)
 
 
 def _white(signals: FloatArray) -> FloatArray:
@@ -262,14 +259,13 @@ class SensorNoise:
             if isinstance(effect, TiedSlack):
                 slack.update(zip(effect.joints, effect.slacks.tolist(), strict=True))
         if any(slack.values()):
-            problem = self._problem(np.array(list(slack.values())))
+            problem = together_interaction_problem(
+                *(self.robot, self.recording, self.used),
+                separate=True,
+                slack=np.array(list(slack.values())),
+            )
         return problem.deviation(np.array(list(stiffness.values())))
 
     @cached_property
     def _taut(self) -> InteractionProblem:
-        return self._problem(0.0)
-
-    def _problem(self, slack: float | FloatArray) -> InteractionProblem:
-        return together_interaction_problem(
-            self.robot, self.recording, self.used, separate=True, slack=slack
-        )
+        return together_interaction_problem(self.robot, self.recording, self.used, separate=True)

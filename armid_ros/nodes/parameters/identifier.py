@@ -6,7 +6,6 @@ from __future__ import annotations
 
 from armid_ros.arm import ArmModel
 from armid_ros.effects import make_effect, USUAL_EFFECTS
-from armid_ros.identification.online.change_watch import ChangeSettings
 from armid_ros.identification.online.identifier import OnlineIdentifier, OnlineSettings
 from armid_ros.nodes.parameters.table import NodeParameter, Values
 from armid_ros.robots import load_robot, parse_gravity, Robot, robot_from_urdf
@@ -127,5 +126,5 @@ def settings_of(value: Values, arm: ArmModel) -> OnlineSettings:
         torque_noise=noise if any(noise) else None,
         max_gap=value('max_gap'),
         measured_velocity=value('measured_velocity'),
-        changes=ChangeSettings(value('false_alarm_time')) if value('false_alarm_time') else None,
+        false_alarm_time=value('false_alarm_time') or None,
     )

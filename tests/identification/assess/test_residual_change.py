@@ -4,7 +4,7 @@
 
 from armid_ros.identification.assess.compare import residual_changes
 from armid_ros.identification.assess.grade_limits import FREEDOM
-from armid_ros.identification.known_fit import KnownFit
+from armid_ros.identification.parameters_file import KnownFit
 import numpy as np
 import pytest
 

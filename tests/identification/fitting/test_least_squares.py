@@ -105,18 +105,6 @@ def test_rows_that_say_nothing_are_not_used():
     np.testing.assert_allclose(solve([partial]).values, TRUTH, atol=0.01)
 
 
-def test_two_stretches_are_one_problem():
-    data = problem(np.random.default_rng(3), 1000)
-
-    def part(samples):
-        return Regression(
-            'bag', data.motion.select(samples), data.informative[samples], data.columns[samples]
-        )
-
-    halves = solve([part(slice(0, 500)), part(slice(500, 1000))])
-    np.testing.assert_allclose(halves.values, solve([data]).values, rtol=1e-9)
-
-
 def test_bounds_hold_and_the_others_make_up_for_it():
     """With the second parameter held at zero, the fit is that without its column."""
     data = [problem(np.random.default_rng(4))]

@@ -30,15 +30,15 @@ def steps(name: str, count: int, done: list[str]) -> Iterator[None]:
         yield
 
 
-def test_urgent_jobs_go_first_and_each_is_finished_before_the_next():
+def test_an_urgent_job_goes_first_and_each_is_finished_before_the_next():
     work, done = Background(), []
     work.begin(steps('a', 2, done))
     work.begin(steps('u', 2, done), urgent=True)
-    work.begin(steps('v', 1, done), urgent=True)
+    work.begin(steps('b', 1, done))
     work.advance(2)
     assert done == ['u0', 'u1']
     work.finish()
-    assert done == ['u0', 'u1', 'v0', 'a0', 'a1'] and not work.busy
+    assert done == ['u0', 'u1', 'a0', 'a1', 'b0'] and not work.busy
 
 
 def test_a_job_that_fails_is_given_up_and_the_others_go_on():

@@ -7,12 +7,17 @@ from __future__ import annotations
 from armid_ros.estimate import Estimate, ParameterName
 from armid_ros.identification.online.background import at_once
 from armid_ros.identification.online.change import Change, change_candidates, ChangeCandidate
-from armid_ros.identification.online.change_score import Block, ScoreStatistics, weighing
-from armid_ros.identification.online.change_search import ChangeSearch, FoundChange
-from armid_ros.identification.online.change_watch import ChangeSettings, ChangeWatch
-from armid_ros.identification.online.nuisance_rows import Row
+from armid_ros.identification.online.change_search import (
+    Block,
+    ChangeSearch,
+    FoundChange,
+    ScoreStatistics,
+    weighing,
+)
+from armid_ros.identification.online.change_watch import ChangeWatch, Row
 from armid_ros.identification.online.null_calibration import NullCalibration
 from armid_ros.identification.online.recursive import RecursiveLeastSquares, WeightedSample
+from armid_ros.identification.online.settings import FALSE_ALARM_TIME
 import numpy as np
 import pytest
 from scipy import stats
@@ -42,7 +47,7 @@ def row(t, rows, tau, weights):
 
 def watching(estimator, candidate):
     """Return what watches for one change, and does all its work at once."""
-    return ChangeWatch(estimator, NoNuisance(), [candidate], ChangeSettings(), Foreground())
+    return ChangeWatch(estimator, NoNuisance(), [candidate], FALSE_ALARM_TIME, Foreground())
 
 
 def learned_and_block(

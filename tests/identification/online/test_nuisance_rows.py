@@ -6,7 +6,7 @@ from __future__ import annotations
 
 from armid_ros.arm import ArmModel
 from armid_ros.effects import make_effect
-from armid_ros.identification.online.nuisance_rows import NuisanceRows, Row
+from armid_ros.identification.online.change_watch import NuisanceRows, Row
 from armid_ros.identification.rows.causal import CausalMotion
 from armid_ros.motion import Motion
 from armid_ros.robots import load_robot

@@ -107,7 +107,7 @@ def test_online_intervals_hold_in_coloured_noise():
     for _ in range(20):
         online = OnlineIdentifier(
             ArmModel(robot, arm.effects),
-            OnlineSettings(changes=None),
+            OnlineSettings(false_alarm_time=None),
             rng=np.random.default_rng(0),
         )
         tau = exact + 0.05 * coloured(exact.shape, 0.97, rng)
