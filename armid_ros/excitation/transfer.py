@@ -12,60 +12,29 @@ from armid_ros.errors import TrajectoryError
 from armid_ros.excitation.geometry.clearance import ClearanceModel
 from armid_ros.excitation.geometry.paths import clear_line, find_path
 from armid_ros.excitation.limits import check_limits, Limits, SLOW_VELOCITY, SPEED_CLASSES
-from armid_ros.motion import FloatArray, freeze, Motion
+from armid_ros.motion import FloatArray, Motion
 from armid_ros.robots import Robot
+from armid_ros.robots.reference import Reference
 import numpy as np
 import numpy.typing as npt
 
 
-@dataclass(frozen=True)
-class Transfer:
-    """
-    Straight lines in joint space from pose to pose, with a stop at each.
-
-    Attributes
-    ----------
-    joints : tuple of str
-        n joint names.
-    t : ndarray, shape (K,)
-        Time at each pose, from 0 on [s].
-    q : ndarray, shape (K, n)
-        Poses [rad or m].
-
-    """
-
-    joints: tuple[str, ...]
-    t: FloatArray
-    q: FloatArray
+@dataclass(frozen=True, eq=False)
+class Transfer(Reference):
+    """Straight lines in joint space from pose to pose, with a stop at each."""
 
     def __post_init__(self) -> None:
-        """Freeze the arrays."""
-        freeze(self, 't', 'q')
-
-    @property
-    def duration(self) -> float:
-        """Duration from rest to rest [s]."""
-        return float(self.t[-1])
+        """Set velocity and acceleration of every pose to zero."""
+        for name in ('dq', 'ddq'):
+            object.__setattr__(self, name, np.zeros_like(self.q))
+        super().__post_init__()
 
     def at(self, t: npt.ArrayLike) -> Motion:
         """Evaluate the way at times of shape (N,) [s]; at rest before its start and after it."""
-        time = np.clip(np.asarray(t, dtype=float), 0.0, self.duration)
-        k = np.clip(np.searchsorted(self.t, time, side='right') - 1, 0, len(self.t) - 2)
-        span = np.diff(self.t)[k][:, np.newaxis]
-        x = (time - self.t[k])[:, np.newaxis] / span
-        way = np.diff(self.q, axis=0)[k]
-        return Motion(
-            self.joints,
-            time,
-            self.q[k] + way * x**3 * (10.0 - 15.0 * x + 6.0 * x**2),
-            way / span * 30.0 * x**2 * (1.0 - x) ** 2,
-            way / span**2 * 60.0 * x * (1.0 - x) * (1.0 - 2.0 * x),
-        )
+        return self.sample(np.clip(np.asarray(t, dtype=float), 0.0, self.duration))
 
     def lasting(self, duration: float) -> Transfer:
         """Return the same way with another duration [s]."""
-        if not self.duration > 0.0:
-            return replace(self, t=np.linspace(0.0, duration, len(self.t)))
         return replace(self, t=self.t * (duration / self.duration))
 
     def reversed(self) -> Transfer:
@@ -157,7 +126,8 @@ class TransferPlanner:
             (1.875 * way / velocity).max(axis=1),
             np.sqrt((10.0 / np.sqrt(3.0)) * way / limits.acceleration).max(axis=1),
         )
-        t = np.append(0.0, np.cumsum(needed))
+        # a way on which no joint moves takes a time as well
+        t = np.append(0.0, np.cumsum(np.maximum(needed, 1e-6)))
         transfer = Transfer(limits.joints, t, poses)
         transfer = transfer.lasting(max(transfer.duration, shortest))
         for _ in range(20):  # durations, each longer than the last

@@ -17,10 +17,10 @@ from armid_ros.nodes.messages.classes import message_class
 from armid_ros.nodes.parameters.table import names, NodeParameter
 from armid_ros.nodes.qos import offered
 from armid_ros.nodes.running.process import run
-from armid_ros.nodes.trajectory.messages import read_trajectory
 from armid_ros.recording.bag import Bag
 from armid_ros.recording.message_types import JOINT_TRAJECTORY
 from armid_ros.recording.source import RawMessage
+from armid_ros.recording.trajectory import waypoints_of
 from armid_ros.robots import robot_from_urdf
 import numpy as np
 from rclpy.clock import Clock, ClockType
@@ -62,7 +62,7 @@ class _JumpGuard:
     def objection(self, cdr: bytes) -> str:
         """Return why a JointTrajectory must not be sent to the arm; empty if it may."""
         try:
-            reference = read_trajectory(deserialize_message(cdr, JointTrajectory))
+            reference = waypoints_of(deserialize_message(cdr, JointTrajectory))
         except ArmidError as error:
             return str(error)
         pose = MeasuredPose.unknown(reference.joints)

@@ -22,8 +22,8 @@ from armid_ros.excitation import (
 from armid_ros.nodes import arm_watch
 from armid_ros.nodes.excitation_publisher import ExcitationPublisherNode
 from armid_ros.nodes.qos import STREAM
-from armid_ros.nodes.trajectory.messages import read_trajectory
 from armid_ros.recording import read_waypoints
+from armid_ros.recording.trajectory import waypoints_of
 from armid_ros.robots import load_robot
 from click.testing import CliRunner
 import numpy as np
@@ -122,7 +122,7 @@ def running(bench, arm, excitation, **parameters):
 
 def follow(bench, arm, until, off=0.0, step=0.2):
     """Let the arm follow what it heard last from 100 s on, off by something at the end."""
-    reference = read_trajectory(arm.heard[0])
+    reference = waypoints_of(arm.heard[0])
     times = np.arange(100.0 + step, until + 1e-9, step)
     for time in times:
         bench.tick(round(time * SECOND))
@@ -133,7 +133,7 @@ def follow(bench, arm, until, off=0.0, step=0.2):
 def sent(bench, messages, count):
     bench.spin_until(lambda: len(messages) >= count, 'the trajectory')
     message = messages[count - 1]
-    return seconds_of(message.header.stamp), read_trajectory(message)
+    return seconds_of(message.header.stamp), waypoints_of(message)
 
 
 def test_start_sends_the_way_from_where_the_arm_is_and_the_run(bench, arm, excitation, robot):
@@ -267,7 +267,7 @@ def test_a_blocked_arm_is_stopped_on_its_path_and_then_held_where_it_stands(
 ):
     node, diagnostics = running(bench, arm, excitation), bench.diagnostics()
     follow(bench, arm, 104.0)
-    path = read_trajectory(arm.heard[0])
+    path = waypoints_of(arm.heard[0])
     where = path.sample(np.array([4.0])).q[0]
     for time in np.arange(104.05, 106.0, 0.05):  # a blocked arm: it stays where it is
         bench.tick(round(time * SECOND))

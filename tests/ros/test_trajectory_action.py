@@ -11,7 +11,8 @@ import sys
 from action_msgs.msg import GoalStatus
 from action_msgs.srv import CancelGoal
 from armid_ros.errors import TrajectoryError
-from armid_ros.nodes.trajectory.messages import read_trajectory, write_trajectory
+from armid_ros.nodes.trajectory.messages import write_trajectory
+from armid_ros.recording.trajectory import waypoints_of
 from control_msgs.action import FollowJointTrajectory
 import numpy as np
 import pytest
@@ -43,7 +44,7 @@ def test_the_excitation_is_a_goal_and_no_message(bench, arm, excitation):
     assert {t.position for t in goal.path_tolerance} == {0.3}
     assert {t.position for t in goal.goal_tolerance} == {0.05}
     assert (goal.goal_time_tolerance.sec, goal.goal_time_tolerance.nanosec) == (1, 500_000_000)
-    assert read_trajectory(goal.trajectory).duration == pytest.approx(node.duration, abs=1e-6)
+    assert waypoints_of(goal.trajectory).duration == pytest.approx(node.duration, abs=1e-6)
 
 
 def test_a_run_ends_when_the_controller_says_so(bench, arm, excitation):

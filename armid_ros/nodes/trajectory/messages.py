@@ -1,29 +1,12 @@
 # Copyright 2026 The armid_ros developers
 # SPDX-License-Identifier: Apache-2.0
-"""Convert joint trajectories from and to messages."""
+"""Convert motions to JointTrajectory messages."""
 
 from __future__ import annotations
 
 from armid_ros.motion import Motion
-from armid_ros.recording.trajectory import waypoints_of
-from armid_ros.simulation import Reference
 from builtin_interfaces.msg import Duration
 from trajectory_msgs.msg import JointTrajectory, JointTrajectoryPoint
-
-
-def read_trajectory(message: JointTrajectory) -> Reference:
-    """
-    Return the waypoints of a message.
-
-    Raises
-    ------
-    TrajectoryError
-        If the trajectory has no points, its points differ in their fields, a number is not finite,
-        or time does not increase.
-
-    """
-    found = waypoints_of(message)
-    return Reference(found.joints, found.t, found.q, found.dq, found.ddq, found.tau)
 
 
 def write_trajectory(motion: Motion, lead: float) -> JointTrajectory:
