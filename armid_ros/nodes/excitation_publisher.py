@@ -304,7 +304,7 @@ class ExcitationPublisherNode(ArmidNode):
         self._controller.close()
         super().destroy_node()
 
-    def _surviving(self, callback: Callable[..., Any], what: str) -> Callable[..., Any]:
+    def surviving(self, callback: Callable[..., Any], what: str) -> Callable[..., Any]:
         """Return a callback that stops the arm after an unexpected exception."""
 
         @wraps(callback)
@@ -318,7 +318,7 @@ class ExcitationPublisherNode(ArmidNode):
                     self._give_up(f'{what}: {type(error).__name__}: {error}')
                 raise
 
-        return super()._surviving(stopping, what)
+        return super().surviving(stopping, what)
 
     def _on_state(self, now: float) -> None:
         """Compare the measured position and effort with the run."""

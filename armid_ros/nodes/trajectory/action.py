@@ -12,7 +12,6 @@ from typing import Any
 from uuid import uuid4
 
 from action_msgs.msg import GoalStatus, GoalStatusArray
-from armid_ros.nodes.complaints import surviving
 from armid_ros.nodes.qos import LATCHED
 from builtin_interfaces.msg import Duration
 from rclpy.action import ActionClient
@@ -253,7 +252,8 @@ class TrajectoryAction:
         future.add_done_callback(self._guarded(done))
 
     def _guarded(self, callback: Callable[[Any], None]) -> Callable[[Any], None]:
-        return surviving(callback, self.name, self._node)
+        guarded: Callable[[Any], None] = self._node.surviving(callback, self.name)
+        return guarded
 
 
 def beside(topic: str) -> str:
