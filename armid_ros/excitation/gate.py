@@ -59,7 +59,7 @@ class MotionGate:
         run : Run
             The run to send.
         planner : TransferPlanner
-            Planner with the arm, limits and bodies. Without limits, no limit is checked.
+            Planner with the arm, limits and bodies.
 
         Raises
         ------
@@ -72,11 +72,8 @@ class MotionGate:
         torque = arm.joint_torque(motion)
         peak = np.abs(motion.ddq).max(axis=0)
         robot = arm.robot
-        none = np.full(robot.n_joints, np.inf)
-        limits = Limits(robot.joints, robot.lower, robot.upper, none, none, none, robot.prismatic)
-        if planner.limits is not None:
-            given = planner.acceleration
-            limits = Limits.of(robot, speed=1.0, reserve=False, acceleration=given)
+        given = planner.acceleration
+        limits = Limits.of(robot, speed=1.0, reserve=False, acceleration=given)
         usual = np.maximum(limits.acceleration, 1.001 * peak)
         fixed = np.isfinite(planner.given_acceleration)
         limits = replace(limits, acceleration=np.where(fixed, limits.acceleration, usual))
@@ -84,7 +81,7 @@ class MotionGate:
         room = np.where(np.isfinite(robot.torque_limit), 0.1 * robot.torque_limit, 0.0)
         effort = np.maximum(np.abs(torque).max(axis=0), room)
         gate = cls(run, limits, planner.clearance, planner.margin, effort)
-        violations = check_limits(limits, motion, torque) if planner.limits is not None else ()
+        violations = check_limits(limits, motion, torque)
         if violations:
             raise TrajectoryError(f'the run is not sent: {violations[0]}')
         # intervals of 0.1 s at the beginning of the proof

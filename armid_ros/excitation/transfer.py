@@ -51,8 +51,8 @@ class TransferPlanner:
     ----------
     arm : ArmModel
         Prior model, for the torque.
-    limits : Limits or None
-        Limits in force. None: no limit is checked, and the duration is ``shortest``.
+    limits : Limits
+        Limits in force.
     clearance : ClearanceModel or None
         Bodies to keep apart, the floor among them.
     margin : float
@@ -63,7 +63,7 @@ class TransferPlanner:
     """
 
     arm: ArmModel
-    limits: Limits | None
+    limits: Limits
     clearance: ClearanceModel | None
     margin: float
     acceleration: FloatArray | None = None
@@ -97,11 +97,9 @@ class TransferPlanner:
             limit or the bodies.
 
         """
-        joints = self.arm.robot.joints
-        if self.limits is None:
-            return Transfer(joints, np.array([0.0, shortest]), np.vstack([start, goal]))
+        limits = self.limits
         # a pose measured slightly beyond a limit is moved onto the limit
-        inside = np.clip(start, self.limits.lower, self.limits.upper)
+        inside = np.clip(start, limits.lower, limits.upper)
         # tolerance beyond a position limit for a measured position [rad or m]
         start = np.where(np.abs(start - inside) <= 0.01, inside, start)
         for name, q in (('it would leave from', start), ('it would go to', goal)):
@@ -112,13 +110,11 @@ class TransferPlanner:
             self.clearance,
             self.margin,
             (start, goal),
-            (self.limits.lower, self.limits.upper),
+            (limits.lower, limits.upper),
             lambda q: not self._overload(q),
             np.random.default_rng(seed),
         )
         # a path with the duration that the limits require
-        limits = self.limits
-        assert limits is not None
         way = np.abs(np.diff(poses, axis=0))
         velocity = np.where(np.isfinite(limits.velocity), limits.velocity, SLOW_VELOCITY)
         # largest velocity and acceleration of a quintic from 0 to 1 in unit time
@@ -141,7 +137,6 @@ class TransferPlanner:
 
     def fault(self, q: FloatArray) -> str:
         """Return why an arm may not stand in a pose, shape (n,); empty if it may."""
-        assert self.limits is not None
         violations = check_limits(self.limits, Motion.of_states(self.limits.joints, q, 0.0, 0.0))
         overload = self._overload(q[np.newaxis])
         if violations or overload:
@@ -164,7 +159,6 @@ class TransferPlanner:
             If no pose about zero is free.
 
         """
-        assert self.limits is not None
         zero = self.arm.robot.zero_pose
         reason = self.fault(zero)
         if not reason:
@@ -208,7 +202,6 @@ class TransferPlanner:
 
     def _overload(self, q: FloatArray) -> str:
         """Return a message if a joint cannot hold some of the poses, shape (N, n)."""
-        assert self.limits is not None
         if not np.isfinite(self.limits.torque).any():
             return ''
         torque = np.abs(self.arm.joint_torque(Motion.of_states(self.limits.joints, q, 0.0, 0.0)))
