@@ -32,7 +32,7 @@ from armid_ros.excitation.limits import (
     used_shares,
     with_joint_limits,
 )
-from armid_ros.excitation.pose_monitor import JointState, PoseMonitor
+from armid_ros.excitation.pose_monitor import PoseMonitor
 from armid_ros.excitation.problem import DesignProblem, DesignSettings, TARGETS, whole_period
 from armid_ros.excitation.run import plan_run, Run
 from armid_ros.excitation.scene import CollisionScene, Fitness, fitness
@@ -60,7 +60,6 @@ __all__ = [
     'FourierTrajectory',
     'Information',
     'Limits',
-    'JointState',
     'MeasuredPose',
     'MotionGate',
     'PoseMonitor',
