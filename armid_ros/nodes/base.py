@@ -230,8 +230,10 @@ class ArmidNode(Node):
         return text
 
     def value(self, parameter: str) -> Any:
-        """Return the value of a parameter."""
-        return self.get_parameter(parameter).value
+        """Return the value of a parameter; of a list of names, those that are not empty."""
+        value = self.get_parameter(parameter).value
+        is_list = isinstance(value, list) and all(isinstance(one, str) for one in value)
+        return tuple(filter(None, value)) if is_list else value
 
     def folder(self, parameter: str) -> Path:
         """Return the folder that a parameter names, and create it if necessary."""

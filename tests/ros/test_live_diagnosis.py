@@ -150,7 +150,7 @@ def test_effects_that_an_arm_cannot_have_are_refused(bench, effect, said):
     result = set_effects(arm, effect)
     assert not result.successful
     assert said in result.reason
-    assert arm.value('effects') == ['']
+    assert arm.value('effects') == ()
 
 
 def test_questions_wait_until_the_one_before_is_answered(bench, idle):

@@ -4,15 +4,10 @@
 
 from __future__ import annotations
 
-from armid_ros.nodes.parameters.table import (
-    declare,
-    names,
-    NodeParameter,
-    ParameterError,
-)
+from armid_ros.nodes.base import ArmidNode
+from armid_ros.nodes.parameters.table import NodeParameter, ParameterError
 from armid_ros.nodes.recorder import RecorderNode
 import pytest
-from rclpy.node import Node
 from rclpy.parameter import Parameter
 
 TABLE = (
@@ -26,10 +21,14 @@ TABLE = (
 )
 
 
-class Declared(Node):
+class Declared(ArmidNode):
+    table = TABLE
+
     def __init__(self, **kwargs):
         super().__init__('declared', **kwargs)
-        declare(self, TABLE)
+
+    def condition(self):
+        return '', {}
 
 
 @pytest.mark.parametrize(
@@ -59,8 +58,8 @@ def test_an_empty_list_is_no_names(bench, given):
     if 'cli_args' in given:
         given = {'cli_args': ['--ros-args', *given['cli_args']]}
     node = bench.add(Declared, **given)
-    assert names(node, 'names') == ()
-    assert names(bench.add(Declared, namespace='other'), 'names') == ('b',)
+    assert node.value('names') == ()
+    assert bench.add(Declared, namespace='other').value('names') == ('b',)
 
 
 def test_parameters_that_a_node_does_not_have_are_named_once_but_not_those_of_ros(bench, tmp_path):

@@ -229,10 +229,9 @@ def make_planner(value: Values) -> tuple[TransferPlanner, tuple[str, ...]]:
     """
     robot, others = load_arms(
         lambda joints: load_robot(value('robot'), gravity=value('gravity'), joints=joints),
-        tuple(filter(None, value('joints'))) or None,
+        value('joints') or None,
     )
-    given = tuple(filter(None, value('velocity')))
-    robot, acceleration = with_joint_limits(robot, value('joint_limits'), given)
+    robot, acceleration = with_joint_limits(robot, value('joint_limits'), value('velocity'))
     arm = load_model(value('model'), robot) if value('model') else ArmModel(robot)
     scene = CollisionScene.of(robot, value('clearance'), value('floor'), value('environment'))
     limits = transfer_limits(arm.robot, value('speed'), acceleration)
@@ -267,7 +266,7 @@ def make_excitation(value: Values, rate: float, planner: TransferPlanner) -> Exc
         return checked(load_excitation(value('file')), planner, value('file'))
     arm = planner.arm
     own = {effect.name for effect in arm.effects}
-    for name in filter(None, value('effects')):
+    for name in value('effects'):
         if name not in own:
             arm = arm.with_effect(make_effect(name, arm.robot))
     periods, run_in = value('n_periods'), value('run_in')
