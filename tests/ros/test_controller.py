@@ -43,11 +43,22 @@ def arm(bench, request):
     arm.leave()
 
 
-def publisher(bench, arm, excitation, **parameters):
-    planner = TransferPlanner(ArmModel(ROBOT), transfer_limits(ROBOT, 1.0), None, 0.0)
+def free_planner():
+    """Plan without bodies: the excitations here are drawn without looking at any."""
+    return TransferPlanner(ArmModel(ROBOT), transfer_limits(ROBOT, 1.0), None, 0.0)
+
+
+def waiting(bench, excitation, **parameters):
+    """Make a publisher on simulated time, at 99 s, that begins when it is told."""
     options = {'start': False, 'use_sim_time': True, 'approach': 1.0, 'state_timeout': 0.5}
+    planner = None if excitation is None else free_planner()
     node = bench.add(ExcitationPublisherNode, excitation, planner, **(options | parameters))
     bench.tick(99 * SECOND)
+    return node
+
+
+def publisher(bench, arm, excitation, **parameters):
+    node = waiting(bench, excitation, **parameters)
     arm.run(100.2)
     return node
 
