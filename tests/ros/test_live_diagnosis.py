@@ -15,7 +15,7 @@ from armid_ros.live.assistant import Done, Plan, Save
 from armid_ros.motion import Motion
 from armid_ros.nodes.live_diagnosis import LiveDiagnosisNode
 from armid_ros.nodes.qos import LATCHED
-from armid_ros.nodes.trajectory.messages import write_trajectory
+from armid_ros.nodes.trajectory_controller import write_trajectory
 from armid_ros.robots import load_robot
 import numpy as np
 import pytest
