@@ -72,10 +72,9 @@ class MotionGate:
         torque = arm.joint_torque(motion)
         peak = np.abs(motion.ddq).max(axis=0)
         robot = arm.robot
-        given = planner.acceleration
-        limits = Limits.of(robot, speed=1.0, reserve=False, acceleration=given)
+        limits = Limits.of(robot, speed=1.0, reserve=False)
         usual = np.maximum(limits.acceleration, 1.001 * peak)
-        fixed = np.isfinite(planner.given_acceleration)
+        fixed = np.isfinite(robot.acceleration_limit)
         limits = replace(limits, acceleration=np.where(fixed, limits.acceleration, usual))
         # a joint may need a tenth of its limit for its dry friction
         room = np.where(np.isfinite(robot.torque_limit), 0.1 * robot.torque_limit, 0.0)

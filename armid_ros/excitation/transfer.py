@@ -57,8 +57,6 @@ class TransferPlanner:
         Bodies to keep apart, the floor among them.
     margin : float
         Clearance to keep [m].
-    acceleration : ndarray, shape (n,), or None
-        Given acceleration limits of any motion [rad/s^2 or m/s^2]; NaN: not given.
 
     """
 
@@ -66,14 +64,6 @@ class TransferPlanner:
     limits: Limits
     clearance: ClearanceModel | None
     margin: float
-    acceleration: FloatArray | None = None
-
-    @property
-    def given_acceleration(self) -> FloatArray:
-        """Return the acceleration limits [rad/s^2 or m/s^2]; infinite if not given."""
-        if self.acceleration is None:
-            return np.full(self.arm.robot.n_joints, np.inf)
-        return np.nan_to_num(self.acceleration, nan=np.inf)
 
     def __call__(
         self, start: FloatArray, goal: FloatArray, shortest: float = 0.0, seed: int = 0
@@ -216,9 +206,7 @@ class TransferPlanner:
         )
 
 
-def transfer_limits(
-    robot: Robot, speed: str | float = 'slow', acceleration: FloatArray | None = None
-) -> Limits:
+def transfer_limits(robot: Robot, speed: str | float = 'slow') -> Limits:
     """
     Return the limits of a way, which is slow because it identifies no parameters.
 
@@ -229,11 +217,9 @@ def transfer_limits(
         end.
     speed : str or float
         Speed of the run; a way is never faster.
-    acceleration : ndarray, shape (n,), optional
-        Acceleration limits [rad/s^2 or m/s^2].
 
     """
-    run = Limits.of(robot, speed=speed, reserve=False, acceleration=acceleration)
+    run = Limits.of(robot, speed=speed, reserve=False)
     share = SPEED_CLASSES[speed] if isinstance(speed, str) else float(speed)
     slow = min(1.0, SPEED_CLASSES['slow'] / share)
     # acceleration that is slow for any joint, used with `SLOW_VELOCITY` [rad/s^2 or m/s^2]

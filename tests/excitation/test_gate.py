@@ -47,8 +47,7 @@ def test_a_stop_is_sent_on_the_path_whatever_the_acceleration_limit(gate, share,
 
 def test_a_run_is_held_to_acceleration_limits_that_are_given(gate, two_link):
     peak = np.abs(gate.run.motion().ddq).max(axis=0)
-    given = np.array([np.nan, 0.9 * peak[1]])
-    arm = ArmModel(two_link)
-    planner = TransferPlanner(arm, transfer_limits(two_link), None, 0.0, given)
+    robot = replace(two_link, acceleration_limit=np.array([np.inf, 0.9 * peak[1]]))
+    planner = TransferPlanner(ArmModel(robot), transfer_limits(robot), None, 0.0)
     with pytest.raises(TrajectoryError, match=f'{two_link.joints[1]}.*acceleration'):
         MotionGate.of(gate.run, planner)

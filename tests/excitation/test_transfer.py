@@ -73,7 +73,8 @@ def test_a_way_of_joints_without_limits_is_slow(two_link):
 
 def test_a_way_keeps_the_torque_limits(two_link):
     """Drives that just hold the arm leave nothing for haste."""
-    limits = Limits.of(two_link, speed=1.0, acceleration=np.full(2, 200.0))
+    hasty = replace(two_link, acceleration_limit=np.full(2, 200.0))
+    limits = Limits.of(hasty, speed=1.0)
     arm, goal = ArmModel(two_link), np.array([1.4, 0.0])
     quick = TransferPlanner(arm, limits, None, 0.0)(np.zeros(2), goal)
     torque = np.abs(arm.torque(dense(quick))).max(axis=0)

@@ -4,6 +4,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 from armid_ros.arm import ArmModel, load_model
 from armid_ros.effects import make_effect, USUAL_EFFECTS
 from armid_ros.errors import TrajectoryError
@@ -231,12 +233,12 @@ def make_planner(value: Values) -> tuple[TransferPlanner, tuple[str, ...]]:
         lambda joints: load_robot(value('robot'), gravity=value('gravity'), joints=joints),
         value('joints') or None,
     )
-    robot, acceleration = with_joint_limits(robot, value('joint_limits'), value('velocity'))
+    robot = with_joint_limits(robot, value('joint_limits'), value('velocity'))
     arm = load_model(value('model'), robot) if value('model') else ArmModel(robot)
     scene = CollisionScene.of(robot, value('clearance'), value('floor'), value('environment'))
-    limits = transfer_limits(arm.robot, value('speed'), acceleration)
+    limits = transfer_limits(arm.robot, value('speed'))
     clearance = ClearanceModel.of(scene.bodies)
-    planner = TransferPlanner(arm, limits, clearance, scene.clearance, acceleration)
+    planner = TransferPlanner(arm, limits, clearance, scene.clearance)
     unchecked = scene.unchecked
     if others:
         unchecked += (f'{", ".join(others)} (not driven, as they belong to no arm)',)
@@ -276,7 +278,6 @@ def make_excitation(value: Values, rate: float, planner: TransferPlanner) -> Exc
         n_periods=periods,
         run_in=run_in,
         speed=value('speed'),
-        acceleration=planner.acceleration,
         clearance=value('clearance'),
         starts=2,
         time_budget=value('design_time'),
@@ -311,8 +312,8 @@ def checked(excitation: Excitation, planner: TransferPlanner, source: str) -> Ex
             f'{", ".join(robot.joints)}'
         )
     excitation = excitation.for_joints(robot.joints)
-    given = planner.given_acceleration
-    limits = Limits.of(robot, speed=1.0, reserve=False, acceleration=given)
+    limits = Limits.of(robot, speed=1.0, reserve=False)
+    limits = replace(limits, acceleration=robot.acceleration_limit)
     rules = (planner.clearance, planner.margin)
     faults = trajectory_faults(planner.arm, limits, excitation.trajectory, *rules)
     faults = faults or excitation_faults(planner.arm, limits, excitation)
