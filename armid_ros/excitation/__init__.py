@@ -29,7 +29,6 @@ from armid_ros.excitation.limits import (
     check_limits,
     Limits,
     SPEED_CLASSES,
-    used_shares,
     with_joint_limits,
 )
 from armid_ros.excitation.pose_monitor import PoseMonitor
@@ -90,7 +89,6 @@ __all__ = [
     'tracking_fault',
     'trajectory_faults',
     'transfer_limits',
-    'used_shares',
     'whole_period',
     'with_joint_limits',
     'with_obstacles',

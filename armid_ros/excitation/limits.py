@@ -223,8 +223,11 @@ def check_limits(
         ('lower position', motion.q, limits.lower, limits.lower - slack - motion.q),
         ('upper position', motion.q, limits.upper, motion.q - limits.upper - slack),
     ]
-    for name, values, bound in _rates(limits, motion, motion.tau if torque is None else torque):
-        checks.append((name, values, bound, np.abs(values) - (1.0 + _ROUNDING) * bound))
+    tau = motion.tau if torque is None else torque
+    for name, values in (('velocity', motion.dq), ('acceleration', motion.ddq), ('torque', tau)):
+        if values is not None:
+            bound = getattr(limits, name)
+            checks.append((name, values, bound, np.abs(values) - (1.0 + _ROUNDING) * bound))
     found = []
     for name, values, bound, excess in checks:
         for j in np.flatnonzero((excess > 0.0).any(axis=0)):
@@ -241,36 +244,6 @@ def check_limits(
                 )
             )
     return tuple(found)
-
-
-def _rates(
-    limits: Limits, motion: Motion, torque: FloatArray | None
-) -> list[tuple[str, FloatArray, FloatArray]]:
-    """Return name, values and limits of velocity, acceleration and torque."""
-    rates = [
-        ('velocity', motion.dq, limits.velocity),
-        ('acceleration', motion.ddq, limits.acceleration),
-    ]
-    return rates if torque is None else [*rates, ('torque', torque, limits.torque)]
-
-
-def used_shares(limits: Limits, motion: Motion, torque: FloatArray) -> dict[str, FloatArray]:
-    """
-    Return the share of every limit that a motion uses.
-
-    Returns
-    -------
-    dict of str to ndarray, shape (n,)
-        'position': largest distance from the middle of the range over half of it; 'velocity',
-        'acceleration' and 'torque': largest absolute value over the limit. 0 without a limit.
-
-    """
-    half = 0.5 * (limits.upper - limits.lower)
-    middle = np.subtract(limits.upper, half, out=np.zeros_like(half), where=np.isfinite(half))
-    shares = {'position': np.abs(motion.q - middle).max(axis=0) / half}
-    for name, values, bound in _rates(limits, motion, torque):
-        shares[name] = np.abs(values).max(axis=0) / bound
-    return shares
 
 
 def require_radians(robot: Robot) -> None:
