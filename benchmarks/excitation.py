@@ -95,12 +95,12 @@ def humanoid(seed):
     )
     (result, seconds, cpu) = timed(lambda: design(arm, settings, rng, collision=collision))
     problem = DesignProblem.of(arm, settings, rng)
-    clearance = ClearanceModel.of(collision)
+    clearance = ClearanceModel.of(collision, 0.01)
     plain = [narrow(arm, problem, clearance, rng) for _ in range(20)]
     unseen = [
-        random_feasible(
-            arm, problem.limits, 20.0, 3, rng, collision=clearance, margin=0.01
-        ).one_period(LUNAR_SAMPLES)
+        random_feasible(arm, problem.limits, 20.0, 3, rng, clearance=clearance).one_period(
+            LUNAR_SAMPLES
+        )
         for _ in range(HELD_OUT)
     ]
     ours = result.excitation.trajectory
@@ -152,7 +152,7 @@ def arm_table(name, arguments, python, file):
     """Compare designs for one arm with random trajectories and with figaroh's."""
     arm = friction_arm(urdf_of(name))
     collision = collision_model(arm.robot)
-    clearance = ClearanceModel.of(collision)
+    clearance = ClearanceModel.of(collision, 0.01)
     settings = DesignSettings(period=20.0, harmonics=5, n_periods=1, rate=RATE)
     rng = np.random.default_rng(arguments.seed)
     problem = DesignProblem.of(arm, settings, rng)
@@ -174,7 +174,7 @@ def arm_table(name, arguments, python, file):
 
     def draw():
         draws = [
-            random_feasible(arm, problem.limits, 20.0, 5, rng, collision=clearance, margin=0.01)
+            random_feasible(arm, problem.limits, 20.0, 5, rng, clearance=clearance)
             for _ in range(arguments.random)
         ]
         return draws, [evaluate(problem, one).information for one in draws]
@@ -316,8 +316,8 @@ def figaroh(urdf, iterations, seed, out):
         **dict.fromkeys(('fv', 'fs', 'Ia', 'off'), [0.0] * robot.n_joints),
     }
     peer.load_param = lambda robot, file: (trajectory, parameters)
-    clear = ClearanceModel.of(collision)
-    first = feasible_pose(arm, limits, np.random.default_rng(seed), clear, 0.01)
+    clear = ClearanceModel.of(collision, 0.01)
+    first = feasible_pose(arm, limits, np.random.default_rng(seed), clear)
 
     class Design(peer.BaseOptimalTrajectory):
         def create_ipopt_problem(self, *arguments):

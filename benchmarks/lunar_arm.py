@@ -11,7 +11,14 @@ of two identifications along the columns of a payload.
 """
 
 from armid_ros.arm import ArmModel
-from armid_ros.excitation import design, DesignSettings, Excitation, Limits, random_feasible
+from armid_ros.excitation import (
+    ClearanceModel,
+    design,
+    DesignSettings,
+    Excitation,
+    Limits,
+    random_feasible,
+)
 from armid_ros.identification import identify
 from armid_ros.recording import Recording
 from armid_ros.robots import collision_model, load_robot
@@ -64,15 +71,11 @@ def run(seed=0):
     """Return errors [%] by robot, each of shape (HELD_OUT, 6), and the load [kg]."""
     rng = np.random.default_rng(seed)
     nominal = load_robot('humanoid_arm', gravity='moon')
-    collision = collision_model(nominal)
+    bodies = ClearanceModel.of(collision_model(nominal), 0.01)
     limits = Limits.of(nominal, speed='medium')
     plan = excitation(nominal, rng)
     tests = [
-        Excitation(
-            random_feasible(
-                ArmModel(nominal), limits, 20.0, 3, rng, collision=collision, margin=0.01
-            )
-        )
+        Excitation(random_feasible(ArmModel(nominal), limits, 20.0, 3, rng, clearance=bodies))
         for _ in range(HELD_OUT)
     ]
     errors, found = {}, []

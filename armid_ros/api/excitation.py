@@ -275,6 +275,5 @@ def planner_of(arm: ArmModel, settings: DesignSettings, scene: CollisionScene) -
     return TransferPlanner(
         arm,
         transfer_limits(arm.robot, settings.speed),
-        ClearanceModel.of(scene.bodies),
-        settings.clearance,
+        ClearanceModel.of(scene.bodies, settings.clearance),
     )

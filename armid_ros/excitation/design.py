@@ -153,7 +153,9 @@ def design(
 
     """
     problem = DesignProblem.of(arm, settings, rng, rival)
-    clearance = None if collision is None else ClearanceModel.of(collision)
+    clearance = None
+    if collision is not None:
+        clearance = ClearanceModel.of(collision, settings.clearance)
     prior = None if prior_information is None else np.asarray(prior_information, dtype=float)
     if prior is not None:
         expected = (problem.base.rank,) * 2

@@ -36,8 +36,6 @@ class MotionGate:
         is at least the largest acceleration of the run.
     clearance : ClearanceModel or None
         Bodies to keep apart, the floor among them.
-    margin : float
-        Clearance to keep [m].
     effort : ndarray, shape (n,)
         Largest predicted effort of each joint, at least 10 % of its limit [N m or N].
 
@@ -46,7 +44,6 @@ class MotionGate:
     run: Run
     limits: Limits
     clearance: ClearanceModel | None
-    margin: float
     effort: FloatArray
 
     @classmethod
@@ -79,14 +76,14 @@ class MotionGate:
         # a joint may need a tenth of its limit for its dry friction
         room = np.where(np.isfinite(robot.torque_limit), 0.1 * robot.torque_limit, 0.0)
         effort = np.maximum(np.abs(torque).max(axis=0), room)
-        gate = cls(run, limits, planner.clearance, planner.margin, effort)
+        gate = cls(run, limits, planner.clearance, effort)
         violations = check_limits(limits, motion, torque)
         if violations:
             raise TrajectoryError(f'the run is not sent: {violations[0]}')
         # intervals of 0.1 s at the beginning of the proof
         times = np.linspace(0.0, run.duration, int(np.ceil(run.duration / 0.1)) + 1)
         if planner.clearance is not None:
-            near = planner.clearance.first_fault(run.at, 1.5 * peak, times, planner.margin)
+            near = planner.clearance.first_fault(run.at, 1.5 * peak, times)
             if near is not None:
                 raise TrajectoryError(f'the run is not sent: {near}')
         return gate
@@ -152,7 +149,7 @@ class MotionGate:
                 f"joint '{joint}' stands {step.max():.3g} from its set point, over {largest:g}"
             )
         inside = np.clip(measured, self.limits.lower, self.limits.upper)
-        near = clear_line(self.clearance, self.margin, set_point, inside)
+        near = clear_line(self.clearance, set_point, inside)
         if near is not None:
             raise TrajectoryError(
                 f'{near.first} and {near.second} would be {near.distance:.4f} m apart'

@@ -55,15 +55,12 @@ class TransferPlanner:
         Limits in force.
     clearance : ClearanceModel or None
         Bodies to keep apart, the floor among them.
-    margin : float
-        Clearance to keep [m].
 
     """
 
     arm: ArmModel
     limits: Limits
     clearance: ClearanceModel | None
-    margin: float
 
     def __call__(
         self, start: FloatArray, goal: FloatArray, shortest: float = 0.0, seed: int = 0
@@ -98,7 +95,6 @@ class TransferPlanner:
                 raise TrajectoryError(f'the pose that {name} is not free: {fault}')
         poses = find_path(
             self.clearance,
-            self.margin,
             (start, goal),
             (limits.lower, limits.upper),
             lambda q: not self._overload(q),
@@ -131,12 +127,12 @@ class TransferPlanner:
         overload = self._overload(q[np.newaxis])
         if violations or overload:
             return '; '.join([*map(str, violations), *filter(None, [overload])])
-        near = clear_line(self.clearance, self.margin, q, q)
-        if near is None:
+        near = clear_line(self.clearance, q, q)
+        if near is None or self.clearance is None:
             return ''
         return (
             f'{near.first} and {near.second} are {near.distance:.4f} m apart, less than the '
-            f'clearance of {self.margin:g} m'
+            f'clearance of {self.clearance.margin:g} m'
         )
 
     def free_start(self) -> FloatArray:
@@ -169,7 +165,7 @@ class TransferPlanner:
 
     def _always_near(self, poses: FloatArray) -> str:
         """Return a phrase on the bodies that are most often too close, and a clearance."""
-        near = [clear_line(self.clearance, self.margin, q, q) for q in poses]
+        near = [clear_line(self.clearance, q, q) for q in poses]
         pairs = Counter((one.first, one.second) for one in near if one is not None)
         if not pairs:
             return ''

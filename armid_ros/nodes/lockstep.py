@@ -138,7 +138,7 @@ def run_lockstep(
         )
         robot = arm.plant.robot
         limits = Limits.of(robot, speed=1.0, reserve=False)
-        planner = TransferPlanner(ArmModel(robot), limits, None, 0.0)  # nothing can be hit
+        planner = TransferPlanner(ArmModel(robot), limits, None)  # nothing can be hit
         publisher = stage.add(
             ExcitationPublisherNode, excitation, planner, start=False, approach=approach
         )

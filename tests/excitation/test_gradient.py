@@ -114,8 +114,7 @@ def test_gradient_of_the_constraints(humanoid, humanoid_collision, with_effects,
     problem = DesignProblem.of(arm, settings, rng)
     constraints = Constraints(
         problem,
-        ClearanceModel.of(humanoid_collision),
-        margin=0.01,
+        ClearanceModel.of(humanoid_collision, 0.01),
         reserve=0.01,
         sharpness=60.0,
         more_times=np.array([0.123]),
@@ -132,9 +131,7 @@ def test_soft_maximum_is_never_below_the_maximum(two_link_arm):
     settings = DesignSettings(period=5.0, harmonics=2)
     rng = np.random.default_rng(6)
     problem = DesignProblem.of(two_link_arm, settings, rng)
-    constraints = Constraints(
-        problem, None, margin=0.0, reserve=0.0, sharpness=60.0, more_times=np.empty(0)
-    )
+    constraints = Constraints(problem, None, reserve=0.0, sharpness=60.0, more_times=np.empty(0))
     for factor in (0.5, 1.0, 2.0):
         x = coefficients(problem, rng) * np.array([1.0, *[factor] * 4])
         values, _ = constraints.value(x)

@@ -82,7 +82,7 @@ def test_peak_between_the_samples_is_found(limits, swing, two_link):
     between = swing.shifted(0.3 * 10.0 / 200)
     tight = replace(limits, upper=np.array([2.0, 1.0 - 1e-9]))
     assert not check_limits(tight, between.one_period(200))
-    assert trajectory_faults(ArmModel(two_link), tight, between, None, 0.0)
+    assert trajectory_faults(ArmModel(two_link), tight, between, None)
 
 
 def test_joints_of_another_robot_are_refused(limits, swing):

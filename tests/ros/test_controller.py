@@ -45,7 +45,7 @@ def arm(bench, request):
 
 def free_planner():
     """Plan without bodies: the excitations here are drawn without looking at any."""
-    return TransferPlanner(ArmModel(ROBOT), transfer_limits(ROBOT, 1.0), None, 0.0)
+    return TransferPlanner(ArmModel(ROBOT), transfer_limits(ROBOT, 1.0), None)
 
 
 def waiting(bench, excitation, **parameters):

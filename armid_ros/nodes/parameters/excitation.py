@@ -237,8 +237,8 @@ def make_planner(value: Values) -> tuple[TransferPlanner, tuple[str, ...]]:
     arm = load_model(value('model'), robot) if value('model') else ArmModel(robot)
     scene = CollisionScene.of(robot, value('clearance'), value('floor'), value('environment'))
     limits = transfer_limits(arm.robot, value('speed'))
-    clearance = ClearanceModel.of(scene.bodies)
-    planner = TransferPlanner(arm, limits, clearance, scene.clearance)
+    clearance = ClearanceModel.of(scene.bodies, scene.clearance)
+    planner = TransferPlanner(arm, limits, clearance)
     unchecked = scene.unchecked
     if others:
         unchecked += (f'{", ".join(others)} (not driven, as they belong to no arm)',)
@@ -314,8 +314,7 @@ def checked(excitation: Excitation, planner: TransferPlanner, source: str) -> Ex
     excitation = excitation.for_joints(robot.joints)
     limits = Limits.of(robot, speed=1.0, reserve=False)
     limits = replace(limits, acceleration=robot.acceleration_limit)
-    rules = (planner.clearance, planner.margin)
-    faults = trajectory_faults(planner.arm, limits, excitation.trajectory, *rules)
+    faults = trajectory_faults(planner.arm, limits, excitation.trajectory, planner.clearance)
     faults = faults or excitation_faults(planner.arm, limits, excitation)
     if faults:
         raise TrajectoryError(f'{source}: {faults}')
