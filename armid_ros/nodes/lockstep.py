@@ -136,9 +136,8 @@ def run_lockstep(
         plant = stage.add(
             SimulatedArmNode, arm, EPOCH_NS, rate=rate, real_time_factor=0.0, use_sim_time=False
         )
-        robot = arm.plant.robot
-        limits = Limits.of(robot, speed=1.0, reserve=False)
-        planner = TransferPlanner(ArmModel(robot), limits, None)  # nothing can be hit
+        limits = Limits.of(arm.plant.robot, speed=1.0, reserve=False)
+        planner = TransferPlanner(ArmModel(arm.plant.robot), limits, None)  # nothing can be hit
         publisher = stage.add(
             ExcitationPublisherNode, excitation, planner, start=False, approach=approach
         )

@@ -25,6 +25,7 @@ from armid_ros.excitation import (
     whole_period,
     with_joint_limits,
 )
+from armid_ros.files import reading
 from armid_ros.nodes.parameters.table import NodeParameter, Values
 from armid_ros.robots import load_arms, load_robot
 import numpy as np
@@ -306,12 +307,8 @@ def checked(excitation: Excitation, planner: TransferPlanner, source: str) -> Ex
 
     """
     robot = planner.arm.robot
-    if set(excitation.joints) != set(robot.joints):
-        raise TrajectoryError(
-            f'{source}: moves {", ".join(excitation.joints)}, but {robot.name} has '
-            f'{", ".join(robot.joints)}'
-        )
-    excitation = excitation.for_joints(robot.joints)
+    with reading(source, TrajectoryError):
+        excitation = excitation.for_joints(robot.joints)
     limits = Limits.of(robot, speed=1.0, reserve=False)
     limits = replace(limits, acceleration=robot.acceleration_limit)
     faults = trajectory_faults(planner.arm, limits, excitation.trajectory, planner.clearance)
