@@ -75,12 +75,12 @@ def humanoid(seed):
     )
     (result, seconds, cpu) = timed(lambda: design(arm, settings, rng, collision=collision))
     problem = DesignProblem.of(arm, settings, rng)
-    clearance = ClearanceModel.of(collision)
+    clearance = ClearanceModel.of(collision, 0.01)
     plain = [narrow(arm, problem, clearance, rng) for _ in range(20)]
     unseen = [
-        random_feasible(
-            arm, problem.limits, 20.0, 3, rng, collision=clearance, margin=0.01
-        ).one_period(LUNAR_SAMPLES)
+        random_feasible(arm, problem.limits, 20.0, 3, rng, clearance=clearance).one_period(
+            LUNAR_SAMPLES
+        )
         for _ in range(HELD_OUT)
     ]
     ours = result.excitation.trajectory
@@ -133,7 +133,7 @@ def arm_table(name, arguments):
     for effect in ('viscous_friction', 'coulomb_friction'):
         arm = arm.with_effect(make_effect(effect, arm.robot))
     collision = collision_model(arm.robot)
-    clearance = ClearanceModel.of(collision)
+    clearance = ClearanceModel.of(collision, 0.01)
     settings = DesignSettings(period=20.0, harmonics=5, n_periods=1, rate=RATE)
     rng = np.random.default_rng(arguments.seed)
     problem = DesignProblem.of(arm, settings, rng)
@@ -155,7 +155,7 @@ def arm_table(name, arguments):
 
     def draw():
         draws = [
-            random_feasible(arm, problem.limits, 20.0, 5, rng, collision=clearance, margin=0.01)
+            random_feasible(arm, problem.limits, 20.0, 5, rng, clearance=clearance)
             for _ in range(arguments.random)
         ]
         return draws, [evaluate(problem, one).information for one in draws]

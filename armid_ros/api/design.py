@@ -138,8 +138,10 @@ def design_excitation(
     """
     model = drivable(arm)
     if joint_limits is not None:
-        model, known = _limited(model, joint_limits)
-        acceleration = known if acceleration is None else acceleration
+        model = _limited(model, joint_limits)
+    if acceleration is not None:
+        given = np.nan_to_num(acceleration, nan=np.inf)
+        model = replace(model, robot=replace(model.robot, acceleration_limit=given))
     # one search of an arm of many joints: each step of it takes seconds
     searches, seconds = (1, 25.0) if model.robot.n_joints > 20 else (4, 120.0)
     run_in = min(2.0, 0.1 * duration)  # [s]
@@ -153,7 +155,6 @@ def design_excitation(
         target=target,
         focus=focus,
         harmonics=harmonics,
-        acceleration=acceleration,
         noise=noise,
         clearance=clearance,
         starts=searches if starts is None else starts,
@@ -201,15 +202,12 @@ def _searched(
     return ExcitationResult(found, model, scene, start, names, rng if isinstance(rng, int) else 0)
 
 
-def _limited(
-    model: ArmModel, given: str | Path | Mapping[str, float]
-) -> tuple[ArmModel, FloatArray | None]:
-    """Apply the joint limits of a file or mapping; return the model and acceleration limits."""
+def _limited(model: ArmModel, given: str | Path | Mapping[str, float]) -> ArmModel:
+    """Return the model with the joint limits of a file or mapping."""
     named = given if isinstance(given, Mapping) else {}
     file = None if isinstance(given, Mapping) else given
     velocity = [f'{joint}:={limit}' for joint, limit in named.items()]
-    robot, acceleration = with_joint_limits(model.robot, file, velocity)
-    return replace(model, robot=robot), acceleration
+    return replace(model, robot=with_joint_limits(model.robot, file, velocity))
 
 
 def _information(

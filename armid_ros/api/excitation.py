@@ -280,7 +280,6 @@ def planner_of(arm: ArmModel, settings: DesignSettings, scene: CollisionScene) -
     """Return a planner of approach and return motions."""
     return TransferPlanner(
         arm,
-        transfer_limits(arm.robot, settings.speed, settings.acceleration),
-        ClearanceModel.of(scene.bodies),
-        settings.clearance,
+        transfer_limits(arm.robot, settings.speed),
+        ClearanceModel.of(scene.bodies, settings.clearance),
     )

@@ -125,8 +125,7 @@ def reference_of(
     if isinstance(trajectory, (str, Path)):
         path = Path(trajectory)
         if path.is_dir() or path.suffix in ('.mcap', '.db3'):
-            read = read_waypoints(path, robot.joints, settings=settings)
-            return Reference(read.joints, read.t, read.q, read.dq, read.ddq, read.tau)
+            return read_waypoints(path, robot.joints, settings=settings)
         trajectory = load_excitation(path)
     if isinstance(trajectory, Excitation):
         trajectory = trajectory.motion(1000.0)  # [Hz]

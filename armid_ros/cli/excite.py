@@ -241,7 +241,7 @@ def excite(
 
     _refuse_other_options(click.get_current_context(), kind)
     robot = _driven(robot_source, gravity, joints, after)
-    robot, limits = with_joint_limits(robot, joint_limits, velocity)
+    robot = with_joint_limits(robot, joint_limits, velocity)
     with progress('reading meshes') as tick:
         scene = CollisionScene.of(robot, clearance, floor, environment, progress=tick)
     if kind in COURSES:
@@ -253,8 +253,6 @@ def excite(
     arm = options.with_effects(arm, focus)
     for text in texts:
         arm = arm.with_effect(*parse_effect(text, robot))
-    if acceleration is not None:
-        limits = options.per_joint(acceleration, robot, '--acceleration')
     require_free(out)
     staged = options.stage(out, ExcitationResult.schema, robot_source)
     beside = [path for path in (model, environment, joint_limits) if path is not None]
@@ -268,7 +266,7 @@ def excite(
             after=options.read(after, robot, None),
             rival=other,
             focus=tuple(name.partition('@')[0] for name in parted(focus) if name),
-            acceleration=limits,
+            acceleration=options.per_joint(acceleration, robot, '--acceleration'),
             noise=options.per_joint(torque_noise, robot, '--torque-noise'),
             clearance=clearance,
             rng=seed,

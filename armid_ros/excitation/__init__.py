@@ -29,10 +29,9 @@ from armid_ros.excitation.limits import (
     check_limits,
     Limits,
     SPEED_CLASSES,
-    used_shares,
     with_joint_limits,
 )
-from armid_ros.excitation.pose_monitor import JointState, PoseMonitor
+from armid_ros.excitation.pose_monitor import PoseMonitor
 from armid_ros.excitation.problem import DesignProblem, DesignSettings, TARGETS, whole_period
 from armid_ros.excitation.run import plan_run, Run
 from armid_ros.excitation.scene import CollisionScene, Fitness, fitness
@@ -60,7 +59,6 @@ __all__ = [
     'FourierTrajectory',
     'Information',
     'Limits',
-    'JointState',
     'MeasuredPose',
     'MotionGate',
     'PoseMonitor',
@@ -91,7 +89,6 @@ __all__ = [
     'tracking_fault',
     'trajectory_faults',
     'transfer_limits',
-    'used_shares',
     'whole_period',
     'with_joint_limits',
     'with_obstacles',

@@ -12,7 +12,7 @@ from armid_ros.errors import TrajectoryError
 from armid_ros.excitation.feasibility import excitation_faults
 from armid_ros.excitation.fourier import FourierTrajectory
 from armid_ros.excitation.geometry.clearance import ClearanceModel
-from armid_ros.excitation.limits import Limits, used_shares
+from armid_ros.excitation.limits import Limits
 from armid_ros.excitation.problem import DesignProblem, DesignSettings
 from armid_ros.excitation.schedule import Excitation
 from armid_ros.excitation.search.criteria import Information
@@ -92,11 +92,20 @@ class Design:
         Returns
         -------
         dict of str to ndarray, shape (n,)
-            See `used_shares`.
+            'position': largest distance from the middle of the range over half of it; 'velocity',
+            'acceleration' and 'torque': largest absolute value over the limit. 0 without a limit.
 
         """
-        motion = self.excitation.motion(self.settings.rate)
-        return used_shares(self.limits, motion, arm.joint_torque(motion))
+        limits, motion = self.limits, self.excitation.motion(self.settings.rate)
+        half = 0.5 * (limits.upper - limits.lower)
+        middle = np.subtract(limits.upper, half, out=np.zeros_like(half), where=np.isfinite(half))
+        used = {
+            'position': (motion.q - middle, half),
+            'velocity': (motion.dq, limits.velocity),
+            'acceleration': (motion.ddq, limits.acceleration),
+            'torque': (arm.joint_torque(motion), limits.torque),
+        }
+        return {name: np.abs(x).max(axis=0) / bound for name, (x, bound) in used.items()}
 
 
 def design(
@@ -144,7 +153,9 @@ def design(
 
     """
     problem = DesignProblem.of(arm, settings, rng, rival)
-    clearance = None if collision is None else ClearanceModel.of(collision)
+    clearance = None
+    if collision is not None:
+        clearance = ClearanceModel.of(collision, settings.clearance)
     prior = None if prior_information is None else np.asarray(prior_information, dtype=float)
     if prior is not None:
         expected = (problem.base.rank,) * 2

@@ -20,7 +20,6 @@ from armid_ros.excitation.geometry.clearance import Approach, ClearanceModel
 from armid_ros.excitation.limits import check_limits, Limits, Violation
 from armid_ros.excitation.schedule import Excitation
 from armid_ros.motion import FloatArray, Motion
-from armid_ros.robots import CollisionModel
 from armid_ros.robots.robot import position_range
 import numpy as np
 
@@ -43,7 +42,6 @@ def trajectory_faults(
     limits: Limits,
     trajectory: FourierTrajectory,
     clearance: ClearanceModel | None,
-    margin: float,
 ) -> Faults:
     """
     Return the faults of a periodic trajectory, at and between all samples.
@@ -58,8 +56,6 @@ def trajectory_faults(
         The trajectory.
     clearance : ClearanceModel or None
         Bodies to keep apart.
-    margin : float
-        Clearance to keep [m].
 
     """
     motion = trajectory.one_period(_DENSITY * trajectory.harmonics)
@@ -69,7 +65,7 @@ def trajectory_faults(
     # intervals at the beginning of the proof
     times = np.linspace(0.0, trajectory.period, 20 * trajectory.harmonics + 1)
     _, acceleration, _ = trajectory.bounds()
-    approach = clearance.first_fault(trajectory.motion, acceleration, times, margin)
+    approach = clearance.first_fault(trajectory.motion, acceleration, times)
     return Faults(violations if approach is None else (*violations, approach))
 
 
@@ -130,8 +126,7 @@ def random_feasible(
     harmonics: int,
     rng: np.random.Generator,
     *,
-    collision: CollisionModel | ClearanceModel | None = None,
-    margin: float = 0.0,
+    clearance: ClearanceModel | None = None,
 ) -> FourierTrajectory:
     """
     Draw a random trajectory that keeps all limits and the clearance, also between samples.
@@ -152,10 +147,8 @@ def random_feasible(
         Number of harmonics.
     rng : Generator
         Source of randomness.
-    collision : CollisionModel or ClearanceModel, optional
+    clearance : ClearanceModel, optional
         Bodies to keep apart.
-    margin : float
-        Clearance to keep [m].
 
     Raises
     ------
@@ -163,22 +156,19 @@ def random_feasible(
         If no solution was found; the message names the joint and its limit, or the bodies.
 
     """
-    clearance = (
-        ClearanceModel.of(collision) if isinstance(collision, CollisionModel) else collision
-    )
     for _ in range(60):
         trajectory = _draw(limits, period, harmonics, rng)
-        found = _shrunk(arm, limits, trajectory, clearance, margin, _SHRINKS)
+        found = _shrunk(arm, limits, trajectory, clearance, _SHRINKS)
         if found is not None:
             return found
-    centre = feasible_pose(arm, limits, rng, clearance, margin)
+    centre = feasible_pose(arm, limits, rng, clearance)
     trajectory = _draw(limits, period, harmonics, rng)
     around = FourierTrajectory(limits.joints, period, centre, trajectory.a, trajectory.b)
-    found = _shrunk(arm, limits, around, clearance, margin, 8 * _SHRINKS)
+    found = _shrunk(arm, limits, around, clearance, 8 * _SHRINKS)
     if found is None:
         raise TrajectoryError(
             f'no motion is possible about the pose {", ".join(f"{x:.2f}" for x in centre)}'
-            f': {trajectory_faults(arm, limits, around.scaled(0.01), clearance, margin)}'
+            f': {trajectory_faults(arm, limits, around.scaled(0.01), clearance)}'
         )
     return found
 
@@ -188,7 +178,6 @@ def feasible_pose(
     limits: Limits,
     rng: np.random.Generator,
     clearance: ClearanceModel | None,
-    margin: float,
 ) -> FloatArray:
     """
     Return the pose with the largest clearance among random poses that the arm can hold.
@@ -222,13 +211,13 @@ def feasible_pose(
     if clearance is None:
         best = np.flatnonzero(held)[int(np.argmin(load[held].max(axis=1)))]
         return np.asarray(q[best])
-    apart = np.where(held, clearance.smallest(q, reach=margin + 1.0), -np.inf)
+    apart = np.where(held, clearance.smallest(q, reach=clearance.margin + 1.0), -np.inf)
     best = int(np.argmax(apart))
-    if apart[best] <= margin:
+    if apart[best] <= clearance.margin:
         nearest = clearance.closest(motion.select(np.array([best])))
         assert nearest is not None  # without pairs the clearance is infinite
         raise TrajectoryError(
-            f'no pose keeps a clearance of {margin:g} m; in the best one '
+            f'no pose keeps a clearance of {clearance.margin:g} m; in the best one '
             f'{nearest.first} and {nearest.second} are {nearest.distance:.4f} m apart'
         )
     return np.asarray(q[best])
@@ -267,19 +256,20 @@ def _shrunk(
     limits: Limits,
     trajectory: FourierTrajectory,
     clearance: ClearanceModel | None,
-    margin: float,
     shrinks: int,
 ) -> FourierTrajectory | None:
     """Reduce the amplitudes of a trajectory until it is feasible."""
 
     def clear(q: FloatArray) -> bool:
-        return clearance is None or bool(clearance.smallest(q, margin + 1e-6).min() > margin)
+        if clearance is None:
+            return True
+        return bool(clearance.smallest(q, clearance.margin + 1e-6).min() > clearance.margin)
 
     for _ in range(shrinks):
         # most trajectories that collide do so in a few samples
         coarse = trajectory.one_period(_SAMPLES * trajectory.harmonics).q
         if clear(trajectory.q0[np.newaxis]) and clear(coarse):
-            if not trajectory_faults(arm, limits, trajectory, clearance, margin):
+            if not trajectory_faults(arm, limits, trajectory, clearance):
                 return trajectory
         trajectory = trajectory.scaled(0.75)
     return None
@@ -339,19 +329,13 @@ class Template:
         # joints
         for _ in range(6):
             whole = random_feasible(
-                arm,
-                limits,
-                self.period,
-                self.harmonics,
-                rng,
-                collision=clearance,
-                margin=CLEARANCE,
+                arm, limits, self.period, self.harmonics, rng, clearance=clearance
             )
             size = np.ptp(whole.one_period(40 * self.harmonics).q, axis=0) / 2.0
             moving = [not self.joints or joint in self.joints for joint in whole.joints]
             share = np.minimum(1.0, self.amplitude / np.maximum(size, 1e-9))
             trajectory = whole.scaled(np.where(moving, share, 0.0))
-            found = trajectory_faults(arm, limits, trajectory, clearance, CLEARANCE)
+            found = trajectory_faults(arm, limits, trajectory, clearance)
             if not found:
                 return trajectory
             faults = str(found)

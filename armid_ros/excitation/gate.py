@@ -36,8 +36,6 @@ class MotionGate:
         is at least the largest acceleration of the run.
     clearance : ClearanceModel or None
         Bodies to keep apart, the floor among them.
-    margin : float
-        Clearance to keep [m].
     effort : ndarray, shape (n,)
         Largest predicted effort of each joint, at least 10 % of its limit [N m or N].
 
@@ -46,7 +44,6 @@ class MotionGate:
     run: Run
     limits: Limits
     clearance: ClearanceModel | None
-    margin: float
     effort: FloatArray
 
     @classmethod
@@ -59,7 +56,7 @@ class MotionGate:
         run : Run
             The run to send.
         planner : TransferPlanner
-            Planner with the arm, limits and bodies. Without limits, no limit is checked.
+            Planner with the arm, limits and bodies.
 
         Raises
         ------
@@ -72,25 +69,21 @@ class MotionGate:
         torque = arm.joint_torque(motion)
         peak = np.abs(motion.ddq).max(axis=0)
         robot = arm.robot
-        none = np.full(robot.n_joints, np.inf)
-        limits = Limits(robot.joints, robot.lower, robot.upper, none, none, none, robot.prismatic)
-        if planner.limits is not None:
-            given = planner.acceleration
-            limits = Limits.of(robot, speed=1.0, reserve=False, acceleration=given)
+        limits = Limits.of(robot, speed=1.0, reserve=False)
         usual = np.maximum(limits.acceleration, 1.001 * peak)
-        fixed = np.isfinite(planner.given_acceleration)
+        fixed = np.isfinite(robot.acceleration_limit)
         limits = replace(limits, acceleration=np.where(fixed, limits.acceleration, usual))
         # a joint may need a tenth of its limit for its dry friction
         room = np.where(np.isfinite(robot.torque_limit), 0.1 * robot.torque_limit, 0.0)
         effort = np.maximum(np.abs(torque).max(axis=0), room)
-        gate = cls(run, limits, planner.clearance, planner.margin, effort)
-        violations = check_limits(limits, motion, torque) if planner.limits is not None else ()
+        gate = cls(run, limits, planner.clearance, effort)
+        violations = check_limits(limits, motion, torque)
         if violations:
             raise TrajectoryError(f'the run is not sent: {violations[0]}')
         # intervals of 0.1 s at the beginning of the proof
         times = np.linspace(0.0, run.duration, int(np.ceil(run.duration / 0.1)) + 1)
         if planner.clearance is not None:
-            near = planner.clearance.first_fault(run.at, 1.5 * peak, times, planner.margin)
+            near = planner.clearance.first_fault(run.at, 1.5 * peak, times)
             if near is not None:
                 raise TrajectoryError(f'the run is not sent: {near}')
         return gate
@@ -156,7 +149,7 @@ class MotionGate:
                 f"joint '{joint}' stands {step.max():.3g} from its set point, over {largest:g}"
             )
         inside = np.clip(measured, self.limits.lower, self.limits.upper)
-        near = clear_line(self.clearance, self.margin, set_point, inside)
+        near = clear_line(self.clearance, set_point, inside)
         if near is not None:
             raise TrajectoryError(
                 f'{near.first} and {near.second} would be {near.distance:.4f} m apart'

@@ -86,7 +86,6 @@ class Limits:
         *,
         speed: str | float = 'fast',
         reserve: bool = True,
-        acceleration: npt.ArrayLike | None = None,
     ) -> Limits:
         """
         Return the limits of a robot, by default with a reserve.
@@ -94,17 +93,14 @@ class Limits:
         Parameters
         ----------
         robot : Robot
-            Robot with position, velocity and torque limits; a joint without a velocity limit gets
-            `SLOW_VELOCITY`.
+            Robot with the limits. A joint without a velocity limit gets `SLOW_VELOCITY`; one
+            without an acceleration limit reaches its top speed in 0.25 s.
         speed : str or float
             'slow', 'medium' or 'fast', or the share of the velocity and acceleration limits that
             may be used.
         reserve : bool
             Whether a tenth of the torque limits is kept free, as the prior model is not exact,
             and 2 % of the joint's range at every position limit.
-        acceleration : array_like, shape (n,), optional
-            Acceleration limits [rad/s^2 or m/s^2]. By default, and where one is NaN, a joint
-            reaches its top speed in 0.25 s.
 
         Raises
         ------
@@ -124,15 +120,13 @@ class Limits:
         # 2 % of the range are kept free at each end, and a tenth of the torque limit
         margin = 0.02 * reserve * np.where(np.isfinite(span), span, 0.0)
         top = np.where(has_velocity_limit(robot), robot.velocity_limit, SLOW_VELOCITY)
-        given = (
-            np.full(robot.n_joints, np.nan) if acceleration is None else np.asarray(acceleration)
-        )
+        given = robot.acceleration_limit
         return cls(
             joints=robot.joints,
             lower=robot.lower + margin,
             upper=robot.upper - margin,
             velocity=share * top,
-            acceleration=share * np.where(np.isnan(given), top / TIME_TO_TOP_SPEED, given),
+            acceleration=share * np.where(np.isinf(given), top / TIME_TO_TOP_SPEED, given),
             torque=(1.0 - 0.1 * reserve) * robot.torque_limit,
             prismatic=robot.prismatic,
         )
@@ -229,8 +223,11 @@ def check_limits(
         ('lower position', motion.q, limits.lower, limits.lower - slack - motion.q),
         ('upper position', motion.q, limits.upper, motion.q - limits.upper - slack),
     ]
-    for name, values, bound in _rates(limits, motion, motion.tau if torque is None else torque):
-        checks.append((name, values, bound, np.abs(values) - (1.0 + _ROUNDING) * bound))
+    tau = motion.tau if torque is None else torque
+    for name, values in (('velocity', motion.dq), ('acceleration', motion.ddq), ('torque', tau)):
+        if values is not None:
+            bound = getattr(limits, name)
+            checks.append((name, values, bound, np.abs(values) - (1.0 + _ROUNDING) * bound))
     found = []
     for name, values, bound, excess in checks:
         for j in np.flatnonzero((excess > 0.0).any(axis=0)):
@@ -247,36 +244,6 @@ def check_limits(
                 )
             )
     return tuple(found)
-
-
-def _rates(
-    limits: Limits, motion: Motion, torque: FloatArray | None
-) -> list[tuple[str, FloatArray, FloatArray]]:
-    """Return name, values and limits of velocity, acceleration and torque."""
-    rates = [
-        ('velocity', motion.dq, limits.velocity),
-        ('acceleration', motion.ddq, limits.acceleration),
-    ]
-    return rates if torque is None else [*rates, ('torque', torque, limits.torque)]
-
-
-def used_shares(limits: Limits, motion: Motion, torque: FloatArray) -> dict[str, FloatArray]:
-    """
-    Return the share of every limit that a motion uses.
-
-    Returns
-    -------
-    dict of str to ndarray, shape (n,)
-        'position': largest distance from the middle of the range over half of it; 'velocity',
-        'acceleration' and 'torque': largest absolute value over the limit. 0 without a limit.
-
-    """
-    half = 0.5 * (limits.upper - limits.lower)
-    middle = np.subtract(limits.upper, half, out=np.zeros_like(half), where=np.isfinite(half))
-    shares = {'position': np.abs(motion.q - middle).max(axis=0) / half}
-    for name, values, bound in _rates(limits, motion, torque):
-        shares[name] = np.abs(values).max(axis=0) / bound
-    return shares
 
 
 def require_radians(robot: Robot) -> None:
@@ -296,9 +263,9 @@ def require_radians(robot: Robot) -> None:
 
 def with_joint_limits(
     robot: Robot, path: str | Path | None = None, velocity: Sequence[str] = ()
-) -> tuple[Robot, FloatArray | None]:
+) -> Robot:
     """
-    Return a robot with the given position and velocity limits, and its acceleration limits.
+    Return a robot with the given position, velocity and acceleration limits.
 
     Parameters
     ----------
@@ -310,13 +277,6 @@ def with_joint_limits(
     velocity : sequence of str
         'joint:=value' [rad/s or m/s]; these replace all other velocity limits.
 
-    Returns
-    -------
-    robot : Robot
-        The robot with these position and velocity limits.
-    acceleration : ndarray, shape (n,), or None
-        Limits [rad/s^2 or m/s^2], NaN where none is given; None without a file.
-
     Raises
     ------
     TrajectoryError
@@ -324,9 +284,8 @@ def with_joint_limits(
         range is empty, or a joint is unknown.
 
     """
-    acceleration = None
     if path:
-        robot, acceleration = _with_file(robot, Path(path))
+        robot = _with_file(robot, Path(path))
     top = np.array(robot.velocity_limit)
     for text in velocity:
         joint, assigned, number = text.partition(':=')
@@ -336,15 +295,14 @@ def with_joint_limits(
             )
         with reading(f'joint {joint}', TrajectoryError):
             top[robot.joints.index(joint)] = _positive(number, 'velocity')
-    return replace(robot, velocity_limit=top), acceleration
+    return replace(robot, velocity_limit=top)
 
 
-def _with_file(robot: Robot, path: Path) -> tuple[Robot, FloatArray]:
-    """Return a robot with the limits of a file, and acceleration limits (n,), NaN if not given."""
-    top, lower, upper = (
-        np.array(limit) for limit in (robot.velocity_limit, robot.lower, robot.upper)
-    )
-    acceleration = np.full(robot.n_joints, np.nan)
+def _with_file(robot: Robot, path: Path) -> Robot:
+    """Return a robot with the limits of a file."""
+    names = ('velocity_limit', 'acceleration_limit', 'lower', 'upper')
+    limits: dict[str, Any] = {name: np.array(getattr(robot, name)) for name in names}
+    top, acceleration, lower, upper = limits.values()
     text = read_text(path, TrajectoryError)
     with reading(path, TrajectoryError):
         document = load_yaml(text)
@@ -374,7 +332,7 @@ def _with_file(robot: Robot, path: Path) -> tuple[Robot, FloatArray]:
             if entry.get('has_acceleration_limits'):
                 most = entry.get('max_acceleration')
                 acceleration[j] = _positive(most, f'{joint}: max_acceleration')
-    return replace(robot, lower=lower, upper=upper, velocity_limit=top), acceleration
+    return replace(robot, **limits)
 
 
 def _positive(value: Any, where: str) -> float:

@@ -25,27 +25,6 @@ _WINDOW = 0.5
 _FARTHEST = 1e4
 
 
-class JointState(NamedTuple):
-    """
-    Joint state of some joints, which may include joints of other devices.
-
-    Attributes
-    ----------
-    names : tuple of str
-        Joints.
-    position, velocity : ndarray
-        Position [rad or m] and velocity [rad/s or m/s] of each; velocity may be empty.
-    stamp_ns : int
-        Timestamp [ns]; 0: none.
-
-    """
-
-    names: tuple[str, ...]
-    position: FloatArray
-    velocity: FloatArray
-    stamp_ns: int
-
-
 class _State(NamedTuple):
     """Positions and velocities of the arm's joints in one message, and its arrival time [s]."""
 
@@ -110,9 +89,30 @@ class PoseMonitor:
         """Number of different lists of joint names that were received."""
         return len(self._sources)
 
-    def update(self, message: JointState, now: float) -> None:
-        """Update the filter with the joint state of a message that arrived at time `now` [s]."""
-        names, joints = message.names, self.pose.joints
+    def update(
+        self,
+        names: tuple[str, ...],
+        position: FloatArray,
+        velocity: FloatArray,
+        stamp_ns: int,
+        now: float,
+    ) -> None:
+        """
+        Update the filter with a joint state.
+
+        Parameters
+        ----------
+        names : tuple of str
+            Joints, which may include joints of other devices.
+        position, velocity : ndarray
+            Position [rad or m] and velocity [rad/s or m/s] of each; velocity may be empty.
+        stamp_ns : int
+            Timestamp [ns]; 0: none.
+        now : float
+            Time of arrival [s].
+
+        """
+        joints = self.pose.joints
         if names not in self._sources:
             own = [(k, joints.index(name)) for k, name in enumerate(names) if name in joints]
             columns, indices = np.array(own, dtype=int).reshape(-1, 2).T
@@ -123,11 +123,11 @@ class PoseMonitor:
             return
         q, dq = (
             values[source.columns]
-            if len(values) == len(message.names)
+            if len(values) == len(names)
             else np.full(len(source.joints), np.nan)
-            for values in (message.position, message.velocity)
+            for values in (position, velocity)
         )
-        state = _State(now, message.stamp_ns, q, dq)
+        state = _State(now, stamp_ns, q, dq)
         fault = self._outside(source, q)
         if fault:
             self._reject(fault, now)

@@ -45,9 +45,6 @@ class DesignSettings:
         require it.
     speed : str or float
         'slow', 'medium', 'fast' or a share of the velocity and acceleration limits.
-    acceleration : ndarray, shape (n,), or None
-        Acceleration limits of the drives [rad/s^2 or m/s^2], which a URDF does not contain. None:
-        the top speed is reached in 0.25 s. ``speed`` applies to these limits.
     clearance : float
         Distance to keep between bodies that may touch [m].
     criterion : str
@@ -86,7 +83,6 @@ class DesignSettings:
     n_periods: int = 2
     run_in: float = 2.0
     speed: str | float = 'fast'
-    acceleration: FloatArray | None = None
     clearance: float = 0.01
     criterion: str = 'D'
     balance: float = 1.0
@@ -223,7 +219,7 @@ class DesignProblem:
             If the arm has no such parameter, or no motion can distinguish the arm from the rival.
 
         """
-        limits = Limits.of(arm.robot, speed=settings.speed, acceleration=settings.acceleration)
+        limits = Limits.of(arm.robot, speed=settings.speed)
         noise = torque_noise(arm, settings)
         if (settings.criterion == 'T') != (rival is not None):
             raise TrajectoryError(

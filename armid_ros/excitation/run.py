@@ -133,8 +133,7 @@ def plan_run(
         If no way was found; the message names the obstruction.
 
     """
-    if planner.limits is not None:
-        excitation = _unwound(excitation, planner.arm, planner.limits, start)
+    excitation = _unwound(excitation, planner.arm, planner.limits, start)
     first, last = excitation.at([0.0, excitation.duration]).q
     there = planner(start, first, shortest, seed)
     home = planner(start, last, shortest, seed).reversed() if back else None

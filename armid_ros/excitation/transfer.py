@@ -12,60 +12,29 @@ from armid_ros.errors import TrajectoryError
 from armid_ros.excitation.geometry.clearance import ClearanceModel
 from armid_ros.excitation.geometry.paths import clear_line, find_path
 from armid_ros.excitation.limits import check_limits, Limits, SLOW_VELOCITY, SPEED_CLASSES
-from armid_ros.motion import FloatArray, freeze, Motion
+from armid_ros.motion import FloatArray, Motion
 from armid_ros.robots import Robot
+from armid_ros.robots.reference import Reference
 import numpy as np
 import numpy.typing as npt
 
 
-@dataclass(frozen=True)
-class Transfer:
-    """
-    Straight lines in joint space from pose to pose, with a stop at each.
-
-    Attributes
-    ----------
-    joints : tuple of str
-        n joint names.
-    t : ndarray, shape (K,)
-        Time at each pose, from 0 on [s].
-    q : ndarray, shape (K, n)
-        Poses [rad or m].
-
-    """
-
-    joints: tuple[str, ...]
-    t: FloatArray
-    q: FloatArray
+@dataclass(frozen=True, eq=False)
+class Transfer(Reference):
+    """Straight lines in joint space from pose to pose, with a stop at each."""
 
     def __post_init__(self) -> None:
-        """Freeze the arrays."""
-        freeze(self, 't', 'q')
-
-    @property
-    def duration(self) -> float:
-        """Duration from rest to rest [s]."""
-        return float(self.t[-1])
+        """Set velocity and acceleration of every pose to zero."""
+        for name in ('dq', 'ddq'):
+            object.__setattr__(self, name, np.zeros_like(self.q))
+        super().__post_init__()
 
     def at(self, t: npt.ArrayLike) -> Motion:
         """Evaluate the way at times of shape (N,) [s]; at rest before its start and after it."""
-        time = np.clip(np.asarray(t, dtype=float), 0.0, self.duration)
-        k = np.clip(np.searchsorted(self.t, time, side='right') - 1, 0, len(self.t) - 2)
-        span = np.diff(self.t)[k][:, np.newaxis]
-        x = (time - self.t[k])[:, np.newaxis] / span
-        way = np.diff(self.q, axis=0)[k]
-        return Motion(
-            self.joints,
-            time,
-            self.q[k] + way * x**3 * (10.0 - 15.0 * x + 6.0 * x**2),
-            way / span * 30.0 * x**2 * (1.0 - x) ** 2,
-            way / span**2 * 60.0 * x * (1.0 - x) * (1.0 - 2.0 * x),
-        )
+        return self.sample(np.clip(np.asarray(t, dtype=float), 0.0, self.duration))
 
     def lasting(self, duration: float) -> Transfer:
         """Return the same way with another duration [s]."""
-        if not self.duration > 0.0:
-            return replace(self, t=np.linspace(0.0, duration, len(self.t)))
         return replace(self, t=self.t * (duration / self.duration))
 
     def reversed(self) -> Transfer:
@@ -82,29 +51,16 @@ class TransferPlanner:
     ----------
     arm : ArmModel
         Prior model, for the torque.
-    limits : Limits or None
-        Limits in force. None: no limit is checked, and the duration is ``shortest``.
+    limits : Limits
+        Limits in force.
     clearance : ClearanceModel or None
         Bodies to keep apart, the floor among them.
-    margin : float
-        Clearance to keep [m].
-    acceleration : ndarray, shape (n,), or None
-        Given acceleration limits of any motion [rad/s^2 or m/s^2]; NaN: not given.
 
     """
 
     arm: ArmModel
-    limits: Limits | None
+    limits: Limits
     clearance: ClearanceModel | None
-    margin: float
-    acceleration: FloatArray | None = None
-
-    @property
-    def given_acceleration(self) -> FloatArray:
-        """Return the acceleration limits [rad/s^2 or m/s^2]; infinite if not given."""
-        if self.acceleration is None:
-            return np.full(self.arm.robot.n_joints, np.inf)
-        return np.nan_to_num(self.acceleration, nan=np.inf)
 
     def __call__(
         self, start: FloatArray, goal: FloatArray, shortest: float = 0.0, seed: int = 0
@@ -128,11 +84,9 @@ class TransferPlanner:
             limit or the bodies.
 
         """
-        joints = self.arm.robot.joints
-        if self.limits is None:
-            return Transfer(joints, np.array([0.0, shortest]), np.vstack([start, goal]))
+        limits = self.limits
         # a pose measured slightly beyond a limit is moved onto the limit
-        inside = np.clip(start, self.limits.lower, self.limits.upper)
+        inside = np.clip(start, limits.lower, limits.upper)
         # tolerance beyond a position limit for a measured position [rad or m]
         start = np.where(np.abs(start - inside) <= 0.01, inside, start)
         for name, q in (('it would leave from', start), ('it would go to', goal)):
@@ -141,15 +95,12 @@ class TransferPlanner:
                 raise TrajectoryError(f'the pose that {name} is not free: {fault}')
         poses = find_path(
             self.clearance,
-            self.margin,
             (start, goal),
-            (self.limits.lower, self.limits.upper),
+            (limits.lower, limits.upper),
             lambda q: not self._overload(q),
             np.random.default_rng(seed),
         )
         # a path with the duration that the limits require
-        limits = self.limits
-        assert limits is not None
         way = np.abs(np.diff(poses, axis=0))
         velocity = np.where(np.isfinite(limits.velocity), limits.velocity, SLOW_VELOCITY)
         # largest velocity and acceleration of a quintic from 0 to 1 in unit time
@@ -157,7 +108,8 @@ class TransferPlanner:
             (1.875 * way / velocity).max(axis=1),
             np.sqrt((10.0 / np.sqrt(3.0)) * way / limits.acceleration).max(axis=1),
         )
-        t = np.append(0.0, np.cumsum(needed))
+        # a way on which no joint moves takes a time as well
+        t = np.append(0.0, np.cumsum(np.maximum(needed, 1e-6)))
         transfer = Transfer(limits.joints, t, poses)
         transfer = transfer.lasting(max(transfer.duration, shortest))
         for _ in range(20):  # durations, each longer than the last
@@ -171,17 +123,16 @@ class TransferPlanner:
 
     def fault(self, q: FloatArray) -> str:
         """Return why an arm may not stand in a pose, shape (n,); empty if it may."""
-        assert self.limits is not None
         violations = check_limits(self.limits, Motion.of_states(self.limits.joints, q, 0.0, 0.0))
         overload = self._overload(q[np.newaxis])
         if violations or overload:
             return '; '.join([*map(str, violations), *filter(None, [overload])])
-        near = clear_line(self.clearance, self.margin, q, q)
-        if near is None:
+        near = clear_line(self.clearance, q, q)
+        if near is None or self.clearance is None:
             return ''
         return (
             f'{near.first} and {near.second} are {near.distance:.4f} m apart, less than the '
-            f'clearance of {self.margin:g} m'
+            f'clearance of {self.clearance.margin:g} m'
         )
 
     def free_start(self) -> FloatArray:
@@ -194,7 +145,6 @@ class TransferPlanner:
             If no pose about zero is free.
 
         """
-        assert self.limits is not None
         zero = self.arm.robot.zero_pose
         reason = self.fault(zero)
         if not reason:
@@ -215,7 +165,7 @@ class TransferPlanner:
 
     def _always_near(self, poses: FloatArray) -> str:
         """Return a phrase on the bodies that are most often too close, and a clearance."""
-        near = [clear_line(self.clearance, self.margin, q, q) for q in poses]
+        near = [clear_line(self.clearance, q, q) for q in poses]
         pairs = Counter((one.first, one.second) for one in near if one is not None)
         if not pairs:
             return ''
@@ -238,7 +188,6 @@ class TransferPlanner:
 
     def _overload(self, q: FloatArray) -> str:
         """Return a message if a joint cannot hold some of the poses, shape (N, n)."""
-        assert self.limits is not None
         if not np.isfinite(self.limits.torque).any():
             return ''
         torque = np.abs(self.arm.joint_torque(Motion.of_states(self.limits.joints, q, 0.0, 0.0)))
@@ -253,9 +202,7 @@ class TransferPlanner:
         )
 
 
-def transfer_limits(
-    robot: Robot, speed: str | float = 'slow', acceleration: FloatArray | None = None
-) -> Limits:
+def transfer_limits(robot: Robot, speed: str | float = 'slow') -> Limits:
     """
     Return the limits of a way, which is slow because it identifies no parameters.
 
@@ -266,11 +213,9 @@ def transfer_limits(
         end.
     speed : str or float
         Speed of the run; a way is never faster.
-    acceleration : ndarray, shape (n,), optional
-        Acceleration limits [rad/s^2 or m/s^2].
 
     """
-    run = Limits.of(robot, speed=speed, reserve=False, acceleration=acceleration)
+    run = Limits.of(robot, speed=speed, reserve=False)
     share = SPEED_CLASSES[speed] if isinstance(speed, str) else float(speed)
     slow = min(1.0, SPEED_CLASSES['slow'] / share)
     # acceleration that is slow for any joint, used with `SLOW_VELOCITY` [rad/s^2 or m/s^2]

@@ -8,7 +8,6 @@ from collections.abc import Callable, Iterable
 import math
 from typing import Any
 
-from armid_ros.excitation import JointState as State
 from armid_ros.excitation import PoseMonitor
 from armid_ros.excitation.pose_monitor import AGREEING
 from armid_ros.motion import FloatArray
@@ -150,9 +149,8 @@ class ArmWatch:
     def _on_joint_states(self, data: bytes) -> None:
         message = self._messages.read(data)
         stamp = message.sec * 10**9 + message.nanosec
-        state = State(message.names, message.position, message.velocity, stamp)
         now = self.now()
-        self.monitor.update(state, now)
+        self.monitor.update(message.names, message.position, message.velocity, stamp, now)
         self.stamps.take(stamp)
         self._efforts = message.names, message.effort
         self._on_state(now)

@@ -14,13 +14,13 @@ from armid_ros.errors import ArmidError, RecordingError
 from armid_ros.excitation import jump_fault, MeasuredPose
 from armid_ros.nodes.base import ArmidNode
 from armid_ros.nodes.messages.classes import message_class
-from armid_ros.nodes.parameters.table import names, NodeParameter
+from armid_ros.nodes.parameters.table import NodeParameter
 from armid_ros.nodes.qos import offered
 from armid_ros.nodes.running.process import run
-from armid_ros.nodes.trajectory.messages import read_trajectory
 from armid_ros.recording.bag import Bag
 from armid_ros.recording.message_types import JOINT_TRAJECTORY
 from armid_ros.recording.source import RawMessage
+from armid_ros.recording.trajectory import waypoints_of
 from armid_ros.robots import robot_from_urdf
 import numpy as np
 from rclpy.clock import Clock, ClockType
@@ -62,7 +62,7 @@ class _JumpGuard:
     def objection(self, cdr: bytes) -> str:
         """Return why a JointTrajectory must not be sent to the arm; empty if it may."""
         try:
-            reference = read_trajectory(deserialize_message(cdr, JointTrajectory))
+            reference = waypoints_of(deserialize_message(cdr, JointTrajectory))
         except ArmidError as error:
             return str(error)
         pose = MeasuredPose.unknown(reference.joints)
@@ -169,7 +169,7 @@ class BagPlayerNode(ArmidNode):
         self._bag = Bag(self.value('bag'))
         self._lock_step = bool(self.value('use_sim_time'))
         self.check({'clock_rate': self.value('clock_rate')})
-        self._wanted = {self.resolve_topic_name(name) for name in names(self, 'topics')}
+        self._wanted = {self.resolve_topic_name(name) for name in self.value('topics')}
         self._refused = ''
         self._topics = self._make_publishers()
         types = {t.name: t.type_name for t in self._bag.topics() if t.name in self._topics}

@@ -6,11 +6,12 @@ from __future__ import annotations
 
 from abc import abstractmethod
 from collections.abc import Callable, Mapping, Sequence
+from functools import wraps
 from pathlib import Path
 from typing import Any, ClassVar
 
 from armid_ros.errors import ArmidError, OutputError
-from armid_ros.nodes.complaints import Complaints, FATAL, surviving
+from armid_ros.nodes.complaints import Complaints, FATAL
 from armid_ros.nodes.parameters.table import as_declared, declare, is_as, NodeParameter, unknown
 from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus, KeyValue
 from rcl_interfaces.msg import SetParametersResult
@@ -89,15 +90,34 @@ class ArmidNode(Node):
     ) -> Subscription:
         """Subscribe as in rclpy; exceptions of the callback do not end the node."""
         return super().create_subscription(
-            msg_type, topic, self._surviving(callback, topic), *args, **more
+            msg_type, topic, self.surviving(callback, topic), *args, **more
         )
 
     def create_timer(
         self, timer_period_sec: float, callback: Callable[[], None], *args: Any, **more: Any
     ) -> Timer:
         """Make a timer as in rclpy; exceptions of the callback do not end the node."""
-        guarded = self._surviving(callback, getattr(callback, '__name__', 'timer'))
+        guarded = self.surviving(callback, getattr(callback, '__name__', 'timer'))
         return super().create_timer(timer_period_sec, guarded, *args, **more)
+
+    def surviving(self, callback: Callable[..., Any], what: str) -> Callable[..., Any]:
+        """Return a callback that logs exceptions as complaints about their source, a topic."""
+
+        @wraps(callback)
+        def survive(*args: Any) -> Any:
+            try:
+                return callback(*args)
+            except FATAL:
+                raise
+            except ArmidError as error:
+                self.complaints.say(what, f'{what}: {error}')
+            except Exception as error:
+                if not self.context.ok():  # ROS shuts down
+                    raise
+                self.complaints.defect(what, error)
+            return None
+
+        return survive
 
     def look_every(self, seconds: float, callback: Callable[[], None]) -> Timer:
         """Call a function periodically in real time, independent of /clock."""
@@ -210,8 +230,10 @@ class ArmidNode(Node):
         return text
 
     def value(self, parameter: str) -> Any:
-        """Return the value of a parameter."""
-        return self.get_parameter(parameter).value
+        """Return the value of a parameter; of a list of names, those that are not empty."""
+        value = self.get_parameter(parameter).value
+        is_list = isinstance(value, list) and all(isinstance(one, str) for one in value)
+        return tuple(filter(None, value)) if is_list else value
 
     def folder(self, parameter: str) -> Path:
         """Return the folder that a parameter names, and create it if necessary."""
@@ -302,6 +324,3 @@ class ArmidNode(Node):
             self.changed(frozenset(p.name for p in parameters))
         except ArmidError as error:
             self.complaints.say('parameter', str(error))
-
-    def _surviving(self, callback: Callable[..., Any], what: str) -> Callable[..., Any]:
-        return surviving(callback, what, self)

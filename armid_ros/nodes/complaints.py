@@ -5,12 +5,9 @@
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Callable
-from functools import wraps
 import traceback
-from typing import Any
 
-from armid_ros.errors import ArmidError, RecordingEnded
+from armid_ros.errors import RecordingEnded
 from rclpy.impl.rcutils_logger import RcutilsLogger
 
 #: Errors that end a node, such as a full disk during recording.
@@ -66,35 +63,3 @@ class Complaints:
     def settle(self) -> None:
         """Begin a new period of reporting."""
         self.fresh = False
-
-
-def surviving(callback: Callable[..., Any], what: str, node: Any) -> Callable[..., Any]:
-    """
-    Return a callback that logs exceptions as complaints instead of raising.
-
-    Parameters
-    ----------
-    callback : callable
-        Callback of a subscription or a timer.
-    what : str
-        Source of the call, such as a topic.
-    node : ArmidNode
-        Node that logs the complaints. Exceptions during shutdown of ROS are raised.
-
-    """
-
-    @wraps(callback)
-    def survive(*args: Any) -> Any:
-        try:
-            return callback(*args)
-        except FATAL:
-            raise
-        except ArmidError as error:
-            node.complaints.say(what, f'{what}: {error}')
-        except Exception as error:
-            if not node.context.ok():
-                raise
-            node.complaints.defect(what, error)
-        return None
-
-    return survive

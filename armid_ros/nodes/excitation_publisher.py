@@ -36,8 +36,7 @@ from armid_ros.nodes.parameters.excitation import (
 from armid_ros.nodes.parameters.table import declare, NodeParameter
 from armid_ros.nodes.qos import LATCHED
 from armid_ros.nodes.running.process import run
-from armid_ros.nodes.trajectory.messages import write_trajectory
-from armid_ros.nodes.trajectory.senders import TrajectorySenders
+from armid_ros.nodes.trajectory_controller import TrajectoryController, write_trajectory
 import numpy as np
 from std_msgs.msg import String
 
@@ -99,7 +98,7 @@ class ExcitationPublisherNode(ArmidNode):
         self._rehearsal: Rehearsal | None = None
         self._waiting = bool(self.value('start'))
         self._deadline = time.monotonic() + self.value('subscriber_timeout')
-        self._controller = TrajectorySenders(self, self._on_goal_ended)
+        self._controller = TrajectoryController(self, self._on_goal_ended)
         tolerance = self.value('tracking_tolerance')
         self._arm = ArmWatch(self, planner.arm.robot, tolerance, self._on_state)
         self._experiments = self.create_subscription(
@@ -304,7 +303,7 @@ class ExcitationPublisherNode(ArmidNode):
         self._controller.close()
         super().destroy_node()
 
-    def _surviving(self, callback: Callable[..., Any], what: str) -> Callable[..., Any]:
+    def surviving(self, callback: Callable[..., Any], what: str) -> Callable[..., Any]:
         """Return a callback that stops the arm after an unexpected exception."""
 
         @wraps(callback)
@@ -318,7 +317,7 @@ class ExcitationPublisherNode(ArmidNode):
                     self._give_up(f'{what}: {type(error).__name__}: {error}')
                 raise
 
-        return super()._surviving(stopping, what)
+        return super().surviving(stopping, what)
 
     def _on_state(self, now: float) -> None:
         """Compare the measured position and effort with the run."""

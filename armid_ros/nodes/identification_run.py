@@ -19,7 +19,7 @@ from armid_ros.errors import ArmidError, RecordingError, TrajectoryError
 from armid_ros.files.output import refuse_foreign
 from armid_ros.identification.output import SCHEMA as IDENTIFICATION
 from armid_ros.nodes.base import ArmidNode
-from armid_ros.nodes.parameters.table import names, NodeParameter
+from armid_ros.nodes.parameters.table import NodeParameter
 from armid_ros.nodes.running.process import run
 from diagnostic_msgs.msg import DiagnosticArray
 from rclpy.client import Client
@@ -103,7 +103,7 @@ class IdentificationRunNode(ArmidNode):
 
         """
         super().__init__('identification_run', **kwargs)
-        joints, effects = names(self, 'joints') or None, ','.join(names(self, 'effects'))
+        joints, effects = self.value('joints') or None, ','.join(self.value('effects'))
         ArmModel.of(
             self.value('robot'), effects=effects, gravity=self.value('gravity'), joints=joints
         )
@@ -258,8 +258,8 @@ class IdentificationRunNode(ArmidNode):
         validate = [part for bag in held_out for part in ('--validate', bag)]
         options = {name: self.value(name) for name in ('robot', 'gravity')}
         if command == 'identify':
-            options['effects'] = ','.join(names(self, 'effects'))
-        options['joints'] = ','.join(names(self, 'joints'))
+            options['effects'] = ','.join(self.value('effects'))
+        options['joints'] = ','.join(self.value('joints'))
         given = [part for key, text in options.items() if text for part in (f'--{key}', text)]
         program = (command, *fitted, *validate, *given, *more, '--out', str(folder))
         self._program = self._start(program)

@@ -14,7 +14,7 @@ from armid_ros.identification.samples.joint_merge import JointMerger
 from armid_ros.motion import FloatArray
 from armid_ros.nodes.base import ArmidNode, LOOK_PERIOD
 from armid_ros.nodes.messages.classes import message_class
-from armid_ros.nodes.parameters.table import names, NodeParameter, ParameterError
+from armid_ros.nodes.parameters.table import NodeParameter, ParameterError
 from armid_ros.nodes.qos import LATCHED, MatchedSubscription, SAMPLES
 from armid_ros.nodes.running.process import run
 from armid_ros.recording.columns import per_joint
@@ -87,7 +87,7 @@ class JointStateMergerNode(ArmidNode):
         self._lag_ns, self._epoch_ns = 0, 0
         self._efforts: MatchedSubscription | None = None
         self._states = self.create_publisher(JointState, '~/joint_states', SAMPLES)
-        self._topics = names(self, 'position_topics')
+        self._topics = self.value('position_topics')
         if not self._topics:
             raise ParameterError("parameter 'position_topics' names no topic")
         own = not self.value('effort_topic')
@@ -95,8 +95,8 @@ class JointStateMergerNode(ArmidNode):
             MatchedSubscription(self, JointState, topic, partial(self._on_positions, own))
             for topic in self._topics
         ]
-        if names(self, 'joints'):
-            self._adopt(names(self, 'joints'))
+        if self.value('joints'):
+            self._adopt(self.value('joints'))
         else:
             self.create_subscription(
                 String,
@@ -146,7 +146,7 @@ class JointStateMergerNode(ArmidNode):
     def _adopt(self, joints: Sequence[str]) -> None:
         if tuple(joints) == self.joints:
             return
-        others = names(self, 'effort_joints')
+        others = self.value('effort_joints')
         if len(others) not in (0, len(joints)):
             raise ParameterError(
                 f"parameter 'effort_joints' has {len(others)} for {len(joints)} joints: "

@@ -20,7 +20,7 @@ from typing import Any, TypeVar
 
 from armid_ros.arm import ArmModel
 from armid_ros.errors import ArmidError
-from armid_ros.excitation import Excitation, TransferPlanner
+from armid_ros.excitation import Excitation, Limits, TransferPlanner
 from armid_ros.excitation.pose_monitor import AGREEING
 from armid_ros.identification.online.identifier import OnlineIdentifier
 from armid_ros.nodes.bag_player import BagPlayerNode
@@ -136,8 +136,8 @@ def run_lockstep(
         plant = stage.add(
             SimulatedArmNode, arm, EPOCH_NS, rate=rate, real_time_factor=0.0, use_sim_time=False
         )
-        # The simulated arm looks at the limits, and nothing in a simulation can be hit.
-        planner = TransferPlanner(ArmModel(arm.plant.robot), None, None, 0.0)
+        limits = Limits.of(arm.plant.robot, speed=1.0, reserve=False)
+        planner = TransferPlanner(ArmModel(arm.plant.robot), limits, None)  # nothing can be hit
         publisher = stage.add(
             ExcitationPublisherNode, excitation, planner, start=False, approach=approach
         )

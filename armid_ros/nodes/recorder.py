@@ -17,7 +17,7 @@ from armid_ros.errors import ArmidError, RecordingEnded, RecordingError
 from armid_ros.files import size_text
 from armid_ros.nodes.base import ArmidNode, LOOK_PERIOD
 from armid_ros.nodes.messages.classes import message_class
-from armid_ros.nodes.parameters.table import names, NodeParameter
+from armid_ros.nodes.parameters.table import NodeParameter
 from armid_ros.nodes.qos import MatchedSubscription, recorded
 from armid_ros.nodes.running.process import run
 from armid_ros.recording import BagWriter
@@ -222,7 +222,7 @@ class RecorderNode(ArmidNode):
             self.stop()
 
     def _topics_wanted(self) -> set[str]:
-        return {self.resolve_topic_name(name) for name in names(self, 'topics')}
+        return {self.resolve_topic_name(name) for name in self.value('topics')}
 
     def _is_wanted(self, topic: str) -> bool:
         return topic in self._wanted if self._wanted else '/_' not in topic

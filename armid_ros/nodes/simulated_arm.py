@@ -26,8 +26,8 @@ from armid_ros.nodes.parameters.table import NodeParameter
 from armid_ros.nodes.qos import LATCHED, SAMPLES, STREAM
 from armid_ros.nodes.running.process import run
 from armid_ros.nodes.running.real_time import RealTime
-from armid_ros.nodes.trajectory.messages import read_trajectory
 from armid_ros.recording.elastic import imu_topic, LINK, REFERENCE
+from armid_ros.recording.trajectory import waypoints_of
 from armid_ros.simulation import Reference, SimulatedArm
 from armid_ros.simulation.run import whole_steps
 from armid_ros.simulation.simulated_arm import LinkSample
@@ -322,7 +322,7 @@ class SimulatedArmNode(ArmidNode):
 
     def _on_trajectory(self, message: JointTrajectory) -> None:
         try:
-            reference = read_trajectory(message).for_robot(self._arm.plant.robot)
+            reference = waypoints_of(message).for_robot(self._arm.plant.robot)
             if reference.duration > LONGEST:
                 raise TrajectoryError(
                     f'trajectory: it lasts {reference.duration:.4g} s; the longest that is taken '

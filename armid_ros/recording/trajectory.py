@@ -5,9 +5,8 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
 from pathlib import Path
-from typing import Any, TYPE_CHECKING
+from typing import Any
 
 from armid_ros.errors import RecordingError, TrajectoryError
 from armid_ros.files import reading
@@ -17,33 +16,19 @@ from armid_ros.recording.message_types import JOINT_TRAJECTORY, store_for
 from armid_ros.recording.metadata import LATCHED
 from armid_ros.recording.source import DEFAULT, ReadSettings
 from armid_ros.recording.writer import whole_bag
+from armid_ros.robots.reference import Reference
 import numpy as np
 from rosbags.serde import SerdeError
 from rosbags.typesys import get_typestore, Stores
 
-if TYPE_CHECKING:
-    from armid_ros.simulation.reference import Reference
 
-
-@dataclass(frozen=True)
-class ReadWaypoints:
-    """Waypoints of a message: a motion whose rates and torques may be None."""
-
-    joints: tuple[str, ...]
-    t: FloatArray
-    q: FloatArray
-    dq: FloatArray | None
-    ddq: FloatArray | None
-    tau: FloatArray | None
-
-
-def joint_trajectory_cdr(motion: Motion | ReadWaypoints | Reference) -> bytes:
+def joint_trajectory_cdr(motion: Motion | Reference) -> bytes:
     """
     Serialise a motion as one trajectory_msgs/JointTrajectory.
 
     Parameters
     ----------
-    motion : Motion, ReadWaypoints or Reference
+    motion : Motion or Reference
         Motion to serialise. Its times become time_from_start; the stamp 0 means now.
 
     """
@@ -80,7 +65,7 @@ def joint_trajectory_cdr(motion: Motion | ReadWaypoints | Reference) -> bytes:
 
 def write_joint_trajectory(
     path: str | Path,
-    motion: Motion | ReadWaypoints | Reference,
+    motion: Motion | Reference,
     *,
     robot_description: str | None = None,
 ) -> None:
@@ -91,7 +76,7 @@ def write_joint_trajectory(
     ----------
     path : str or Path
         Bag directory to create; it must not exist.
-    motion : Motion, ReadWaypoints or Reference
+    motion : Motion or Reference
         Motion to write. Its torque, if any, is a feedforward effort.
     robot_description : str, optional
         URDF to be written to /robot_description.
@@ -116,7 +101,7 @@ def read_waypoints(
     *,
     topic: str | None = None,
     settings: ReadSettings = DEFAULT,
-) -> ReadWaypoints:
+) -> Reference:
     """
     Read the last JointTrajectory of a bag.
 
@@ -133,7 +118,7 @@ def read_waypoints(
 
     Returns
     -------
-    ReadWaypoints
+    Reference
         Waypoints of the message; velocities, accelerations and efforts are None if the message has
         none.
 
@@ -164,22 +149,18 @@ def read_waypoints(
         )
     if len(found.t) < 2:
         raise RecordingError(f'{where}: a trajectory needs two points, this has {len(found.t)}')
-    if (np.diff(found.t) <= 0).any():
-        at = int(np.flatnonzero(np.diff(found.t) <= 0)[0]) + 1
-        raise RecordingError(f'{where}: time_from_start does not increase at point {at}')
-    columns = [found.joints.index(joint) for joint in joints]
-    rates = (one if one is None else one[:, columns] for one in (found.dq, found.ddq, found.tau))
-    return ReadWaypoints(tuple(joints), found.t, found.q[:, columns], *rates)
+    return found.of_joints(tuple(joints))
 
 
-def waypoints_of(message: Any) -> ReadWaypoints:
+def waypoints_of(message: Any) -> Reference:
     """
     Return the waypoints of a JointTrajectory message decoded by ROS or rosbags.
 
     Raises
     ------
     TrajectoryError
-        If the trajectory has no points, or its points differ in their fields.
+        If the trajectory has no points, its points differ in their fields, a number is not finite,
+        or time does not increase.
 
     """
     points, joints = message.points, tuple(message.joint_names)
@@ -203,4 +184,4 @@ def waypoints_of(message: Any) -> ReadWaypoints:
     if q is None:
         raise TrajectoryError('trajectory: its points have no positions')
     rates = quantity('velocities'), quantity('accelerations')
-    return ReadWaypoints(joints, t, q, *rates, quantity('effort'))
+    return Reference(joints, t, q, *rates, quantity('effort'))

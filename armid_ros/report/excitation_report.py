@@ -49,6 +49,7 @@ from armid_ros.report.page import Page, Section, Templated
 from armid_ros.report.provenance import ResultOrigin
 from armid_ros.report.sections.diagnosed import isolability_section, SHADE
 from armid_ros.report.sections.fit import ZOOM
+from armid_ros.robots import Robot
 import numpy as np
 
 _SAMPLES, _POSES, _WAY = 600, 6, 150
@@ -119,7 +120,7 @@ def excitation_report(
         colours.append(('line', ', '.join(obstacle.name for obstacle in obstacles)))
     sections: list[Section] = [
         replace(
-            _verdict(design, arm.robot.links, shares, checked, collision.notes),
+            _verdict(design, arm.robot, shares, checked, collision.notes),
             step=origin.step,
         ),
         ContentSection('Poses', [poses, Legend(colours)]),
@@ -141,13 +142,13 @@ def excitation_report(
 
 def _verdict(
     design: Design,
-    links: Sequence[str],
+    robot: Robot,
     shares: Mapping[str, FloatArray],
     checked: Fitness,
     notes: Sequence[str],
 ) -> VerdictSection:
     """Return the verdict: parameters seen, the worst known one, and clearance."""
-    settings = design.settings
+    settings, links = design.settings, robot.links
     unseen = [
         full_label(name, links)
         for name, s in zip(design.information.parameters, design.information.std, strict=True)
@@ -170,7 +171,7 @@ def _verdict(
             f'The search was stopped early ({design.stopped}). This is the best result so far; '
             'the same seed may give another one.'
         )
-    if settings.acceleration is None:
+    if np.isinf(robot.acceleration_limit).all():
         beware.append(
             'Acceleration limits are assumed, as a URDF has none: each joint reaches its top '
             'speed in 0.25 s.'

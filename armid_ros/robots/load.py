@@ -209,6 +209,7 @@ def robot_from_urdf(
         upper=np.array([joint.upper for joint in driven]),
         velocity_limit=np.array([joint.velocity for joint in driven]),
         torque_limit=np.array([joint.effort for joint in driven]),
+        acceleration_limit=np.full(len(driven), np.inf),
         prismatic=np.array([joint.kind == 'prismatic' for joint in driven]),
         urdf=text,
         urdf_damping=np.array([joint.damping for joint in driven]),

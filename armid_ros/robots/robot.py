@@ -54,6 +54,8 @@ class Robot:
         [rad/s or m/s], infinite where unlimited.
     torque_limit : ndarray, shape (n,)
         [N m or N], infinite where unlimited.
+    acceleration_limit : ndarray, shape (n,)
+        [rad/s^2 or m/s^2], infinite where none is given; a URDF has none.
     prismatic : ndarray of bool, shape (n,)
         True where a joint slides.
     urdf : str
@@ -84,6 +86,7 @@ class Robot:
     upper: FloatArray
     velocity_limit: FloatArray
     torque_limit: FloatArray
+    acceleration_limit: FloatArray
     prismatic: npt.NDArray[np.bool_]
     urdf: str = field(repr=False)
     urdf_damping: FloatArray = field(repr=False)
@@ -100,7 +103,7 @@ class Robot:
 
     def __post_init__(self) -> None:
         """Freeze the arrays and check that model and names agree."""
-        limits = ('lower', 'upper', 'velocity_limit', 'torque_limit')
+        limits = ('lower', 'upper', 'velocity_limit', 'torque_limit', 'acceleration_limit')
         names = (*limits, 'urdf_damping', 'urdf_friction')
         freeze(self, *names)
         for name in names:

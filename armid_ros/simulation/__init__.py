@@ -9,10 +9,10 @@ plant has an `Elasticity`.
 
 """
 
+from armid_ros.robots.reference import Reference
 from armid_ros.simulation.controller import ComputedTorque, Controller, GravityPD, MotorControl
 from armid_ros.simulation.integrator import step
 from armid_ros.simulation.plant import Plant, State
-from armid_ros.simulation.reference import Reference
 from armid_ros.simulation.run import simulate, SimulatedRun
 from armid_ros.simulation.sensors import Sensors
 from armid_ros.simulation.simulated_arm import SimulatedArm

@@ -230,14 +230,10 @@ class GravityPD(Controller):
     ----------
     arm : ArmModel
         The controller's model of the arm; only its gravity torque is used.
-    stiffness, damping : ndarray, shape (n,)
-        kp [N m/rad or N/m] and kd [N m s/rad or N s/m].
 
     """
 
     arm: ArmModel
-    stiffness: FloatArray = field(init=False)
-    damping: FloatArray = field(init=False)
     feedback: LinearFeedback = field(init=False, repr=False)
 
     def __post_init__(self) -> None:
@@ -246,11 +242,8 @@ class GravityPD(Controller):
         robot = body.robot
         inertia = np.diag(pin.crba(robot.model, robot.model.createData(), robot.middle_pose))
         inertia = inertia + np.diag(body.added_inertia)
-        stiffness = read_only(inertia * BANDWIDTH**2)
-        damping = read_only(2.0 * np.sqrt(inertia * stiffness))
-        feedback = replace(body, stiffness=stiffness, damping=damping)
-        object.__setattr__(self, 'stiffness', stiffness)
-        object.__setattr__(self, 'damping', damping)
+        stiffness, damping = inertia * BANDWIDTH**2, 2.0 * BANDWIDTH * inertia
+        feedback = replace(body, stiffness=read_only(stiffness), damping=read_only(damping))
         object.__setattr__(self, 'feedback', feedback)
 
 

@@ -12,10 +12,10 @@ from armid_ros.effects import make_effect
 from armid_ros.errors import TrajectoryError
 from armid_ros.motion import FloatArray
 from armid_ros.robots import load_robot, Robot
+from armid_ros.robots.reference import Reference
 from armid_ros.robots.two_link import ROBOT, two_link_set, TwoLinkParameters, TwoLinkSet
 from armid_ros.simulation.controller import MotorControl, VelocityLoop
 from armid_ros.simulation.plant import Plant
-from armid_ros.simulation.reference import Reference
 from armid_ros.simulation.sensors import LinkAccelerometers, Sensors
 from armid_ros.simulation.simulated_arm import SimulatedArm
 from armid_ros.simulation.springs import Elasticity

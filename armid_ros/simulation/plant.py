@@ -15,6 +15,7 @@ from armid_ros.errors import ModelError, TrajectoryError
 from armid_ros.model.pseudo_inertia import PER_LINK, pseudo_inertia
 from armid_ros.motion import FloatArray, read_only
 from armid_ros.robots import NO_MASS, Robot
+from armid_ros.robots.reference import limit_slack
 from armid_ros.simulation.contacts import Contacts, Modes, split_constant
 from armid_ros.simulation.springs import Elasticity, ElasticJoints
 import numpy as np
@@ -87,10 +88,6 @@ def _of_negative_mass(robot: Robot) -> str:
         if mass < 0.0
     ]
     return ', '.join(named)
-
-
-#: Tolerance beyond a position limit, as a share of the range between the limits.
-LIMIT_TOLERANCE = 1e-6
 
 
 class Rotors(NamedTuple):
@@ -365,12 +362,6 @@ class Plant:
             )
             self._at_stops[key] = Contacts.of(elements)
         return self._at_stops[key]
-
-
-def limit_slack(robot: Robot) -> FloatArray:
-    """Return the tolerance beyond a position limit [rad or m], shape (n,)."""
-    span = robot.upper - robot.lower
-    return np.asarray(LIMIT_TOLERANCE * np.where(np.isfinite(span), span, 1.0))
 
 
 def _damping_weight(robot: Robot, inertia: FloatArray, damping: FloatArray, dt: float) -> float:

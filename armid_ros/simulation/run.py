@@ -10,9 +10,9 @@ from dataclasses import dataclass, replace
 from armid_ros.arm import ArmModel
 from armid_ros.errors import ModelError
 from armid_ros.motion import ElasticRun, FloatArray, freeze, Motion
+from armid_ros.robots.reference import Reference
 from armid_ros.simulation.controller import Controller
 from armid_ros.simulation.plant import Plant
-from armid_ros.simulation.reference import Reference
 from armid_ros.simulation.sensors import readings, Sensors
 from armid_ros.simulation.simulated_arm import SimulatedArm
 import numpy as np

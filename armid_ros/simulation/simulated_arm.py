@@ -10,10 +10,10 @@ from dataclasses import dataclass, replace
 from armid_ros.arm import ArmModel
 from armid_ros.errors import ModelError, TrajectoryError
 from armid_ros.motion import FloatArray, Motion
+from armid_ros.robots.reference import Reference
 from armid_ros.simulation.closed_loop import command, CompiledLoop, run, Trace
 from armid_ros.simulation.controller import ComputedTorque, Controller, MotorControl, Targets
 from armid_ros.simulation.plant import Plant, State
-from armid_ros.simulation.reference import Reference
 from armid_ros.simulation.sensors import LinkAccelerometers, RecentPast, Sensors
 import numpy as np
 import numpy.typing as npt

@@ -43,7 +43,8 @@ def excite(robot, out, *options, code=0):
 
 
 def plan_of(robot, out):
-    return Motion(**vars(read_waypoints(out / 'trajectory', load_robot(robot).joints)))
+    read = read_waypoints(out / 'trajectory', load_robot(robot).joints)
+    return Motion(read.joints, read.t, read.q, read.dq, read.ddq, read.tau)
 
 
 @pytest.fixture(scope='module')

@@ -6,7 +6,7 @@ from armid_ros.cli.demo.steps import hidden_change, HiddenChange, ROBOT, show_hi
 from armid_ros.diagnosis import diagnose
 from armid_ros.effects import parse_effect
 from armid_ros.errors import ModelError
-from armid_ros.excitation import Limits, random_feasible
+from armid_ros.excitation import ClearanceModel, Limits, random_feasible
 from armid_ros.robots import collision_model, load_robot
 import numpy as np
 import pytest
@@ -21,7 +21,8 @@ def robot():
 
 def test_every_change_shows_in_the_torque_and_is_possible(robot):
     arm, rng = true_arm(robot), np.random.default_rng(0)
-    drawn = random_feasible(arm, Limits.of(robot), 8.0, 5, rng, collision=collision_model(robot))
+    bodies = ClearanceModel.of(collision_model(robot))
+    drawn = random_feasible(arm, Limits.of(robot), 8.0, 5, rng, clearance=bodies)
     motion = drawn.one_period(400)
     whole = arm.torque(motion)
     every = {str(one.effect): one for one in (hidden_change(robot, rng) for _ in range(100))}

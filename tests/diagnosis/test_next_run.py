@@ -96,10 +96,10 @@ def test_a_run_that_tells_nothing_is_none(bench):
 
 def test_the_arm_can_make_the_run_without_hitting_its_own_pedestal(bench, chosen):
     bodies = collision_model(bench.robot)
-    clearance = ClearanceModel.of(bodies)
+    clearance = ClearanceModel.of(bodies, CLEARANCE)
     limits = Limits.of(bench.robot, speed=0.9)
     run = chosen.excitation
-    assert not trajectory_faults(bench.arm, limits, run.trajectory, clearance, CLEARANCE)
+    assert not trajectory_faults(bench.arm, limits, run.trajectory, clearance)
     assert not excitation_faults(bench.arm, limits, run)
     assert path_clearance(bodies, run.motion(100.0).q).min() >= CLEARANCE
     assert run.n_periods == 2

@@ -24,7 +24,7 @@ def gate(two_link):
     arm = ArmModel(two_link)
     path = random_feasible(arm, Limits.of(two_link), 2.0, 3, np.random.default_rng(1))
     excitation = Excitation(path, 1, 0.5)
-    planner = TransferPlanner(arm, transfer_limits(two_link), None, 0.0)
+    planner = TransferPlanner(arm, transfer_limits(two_link), None)
     run = plan_run(excitation, planner, excitation.at([0.0]).q[0], 100.0)
     return MotionGate.of(run, planner)
 
@@ -47,8 +47,7 @@ def test_a_stop_is_sent_on_the_path_whatever_the_acceleration_limit(gate, share,
 
 def test_a_run_is_held_to_acceleration_limits_that_are_given(gate, two_link):
     peak = np.abs(gate.run.motion().ddq).max(axis=0)
-    given = np.array([np.nan, 0.9 * peak[1]])
-    arm = ArmModel(two_link)
-    planner = TransferPlanner(arm, transfer_limits(two_link), None, 0.0, given)
+    robot = replace(two_link, acceleration_limit=np.array([np.inf, 0.9 * peak[1]]))
+    planner = TransferPlanner(ArmModel(robot), transfer_limits(robot), None)
     with pytest.raises(TrajectoryError, match=f'{two_link.joints[1]}.*acceleration'):
         MotionGate.of(gate.run, planner)

@@ -70,10 +70,12 @@ def test_gradient_of_each_target(humanoid, with_effects, target, effects):
     assert_gradient(Objective(problem), problem)
 
 
-def test_gradient_of_a_subset(two_link_arm):
+def test_gradient_of_a_subset_with_prior_information(two_link_arm):
     settings = DesignSettings(period=5.0, harmonics=2, focus=('coulomb_friction',))
-    problem = DesignProblem.of(two_link_arm, settings, np.random.default_rng(3))
-    assert_gradient(Objective(problem), problem)
+    rng = np.random.default_rng(3)
+    problem = DesignProblem.of(two_link_arm, settings, rng)
+    known = problem.information(random_motion(two_link_arm.robot, rng, 50)).matrix
+    assert_gradient(Objective(problem, known), problem)
 
 
 def test_gradient_against_a_rival(two_link, with_effects):
@@ -82,14 +84,6 @@ def test_gradient_against_a_rival(two_link, with_effects):
     rival = with_effects(two_link, 'coulomb_friction', 'torque_offset')
     problem = DesignProblem.of(arm, settings, np.random.default_rng(3), rival)
     assert_gradient(Objective(problem), problem)
-
-
-def test_gradient_with_prior_information(two_link_arm):
-    settings = DesignSettings(period=5.0, harmonics=2)
-    rng = np.random.default_rng(3)
-    problem = DesignProblem.of(two_link_arm, settings, rng)
-    known = problem.information(random_motion(two_link_arm.robot, rng, 50)).matrix
-    assert_gradient(Objective(problem, known), problem)
 
 
 def assert_gradient(objective, problem):
@@ -120,8 +114,7 @@ def test_gradient_of_the_constraints(humanoid, humanoid_collision, with_effects,
     problem = DesignProblem.of(arm, settings, rng)
     constraints = Constraints(
         problem,
-        ClearanceModel.of(humanoid_collision),
-        margin=0.01,
+        ClearanceModel.of(humanoid_collision, 0.01),
         reserve=0.01,
         sharpness=60.0,
         more_times=np.array([0.123]),
@@ -138,9 +131,7 @@ def test_soft_maximum_is_never_below_the_maximum(two_link_arm):
     settings = DesignSettings(period=5.0, harmonics=2)
     rng = np.random.default_rng(6)
     problem = DesignProblem.of(two_link_arm, settings, rng)
-    constraints = Constraints(
-        problem, None, margin=0.0, reserve=0.0, sharpness=60.0, more_times=np.empty(0)
-    )
+    constraints = Constraints(problem, None, reserve=0.0, sharpness=60.0, more_times=np.empty(0))
     for factor in (0.5, 1.0, 2.0):
         x = coefficients(problem, rng) * np.array([1.0, *[factor] * 4])
         values, _ = constraints.value(x)

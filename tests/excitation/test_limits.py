@@ -3,10 +3,18 @@
 """Limits, and where motions exceed them."""
 
 from dataclasses import replace
+from types import SimpleNamespace
 
 from armid_ros.arm import ArmModel
 from armid_ros.errors import TrajectoryError
-from armid_ros.excitation import check_limits, FourierTrajectory, Limits, used_shares
+from armid_ros.excitation import (
+    check_limits,
+    Design,
+    DesignSettings,
+    Excitation,
+    FourierTrajectory,
+    Limits,
+)
 from armid_ros.excitation.feasibility import trajectory_faults
 import numpy as np
 import pytest
@@ -50,11 +58,14 @@ def test_violation_names_joint_limit_time_and_value(limits, swing, change, limit
     assert 'elbow' in str(violation) and limit in str(violation)
 
 
-def test_a_position_uses_its_limits_by_the_distance_from_the_middle(limits, swing):
+def test_a_position_uses_its_limits_by_the_distance_from_the_middle(limits, swing, two_link):
     """A short way beside one end of the range is near a limit; one without an end uses none."""
     motion = swing.one_period(200)  # the joints stay within 1 rad
     beside = replace(limits, lower=np.array([-9.0, -np.inf]), upper=np.array([1.0, np.inf]))
-    shares = used_shares(beside, motion, 0.0 * motion.q)
+    design = SimpleNamespace(
+        excitation=Excitation(swing), limits=beside, settings=DesignSettings()
+    )
+    shares = Design.limits_used(design, ArmModel(two_link))
     np.testing.assert_allclose(shares['position'], [1.0, 0.0], atol=1e-3)
     assert not any(fault.joint == 'shoulder' for fault in check_limits(beside, motion))
 
@@ -71,7 +82,7 @@ def test_peak_between_the_samples_is_found(limits, swing, two_link):
     between = swing.shifted(0.3 * 10.0 / 200)
     tight = replace(limits, upper=np.array([2.0, 1.0 - 1e-9]))
     assert not check_limits(tight, between.one_period(200))
-    assert trajectory_faults(ArmModel(two_link), tight, between, None, 0.0)
+    assert trajectory_faults(ArmModel(two_link), tight, between, None)
 
 
 def test_joints_of_another_robot_are_refused(limits, swing):

@@ -37,7 +37,7 @@ def test_a_joint_without_a_velocity_limit_is_slow_and_that_is_said(given):
     np.testing.assert_allclose(limits.velocity, [SLOW_VELOCITY, 2.0, 2.0])
     np.testing.assert_allclose(limits.acceleration, limits.velocity / TIME_TO_TOP_SPEED)
     assert any('waist' in line for line in CollisionScene.of(robot, 0.01).unchecked)
-    mended, _ = with_joint_limits(robot, velocity=['waist:=1.5'])
+    mended = with_joint_limits(robot, velocity=['waist:=1.5'])
     assert Limits.of(mended, speed=1.0).velocity[0] == 1.5
     assert not any('velocity' in line for line in CollisionScene.of(mended, 0.01).unchecked)
 
@@ -64,8 +64,8 @@ def test_moveit_limits_are_read(tmp_path):
         '  shoulder: {has_velocity_limits: true, max_velocity: 9.0, has_acceleration_limits: '
         'false, max_acceleration: 0}\n'
     )
-    robot, acceleration = with_joint_limits(robot_from_urdf(arm_urdf()), path)
-    limits = Limits.of(robot, speed=1.0, acceleration=acceleration)
+    robot = with_joint_limits(robot_from_urdf(arm_urdf()), path)
+    limits = Limits.of(robot, speed=1.0)
     np.testing.assert_allclose(limits.velocity, [1.0, 2.0, 2.0])
     np.testing.assert_allclose(limits.acceleration, [3.0, 8.0, 8.0])
     path.write_text('joint_limits: {waist: {has_acceleration_limits: true}}')
@@ -82,7 +82,7 @@ def test_moveit_position_limits_narrow_those_of_the_description(
     path = tmp_path / 'joint_limits.yaml'
     limits = f'has_position_limits: true, min_position: {least}, max_position: {most}'
     path.write_text(f'joint_limits: {{waist: {{{limits}}}, shoulder: }}')  # null: none
-    robot, _ = with_joint_limits(robot_from_urdf(arm_urdf(limit=2.0)), path)
+    robot = with_joint_limits(robot_from_urdf(arm_urdf(limit=2.0)), path)
     np.testing.assert_array_equal(robot.lower, [lower, -1, -1])
     np.testing.assert_array_equal(robot.upper, [upper, 1, 1])
     found = random_feasible(

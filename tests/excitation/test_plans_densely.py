@@ -46,8 +46,8 @@ def planned(path):
         iterations=2, time_budget=60.0,
     )  # fmt: skip
     found = design(arm, settings, np.random.default_rng(0), collision=scene.bodies)
-    clearance = ClearanceModel.of(scene.bodies)
-    planner = TransferPlanner(arm, transfer_limits(robot), clearance, scene.clearance)
+    clearance = ClearanceModel.of(scene.bodies, scene.clearance)
+    planner = TransferPlanner(arm, transfer_limits(robot), clearance)
     start = planner.free_start()
     return robot, plan_run(found.excitation, planner, start, 100.0)
 

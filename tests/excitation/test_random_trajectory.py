@@ -7,7 +7,14 @@ from dataclasses import replace
 from armid_ros.arm import ArmModel
 from armid_ros.effects import make_effect
 from armid_ros.errors import TrajectoryError
-from armid_ros.excitation import check_limits, Limits, Obstacle, random_feasible, with_obstacles
+from armid_ros.excitation import (
+    check_limits,
+    ClearanceModel,
+    Limits,
+    Obstacle,
+    random_feasible,
+    with_obstacles,
+)
 from armid_ros.motion import Motion
 from armid_ros.robots import collision_model
 import numpy as np
@@ -21,7 +28,7 @@ def test_random_trajectories_keep_every_limit(humanoid, humanoid_collision, with
     rng = np.random.default_rng(0)
     for _ in range(5):
         trajectory = random_feasible(
-            arm, limits, 6.0, 3, rng, collision=humanoid_collision, margin=0.01
+            arm, limits, 6.0, 3, rng, clearance=ClearanceModel.of(humanoid_collision, 0.01)
         )
         motion = trajectory.one_period(3000)
         assert not check_limits(limits, motion, arm.torque(motion))
@@ -63,7 +70,12 @@ def test_bodies_that_cannot_be_kept_apart_are_named(two_link_arm):
     )
     with pytest.raises(TrajectoryError, match=r'(upper|lower).*wall'):
         random_feasible(
-            two_link_arm, Limits.of(robot), 6.0, 3, np.random.default_rng(0), collision=walled
+            two_link_arm,
+            Limits.of(robot),
+            6.0,
+            3,
+            np.random.default_rng(0),
+            clearance=ClearanceModel.of(walled),
         )
 
 
@@ -75,7 +87,8 @@ def test_trajectory_in_a_narrow_gap_touches_no_wall(two_link_arm):
     ]
     between = with_obstacles(collision_model(robot), walls)
     limits, rng = Limits.of(robot), np.random.default_rng(0)
-    trajectory = random_feasible(two_link_arm, limits, 6.0, 3, rng, collision=between, margin=0.01)
+    bodies = ClearanceModel.of(between, 0.01)
+    trajectory = random_feasible(two_link_arm, limits, 6.0, 3, rng, clearance=bodies)
     q = trajectory.one_period(3000).q
     assert path_clearance(between, q).min() >= 0.01
     assert np.ptp(q, axis=0).min() > 0.0

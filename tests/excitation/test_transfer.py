@@ -32,8 +32,8 @@ MARGIN = 0.02
 
 
 def planner(robot, *obstacles, speed='slow', margin=MARGIN):
-    clearance = ClearanceModel.of(with_obstacles(collision_model(robot), obstacles))
-    return TransferPlanner(ArmModel(robot), transfer_limits(robot, speed), clearance, margin)
+    clearance = ClearanceModel.of(with_obstacles(collision_model(robot), obstacles), margin)
+    return TransferPlanner(ArmModel(robot), transfer_limits(robot, speed), clearance)
 
 
 def dense(way, count=4001):
@@ -67,20 +67,21 @@ def test_a_way_of_joints_without_limits_is_slow(two_link):
     free = replace(
         transfer_limits(two_link), velocity=np.full(2, np.inf), acceleration=np.full(2, np.inf)
     )
-    way = TransferPlanner(ArmModel(two_link), free, None, 0.0)(np.zeros(2), np.ones(2))
+    way = TransferPlanner(ArmModel(two_link), free, None)(np.zeros(2), np.ones(2))
     assert np.abs(dense(way).dq).max() == pytest.approx(0.5, rel=1e-3)
 
 
 def test_a_way_keeps_the_torque_limits(two_link):
     """Drives that just hold the arm leave nothing for haste."""
-    limits = Limits.of(two_link, speed=1.0, acceleration=np.full(2, 200.0))
+    hasty = replace(two_link, acceleration_limit=np.full(2, 200.0))
+    limits = Limits.of(hasty, speed=1.0)
     arm, goal = ArmModel(two_link), np.array([1.4, 0.0])
-    quick = TransferPlanner(arm, limits, None, 0.0)(np.zeros(2), goal)
+    quick = TransferPlanner(arm, limits, None)(np.zeros(2), goal)
     torque = np.abs(arm.torque(dense(quick))).max(axis=0)
     assert np.all(torque <= limits.torque * (1.0 + 1e-6))
     weak = replace(limits, torque=0.6 * torque)
     with pytest.raises(TrajectoryError, match=r'torque|still'):
-        TransferPlanner(arm, weak, None, 0.0)(np.zeros(2), goal)
+        TransferPlanner(arm, weak, None)(np.zeros(2), goal)
 
 
 def test_a_way_goes_around_what_stands_in_the_straight_one(two_link):
@@ -133,7 +134,7 @@ def test_a_run_is_one_motion_from_its_start(two_link, back, rate):
     """Sampled and evaluated it is the same; it moves without a jump, and the periods are equal."""
     plan, rng = planner(two_link), np.random.default_rng(0)
     limits = Limits.of(two_link, speed='medium')
-    path = random_feasible(plan.arm, limits, 4.0, 3, rng, collision=plan.clearance, margin=MARGIN)
+    path = random_feasible(plan.arm, limits, 4.0, 3, rng, clearance=plan.clearance)
     excitation = Excitation(path, 2, 0.77)
     run = plan_run(excitation, plan, np.zeros(2), rate, back=back)
     motion, exact = run.motion(), run.at(run.motion().t)

@@ -13,7 +13,8 @@ from armid_ros.recording import (
     write_recording,
 )
 from armid_ros.recording.message_types import JOINT_TRAJECTORY
-from armid_ros.recording.trajectory import joint_trajectory_cdr, ReadWaypoints
+from armid_ros.recording.trajectory import joint_trajectory_cdr
+from armid_ros.robots.reference import Reference
 import numpy as np
 import pytest
 from rosbags.typesys import get_typestore, Stores
@@ -42,7 +43,7 @@ def test_a_trajectory_is_read_back_exactly_in_the_order_asked(motion, tmp_path):
 
 
 def test_efforts_are_written_and_what_is_not_known_is_left_out(motion, tmp_path):
-    waypoints = ReadWaypoints(('a', 'b'), motion.t, motion.q, None, None, 5.0 * motion.q)
+    waypoints = Reference(('a', 'b'), motion.t, motion.q, None, None, 5.0 * motion.q)
     write_joint_trajectory(tmp_path / 'bag', waypoints)
     back = read_waypoints(tmp_path / 'bag', ('b', 'a'))
     assert back.dq is None and back.ddq is None

@@ -22,7 +22,7 @@ from armid_ros.arm import ArmModel
 from armid_ros.errors import ArmidError
 from armid_ros.motion import Motion
 from armid_ros.nodes.qos import STREAM
-from armid_ros.nodes.trajectory.messages import read_trajectory
+from armid_ros.recording.trajectory import waypoints_of
 from builtin_interfaces.msg import Time
 from control_msgs.action import FollowJointTrajectory
 import numpy as np
@@ -123,7 +123,7 @@ class Course:
     @classmethod
     def of(cls, message, robot, now, before):
         """Take a message, from a state at a time on."""
-        reference = read_trajectory(message).for_robot(robot)
+        reference = waypoints_of(message).for_robot(robot)
         # Trajectory.sample: a stamp of zero is the time of the first sample
         start = seconds_of(message.header.stamp) or now
         rows = (x for x in (reference.q, reference.dq, reference.ddq) if x is not None)
@@ -359,7 +359,7 @@ class Controller:
         if (start and start + t[-1] < self.now) or np.any(np.diff(t) <= 0.0):
             return False
         try:
-            return read_trajectory(message).tau is None  # no efforts
+            return waypoints_of(message).tau is None  # no efforts
         except ArmidError:
             return False
 

@@ -16,7 +16,7 @@ from armid_ros.excitation import (
 from armid_ros.excitation.schedule import excitation_text
 from armid_ros.nodes.excitation_publisher import ExcitationPublisherNode
 from armid_ros.nodes.qos import LATCHED, STREAM
-from armid_ros.nodes.trajectory.messages import read_trajectory
+from armid_ros.recording.trajectory import waypoints_of
 from armid_ros.robots import load_robot
 import numpy as np
 import pytest
@@ -43,11 +43,22 @@ def arm(bench, request):
     arm.leave()
 
 
-def publisher(bench, arm, excitation, **parameters):
-    planner = TransferPlanner(ArmModel(ROBOT), transfer_limits(ROBOT, 1.0), None, 0.0)
+def free_planner():
+    """Plan without bodies: the excitations here are drawn without looking at any."""
+    return TransferPlanner(ArmModel(ROBOT), transfer_limits(ROBOT, 1.0), None)
+
+
+def waiting(bench, excitation, **parameters):
+    """Make a publisher on simulated time, at 99 s, that begins when it is told."""
     options = {'start': False, 'use_sim_time': True, 'approach': 1.0, 'state_timeout': 0.5}
+    planner = None if excitation is None else free_planner()
     node = bench.add(ExcitationPublisherNode, excitation, planner, **(options | parameters))
     bench.tick(99 * SECOND)
+    return node
+
+
+def publisher(bench, arm, excitation, **parameters):
+    node = waiting(bench, excitation, **parameters)
     arm.run(100.2)
     return node
 
@@ -102,7 +113,7 @@ def test_at_half_the_speed_the_path_is_the_same_and_the_time_twice(bench, arm, e
     assert not set_parameter(node, 'speed_scaling', 2.0).successful
     node.start()
     bench.spin_until(lambda: arm.accepted, 'the trajectory')
-    sent = read_trajectory(arm.accepted[0])
+    sent = waypoints_of(arm.accepted[0])
     slow = excitation.at_speed(0.5, 100.0)
     t = np.linspace(0.0, excitation.duration, 50)
     np.testing.assert_allclose(slow.at(2.0 * t).q, excitation.at(t).q, atol=1e-9)

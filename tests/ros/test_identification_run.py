@@ -83,13 +83,16 @@ def carry_on(bench, arm, node, run, fault=lambda: None):
     pytest.fail(f'still {run.condition()}')
 
 
-def test_two_runs_are_recorded_identified_held_out_and_diagnosed(bench, arm, excitation, tmp_path):
+def test_a_rehearsal_and_two_runs_are_identified_held_out_and_diagnosed(
+    bench, arm, excitation, tmp_path
+):
     programs = Programs()
-    options = {'effects': ['viscous_friction', 'coulomb_friction'], 'gravity': 'moon'}
+    effects = ['viscous_friction', 'coulomb_friction']
+    options = {'effects': effects, 'gravity': 'moon', 'rehearse': True}
     node, run = everything(bench, arm, excitation, tmp_path, programs, **options)
     carry_on(bench, arm, node, run)
     assert not run.failure
-    assert arm.ends == ['succeed', 'succeed']
+    assert arm.ends == ['succeed', 'succeed', 'succeed']
     first, second = tmp_path / 'run', tmp_path / 'run_1'
     for bag in (first, second):
         recording = read_recording(bag, joints=ROBOT.joints)
@@ -104,17 +107,6 @@ def test_two_runs_are_recorded_identified_held_out_and_diagnosed(bench, arm, exc
     assert ('--model', str(tmp_path / 'identification' / 'model.yaml')) == diagnose[-4:-2]
     results = run.condition()[1]['results']
     assert 'good' in results and 'repeatable' in results
-
-
-def test_after_a_rehearsal_that_is_as_foreseen_it_goes_on(bench, arm, excitation, tmp_path):
-    programs = Programs()
-    options = {'rehearse': True, 'runs': 1, 'diagnose': False}
-    node, run = everything(bench, arm, excitation, tmp_path, programs, **options)
-    carry_on(bench, arm, node, run)
-    assert not run.failure
-    assert len(arm.goals) == 2
-    assert [program[0] for program in programs.called] == ['identify']
-    assert '--validate' not in programs.called[0]
 
 
 def test_a_rehearsal_that_surprises_ends_it(bench, arm, excitation, tmp_path):
@@ -148,6 +140,7 @@ def test_data_that_cannot_be_diagnosed_are_an_answer_and_other_failures_are_not(
     programs = Programs(codes=(0, 2), verdict=verdict)
     node, run = everything(bench, arm, excitation, tmp_path, programs, runs=1)
     carry_on(bench, arm, node, run)
+    assert '--validate' not in programs.called[0]
     if verdict == 'bad_data':
         assert not run.failure
         assert 'bad data' in run.condition()[1]['results']

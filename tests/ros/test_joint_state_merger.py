@@ -33,43 +33,19 @@ def sender(bench, node, kind, topic):
 
 
 def test_joints_of_two_senders_are_one_message_in_the_order_asked_for(bench):
-    node, out = merger(bench)
-    first = sender(bench, node, JointState, 'joint_states')
+    node, out = merger(bench, position_topics=['left', 'right'])
+    left, right = (sender(bench, node, JointState, topic) for topic in ('left', 'right'))
     for t in (1.0, 1.1, 1.2):
-        first.publish(
+        left.publish(
             joint_state(t, ['b', 'gripper'], [20.0 * t, 0.0], [2.0, 0.0], [200.0 * t, 9.0])
         )
-        first.publish(joint_state(t - 0.05, ['a'], [t - 0.05], [1.0], [-t]))
+        right.publish(joint_state(t - 0.05, ['a'], [t - 0.05], [1.0], [-t]))
     bench.spin_until(lambda: len(out) >= 2, OUT)
     assert out[0].name == list(JOINTS)
     np.testing.assert_allclose(out[0].position, [1.05, 21.0])
     np.testing.assert_allclose(out[0].velocity, [1.0, 2.0])
     np.testing.assert_allclose(out[0].effort, [-1.1, 210.0])
     assert out[0].header.stamp == stamp_of(1.05)
-
-
-@pytest.mark.parametrize(
-    ('joints', 'waits_for'), [(JOINTS, 'torque of a, b'), (('',), 'robot_description')]
-)
-def test_what_it_waits_for_is_logged_once(bench, joints, waits_for):
-    logged = bench.rosout()
-    node = bench.add(JointStateMergerNode, joints=list(joints))
-    for _ in range(3):
-        node.look_for_trouble()
-    bench.spin_until(lambda: logged, 'the log')
-    bench.settle()
-    (log,) = logged
-    assert waits_for in log.msg
-
-
-def test_joint_states_on_several_topics_are_merged(bench):
-    node, out = merger(bench, position_topics=['left', 'right'])
-    left, right = (sender(bench, node, JointState, topic) for topic in ('left', 'right'))
-    left.publish(joint_state(1.0, ['a'], [1.0], [], [3.0]))
-    right.publish(joint_state(1.0, ['b'], [2.0], [], [4.0]))
-    bench.spin_until(lambda: out, OUT)
-    assert (list(out[0].position), list(out[0].effort)) == ([1.0, 2.0], [3.0, 4.0])
-    assert not out[0].velocity
 
 
 def currents(t, values):
@@ -114,10 +90,14 @@ def test_an_array_without_a_stamp_is_of_the_time_it_comes(bench):
     np.testing.assert_allclose(out[-1].effort, [3.0, 6.0])
 
 
-def test_the_joints_are_those_of_the_description(bench):
-    robot = load_robot('humanoid_arm')
+def test_the_joints_are_those_of_the_description_for_which_it_waits(bench):
+    robot, logged = load_robot('humanoid_arm'), bench.rosout()
     node = bench.add(JointStateMergerNode)
-    assert 'robot_description' in node.condition()[0]
+    for _ in range(3):
+        node.look_for_trouble()
+    bench.spin_until(lambda: logged, 'the log')
+    bench.settle()
+    assert ['robot_description' in log.msg for log in logged] == [True]
     publisher = bench.matched_publisher(String, 'robot_description', LATCHED)
     publisher.publish(String(data=robot.urdf))
     bench.spin_until(lambda: node.joints, 'the joints')

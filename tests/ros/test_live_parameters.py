@@ -55,20 +55,14 @@ def dumped(node: Node) -> list[Parameter]:
 
 
 @pytest.mark.parametrize('kind', NODES)
-def test_what_a_node_was_dumped_with_can_be_loaded_again(bench, tmp_path, kind):
-    node = make(bench, kind, tmp_path)
-    before = dumped(node)
-    results = node.set_parameters(before)
-    assert all(result.successful for result in results)
-    assert [p.value for p in dumped(node)] == [p.value for p in before]
-
-
-@pytest.mark.parametrize('kind', NODES)
-def test_every_number_has_a_range_and_every_live_one_can_be_set_at_both_ends(
+def test_a_dump_can_be_loaded_again_and_every_live_number_set_at_both_ends_of_its_range(
     bench, tmp_path, kind
 ):
     """The range is what a slider of rqt_reconfigure shows."""
     node = make(bench, kind, tmp_path)
+    dump = dumped(node)
+    assert all(result.successful for result in node.set_parameters(dump))
+    assert [p.value for p in dumped(node)] == [p.value for p in dump]
     for entry in node.parameters():
         if isinstance(entry.default, bool) or not isinstance(entry.default, int | float):
             continue

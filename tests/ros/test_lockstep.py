@@ -57,18 +57,16 @@ def run(truth, excitation, bag, learner=None, **options):
 
 @pytest.fixture(scope='module')
 def first_run(truth, robot, excitation, tmp_path_factory):
-    """Return the bag, the result, what was learned, and time and estimate on the way."""
+    """Return the bag, the result, and what was learned."""
     bag, told, learner = tmp_path_factory.mktemp('lockstep') / 'bag', [], identifier(robot)
-
-    def tell(now):
-        told.append((now.t, learner.estimate().values))
-
-    result = run(truth, excitation, bag, learner, approach=APPROACH, on_progress=tell)
-    return bag, result, learner, told
+    options = {'approach': APPROACH, 'on_progress': lambda now: told.append(round(now.t))}
+    result = run(truth, excitation, bag, learner, **options)
+    assert told == list(range(1, len(told) + 1))
+    return bag, result, learner
 
 
 def test_every_sample_is_recorded_on_time(first_run, robot, excitation):
-    bag, result, *_ = first_run
+    bag, result, _ = first_run
     recording = read_recording(bag, joints=robot.joints)
     assert recording.report.clean
     assert recording.start_ns == EPOCH_NS + round(1e9 / RATE)
@@ -88,15 +86,8 @@ def test_the_arm_is_where_the_excitation_is(first_run, robot, excitation):
     np.testing.assert_allclose(reached, wanted, atol=0.01)
 
 
-def test_the_estimate_converges_to_the_truth(first_run, truth):
-    *_, learner, told = first_run
-    assert [round(t) for t, _ in told] == list(range(1, len(told) + 1))
-    error = [np.abs(values - learner.base.values(truth.theta)).max() for _, values in told]
-    assert error[-1] < 0.1 * error[0]
-
-
 def test_a_replay_learns_the_same(first_run, robot):
-    bag, result, learner, _ = first_run
+    bag, result, learner = first_run
     again = identifier(robot)
     replay_lockstep(bag, again, duration=result.t)
     assert again.samples == learner.samples
@@ -114,9 +105,9 @@ def test_another_run_gives_the_same_samples_whether_somebody_learns_or_not(
         np.testing.assert_array_equal(getattr(first, name), getattr(second, name))
 
 
-def test_an_excitation_that_the_arm_refuses_ends_the_run_with_its_reason(
+def test_an_excitation_beyond_the_limits_ends_the_run_with_its_reason(
     truth, robot, excitation, tmp_path
 ):
-    with pytest.raises(ArmidError, match='velocity limit'):
-        run(truth, excitation, tmp_path / 'bag', approach=0.1)
+    with pytest.raises(ArmidError, match='velocity'):
+        run(truth, Excitation(excitation.trajectory.stretched(0.5), 1), tmp_path / 'bag')
     assert len(read_recording(tmp_path / 'bag', joints=robot.joints)) > 0

@@ -4,15 +4,10 @@
 
 from __future__ import annotations
 
-from armid_ros.nodes.parameters.table import (
-    declare,
-    names,
-    NodeParameter,
-    ParameterError,
-)
+from armid_ros.nodes.base import ArmidNode
+from armid_ros.nodes.parameters.table import NodeParameter, ParameterError
 from armid_ros.nodes.recorder import RecorderNode
 import pytest
-from rclpy.node import Node
 from rclpy.parameter import Parameter
 
 TABLE = (
@@ -26,10 +21,14 @@ TABLE = (
 )
 
 
-class Declared(Node):
+class Declared(ArmidNode):
+    table = TABLE
+
     def __init__(self, **kwargs):
         super().__init__('declared', **kwargs)
-        declare(self, TABLE)
+
+    def condition(self):
+        return '', {}
 
 
 @pytest.mark.parametrize(
@@ -59,8 +58,8 @@ def test_an_empty_list_is_no_names(bench, given):
     if 'cli_args' in given:
         given = {'cli_args': ['--ros-args', *given['cli_args']]}
     node = bench.add(Declared, **given)
-    assert names(node, 'names') == ()
-    assert names(bench.add(Declared, namespace='other'), 'names') == ('b',)
+    assert node.value('names') == ()
+    assert bench.add(Declared, namespace='other').value('names') == ('b',)
 
 
 def test_parameters_that_a_node_does_not_have_are_named_once_but_not_those_of_ros(bench, tmp_path):
@@ -75,17 +74,11 @@ def test_parameters_that_a_node_does_not_have_are_named_once_but_not_those_of_ro
     assert node.complaints.counts['parameter'] == 1
 
 
-def test_descriptors_hold_unit_range_choices_and_read_only(bench):
+def test_descriptors_are_complete_and_only_a_valid_value_is_taken_while_running(bench):
     node = bench.add(Declared)
     rate, kind, fixed = (node.describe_parameter(name) for name in ('rate', 'kind', 'fixed'))
-    assert '[Hz]' in rate.description
-    assert rate.floating_point_range[0].to_value == 1000.0
-    assert 'a, b' in kind.description
-    assert fixed.read_only and not rate.read_only
-
-
-def test_a_valid_value_is_taken_while_running_and_an_invalid_one_is_not(bench):
-    node = bench.add(Declared)
+    assert '[Hz]' in rate.description and rate.floating_point_range[0].to_value == 1000.0
+    assert 'a, b' in kind.description and fixed.read_only and not rate.read_only
     results = node.set_parameters(
         [
             Parameter('rate', value=50.0),

@@ -62,9 +62,9 @@ class Bed:
         self.offset, self.changes, self.paths, self.violations = 0.0, [], [], []
         self.set_points = []
         self.arm = Controller(bench, ROBOT, HOME)
-        bodies = ClearanceModel.of(SCENE.bodies)
+        bodies = ClearanceModel.of(SCENE.bodies, SCENE.clearance)
         limits = transfer_limits(ROBOT, 1.0)
-        planner = TransferPlanner(ArmModel(ROBOT), limits, bodies, SCENE.clearance)
+        planner = TransferPlanner(ArmModel(ROBOT), limits, bodies)
         options = {'start': False, 'approach': 1.0, 'tracking_tolerance': TOLERANCE}
         self.node = node = bench.add(
             ExcitationPublisherNode, excitation, planner, **(options | parameters)
@@ -161,8 +161,9 @@ class Bed:
 def excitation():
     rng = np.random.default_rng(3)
     limits = Limits.of(ROBOT, speed='fast')
-    collision = {'collision': SCENE.bodies, 'margin': SCENE.clearance}
-    return Excitation(random_feasible(ArmModel(ROBOT), limits, 2.0, 3, rng, **collision), 1, 0.5)
+    bodies = ClearanceModel.of(SCENE.bodies, SCENE.clearance)
+    drawn = random_feasible(ArmModel(ROBOT), limits, 2.0, 3, rng, clearance=bodies)
+    return Excitation(drawn, 1, 0.5)
 
 
 def other(message, joint, value, *, add=False):

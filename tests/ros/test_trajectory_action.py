@@ -11,7 +11,8 @@ import sys
 from action_msgs.msg import GoalStatus
 from action_msgs.srv import CancelGoal
 from armid_ros.errors import TrajectoryError
-from armid_ros.nodes.trajectory.messages import read_trajectory, write_trajectory
+from armid_ros.nodes.trajectory_controller import write_trajectory
+from armid_ros.recording.trajectory import waypoints_of
 from control_msgs.action import FollowJointTrajectory
 import numpy as np
 import pytest
@@ -43,7 +44,7 @@ def test_the_excitation_is_a_goal_and_no_message(bench, arm, excitation):
     assert {t.position for t in goal.path_tolerance} == {0.3}
     assert {t.position for t in goal.goal_tolerance} == {0.05}
     assert (goal.goal_time_tolerance.sec, goal.goal_time_tolerance.nanosec) == (1, 500_000_000)
-    assert read_trajectory(goal.trajectory).duration == pytest.approx(node.duration, abs=1e-6)
+    assert waypoints_of(goal.trajectory).duration == pytest.approx(node.duration, abs=1e-6)
 
 
 def test_a_run_ends_when_the_controller_says_so(bench, arm, excitation):
@@ -70,7 +71,7 @@ def test_a_goal_that_is_refused_or_not_answered_is_no_run(
     bench, arm, excitation, monkeypatch, deaf, fact
 ):
     if not deaf:
-        monkeypatch.setattr('armid_ros.nodes.trajectory.action._ANSWER', 0.0)
+        monkeypatch.setattr('armid_ros.nodes.trajectory_controller._ANSWER', 0.0)
     node = publisher(bench, arm, excitation)
     arm.faults.deaf = deaf
     node.start()
@@ -225,6 +226,6 @@ def test_without_control_msgs_the_action_cannot_be_asked_for(bench, excitation, 
     monkeypatch.setitem(sys.modules, 'control_msgs.action', None)
     node = publisher(bench, arm, excitation)
     node.start()
-    assert node._controller.action is None
+    assert node._controller.client is None
     with pytest.raises(TrajectoryError, match=r'control_msgs.*apt install'):
         publisher(bench, arm, excitation, interface='action')

@@ -68,7 +68,9 @@ def test_spring_and_damper_sag_under_a_gravity_they_do_not_know(humanoid) -> Non
     missing = run.truth.select(slice(-1, None))
     expected = ArmModel(humanoid).torque(missing)[0] - moon.torque(missing)[0]
     assert np.abs(expected).max() > 1.0
-    np.testing.assert_allclose(controller.stiffness * sag, -expected, rtol=1e-3, atol=1e-4)
+    np.testing.assert_allclose(
+        controller.feedback.stiffness * sag, -expected, rtol=1e-3, atol=1e-4
+    )
 
 
 def test_drives_give_no_more_torque_than_they_have(humanoid) -> None:

@@ -42,13 +42,6 @@ def test_an_arm_of_one_joint_follows(kind):
     assert np.abs(run.truth.q - run.reference.q).max() < 1e-3
 
 
-@pytest.mark.parametrize('rate', [0.0, -5.0, np.nan])
-def test_a_rate_has_to_be_positive(rate):
-    robot = one_joint()
-    with pytest.raises(ModelError, match=r'rate.*Hz'):
-        simulate(ArmModel(robot), sine(robot.joints), rng=np.random.default_rng(0), rate=rate)
-
-
 def test_a_link_of_negative_mass_is_named():
     robot = load_robot('humanoid_arm')
     bodies = robot.rigid_parameters.reshape(-1, 10).copy()

@@ -14,7 +14,7 @@ from armid_ros.cli.terminal import progress, say
 from armid_ros.diagnosis import Diagnosis
 from armid_ros.effects import Effect, make_effect, parse_effect
 from armid_ros.errors import ModelError
-from armid_ros.excitation import Excitation, Limits, random_feasible
+from armid_ros.excitation import ClearanceModel, Excitation, Limits, random_feasible
 from armid_ros.files import load_yaml, read_text, settled
 from armid_ros.motion import FloatArray
 from armid_ros.nodes.lockstep import run_lockstep
@@ -168,12 +168,13 @@ def diagnose_hidden(
         Joint states per second.
 
     """
-    limits, bodies = Limits.of(known.robot), collision_model(known.robot)
+    limits = Limits.of(known.robot)
+    bodies = ClearanceModel.of(collision_model(known.robot))
     changed = truth.with_effect(hidden.effect, hidden.values)
 
     def recorded(name: str) -> Recording:
         # a period of 8 s with 5 harmonics
-        drawn = random_feasible(known, limits, 8.0, 5, rng, collision=bodies)
+        drawn = random_feasible(known, limits, 8.0, 5, rng, clearance=bodies)
         plant = SimulatedArm(changed, rng=rng, sensors=SENSORS)
         with progress(f'recording {name}') as tick:
             run_lockstep(

@@ -146,7 +146,7 @@ def next_run(
     arm = diagnosis.arm
     if not doubts or any(isinstance(effect, Tied) for effect in arm.effects):
         return None
-    clearance = ClearanceModel.of(collision or collision_model(arm.robot))
+    clearance = ClearanceModel.of(collision or collision_model(arm.robot), CLEARANCE)
     joints = dict.fromkeys(joint for doubt in doubts for joint in doubt.joints)
     whole_arm = any(not doubt.joints for doubt in doubts)
     runs: list[_Run] = []

@@ -81,6 +81,8 @@ class ClearanceModel:
     ----------
     collision : CollisionModel
         Bodies and pairs.
+    margin : float
+        Clearance to keep [m].
     joints : ndarray of int, shape (number of bodies,)
         Joint that carries each body, -1 for those that do not move.
     spheres : ndarray, shape (number of bodies, 4)
@@ -99,6 +101,7 @@ class ClearanceModel:
     """
 
     collision: CollisionModel
+    margin: float
     joints: IntArray = field(repr=False)
     spheres: FloatArray = field(repr=False)
     planes: FloatArray = field(repr=False)
@@ -108,8 +111,8 @@ class ClearanceModel:
     levers: FloatArray = field(repr=False)
 
     @classmethod
-    def of(cls, collision: CollisionModel) -> ClearanceModel:
-        """Return the clearance model of a collision model."""
+    def of(cls, collision: CollisionModel, margin: float = 0.0) -> ClearanceModel:
+        """Return the clearance model of a collision model, and the clearance to keep [m]."""
         robot, bodies = collision.robot, list(collision.geometry.geometryObjects)
         joints = np.array([int(body.parentJoint) - 1 for body in bodies], dtype=np.intp)
         spheres, planes = np.zeros((len(bodies), 4)), np.full((len(bodies), 4), np.nan)
@@ -140,7 +143,8 @@ class ClearanceModel:
                 joint = robot.geometry[joint].parent
         first, second = levers[pairs[:, 0]], levers[pairs[:, 1]]
         most = np.where(between > 0.0, second, np.where(between < 0.0, first, 0.0))
-        return cls(collision, joints, spheres, planes, np.arange(len(pairs)), pairs, between, most)
+        numbers = np.arange(len(pairs))
+        return cls(collision, margin, joints, spheres, planes, numbers, pairs, between, most)
 
     def watched(self, q: FloatArray, reach: float) -> ClearanceModel:
         """Return the model with only the pairs that are closer than ``reach`` [m] in a pose."""
@@ -202,10 +206,9 @@ class ClearanceModel:
         path: Callable[[FloatArray], Motion],
         acceleration: FloatArray,
         times: FloatArray,
-        margin: float,
     ) -> Approach | None:
         """
-        Prove that no pair comes closer than a margin on a path, or return an approach that does.
+        Prove that no pair comes closer than the margin on a path, or return an approach that does.
 
         On an interval, the distance of a pair is at least the mean of the distances at both ends,
         minus half the distance that the joints between the bodies can move them. An interval for
@@ -219,8 +222,6 @@ class ClearanceModel:
             Bound on the joint accelerations over the whole path [rad/s^2 or m/s^2].
         times : ndarray, shape (N,)
             Ends of the initial intervals [s].
-        margin : float
-            Clearance to prove [m].
 
         Returns
         -------
@@ -244,13 +245,13 @@ class ClearanceModel:
             speed = np.abs(motion.dq[place[: len(left)]])
             speed += 0.5 * acceleration * duration[:, np.newaxis]
             travel = (self.levers[pair] * speed).sum(axis=1) * duration
-            within = np.full(len(needed), margin)
-            np.maximum.at(within, slot, margin + np.tile(travel, 2))
+            within = np.full(len(needed), self.margin)
+            np.maximum.at(within, slot, self.margin + np.tile(travel, 2))
             distance = self._bound(LinkFrames.of(self.collision.robot, motion.q))[sample, number]
             near = np.flatnonzero(distance < within)
             distance[near] = self._measure(motion.q, sample[near], number[near])[0]
             worst = int(np.argmin(distance))
-            if distance[worst] < margin:
+            if distance[worst] < self.margin:
                 return self._approach(
                     int(number[worst]), float(moment[sample[worst]]), float(distance[worst])
                 )
@@ -258,7 +259,7 @@ class ClearanceModel:
             bound = 0.5 * (ends[: len(left)] + ends[len(left) :] - travel)
             # shortest interval of the proof of clearance [s]; in this time a body moves by less
             # than the extra clearance of a design
-            open_ = (bound < margin) & (duration > 1e-4)
+            open_ = (bound < self.margin) & (duration > 1e-4)
             middle = 0.5 * (left + right)[open_]
             left, right, pair = (
                 np.concatenate([left[open_], middle]),

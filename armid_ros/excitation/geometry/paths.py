@@ -31,7 +31,6 @@ _Free = Callable[[FloatArray, FloatArray], bool]
 
 def find_path(
     clearance: ClearanceModel | None,
-    margin: float,
     ends: tuple[FloatArray, FloatArray],
     limits: tuple[FloatArray, FloatArray],
     held: Held,
@@ -44,8 +43,6 @@ def find_path(
     ----------
     clearance : ClearanceModel or None
         Bodies to keep apart.
-    margin : float
-        Clearance to keep [m].
     ends : tuple of ndarray, shape (n,)
         First and last pose of the path [rad or m].
     limits : tuple of ndarray, shape (n,)
@@ -71,7 +68,7 @@ def find_path(
     def free(first: FloatArray, second: FloatArray) -> bool:
         count = int(np.ceil(np.abs(second - first).max() / _INTERVAL)) + 1
         poses = np.linspace(first, second, count + 1)
-        return held(poses) and clear_line(clearance, margin, first, second) is None
+        return held(poses) and clear_line(clearance, first, second) is None
 
     if free(start, goal):
         return np.vstack([start, goal])
@@ -86,7 +83,7 @@ def find_path(
             path = path if number % 2 == 0 else path[::-1]
             return np.array(_shortened(path, free, rng))
         near, far = far, near
-    blocked = clear_line(clearance, margin, start, goal)
+    blocked = clear_line(clearance, start, goal)
     reason = 'some pose on the straight one is too heavy to hold'
     if blocked is not None:
         reason = (
@@ -97,7 +94,7 @@ def find_path(
 
 
 def clear_line(
-    clearance: ClearanceModel | None, margin: float, start: FloatArray, goal: FloatArray
+    clearance: ClearanceModel | None, start: FloatArray, goal: FloatArray
 ) -> Approach | None:
     """Prove that a straight line between two poses (n,) is clear, or return an approach."""
     if clearance is None:
@@ -111,7 +108,7 @@ def clear_line(
         return Motion(clearance.collision.robot.joints, share, q, dq, np.zeros_like(q))
 
     times = np.linspace(0.0, 1.0, count + 1)
-    return clearance.first_fault(path, np.zeros(len(way)), times, margin)
+    return clearance.first_fault(path, np.zeros(len(way)), times)
 
 
 @dataclass

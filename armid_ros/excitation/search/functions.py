@@ -179,8 +179,6 @@ class Constraints:
         Problem with the limits and the prior model.
     clearance : ClearanceModel or None
         Bodies to keep apart.
-    margin : float
-        Clearance to keep [m].
     reserve : float
         Share of every limit that is kept free for peaks between the samples.
     sharpness : float
@@ -195,12 +193,11 @@ class Constraints:
         problem: DesignProblem,
         clearance: ClearanceModel | None,
         *,
-        margin: float,
         reserve: float,
         sharpness: float,
         more_times: FloatArray,
     ) -> None:
-        self.problem, self.clearance, self.margin = problem, clearance, margin
+        self.problem, self.clearance = problem, clearance
         self.reserve, self.sharpness = reserve, sharpness
         period, harmonics = problem.settings.period, problem.settings.harmonics
         samples = problem.settings.samples
@@ -294,14 +291,15 @@ class Constraints:
     def _clear(self, motion: Motion) -> Part:
         """Return one clearance constraint for every stretch of the period."""
         assert self.clearance is not None
-        near = self.clearance.near(motion.q, self.margin + _CLEARANCE_REACH * _CLEARANCE_UNIT)
+        margin = self.clearance.margin
+        near = self.clearance.near(motion.q, margin + _CLEARANCE_REACH * _CLEARANCE_UNIT)
         stretch = self.t[near.sample] * (_STRETCHES / self.problem.settings.period)
         totals = np.full(_STRETCHES, -_CLEARANCE_REACH)
         weighted: list[tuple[int, npt.NDArray[np.intp], FloatArray]] = []
         for number in range(_STRETCHES):
             rows = np.flatnonzero(stretch.astype(int) == number)
             if len(rows):
-                lack = (self.margin - near.distance[rows]) / _CLEARANCE_UNIT
+                lack = (margin - near.distance[rows]) / _CLEARANCE_UNIT
                 totals[number], weights = self._soft_maximum(lack)
                 weighted.append((number, rows, -weights[:, np.newaxis] / _CLEARANCE_UNIT))
 

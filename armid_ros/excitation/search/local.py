@@ -14,7 +14,7 @@ round.
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import lru_cache
 import math
 import time
@@ -118,8 +118,7 @@ class Search:
                     settings.period,
                     settings.harmonics,
                     self.rng,
-                    collision=self.clearance,
-                    margin=settings.clearance,
+                    clearance=self.clearance,
                 )
                 drawn.append((self.offer(trajectory), trajectory))
             drawn.sort(key=lambda pair: pair[0])
@@ -157,9 +156,10 @@ class Search:
             limits = self.problem.limits
             lower, upper = position_range(limits.lower, limits.upper)
             # The solver ignores pairs of bodies that stay 1 cm beyond the margin in 1000 random
-            # poses; the proof of clearance checks all pairs.
+            # poses, and keeps 1 mm on top of it; the proof of clearance checks all pairs.
             poses = self.rng.uniform(lower, upper, (1000, len(lower)))
-            watched = watched.watched(poses, self.problem.settings.clearance + 0.01)
+            watched = watched.watched(poses, watched.margin + 0.01)
+            watched = replace(watched, margin=watched.margin + 0.001)
         branches = [_Branch(self, objective, watched, start) for start in starts]
         while branches:
             for branch in branches:
@@ -201,11 +201,10 @@ class _Branch:
             return
         problem, clearance = self.search.problem, self.search.clearance
         settings = problem.settings
-        # the solver keeps 0.2 % of every limit free, and 1 mm on top of the margin
+        # the solver keeps 0.2 % of every limit free
         constraints = Constraints(
             problem,
             self.watched,
-            margin=settings.clearance + 0.001,
             reserve=0.002,
             sharpness=self.sharpness,
             more_times=self.times,
@@ -218,8 +217,8 @@ class _Branch:
         torque = np.abs(problem.arm.joint_torque(motion))
         excess = (torque / problem.limits.torque).max(axis=1) - 1.0
         if clearance is not None:
-            margin = problem.settings.clearance
-            excess = np.maximum(excess, margin - clearance.smallest(motion.q, reach=margin))
+            apart = clearance.smallest(motion.q, reach=clearance.margin)
+            excess = np.maximum(excess, clearance.margin - apart)
         peak = (excess >= np.roll(excess, 1)) & (excess > np.roll(excess, -1)) & (excess > 0.0)
         self.times = np.concatenate([self.times, motion.t[peak]])
         feasible = _made_feasible(problem, clearance, trajectory)
@@ -283,9 +282,7 @@ def _made_feasible(
 ) -> FourierTrajectory | None:
     """Reduce the amplitudes of the joints at fault, or of all joints if the joint is unknown."""
     for _ in range(12):  # reductions of the amplitudes
-        faults = trajectory_faults(
-            problem.arm, problem.limits, trajectory, clearance, problem.settings.clearance
-        )
+        faults = trajectory_faults(problem.arm, problem.limits, trajectory, clearance)
         if not faults:
             return trajectory
         own = {v.joint for v in faults if isinstance(v, Violation) and v.limit != 'torque'}

@@ -4,6 +4,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 from armid_ros.arm import ArmModel, load_model
 from armid_ros.effects import make_effect, USUAL_EFFECTS
 from armid_ros.errors import TrajectoryError
@@ -23,6 +25,7 @@ from armid_ros.excitation import (
     whole_period,
     with_joint_limits,
 )
+from armid_ros.files import reading
 from armid_ros.nodes.parameters.table import NodeParameter, Values
 from armid_ros.robots import load_arms, load_robot
 import numpy as np
@@ -229,15 +232,14 @@ def make_planner(value: Values) -> tuple[TransferPlanner, tuple[str, ...]]:
     """
     robot, others = load_arms(
         lambda joints: load_robot(value('robot'), gravity=value('gravity'), joints=joints),
-        tuple(filter(None, value('joints'))) or None,
+        value('joints') or None,
     )
-    given = tuple(filter(None, value('velocity')))
-    robot, acceleration = with_joint_limits(robot, value('joint_limits'), given)
+    robot = with_joint_limits(robot, value('joint_limits'), value('velocity'))
     arm = load_model(value('model'), robot) if value('model') else ArmModel(robot)
     scene = CollisionScene.of(robot, value('clearance'), value('floor'), value('environment'))
-    limits = transfer_limits(arm.robot, value('speed'), acceleration)
-    clearance = ClearanceModel.of(scene.bodies)
-    planner = TransferPlanner(arm, limits, clearance, scene.clearance, acceleration)
+    limits = transfer_limits(arm.robot, value('speed'))
+    clearance = ClearanceModel.of(scene.bodies, scene.clearance)
+    planner = TransferPlanner(arm, limits, clearance)
     unchecked = scene.unchecked
     if others:
         unchecked += (f'{", ".join(others)} (not driven, as they belong to no arm)',)
@@ -267,7 +269,7 @@ def make_excitation(value: Values, rate: float, planner: TransferPlanner) -> Exc
         return checked(load_excitation(value('file')), planner, value('file'))
     arm = planner.arm
     own = {effect.name for effect in arm.effects}
-    for name in filter(None, value('effects')):
+    for name in value('effects'):
         if name not in own:
             arm = arm.with_effect(make_effect(name, arm.robot))
     periods, run_in = value('n_periods'), value('run_in')
@@ -277,7 +279,6 @@ def make_excitation(value: Values, rate: float, planner: TransferPlanner) -> Exc
         n_periods=periods,
         run_in=run_in,
         speed=value('speed'),
-        acceleration=planner.acceleration,
         clearance=value('clearance'),
         starts=2,
         time_budget=value('design_time'),
@@ -306,16 +307,11 @@ def checked(excitation: Excitation, planner: TransferPlanner, source: str) -> Ex
 
     """
     robot = planner.arm.robot
-    if set(excitation.joints) != set(robot.joints):
-        raise TrajectoryError(
-            f'{source}: moves {", ".join(excitation.joints)}, but {robot.name} has '
-            f'{", ".join(robot.joints)}'
-        )
-    excitation = excitation.for_joints(robot.joints)
-    given = planner.given_acceleration
-    limits = Limits.of(robot, speed=1.0, reserve=False, acceleration=given)
-    rules = (planner.clearance, planner.margin)
-    faults = trajectory_faults(planner.arm, limits, excitation.trajectory, *rules)
+    with reading(source, TrajectoryError):
+        excitation = excitation.for_joints(robot.joints)
+    limits = Limits.of(robot, speed=1.0, reserve=False)
+    limits = replace(limits, acceleration=robot.acceleration_limit)
+    faults = trajectory_faults(planner.arm, limits, excitation.trajectory, planner.clearance)
     faults = faults or excitation_faults(planner.arm, limits, excitation)
     if faults:
         raise TrajectoryError(f'{source}: {faults}')

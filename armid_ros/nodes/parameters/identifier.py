@@ -81,10 +81,7 @@ IDENTIFIER_PARAMETERS = (
 
 def robot_of(value: Values, description: str | None) -> Robot:
     """Return the robot of a URDF, or without a URDF the robot that parameters name."""
-    given = {
-        'gravity': value('gravity'),
-        'joints': tuple(filter(None, value('joints'))) or None,
-    }
+    given = {'gravity': value('gravity'), 'joints': value('joints') or None}
     if description is None:
         return load_robot(value('robot'), **given)
     return robot_from_urdf(description, **given)
@@ -109,7 +106,7 @@ def make_identifier(value: Values, description: str | None = None) -> OnlineIden
     """
     robot = robot_of(value, description)
     arm = ArmModel(robot)
-    for text in filter(None, value('effects')):
+    for text in value('effects'):
         arm = arm.with_effect(make_effect(text, robot))
     return OnlineIdentifier(arm, settings_of(value, arm), rng=np.random.default_rng(0))
 

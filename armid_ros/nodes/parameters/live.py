@@ -137,7 +137,7 @@ def make_diagnosis(value: Values, description: str | None = None) -> LiveDiagnos
     else:
         assert robot is not None  # the node then waits for robot_description
         arm = ArmModel(robot)
-    for text in filter(None, value('effects')):
+    for text in value('effects'):
         effect, values = parse_effect(text, arm.robot)
         if effect in arm.effects:
             known = list(arm.values)
@@ -150,7 +150,7 @@ def make_diagnosis(value: Values, description: str | None = None) -> LiveDiagnos
             f'{arm.robot.name}: no link that moves has an <inertial>, so that the model predicts '
             'no torque to compare with; complete the description, or give a model'
         )
-    bags = [read_recording(bag, arm) for bag in filter(None, value('baseline'))]
+    bags = [read_recording(bag, arm) for bag in value('baseline')]
     misfit = load_misfit(value('model')) if value('model') and not bags else None
     return LiveDiagnosis(
         arm, settings_of(value), baseline=tuple(bags), misfit=misfit, seed=value('seed')

@@ -179,12 +179,6 @@ def is_as(node: Node, parameter: Parameter) -> bool:
     return bool(now == parameter.get_parameter_value())
 
 
-def names(node: Node, parameter: str) -> tuple[str, ...]:
-    """Return a parameter with a list of names, without empty names."""
-    values: list[str] = node.get_parameter(parameter).value
-    return tuple(name for name in values if name)
-
-
 def _has_type(parameter: Parameter) -> bool:
     """Return whether the type of a value is known; that of an empty list is not."""
     return parameter.type_ is not Parameter.Type.NOT_SET and parameter.value != []

@@ -9,10 +9,11 @@ from dataclasses import dataclass, replace
 
 from armid_ros.errors import TrajectoryError
 from armid_ros.motion import ElasticRun, FloatArray, Motion
+from armid_ros.robots.reference import limit_slack
 from armid_ros.simulation.closed_loop import command, run
 from armid_ros.simulation.controller import MotorControl, Targets, VelocityLoop
 from armid_ros.simulation.elastic import multisine
-from armid_ros.simulation.plant import limit_slack, Plant
+from armid_ros.simulation.plant import Plant
 import numpy as np
 import numpy.typing as npt
 

@@ -20,7 +20,14 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 
 from armid_ros.arm import ArmModel
-from armid_ros.excitation import design, DesignSettings, Excitation, Limits, random_feasible
+from armid_ros.excitation import (
+    ClearanceModel,
+    design,
+    DesignSettings,
+    Excitation,
+    Limits,
+    random_feasible,
+)
 from armid_ros.identification.identify import Identification, identify
 from armid_ros.identification.rows.regression import Fit
 from armid_ros.model import gravity_composites, inverse_dynamics
@@ -255,12 +262,10 @@ def reproduce(
         target='gravity',
     )
     run = design(ArmModel(nominal), settings, rng, collision=collision).excitation
-    limits = Limits.of(nominal, speed='slow')
+    limits, bodies = Limits.of(nominal, speed='slow'), ClearanceModel.of(collision, 0.01)
     tests = [
         Excitation(
-            random_feasible(
-                ArmModel(nominal), limits, _TEST, 3, rng, collision=collision, margin=0.01
-            )
+            random_feasible(ArmModel(nominal), limits, _TEST, 3, rng, clearance=bodies)
         ).motion(_RATE)
         for _ in range(HELD_OUT)
     ]

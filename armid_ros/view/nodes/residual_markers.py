@@ -14,7 +14,7 @@ from armid_ros.model.kinematics import LinkFrames
 from armid_ros.motion import FloatArray
 from armid_ros.nodes.listening import ListeningNode
 from armid_ros.nodes.messages.joint_states import JointSample
-from armid_ros.nodes.parameters.table import names, NodeParameter
+from armid_ros.nodes.parameters.table import NodeParameter
 from armid_ros.nodes.qos import DEPTH, LATCHED, STREAM
 from armid_ros.nodes.running.process import run
 from armid_ros.robots import load_robot, Robot, robot_from_urdf
@@ -63,7 +63,7 @@ class ResidualMarkersNode(ListeningNode):
         self._told = ''
         self._markers = self.create_publisher(MarkerArray, '~/markers', STREAM)
         if self.value('robot'):
-            self._draw_on(load_robot(self.value('robot'), joints=names(self, 'joints') or None))
+            self._draw_on(load_robot(self.value('robot'), joints=self.value('joints') or None))
         self.listen()
         self.create_subscription(
             JointState, 'online_identifier/residual', self._on_residual, DEPTH
@@ -136,7 +136,7 @@ class ResidualMarkersNode(ListeningNode):
 
     def take_description(self, urdf: str) -> None:
         """Use the robot of robot_description."""
-        self._draw_on(robot_from_urdf(urdf, joints=names(self, 'joints') or None))
+        self._draw_on(robot_from_urdf(urdf, joints=self.value('joints') or None))
 
     def _draw_on(self, robot: Robot) -> None:
         n = robot.n_joints

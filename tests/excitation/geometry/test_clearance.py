@@ -92,11 +92,11 @@ def in_outer_link(two_link, angle):
 def test_post_between_two_samples_is_found(two_link):
     post = Obstacle('post', 'sphere', (0.002,), in_outer_link(two_link, 0.43))
     blocked = with_obstacles(collision_model(two_link), [post])
-    clearance = ClearanceModel.of(blocked)
+    clearance = ClearanceModel.of(blocked, 0.01)
     path = sweep(two_link)
     coarse = np.linspace(0.0, 4.0, 9)
     assert clearance.smallest(path.motion(coarse).q).min() > 0.05
-    fault = clearance.first_fault(path.motion, path.bounds()[1], coarse, 0.01)
+    fault = clearance.first_fault(path.motion, path.bounds()[1], coarse)
     assert {fault.first, fault.second} == {'lower', 'post'}
     assert fault.distance < 0.01
     there = clearance.smallest(path.motion(np.array([fault.time])).q)

@@ -12,7 +12,7 @@ from typing import Any
 
 from armid_ros.model.spring_ties import SEGMENTS
 from armid_ros.nodes.base import ArmidNode
-from armid_ros.nodes.parameters.table import names, NodeParameter
+from armid_ros.nodes.parameters.table import NodeParameter
 from armid_ros.nodes.qos import SAMPLES
 from armid_ros.nodes.running.process import run
 from armid_ros.nodes.running.real_time import RealTime
@@ -76,9 +76,9 @@ class SimulatedPairNode(ArmidNode):
 
         """
         super().__init__('simulated_pair', **kwargs)
-        pair = leg_pair(self.value('stiffness'), names(self, 'segments'))
+        pair = leg_pair(self.value('stiffness'), self.value('segments'))
         pair = pair.with_slack(self.value('slack'))
-        driven = names(self, 'driven')
+        driven = self.value('driven')
         gait = self.value('gait')
         self.pair = SimulatedPair(
             pair,

@@ -16,9 +16,11 @@ from typing import Any
 
 from armid_ros.errors import TrajectoryError
 from armid_ros.motion import FloatArray, freeze, Motion
-from armid_ros.robots import Robot
-from armid_ros.simulation.plant import limit_slack, LIMIT_TOLERANCE
+from armid_ros.robots.robot import Robot
 import numpy as np
+
+#: Tolerance beyond a position limit, as a share of the range between the limits.
+LIMIT_TOLERANCE = 1e-6
 
 #: Samples per block when a reference is compared with the limits.
 _BLOCK = 20_000
@@ -86,8 +88,8 @@ class Reference:
         if len(late):
             point = int(late[0]) + 1
             raise TrajectoryError(
-                f'trajectory: time has to increase, but point {point} is at {self.t[point]} s and '
-                f'the one before it at {self.t[point - 1]} s'
+                f'trajectory: time_from_start has to increase, but point {point} is at '
+                f'{self.t[point]} s and the one before it at {self.t[point - 1]} s'
             )
         if self.ddq is not None and self.dq is None:
             raise TrajectoryError('trajectory: it has accelerations but no velocities')
@@ -135,7 +137,7 @@ class Reference:
             ddq = ddq * u + 2.0 * dq
             dq = dq * u + q
             q = q * u + c.take(segment, axis=0)
-        q = np.where((t > self.t[-1])[:, np.newaxis], self.q[-1], q)
+        q = np.where((t >= self.t[-1])[:, np.newaxis], self.q[-1], q)
         dq, ddq = (np.where(outside, 0.0, x) for x in (dq / span, ddq / span**2))
         return Motion(self.joints, t, q, dq, ddq, tau)
 
@@ -162,10 +164,12 @@ class Reference:
                     f"trajectory: joint '{joint}' is missing; {robot.name} needs {listed}; "
                     f'--joints {",".join(self.joints)} holds the others still'
                 )
-        if self.joints == robot.joints:
-            return self
-        order = [self.joints.index(joint) for joint in robot.joints]
-        return self._waypoints(robot.joints, self.t, (slice(None), order))
+        return self if self.joints == robot.joints else self.of_joints(robot.joints)
+
+    def of_joints(self, joints: tuple[str, ...]) -> Reference:
+        """Return the reference of some of its joints, in the given order."""
+        order = [self.joints.index(joint) for joint in joints]
+        return self._waypoints(joints, self.t, (slice(None), order))
 
     def remaining(self, late: float) -> Reference:
         """
@@ -248,6 +252,12 @@ class Reference:
                     f'{values[sample, joint]:.4g} {what} at {motion.t[sample]:.3f} s, beyond its '
                     f'{kind} limit of {limit:.4g} {what}'
                 )
+
+
+def limit_slack(robot: Robot) -> FloatArray:
+    """Return the tolerance beyond a position limit [rad or m], shape (n,)."""
+    span = robot.upper - robot.lower
+    return np.asarray(LIMIT_TOLERANCE * np.where(np.isfinite(span), span, 1.0))
 
 
 def _polynomials(

@@ -1,0 +1,375 @@
+# Copyright 2026 The armid_ros developers
+# SPDX-License-Identifier: Apache-2.0
+"""Send trajectories to a controller: as goals of its action if it offers one, else by topic."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+import math
+import time
+from typing import Any
+from uuid import uuid4
+
+from action_msgs.msg import GoalStatus, GoalStatusArray
+from armid_ros.errors import TrajectoryError
+from armid_ros.motion import Motion
+from armid_ros.nodes.qos import LATCHED, STREAM
+from builtin_interfaces.msg import Duration as DurationMessage
+from rclpy.action import ActionClient
+from rclpy.action.client import ClientGoalHandle
+from rclpy.duration import Duration
+from rclpy.executors import SingleThreadedExecutor
+from rclpy.task import Future
+from trajectory_msgs.msg import JointTrajectory, JointTrajectoryPoint
+from unique_identifier_msgs.msg import UUID
+
+#: Tolerance that permits any joint position; zero means the default of the controller.
+ANYWHERE = -1.0
+#: Timeout of the answer to a goal [s]; a controller first checks every waypoint.
+_ANSWER = 5.0
+#: Error code of an accepted goal that another goal replaced.
+_REPLACED = -1
+#: Texts of the error codes of control_msgs/action/FollowJointTrajectory.
+_ERRORS = {
+    _REPLACED: 'the goal is not valid',
+    -2: 'the joints are not those of the controller',
+    -3: 'the stamp is in the past: where clocks differ, use zero_stamp',
+    -4: 'a joint was outside its path tolerance',
+    -5: 'the goal was not reached within its tolerance',
+}
+
+
+def write_trajectory(motion: Motion, lead: float) -> JointTrajectory:
+    """
+    Convert a motion to a message with one point per sample.
+
+    Parameters
+    ----------
+    motion : Motion
+        Motion for the arm.
+    lead : float
+        Time from the start to the first sample [s].
+
+    """
+    message = JointTrajectory(joint_names=list(motion.joints))
+    for row, t in enumerate(motion.t - motion.t[0] + lead):
+        message.points.append(
+            JointTrajectoryPoint(
+                positions=motion.q[row].tolist(),
+                velocities=motion.dq[row].tolist(),
+                accelerations=motion.ddq[row].tolist(),
+                time_from_start=_duration(float(t)),
+            )
+        )
+    return message
+
+
+def _duration(seconds: float) -> DurationMessage:
+    whole, nanoseconds = divmod(round(seconds * 1e9), 10**9)
+    return DurationMessage(sec=whole, nanosec=nanoseconds)
+
+
+@dataclass
+class _Goal:
+    """Goal that was sent, with the time of sending [s] and a flag for cancelling."""
+
+    sent: float
+    handle: ClientGoalHandle | None = None
+    unwanted: bool = False
+
+
+class TrajectoryController:
+    """
+    Topic joint_trajectory and action follow_joint_trajectory of one controller.
+
+    A run uses the same of them until its end.
+
+    Attributes
+    ----------
+    topic : str
+        Full name of the topic.
+    action : str
+        Full name of the action.
+    client : ActionClient or None
+        None if only the topic is used, no controller has offered the action so far, or
+        control_msgs is not installed.
+
+    """
+
+    def __init__(self, node: Any, on_end: Callable[[str], None]) -> None:
+        """
+        Make the publisher, and look for the action.
+
+        Parameters
+        ----------
+        node : ArmidNode
+            With the parameters `interface`, `action` and `zero_stamp`, and tolerances.
+        on_end : callable
+            Called at the end of a goal with the reason of its failure; empty if it was reached.
+
+        Raises
+        ------
+        TrajectoryError
+            If the action is required and control_msgs is not installed.
+
+        """
+        self._publisher = node.create_publisher(JointTrajectory, 'joint_trajectory', STREAM)
+        self.topic = str(self._publisher.topic_name)
+        beside = f'{self.topic.rpartition("/")[0]}/follow_joint_trajectory'
+        self.action = node.resolve_topic_name(node.value('action') or beside)
+        self.client: ActionClient | None = None
+        self._node, self._on_end = node, on_end
+        self._kind = node.value('interface')
+        self._by_action, self._possible = False, self._kind != 'topic'
+        self._goal: _Goal | None = None
+        self._error, self._seen = math.nan, -math.inf
+        self._known: set[bytes] = set()
+        self._requests: list[Future] = []
+        if self._kind == 'action':
+            self._make_client()
+            if self.client is None:
+                raise TrajectoryError(
+                    "parameter 'interface' is action, but the package control_msgs is not "
+                    'installed: apt install ros-jazzy-control-msgs, or use interface:=topic'
+                )
+
+    @property
+    def readers(self) -> int:
+        """Return the number of subscriptions to the topic."""
+        return int(self._publisher.get_subscription_count())
+
+    @property
+    def missing(self) -> str:
+        """Return why no controller can receive a trajectory; empty if one can."""
+        if self._ready:
+            return ''
+        if self._kind == 'action':
+            return f'no controller offers the action {self.action}'
+        return '' if self.readers else f'no node subscribes to {self.topic}'
+
+    @property
+    def under_way(self) -> bool:
+        """Return whether a goal was sent that the controller has not ended."""
+        return self._by_action and self._goal is not None
+
+    @property
+    def error(self) -> float:
+        """Return the largest joint error that the controller reported [rad or m]; or NaN."""
+        return self._error if self.under_way else math.nan
+
+    def look(self) -> None:
+        """Make a client of the action when a controller offers it."""
+        if self._possible and self.client is None and self._offered:
+            self._make_client()
+
+    def begin(self, trajectory: JointTrajectory) -> str:
+        """
+        Send the trajectory of a run, and return the name of the receiver.
+
+        Raises
+        ------
+        TrajectoryError
+            If no controller can receive the trajectory.
+
+        """
+        self.look()
+        if self.client is not None and self._offered:
+            deadline = time.monotonic() + 1.0  # the discovery of an action takes no longer
+            while not self._ready and time.monotonic() < deadline:
+                time.sleep(0.005)
+        if self.missing:
+            raise TrajectoryError(f'{self.missing}; the arm is not started')
+        self._by_action = self._ready
+        if self._by_action:
+            names = ('tracking_tolerance', 'goal_tolerance', 'goal_time_tolerance')
+            self._send_goal(trajectory, *map(self._node.value, names))
+            return f'the action {self.action}'
+        self._publisher.publish(trajectory)
+        return f'{self.readers} subscribers'
+
+    def bring_to_rest(self, trajectory: JointTrajectory) -> None:
+        """Send the trajectory that stops a run, without tolerances."""
+        if self._by_action:
+            self._send_goal(trajectory, ANYWHERE, ANYWHERE)
+        else:
+            self._publisher.publish(trajectory)
+
+    def insist(self, trajectory: JointTrajectory) -> None:
+        """Send a trajectory to the controller of the present run, by action and by topic."""
+        self.bring_to_rest(trajectory)
+        if self._by_action:
+            self._publisher.publish(trajectory)
+
+    def trouble(self, patience: float) -> str:
+        """Return a text if the controller is gone or does not answer for a time [s]; or empty."""
+        goal, now = self._goal, time.monotonic()
+        if goal is None or not self._by_action:
+            return ''
+        if self._ready:
+            self._seen = now
+        if now - self._seen > patience:
+            return f'{self.action} is gone: its controller was stopped or restarted'
+        if goal.handle is None and now - goal.sent > _ANSWER:
+            return f'{self.action} did not answer the goal within {_ANSWER:g} s'
+        return ''
+
+    def settle(self, patience: float) -> None:
+        """Wait until sent messages have arrived and calls are answered, with a timeout [s]."""
+        if not self._by_action:
+            self._publisher.wait_for_all_acked(Duration(seconds=patience))
+            return
+        executor = SingleThreadedExecutor(context=self._node.context)
+        before, deadline = self._node.executor, time.monotonic() + patience
+        executor.add_node(self._node)
+        try:
+            while self._requests and time.monotonic() < deadline:
+                executor.spin_once(timeout_sec=max(deadline - time.monotonic(), 0.0))
+        finally:
+            executor.remove_node(self._node)
+            executor.shutdown()
+            if before is not None:
+                before.add_node(self._node)
+
+    def close(self) -> None:
+        """Destroy the client of the action."""
+        if self.client is not None:
+            self.client.destroy()
+
+    @property
+    def _offered(self) -> bool:
+        return bool(self._node.count_publishers(f'{self.action}/_action/feedback'))
+
+    @property
+    def _ready(self) -> bool:
+        """Return whether a controller accepts goals."""
+        return self.client is not None and bool(self.client.server_is_ready())
+
+    def _make_client(self) -> None:
+        """Make the client of the action; no goal is sent."""
+        try:
+            from control_msgs.action import FollowJointTrajectory
+            from control_msgs.msg import JointTolerance
+        except ImportError:
+            self._possible = False
+            return
+        self._kind_of_goal, self._tolerance = FollowJointTrajectory.Goal, JointTolerance
+        self.client = ActionClient(self._node, FollowJointTrajectory, self.action)
+        self._node.create_subscription(
+            GoalStatusArray, f'{self.action}/_action/status', self._on_status, LATCHED
+        )
+
+    def _send_goal(
+        self, trajectory: JointTrajectory, path: float, end: float, late: float = 0.0
+    ) -> None:
+        """
+        Send a goal that replaces the present one.
+
+        A controller of ros2_control replaces the old goal by itself. The old goal is cancelled as
+        well, since other controllers do not replace it.
+
+        Parameters
+        ----------
+        trajectory : JointTrajectory
+            Motion for the arm.
+        path, end : float
+            Tolerance of each joint on the path, and at its end [rad or m]. 0: default of the
+            controller, `ANYWHERE`: no limit.
+        late : float
+            Largest delay of the end [s]; 0: default of the controller.
+
+        """
+        assert self.client is not None
+        before, self._goal = self._goal, _Goal(time.monotonic())
+        goal, self._error, self._seen = self._goal, math.nan, time.monotonic()
+        message = self._kind_of_goal(trajectory=trajectory)
+        for joint in trajectory.joint_names:
+            message.path_tolerance.append(self._tolerance(name=joint, position=path))
+            message.goal_tolerance.append(self._tolerance(name=joint, position=end))
+        message.goal_time_tolerance = _duration(late)
+        identifier = uuid4().bytes
+        self._known.add(identifier)
+        future = self.client.send_goal_async(
+            message,
+            goal_uuid=UUID(uuid=list(identifier)),
+            feedback_callback=self._guarded(lambda said: self._on_feedback(goal, said)),
+        )
+        self._ask(future, lambda handle: self._on_answer(goal, handle))
+        if before is not None:
+            self._cancel(before)
+
+    def _cancel(self, goal: _Goal) -> None:
+        """Cancel a goal at once, or when it is accepted."""
+        goal.unwanted = True
+        if goal.handle is not None:
+            self._ask(goal.handle.cancel_goal_async(), lambda _: None)
+
+    def _on_answer(self, goal: _Goal, handle: ClientGoalHandle) -> None:
+        if not handle.accepted:
+            reason = 'see its log; its joints and clock have to be those of this node'
+            self._end(goal, f'{self.action} refused the trajectory; {reason}')
+            return
+        goal.handle = handle
+        # `settle` does not wait for the result, which comes at the end of the motion
+        result = handle.get_result_async()
+        result.add_done_callback(self._guarded(lambda f: self._on_result(goal, f.result())))
+        if goal.unwanted:
+            self._cancel(goal)
+
+    def _on_result(self, goal: _Goal, response: Any) -> None:
+        status, result = response.status, response.result
+        if status == GoalStatus.STATUS_SUCCEEDED and not result.error_code:
+            self._end(goal, '')
+        elif status == GoalStatus.STATUS_CANCELED or result.error_code == _REPLACED:
+            self._end(goal, self._taken_over())
+        else:
+            why = _ERRORS.get(result.error_code, 'without a reason')
+            detail = f' ({result.error_string})' if result.error_string else ''
+            self._end(goal, f'{self.action} gave up the trajectory: {why}{detail}')
+
+    def _on_status(self, message: GoalStatusArray) -> None:
+        """End the present goal if the controller has accepted a later one."""
+        active = (GoalStatus.STATUS_ACCEPTED, GoalStatus.STATUS_EXECUTING)
+        goals = {
+            bytes(s.goal_info.goal_id.uuid) for s in message.status_list if s.status in active
+        }
+        goal = self._goal
+        if goal is None or goal.handle is None:
+            self._known |= goals
+        elif goals - self._known:
+            self._end(goal, self._taken_over())
+
+    def _taken_over(self) -> str:
+        """Return a text that the goal was replaced by another client, with its name."""
+        node, service = self._node, f'{self.action}/_action/send_goal'
+        found = []
+        for name, space in node.get_node_names_and_namespaces():
+            if (name, space) == (node.get_name(), node.get_namespace()):
+                continue
+            clients = node.get_client_names_and_types_by_node(name, space)
+            if any(client == service for client, _ in clients):
+                found.append(f'{space.rstrip("/")}/{name}')
+        who = ', '.join(sorted(found)) or 'another client'
+        return f'the goal of {self.action} was cancelled or replaced by {who}'
+
+    def _end(self, goal: _Goal, reason: str) -> None:
+        if goal is self._goal:
+            self._goal = None
+            self._on_end(reason)
+
+    def _on_feedback(self, goal: _Goal, message: Any) -> None:
+        if goal is self._goal:
+            errors = [abs(error) for error in message.feedback.error.positions]
+            self._error = max(errors, default=math.nan)
+
+    def _ask(self, future: Future, then: Callable[[Any], None]) -> None:
+        def done(future: Future) -> None:
+            self._requests.remove(future)
+            then(future.result())
+
+        self._requests.append(future)
+        future.add_done_callback(self._guarded(done))
+
+    def _guarded(self, callback: Callable[[Any], None]) -> Callable[[Any], None]:
+        guarded: Callable[[Any], None] = self._node.surviving(callback, self.action)
+        return guarded
