@@ -16,7 +16,7 @@ from dataclasses import dataclass, replace
 from armid_ros.arm import ArmModel, Misfit
 from armid_ros.arm.memoized_arm import memoized_arm, plain_arm
 from armid_ros.arm.misfit import louder
-from armid_ros.arm.words import with_named
+from armid_ros.arm.model_file import with_named
 from armid_ros.diagnosis.data.baseline import Baseline
 from armid_ros.diagnosis.data.days import Rows
 from armid_ros.diagnosis.data.evidence import Evidence, noise_floor, torque_rms
