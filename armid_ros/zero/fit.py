@@ -6,49 +6,42 @@ Torque zeros and gains, gravity, tool and dry friction from an arm at rest.
 The reading of a joint is gain (weight + offset + friction against the approach), as an `ArmModel`
 has it; weight is that of the described links and of a tool. The fit is generalised least squares
 with a variance of each joint that is estimated from the residuals. Weak priors keep confounded
-parameters finite. A quantity that the rests do not improve enough is not determined.
+parameters finite. A quantity with a wide interval is not determined.
 
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
+from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass
 
 from armid_ros.arm import ArmModel
 from armid_ros.effects import CATALOGUE
 from armid_ros.effects.load import described_spread
-from armid_ros.errors import IdentificationError
-from armid_ros.estimate import Estimate
 from armid_ros.motion import FloatArray, Motion
 from armid_ros.robots import Robot
-from armid_ros.zero.rests import count_poses
 import numpy as np
 import numpy.typing as npt
+import pinocchio as pin
 from scipy.stats import t as student
 
 #: What may be held known, and the effect that then is not fitted.
 KNOWN = {'gain': 'torque_gain', 'tilt': 'base_tilt', 'tool': 'payload'}
+#: Quantity of each effect, without which it is not in the model.
+_OF = {'torque_gain': 'gain', 'torque_offset': 'zero', 'base_tilt': 'tilt', 'payload': 'mass'}
 #: Largest half of a 95 % interval of a determined quantity: of zeros and friction as a share of
 #: the largest reading of the joint, of gravity [m/s^2], tilt [deg], mass as a share of that of the
 #: arm, and centre [m].
-_USEFUL = {
-    **{'zero': 0.2, 'friction': 0.2, 'gain': 0.1, 'gravity': 0.4, 'tilt': 2.0, 'mass': 0.04},
-    'center': 0.1,
-}
-#: Standard deviation of the prior of each parameter, ten times what is useful: a share of the
-#: largest reading of the joint, the gain itself, [rad], [m/s^2], a share of the mass of the arm.
-_PRIORS = {
-    **{'torque_offset': 1.0, 'coulomb_torque': 1.0, 'gain_error': 0.5, 'tilt_x': 0.3},
-    **{'tilt_y': 0.3, 'gravity_difference': 2.0, 'payload_m': 0.3},
-    **dict.fromkeys(('payload_mx', 'payload_my', 'payload_mz'), 0.1),
-}
-#: Effects whose parameters are shares of the largest reading of their joint, or of the mass.
-_SCALED = ('torque_offset', 'coulomb_friction', 'payload')
-#: Poses below which most quantities are not determined.
-_FEW = 5
-#: Residual of a reading that is left out, over the standard deviation of its joint.
-_OUTLYING = 4.5
+_USEFUL = {'zero': 0.2, 'friction': 0.2, 'gain': 0.1, 'gravity': 0.4, 'tilt': 2.0, 'mass': 0.04}
+_USEFUL['center'] = 0.1
+#: Standard deviation of the prior of each parameter, ten times what is useful: torques as a share
+#: of the largest reading of the joint, payload as one of the mass of the arm, others in SI units.
+_PRIORS = {'torque_offset': 1.0, 'coulomb_torque': 1.0, 'gain_error': 0.5, 'payload_m': 0.3}
+_PRIORS |= {'tilt_x': 0.3, 'tilt_y': 0.3, 'gravity_difference': 2.0}
+_PRIORS |= dict.fromkeys(('payload_mx', 'payload_my', 'payload_mz'), 0.1)
+#: Residual of a reading that is left out, over the median one of its joint: 4.5 standard
+#: deviations. Poses below which nothing is determined.
+_OUTLYING, _FEW = 6.7, 5
 #: What determines most quantities.
 MORE = 'record a run of armid zero plan'
 
@@ -56,16 +49,10 @@ MORE = 'record a run of armid zero plan'
 @dataclass(frozen=True)
 class Quantity:
     """
-    A fitted quantity.
+    A fitted quantity with half of its 95 % interval; 0: held known.
 
-    Attributes
-    ----------
-    name, joint, unit : str
-        Name, joint (empty for the whole arm) and unit.
-    value, reach : float
-        Value, and half of its 95 % interval; 0: held known.
-    reason, remedy : str
-        Why it is not determined, and what determines it; empty if it is.
+    The joint of a quantity of the whole arm is empty. The reason, which ends with a remedy, is
+    that of a quantity that is not determined.
 
     """
 
@@ -73,9 +60,8 @@ class Quantity:
     joint: str
     unit: str
     value: float
-    reach: float
-    reason: str = ''
-    remedy: str = ''
+    half_width: float
+    reason: str
 
 
 @dataclass(frozen=True)
@@ -87,22 +73,22 @@ class ZeroFit:
     ----------
     arm : ArmModel
         The model with the fitted values; of the last recording, if payloads differ.
-    estimate : Estimate
-        Fitted values of the effects.
     quantities : tuple of Quantity
         In the order of `quantities_of`.
     before, residual : ndarray, shape (n,)
         Rms of reading minus description, and of reading minus fit [N m or N].
+    largest : ndarray, shape (n,)
+        Largest reading of each joint, at least 5 % of that of any joint [N m or N].
     rests, poses, outliers : int
         Numbers of rests, of different poses, and of readings that are left out.
 
     """
 
     arm: ArmModel
-    estimate: Estimate
     quantities: tuple[Quantity, ...]
     before: FloatArray
     residual: FloatArray
+    largest: FloatArray
     rests: int
     poses: int
     outliers: int
@@ -110,6 +96,19 @@ class ZeroFit:
     def of(self, name: str, joint: str = '') -> Quantity:
         """Return a quantity by its name and joint."""
         return next(one for one in self.quantities if (one.name, one.joint) == (name, joint))
+
+    def model(self) -> ArmModel:
+        """Return the arm with what is determined, the tool as a point; friction is left out."""
+        arm = ArmModel(self.arm.robot)
+        for effect, values in zip(self.arm.effects, self.arm.values, strict=True):
+            if effect.name == 'payload' and values[0] > 0.0:
+                point = pin.Inertia(values[0], values[1:4] / values[0], np.zeros((3, 3)))
+                values = point.toDynamicParameters()
+            if name := _OF.get(effect.name):
+                owners = effect.joints if name in ('gain', 'zero') else ('',)
+                known = [not self.of(name, joint).reason for joint in owners]
+                arm = arm.with_effect(effect, values * known)
+        return arm
 
 
 def arm_at_rest(robot: Robot, known: Collection[str] = ()) -> ArmModel:
@@ -142,8 +141,8 @@ def quantities_of(arm: ArmModel) -> dict[tuple[str, str, str], float]:
         found['friction', joint, unit] = gain[j] * values['coulomb_friction'][j]
     gravity = arm.body.gravity
     found |= {(f'gravity_{axis}', '', 'm/s^2'): gravity[k] for k, axis in enumerate('xyz')}
-    found['gravity', '', 'm/s^2'] = np.linalg.norm(gravity)
-    found['tilt', '', 'deg'] = np.degrees(np.linalg.norm(values.get('base_tilt', 0.0)))
+    found['gravity', '', 'm/s^2'] = float(np.linalg.norm(gravity))
+    found['tilt', '', 'deg'] = float(np.degrees(np.linalg.norm(values.get('base_tilt', 0.0))))
     mass, *moments = values.get('payload', np.zeros(4))[:4]
     found['mass', '', 'kg'] = mass
     found |= {(f'center_{a}', '', 'm'): moments[k] / (mass or 1.0) for k, a in enumerate('xyz')}
@@ -172,132 +171,134 @@ def fit_rests(
         are trusted.
 
     """
-    described = [arm_at_rest(robot, known) for robot in robots]
+    arms = [arm_at_rest(robot, known) for robot in robots]
     y = np.concatenate([np.asarray(one.tau) for one in rests])
-    largest = np.maximum(np.abs(y), 0.05 * np.abs(y).max()).max(axis=0)
-    scales = dict(zip(rests[0].joints, largest, strict=True))
-    scales[''] = float(robots[0].rigid_parameters[::10].sum()) or 10.0  # [kg], a common arm
+    scales = np.maximum(np.abs(y), 0.05 * np.abs(y).max()).max(axis=0)
+    units = dict(zip(rests[0].joints, scales, strict=True))
+    units[''] = float(robots[0].rigid_parameters[::10].sum()) or 10.0  # [kg], a common arm
     links = link_error * described_spread(robots[0])
     links[:, 4:] = 0.0  # inertia
-    names = described[0].parameters
-    prior = np.concatenate([links.ravel(), np.zeros(len(names) - links.size)])
-    for k, name in enumerate(names[links.size :], links.size):
+    prior = [*links.ravel()]
+    for name in arms[0].parameters[links.size :]:
+        share = name.effect in ('torque_offset', 'coulomb_friction', 'payload')
         owner = '' if name.effect == 'payload' else name.joint
-        unit = scales[owner] if name.effect in _SCALED else 1.0
-        prior[k] = unit * _PRIORS.get(name.name, 0.0)
-
-    def predicted(x: FloatArray) -> tuple[FloatArray, FloatArray]:
-        """Return readings (K, n) and sensitivities (K, n, P) for a change of all parameters."""
-        arms = [arm.with_theta(arm.theta + x) for arm in described]
-        pairs = list(zip(arms, rests, strict=True))
-        torque = np.concatenate([arm.torque(motion) for arm, motion in pairs])
-        return torque, np.concatenate([arm.columns(motion) for arm, motion in pairs])
-
-    # without an approach, dry friction is anything up to its bound
-    known_side = np.concatenate([one.dq for one in rests]) != 0.0
-    solution = _solved(predicted, y, known_side, prior, largest)
-    arm = described[-1].with_theta(described[-1].theta + solution.x)
-    poses = count_poses(np.concatenate([one.q for one in rests]))
-    free = solution.free
-    effects = free >= links.size
-    left = y - predicted(solution.x)[0]
+        prior.append(_PRIORS.get(name.name, 0.0) * (units[owner] if share else 1.0))
+    x, covariance, information, used, freedom = _solved(arms, rests, np.array(prior), scales)
+    arm = arms[-1].with_theta(arms[-1].theta + x)
+    poses = len(np.unique(np.concatenate([one.q for one in rests]).round(1), axis=0))
+    judge = _Judge(arm, np.flatnonzero(prior), covariance, information, units)
+    few = f'{poses} poses are too few; {MORE}' if poses < _FEW or freedom < 1.0 else ''
+    factor = float(student.ppf(0.975, max(freedom, 1.0)))
     return ZeroFit(
         arm,
-        Estimate(
-            tuple(names[k] for k in free[effects]),
-            arm.theta[free[effects]],
-            solution.covariance[np.ix_(effects, effects)],
-        ),
-        tuple(_judged(arm, solution, scales, poses)),
-        np.sqrt(np.mean((y - predicted(0.0 * prior)[0]) ** 2, axis=0)),
-        np.sqrt(np.mean(left**2, axis=0, where=solution.used)),
+        judge.quantities(factor, few),
+        np.sqrt(np.mean((y - _predicted(arms, rests, 0.0 * x)[0]) ** 2, axis=0)),
+        np.sqrt(np.mean((y - _predicted(arms, rests, x)[0]) ** 2, axis=0, where=used)),
+        scales,
         len(y),
         poses,
-        int(np.sum(known_side & ~solution.used)),
+        int(np.sum(_sided(rests) & ~used)),
     )
 
 
-@dataclass(frozen=True)
-class _Solution:
-    """Change of P parameters; covariance and information of the free ones; readings used."""
+def _predicted(
+    arms: Sequence[ArmModel], rests: Sequence[Motion], x: FloatArray
+) -> tuple[FloatArray, FloatArray]:
+    """Return readings (K, n) and sensitivities (K, n, P) for a change of all parameters."""
+    pairs = [(a.with_theta(a.theta + x), motion) for a, motion in zip(arms, rests, strict=True)]
+    torque = np.concatenate([arm.torque(motion) for arm, motion in pairs])
+    return torque, np.concatenate([arm.columns(motion) for arm, motion in pairs])
 
-    x: FloatArray
-    free: npt.NDArray[np.intp]
-    covariance: FloatArray
-    information: FloatArray
-    used: npt.NDArray[np.bool_]
-    freedom: float  # readings minus parameters of the joint with the fewest
+
+def _sided(rests: Sequence[Motion]) -> npt.NDArray[np.bool_]:
+    """Mark readings after an approach; without one, dry friction is anything up to its bound."""
+    return np.concatenate([one.dq for one in rests]).astype(bool)
 
 
 def _solved(
-    predicted: Callable[[FloatArray], tuple[FloatArray, FloatArray]],
-    y: FloatArray,
-    known_side: npt.NDArray[np.bool_],
-    prior: FloatArray,
-    scales: FloatArray,
-) -> _Solution:
-    """Solve by Gauss-Newton iterations; estimate variances and leave out outliers on the way."""
-    x, free, used = np.zeros(len(prior)), np.flatnonzero(prior), known_side
-    sigma = 0.02 * scales
+    arms: Sequence[ArmModel], rests: Sequence[Motion], prior: FloatArray, scales: FloatArray
+) -> tuple[FloatArray, FloatArray, FloatArray, npt.NDArray[np.bool_], float]:
+    """
+    Solve by Gauss-Newton iterations; estimate variances and leave out outliers on the way.
+
+    Returns
+    -------
+    x : ndarray, shape (P,)
+        Change of all parameters.
+    covariance, information : ndarray, shape (F, F)
+        Covariance of the free parameters, and information of the rests without the prior.
+    used : ndarray of bool, shape (K, n)
+        Readings that count.
+    freedom : float
+        Readings minus parameters of the joint with the fewest.
+
+    """
+    y, sided = np.concatenate([np.asarray(one.tau) for one in rests]), _sided(rests)
+    x, free, used, sigma = np.zeros(len(prior)), np.flatnonzero(prior), sided, 0.02 * scales
     for _ in range(60):
-        torque, columns = predicted(x)
-        columns = columns[:, :, free]
-        w = columns * (used / sigma)[:, :, np.newaxis]
+        torque, columns = _predicted(arms, rests, x)
+        w = columns[:, :, free] * (used / sigma)[:, :, np.newaxis]
         information = np.einsum('kjp,kjr->pr', w, w)
         covariance = np.linalg.inv(information + np.diag(prior[free] ** -2.0))
         pull = np.einsum('kjp,kj->p', w, (y - torque) / sigma) - x[free] / prior[free] ** 2
         step = covariance @ pull
         x[free] += step
         freedom = used.sum(axis=0) - np.einsum('kjp,pr,kjr->j', w, covariance, w)
-        left = np.abs(y - torque - columns @ step)
-        squares = np.sum(used * left**2, axis=0)
-        before, sigma = sigma, np.sqrt(squares / np.maximum(freedom, 0.1)) + 1e-6 * scales
-        # the median of normal errors is 0.67 of their standard deviation
-        used = known_side & (left < _OUTLYING / 0.67 * np.median(left, axis=0) + 1e-6 * scales)
-        still = np.abs(step).max(initial=0.0, where=step**2 > 1e-6 * np.diag(covariance))
-        if not still and np.all(np.abs(before / sigma - 1.0) < 1e-3):
+        left = np.abs(y - torque - columns[:, :, free] @ step)
+        before, least = sigma, 1e-6 * scales
+        sigma = np.sqrt((used * left**2).sum(axis=0) / np.maximum(freedom, 0.1)) + least
+        used = sided & (left <= _OUTLYING * np.median(left, axis=0) + least)
+        small = np.all(step**2 < 1e-6 * np.diag(covariance))
+        if small and np.all(np.abs(before / sigma - 1.0) < 1e-3):
             break
-    return _Solution(x, free, covariance, information, used, float(freedom.min()))
+    return x, covariance, information, used, float(freedom.min())
 
 
-def _judged(
-    arm: ArmModel, solution: _Solution, scales: Mapping[str, float], poses: int
-) -> Iterator[Quantity]:
-    """Return the quantities with their intervals, and why some are not determined."""
-    free, covariance = solution.free, solution.covariance
-    std = np.sqrt(np.diag(covariance))
-    middle = quantities_of(arm)
-    slopes = np.zeros((len(middle), len(free)))
-    for k, place in enumerate(free):
-        step = 0.01 * std[k] * np.eye(1, len(arm.theta), place)[0]
-        ends = [[*quantities_of(arm.with_theta(arm.theta + s * step)).values()] for s in (-1, 1)]
-        slopes[:, k] = np.subtract(ends[1], ends[0]) / (0.02 * std[k])
-    factor = float(student.ppf(0.975, max(solution.freedom, 1.0)))
-    names = [arm.parameters[k] for k in free]
-    alone = 1.0 / np.sqrt(np.maximum(np.diag(solution.information), 1e-300))
-    for (key, value), slope in zip(middle.items(), slopes, strict=True):
-        reach = factor * float(np.sqrt(slope @ covariance @ slope))
-        limit = _USEFUL[key[0].split('_')[0]]
-        limit *= scales[key[1]] if key[0] in ('zero', 'friction', 'mass') else 1.0
-        reason = remedy = ''
-        if reach > limit or (reach > 0.0 and solution.freedom < 1.0):
-            most = int(np.argmax(np.abs(slope) * std))
-            correlation = covariance[most] / (std * std[most])
-            correlation[most] = 0.0
-            other = names[int(np.argmax(np.abs(correlation)))]
-            mixed = factor * abs(slope[most]) * alone[most] <= limit
-            reason = f'not separable from {other.words} of {other.joint or "the arm"}'
-            reason = reason if mixed else 'no rest shows it'
-            remedy = _remedy({names[most].name, other.name if mixed else ''})
-            if poses < _FEW:
-                reason, remedy = f'{poses} poses are too few', MORE
-        yield Quantity(*key, value, reach, reason, remedy)
+@dataclass(frozen=True)
+class _Judge:
+    """A fitted arm, its free parameters, their covariance and information, and units of limits."""
 
+    arm: ArmModel
+    free: npt.NDArray[np.intp]
+    covariance: FloatArray
+    information: FloatArray
+    units: Mapping[str, float]
 
-def _remedy(names: set[str]) -> str:
-    """Return what separates or shows parameters."""
-    if any(name.startswith('payload') for name in names):
-        return 'record a known payload as well, --payload BAG=KG@LINK, or say --known tool'
-    if 'gain_error' in names:
-        return 'gravity hardly turns the joint: a known force or tool has to, or say --known gain'
-    return MORE if names == {'coulomb_torque', ''} else 'say what is known: --known tilt'
+    def quantities(self, factor: float, few: str) -> tuple[Quantity, ...]:
+        """Return the quantities, with intervals of a factor times the standard deviation."""
+        arm, std = self.arm, np.sqrt(np.diag(self.covariance))
+        middle, found = quantities_of(arm), []
+        slopes = np.zeros((len(middle), len(std)))
+        for k, place in enumerate(self.free):
+            step = 0.01 * std[k] * np.eye(1, len(arm.theta), place)[0]
+            ends = [quantities_of(arm.with_theta(arm.theta + s * step)) for s in (-1.0, 1.0)]
+            low, high = (np.array([*end.values()]) for end in ends)
+            slopes[:, k] = (high - low) / (0.02 * std[k])
+        for ((name, joint, unit), value), slope in zip(middle.items(), slopes, strict=True):
+            half = factor * float(np.sqrt(slope @ self.covariance @ slope))
+            scale = self.units[joint] if name in ('zero', 'friction', 'mass') else 1.0
+            limit = scale * _USEFUL[name.split('_')[0]]
+            reason = few if half > 0.0 else ''
+            if half > limit:
+                reason = few or self._reason(
+                    int(np.argmax(np.abs(slope) * std)), slope, limit / factor
+                )
+            found.append(Quantity(name, joint, unit, value, half, reason))
+        return tuple(found)
+
+    def _reason(self, most: int, slope: FloatArray, limit: float) -> str:
+        """Return why a quantity is not determined that depends most on one of the parameters."""
+        correlation = np.abs(self.covariance[most]) / np.sqrt(np.diag(self.covariance))
+        correlation[most] = 0.0
+        own, other = (self.arm.parameters[self.free[k]] for k in (most, np.argmax(correlation)))
+        alone = abs(slope[most]) / np.sqrt(max(self.information[most, most], 1e-300)) < limit
+        names = own.name + (other.name if alone else '')
+        remedy = 'say --known tilt if the base is level'
+        if 'payload' in names:
+            remedy = 'record a known payload as well (--payload), or say --known tool'
+        elif 'gain_error' in names:
+            remedy = 'gravity hardly turns the joint: say --known gain, or record it with a tool'
+        elif own.name == 'coulomb_torque':
+            remedy = MORE
+        mixed = f'not separable from {other.words} of {other.joint or "the base"}'
+        return f'{mixed if alone else "no rest shows it"}; {remedy}'

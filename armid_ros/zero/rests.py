@@ -6,7 +6,7 @@ from __future__ import annotations
 
 from armid_ros.errors import IdentificationError
 from armid_ros.identification.rows.checks import REST_RANGE
-from armid_ros.motion import FloatArray, Motion
+from armid_ros.motion import Motion
 from armid_ros.recording import Recording
 import numpy as np
 from scipy.ndimage import maximum_filter1d, median_filter, minimum_filter1d, uniform_filter1d
@@ -16,16 +16,14 @@ from scipy.ndimage import maximum_filter1d, median_filter, minimum_filter1d, uni
 WINDOW, SETTLING, SHORTEST = 1.0, 0.5, 0.5
 #: Motion to a pose after which dry friction acts against its direction [rad or m].
 APPROACH = 0.03
-#: Distance between two poses [rad or m].
-APART = 0.05
 
 
 def find_rests(recording: Recording) -> Motion:
     """
     Return the K rests of a recording as samples, with the time of their begin.
 
-    Position and torque are means. The velocity is the direction from which a joint came: 1 upwards,
-    -1 downwards, 0 where it hardly moved since the rest before. IdentificationError: efforts are
+    Position and torque are means. The velocity is the direction from which a joint came, 1
+    or -1, 0 where it hardly moved since the rest before. IdentificationError: efforts are
     missing or constant, or the arm is never at rest.
 
     """
@@ -62,12 +60,3 @@ def find_rests(recording: Recording) -> Motion:
         before = first
     time, poses, directions, torque = (np.array(one) for one in zip(*rests, strict=True))
     return Motion(recording.joints, time, poses, directions, np.zeros_like(poses), torque)
-
-
-def count_poses(q: FloatArray) -> int:
-    """Return the number of poses, rows of shape (K, n), that are apart from each other."""
-    kept: list[FloatArray] = []
-    for pose in q:
-        if all(np.abs(pose - other).max() > APART for other in kept):
-            kept.append(pose)
-    return len(kept)

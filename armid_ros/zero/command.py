@@ -1,0 +1,161 @@
+# Copyright 2026 The armid_ros developers
+# SPDX-License-Identifier: Apache-2.0
+"""The command ``armid zero``: sensor zeros, gains, gravity and tool from an arm at rest."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+from armid_ros.cli import columns, parameters
+from armid_ros.cli.excite import excite, require_free
+from armid_ros.cli.identify import identify
+from armid_ros.cli.terminal import progress
+import click
+
+#: Options of `armid excite` on the limits and surroundings of an arm.
+_AROUND = ('joint_limits', 'velocity', 'clearance', 'environment', 'floor')
+
+
+@click.group()
+def zero() -> None:
+    """
+    Find zeros of torque sensors, gains, tilt of the base and tool from an arm at rest.
+
+    plan: a trajectory of static poses, of some minutes, for the excitation publisher. fit: what a
+    recording of it shows, or of another run with rests.
+
+    """
+
+
+@zero.command(epilog='Example: armid zero plan --robot ur5.urdf --out plan')
+@parameters.robot
+@parameters.folder
+@click.option(
+    '--poses', type=click.IntRange(4, 40), default=16, show_default=True, help='Number of poses.'
+)
+@click.option(
+    '--hold',
+    type=click.FloatRange(1.0, 60.0),
+    default=3.0,
+    show_default=True,
+    help='Time at rest in each pose, from each side [s].',
+)
+@parameters.setting
+@parameters.as_json
+def plan(
+    robot_source: str,
+    gravity: str,
+    joints: str | None,
+    out: Path,
+    poses: int,
+    hold: float,
+    seed: int,
+    as_json: bool,
+    **around: Any,
+) -> None:
+    """Plan static poses and the way through them, as a trajectory of armid excite."""
+    from armid_ros.api.excitation import ExcitationResult
+    from armid_ros.api.table import ResultOrigin
+    from armid_ros.cli import options
+    from armid_ros.excitation import CollisionScene, with_joint_limits
+    from armid_ros.zero.plan import plan_zero
+    from armid_ros.zero.text import plan_summary
+
+    robot = options.open_robot(robot_source, gravity, joints)
+    robot, limits = with_joint_limits(robot, around['joint_limits'], around['velocity'])
+    require_free(out)
+    staged = options.stage(out, ExcitationResult.schema, robot_source)
+    with progress('planning'):
+        place = around['clearance'], around['floor'], around['environment']
+        scene = CollisionScene.of(robot, *place)
+        result, expected = plan_zero(
+            robot, scene, poses=poses, hold=hold, acceleration=limits, seed=seed
+        )
+        files = filter(None, [around['environment'], around['joint_limits']])
+        origin = options.provenance([Path(robot_source.split(' ')[0]), *files], seed=seed)
+        summary = plan_summary(result, expected, robot_source, str(out / 'excitation.yaml'))
+        options.deliver(
+            result, staged, ResultOrigin(robot_source, provenance=origin), as_json, summary
+        )
+
+
+plan.params += [one for one in excite.params if one.name in _AROUND]
+
+
+@zero.command(epilog='Example: armid zero fit run.mcap --robot ur5.urdf --out zeros')
+@parameters.bags
+@parameters.robot
+@parameters.folder
+@click.option(
+    '--known',
+    type=click.Choice(['gain', 'tilt', 'tool']),
+    multiple=True,
+    help='Held as described: gains of 1, no tilt, no tool; may be given several times. With known '
+    'gains, the size of gravity is found.',
+)
+@click.option(
+    '--link-error',
+    type=click.FloatRange(0.0, 1.0),
+    default=0.0,
+    show_default=True,
+    help='Standard deviation of the described masses and first moments of links, as a share; 0: '
+    'trusted.',
+)
+@click.option(
+    '--external',
+    is_flag=True,
+    help='Efforts are an estimate of external torque (--topic, --effort): find the constants and '
+    'the payload that explain it.',
+)
+@columns.recordings
+def fit(
+    bags: tuple[Path, ...],
+    robot_source: str,
+    gravity: str,
+    joints: str | None,
+    topic: str | None,
+    out: Path,
+    known: tuple[str, ...],
+    link_error: float,
+    external: bool,
+    payloads: tuple[str, ...],
+    seed: int,
+    as_json: bool,
+) -> None:
+    """Find zeros, gains, gravity, tool and friction from the rests of recordings."""
+    from armid_ros.arm import save_model
+    from armid_ros.cli import options
+    from armid_ros.files import json_text
+    from armid_ros.identification import write_document
+    from armid_ros.identification.known_payload import payloads_of
+    from armid_ros.zero.fit import fit_rests
+    from armid_ros.zero.rests import find_rests
+    from armid_ros.zero.text import fit_document, fit_summary, SCHEMA
+
+    staged = options.stage(out, SCHEMA, robot_source)
+    robot = options.open_robot(robot_source, gravity, joints, bags)
+    recordings = options.read(bags, robot, topic)
+    options.tell_damage(*recordings)
+    loaded = payloads_of(payloads, bags, recordings, robot)
+    robots = [loaded.get(one.source, robot) for one in recordings]
+    if external:  # the torque of a payload alone
+        known = ('gain', 'tilt')
+        robots = [robot.with_inertias(0.0 * robot.rigid_parameters) for _ in bags]
+    found = fit_rests([find_rests(one) for one in recordings], robots, known, link_error)
+    document = fit_document(found, known, link_error, external)
+    write_document(staged.folder / 'zero.json', document)
+    written, step = f'{out}: zero.json', 'enter the load in the controller'
+    if not external:
+        source = options.kept_source(robot_source, robot, staged.folder)
+        save_model(staged.folder / 'model.yaml', found.model(), source)
+        written = f'{written}, model.yaml'
+        step = f'armid diagnose RUN --robot {robot_source} --model {out / "model.yaml"}'
+    staged.keep()
+    if as_json:
+        click.echo(json_text(document))
+    else:
+        options.show(fit_summary(found, document, step), written)
+
+
+fit.params += [one for one in identify.params if one.name == 'payloads']

@@ -1,0 +1,106 @@
+# Copyright 2026 The armid_ros developers
+# SPDX-License-Identifier: Apache-2.0
+"""What ``armid zero`` prints and writes."""
+
+from __future__ import annotations
+
+from collections.abc import Collection, Iterable
+from dataclasses import asdict
+from typing import Any
+
+from armid_ros.api.excitation import ExcitationResult
+from armid_ros.api.table import Summary
+from armid_ros.report.notation import measured
+from armid_ros.zero.fit import MORE, Quantity, ZeroFit
+import numpy as np
+
+SCHEMA = 'armid/zero/1'
+#: Quantities of an estimate of external torque.
+_EXTERNAL = ('zero', 'friction', 'mass', 'center_x', 'center_y', 'center_z')
+#: Residual over the largest reading of a joint, above which the model does not explain it.
+_POOR = 0.1
+
+
+def plan_summary(result: ExcitationResult, expected: ZeroFit, robot: str, file: str) -> Summary:
+    """Return the summary of a plan: half-widths of the intervals that its rests give."""
+    shown, joints = result.summary(), result.arm.robot.joints
+    rows = [
+        (j, *(_cell(expected.of(name, j)).split(' ± ')[-1] for name in ('zero', 'gain')))
+        for j in joints
+    ]
+    minutes = result.run.duration / 60.0
+    title = f'{expected.rests} rests in {expected.poses} poses, {minutes:.1f} min'
+    words = (f'{name} ± {expected.of(name).half_width:.2g}' for name in ('tilt', 'mass'))
+    lines = [f'expected at a noise of 1 % of the torque limits: {" deg, ".join(words)} kg']
+    lines += [*shown.lines[:1], *_undetermined(q for q in expected.quantities if q.joint)]
+    step = f'play {file} with excitation_publisher, record it, then armid zero fit BAG --robot '
+    heads = ('joint', 'zero ± [N m or N]', 'gain ±')
+    return Summary(title, shown.badge, heads, rows, lines, [f'{step}{robot} --out zeros'])
+
+
+def fit_document(
+    found: ZeroFit, known: Collection[str], link_error: float, external: bool
+) -> dict[str, Any]:
+    """Return what zero.json holds."""
+    shown = [one for one in found.quantities if one.name in _EXTERNAL or not external]
+    held = [f'links within {100.0 * link_error:g} % of the description', *known]
+    held += [] if 'gain' in known else [f'gravity of {found.of("gravity").value:.4g} m/s^2']
+    poor = bool(np.any(found.residual > _POOR * found.largest))
+    lacking = any(one.reason for one in shown)
+    rms = zip(found.arm.robot.joints, found.before, found.residual, strict=True)
+    return {
+        'schema': SCHEMA,
+        'robot': found.arm.robot.name,
+        'verdict': 'not explained' if poor else 'in part' if lacking else 'determined',
+        'external': external,
+        'held': [] if external else held,
+        'rests': found.rests,
+        'poses': found.poses,
+        'outliers': found.outliers,
+        'quantities': [asdict(one) for one in shown],
+        'joints': [{'joint': j, 'before': float(b), 'residual': float(r)} for j, b, r in rms],
+    }
+
+
+def fit_summary(found: ZeroFit, document: dict[str, Any], step: str) -> Summary:
+    """Return the summary of a fit with the step that follows if it is good."""
+    names = ('zero', 'friction') if document['external'] else ('zero', 'gain', 'friction')
+    rows = [
+        (joint, *(_cell(found.of(name, joint)) for name in names), f'{left:.2g}')
+        for joint, left in zip(found.arm.robot.joints, found.residual, strict=True)
+    ]
+    place = ', '.join(_cell(found.of(f'center_{axis}')).split(' ± ')[0] for axis in 'xyz')
+    title = f'tool of {_cell(found.of("mass"))} kg at {place} m'
+    if document['external']:
+        share = 1.0 - np.sum(found.residual**2) / np.sum(found.before**2)
+        title = f'{title} and constants explain {100.0 * share:.0f} % of the external torque'
+    else:
+        title = f'base tilted by {_cell(found.of("tilt"))} deg, {title}'
+    lines = [f'{found.rests} rests in {found.poses} poses; {found.outliers} outliers left out']
+    if held := document['held']:
+        lines[0] += f'; held known: {", ".join(held)}'
+    shown = {row['name'] for row in document['quantities']}
+    lines += _undetermined(q for q in found.quantities if q.name in shown)
+    if document['verdict'] == 'not explained':
+        step = 'check --robot, --gravity, --effort-scale and what touched the arm'
+    elif all(found.of('zero', joint).reason for joint in found.arm.robot.joints):
+        step = MORE
+    heads = ('joint', *names, 'residual [N m or N]')
+    return Summary(title, document['verdict'], heads, rows, lines, [step])
+
+
+def _cell(one: Quantity) -> str:
+    """Write a quantity with its interval."""
+    if one.reason:
+        return 'not det.'
+    value, half = measured(one.value, one.half_width)
+    return f'{value} ± {half}' if one.half_width else f'{value} (known)'
+
+
+def _undetermined(quantities: Iterable[Quantity]) -> list[str]:
+    """Return a line for each reason why quantities are not determined."""
+    groups: dict[str, list[str]] = {}
+    for one in quantities:
+        if one.reason:
+            groups.setdefault(one.reason, []).append(f'{one.name} {one.joint}'.strip())
+    return [f'not determined: {", ".join(names)}: {why}' for why, names in groups.items()]
