@@ -4,6 +4,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -14,7 +15,7 @@ from armid_ros.cli.terminal import progress
 import click
 
 #: Options of `armid excite` on the limits and surroundings of an arm.
-_AROUND = ('joint_limits', 'velocity', 'clearance', 'environment', 'floor')
+_AROUND = ('joint_limits', 'velocity', 'clearance', 'floor', 'environment')
 
 
 @click.group()
@@ -44,15 +45,7 @@ def zero() -> None:
 @parameters.setting
 @parameters.as_json
 def plan(
-    robot_source: str,
-    gravity: str,
-    joints: str | None,
-    out: Path,
-    poses: int,
-    hold: float,
-    seed: int,
-    as_json: bool,
-    **around: Any,
+    robot_source: str, gravity: str, joints: str | None, out: Path, as_json: bool, **given: Any
 ) -> None:
     """Plan static poses and the way through them, as a trajectory of armid excite."""
     from armid_ros.api.excitation import ExcitationResult
@@ -60,23 +53,24 @@ def plan(
     from armid_ros.cli import options
     from armid_ros.excitation import CollisionScene, with_joint_limits
     from armid_ros.zero.plan import plan_zero
-    from armid_ros.zero.text import plan_summary
 
+    joint_limits, velocity, *place = (given.pop(name) for name in _AROUND)
     robot = options.open_robot(robot_source, gravity, joints)
-    robot, limits = with_joint_limits(robot, around['joint_limits'], around['velocity'])
+    robot, acceleration = with_joint_limits(robot, joint_limits, velocity)
     require_free(out)
     staged = options.stage(out, ExcitationResult.schema, robot_source)
     with progress('planning'):
-        place = around['clearance'], around['floor'], around['environment']
         scene = CollisionScene.of(robot, *place)
-        result, expected = plan_zero(
-            robot, scene, poses=poses, hold=hold, acceleration=limits, seed=seed
+        result = plan_zero(robot, scene, acceleration=acceleration, **given)
+        read = [Path(robot_source.split(' ')[0]), *filter(None, (joint_limits, place[-1]))]
+        kept = options.provenance(read, seed=result.seed)
+        step = (
+            f'play {out / "excitation.yaml"} with excitation_publisher, record it, then '
+            f'armid zero fit BAG --robot {robot_source} --out zeros'
         )
-        files = filter(None, [around['environment'], around['joint_limits']])
-        origin = options.provenance([Path(robot_source.split(' ')[0]), *files], seed=seed)
-        summary = plan_summary(result, expected, robot_source, str(out / 'excitation.yaml'))
+        summary = replace(result.summary(), then='', steps=[step])
         options.deliver(
-            result, staged, ResultOrigin(robot_source, provenance=origin), as_json, summary
+            result, staged, ResultOrigin(robot_source, provenance=kept), as_json, summary
         )
 
 

@@ -21,7 +21,6 @@ from armid_ros.excitation import (
     DesignProblem,
     DesignSettings,
     evaluate,
-    Excitation,
     FourierTrajectory,
     Limits,
     trajectory_faults,
@@ -31,7 +30,7 @@ from armid_ros.excitation.problem import torque_noise
 from armid_ros.motion import FloatArray, Motion
 from armid_ros.robots import Robot
 from armid_ros.robots.robot import position_range
-from armid_ros.zero.fit import arm_at_rest, fit_rests, ZeroFit
+from armid_ros.zero.fit import arm_at_rest
 import numpy as np
 
 #: Standard deviation of the smoothing, and its effect at either end of a rest [s].
@@ -54,61 +53,36 @@ def plan_zero(
     hold: float = 3.0,
     acceleration: FloatArray | None = None,
     seed: int = 0,
-) -> tuple[ExcitationResult, ZeroFit]:
+) -> ExcitationResult:
     """
-    Plan a tour of static poses.
+    Plan a tour of static poses, at rest for a time from each side [s].
 
-    Parameters
-    ----------
-    robot : Robot
-        The arm.
-    scene : CollisionScene
-        Bodies, floor and obstacles.
-    poses : int
-        Number of poses.
-    hold : float
-        Time at rest in each pose, from each side [s].
-    acceleration : ndarray, shape (n,), optional
-        Acceleration limits [rad/s^2 or m/s^2].
-    seed : int
-        Seed of the random poses.
-
-    Returns
-    -------
-    result : ExcitationResult
-        The tour, checked like any excitation.
-    expected : ZeroFit
-        Fit of its rests with the described torque and a noise of 1 % of the torque limits.
-
-    Raises
-    ------
-    TrajectoryError
-        If too few poses are free, or no way is found.
+    The acceleration limits, shape (n,), are as of `DesignSettings`; the seed is that of the random
+    poses. TrajectoryError: too few poses are free, or no way is found.
 
     """
     arm, model, rng = ArmModel(robot), arm_at_rest(robot), np.random.default_rng(seed)
-    settings = DesignSettings(acceleration=acceleration, clearance=scene.clearance)
-    noise = torque_noise(arm, settings)
+    settings = DesignSettings(
+        acceleration=acceleration, clearance=scene.clearance, n_periods=1, target='effects'
+    )
     limits = Limits.of(robot, speed=1.0, acceleration=acceleration)
     planner = planner_of(arm, settings, scene)
     assert planner.limits is not None
     inside = replace(planner.limits, lower=limits.lower, upper=limits.upper)
     careful = replace(planner, limits=inside, margin=_RESERVE * scene.clearance)
-    chosen = _poses(careful, model, poses, noise, rng)
-    trajectory, rests = _tour(careful, inside, chosen, hold)
+    chosen = _poses(careful, inside, model, poses, torque_noise(arm, settings), rng)
+    trajectory = _tour(careful, inside, chosen, hold)
     faults = trajectory_faults(arm, limits, trajectory, planner.clearance, scene.clearance)
     if faults:
         raise TrajectoryError(f'the way through the poses: {faults}; take another --seed')
-    period, harmonics = trajectory.period, trajectory.harmonics
-    settings = replace(settings, period=period, harmonics=harmonics, n_periods=1, target='effects')
-    problem = DesignProblem.of(model, settings, rng)
-    core = evaluate(problem, Excitation(trajectory, 1, settings.run_in))
-    rests = rests.with_torque(model.torque(rests) + noise * rng.normal(size=rests.q.shape))
-    return ExcitationResult(core, arm, scene, seed=seed), fit_rests([rests], [robot])
+    settings = replace(settings, period=trajectory.period, harmonics=trajectory.harmonics)
+    core = evaluate(DesignProblem.of(model, settings, rng), trajectory)
+    return ExcitationResult(core, arm, scene, seed=seed)
 
 
 def _poses(
     planner: TransferPlanner,
+    limits: Limits,
     model: ArmModel,
     count: int,
     noise: FloatArray,
@@ -121,12 +95,12 @@ def _poses(
     exchange. Source: Fedorov 1972.
 
     """
-    robot, limits = model.robot, planner.limits
-    assert limits is not None
+    robot = model.robot
     lower, upper = position_range(limits.lower, limits.upper)
     turn = np.where(robot.prismatic, np.inf, np.pi)  # weight repeats after a turn
-    low, high = np.maximum(lower, -turn), np.minimum(upper, turn)
-    drawn = rng.uniform(low, high, (_CANDIDATES, robot.n_joints))
+    lower, upper = np.maximum(lower, -turn), np.minimum(upper, turn)
+    room = np.minimum(BEYOND, 0.1 * (upper - lower))
+    drawn = rng.uniform(lower + room, upper - room, (_CANDIDATES, robot.n_joints))
     free = np.array([q for q in drawn if not planner.fault(q)])
     if len(free) < count:
         raise TrajectoryError(
@@ -155,34 +129,25 @@ def _poses(
 
 def _tour(
     planner: TransferPlanner, limits: Limits, poses: FloatArray, hold: float
-) -> tuple[FourierTrajectory, Motion]:
-    """
-    Return the tour, and its rests with the direction of the approach as velocity.
-
-    A pose that no way leads to, and a motion beyond a pose that is not free, are left out.
-
-    """
+) -> FourierTrajectory:
+    """Return the tour without poses that no way leads to, and motions beyond that are not free."""
     count = round((hold + 2.0 * SMOOTHED) * _RATE)
     u = np.arange(BACK * _RATE)[:, np.newaxis] / (BACK * _RATE)
     bump = (4.0 * u * (1.0 - u)) ** 4  # begins and ends smoothly
     now, reason = poses[0], ''
     parts: list[FloatArray] = []
-    rests: list[tuple[FloatArray, FloatArray]] = []
     for pose in (*poses[1:], poses[0]):
         try:
             way = planner(now, pose)
         except TrajectoryError as error:
             reason = str(error)
             continue
-        now, side = pose, np.sign(way.q[-1] - way.q[-2])
-        rest = np.tile(pose, (count, 1))
+        now, rest = pose, np.tile(pose, (count, 1))
         parts += [way.at(np.arange(0.0, way.duration, 1.0 / _RATE)).q, rest]
-        rests.append((pose, side))
-        over = pose + np.where(side < 0.0, -BEYOND, BEYOND)
+        over = pose + np.where(way.q[-1] < way.q[-2], -BEYOND, BEYOND)
         over = np.clip(over, limits.lower, limits.upper)
         if not planner.fault(over):
             parts += [pose + bump * (over - pose), rest]
-            rests.append((pose, np.where(over == pose, side, np.sign(pose - over))))
     if not np.array_equal(now, poses[0]):
         raise TrajectoryError(f'there is no way back from the poses: {reason}')
     q = np.roll(np.concatenate(parts), count // 2, axis=0)  # begins and ends in a rest
@@ -191,6 +156,4 @@ def _tour(
     w = 2.0 * np.pi / period * np.arange(1, round(CUTOFF * period) + 1)
     waves = np.fft.rfft(q, axis=0)[: len(w) + 1].T / len(q)
     series = 2.0 * w * waves[:, 1:] * np.exp(-0.5 * (SMOOTHING * w) ** 2)
-    joints, (reached, came) = limits.joints, (np.array(one) for one in zip(*rests, strict=True))
-    found = FourierTrajectory(joints, period, waves[:, 0].real, -series.imag, -series.real)
-    return found, Motion.of_states(joints, reached, came, 0.0)
+    return FourierTrajectory(limits.joints, period, waves[:, 0].real, -series.imag, -series.real)

@@ -8,7 +8,6 @@ from collections.abc import Collection, Iterable
 from dataclasses import asdict
 from typing import Any
 
-from armid_ros.api.excitation import ExcitationResult
 from armid_ros.api.table import Summary
 from armid_ros.report.notation import measured
 from armid_ros.zero.fit import MORE, Quantity, ZeroFit
@@ -21,29 +20,13 @@ _EXTERNAL = ('zero', 'friction', 'mass', 'center_x', 'center_y', 'center_z')
 _POOR = 0.1
 
 
-def plan_summary(result: ExcitationResult, expected: ZeroFit, robot: str, file: str) -> Summary:
-    """Return the summary of a plan: half-widths of the intervals that its rests give."""
-    shown, joints = result.summary(), result.arm.robot.joints
-    rows = [
-        (j, *(_cell(expected.of(name, j)).split(' ± ')[-1] for name in ('zero', 'gain')))
-        for j in joints
-    ]
-    minutes = result.run.duration / 60.0
-    title = f'{expected.rests} rests in {expected.poses} poses, {minutes:.1f} min'
-    words = (f'{name} ± {expected.of(name).half_width:.2g}' for name in ('tilt', 'mass'))
-    lines = [f'expected at a noise of 1 % of the torque limits: {" deg, ".join(words)} kg']
-    lines += [*shown.lines[:1], *_undetermined(q for q in expected.quantities if q.joint)]
-    step = f'play {file} with excitation_publisher, record it, then armid zero fit BAG --robot '
-    heads = ('joint', 'zero ± [N m or N]', 'gain ±')
-    return Summary(title, shown.badge, heads, rows, lines, [f'{step}{robot} --out zeros'])
-
-
 def fit_document(
     found: ZeroFit, known: Collection[str], link_error: float, external: bool
 ) -> dict[str, Any]:
     """Return what zero.json holds."""
     shown = [one for one in found.quantities if one.name in _EXTERNAL or not external]
-    held = [f'links within {100.0 * link_error:g} % of the description', *known]
+    links = f'links within {100.0 * link_error:g} %' if link_error else 'links as described'
+    held = [links, *known]
     held += [] if 'gain' in known else [f'gravity of {found.of("gravity").value:.4g} m/s^2']
     poor = bool(np.any(found.residual > _POOR * found.largest))
     lacking = any(one.reason for one in shown)

@@ -2,7 +2,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """Arms with hidden zeros, gains, tilt, tool and dry friction, without a model of the package."""
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 from armid_ros.motion import Motion
 from armid_ros.recording import Recording
@@ -39,14 +39,6 @@ class Secret:
             mass=float(robot.rigid_parameters[::10].sum() * rng.uniform(0.03, 0.12)),
             center=rng.uniform((-0.05, -0.05, 0.03), (0.05, 0.05, 0.13)),
         )
-
-    def with_gains(self, gain):
-        """Return it with the same gain in all joints."""
-        return replace(self, gain=np.full(len(self.gain), gain))
-
-    def level(self):
-        """Return it without tilt."""
-        return replace(self, tilt=np.zeros(2))
 
     def gravity(self, robot):
         """Return gravity in the frame of the tilted base [m/s^2]."""

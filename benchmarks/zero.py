@@ -3,7 +3,7 @@
 """
 Random arms in MuJoCo that play a plan: how well the fit finds what is hidden in them.
 
-python -m tests.zero.cases [NUMBER [FIRST]]
+python -m benchmarks.zero [NUMBER [FIRST]]
 
 """
 
@@ -25,7 +25,7 @@ def case(seed):
     """Return arm, intervals that hold the truth, all of them, and errors as shares."""
     name = ARMS[seed % len(ARMS)]
     robot, rng = load_machine(name), np.random.default_rng(seed)
-    plan, _ = plan_zero(robot, CollisionScene.of(robot, 0.01), seed=seed)
+    plan = plan_zero(robot, CollisionScene.of(robot, 0.01), seed=seed)
     secret = Secret.draw(robot, rng)
     rests = find_rests(play(robot, plan.trajectory, secret, rng))
     found, truth = fit_rests([rests], [robot]), secret.truth(robot)
