@@ -21,10 +21,13 @@ _AROUND = ('joint_limits', 'velocity', 'clearance', 'floor', 'environment')
 @click.group()
 def zero() -> None:
     """
-    Find zeros of torque sensors, gains, tilt of the base and tool from an arm at rest.
+    Find torque zeros and gains, tilt of the base and tool from an arm at rest.
 
-    plan: a trajectory of static poses, of some minutes, for the excitation publisher. fit: what a
-    recording of it shows, or of another run with rests.
+    plan: some minutes of static poses, each reached from both sides, as a trajectory of armid
+    excite; excitation_publisher plays it with all its checks. fit: what the rests of a recording
+    show. Links of the description and the size of gravity are trusted; with --known gain the size
+    is found, with --link-error links are doubted. Friction at rest is a bound below that in
+    motion. The centre of the tool is in the frame of the last joint. model.yaml is for --model.
 
     """
 

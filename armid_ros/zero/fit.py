@@ -5,8 +5,8 @@ Torque zeros and gains, gravity, tool and dry friction from an arm at rest.
 
 The reading of a joint is gain (weight + offset + friction against the approach), as an `ArmModel`
 has it; weight is that of the described links and of a tool. The fit is generalised least squares
-with a variance of each joint that is estimated from the residuals, robust to outliers. Weak priors
-keep confounded parameters finite. A quantity with a wide interval is not determined.
+with a variance of each joint that is estimated from the residuals. Weak priors keep confounded
+parameters finite. A quantity with a wide interval is not determined.
 
 """
 
@@ -39,9 +39,10 @@ _USEFUL['center'] = 0.1
 _PRIORS = {'torque_offset': 1.0, 'coulomb_torque': 1.0, 'gain_error': 0.5, 'payload_m': 0.3}
 _PRIORS |= {'tilt_x': 0.3, 'tilt_y': 0.3, 'gravity_difference': 2.0}
 _PRIORS |= dict.fromkeys(('payload_mx', 'payload_my', 'payload_mz'), 0.1)
-#: Residual of a reading that is left out, over the standard deviation of its joint: the biweight
-#: of 95 % efficiency. Poses below which nothing is determined.
-_TUNING, _FEW = 4.685, 5
+#: Residual of a reading that is left out, over the median one of its joint: 6.7 standard
+#: deviations, as where dry friction acts the other way. Redundant readings of a joint from which
+#: this is done, and below which nothing is determined.
+_OUTLYING, _REDUNDANT, _FEW = 10.0, 8.0, 3.0
 #: What determines most quantities.
 MORE = 'record a run of armid zero plan'
 
@@ -185,11 +186,9 @@ def fit_rests(
         prior.append(_PRIORS.get(name.name, 0.0) * (units[owner] if share else 1.0))
     x, covariance, information, used, freedom = _solved(arms, rests, np.array(prior), scales)
     arm = arms[-1].with_theta(arms[-1].theta + x)
-    q = np.concatenate([one.q for one in rests])
-    # poses that are 0.05 rad or m apart from those before
-    poses = sum(bool(np.all(np.abs(q[:k] - q[k]).max(axis=1) > 0.05)) for k in range(len(q)))
+    poses = len(np.unique(np.concatenate([one.q for one in rests]).round(1), axis=0))
     judge = _Judge(arm, np.flatnonzero(prior), covariance, information, units)
-    few = f'{poses} poses are too few; {MORE}' if poses < _FEW or freedom < 1.0 else ''
+    few = f'{poses} poses are too few; {MORE}' if freedom < _FEW else ''
     factor = float(student.ppf(0.975, max(freedom, 1.0)))
     return ZeroFit(
         arm,
@@ -221,37 +220,40 @@ def _solved(
     arms: Sequence[ArmModel], rests: Sequence[Motion], prior: FloatArray, scales: FloatArray
 ) -> tuple[FloatArray, FloatArray, FloatArray, npt.NDArray[np.bool_], float]:
     """
-    Solve by Gauss-Newton iterations with biweight residuals, and estimate variances.
+    Solve by Gauss-Newton iterations; estimate variances and leave out outliers on the way.
 
-    Return the change of all parameters, covariance and information of those with a prior, readings
-    that count, (K, n), and readings minus parameters of the joint with the fewest. Source: Huber
-    1981, section 7.6, for the covariance.
+    Returns
+    -------
+    x : ndarray, shape (P,)
+        Change of all parameters.
+    covariance, information : ndarray, shape (F, F)
+        Covariance of the free parameters, and information of the rests without the prior.
+    used : ndarray of bool, shape (K, n)
+        Readings that count.
+    freedom : float
+        Readings minus parameters of the joint with the fewest.
 
     """
     y, sided = np.concatenate([np.asarray(one.tau) for one in rests]), _sided(rests)
-    x, free, freedom = np.zeros(len(prior)), np.flatnonzero(prior), sided.sum(axis=0)
-    count, before = np.maximum(freedom, 1), np.zeros_like(scales)
-    for number in range(60):
+    x, free, used, sigma = np.zeros(len(prior)), np.flatnonzero(prior), sided, 0.02 * scales
+    for _ in range(60):
         torque, columns = _predicted(arms, rests, x)
-        rest = sided * (y - torque)
-        typical = 1.5 * np.median(np.abs(rest), axis=0) * np.sqrt(count / np.maximum(freedom, 0.1))
-        u = np.minimum((rest / (_TUNING * typical + 1e-6 * scales)) ** 2, 1.0)
-        u *= number > 5  # least squares at first
-        pull = rest * (1.0 - u) ** 2
-        slope = np.maximum((sided * (1.0 - u) * (1.0 - 5.0 * u)).sum(axis=0) / count, 0.1)
-        sigma = np.sqrt((pull**2).sum(axis=0) / np.maximum(freedom, 0.1)) / slope + 1e-6 * scales
-        w = columns[:, :, free] * (sided / sigma)[:, :, np.newaxis]
+        w = columns[:, :, free] * (used / sigma)[:, :, np.newaxis]
         information = np.einsum('kjp,kjr->pr', w, w)
         covariance = np.linalg.inv(information + np.diag(prior[free] ** -2.0))
-        step = np.einsum('kjp,kj->p', w, pull / slope / sigma) - x[free] / prior[free] ** 2
-        step = covariance @ step
+        pull = np.einsum('kjp,kj->p', w, (y - torque) / sigma) - x[free] / prior[free] ** 2
+        step = covariance @ pull
         x[free] += step
-        freedom = sided.sum(axis=0) - np.einsum('kjp,pr,kjr->j', w, covariance, w)
-        small = np.all(step**2 < 1e-6 * np.diag(covariance)) and number > 6
+        freedom = used.sum(axis=0) - np.einsum('kjp,pr,kjr->j', w, covariance, w)
+        left = np.abs(y - torque - columns[:, :, free] @ step)
+        before, least = sigma, 1e-6 * scales
+        sigma = np.sqrt((used * left**2).sum(axis=0) / np.maximum(freedom, 0.1)) + least
+        if freedom.min() > _REDUNDANT:
+            used = sided & (left <= _OUTLYING * np.median(left, axis=0) + least)
+        small = np.all(step**2 < 1e-6 * np.diag(covariance))
         if small and np.all(np.abs(before / sigma - 1.0) < 1e-3):
             break
-        before = sigma
-    return x, covariance, information, sided & (u < 1.0), float(freedom.min())
+    return x, covariance, information, used, float(freedom.min())
 
 
 @dataclass(frozen=True)

@@ -25,16 +25,21 @@ def fit_document(
 ) -> dict[str, Any]:
     """Return what zero.json holds."""
     shown = [one for one in found.quantities if one.name in _EXTERNAL or not external]
+    gains = [one.value for one in shown if one.name == 'gain' and not one.reason] or [1.0]
     links = f'links within {100.0 * link_error:g} %' if link_error else 'links as described'
     held = [links, *known]
     held += [] if 'gain' in known else [f'gravity of {found.of("gravity").value:.4g} m/s^2']
-    poor = bool(np.any(found.residual > _POOR * found.largest))
-    lacking = any(one.reason for one in shown)
+    poor = np.any(found.residual > _POOR * found.largest) or min(gains) < 0.0
+    if external:
+        poor = _explained(found) < 0.8
+    verdict = 'in part' if any(one.reason for one in shown) else 'determined'
+    if all(one.reason for one in shown if one.name == 'zero'):
+        verdict = 'not determined'
     rms = zip(found.arm.robot.joints, found.before, found.residual, strict=True)
     return {
         'schema': SCHEMA,
         'robot': found.arm.robot.name,
-        'verdict': 'not explained' if poor else 'in part' if lacking else 'determined',
+        'verdict': 'not explained' if poor else verdict,
         'external': external,
         'held': [] if external else held,
         'rests': found.rests,
@@ -52,13 +57,14 @@ def fit_summary(found: ZeroFit, document: dict[str, Any], step: str) -> Summary:
         (joint, *(_cell(found.of(name, joint)) for name in names), f'{left:.2g}')
         for joint, left in zip(found.arm.robot.joints, found.residual, strict=True)
     ]
+    tilt, mass = found.of('tilt'), found.of('mass')
     place = ', '.join(_cell(found.of(f'center_{axis}')).split(' ± ')[0] for axis in 'xyz')
-    title = f'tool of {_cell(found.of("mass"))} kg at {place} m'
+    parts = [] if tilt.reason or document['external'] else [f'base tilted by {_cell(tilt)} deg']
+    parts += [] if mass.reason else [f'tool of {_cell(mass)} kg at {place} m']
+    title = ', '.join(parts) or 'neither tilt nor tool is determined'
     if document['external']:
-        share = 1.0 - np.sum(found.residual**2) / np.sum(found.before**2)
-        title = f'{title} and constants explain {100.0 * share:.0f} % of the external torque'
-    else:
-        title = f'base tilted by {_cell(found.of("tilt"))} deg, {title}'
+        share = 100.0 * _explained(found)
+        title += f'; with the constants it explains {share:.0f} % of the external torque'
     lines = [f'{found.rests} rests in {found.poses} poses; {found.outliers} outliers left out']
     if held := document['held']:
         lines[0] += f'; held known: {", ".join(held)}'
@@ -66,7 +72,7 @@ def fit_summary(found: ZeroFit, document: dict[str, Any], step: str) -> Summary:
     lines += _undetermined(q for q in found.quantities if q.name in shown)
     if document['verdict'] == 'not explained':
         step = 'check --robot, --gravity, --effort-scale and what touched the arm'
-    elif all(found.of('zero', joint).reason for joint in found.arm.robot.joints):
+    elif document['verdict'] == 'not determined':
         step = MORE
     heads = ('joint', *names, 'residual [N m or N]')
     return Summary(title, document['verdict'], heads, rows, lines, [step])
@@ -86,4 +92,10 @@ def _undetermined(quantities: Iterable[Quantity]) -> list[str]:
     for one in quantities:
         if one.reason:
             groups.setdefault(one.reason, []).append(f'{one.name} {one.joint}'.strip())
-    return [f'not determined: {", ".join(names)}: {why}' for why, names in groups.items()]
+    texts = {why: ', '.join(n) if len(n) < 9 else f'{len(n)} values' for why, n in groups.items()}
+    return [f'not determined: {names}: {why}' for why, names in texts.items()]
+
+
+def _explained(found: ZeroFit) -> float:
+    """Return the share of the squared readings that the fit explains."""
+    return float(1.0 - np.sum(found.residual**2) / np.sum(found.before**2))
