@@ -39,10 +39,10 @@ _USEFUL['center'] = 0.1
 _PRIORS = {'torque_offset': 1.0, 'coulomb_torque': 1.0, 'gain_error': 0.5, 'payload_m': 0.3}
 _PRIORS |= {'tilt_x': 0.3, 'tilt_y': 0.3, 'gravity_difference': 2.0}
 _PRIORS |= dict.fromkeys(('payload_mx', 'payload_my', 'payload_mz'), 0.1)
-#: Residual of a reading that is left out, over the median one of its joint: 6.7 standard
+#: Residual of a reading that is left out, over the median one of its joint: 4.5 standard
 #: deviations, as where dry friction acts the other way. Redundant readings of a joint from which
 #: this is done, and below which nothing is determined.
-_OUTLYING, _REDUNDANT, _FEW = 10.0, 8.0, 3.0
+_OUTLYING, _REDUNDANT, _FEW = 6.7, 8.0, 3.0
 #: What determines most quantities.
 MORE = 'record a run of armid zero plan'
 
@@ -184,10 +184,12 @@ def fit_rests(
         share = name.effect in ('torque_offset', 'coulomb_friction', 'payload')
         owner = '' if name.effect == 'payload' else name.joint
         prior.append(_PRIORS.get(name.name, 0.0) * (units[owner] if share else 1.0))
-    x, covariance, information, used, freedom = _solved(arms, rests, np.array(prior), scales)
+    x, covariance, scattered, information, used, freedom = _solved(
+        arms, rests, np.array(prior), scales
+    )
     arm = arms[-1].with_theta(arms[-1].theta + x)
     poses = len(np.unique(np.concatenate([one.q for one in rests]).round(1), axis=0))
-    judge = _Judge(arm, np.flatnonzero(prior), covariance, information, units)
+    judge = _Judge(arm, np.flatnonzero(prior), covariance, scattered, information, units)
     few = f'{poses} poses are too few; {MORE}' if freedom < _FEW else ''
     factor = float(student.ppf(0.975, max(freedom, 1.0)))
     return ZeroFit(
@@ -218,7 +220,7 @@ def _sided(rests: Sequence[Motion]) -> npt.NDArray[np.bool_]:
 
 def _solved(
     arms: Sequence[ArmModel], rests: Sequence[Motion], prior: FloatArray, scales: FloatArray
-) -> tuple[FloatArray, FloatArray, FloatArray, npt.NDArray[np.bool_], float]:
+) -> tuple[FloatArray, FloatArray, FloatArray, FloatArray, npt.NDArray[np.bool_], float]:
     """
     Solve by Gauss-Newton iterations; estimate variances and leave out outliers on the way.
 
@@ -253,16 +255,20 @@ def _solved(
         small = np.all(step**2 < 1e-6 * np.diag(covariance))
         if small and np.all(np.abs(before / sigma - 1.0) < 1e-3):
             break
-    return x, covariance, information, used, float(freedom.min())
+    leverage = np.minimum(np.einsum('kjp,pr,kjr->kj', w, covariance, w), 0.9)
+    rest = (y - _predicted(arms, rests, x)[0]) / sigma / (1.0 - leverage)
+    moved = np.einsum('kjp,kj->kp', w, rest) @ covariance
+    return x, covariance, moved.T @ moved, information, used, float(freedom.min())
 
 
 @dataclass(frozen=True)
 class _Judge:
-    """A fitted arm, its free parameters, their covariance and information, and units of limits."""
+    """A fitted arm, its free parameters, their covariances and information, units of limits."""
 
     arm: ArmModel
     free: npt.NDArray[np.intp]
     covariance: FloatArray
+    scattered: FloatArray
     information: FloatArray
     units: Mapping[str, float]
 
@@ -277,7 +283,8 @@ class _Judge:
             low, high = (np.array([*end.values()]) for end in ends)
             slopes[:, k] = (high - low) / (0.02 * std[k])
         for ((name, joint, unit), value), slope in zip(middle.items(), slopes, strict=True):
-            half = factor * float(np.sqrt(slope @ self.covariance @ slope))
+            variance = max(slope @ one @ slope for one in (self.covariance, self.scattered))
+            half = factor * float(np.sqrt(variance))
             scale = self.units[joint] if name in ('zero', 'friction', 'mass') else 1.0
             limit = scale * _USEFUL[name.split('_')[0]]
             reason = few if half > 0.0 else ''
