@@ -71,7 +71,10 @@ def plan(
             f'play {out / "excitation.yaml"} with excitation_publisher, record it, then '
             f'armid zero fit BAG --robot {robot_source} --out zeros'
         )
-        summary = replace(result.summary(), then='', steps=[step])
+        shown = (
+            result.summary()
+        )  # without the precision relative to zeros, which are described as 0
+        summary = replace(shown, then='', lines=shown.lines[:-1], steps=[step])
         options.deliver(
             result, staged, ResultOrigin(robot_source, provenance=kept), as_json, summary
         )

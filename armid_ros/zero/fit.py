@@ -27,7 +27,7 @@ from scipy.stats import t as student
 
 #: What may be held known, and the effect that then is not fitted.
 KNOWN = {'gain': 'torque_gain', 'tilt': 'base_tilt', 'tool': 'payload'}
-#: Quantity of each effect, without which it is not in the model.
+#: FittedQuantity of each effect, without which it is not in the model.
 _OF = {'torque_gain': 'gain', 'torque_offset': 'zero', 'base_tilt': 'tilt', 'payload': 'mass'}
 #: Largest half of a 95 % interval of a determined quantity: of zeros and friction as a share of
 #: the largest reading of the joint, of gravity [m/s^2], tilt [deg], mass as a share of that of the
@@ -48,7 +48,7 @@ MORE = 'record a run of armid zero plan'
 
 
 @dataclass(frozen=True)
-class Quantity:
+class FittedQuantity:
     """
     A fitted quantity with half of its 95 % interval; 0: held known.
 
@@ -74,7 +74,7 @@ class ZeroFit:
     ----------
     arm : ArmModel
         The model with the fitted values; of the last recording, if payloads differ.
-    quantities : tuple of Quantity
+    quantities : tuple of FittedQuantity
         In the order of `quantities_of`.
     before, residual : ndarray, shape (n,)
         Rms of reading minus description, and of reading minus fit [N m or N].
@@ -86,7 +86,7 @@ class ZeroFit:
     """
 
     arm: ArmModel
-    quantities: tuple[Quantity, ...]
+    quantities: tuple[FittedQuantity, ...]
     before: FloatArray
     residual: FloatArray
     largest: FloatArray
@@ -94,7 +94,7 @@ class ZeroFit:
     poses: int
     outliers: int
 
-    def of(self, name: str, joint: str = '') -> Quantity:
+    def of(self, name: str, joint: str = '') -> FittedQuantity:
         """Return a quantity by its name and joint."""
         return next(one for one in self.quantities if (one.name, one.joint) == (name, joint))
 
@@ -188,7 +188,9 @@ def fit_rests(
         arms, rests, np.array(prior), scales
     )
     arm = arms[-1].with_theta(arms[-1].theta + x)
-    poses = len(np.unique(np.concatenate([one.q for one in rests]).round(1), axis=0))
+    q = np.concatenate([one.q for one in rests])
+    # poses that are 0.1 rad or m apart from all before
+    poses = sum(bool(np.all(np.abs(q[:k] - q[k]).max(axis=1) > 0.1)) for k in range(len(q)))
     judge = _Judge(arm, np.flatnonzero(prior), covariance, scattered, information, units)
     few = f'{poses} poses are too few; {MORE}' if freedom < _FEW else ''
     factor = float(student.ppf(0.975, max(freedom, 1.0)))
@@ -272,7 +274,7 @@ class _Judge:
     information: FloatArray
     units: Mapping[str, float]
 
-    def quantities(self, factor: float, few: str) -> tuple[Quantity, ...]:
+    def quantities(self, factor: float, few: str) -> tuple[FittedQuantity, ...]:
         """Return the quantities, with intervals of a factor times the standard deviation."""
         arm, std = self.arm, np.sqrt(np.diag(self.covariance))
         middle, found = quantities_of(arm), []
@@ -292,7 +294,7 @@ class _Judge:
                 reason = few or self._reason(
                     int(np.argmax(np.abs(slope) * std)), slope, limit / factor
                 )
-            found.append(Quantity(name, joint, unit, value, half, reason))
+            found.append(FittedQuantity(name, joint, unit, value, half, reason))
         return tuple(found)
 
     def _reason(self, most: int, slope: FloatArray, limit: float) -> str:

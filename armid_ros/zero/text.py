@@ -10,7 +10,7 @@ from typing import Any
 
 from armid_ros.api.table import Summary
 from armid_ros.report.notation import measured
-from armid_ros.zero.fit import MORE, Quantity, ZeroFit
+from armid_ros.zero.fit import MORE, FittedQuantity, ZeroFit
 import numpy as np
 
 SCHEMA = 'armid/zero/1'
@@ -78,7 +78,7 @@ def fit_summary(found: ZeroFit, document: dict[str, Any], step: str) -> Summary:
     return Summary(title, document['verdict'], heads, rows, lines, [step])
 
 
-def _cell(one: Quantity) -> str:
+def _cell(one: FittedQuantity) -> str:
     """Write a quantity with its interval."""
     if one.reason:
         return 'not det.'
@@ -86,7 +86,7 @@ def _cell(one: Quantity) -> str:
     return f'{value} ± {half}' if one.half_width else f'{value} (known)'
 
 
-def _undetermined(quantities: Iterable[Quantity]) -> list[str]:
+def _undetermined(quantities: Iterable[FittedQuantity]) -> list[str]:
     """Return a line for each reason why quantities are not determined."""
     groups: dict[str, list[str]] = {}
     for one in quantities:
