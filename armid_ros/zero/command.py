@@ -71,9 +71,8 @@ def plan(
             f'play {out / "excitation.yaml"} with excitation_publisher, record it, then '
             f'armid zero fit BAG --robot {robot_source} --out zeros'
         )
-        shown = (
-            result.summary()
-        )  # without the precision relative to zeros, which are described as 0
+        shown = result.summary()
+        # the last line is on the precision relative to zeros, tilt and tool described as 0
         summary = replace(shown, then='', lines=shown.lines[:-1], steps=[step])
         options.deliver(
             result, staged, ResultOrigin(robot_source, provenance=kept), as_json, summary

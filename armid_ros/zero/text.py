@@ -10,7 +10,7 @@ from typing import Any
 
 from armid_ros.api.table import Summary
 from armid_ros.report.notation import measured
-from armid_ros.zero.fit import MORE, FittedQuantity, ZeroFit
+from armid_ros.zero.fit import FittedQuantity, MORE, ZeroFit
 import numpy as np
 
 SCHEMA = 'armid/zero/1'
