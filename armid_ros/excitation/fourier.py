@@ -121,9 +121,13 @@ class FourierTrajectory:
 
         """
         time = np.asarray(t, dtype=float)
-        q, dq, ddq = fourier_basis(time, self.period, self.harmonics)
         x = self.coefficients.T
-        return Motion(self.joints, time, q @ x, dq @ x, ddq @ x)
+        states = np.empty((3, len(time), self.n_joints))
+        # the basis of all samples of hundreds of harmonics would take gigabytes
+        for block in np.array_split(np.arange(len(time)), len(time) * len(x) // 4_000_000 + 1):
+            basis = fourier_basis(time[block], self.period, self.harmonics)
+            states[:, block] = [one @ x for one in basis]
+        return Motion(self.joints, time, *states)
 
     def one_period(self, n_samples: int) -> Motion:
         """Return n_samples equally spaced samples of one period, without its end."""

@@ -12,7 +12,7 @@ import tomllib
 import pytest
 
 LAYERS = (
-    ('controllers', 'fleet', 'papers', 'view'),
+    ('controllers', 'fleet', 'papers', 'view', 'zero'),
     ('cli',),
     ('nodes',),
     ('live',),

@@ -18,6 +18,7 @@ WITH_COMMAND = {
     'papers/exo': 'exo',
     'papers/lunar': 'lunar',
     'view': 'view',
+    'zero': 'zero',
 }
 #: Folders of plug-ins that serve commands of the core, and such a command.
 SERVING = {

@@ -24,7 +24,7 @@ from armid_ros.arm import ArmModel
 from armid_ros.diagnosis.data.baseline import described_precision, excited
 from armid_ros.diagnosis.data.days import Rows
 from armid_ros.diagnosis.data.discrepancy import discrepancy_columns
-from armid_ros.diagnosis.search.cause import Cause
+from armid_ros.diagnosis.search.cause import Cause, CauseTerm
 from armid_ros.diagnosis.search.setting import Marginal, MotionDiscrepancy, Setting
 from armid_ros.model import BaseParameters
 from armid_ros.motion import FloatArray
@@ -39,41 +39,6 @@ _HELD = 1e-12
 _DESCRIBED = 0.25
 #: Fewest rows for a correlation, correlation that counts as zero, and largest lag [rows].
 _FEW, _UNCORRELATED, _LAGS = 60, 0.05, 20
-
-
-@dataclass(frozen=True)
-class CauseTerm:
-    """
-    A cause among the nuisance columns.
-
-    Attributes
-    ----------
-    cause : Cause
-        The cause.
-    size : float
-        Standard deviation of the prior of its values, over their unit.
-    acts : ndarray of bool, shape (K,)
-        Whether it acts in each recording.
-    known : (ndarray, shape (p,), float, float), optional
-        Direction among its values along which their sum is known, the sum, and its standard
-        deviation.
-
-    """
-
-    cause: Cause
-    size: float
-    acts: npt.NDArray[np.bool_]
-    known: tuple[FloatArray, float, float] | None = None
-
-    @property
-    def prior(self) -> tuple[FloatArray, FloatArray, float]:
-        """Return the prior precision (p, p), its product with the mean, and half of its loss."""
-        precision = np.diag((self.size * self.cause.unit) ** -2.0)
-        if self.known is None:
-            return precision, np.zeros(len(precision)), 0.0
-        direction, total, std = self.known
-        aim = direction * total / std**2
-        return precision + np.outer(direction, direction) / std**2, aim, 0.5 * (total / std) ** 2
 
 
 @dataclass(frozen=True)

@@ -1,0 +1,160 @@
+# Copyright 2026 The armid_ros developers
+# SPDX-License-Identifier: Apache-2.0
+"""The command ``armid zero``: sensor zeros, gains, gravity and tool from an arm at rest."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+from armid_ros.cli import columns, parameters
+from armid_ros.cli.excite import excite, require_free
+from armid_ros.cli.identify import identify
+from armid_ros.cli.terminal import progress
+import click
+
+#: Options of `armid excite` on the limits and surroundings of an arm.
+_AROUND = ('joint_limits', 'velocity', 'clearance', 'floor', 'environment')
+
+
+@click.group()
+def zero() -> None:
+    """
+    Find torque zeros and gains, tilt of the base and tool from an arm at rest.
+
+    plan: some minutes of static poses, each reached from both sides, as a trajectory of armid
+    excite; excitation_publisher plays it with all its checks. fit: what the rests of a recording
+    show. Links of the description and the size of gravity are trusted; with --known gain the size
+    is found, with --link-error links are doubted. Friction at rest is a bound below that in
+    motion. The centre of the tool is in the frame of the last joint. model.yaml is for --model.
+
+    """
+
+
+@zero.command(epilog='Example: armid zero plan --robot ur5.urdf --out plan')
+@parameters.robot
+@parameters.folder
+@click.option(
+    '--poses', type=click.IntRange(4, 40), default=16, show_default=True, help='Number of poses.'
+)
+@click.option(
+    '--hold',
+    type=click.FloatRange(1.0, 60.0),
+    default=3.0,
+    show_default=True,
+    help='Time at rest in each pose, from each side [s].',
+)
+@parameters.setting
+@parameters.as_json
+def plan(
+    robot_source: str, gravity: str, joints: str | None, out: Path, as_json: bool, **given: Any
+) -> None:
+    """Plan static poses and the way through them, as a trajectory of armid excite."""
+    from armid_ros.api.excitation import ExcitationResult
+    from armid_ros.cli import options
+    from armid_ros.excitation import CollisionScene, with_joint_limits
+    from armid_ros.report.provenance import ResultOrigin
+    from armid_ros.zero.plan import plan_zero
+
+    joint_limits, velocity, *place = (given.pop(name) for name in _AROUND)
+    robot = options.open_robot(robot_source, gravity, joints)
+    robot = with_joint_limits(robot, joint_limits, velocity)
+    require_free(out)
+    staged = options.stage(out, ExcitationResult.schema, robot_source)
+    with progress('planning'):
+        scene = CollisionScene.of(robot, *place)
+        result = plan_zero(robot, scene, **given)
+        read = [Path(robot_source.split(' ')[0]), *filter(None, (joint_limits, place[-1]))]
+        kept = options.provenance(read, seed=result.seed)
+        step = (
+            f'play {out / "excitation.yaml"} with excitation_publisher, record it, then '
+            f'armid zero fit BAG --robot {robot_source} --out zeros'
+        )
+        shown = result.summary()
+        # the last line is on the precision relative to zeros, tilt and tool described as 0
+        summary = replace(shown, then='', lines=shown.lines[:-1], steps=[step])
+        options.deliver(
+            result, staged, ResultOrigin(robot_source, provenance=kept), as_json, summary
+        )
+
+
+plan.params += [one for one in excite.params if one.name in _AROUND]
+
+
+@zero.command(epilog='Example: armid zero fit run.mcap --robot ur5.urdf --out zeros')
+@parameters.bags
+@parameters.robot
+@parameters.folder
+@click.option(
+    '--known',
+    type=click.Choice(['gain', 'tilt', 'tool']),
+    multiple=True,
+    help='Held as described: gains of 1, no tilt, no tool; may be given several times. With known '
+    'gains, the size of gravity is found.',
+)
+@click.option(
+    '--link-error',
+    type=click.FloatRange(0.0, 1.0),
+    default=0.0,
+    show_default=True,
+    help='Standard deviation of the described masses and first moments of links, as a share; 0: '
+    'trusted.',
+)
+@click.option(
+    '--external',
+    is_flag=True,
+    help='Efforts are an estimate of external torque (--topic, --effort): find the constants and '
+    'the payload that explain it.',
+)
+@columns.recordings
+def fit(
+    bags: tuple[Path, ...],
+    robot_source: str,
+    gravity: str,
+    joints: str | None,
+    topic: str | None,
+    out: Path,
+    known: tuple[str, ...],
+    link_error: float,
+    external: bool,
+    payloads: tuple[str, ...],
+    seed: int,
+    as_json: bool,
+) -> None:
+    """Find zeros, gains, gravity, tool and friction from the rests of recordings."""
+    from armid_ros.arm import save_model
+    from armid_ros.cli import options
+    from armid_ros.files import json_text
+    from armid_ros.identification import write_document
+    from armid_ros.identification.known_payload import payloads_of
+    from armid_ros.zero.fit import fit_rests
+    from armid_ros.zero.rests import find_rests
+    from armid_ros.zero.text import fit_document, fit_summary, SCHEMA
+
+    staged = options.stage(out, SCHEMA, robot_source)
+    robot = options.open_robot(robot_source, gravity, joints, bags)
+    recordings = options.read(bags, robot, topic)
+    options.tell_damage(*recordings)
+    loaded = payloads_of(payloads, recordings, robot)
+    robots = [loaded.get(one.source, robot) for one in recordings]
+    if external:  # the torque of a payload alone
+        known = ('gain', 'tilt')
+        robots = [robot.with_inertias(0.0 * robot.rigid_parameters) for _ in bags]
+    found = fit_rests([find_rests(one) for one in recordings], robots, known, link_error)
+    document = fit_document(found, known, link_error, external)
+    write_document(staged.folder / 'zero.json', document)
+    written, step = f'{out}: zero.json', 'enter the load in the controller'
+    if not external:
+        source = options.kept_source(robot_source, robot, staged.folder)
+        save_model(staged.folder / 'model.yaml', found.model(), source)
+        written = f'{written}, model.yaml'
+        step = f'armid diagnose RUN --robot {robot_source} --model {out / "model.yaml"}'
+    staged.keep()
+    if as_json:
+        click.echo(json_text(document))
+    else:
+        options.show(fit_summary(found, document, step), written)
+
+
+fit.params += [one for one in identify.params if one.name == 'payloads']

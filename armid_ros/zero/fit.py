@@ -1,0 +1,315 @@
+# Copyright 2026 The armid_ros developers
+# SPDX-License-Identifier: Apache-2.0
+"""
+Torque zeros and gains, gravity, tool and dry friction from an arm at rest.
+
+The reading of a joint is gain (weight + offset + friction against the approach), as an `ArmModel`
+has it; weight is that of the described links and of a tool. The fit is generalised least squares
+with a variance of each joint that is estimated from the residuals. Weak priors keep confounded
+parameters finite. A quantity with a wide interval is not determined.
+
+"""
+
+from __future__ import annotations
+
+from collections.abc import Collection, Mapping, Sequence
+from dataclasses import dataclass
+
+from armid_ros.arm import ArmModel
+from armid_ros.effects import CATALOGUE
+from armid_ros.effects.load import described_spread
+from armid_ros.motion import FloatArray, Motion
+from armid_ros.robots import Robot
+import numpy as np
+import numpy.typing as npt
+import pinocchio as pin
+from scipy.stats import t as student
+
+#: What may be held known, and the effect that then is not fitted.
+KNOWN = {'gain': 'torque_gain', 'tilt': 'base_tilt', 'tool': 'payload'}
+#: FittedQuantity of each effect, without which it is not in the model.
+_OF = {'torque_gain': 'gain', 'torque_offset': 'zero', 'base_tilt': 'tilt', 'payload': 'mass'}
+#: Largest half of a 95 % interval of a determined quantity: of zeros and friction as a share of
+#: the largest reading of the joint, of gravity [m/s^2], tilt [deg], mass as a share of that of the
+#: arm, and centre [m].
+_USEFUL = {'zero': 0.2, 'friction': 0.2, 'gain': 0.1, 'gravity': 0.4, 'tilt': 2.0, 'mass': 0.04}
+_USEFUL['center'] = 0.1
+#: Standard deviation of the prior of each parameter, ten times what is useful: torques as a share
+#: of the largest reading of the joint, payload as one of the mass of the arm, others in SI units.
+_PRIORS = {'torque_offset': 1.0, 'coulomb_torque': 1.0, 'gain_error': 0.5, 'payload_m': 0.3}
+_PRIORS |= {'tilt_x': 0.3, 'tilt_y': 0.3, 'gravity_difference': 2.0}
+_PRIORS |= dict.fromkeys(('payload_mx', 'payload_my', 'payload_mz'), 0.1)
+#: Residual of a reading that is left out, over the median one of its joint: 4.5 standard
+#: deviations, as where dry friction acts the other way. Redundant readings of a joint from which
+#: this is done, and below which nothing is determined.
+_OUTLYING, _REDUNDANT, _FEW = 6.7, 8.0, 3.0
+#: What determines most quantities.
+MORE = 'record a run of armid zero plan'
+
+
+@dataclass(frozen=True)
+class FittedQuantity:
+    """
+    A fitted quantity with half of its 95 % interval; 0: held known.
+
+    The joint of a quantity of the whole arm is empty. The reason, which ends with a remedy, is
+    that of a quantity that is not determined.
+
+    """
+
+    name: str
+    joint: str
+    unit: str
+    value: float
+    half_width: float
+    reason: str
+
+
+@dataclass(frozen=True)
+class ZeroFit:
+    """
+    The fit of K rests in some poses.
+
+    Attributes
+    ----------
+    arm : ArmModel
+        The model with the fitted values; of the last recording, if payloads differ.
+    quantities : tuple of FittedQuantity
+        In the order of `quantities_of`.
+    before, residual : ndarray, shape (n,)
+        Rms of reading minus description, and of reading minus fit [N m or N].
+    largest : ndarray, shape (n,)
+        Largest reading of each joint, at least 5 % of that of any joint [N m or N].
+    rests, poses, outliers : int
+        Numbers of rests, of different poses, and of readings that are left out.
+
+    """
+
+    arm: ArmModel
+    quantities: tuple[FittedQuantity, ...]
+    before: FloatArray
+    residual: FloatArray
+    largest: FloatArray
+    rests: int
+    poses: int
+    outliers: int
+
+    def of(self, name: str, joint: str = '') -> FittedQuantity:
+        """Return a quantity by its name and joint."""
+        return next(one for one in self.quantities if (one.name, one.joint) == (name, joint))
+
+    def model(self) -> ArmModel:
+        """Return the arm with what is determined, the tool as a point; friction is left out."""
+        arm = ArmModel(self.arm.robot)
+        for effect, values in zip(self.arm.effects, self.arm.values, strict=True):
+            if effect.name == 'payload' and values[0] > 0.0:
+                point = pin.Inertia(values[0], values[1:4] / values[0], np.zeros((3, 3)))
+                values = point.toDynamicParameters()
+            if name := _OF.get(effect.name):
+                owners = effect.joints if name in ('gain', 'zero') else ('',)
+                known = [not self.of(name, joint).reason for joint in owners]
+                arm = arm.with_effect(effect, values * known)
+        return arm
+
+
+def arm_at_rest(robot: Robot, known: Collection[str] = ()) -> ArmModel:
+    """Return an arm at rest with the effects to fit; with known gains the size of gravity too."""
+    names = ['payload', 'base_tilt', 'coulomb_friction', 'torque_offset', 'torque_gain']
+    if 'gain' in known and 'tilt' not in known:
+        names.append('gravity_magnitude')
+    arm = ArmModel(robot, quasi_static=True)
+    for name in names:
+        if name not in {KNOWN[one] for one in known}:
+            arm = arm.with_effect(CATALOGUE.find(name).on(robot))
+    return arm
+
+
+def quantities_of(arm: ArmModel) -> dict[tuple[str, str, str], float]:
+    """
+    Return the quantities of a fitted arm by name, joint and unit.
+
+    A zero is the reading without any torque. The centre of the tool is in the frame of the last
+    joint.
+
+    """
+    values = {e.name: v for e, v in zip(arm.effects, arm.values, strict=True)}
+    gain = 1.0 + values.get('torque_gain', np.zeros(arm.robot.n_joints))
+    found: dict[tuple[str, str, str], float] = {}
+    for j, joint in enumerate(arm.robot.joints):
+        unit = 'N' if arm.robot.prismatic[j] else 'N m'
+        found['zero', joint, unit] = gain[j] * values['torque_offset'][j]
+        found['gain', joint, ''] = gain[j]
+        found['friction', joint, unit] = gain[j] * values['coulomb_friction'][j]
+    gravity = arm.body.gravity
+    found |= {(f'gravity_{axis}', '', 'm/s^2'): gravity[k] for k, axis in enumerate('xyz')}
+    found['gravity', '', 'm/s^2'] = float(np.linalg.norm(gravity))
+    found['tilt', '', 'deg'] = float(np.degrees(np.linalg.norm(values.get('base_tilt', 0.0))))
+    mass, *moments = values.get('payload', np.zeros(4))[:4]
+    found['mass', '', 'kg'] = mass
+    found |= {(f'center_{a}', '', 'm'): moments[k] / (mass or 1.0) for k, a in enumerate('xyz')}
+    return {key: float(value) for key, value in found.items()}
+
+
+def fit_rests(
+    rests: Sequence[Motion],
+    robots: Sequence[Robot],
+    known: Collection[str] = (),
+    link_error: float = 0.0,
+) -> ZeroFit:
+    """
+    Fit an arm at rest.
+
+    Parameters
+    ----------
+    rests : sequence of Motion
+        Rests of each recording, see `find_rests`.
+    robots : sequence of Robot
+        The described arm in each recording, with its known payload.
+    known : collection of str
+        Quantities of `KNOWN` that are held at their described values.
+    link_error : float
+        Standard deviation of masses and first moments of links, as a share of their size; 0: they
+        are trusted.
+
+    """
+    arms = [arm_at_rest(robot, known) for robot in robots]
+    y = np.concatenate([np.asarray(one.tau) for one in rests])
+    scales = np.maximum(np.abs(y), 0.05 * np.abs(y).max()).max(axis=0)
+    units = dict(zip(rests[0].joints, scales, strict=True))
+    units[''] = float(robots[0].rigid_parameters[::10].sum()) or 10.0  # [kg], a common arm
+    links = link_error * described_spread(robots[0])
+    links[:, 4:] = 0.0  # inertia
+    prior = [*links.ravel()]
+    for name in arms[0].parameters[links.size :]:
+        share = name.effect in ('torque_offset', 'coulomb_friction', 'payload')
+        owner = '' if name.effect == 'payload' else name.joint
+        prior.append(_PRIORS.get(name.name, 0.0) * (units[owner] if share else 1.0))
+    x, covariance, scattered, information, used, freedom = _solved(
+        arms, rests, np.array(prior), scales
+    )
+    arm = arms[-1].with_theta(arms[-1].theta + x)
+    q = np.concatenate([one.q for one in rests])
+    # poses that are 0.1 rad or m apart from all before
+    poses = sum(bool(np.all(np.abs(q[:k] - q[k]).max(axis=1) > 0.1)) for k in range(len(q)))
+    judge = _Judge(arm, np.flatnonzero(prior), covariance, scattered, information, units)
+    few = f'{poses} poses are too few; {MORE}' if freedom < _FEW else ''
+    factor = float(student.ppf(0.975, max(freedom, 1.0)))
+    return ZeroFit(
+        arm,
+        judge.quantities(factor, few),
+        np.sqrt(np.mean((y - _predicted(arms, rests, 0.0 * x)[0]) ** 2, axis=0)),
+        np.sqrt(np.mean((y - _predicted(arms, rests, x)[0]) ** 2, axis=0, where=used)),
+        scales,
+        len(y),
+        poses,
+        int(np.sum(_sided(rests) & ~used)),
+    )
+
+
+def _predicted(
+    arms: Sequence[ArmModel], rests: Sequence[Motion], x: FloatArray
+) -> tuple[FloatArray, FloatArray]:
+    """Return readings (K, n) and sensitivities (K, n, P) for a change of all parameters."""
+    pairs = [(a.with_theta(a.theta + x), motion) for a, motion in zip(arms, rests, strict=True)]
+    torque = np.concatenate([arm.torque(motion) for arm, motion in pairs])
+    return torque, np.concatenate([arm.columns(motion) for arm, motion in pairs])
+
+
+def _sided(rests: Sequence[Motion]) -> npt.NDArray[np.bool_]:
+    """Mark readings after an approach; without one, dry friction is anything up to its bound."""
+    return np.concatenate([one.dq for one in rests]).astype(bool)
+
+
+def _solved(
+    arms: Sequence[ArmModel], rests: Sequence[Motion], prior: FloatArray, scales: FloatArray
+) -> tuple[FloatArray, FloatArray, FloatArray, FloatArray, npt.NDArray[np.bool_], float]:
+    """
+    Solve by Gauss-Newton iterations; estimate variances and leave out outliers on the way.
+
+    Returns
+    -------
+    x : ndarray, shape (P,)
+        Change of all parameters.
+    covariance, information : ndarray, shape (F, F)
+        Covariance of the free parameters, and information of the rests without the prior.
+    used : ndarray of bool, shape (K, n)
+        Readings that count.
+    freedom : float
+        Readings minus parameters of the joint with the fewest.
+
+    """
+    y, sided = np.concatenate([np.asarray(one.tau) for one in rests]), _sided(rests)
+    x, free, used, sigma = np.zeros(len(prior)), np.flatnonzero(prior), sided, 0.02 * scales
+    for _ in range(60):
+        torque, columns = _predicted(arms, rests, x)
+        w = columns[:, :, free] * (used / sigma)[:, :, np.newaxis]
+        information = np.einsum('kjp,kjr->pr', w, w)
+        covariance = np.linalg.inv(information + np.diag(prior[free] ** -2.0))
+        pull = np.einsum('kjp,kj->p', w, (y - torque) / sigma) - x[free] / prior[free] ** 2
+        step = covariance @ pull
+        x[free] += step
+        freedom = used.sum(axis=0) - np.einsum('kjp,pr,kjr->j', w, covariance, w)
+        left = np.abs(y - torque - columns[:, :, free] @ step)
+        before, least = sigma, 1e-6 * scales
+        sigma = np.sqrt((used * left**2).sum(axis=0) / np.maximum(freedom, 0.1)) + least
+        if freedom.min() > _REDUNDANT:
+            used = sided & (left <= _OUTLYING * np.median(left, axis=0) + least)
+        small = np.all(step**2 < 1e-6 * np.diag(covariance))
+        if small and np.all(np.abs(before / sigma - 1.0) < 1e-3):
+            break
+    leverage = np.minimum(np.einsum('kjp,pr,kjr->kj', w, covariance, w), 0.9)
+    rest = (y - _predicted(arms, rests, x)[0]) / sigma / (1.0 - leverage)
+    moved = np.einsum('kjp,kj->kp', w, rest) @ covariance
+    return x, covariance, moved.T @ moved, information, used, float(freedom.min())
+
+
+@dataclass(frozen=True)
+class _Judge:
+    """A fitted arm, its free parameters, their covariances and information, units of limits."""
+
+    arm: ArmModel
+    free: npt.NDArray[np.intp]
+    covariance: FloatArray
+    scattered: FloatArray
+    information: FloatArray
+    units: Mapping[str, float]
+
+    def quantities(self, factor: float, few: str) -> tuple[FittedQuantity, ...]:
+        """Return the quantities, with intervals of a factor times the standard deviation."""
+        arm, std = self.arm, np.sqrt(np.diag(self.covariance))
+        middle, found = quantities_of(arm), []
+        slopes = np.zeros((len(middle), len(std)))
+        for k, place in enumerate(self.free):
+            step = 0.01 * std[k] * np.eye(1, len(arm.theta), place)[0]
+            ends = [quantities_of(arm.with_theta(arm.theta + s * step)) for s in (-1.0, 1.0)]
+            low, high = (np.array([*end.values()]) for end in ends)
+            slopes[:, k] = (high - low) / (0.02 * std[k])
+        for ((name, joint, unit), value), slope in zip(middle.items(), slopes, strict=True):
+            variance = max(slope @ one @ slope for one in (self.covariance, self.scattered))
+            half = factor * float(np.sqrt(variance))
+            scale = self.units[joint] if name in ('zero', 'friction', 'mass') else 1.0
+            limit = scale * _USEFUL[name.split('_')[0]]
+            reason = few if half > 0.0 else ''
+            if half > limit:
+                reason = few or self._reason(
+                    int(np.argmax(np.abs(slope) * std)), slope, limit / factor
+                )
+            found.append(FittedQuantity(name, joint, unit, value, half, reason))
+        return tuple(found)
+
+    def _reason(self, most: int, slope: FloatArray, limit: float) -> str:
+        """Return why a quantity is not determined that depends most on one of the parameters."""
+        correlation = np.abs(self.covariance[most]) / np.sqrt(np.diag(self.covariance))
+        correlation[most] = 0.0
+        own, other = (self.arm.parameters[self.free[k]] for k in (most, np.argmax(correlation)))
+        alone = abs(slope[most]) / np.sqrt(max(self.information[most, most], 1e-300)) < limit
+        names = own.name + (other.name if alone else '')
+        remedy = 'say --known tilt if the base is level'
+        if 'payload' in names:
+            remedy = 'record a known payload as well (--payload), or say --known tool'
+        elif 'gain_error' in names:
+            remedy = 'gravity hardly turns the joint: say --known gain, or record it with a tool'
+        elif own.name == 'coulomb_torque':
+            remedy = MORE
+        mixed = f'not separable from {other.words} of {other.joint or "the base"}'
+        return f'{mixed if alone else "no rest shows it"}; {remedy}'

@@ -1,0 +1,157 @@
+# Copyright 2026 The armid_ros developers
+# SPDX-License-Identifier: Apache-2.0
+"""
+Static poses that determine zeros, gains, gravity and tool, and the way through them.
+
+The way is a closed tour: transfer, rest, a short motion onwards and back, and rest again, so that
+the arm comes to each pose from both sides. A Gaussian smooths it, which keeps all limits. As a
+Fourier series it is an `Excitation` like any other: the publisher checks and plays it.
+
+"""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+from armid_ros.api.excitation import ExcitationResult, planner_of
+from armid_ros.arm import ArmModel
+from armid_ros.errors import TrajectoryError
+from armid_ros.excitation import (
+    CollisionScene,
+    DesignProblem,
+    DesignSettings,
+    evaluate,
+    FourierTrajectory,
+    Limits,
+    trajectory_faults,
+    TransferPlanner,
+)
+from armid_ros.excitation.problem import torque_noise
+from armid_ros.motion import FloatArray, Motion
+from armid_ros.robots import Robot
+from armid_ros.robots.robot import position_range
+from armid_ros.zero.fit import arm_at_rest
+import numpy as np
+
+#: Standard deviation of the smoothing, and its effect at either end of a rest [s].
+SMOOTHING, SMOOTHED = 0.5, 1.5
+#: Highest frequency of the series [Hz], of which the smoothing leaves a tenth.
+CUTOFF = 0.7
+#: Motion beyond a pose and back [rad or m], and its duration [s].
+BEYOND, BACK = 0.1, 4.0
+#: Random poses to choose from; factor on the clearance, as the smoothing cuts corners.
+_CANDIDATES, _RESERVE = 400, 1.5
+#: Samples per second of the tour [Hz].
+_RATE = 20.0
+
+
+def plan_zero(
+    robot: Robot,
+    scene: CollisionScene,
+    *,
+    poses: int = 16,
+    hold: float = 3.0,
+    seed: int = 0,
+) -> ExcitationResult:
+    """
+    Plan a tour of static poses, at rest for a time from each side [s].
+
+    The seed is that of the random poses. TrajectoryError: too few poses are free, or no way is
+    found.
+
+    """
+    arm, model, rng = ArmModel(robot), arm_at_rest(robot), np.random.default_rng(seed)
+    settings = DesignSettings(clearance=scene.clearance, n_periods=1, target='effects')
+    limits = Limits.of(robot, speed=1.0)
+    planner = planner_of(arm, settings, scene)
+    assert planner.limits is not None and planner.clearance is not None
+    inside = replace(planner.limits, lower=limits.lower, upper=limits.upper)
+    reserve = replace(planner.clearance, margin=_RESERVE * scene.clearance)
+    careful = replace(planner, limits=inside, clearance=reserve)
+    chosen = _poses(careful, inside, model, poses, torque_noise(arm, settings), rng)
+    trajectory = _tour(careful, inside, chosen, hold)
+    faults = trajectory_faults(arm, limits, trajectory, planner.clearance)
+    if faults:
+        raise TrajectoryError(f'the way through the poses: {faults}; take another --seed')
+    settings = replace(settings, period=trajectory.period, harmonics=trajectory.harmonics)
+    core = evaluate(DesignProblem.of(model, settings, rng), trajectory)
+    return ExcitationResult(core, arm, scene, seed=seed)
+
+
+def _poses(
+    planner: TransferPlanner,
+    limits: Limits,
+    model: ArmModel,
+    count: int,
+    noise: FloatArray,
+    rng: np.random.Generator,
+) -> FloatArray:
+    """
+    Return free poses of a model, shape (count, n), in the order of a short way.
+
+    The determinant of the information on all effects is maximised, pose by pose and then by
+    exchange. Source: Fedorov 1972.
+
+    """
+    robot = model.robot
+    lower, upper = position_range(limits.lower, limits.upper)
+    turn = np.where(robot.prismatic, np.inf, np.pi)  # weight repeats after a turn
+    lower, upper = np.maximum(lower, -turn), np.minimum(upper, turn)
+    room = np.minimum(BEYOND, 0.1 * (upper - lower))
+    drawn = rng.uniform(lower + room, upper - room, (_CANDIDATES, robot.n_joints))
+    free = np.array([q for q in drawn if not planner.fault(q)])
+    if len(free) < count:
+        raise TrajectoryError(
+            f'{len(free)} of {_CANDIDATES} random poses are free, fewer than {count}; in the '
+            f'first one {planner.fault(drawn[0])}'
+        )
+    sides = [Motion.of_states(robot.joints, free, side, 0.0) for side in (-1.0, 1.0)]
+    columns = np.concatenate([model.effect_columns(side) for side in sides], axis=1)
+    columns /= np.tile(noise, 2)[:, np.newaxis]
+    size = np.sqrt(np.mean(columns**2, axis=(0, 1)))
+    columns = columns[:, :, size > 0.0] / size[size > 0.0]
+    each = np.einsum('cjp,cjr->cpr', columns, columns)
+    chosen: list[int] = []
+    for step in range(3 * count):  # each pose is exchanged twice
+        chosen = chosen[step >= count :]
+        total = each[chosen].sum(axis=0) + 1e-6 * np.eye(each.shape[1])
+        gain = np.linalg.slogdet(total + each)[1]
+        gain[chosen] = -np.inf
+        chosen.append(int(np.argmax(gain)))
+    left, order = list(free[chosen]), [planner.free_start()]
+    while left:
+        far = [(np.abs(q - order[-1]) / limits.velocity).max() for q in left]
+        order.append(left.pop(int(np.argmin(far))))
+    return np.array(order[1:])
+
+
+def _tour(
+    planner: TransferPlanner, limits: Limits, poses: FloatArray, hold: float
+) -> FourierTrajectory:
+    """Return the tour without poses that no way leads to, and motions beyond that are not free."""
+    count = round((hold + 2.0 * SMOOTHED) * _RATE)
+    u = np.arange(BACK * _RATE)[:, np.newaxis] / (BACK * _RATE)
+    bump = (4.0 * u * (1.0 - u)) ** 4  # begins and ends smoothly
+    now, reason = poses[0], ''
+    parts: list[FloatArray] = []
+    for pose in (*poses[1:], poses[0]):
+        try:
+            way = planner(now, pose)
+        except TrajectoryError as error:
+            reason = str(error)
+            continue
+        now, rest = pose, np.tile(pose, (count, 1))
+        parts += [way.at(np.arange(0.0, way.duration, 1.0 / _RATE)).q, rest]
+        over = pose + np.where(way.q[-1] < way.q[-2], -BEYOND, BEYOND)
+        over = np.clip(over, limits.lower, limits.upper)
+        if not planner.fault(over):
+            parts += [pose + bump * (over - pose), rest]
+    if not np.array_equal(now, poses[0]):
+        raise TrajectoryError(f'there is no way back from the poses: {reason}')
+    q = np.roll(np.concatenate(parts), count // 2, axis=0)  # begins and ends in a rest
+    q = np.concatenate([q, np.tile(q[-1], (-len(q) % int(_RATE), 1))])  # whole seconds
+    period = len(q) / _RATE
+    w = 2.0 * np.pi / period * np.arange(1, round(CUTOFF * period) + 1)
+    waves = np.fft.rfft(q, axis=0)[: len(w) + 1].T / len(q)
+    series = 2.0 * w * waves[:, 1:] * np.exp(-0.5 * (SMOOTHING * w) ** 2)
+    return FourierTrajectory(limits.joints, period, waves[:, 0].real, -series.imag, -series.real)

@@ -1,0 +1,62 @@
+# Copyright 2026 The armid_ros developers
+# SPDX-License-Identifier: Apache-2.0
+"""The seconds of a recording in which all joints are at rest."""
+
+from __future__ import annotations
+
+from armid_ros.errors import IdentificationError
+from armid_ros.identification.rows.checks import REST_RANGE
+from armid_ros.motion import Motion
+from armid_ros.recording import Recording
+import numpy as np
+from scipy.ndimage import maximum_filter1d, median_filter, minimum_filter1d, uniform_filter1d
+
+#: Time in which a joint at rest stays within `REST_RANGE` [s]; half of it at either end of a rest
+#: is left out. Time after that in which the torque settles, and shortest time that is left [s].
+WINDOW, SETTLING, SHORTEST = 1.0, 0.5, 0.5
+#: Motion to a pose after which dry friction acts against its direction [rad or m].
+APPROACH = 0.03
+
+
+def find_rests(recording: Recording) -> Motion:
+    """
+    Return the K rests of a recording as samples, with the time of their begin.
+
+    Position and torque are means. The velocity is the direction from which a joint came, 1
+    or -1, 0 where it hardly moved since the rest before. IdentificationError: efforts are
+    missing or constant, or the arm is never at rest.
+
+    """
+    tau, t = recording.tau, recording.t
+    if tau is None or not np.ptp(tau, axis=0).any():
+        raise IdentificationError(
+            f'{recording.source}: no effort was recorded; name the topic or the columns of the '
+            'torque with --topic or --effort'
+        )
+    size = max(round(WINDOW / max(recording.period, 1e-6)), 3)
+    # neither single wrong readings of an encoder nor its noise end a rest
+    q = median_filter(recording.q, (5, 1), mode='nearest')
+    q = uniform_filter1d(q, max(size // 5, 1), axis=0, mode='nearest')
+    spread = maximum_filter1d(q, size, axis=0) - minimum_filter1d(q, size, axis=0)
+    still = (spread < REST_RANGE).all(axis=1)
+    still[1:] &= np.diff(t) < SHORTEST
+    edges = np.flatnonzero(np.diff(np.concatenate([[False], still, [False]]).astype(int)))
+    begins, ends = edges[::2], edges[1::2] - 1
+    lasting = t[ends] - t[begins] >= SETTLING + SHORTEST
+    if not lasting.any():
+        longest = float((t[ends] - t[begins]).max(initial=-WINDOW)) + WINDOW
+        raise IdentificationError(
+            f'{recording.source}: the arm is at rest for {longest:.2g} s at most, and '
+            f'{SETTLING + SHORTEST + WINDOW:g} s are needed; record a run of armid zero plan'
+        )
+    rests, before = [], 0
+    for begin, end in zip(begins[lasting], ends[lasting] + 1, strict=True):
+        first = int(np.searchsorted(t, t[begin] + SETTLING))
+        pose, came = q[first:end].mean(axis=0), np.zeros(q.shape[1])
+        for j, way in enumerate((pose - q[before:begin]).T):
+            apart = np.flatnonzero(np.abs(way) > APPROACH)
+            came[j] = np.sign(way[apart[-1]]) if len(apart) else 0.0
+        rests.append((t[begin], pose, came, tau[first:end].mean(axis=0)))
+        before = first
+    time, poses, directions, torque = (np.array(one) for one in zip(*rests, strict=True))
+    return Motion(recording.joints, time, poses, directions, np.zeros_like(poses), torque)

@@ -1,0 +1,101 @@
+# Copyright 2026 The armid_ros developers
+# SPDX-License-Identifier: Apache-2.0
+"""What ``armid zero`` prints and writes."""
+
+from __future__ import annotations
+
+from collections.abc import Collection, Iterable
+from dataclasses import asdict
+from typing import Any
+
+from armid_ros.api.table import Summary
+from armid_ros.report.notation import measured
+from armid_ros.zero.fit import FittedQuantity, MORE, ZeroFit
+import numpy as np
+
+SCHEMA = 'armid/zero/1'
+#: Quantities of an estimate of external torque.
+_EXTERNAL = ('zero', 'friction', 'mass', 'center_x', 'center_y', 'center_z')
+#: Residual over the largest reading of a joint, above which the model does not explain it.
+_POOR = 0.1
+
+
+def fit_document(
+    found: ZeroFit, known: Collection[str], link_error: float, external: bool
+) -> dict[str, Any]:
+    """Return what zero.json holds."""
+    shown = [one for one in found.quantities if one.name in _EXTERNAL or not external]
+    gains = [one.value for one in shown if one.name == 'gain' and not one.reason] or [1.0]
+    links = f'links within {100.0 * link_error:g} %' if link_error else 'links as described'
+    held = [links, *known]
+    held += [] if 'gain' in known else [f'gravity of {found.of("gravity").value:.4g} m/s^2']
+    poor = np.any(found.residual > _POOR * found.largest) or min(gains) < 0.0
+    if external:
+        poor = _explained(found) < 0.8
+    verdict = 'in part' if any(one.reason for one in shown) else 'determined'
+    if all(one.reason for one in shown if one.name == 'zero'):
+        verdict = 'not determined'
+    rms = zip(found.arm.robot.joints, found.before, found.residual, strict=True)
+    return {
+        'schema': SCHEMA,
+        'robot': found.arm.robot.name,
+        'verdict': 'not explained' if poor else verdict,
+        'external': external,
+        'held': [] if external else held,
+        'rests': found.rests,
+        'poses': found.poses,
+        'outliers': found.outliers,
+        'quantities': [asdict(one) for one in shown],
+        'joints': [{'joint': j, 'before': float(b), 'residual': float(r)} for j, b, r in rms],
+    }
+
+
+def fit_summary(found: ZeroFit, document: dict[str, Any], step: str) -> Summary:
+    """Return the summary of a fit with the step that follows if it is good."""
+    names = ('zero', 'friction') if document['external'] else ('zero', 'gain', 'friction')
+    rows = [
+        (joint, *(_cell(found.of(name, joint)) for name in names), f'{left:.2g}')
+        for joint, left in zip(found.arm.robot.joints, found.residual, strict=True)
+    ]
+    tilt, mass = found.of('tilt'), found.of('mass')
+    place = ', '.join(_cell(found.of(f'center_{axis}')).split(' ± ')[0] for axis in 'xyz')
+    parts = [] if tilt.reason or document['external'] else [f'base tilted by {_cell(tilt)} deg']
+    parts += [] if mass.reason else [f'tool of {_cell(mass)} kg at {place} m']
+    title = ', '.join(parts) or 'neither tilt nor tool is determined'
+    if document['external']:
+        share = 100.0 * _explained(found)
+        title += f'; with the constants it explains {share:.0f} % of the external torque'
+    lines = [f'{found.rests} rests in {found.poses} poses; {found.outliers} outliers left out']
+    if held := document['held']:
+        lines[0] += f'; held known: {", ".join(held)}'
+    shown = {row['name'] for row in document['quantities']}
+    lines += _undetermined(q for q in found.quantities if q.name in shown)
+    if document['verdict'] == 'not explained':
+        step = 'check --robot, --gravity, --effort-scale and what touched the arm'
+    elif document['verdict'] == 'not determined':
+        step = MORE
+    heads = ('joint', *names, 'residual [N m or N]')
+    return Summary(title, document['verdict'], heads, rows, lines, [step])
+
+
+def _cell(one: FittedQuantity) -> str:
+    """Write a quantity with its interval."""
+    if one.reason:
+        return 'not det.'
+    value, half = measured(one.value, one.half_width)
+    return f'{value} ± {half}' if one.half_width else f'{value} (known)'
+
+
+def _undetermined(quantities: Iterable[FittedQuantity]) -> list[str]:
+    """Return a line for each reason why quantities are not determined."""
+    groups: dict[str, list[str]] = {}
+    for one in quantities:
+        if one.reason:
+            groups.setdefault(one.reason, []).append(f'{one.name} {one.joint}'.strip())
+    texts = {why: ', '.join(n) if len(n) < 9 else f'{len(n)} values' for why, n in groups.items()}
+    return [f'not determined: {names}: {why}' for why, names in texts.items()]
+
+
+def _explained(found: ZeroFit) -> float:
+    """Return the share of the squared readings that the fit explains."""
+    return float(1.0 - np.sum(found.residual**2) / np.sum(found.before**2))

@@ -1,0 +1,111 @@
+# Copyright 2026 The armid_ros developers
+# SPDX-License-Identifier: Apache-2.0
+"""`armid zero`: plan, rests of what plays it, and what the commands write and refuse."""
+
+from dataclasses import replace
+import json
+
+import armid_ros as ar
+from armid_ros.errors import ArmidError, IdentificationError
+from armid_ros.excitation import load_excitation
+from armid_ros.nodes.parameters.excitation import checked, make_planner, PUBLISHER_PARAMETERS
+from armid_ros.recording import write_recording
+from armid_ros.robots import load_robot
+from armid_ros.zero.command import zero
+from armid_ros.zero.rests import find_rests
+from click.testing import CliRunner
+import numpy as np
+import pytest
+
+from docsite.schemas import faults
+from tests.zero.machine import play, Secret
+
+
+def run(*arguments):
+    """Run the command; return its output, or raise what it refuses."""
+    done = CliRunner().invoke(zero, [str(part) for part in arguments])
+    if isinstance(done.exception, ArmidError):
+        raise done.exception
+    assert done.exit_code == 0, done.output
+    return done.stdout
+
+
+@pytest.fixture(scope='module')
+def robot():
+    return load_robot('humanoid_arm')
+
+
+@pytest.fixture(scope='module')
+def planned(tmp_path_factory):
+    """Return the folder of a plan and what is printed of it."""
+    folder = tmp_path_factory.mktemp('zero') / 'plan'
+    plan = ('plan', '--robot', 'humanoid_arm', '--out', folder, '--poses', 6, '--hold', 1.5)
+    return folder, run(*plan)
+
+
+@pytest.fixture(scope='module')
+def secret(robot):
+    return Secret.draw(robot, np.random.default_rng(1))
+
+
+@pytest.fixture(scope='module')
+def recorded(robot, planned, secret):
+    """Return what an arm in MuJoCo records that plays the plan."""
+    excitation = load_excitation(planned[0] / 'excitation.yaml')
+    return play(robot, excitation, secret, np.random.default_rng(2), rate=100)
+
+
+def test_the_publisher_takes_the_plan_with_all_its_checks(planned, robot):
+    values = {one.name: one.default for one in PUBLISHER_PARAMETERS} | {'robot': 'humanoid_arm'}
+    values = {name: () if value == [''] else value for name, value in values.items()}
+    planner, _ = make_planner(values.get)
+    excitation = load_excitation(planned[0] / 'excitation.yaml')
+    assert checked(excitation, planner, 'plan').joints == robot.joints
+    assert (
+        faults('excitation_quality', json.loads((planned[0] / 'excitation.json').read_text()))
+        == []
+    )
+
+
+def test_the_plan_says_first_whether_it_is_fit_and_last_what_to_do(planned):
+    lines = planned[1].strip().splitlines()
+    assert lines[0].startswith('FIT TO RUN: ')
+    assert lines[-1].startswith('next: play ') and 'armid zero fit' in lines[-1]
+
+
+def test_the_arm_is_at_rest_in_each_pose_from_both_sides(planned, recorded):
+    rests = find_rests(recorded)
+    pairs = np.abs(np.diff(rests.q, axis=0)).max(axis=1) < 0.02
+    assert np.count_nonzero(pairs) >= 5
+    assert np.mean(rests.dq[:-1][pairs] == -rests.dq[1:][pairs]) > 0.9
+    assert np.mean(rests.dq != 0.0) > 0.9
+
+
+def test_a_fit_finds_what_is_hidden_and_writes_it(tmp_path, robot, recorded, secret):
+    write_recording(tmp_path / 'run', recorded, robot_description=robot.urdf)
+    said = run('fit', tmp_path / 'run', '--robot', 'humanoid_arm', '--out', tmp_path / 'zeros')
+    document = json.loads((tmp_path / 'zeros' / 'zero.json').read_text())
+    assert faults('zero', document) == []
+    rows = {(row['name'], row['joint']): row for row in document['quantities']}
+    for joint, value in zip(robot.joints, secret.zero, strict=True):
+        row = rows['zero', joint]
+        assert abs(row['value'] - value) < 1.5 * row['half_width']
+    assert rows['mass', '']['value'] == pytest.approx(secret.mass, rel=0.05)
+    assert rows['tilt', '']['value'] == pytest.approx(np.degrees(np.hypot(*secret.tilt)), abs=0.3)
+    lines = said.strip().splitlines()
+    assert lines[0].split(':')[0] in ('DETERMINED', 'IN PART') and 'tilted by' in lines[0]
+    assert lines[-1].startswith('next: armid diagnose')
+    arm = ar.load_model(tmp_path / 'zeros' / 'model.yaml')
+    values = {effect.name: v for effect, v in zip(arm.effects, arm.values, strict=True)}
+    assert values['payload'][0] == rows['mass', '']['value']
+    reading = values['torque_offset'] * (1.0 + values['torque_gain'])
+    np.testing.assert_allclose(reading[:2], [rows['zero', j]['value'] for j in robot.joints[:2]])
+
+
+def test_a_run_without_rest_and_one_without_effort_are_refused(recorded):
+    moving = replace(recorded, q=recorded.q + 0.2 * np.sin(2.0 * recorded.t)[:, np.newaxis])
+    with pytest.raises(IdentificationError, match=r'at rest for .* armid zero plan'):
+        find_rests(moving)
+    for tau in (None, np.zeros_like(recorded.q)):
+        with pytest.raises(IdentificationError, match='no effort was recorded'):
+            find_rests(replace(recorded, tau=tau))
