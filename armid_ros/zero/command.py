@@ -18,7 +18,7 @@ import click
 _AROUND = ('joint_limits', 'velocity', 'clearance', 'floor', 'environment')
 
 
-@click.group()
+@click.group(epilog='Example: armid zero plan --robot ur5.urdf --out plan')
 def zero() -> None:
     """
     Find torque zeros and gains, tilt of the base and tool from an arm at rest.

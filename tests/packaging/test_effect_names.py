@@ -19,8 +19,9 @@ LEFT = {
     # what help shows without importing effects; a test holds it against the catalogue
     'cli/choices.py': 5,
     'nodes/running/launching.py': 2,
-    # the effect that a room makes
+    # the effects that a room makes, or fits to an arm at rest
     'residual/learn.py': 1,
+    'zero/fit.py': 25,
     # a key of diagnosis.json that is called as an effect is
     'diagnosis/next_run/plan.py': 1,
 }

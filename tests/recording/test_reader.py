@@ -217,6 +217,7 @@ def test_malformed_messages_are_dropped_and_counted(
     short.velocity = short.velocity[:2]  # shorter than the names
     bad = [b'', good[:3], good[:40], good[:-1], good + bytes(16), bytes(len(good))]
     bad.append(bytes(store.serialize_cdr(short, JOINT_STATE)))
+    bad.append(good.replace(b'elbow\0', b'elbow\2'))  # a name without its end
     places = 5 + 50 * np.arange(len(bad))
     for at, cdr in zip(places, bad, strict=True):
         messages[at] = (topic, cdr, messages[at][2])

@@ -82,6 +82,8 @@ class JointStateLayout:
                 position += 4 + length
                 if not length or position > len(cdr):
                     raise MalformedMessage('a joint name does not end within the message')
+                if cdr[position - 1]:
+                    raise MalformedMessage('a joint name does not end with a zero')
                 names += (cdr[position - length : position - 1].decode(),)
             for field in range(3):
                 layout = cls(order, frame_length, names, (*counts, *[0] * (3 - field)))
