@@ -8,7 +8,7 @@ and then those of day 1 itself, where nothing may be named. For the cases see
 tests/hidden/lived/README.md.
 
     python -m benchmarks.lived [KIND] [--cases FIRST:LAST] [--only CAUSE ...] [--no-again]
-        [--out FILE] [--probabilities FILE] [--processes N]
+        [--model-alone] [--out FILE] [--probabilities FILE] [--processes N]
 
 """
 
@@ -20,6 +20,8 @@ from functools import partial
 from pathlib import Path
 import traceback
 
+from armid_ros.api.identification import identify
+
 from benchmarks.lived_scoring import LivedJudged, LivedTruth, probabilities, score
 from benchmarks.looks import judge_all, write_json
 from benchmarks.two_days import Answer, ask, identification_of, known_arm
@@ -27,8 +29,15 @@ from tests.hidden.lived.cases import lived_case
 from tests.hidden.lived.specification import COUNTS, KINDS, specify
 
 
-def judge(kind: str, index: int, *, again: bool = True) -> LivedJudged | None:
-    """Make a case and diagnose it; an exception is an answer; None if it cannot be made."""
+def judge(
+    kind: str, index: int, *, again: bool = True, model_alone: bool = False
+) -> LivedJudged | None:
+    """
+    Make a case and diagnose it; an exception is an answer; None if it cannot be made.
+
+    If the model is given alone, the diagnosis gets no recordings of day 1.
+
+    """
     try:
         case = lived_case(kind, index)
     except RuntimeError as error:
@@ -36,9 +45,12 @@ def judge(kind: str, index: int, *, again: bool = True) -> LivedJudged | None:
         return None
     day_1, day_2 = ([run.recording for run in day] for day in (case.day_1, case.day_2))
     runs = [*case.day_2, case.held_out] if case.truth else []
-    repeated = None
+    repeated, misfit = None, None
     try:
-        if day_1:
+        if model_alone:
+            found = identify(case.robot, day_1)
+            arm, misfit, day_1 = found.arm, found.misfit, []
+        elif day_1:
             arm = identification_of(case.robot, day_1).arm
         else:
             arm = known_arm(case.robot, case.known)
@@ -47,6 +59,7 @@ def judge(kind: str, index: int, *, again: bool = True) -> LivedJudged | None:
             day_2,
             validate=[case.held_out.recording],
             baseline=day_1,
+            misfit=misfit,
             contributions=[run.contribution for run in runs],
         )
         if day_1 and again:
@@ -63,6 +76,7 @@ def main() -> None:
     parser.add_argument('--cases', default=':', metavar='FIRST:LAST', help='some of them')
     parser.add_argument('--only', nargs='+', default=[], metavar='CAUSE', help='of some causes')
     parser.add_argument('--no-again', action='store_true', help='do not ask about day 1')
+    parser.add_argument('--model-alone', action='store_true', help='give no recordings of day 1')
     parser.add_argument('--out', type=Path, help='file for all answers, as JSON')
     parser.add_argument('--probabilities', type=Path, help='file for those of names, as JSON')
     parser.add_argument('--processes', type=int, default=2)
@@ -70,8 +84,14 @@ def main() -> None:
     cases = select(options.kind, options.cases, options.only)
     what = f'lived, {options.kind}, {len(cases)} cases'
     what += f', only {" ".join(options.only)}' if options.only else ''
+    what += ', model alone' if options.model_alone else ''
     judged = judge_all(
-        partial(judge, options.kind, again=not options.no_again),
+        partial(
+            judge,
+            options.kind,
+            again=not options.no_again,
+            model_alone=options.model_alone,
+        ),
         cases,
         what,
         partial(score, kind=options.kind),

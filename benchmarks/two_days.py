@@ -14,7 +14,7 @@ from dataclasses import dataclass, replace
 import time
 from typing import Any
 
-from armid_ros.arm import ArmModel
+from armid_ros.arm import ArmModel, Misfit
 from armid_ros.diagnosis import diagnose, diagnosis_document, DiagnosisSettings
 from armid_ros.diagnosis.verdict.finding import Gap
 from armid_ros.effects import CATALOGUE
@@ -153,6 +153,7 @@ def ask(
     *,
     validate: Sequence[Recording] = (),
     baseline: Sequence[Recording] = (),
+    misfit: Misfit | None = None,
     settings: DiagnosisSettings | None = None,
     contributions: Sequence[FloatArray] = (),
 ) -> Answer:
@@ -167,6 +168,8 @@ def ask(
         Fitted and held-out recordings of the day in question.
     baseline : sequence of Recording
         Recordings of the day on which the model was identified.
+    misfit : Misfit, optional
+        Misfit of the model when it was identified, without these recordings.
     settings : DiagnosisSettings, optional
         Settings of the diagnosis.
     contributions : sequence of ndarray, each (N, n), optional
@@ -180,6 +183,7 @@ def ask(
         list(recordings),
         validate=list(validate),
         baseline=list(baseline),
+        misfit=misfit,
         settings=settings,
         rng=np.random.default_rng(0),
     )
