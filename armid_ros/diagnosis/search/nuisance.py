@@ -260,8 +260,9 @@ class Nuisance:
     def _precision(self, setting: Setting) -> tuple[FloatArray, npt.NDArray[np.intp]]:
         """Return the prior precision of the fitted parameters, and their indices."""
         unit = self.rows.amplitude[0]
-        scale = np.where(self.open, 1.0, setting.body or 1.0)
-        body = self.turn.T @ self.described @ self.turn / np.outer(scale, scale)
+        rigid = self.base.independent < len(self.arm.robot.rigid_parameters)
+        scale = np.where(rigid, setting.body or 1.0, 1.0)
+        body = self.turn.T @ (self.described / np.outer(scale, scale)) @ self.turn
         body += _HELD * np.eye(self.rank)
         size = max(setting.shared, _HELD) * unit[:, np.newaxis] * self.reach
         shared = size.ravel() ** -2.0

@@ -22,8 +22,8 @@ class Setting:
     Attributes
     ----------
     body : float
-        Standard deviation of the errors of described values, over the largest expected errors;
-        zero if described values are exact. Parameters without given values are always fitted.
+        Standard deviation of the errors of described links, over the largest expected errors;
+        zero if all given values are exact. Parameters without given values are always fitted.
     shared, own : float
         Standard deviations of d0 and d_k, over their unit.
     noise : float
