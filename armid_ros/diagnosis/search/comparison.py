@@ -178,7 +178,8 @@ class CauseComparison:
         telling = [
             one
             for one in look.ranking
-            if one.data > min(levels.inexact * explained, (levels.same_fit - 1.0) * one.left)
+            if look.nuisance.rows.unseen
+            or one.data > min(levels.inexact * explained, (levels.same_fit - 1.0) * one.left)
         ]
         able = [one for one in telling if one.odds > levels.alone]
         if not able or max(one.odds for one in able) < levels.alarm:
