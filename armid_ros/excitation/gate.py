@@ -17,9 +17,9 @@ from armid_ros.excitation.transfer import TransferPlanner
 from armid_ros.motion import FloatArray, Motion
 import numpy as np
 
-#: Factor on the duration of a stop that exceeds an acceleration limit, and the largest number of
-#: new plans. The last plan takes 4.8 times the duration.
-_LONGER, _TRIES = 1.25, 8
+#: Factor on the duration of a stop that exceeds an acceleration limit, and the largest duration as
+#: a multiple of the desired one, or of that of a stop at the acceleration limit if it is longer.
+_LONGER, _LONGEST = 1.25, 4.8
 
 
 @dataclass(frozen=True)
@@ -112,12 +112,15 @@ class MotionGate:
 
         """
         phase = float(np.clip(phase, 0.0, self.run.duration))
-        for _ in range(_TRIES):
-            motion = slowed(self.run, phase, duration, self.run.rate)
-            if not check_limits(self.limits, motion):
-                break
-            duration *= _LONGER
         path = self.run.at([phase])
+        # half a cosine takes pi / 2 times as long as a constant deceleration; a run within its
+        # limits needs no longer to come to rest than it lasts
+        needed = float((np.abs(path.dq[0]) / self.limits.acceleration).max()) * np.pi / 2.0
+        longest = _LONGEST * max(duration, min(needed, self.run.duration))
+        motion = slowed(self.run, phase, duration, self.run.rate)
+        while check_limits(self.limits, motion) and _LONGER * duration <= longest:
+            duration *= _LONGER
+            motion = slowed(self.run, phase, duration, self.run.rate)
         step = np.nan_to_num(np.abs(measured - path.q[0]))
         lead = self._time_of(step, np.nan_to_num(np.abs(velocity - path.dq[0])))
         reached = int(np.searchsorted(motion.t, lead))

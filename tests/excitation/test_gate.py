@@ -51,3 +51,20 @@ def test_a_run_is_held_to_acceleration_limits_that_are_given(gate, two_link):
     planner = TransferPlanner(ArmModel(robot), transfer_limits(robot), None)
     with pytest.raises(TrajectoryError, match=f'{two_link.joints[1]}.*acceleration'):
         MotionGate.of(gate.run, planner)
+
+
+@pytest.mark.parametrize('limit', [2.0, 0.2])
+def test_a_stop_lasts_as_long_as_given_acceleration_limits_require(two_link, limit):
+    robot = replace(two_link, acceleration_limit=np.full(2, limit))
+    arm = ArmModel(robot)
+    path = random_feasible(arm, Limits.of(robot), 10.0, 2, np.random.default_rng(1))
+    excitation = Excitation(path, 1, 2.0)
+    planner = TransferPlanner(arm, transfer_limits(robot), None)
+    run = plan_run(excitation, planner, excitation.at([0.0]).q[0], 100.0)
+    gate = MotionGate.of(run, planner)
+    for phase in np.linspace(0.0, run.duration, 60):
+        motion = gate.stop(phase, 0.1, *np.full((2, 2), np.nan))
+        assert np.abs(motion.ddq).max() < 1.05 * limit
+        assert motion.t[-1] < 4.8 * max(
+            0.1, np.pi / 2.0 * np.abs(run.at([phase]).dq).max() / limit
+        )
