@@ -15,11 +15,14 @@ from armid_ros.excitation.run import Run
 from armid_ros.excitation.supervision import HANDOVER, slowed
 from armid_ros.excitation.transfer import TransferPlanner
 from armid_ros.motion import FloatArray, Motion
+from armid_ros.robots.reference import Reference
 import numpy as np
 
 #: Factor on the duration of a stop that exceeds an acceleration limit, and the largest duration as
 #: a multiple of the desired one, or of that of a stop at the acceleration limit if it is longer.
 _LONGER, _LONGEST = 1.25, 4.8
+#: Largest distance of the curve through the waypoints from the path that was checked [rad or m].
+_OFF_PATH = 0.001
 
 
 @dataclass(frozen=True)
@@ -61,8 +64,8 @@ class MotionGate:
         Raises
         ------
         TrajectoryError
-            If the run exceeds a limit or bodies come too close; the message names the joint or the
-            bodies.
+            If the run exceeds a limit, has too few waypoints for its path, or bodies come too
+            close; the message names the joint or the bodies.
 
         """
         motion, arm = run.motion(), planner.arm
@@ -80,6 +83,17 @@ class MotionGate:
         violations = check_limits(limits, motion, torque)
         if violations:
             raise TrajectoryError(f'the run is not sent: {violations[0]}')
+        # a controller interpolates between the samples; there the difference of a quintic is
+        # largest in the middle, where a harmonic of the rate is zero
+        between = motion.t[:-1] + 0.4 / run.rate
+        away = np.abs(Reference.of(motion).sample(between).q - run.at(between).q).max(axis=0)
+        j = int(np.argmax(away))
+        if away[j] > _OFF_PATH:
+            raise TrajectoryError(
+                f"the run is not sent: joint '{robot.joints[j]}' would be {away[j]:.2g} "
+                f'{robot.position_units[j]} off its path between {run.rate:g} waypoints per '
+                'second; send more (rate)'
+            )
         # intervals of 0.1 s at the beginning of the proof
         times = np.linspace(0.0, run.duration, int(np.ceil(run.duration / 0.1)) + 1)
         if planner.clearance is not None:

@@ -68,3 +68,20 @@ def test_a_stop_lasts_as_long_as_given_acceleration_limits_require(two_link, lim
         assert motion.t[-1] < 4.8 * max(
             0.1, np.pi / 2.0 * np.abs(run.at([phase]).dq).max() / limit
         )
+
+
+@pytest.mark.parametrize(('rate', 'harmonics'), [(1.0, 1), (2.0, 3), (10.0, 20)])
+def test_a_run_is_sent_with_enough_waypoints_for_its_path(gate, two_link, rate, harmonics):
+    excitation = gate.run.excitation
+    a, b = np.zeros((2, 2, harmonics))
+    a[:, -1] = 0.02 * np.pi * harmonics  # 0.04 rad to and fro, at most twice the rate
+    excitation = replace(excitation, trajectory=replace(excitation.trajectory, a=a, b=b))
+    planner = TransferPlanner(ArmModel(two_link), transfer_limits(two_link), None)
+    start = excitation.at([0.0]).q[0]
+    for enough in (False, True):
+        run = plan_run(excitation, planner, start, 20.0 * rate if enough else rate)
+        if enough:
+            MotionGate.of(run, planner)
+        else:
+            with pytest.raises(TrajectoryError, match='waypoints'):
+                MotionGate.of(run, planner)
