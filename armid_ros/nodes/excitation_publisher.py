@@ -40,6 +40,10 @@ from armid_ros.nodes.trajectory_controller import TrajectoryController, write_tr
 import numpy as np
 from std_msgs.msg import String
 
+#: Largest distance between the measured position for which a run was planned and that at which it
+#: is sent [rad or m]. A controller covers it until the first waypoint, within `HANDOVER`.
+_MOVED = 0.01
+
 
 class ExcitationPublisherNode(ArmidNode):
     """
@@ -189,13 +193,13 @@ class ExcitationPublisherNode(ArmidNode):
         self._waiting = False
         if self.elapsed is not None:
             raise TrajectoryError('the excitation is under way; ~/stop ends it')
-        fault = self._fault_at_start()
+        fault, begin = self._fault_at_start(), self._arm.monitor.pose.q
         if fault:
             raise TrajectoryError(f'{fault}; the arm is not started')
         planned = plan_run(
             self._excitation.at_speed(speed, self._rate),
             self._planner,
-            self._arm.monitor.pose.q,
+            begin,
             self._rate,
             shortest=self.value('approach'),
             back=False,
@@ -205,6 +209,13 @@ class ExcitationPublisherNode(ArmidNode):
         # the set point differs from the measured position
         first = max(math.ceil(HANDOVER * self._rate), 1)
         message = write_trajectory(motion.select(slice(first, None)), first / self._rate)
+        self._controller.discover()  # no time passes between the stamp and the sending
+        self._arm.catch_up()
+        pose, units = self._arm.monitor.pose, self._planner.arm.robot.position_units
+        fault = self._arm.monitor.contradiction(self._arm.now(), 1)
+        fault = fault or tracking_fault(pose.joints, units, begin, pose.q, _MOVED)
+        if fault:
+            raise TrajectoryError(f'{fault}, while its way was planned; the arm is not started')
         now = self.get_clock().now()
         if not self.value('zero_stamp'):
             message.header.stamp = now.to_msg()
