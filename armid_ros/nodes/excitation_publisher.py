@@ -402,8 +402,10 @@ class ExcitationPublisherNode(ArmidNode):
     def _on_goal_ended(self, reason: str) -> None:
         """Handle the result of the controller: empty at the end of the run, else the reason."""
         gate, now = self._gate, self._arm.now()
-        if gate is None:
-            return  # the run was stopped before
+        if gate is None:  # the run was stopped before
+            if reason and self._ending is not None and self._ending.last is not None:
+                self._say_trouble(f'the arm may still move, as its stop failed: {reason}')
+            return
         if not reason:
             self._end_complete(gate)
             return

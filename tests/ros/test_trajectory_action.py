@@ -148,6 +148,18 @@ def test_a_stop_replaces_the_goal_by_one_that_comes_to_rest(bench, arm, excitati
     assert node.elapsed is None
 
 
+def test_a_stop_that_is_refused_is_reported_at_once_and_repeated(bench, arm, excitation):
+    node = begun(bench, arm, excitation)
+    arm.run(101.5)
+    arm.faults.deaf = True
+    node.stop()
+    bench.spin_until(lambda: 'refused' in node.condition()[0], 'the refusal')
+    arm.run(103.0)
+    arm.faults.deaf = False
+    arm.run(105.5)
+    np.testing.assert_allclose(arm.state(arm.now).dq, 0.0, atol=1e-9)
+
+
 class Stubborn:
     """A controller that takes no goal while it has one, and stops when that is cancelled."""
 
