@@ -142,14 +142,18 @@ class MotionGate:
             return motion.select(slice(reached, None))
         return replace(motion.select(slice(-1, None)), t=np.array([lead]))
 
-    def hold(self, set_point: FloatArray, measured: FloatArray, largest: float) -> Motion:
+    def hold(
+        self, set_point: FloatArray, speed: FloatArray, measured: FloatArray, largest: float
+    ) -> Motion:
         """
         Return the small straight step from the set point to the measured position.
 
         Parameters
         ----------
-        set_point, measured : ndarray, shape (n,)
-            Set point of the controller, and measured position [rad or m].
+        set_point, speed : ndarray, shape (n,)
+            Set point of the controller [rad or m], and its absolute velocity [rad/s or m/s].
+        measured : ndarray, shape (n,)
+            Measured position [rad or m].
         largest : float
             Largest step of a joint [rad or m].
 
@@ -171,7 +175,7 @@ class MotionGate:
             raise TrajectoryError(
                 f'{near.first} and {near.second} would be {near.distance:.4f} m apart'
             )
-        needed = max(self._time_of(step), HANDOVER)
+        needed = max(self._time_of(step, speed), HANDOVER)
         t, still = needed + np.array([0.0, HANDOVER / 2.0]), np.zeros((2, len(step)))
         return Motion(self.limits.joints, t, np.vstack([inside, inside]), still, still)
 
@@ -197,7 +201,7 @@ class MotionGate:
             f'more than effort_factor {factor:g} allows'
         )
 
-    def _time_of(self, step: FloatArray, speed: FloatArray | float = 0.0) -> float:
+    def _time_of(self, step: FloatArray, speed: FloatArray) -> float:
         """Return the time of a small step with an initial speed, within the limits [s]."""
         velocity = np.where(np.isfinite(self.limits.velocity), self.limits.velocity, SLOW_VELOCITY)
         stopping = speed / self.limits.acceleration
@@ -298,13 +302,14 @@ class Ending:
             # the arm is held where it is, if the step of the set point is allowed
             ending, measured = replace(self, blocked=False), monitor.pose.q
             row = int(np.searchsorted(self.last.t, now - self.sent))
-            set_point = self.last.q[min(row, len(self.last.t) - 1)]
+            row = min(row, len(self.last.t) - 1)
+            set_point, speed = self.last.q[row], np.abs(self.last.dq[row])
             if np.abs(measured - set_point).max() <= tolerance:
                 return ending, None, ''
             try:
                 # largest step of the set point to a blocked arm, in units of the tracking
                 # tolerance
-                motion = self.gate.hold(set_point, measured, 3.0 * tolerance)
+                motion = self.gate.hold(set_point, speed, measured, 3.0 * tolerance)
             except TrajectoryError as error:
                 return ending, None, f'{self.reason}; the set point stays where it is: {error}'
             return replace(ending, last=motion, sent=now), motion, ''

@@ -7,6 +7,7 @@ from dataclasses import replace
 from armid_ros.arm import ArmModel
 from armid_ros.errors import TrajectoryError
 from armid_ros.excitation import (
+    check_limits,
     Excitation,
     Limits,
     plan_run,
@@ -15,6 +16,7 @@ from armid_ros.excitation import (
     TransferPlanner,
 )
 from armid_ros.excitation.gate import MotionGate
+from armid_ros.robots.reference import Reference
 import numpy as np
 import pytest
 
@@ -85,3 +87,14 @@ def test_a_run_is_sent_with_enough_waypoints_for_its_path(gate, two_link, rate, 
         else:
             with pytest.raises(TrajectoryError, match='waypoints'):
                 MotionGate.of(run, planner)
+
+
+def test_a_set_point_that_moves_is_held_within_the_acceleration_limits(gate):
+    stop = gate.stop(0.6 * gate.run.duration, 0.5, *np.full((2, 2), np.nan))
+    k = int(np.argmax(np.abs(stop.dq).max(axis=1)))
+    blocked = stop.q[k] - 0.05 * np.sign(stop.dq[k])
+    motion = gate.hold(stop.q[k], np.abs(stop.dq[k]), blocked, 0.1)
+    played = Reference(motion.joints, motion.t, motion.q, motion.dq, motion.ddq)
+    played = played.after(stop.q[k], stop.dq[k], stop.ddq[k])
+    played = played.sample(np.linspace(0.0, motion.t[-1], 1000))
+    assert not check_limits(gate.limits, played)
