@@ -426,8 +426,10 @@ class ExcitationPublisherNode(ArmidNode):
 
     def _on_experiment(self, message: String) -> None:
         """Take an excitation from the topic experiment; only ~/start runs it."""
-        if self.elapsed is not None:
-            raise TrajectoryError('an excitation is under way; the new excitation is ignored')
+        if self.elapsed is not None or self._waiting:
+            raise TrajectoryError(
+                'an excitation is under way or begins soon; the new excitation is ignored'
+            )
         excitation = read_excitation(message.data, self._experiments.topic_name)
         self._excitation = checked(excitation, self._planner, self._experiments.topic_name)
         self.tell(f'took an excitation of {self._excitation.duration:g} s; ~/start runs it')
