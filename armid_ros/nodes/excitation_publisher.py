@@ -403,8 +403,11 @@ class ExcitationPublisherNode(ArmidNode):
         """Handle the result of the controller: empty at the end of the run, else the reason."""
         gate, now = self._gate, self._arm.now()
         if gate is None:  # the run was stopped before
-            if reason and self._ending is not None and self._ending.last is not None:
-                self._say_trouble(f'the arm may still move, as its stop failed: {reason}')
+            ending = self._ending
+            if reason and ending is not None and ending.last is not None and not ending.warned:
+                self._say_trouble(
+                    f'the stop failed: {reason}; if the arm still moves, use the emergency stop'
+                )
             return
         if not reason:
             self._end_complete(gate)
