@@ -15,11 +15,14 @@ from armid_ros.excitation.run import Run
 from armid_ros.excitation.supervision import HANDOVER, slowed
 from armid_ros.excitation.transfer import TransferPlanner
 from armid_ros.motion import FloatArray, Motion
+from armid_ros.robots.reference import Reference
 import numpy as np
 
-#: Factor on the duration of a stop that exceeds an acceleration limit, and the largest number of
-#: new plans. The last plan takes 4.8 times the duration.
-_LONGER, _TRIES = 1.25, 8
+#: Factor on the duration of a stop that exceeds an acceleration limit, and the largest duration as
+#: a multiple of the desired one, or of that of a stop at the acceleration limit if it is longer.
+_LONGER, _LONGEST = 1.25, 4.8
+#: Largest distance of the curve through the waypoints from the path that was checked [rad or m].
+_OFF_PATH = 0.001
 
 
 @dataclass(frozen=True)
@@ -61,8 +64,8 @@ class MotionGate:
         Raises
         ------
         TrajectoryError
-            If the run exceeds a limit or bodies come too close; the message names the joint or the
-            bodies.
+            If the run exceeds a limit, has too few waypoints for its path, or bodies come too
+            close; the message names the joint or the bodies.
 
         """
         motion, arm = run.motion(), planner.arm
@@ -80,6 +83,17 @@ class MotionGate:
         violations = check_limits(limits, motion, torque)
         if violations:
             raise TrajectoryError(f'the run is not sent: {violations[0]}')
+        # a controller interpolates between the samples; there the difference of a quintic is
+        # largest in the middle, where a harmonic of the rate is zero
+        between = motion.t[:-1] + 0.4 / run.rate
+        away = np.abs(Reference.of(motion).sample(between).q - run.at(between).q).max(axis=0)
+        j = int(np.argmax(away))
+        if away[j] > _OFF_PATH:
+            raise TrajectoryError(
+                f"the run is not sent: joint '{robot.joints[j]}' would be {away[j]:.2g} "
+                f'{robot.position_units[j]} off its path between {run.rate:g} waypoints per '
+                'second; send more (rate)'
+            )
         # intervals of 0.1 s at the beginning of the proof
         times = np.linspace(0.0, run.duration, int(np.ceil(run.duration / 0.1)) + 1)
         if planner.clearance is not None:
@@ -112,12 +126,15 @@ class MotionGate:
 
         """
         phase = float(np.clip(phase, 0.0, self.run.duration))
-        for _ in range(_TRIES):
-            motion = slowed(self.run, phase, duration, self.run.rate)
-            if not check_limits(self.limits, motion):
-                break
-            duration *= _LONGER
         path = self.run.at([phase])
+        # half a cosine takes pi / 2 times as long as a constant deceleration; a run within its
+        # limits needs no longer to come to rest than it lasts
+        needed = float((np.abs(path.dq[0]) / self.limits.acceleration).max()) * np.pi / 2.0
+        longest = _LONGEST * max(duration, min(needed, self.run.duration))
+        motion = slowed(self.run, phase, duration, self.run.rate)
+        while check_limits(self.limits, motion) and _LONGER * duration <= longest:
+            duration *= _LONGER
+            motion = slowed(self.run, phase, duration, self.run.rate)
         step = np.nan_to_num(np.abs(measured - path.q[0]))
         lead = self._time_of(step, np.nan_to_num(np.abs(velocity - path.dq[0])))
         reached = int(np.searchsorted(motion.t, lead))
@@ -125,14 +142,18 @@ class MotionGate:
             return motion.select(slice(reached, None))
         return replace(motion.select(slice(-1, None)), t=np.array([lead]))
 
-    def hold(self, set_point: FloatArray, measured: FloatArray, largest: float) -> Motion:
+    def hold(
+        self, set_point: FloatArray, speed: FloatArray, measured: FloatArray, largest: float
+    ) -> Motion:
         """
         Return the small straight step from the set point to the measured position.
 
         Parameters
         ----------
-        set_point, measured : ndarray, shape (n,)
-            Set point of the controller, and measured position [rad or m].
+        set_point, speed : ndarray, shape (n,)
+            Set point of the controller [rad or m], and its absolute velocity [rad/s or m/s].
+        measured : ndarray, shape (n,)
+            Measured position [rad or m].
         largest : float
             Largest step of a joint [rad or m].
 
@@ -154,7 +175,7 @@ class MotionGate:
             raise TrajectoryError(
                 f'{near.first} and {near.second} would be {near.distance:.4f} m apart'
             )
-        needed = max(self._time_of(step), HANDOVER)
+        needed = max(self._time_of(step, speed), HANDOVER)
         t, still = needed + np.array([0.0, HANDOVER / 2.0]), np.zeros((2, len(step)))
         return Motion(self.limits.joints, t, np.vstack([inside, inside]), still, still)
 
@@ -180,7 +201,7 @@ class MotionGate:
             f'more than effort_factor {factor:g} allows'
         )
 
-    def _time_of(self, step: FloatArray, speed: FloatArray | float = 0.0) -> float:
+    def _time_of(self, step: FloatArray, speed: FloatArray) -> float:
         """Return the time of a small step with an initial speed, within the limits [s]."""
         velocity = np.where(np.isfinite(self.limits.velocity), self.limits.velocity, SLOW_VELOCITY)
         stopping = speed / self.limits.acceleration
@@ -281,13 +302,14 @@ class Ending:
             # the arm is held where it is, if the step of the set point is allowed
             ending, measured = replace(self, blocked=False), monitor.pose.q
             row = int(np.searchsorted(self.last.t, now - self.sent))
-            set_point = self.last.q[min(row, len(self.last.t) - 1)]
+            row = min(row, len(self.last.t) - 1)
+            set_point, speed = self.last.q[row], np.abs(self.last.dq[row])
             if np.abs(measured - set_point).max() <= tolerance:
                 return ending, None, ''
             try:
                 # largest step of the set point to a blocked arm, in units of the tracking
                 # tolerance
-                motion = self.gate.hold(set_point, measured, 3.0 * tolerance)
+                motion = self.gate.hold(set_point, speed, measured, 3.0 * tolerance)
             except TrajectoryError as error:
                 return ending, None, f'{self.reason}; the set point stays where it is: {error}'
             return replace(ending, last=motion, sent=now), motion, ''

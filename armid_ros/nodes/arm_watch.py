@@ -88,6 +88,12 @@ class ArmWatch:
             return float(self._steady.now().nanoseconds * 1e-9)
         return float((clock.now().nanoseconds - self._stepped_ns) * 1e-9)
 
+    def catch_up(self) -> None:
+        """Process the joint states that arrived during a long callback."""
+        with self._states.handle:
+            while (taken := self._states.handle.take_message(JointState, True)) is not None:
+                self._states.callback(taken[0])
+
     def staleness(self, timeout: float) -> str:
         """Return a text that names joints without a new position for a time [s]; empty if none."""
         fault = self.monitor.pose.staleness(self.now(), timeout)

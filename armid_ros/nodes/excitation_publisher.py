@@ -40,6 +40,10 @@ from armid_ros.nodes.trajectory_controller import TrajectoryController, write_tr
 import numpy as np
 from std_msgs.msg import String
 
+#: Largest distance between the measured position for which a run was planned and that at which it
+#: is sent [rad or m]. A controller covers it until the first waypoint, within `HANDOVER`.
+_MOVED = 0.01
+
 
 class ExcitationPublisherNode(ArmidNode):
     """
@@ -189,13 +193,13 @@ class ExcitationPublisherNode(ArmidNode):
         self._waiting = False
         if self.elapsed is not None:
             raise TrajectoryError('the excitation is under way; ~/stop ends it')
-        fault = self._fault_at_start()
+        fault, begin = self._fault_at_start(), self._arm.monitor.pose.q
         if fault:
             raise TrajectoryError(f'{fault}; the arm is not started')
         planned = plan_run(
             self._excitation.at_speed(speed, self._rate),
             self._planner,
-            self._arm.monitor.pose.q,
+            begin,
             self._rate,
             shortest=self.value('approach'),
             back=False,
@@ -205,6 +209,13 @@ class ExcitationPublisherNode(ArmidNode):
         # the set point differs from the measured position
         first = max(math.ceil(HANDOVER * self._rate), 1)
         message = write_trajectory(motion.select(slice(first, None)), first / self._rate)
+        self._controller.discover()  # no time passes between the stamp and the sending
+        self._arm.catch_up()
+        pose, units = self._arm.monitor.pose, self._planner.arm.robot.position_units
+        fault = self._arm.monitor.contradiction(self._arm.now(), 1)
+        fault = fault or tracking_fault(pose.joints, units, begin, pose.q, _MOVED)
+        if fault:
+            raise TrajectoryError(f'{fault}, while its way was planned; the arm is not started')
         now = self.get_clock().now()
         if not self.value('zero_stamp'):
             message.header.stamp = now.to_msg()
@@ -391,8 +402,13 @@ class ExcitationPublisherNode(ArmidNode):
     def _on_goal_ended(self, reason: str) -> None:
         """Handle the result of the controller: empty at the end of the run, else the reason."""
         gate, now = self._gate, self._arm.now()
-        if gate is None:
-            return  # the run was stopped before
+        if gate is None:  # the run was stopped before
+            ending = self._ending
+            if reason and ending is not None and ending.last is not None and not ending.warned:
+                self._say_trouble(
+                    f'the stop failed: {reason}; if the arm still moves, use the emergency stop'
+                )
+            return
         if not reason:
             self._end_complete(gate)
             return
@@ -413,8 +429,10 @@ class ExcitationPublisherNode(ArmidNode):
 
     def _on_experiment(self, message: String) -> None:
         """Take an excitation from the topic experiment; only ~/start runs it."""
-        if self.elapsed is not None:
-            raise TrajectoryError('an excitation is under way; the new excitation is ignored')
+        if self.elapsed is not None or self._waiting:
+            raise TrajectoryError(
+                'an excitation is under way or begins soon; the new excitation is ignored'
+            )
         excitation = read_excitation(message.data, self._experiments.topic_name)
         self._excitation = checked(excitation, self._planner, self._experiments.topic_name)
         self.tell(f'took an excitation of {self._excitation.duration:g} s; ~/start runs it')

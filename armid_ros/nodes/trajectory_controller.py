@@ -163,14 +163,14 @@ class TrajectoryController:
         if self._possible and self.client is None and self._offered:
             self._make_client()
 
-    def begin(self, trajectory: JointTrajectory) -> str:
+    def discover(self) -> None:
         """
-        Send the trajectory of a run, and return the name of the receiver.
+        Wait until a controller that offers the action accepts goals, for a second at most.
 
         Raises
         ------
         TrajectoryError
-            If no controller can receive the trajectory.
+            If no controller can receive a trajectory.
 
         """
         self.look()
@@ -180,6 +180,9 @@ class TrajectoryController:
                 time.sleep(0.005)
         if self.missing:
             raise TrajectoryError(f'{self.missing}; the arm is not started')
+
+    def begin(self, trajectory: JointTrajectory) -> str:
+        """Send the trajectory of a run after `discover`, and return the name of the receiver."""
         self._by_action = self._ready
         if self._by_action:
             names = ('tracking_tolerance', 'goal_tolerance', 'goal_time_tolerance')

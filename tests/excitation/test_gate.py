@@ -7,6 +7,7 @@ from dataclasses import replace
 from armid_ros.arm import ArmModel
 from armid_ros.errors import TrajectoryError
 from armid_ros.excitation import (
+    check_limits,
     Excitation,
     Limits,
     plan_run,
@@ -15,6 +16,7 @@ from armid_ros.excitation import (
     TransferPlanner,
 )
 from armid_ros.excitation.gate import MotionGate
+from armid_ros.robots.reference import Reference
 import numpy as np
 import pytest
 
@@ -51,3 +53,48 @@ def test_a_run_is_held_to_acceleration_limits_that_are_given(gate, two_link):
     planner = TransferPlanner(ArmModel(robot), transfer_limits(robot), None)
     with pytest.raises(TrajectoryError, match=f'{two_link.joints[1]}.*acceleration'):
         MotionGate.of(gate.run, planner)
+
+
+@pytest.mark.parametrize('limit', [2.0, 0.2])
+def test_a_stop_lasts_as_long_as_given_acceleration_limits_require(two_link, limit):
+    robot = replace(two_link, acceleration_limit=np.full(2, limit))
+    arm = ArmModel(robot)
+    path = random_feasible(arm, Limits.of(robot), 10.0, 2, np.random.default_rng(1))
+    excitation = Excitation(path, 1, 2.0)
+    planner = TransferPlanner(arm, transfer_limits(robot), None)
+    run = plan_run(excitation, planner, excitation.at([0.0]).q[0], 100.0)
+    gate = MotionGate.of(run, planner)
+    for phase in np.linspace(0.0, run.duration, 60):
+        motion = gate.stop(phase, 0.1, *np.full((2, 2), np.nan))
+        assert np.abs(motion.ddq).max() < 1.05 * limit
+        assert motion.t[-1] < 4.8 * max(
+            0.1, np.pi / 2.0 * np.abs(run.at([phase]).dq).max() / limit
+        )
+
+
+@pytest.mark.parametrize(('rate', 'harmonics'), [(1.0, 1), (2.0, 3), (10.0, 20)])
+def test_a_run_is_sent_with_enough_waypoints_for_its_path(gate, two_link, rate, harmonics):
+    excitation = gate.run.excitation
+    a, b = np.zeros((2, 2, harmonics))
+    a[:, -1] = 0.02 * np.pi * harmonics  # 0.04 rad to and fro, at most twice the rate
+    excitation = replace(excitation, trajectory=replace(excitation.trajectory, a=a, b=b))
+    planner = TransferPlanner(ArmModel(two_link), transfer_limits(two_link), None)
+    start = excitation.at([0.0]).q[0]
+    for enough in (False, True):
+        run = plan_run(excitation, planner, start, 20.0 * rate if enough else rate)
+        if enough:
+            MotionGate.of(run, planner)
+        else:
+            with pytest.raises(TrajectoryError, match='waypoints'):
+                MotionGate.of(run, planner)
+
+
+def test_a_set_point_that_moves_is_held_within_the_acceleration_limits(gate):
+    stop = gate.stop(0.6 * gate.run.duration, 0.5, *np.full((2, 2), np.nan))
+    k = int(np.argmax(np.abs(stop.dq).max(axis=1)))
+    blocked = stop.q[k] - 0.05 * np.sign(stop.dq[k])
+    motion = gate.hold(stop.q[k], np.abs(stop.dq[k]), blocked, 0.1)
+    played = Reference(motion.joints, motion.t, motion.q, motion.dq, motion.ddq)
+    played = played.after(stop.q[k], stop.dq[k], stop.ddq[k])
+    played = played.sample(np.linspace(0.0, motion.t[-1], 1000))
+    assert not check_limits(gate.limits, played)

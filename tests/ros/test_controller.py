@@ -161,3 +161,13 @@ def test_an_excitation_that_was_planned_elsewhere_is_taken_and_not_begun(
     sender.publish(String(data='schema: other'))
     bench.settle()
     assert node.complaints.latest.startswith('experiment: ')
+
+
+def test_an_excitation_that_was_planned_elsewhere_does_not_begin_by_itself(bench, arm, excitation):
+    node = waiting(bench, excitation, start=True)
+    sender = bench.matched_publisher(String, 'experiment', LATCHED)
+    sender.publish(String(data=excitation_text(excitation.at_speed(0.4, 100.0))))
+    bench.spin_until(lambda: node.complaints.latest.startswith('experiment: '), 'the refusal')
+    arm.run(100.2)
+    bench.spin_until(lambda: arm.accepted, 'the trajectory')
+    assert node._gate.run.excitation.duration == pytest.approx(excitation.duration)

@@ -7,9 +7,9 @@ from __future__ import annotations
 import json
 
 from armid_ros.cli.excite import excite
-from armid_ros.errors import ArmidError
-from armid_ros.excitation import Excitation, load_excitation, save_excitation, slowed
-from armid_ros.nodes import arm_watch
+from armid_ros.errors import ArmidError, TrajectoryError
+from armid_ros.excitation import Excitation, load_excitation, plan_run, save_excitation, slowed
+from armid_ros.nodes import arm_watch, excitation_publisher
 from armid_ros.nodes.excitation_publisher import ExcitationPublisherNode
 from armid_ros.nodes.qos import STREAM
 from armid_ros.recording import read_waypoints
@@ -154,6 +154,32 @@ def test_from_a_pose_that_is_not_free_it_does_not_start(bench, plan):
     told(bench, (JOINTS, [np.pi / 2, -np.pi / 2, 0, 0, 0, 0]), at=STANDS)
     answer = bench.call('excitation_publisher/start')
     assert not answer.success and 'floor' in answer.message and not heard
+
+
+@pytest.mark.parametrize('moved', [False, True])
+def test_an_arm_that_moves_while_its_way_is_planned_is_not_started(
+    bench, arm, excitation, monkeypatch, moved
+):
+    node = publisher(bench, arm, excitation)
+
+    def planning(*args, **options):
+        run = plan_run(*args, **options)
+        arm.q = arm.q + 0.05 * moved  # by another client
+        states = bench.listen(JointState, 'joint_states')
+        arm.now += 0.1
+        arm._publish()
+        bench.executor.remove_node(node)
+        bench.spin_until(lambda: states, 'a joint state')
+        bench.executor.add_node(node)
+        return run
+
+    monkeypatch.setattr(excitation_publisher, 'plan_run', planning)
+    if moved:
+        with pytest.raises(TrajectoryError, match='not started'):
+            node.start()
+    else:
+        node.start()
+    assert (node.elapsed is None) == moved
 
 
 @pytest.mark.parametrize(

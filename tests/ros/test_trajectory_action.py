@@ -7,11 +7,12 @@ from __future__ import annotations
 from dataclasses import replace
 import gc
 import sys
+import time
 
 from action_msgs.msg import GoalStatus
 from action_msgs.srv import CancelGoal
 from armid_ros.errors import TrajectoryError
-from armid_ros.nodes.trajectory_controller import write_trajectory
+from armid_ros.nodes.trajectory_controller import TrajectoryController, write_trajectory
 from armid_ros.recording.trajectory import waypoints_of
 from control_msgs.action import FollowJointTrajectory
 import numpy as np
@@ -45,6 +46,20 @@ def test_the_excitation_is_a_goal_and_no_message(bench, arm, excitation):
     assert {t.position for t in goal.goal_tolerance} == {0.05}
     assert (goal.goal_time_tolerance.sec, goal.goal_time_tolerance.nanosec) == (1, 500_000_000)
     assert waypoints_of(goal.trajectory).duration == pytest.approx(node.duration, abs=1e-6)
+
+
+def test_a_trajectory_is_stamped_after_the_discovery_of_the_controller(
+    bench, arm, excitation, monkeypatch
+):
+    node, stamped = publisher(bench, arm, excitation), []
+    bench.spin_until(lambda: node.look() or node._controller._ready, 'the action')
+    begun, begin = time.monotonic(), node._controller.begin
+    monkeypatch.setattr(
+        TrajectoryController, '_ready', property(lambda _: time.monotonic() > begun + 0.3)
+    )
+    node._controller.begin = lambda message: stamped.append(time.monotonic()) or begin(message)
+    node.start()
+    assert stamped[0] > begun + 0.3
 
 
 def test_a_run_ends_when_the_controller_says_so(bench, arm, excitation):
@@ -131,6 +146,18 @@ def test_a_stop_replaces_the_goal_by_one_that_comes_to_rest(bench, arm, excitati
     assert arm.ends[:2] == ['abort', 'succeed']
     np.testing.assert_allclose(arm.state(arm.now).dq, 0.0, atol=1e-9)
     assert node.elapsed is None
+
+
+def test_a_stop_that_is_refused_is_reported_at_once_and_repeated(bench, arm, excitation):
+    node = begun(bench, arm, excitation)
+    arm.run(101.5)
+    arm.faults.deaf = True
+    node.stop()
+    bench.spin_until(lambda: 'refused' in node.condition()[0], 'the refusal')
+    arm.run(103.0)
+    arm.faults.deaf = False
+    arm.run(105.5)
+    np.testing.assert_allclose(arm.state(arm.now).dq, 0.0, atol=1e-9)
 
 
 class Stubborn:
