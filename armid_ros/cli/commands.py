@@ -240,7 +240,7 @@ def project_options(
 
 
 def _options(command: click.Command) -> dict[str, click.Option]:
-    """Return the options of a command, and of those in a group, by their long names."""
+    """Return the options of a command and of its subcommands, by name without dashes."""
     inner = command.commands.values() if isinstance(command, click.Group) else ()
     own = [one for one in command.params if isinstance(one, click.Option)]
     found = {text.lstrip('-'): one for one in own for text in one.opts}

@@ -271,7 +271,7 @@ def open_partner(
 
     if source is None:
         if ties:
-            raise ModelError('give both --tie, where the arm is tied, and --partner, to what')
+            raise ModelError('give both --tie and --partner, the machine or person at the tie')
         return None
     other = load_robot(source, gravity=gravity)
     kept = str(Path(source).resolve()) if Path(source).is_file() else source

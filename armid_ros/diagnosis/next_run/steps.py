@@ -135,10 +135,10 @@ def _centre(finding: Finding) -> str:
 
 def _look_at(name: str, diagnosis: Diagnosis) -> str:
     """
-    Return an effect's hint on parts to inspect; also for effects outside the catalogue.
+    Return the part of the robot to inspect for an effect of the catalogue or of a plug-in.
 
-    It is empty for usual effects, such as friction, that the given model lacks: nearly every arm
-    has them.
+    The text is empty for a usual effect that the given model lacks: friction of a joint without
+    a friction model is no fault of the robot.
 
     """
     if name not in CATALOGUE:

@@ -240,7 +240,7 @@ class CauseComparison:
         return Look(ranking, others, nuisance, likeliest, self.usual)
 
     def ranked(self, cause: Cause, nuisance: Nuisance) -> Ranked:
-        """Compare the models with and without a cause, averaged over all settings."""
+        """Return the evidence of a cause, averaged over the amplitudes of errors and noise."""
         settings = self._settings(nuisance)
         fits = [(odds(cause, nuisance, one), one) for one in settings]
         nothing = np.logaddexp.reduce([under.evidence for _, under in fits])

@@ -351,7 +351,7 @@ class ChangeWatch:
         )
 
     def _learn_again(self, found: FoundChange, reopened: FloatArray) -> Job:
-        """Restore the state before a change, reopen directions, and learn later samples again."""
+        """Restart from the state before a change, without information on changed parameters."""
         last = found.blocks[found.before]
         since = [sample for block in found.blocks[found.after :] for sample in block.samples]
         stretches = (*self._unseen, *([self._open] if self._open else ()))

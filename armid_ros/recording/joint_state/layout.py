@@ -127,7 +127,7 @@ class JointStateLayout:
 
     @cached_property
     def spare(self) -> int:
-        """Largest number of bytes behind the last value."""
+        """Largest number of padding bytes after the last value."""
         # A writer reserves room to align what follows, and for each empty sequence as well.
         return 7 + 4 * self.counts.count(0)
 
