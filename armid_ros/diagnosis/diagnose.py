@@ -89,10 +89,10 @@ def diagnose(
     validate : sequence of Recording
         Recordings that are predicted and not fitted.
     baseline : sequence of Recording
-        Recordings from when nothing was wrong, such as those the model was identified from. Their
-        residual is the misfit of the model, and the diagnosis finds what has changed since.
+        Recordings from when the model was right, such as the recordings of its identification.
+        Their residual is the misfit of the model, and the diagnosis finds changes since then.
     misfit : Misfit, optional
-        Misfit of the model when it was identified. The result is in doubt if the residual of the
+        Misfit of the model at its identification. The result is in doubt if the residual of the
         baseline is much larger.
     settings : DiagnosisSettings, optional
         Catalogue and thresholds.

@@ -125,7 +125,7 @@ def next_run(
     Parameters
     ----------
     diagnosis : Diagnosis
-        The names and their rivals.
+        Diagnosis with named effects and their rivals.
     rng : numpy.random.Generator
         Draws the motions.
     collision : CollisionModel, optional

@@ -1,7 +1,7 @@
 # Copyright 2026 The armid_ros developers
 # SPDX-License-Identifier: Apache-2.0
 """
-What to do after a diagnosis: inspect the robot, then record motion that separates rivals.
+Next steps after a diagnosis: inspect the robot, then record motion that separates rivals.
 
 An experiment is advised only for effects that the planned run does not separate.
 
@@ -89,8 +89,8 @@ def _use_of_model(diagnosis: Diagnosis, model: str, worse: Sequence[str]) -> lis
         return [f'Move {", ".join(diagnosis.not_checked)} as well, and record again.']
     if worse:
         return [
-            f'Do not simulate with {model} yet: driven by the recorded torques, it is farther off '
-            f'than the model before in {", ".join(worse)}. Record more motions of '
+            f'Do not simulate with {model} yet: driven by the recorded torques, its error is '
+            f'larger than that of the given model in {", ".join(worse)}. Record more motions of '
             f'{", ".join(worse)}, and diagnose all recordings together.'
         ]
     if diagnosis.verdict not in ('named', 'consistent'):
