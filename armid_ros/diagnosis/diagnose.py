@@ -343,7 +343,7 @@ def _remarks(
 def _unseen(
     data: Sequence[Trajectory], explanation: Explanation, chosen: Chosen
 ) -> Evidence | None:
-    """Return the held-out recordings in the unit of the gap."""
+    """Return the held-out recordings, weighted by the noise, or the misfit if larger."""
     if not data:
         return None
     noise = [noise_floor(part, explanation.fitted.arm).sigma for part in data]

@@ -154,8 +154,8 @@ def copy_bag(
         ]
         if len(left_out) == len(topics):
             raise RecordingError(
-                f'{path}: nothing in it has a type that ROS 2 has; left out: '
-                f'{"; ".join(left_out) or "it is empty"}'
+                f'{path}: no topic has a message type of ROS 2; left out: '
+                f'{"; ".join(left_out) or "the bag is empty"}'
             )
         for topic in topics:
             if rename and topic.type_name == JOINT_STATE and not is_plain(topic):

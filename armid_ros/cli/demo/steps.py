@@ -77,7 +77,7 @@ def hidden_change(robot: Robot, rng: np.random.Generator, hide: str = '') -> Hid
     fitting = [text for text in known if text.startswith(hide)]
     if not fitting:
         names = ', '.join(text.partition(':')[0] for text in known)
-        raise ModelError(f'--hide {hide}: give its values as E@joint:k=v, or one of {names}')
+        raise ModelError(f'--hide {hide}: give an effect as E@joint:k=v, or one of {names}')
     return HiddenChange(*parse_effect(str(rng.choice(fitting)), robot))
 
 

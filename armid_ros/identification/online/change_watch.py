@@ -339,7 +339,7 @@ class ChangeWatch:
         return float(np.exp(np.mean(np.log(self._residual_scale.value))))
 
     def _name(self, found: FoundChange) -> Job:
-        """Report a change in a block, and reopen its parameters."""
+        """Report a change, and restart without information on the changed parameters."""
         values, covariance = yield from self._search.size(found, self._residual_scale_of_all)
         yield
         size = Estimate(found.best.parameters, values, covariance)
