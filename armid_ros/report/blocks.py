@@ -1,6 +1,6 @@
 # Copyright 2026 The armid_ros developers
 # SPDX-License-Identifier: Apache-2.0
-"""What pages are made of: blocks, and the sections that every page has."""
+"""Elements of pages: blocks, and the sections that every page has."""
 
 from __future__ import annotations
 
