@@ -69,7 +69,7 @@ class Copied:
 
 def recover(file: str | Path, out: str | Path, settings: ReadSettings = DEFAULT) -> Copied:
     """
-    Copy what can be read of an MCAP file into a complete bag, with index and metadata.yaml.
+    Copy the readable part of an MCAP file into a complete bag, with index and metadata.yaml.
 
     Complete chunks are copied if their checksum is correct. If the file ends inside a chunk, the
     messages before the end are copied.
