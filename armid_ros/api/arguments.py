@@ -114,7 +114,7 @@ def drivable(arm: RobotLike) -> ArmModel:
     if others:
         kept = ', '.join(repr(joint) for joint in model.robot.joints if joint not in others)
         raise TrajectoryError(
-            f'{arm}: {", ".join(others)} belong to no arm; choose what is driven with '
+            f'{arm}: {", ".join(others)} belong to no arm; choose the driven joints with '
             f'ar.load_robot({str(arm)!r}, joints=[{kept}])'
         )
     return model

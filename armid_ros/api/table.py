@@ -95,7 +95,7 @@ ResidualPart = tuple[str, FloatArray, FloatArray]
 
 
 def data_frame(rows: Any) -> pandas.DataFrame:
-    """Return rows as a pandas table; an ArmidError says so where pandas is not installed."""
+    """Return rows as a pandas table; ArmidError if pandas is not installed."""
     try:
         from pandas import DataFrame
     except ModuleNotFoundError:

@@ -57,7 +57,7 @@ class Commands(click.Group):
     """Imports commands late, and reports bad input as one line on stderr and exit code 2."""
 
     def list_commands(self, ctx: click.Context) -> list[str]:
-        """List the commands in the order of the work, those of plug-ins last."""
+        """List the commands in the order of the work, commands of plug-ins last."""
         return [*COMMANDS, *sorted(plug_ins('commands').keys() - COMMANDS)]
 
     def get_command(self, ctx: click.Context, cmd_name: str) -> click.Command | None:
@@ -251,7 +251,7 @@ def _options(command: click.Command) -> dict[str, click.Option]:
 @click.version_option(__version__, prog_name='armid')
 def main() -> None:
     """
-    Identify a robot arm: excite, record, identify, and find what the model lacks.
+    Identify a robot arm: excite, record, identify, and find effects that the model lacks.
 
     Exit codes: 0 done, 1 a defect of the program, 2 bad input or data, 130 interrupted. With
     --strict of identify and diagnose, 3 is a result not to be used.

@@ -1,6 +1,6 @@
 # Copyright 2026 The armid_ros developers
 # SPDX-License-Identifier: Apache-2.0
-"""What changed between two identifications."""
+"""Comparison of two identifications."""
 
 from __future__ import annotations
 

@@ -35,7 +35,7 @@ def main(name: str | None = None) -> int | None:
 
 
 def lacking(error: ModuleNotFoundError) -> str | None:
-    """Return what to install for a missing module; None if it is not part of ROS 2."""
+    """Return how to install a missing module; None if the module is not part of ROS 2."""
     module = (error.name or '').partition('.')[0]
     if module == 'armid_msgs':
         return (
