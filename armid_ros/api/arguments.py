@@ -1,6 +1,6 @@
 # Copyright 2026 The armid_ros developers
 # SPDX-License-Identifier: Apache-2.0
-"""What a person passes, and what the packages below take: a path for a robot, an int for a rng."""
+"""Arguments of the public functions: a path for a robot, a seed for a random generator."""
 
 from __future__ import annotations
 
@@ -26,14 +26,13 @@ from armid_ros.robots import joints_beside_arms, load_robot, Robot, shipped_robo
 from armid_ros.robots.load import shipped_path
 import numpy as np
 
-#: A robot: as it is, as part of a model, by a shipped name, or by the path of its description or
-#: of the model.yaml of one.
+#: A robot, a model of its arm, a shipped name, or the path of a description or a model.yaml.
 RobotLike = Robot | ArmModel | str | Path
-#: A recording: as it is, or the path of a bag or a table.
+#: A recording, or the path of a bag or a table.
 RecordingLike = Recording | str | Path
-#: A generator, or the seed of one.
+#: A random generator, or a seed.
 Rng = np.random.Generator | int
-#: Is called with the share of the work that is done and, where it changes, what is being done.
+#: Called with the share of the work that is done and, if it changes, the name of the step.
 Progress = Callable[..., None]
 
 #: A number, one a joint, or these as text: '1798/7, 50'.
@@ -50,7 +49,7 @@ USUAL = ','.join(USUAL_EFFECTS)
 
 
 def spelled(function: Callable[_Given, _Result]) -> Callable[_Given, _Result]:
-    """Let a function answer a keyword that it does not have with the one that was meant."""
+    """Let the error on an unknown keyword of a function name the most similar keyword."""
     known = signature(function).parameters
 
     @wraps(function)
@@ -92,7 +91,7 @@ def describes_robot(one: RobotLike | RecordingLike) -> bool:
 
 
 def source_of(robot: Robot) -> str:
-    """Return how files refer to a robot: by its shipped name, its path, or its name."""
+    """Return the reference to a robot in files: its shipped name, its path, or its name."""
     for name in shipped_robots():
         if robot.path == shipped_path(name):
             return name
@@ -115,7 +114,7 @@ def drivable(arm: RobotLike) -> ArmModel:
     if others:
         kept = ', '.join(repr(joint) for joint in model.robot.joints if joint not in others)
         raise TrajectoryError(
-            f'{arm}: {", ".join(others)} belong to no arm; choose what is driven with '
+            f'{arm}: {", ".join(others)} belong to no arm; choose the driven joints with '
             f'ar.load_robot({str(arm)!r}, joints=[{kept}])'
         )
     return model
@@ -209,14 +208,14 @@ def read_recording(
         A rosbag2 directory, .mcap, .db3, .bag, .csv, .npz, .mat, .parquet, or the folder of a
         LeRobot dataset.
     robot : robot, model, name, path, or sequence of str
-        Whose joints; a sequence of names does too. By default all joints of a table, or of a bag
-        with one topic of JointState, or of ``topic``.
+        Robot whose joints are read, or names of joints. By default all joints of a table, of the
+        only JointState topic of a bag, or of ``topic``.
     topic : str, optional
         JointState topic, where a bag has several.
     time, position, velocity, effort : str, optional
         Columns of a table: a name, names with commas, ``'q{}'`` for the joint's name or number;
-        ``'[1..7]'`` for columns without names, counted from 0; ``'none'`` for what is not to be
-        read. Guessed by default.
+        ``'[1..7]'`` for columns without names, counted from 0; ``'none'`` to skip the
+        quantity. Guessed by default.
     time_unit : {'s', 'ms', 'us', 'ns'}, optional
         Unit of the column of time; guessed by default.
     rate_hz : float, optional
@@ -224,16 +223,16 @@ def read_recording(
     degrees : bool
         Whether positions and velocities are in degrees.
     position_scale, effort_scale : float or sequence of float
-        Factors to rad or m, and to N m or N: one, or one a joint. Of a current, the torque
-        constant [N m/A].
+        Factors to rad or m, and to N m or N: one, or one per joint. The factor of a current is
+        the torque constant [N m/A].
     zero : float or sequence of float
-        Added to the positions after all [rad or m].
+        Offsets added to the converted positions [rad or m]: one, or one per joint.
     gear : float or sequence of float
-        Turns of the motor for one of the joint, where values are those of motors.
+        Turns of the motor per turn of the joint, if the values are those of the motors.
     coupling : sequence of (str, str, float)
-        Motor, joint, and turns of that motor for one of that other joint, for wrists.
+        Motor, joint, and turns of the motor per turn of that other joint, for wrists.
     rename : mapping of str to str
-        Beginnings of joint names in the file, and what to put there instead:
+        Beginnings of joint names in the file, and their replacements:
         ``{'fer_': 'panda_'}``.
     episode : int, optional
         Number of the episode of a LeRobot dataset.
@@ -246,7 +245,7 @@ def read_recording(
     Raises
     ------
     RecordingError
-        Naming the file, and the topic, joint, column or line, and what to do.
+        With the file, the topic, joint, column or line, and the remedy.
 
     Examples
     --------
@@ -290,7 +289,7 @@ def read_recording(
 
 
 def topics_of(path: Path, settings: ReadSettings = DEFAULT) -> tuple[Topic, ...]:
-    """Return the topics of a bag; of a table none."""
+    """Return the topics of a bag; empty for a table."""
     return () if is_table(path) else bag_contents(path, settings)
 
 

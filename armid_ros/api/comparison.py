@@ -1,6 +1,6 @@
 # Copyright 2026 The armid_ros developers
 # SPDX-License-Identifier: Apache-2.0
-"""What changed between two identifications."""
+"""Comparison of two identifications."""
 
 from __future__ import annotations
 
@@ -22,12 +22,12 @@ if TYPE_CHECKING:
 @dataclass(frozen=True, repr=False, eq=False)
 class ComparisonResult(Shown):
     """
-    Two identifications side by side.
+    Changes between two identifications.
 
     Attributes
     ----------
     core : Comparison
-        Everything that was found.
+        Everything that the comparison found.
 
     Examples
     --------
@@ -51,7 +51,7 @@ class ComparisonResult(Shown):
 
     @property
     def load(self) -> float | None:
-        """Mass that was added to a link [kg], where that explains the changes of the body."""
+        """Mass added to a link [kg]; None unless a load explains the changes of the body."""
         return None if self.core.load is None else float(self.core.load.mass)
 
     def to_dataframe(self) -> pandas.DataFrame:
@@ -59,7 +59,7 @@ class ComparisonResult(Shown):
         return data_frame(self.document()['parameters'])
 
     def document(self, origin: ResultOrigin = DEFAULT_ORIGIN) -> dict[str, Any]:
-        """Return what comparison.json holds."""
+        """Return the content of comparison.json."""
         return self.core.document()
 
     def page(self, origin: ResultOrigin = DEFAULT_ORIGIN) -> str:
@@ -88,17 +88,17 @@ def compare(
     Parameters
     ----------
     before, after : IdentificationResult, or path
-        Results of ``identify``, or folders that they were saved to.
+        Results of ``identify``, or the folders of such results.
 
     Returns
     -------
     ComparisonResult
-        Prints what changed; ``report``, ``save``, ``to_dataframe``.
+        Prints the changes; ``report``, ``save``, ``to_dataframe``.
 
     Raises
     ------
     ArmidError
-        A folder has no result, both are the same, or they are not of one robot.
+        If a folder has no result, both results are equal, or their robots differ.
 
     Examples
     --------

@@ -1,6 +1,6 @@
 # Copyright 2026 The armid_ros developers
 # SPDX-License-Identifier: Apache-2.0
-"""The search for a trajectory that shows the parameters."""
+"""Search for a trajectory that makes the parameters identifiable."""
 
 from __future__ import annotations
 
@@ -64,28 +64,28 @@ def design_excitation(
     time_budget: float | None = None,
 ) -> ExcitationResult:
     """
-    Find a trajectory that shows the parameters, inside all limits and free of collisions.
+    Find a trajectory that makes the parameters identifiable, without collisions, inside limits.
 
     The arm, its floor and its surroundings are checked as by ``armid excite``.
 
     Parameters
     ----------
     arm : model, robot, name or path
-        What is to be identified.
+        The model to identify.
     duration : float
-        Of the whole run [s].
+        Duration of the whole run [s].
     periods : int
-        How often the trajectory is run through; two tell noise from what a model lacks.
+        Number of equal periods; the difference of two is the noise floor.
     rng : int or Generator
         Seed, or source of randomness.
     floor : str or float, optional
-        Height of the floor above the origin of the base [m], or 'none'; by default the base plane
-        of an arm that stands, or what is shipped with the robot.
+        Height of the floor above the origin of the base [m], or 'none'; by default the height
+        shipped with the robot, or the base plane of a standing arm.
     environment : str or Path, optional
-        YAML with what stands around the arm, or a planning scene of MoveIt.
+        YAML file of obstacles around the arm, or a planning scene of MoveIt.
     joint_limits : str, Path or mapping of str to float, optional
         ``joint_limits.yaml`` of MoveIt (position, velocity, acceleration), or velocity limits by
-        name [rad/s or m/s]. A joint without any gets a slow one, which the summary names.
+        name [rad/s or m/s]. A joint without limit gets a low one, which the summary names.
     scene : CollisionScene, optional
         Bodies, floor and surroundings, in place of ``floor`` and ``environment``.
     start : ndarray, shape (n,), optional
@@ -93,27 +93,27 @@ def design_excitation(
     after : recording or path, or several
         Recordings whose information the trajectory adds to.
     rival : ArmModel, optional
-        With ``criterion='T'``: what may be there in place of the effects of ``arm``.
+        With ``criterion='T'``: model with the rival effects in place of those of ``arm``.
     progress : callable, optional
         Called with the progress of the search.
     speed : str or float
         'slow', 'medium', 'fast' or a share of the velocity and acceleration limits.
     criterion : {'D', 'A', 'E', 'condition', 'T'}
-        What is made best; 'T' tells the arm from ``rival``.
+        Criterion to optimise; 'T' distinguishes the arm from ``rival``.
     target : {'all', 'gravity', 'effects'}
-        Of which parameters.
+        Parameters that count in the criterion.
     focus : tuple of str
-        Names of effects to see best, everything else being fitted too.
+        Names of effects to identify best, while all other parameters are fitted too.
     harmonics : int
         Fourier harmonics per joint.
     acceleration, noise : ndarray, shape (n,)
         Acceleration limits [rad/s^2 or m/s^2], by default the top speed in 0.25 s; standard
         deviation of the torque noise [N m or N], by default 1 % of the torque limits.
     clearance : float
-        Distance between bodies that may touch [m].
+        Distance to keep between bodies that may touch [m].
     starts, iterations, candidates : int
-        Searches, by default 4, and 1 above 20 joints; iterations of each; random trajectories
-        that they begin with.
+        Number of searches, by default 4, and 1 above 20 joints; of iterations of each search;
+        of random trajectories at the start.
     time_budget : float
         Processor time [s]: by default 120, and above 20 joints 25.
 
@@ -125,8 +125,8 @@ def design_excitation(
     Raises
     ------
     TrajectoryError
-        No trajectory is inside the limits, with the limit or the bodies that touch; or the height
-        of the floor is unknown.
+        If no trajectory is inside the limits; the message names the limit or the bodies that
+        touch. If the height of the floor is unknown.
 
     Examples
     --------
@@ -185,7 +185,7 @@ def _searched(
     """Check that a start pose is free, then search for the trajectory."""
     planner = planner_of(model, asked, scene)
     if start is None:
-        planner.free_start()  # where there is none, that is said before the search
+        planner.free_start()  # raises before the search if no pose is free
     elif fault := planner.fault(start):
         raise TrajectoryError(f'--start: {fault}')
     prior = _information(model, asked, earlier, rng) if earlier else None

@@ -1,6 +1,6 @@
 # Copyright 2026 The armid_ros developers
 # SPDX-License-Identifier: Apache-2.0
-"""Recordings and a model in, what the model lacks out."""
+"""Diagnosis: from recordings and a model to the effects that the model lacks."""
 
 from __future__ import annotations
 
@@ -74,17 +74,17 @@ class DiagnosisResult(ShownModel):
     core : Diagnosis
         Everything that the diagnosis found.
     description : ArmModel
-        The model before.
+        The model in question, without the named effects.
     recordings, held_out, baseline : tuple of Recording
-        What was looked at, what was only predicted, and what is from before.
+        Recordings that are diagnosed, only predicted, and from when the model was right.
     settings : DiagnosisSettings
-        What was asked.
+        Settings of the diagnosis.
     misfit : Misfit or None
-        What the model left when it was identified, where there is no baseline.
+        Misfit of the model at its identification; None with a baseline, or if unknown.
     extras : Extras
-        What was made of the diagnosis: a learned residual, simulations, a next run.
+        Learned residual, simulations of held-out recordings, and next run.
     simulated : IdentificationResult or None
-        The model of the simulator that was asked about.
+        Identification of a simulator's model; None without recordings of a simulator.
 
     Examples
     --------
@@ -122,7 +122,7 @@ class DiagnosisResult(ShownModel):
 
     @property
     def names(self) -> tuple[str, ...]:
-        """Effects that are named, the largest first."""
+        """Names of the accepted effects, the largest first."""
         return tuple(finding.name for finding in self.core.findings)
 
     @property
@@ -163,7 +163,7 @@ class DiagnosisResult(ShownModel):
         )
 
     def document(self, origin: ResultOrigin = DEFAULT_ORIGIN) -> dict[str, Any]:
-        """Return what diagnosis.json holds."""
+        """Return the content of diagnosis.json."""
         extras = self.extras
         return {
             **diagnosis_document(self.core),
@@ -173,7 +173,7 @@ class DiagnosisResult(ShownModel):
         }
 
     def page(self, origin: ResultOrigin = DEFAULT_ORIGIN, patch: str = '') -> str:
-        """Return report.html with the verdict and the evidence, and the text of model.yaml."""
+        """Return report.html with verdict and evidence; `patch` is the text of model.yaml."""
         return diagnosis_report(
             self.core,
             {
@@ -189,7 +189,7 @@ class DiagnosisResult(ShownModel):
         )
 
     def fill(self, folder: Path, origin: ResultOrigin = DEFAULT_ORIGIN) -> dict[str, Any]:
-        """Write diagnosis.json, model.yaml and report.html into a folder, numbers first."""
+        """Write diagnosis.json, model.yaml and report.html into a folder, the page last."""
         model, document = folder / 'model.yaml', self.document()
         source = origin.of(source_of(self.description.robot)).source
         save_model(model, self.arm, source, self.core.estimate, self.misfit)
@@ -212,7 +212,7 @@ class DiagnosisResult(ShownModel):
         ]
 
     def with_residual(self, seed: int) -> DiagnosisResult:
-        """Learn the unexplained residual as a map of the state; note why if it is not learned."""
+        """Learn the unexplained residual as a map of the state, or add a note with the reason."""
         if self.verdict not in OPEN:
             said = self.verdict.replace('_', ' ')
             return self._with_notes(f'nothing is learned where the verdict is {said}')
@@ -230,7 +230,7 @@ class DiagnosisResult(ShownModel):
         return replace(self, extras=replace(self.extras, residual=found))
 
     def with_extras(self, residual: bool, seed: int, progress: Progress) -> DiagnosisResult:
-        """Learn the residual if asked for, simulate, and plan the next run."""
+        """Learn the residual if requested, simulate held-out recordings, and plan the next run."""
         result = self
         if residual:
             progress(1.0, 'learning the residual')
@@ -242,7 +242,7 @@ class DiagnosisResult(ShownModel):
         return replace(result, extras=extras)
 
     def _with_simulations(self, progress: Progress) -> DiagnosisResult:
-        """Simulate the held-out recordings, with the model as it was and as it is patched."""
+        """Simulate the held-out recordings, with the given and with the patched model."""
         if not self.held_out or self.core.gap is None:
             return self
 
@@ -262,7 +262,7 @@ class DiagnosisResult(ShownModel):
         return replace(self, extras=replace(self.extras, notes=(*self.extras.notes, *notes)))
 
     def summary(self, model: str = MODEL, every: bool = True) -> Summary:
-        """Return the verdict, values that are not zero, notes, and steps with a model's path."""
+        """Return verdict, values that differ from zero, notes, and next steps for a model file."""
         rows: list[Sequence[str]] = [*named_rows(self.core.findings, certain=True)]
         most = 6  # rows without --all
         if not every and len(rows) > most + 1:
@@ -313,48 +313,48 @@ def diagnose(
     progress: Progress | None = None,
 ) -> DiagnosisResult:
     """
-    Find what a model lacks.
+    Find the effects that a model lacks, or that have changed.
 
     Parameters
     ----------
     arm : identification, model, robot, name or path
-        What is believed of the arm. Of what ``identify`` returned, and of the path of the
-        model.yaml that it wrote, it is known what the model left then, which is no gap. An
-        `ArmModel` is believed as it is.
+        The model in question. A result of ``identify`` and the path of its model.yaml supply the
+        misfit of the identification, which does not count as a gap. An `ArmModel` or a robot has
+        no misfit.
     recordings : recording or path, or several
-        What it did.
+        Recordings to diagnose, with torques.
     validate : recording or path, or several
-        To be predicted and not to be fitted.
+        Held-out recordings, which are predicted and not fitted.
     baseline : recording or path, or several, optional
-        From when the model was right: what it left then is no cause. By default what it was
-        identified from, where that is known and there, and is not looked at; ``()`` asks
-        without.
+        Recordings from when the model was right. Their residual is the misfit of the model. By
+        default the recordings of the identification, if they exist and none of them is
+        diagnosed; ``()``: no baseline.
     against : recording or path, or several
-        Recordings of a simulator. The model in question is then the simulator's, which is
-        identified from them; their motion may differ from that of ``recordings``.
+        Recordings of a simulator. The model in question is then identified from these. Their
+        motion may differ from that of ``recordings``.
     effects : str
-        Catalogue names with commas, for a robot without a model; with ``against`` those of the
-        simulator.
+        Catalogue names with commas: effects of a robot without a model; with ``against`` the
+        effects of the simulator.
     residual : {'gp'}, optional
-        Learn what is left without a name, where the verdict is partial or unknown.
+        Learn the residual that no effect explains, if the verdict is partial or unknown.
     cutoff : float, optional
-        Of the position filter [Hz]; from the noise by default.
+        Cut-off of the position filter [Hz]; from the noise by default.
     decimation : int, optional
-        Keep one sample of this many.
+        Keep one of this many samples.
     material : float
         Share of a joint's torque below which an effect does not matter.
     everything : bool
-        Add effects to the model that do not matter, too.
+        Add immaterial effects to the model as well.
     prior : mapping of str to str, optional
-        How often effects happen to this arm, by name: often, usual, seldom or never.
+        Frequency of effects on this arm, by name: often, usual, seldom or never.
     misfit : Misfit, optional
-        What the model left when it was identified; by default as ``arm`` tells it.
+        Misfit of the model at its identification; by default that of ``arm``.
     partner : Partner, optional
-        A machine or person recorded with the arm, to which it may be tied.
+        Machine or person that was recorded with the arm, and may be tied to it.
     rng : int or Generator
         Seed, or source of randomness.
     progress : callable, optional
-        Called with the share that is done and what is being done.
+        Called with the share of the work that is done, and the name of the present step.
 
     Returns
     -------
@@ -364,7 +364,7 @@ def diagnose(
     Raises
     ------
     ArmidError
-        A recording or the model cannot be used; the message names it and what to do.
+        If a recording or the model cannot be used. The message names it and the remedy.
 
     Examples
     --------

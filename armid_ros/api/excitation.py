@@ -1,6 +1,6 @@
 # Copyright 2026 The armid_ros developers
 # SPDX-License-Identifier: Apache-2.0
-"""Trajectories that show the parameters."""
+"""Results of the design of excitation trajectories."""
 
 from __future__ import annotations
 
@@ -60,15 +60,15 @@ class ExcitationResult(Shown):
     core : Design
         Everything that the design found.
     arm : ArmModel
-        What it was made for.
+        Model of the arm.
     scene : CollisionScene
-        Bodies, floor and surroundings that it was checked against.
+        Bodies, floor and surroundings for the check of clearance.
     given_start : ndarray, shape (n,), or None
         Pose to leave from and to return to [rad or m]; the free pose nearest to zero by default.
     after : tuple of str
-        Recordings that it adds to.
+        Names of the recordings whose information the trajectory adds to.
     seed : int
-        Of the search.
+        Seed of the search.
     with_isolability : bool
         Whether results contain the `isolability`.
 
@@ -153,7 +153,7 @@ class ExcitationResult(Shown):
         return fitness(self.run.motion(), self.core.limits, self.scene)
 
     def document(self, origin: ResultOrigin = DEFAULT_ORIGIN) -> dict[str, Any]:
-        """Return what excitation.json holds."""
+        """Return the content of excitation.json."""
         core = replace(self.core, excitation=self.run.excitation)
         information, settings = core.information, core.settings
         used = core.limits_used(self.arm)
@@ -210,12 +210,12 @@ class ExcitationResult(Shown):
         """
         Write excitation.yaml, .csv and .json, a bag with the run, and report.html into a folder.
 
-        What takes longest to find is written first.
+        The trajectory, which takes longest to find, is written first.
 
         Raises
         ------
         TrajectoryError
-            If no way leads from the start to the trajectory; its coefficients are written then.
+            If no path leads from the start to the trajectory; its coefficients are still written.
 
         """
         for name in ('excitation.yaml', 'excitation.csv'):
@@ -256,7 +256,7 @@ class ExcitationResult(Shown):
         )
 
     def _of_run(self) -> tuple[str, list[str], str]:
-        """Return the fitness of the run, sentences on it and its search, and what makes it fit."""
+        """Return the fitness of the run in a word, sentences on run and search, and the remedy."""
         try:
             run, fit = self.run, self.fitness
         except TrajectoryError as error:

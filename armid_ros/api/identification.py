@@ -1,6 +1,6 @@
 # Copyright 2026 The armid_ros developers
 # SPDX-License-Identifier: Apache-2.0
-"""Recordings in, a model with uncertainties out."""
+"""Identification: from recordings to a model with uncertainties."""
 
 from __future__ import annotations
 
@@ -77,13 +77,13 @@ class IdentificationResult(ShownModel):
     core : Identification
         Everything that the identification found.
     description : ArmModel
-        The model before.
+        The given model.
     recordings : tuple of Recording
-        What it was fitted to.
+        Recordings that the model is fitted to.
     held_out : tuple of Recording
-        What it only predicted.
+        Recordings that are predicted and not fitted.
     validation : dict of str to tuple of Fit
-        Predictions of the held-out recordings, by their names.
+        Predicted torques of the held-out recordings, by the name of the recording.
     verification : Verification or None
         Test for encoder noise, and simulations along the held-out recordings.
     gains : DriveGains or None
@@ -180,7 +180,7 @@ class IdentificationResult(ShownModel):
 
     def plot(self) -> npt.NDArray[np.object_]:
         """
-        Draw measured and predicted torques of the first held-out recording, else of the training.
+        Draw measured and predicted torques of the first held-out recording, or the training data.
 
         Returns
         -------
@@ -211,7 +211,7 @@ class IdentificationResult(ShownModel):
 
     @cached_property
     def exports(self) -> dict[str, Exported]:
-        """Return the model for other programs by file name; empty unless links are bodies."""
+        """Return URDF and MJCF by file name; empty unless the links are physically consistent."""
         if self.core.physical is None:
             return {}
         return {'identified.urdf': arm_urdf(self.arm), 'identified.mjcf.xml': arm_mjcf(self.arm)}
@@ -259,7 +259,7 @@ class IdentificationResult(ShownModel):
         return document
 
     def summary(self, every: bool = False) -> Summary:
-        """Return errors and friction of each joint, doubts, and the next step; or every value."""
+        """Return errors and friction of each joint, doubts, and next step; `every`: all values."""
         from armid_ros.report.families import joint_columns
         from armid_ros.report.judgement import judge, residual_trends
         from armid_ros.report.notation import counted, plain
@@ -310,7 +310,7 @@ class IdentificationResult(ShownModel):
         )
 
     def _parameters(self) -> list[str]:
-        """Return all parameters beside those of the description, a line each."""
+        """Return a table of all parameters with their described values, one line each."""
         from armid_ros.report.families import estimate_text, full_label
         from armid_ros.report.notation import digits, pretty
 
@@ -348,32 +348,32 @@ def identify(
     Parameters
     ----------
     arm : model, robot, name or path
-        What is fitted; a robot without a model gets ``effects``.
+        The model to fit; a robot without a model gets ``effects``.
     recordings : recording or path, or several
         Bags or tables with torques.
     validate : recording or path, or several
-        To be predicted and not to be fitted.
+        Held-out recordings, which are predicted and not fitted.
     effects : str
         Catalogue names with commas, for a robot without a model.
     method : {'ols', 'wls', 'irls', 'iv'}
-        Least squares with all joints alike, weighted by their noise, or robust as well;
-        instrumental variables against encoder noise.
+        Least squares: ordinary, weighted by the noise of each joint, or weighted and robust;
+        or instrumental variables, against encoder noise.
     cutoff : float, optional
-        Of the position filter [Hz]; from the noise by default.
+        Cut-off of the position filter [Hz]; from the noise by default.
     decimation : int, optional
-        Keep one sample of this many.
+        Keep one of this many samples.
     physical : bool or PhysicalSettings, optional
-        Fit links that can be bodies, which simulators need; ``urdf`` then describes one. By
-        default where that makes the torque error larger by a tenth at most.
+        Fit physically consistent links, which simulators need. By default such links are fitted
+        if they increase the torque error by a tenth at most.
     verify : bool
         Test for encoder noise and simulate along the held-out recordings.
     payloads : sequence of str
-        What the arm is known to carry in a recording, as 'BAG=KG@LINK[:X,Y,Z]', which fixes the
-        gains of the drives.
+        Known payload of each loaded recording, as 'BAG=KG@LINK[:X,Y,Z]'. The payloads determine
+        the gains of the drives.
     rng : int or Generator
         Seed, or source of randomness.
     progress : callable, optional
-        Called with the share that is done and what is being done.
+        Called with the share of the work that is done, and the name of the present step.
 
     Returns
     -------
@@ -383,10 +383,10 @@ def identify(
     Raises
     ------
     IdentificationError
-        If the data cannot identify anything, or no joint moves in what is held out; the message
-        says why and what to do.
+        If the data identify no parameter, or no joint moves in the held-out recordings. The
+        message states the reason and the remedy.
     RecordingError
-        If there is no recording, or one is given twice, or held out and fitted.
+        If no recording is given, or a recording is given twice, or both held out and fitted.
 
     Examples
     --------

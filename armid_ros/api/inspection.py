@@ -1,6 +1,6 @@
 # Copyright 2026 The armid_ros developers
 # SPDX-License-Identifier: Apache-2.0
-"""What is in a recording, and what is wrong with it or with a description."""
+"""Inspection of a recording, and check of a robot description."""
 
 from __future__ import annotations
 
@@ -52,7 +52,7 @@ class InspectionResult(Shown):
     Attributes
     ----------
     core : Inspection
-        Everything that was found.
+        Everything that the inspection found.
 
     Examples
     --------
@@ -83,7 +83,7 @@ class InspectionResult(Shown):
         return data_frame(self.core.joints)
 
     def document(self, origin: ResultOrigin = DEFAULT_ORIGIN) -> dict[str, Any]:
-        """Return what ``armid inspect --json`` prints."""
+        """Return the document that ``armid inspect --json`` prints."""
         return inspection_document(self.core)
 
     def page(self, origin: ResultOrigin = DEFAULT_ORIGIN) -> str:
@@ -138,11 +138,11 @@ def inspect(
     Parameters
     ----------
     robot : model, robot, name or path, optional
-        With it limits and units are checked, and an identification is tried.
+        Robot for the checks of limits and units, and for a trial identification.
     recording : Recording or path
-        A bag or a table; the only argument where there is no robot.
+        Bag or table; the only argument if no robot is given.
     topics : tuple of Topic, optional
-        All topics of the bag; read from it by default where no robot is given.
+        All topics of the bag; by default read from the bag if no robot is given.
     rng : int or Generator
         Seed, or source of randomness.
 
@@ -154,7 +154,7 @@ def inspect(
     Raises
     ------
     ArmidError
-        The file or the description cannot be read; the message names it and what to do.
+        If the file or the description cannot be read. The message names it and the remedy.
 
     Examples
     --------
@@ -189,11 +189,11 @@ class CheckResult(Shown):
     Attributes
     ----------
     robot : Robot
-        As described.
+        The robot as described.
     remarks : tuple of Remark
         Impossible and doubtful values, the worst first.
     links : LinkCheck or None
-        Masses and centres as described and as measured; None without a recording.
+        Described and measured masses and centres of mass; None without a recording.
 
     Examples
     --------
@@ -224,7 +224,7 @@ class CheckResult(Shown):
         return impossible or (self.links is not None and not self.links.agrees)
 
     def document(self, origin: ResultOrigin = DEFAULT_ORIGIN) -> dict[str, Any]:
-        """Return what ``armid check --json`` prints."""
+        """Return the document that ``armid check --json`` prints."""
         links = {} if self.links is None else asdict(self.links)
         numbers = {name: v.tolist() for name, v in links.items() if hasattr(v, 'tolist')}
         return {
@@ -242,7 +242,7 @@ class CheckResult(Shown):
         return description_check_report(self.remarks, self.links, self.stated(origin, self.robot))
 
     def summary(self) -> Summary:
-        """Return the finding, and the links: what was measured where any of them is wrong."""
+        """Return the finding and the links, with measured values if any are known."""
         from armid_ros.report.inspection_report import check_word, headline, HEADS, link_rows
 
         links = self.links
@@ -279,9 +279,9 @@ def check(
     robot : robot, model, name or path
         The description.
     recordings : recording or path, or several, optional
-        With torques; without, only the values of the description are checked.
+        Recordings with torques; by default only the values of the description are checked.
     effects : str
-        What the arm has besides its bodies, catalogue names with commas.
+        Effects of the arm besides the rigid body: catalogue names with commas.
     rng : int or Generator
         Seed, or source of randomness.
 
@@ -293,7 +293,7 @@ def check(
     Raises
     ------
     ArmidError
-        The description or a recording cannot be used; the message names it and what to do.
+        If the description or a recording cannot be used. The message names it and the remedy.
 
     Examples
     --------

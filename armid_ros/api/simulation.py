@@ -1,6 +1,6 @@
 # Copyright 2026 The armid_ros developers
 # SPDX-License-Identifier: Apache-2.0
-"""Arms that follow a trajectory."""
+"""Simulation of an arm that follows a trajectory."""
 
 from __future__ import annotations
 
@@ -39,8 +39,8 @@ def simulate(
     arm : model, robot, name or path
         The arm; a robot without a model is a rigid body without friction.
     trajectory : optional
-        What ``design_excitation`` found, a motion, or a file of either; one made in a hurry by
-        default.
+        Result of ``design_excitation``, a motion, or a file of either; by default the result of
+        a short search.
     rate : float
         Recorded samples per second.
     torque_noise, position_noise, velocity_noise : float
@@ -53,12 +53,12 @@ def simulate(
     Returns
     -------
     Recording
-        What the sensors read.
+        Readings of the sensors.
 
     Raises
     ------
     ArmidError
-        The trajectory cannot be read, or does not fit the arm.
+        If the trajectory cannot be read, or does not fit the arm.
 
     Examples
     --------
@@ -103,17 +103,17 @@ def reference_of(
     robot : Robot
         The arm.
     trajectory : optional
-        What ``design_excitation`` found, a motion, or a file of either; a short search makes one
-        by default.
+        Result of ``design_excitation``, a motion, or a file of either; by default the result of
+        a short search.
     rng : numpy.random.Generator
-        Draws the beginnings of that search.
+        Draws the starts of the search.
     settings : ReadSettings
-        How a bag is read.
+        Settings of the reader of bags.
 
     Raises
     ------
     ArmidError
-        The file cannot be read.
+        If the file cannot be read.
 
     """
     if trajectory is None:

@@ -44,7 +44,7 @@ def recordings_since(
     """
     Return the given baseline; by default the recordings of the identification.
 
-    There is no such default if one of them is diagnosed.
+    There is no default baseline if one of these recordings is diagnosed.
 
     """
     if baseline is not None:
@@ -74,7 +74,7 @@ def model_in_question(
     Return the given or simulated arm, its model, and the identification of a simulator.
 
     The model of a simulator is identified from its recordings (`against`). Without given effects,
-    it has those that nearly every joint has or a MJCF describes.
+    it has the usual effects and the effects that a MJCF can describe.
 
     """
     model = arm.arm if isinstance(arm, IdentificationResult) else arm_of(arm, effects)

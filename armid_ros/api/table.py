@@ -1,6 +1,6 @@
 # Copyright 2026 The armid_ros developers
 # SPDX-License-Identifier: Apache-2.0
-"""How results show themselves: ten lines in a terminal, the report in a notebook."""
+"""Display of results: ten lines in a terminal, the report in a notebook."""
 
 from __future__ import annotations
 
@@ -38,19 +38,19 @@ class Summary:
     Attributes
     ----------
     title : str
-        What it is, with the number that matters most.
+        Kind of the result, with the number that matters most.
     badge : str
         One word; empty for none.
     heads : sequence of str
-        Of the columns.
+        Headings of the columns.
     rows : sequence of sequence of str
         Cells; the first is a name.
     lines : sequence of str
-        What stands below.
+        Lines below the table.
     steps : sequence of str
-        What to do next.
+        Next steps for the user.
     then : str
-        Name of the command that does it; empty for none.
+        Name of the command of the next step; empty for none.
 
     """
 
@@ -95,7 +95,7 @@ ResidualPart = tuple[str, FloatArray, FloatArray]
 
 
 def data_frame(rows: Any) -> pandas.DataFrame:
-    """Return rows as a pandas table; an ArmidError says so where pandas is not installed."""
+    """Return rows as a pandas table; ArmidError if pandas is not installed."""
     try:
         from pandas import DataFrame
     except ModuleNotFoundError:
@@ -119,24 +119,24 @@ class Shown(ABC):
     @property
     @abstractmethod
     def files(self) -> Sequence[str]:
-        """Return the names of the files it writes: the document first, then the page."""
+        """Return the names of the written files: the document first, then the page."""
 
     @abstractmethod
     def summary(self) -> Summary:
         """Return a summary."""
 
     def stated(self, origin: ResultOrigin, robot: Robot | None = None) -> ResultOrigin:
-        """Fill in the robot, and what to do next: a sentence or the command."""
+        """Fill in the robot and the next step: a sentence or a command."""
         shown, known = self.summary(), origin if robot is None else origin.of(source_of(robot))
         step = origin.step or ''.join(shown.steps[:1]) or f'armid {shown.then}'
         return replace(known, step=step)
 
     @abstractmethod
     def document(self, origin: ResultOrigin = DEFAULT_ORIGIN) -> dict[str, Any]:
-        """Return the content of its JSON file, with the provenance given."""
+        """Return the content of the JSON file, with a given provenance."""
 
     def to_dict(self) -> dict[str, Any]:
-        """Return the content of its JSON file."""
+        """Return the content of the JSON file."""
         return self.document()
 
     @abstractmethod
@@ -144,7 +144,7 @@ class Shown(ABC):
         """Return the report, one HTML file."""
 
     def report(self, path: str | Path = 'report.html') -> Path:
-        """Write the report; return where it is."""
+        """Write the report and return its path."""
         write_file(Path(path), self.page())
         return Path(path)
 
@@ -156,7 +156,7 @@ class Shown(ABC):
         return document
 
     def save(self, folder: str | Path) -> Path:
-        """Write the files of the command of the same name; OutputError if others are there."""
+        """Write the files of the result into a folder; OutputError if it has other files."""
         with staged(Path(folder)) as result:
             self.fill(result.folder)
             with result_folder(Path(folder), self.schema):
@@ -185,7 +185,7 @@ class ShownModel(Shown):
 
     def residual_table(self) -> pandas.DataFrame:
         """
-        Return measured minus predicted torques [N m or N] as a pandas table, held-out ones last.
+        Return measured minus predicted torques [N m or N] as a pandas table, held-out data last.
 
         Columns are recording, t [s], and every joint.
 
@@ -206,7 +206,7 @@ class ShownModel(Shown):
         """Return the model."""
 
     def urdf(self, path: str | Path | None = None) -> str:
-        """Return the description with the values found; write it where a path is given."""
+        """Return a URDF with the identified values; write it to a file if a path is given."""
         text = arm_urdf(self.arm).text
         if path is not None:
             write_file(path, text)

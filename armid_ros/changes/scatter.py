@@ -77,7 +77,7 @@ class ParameterHistory:
 
     @property
     def parameter(self) -> tuple[str, str]:
-        """Name and joint."""
+        """Name and joint of the parameter."""
         return self.name, self.joint
 
 

@@ -22,7 +22,7 @@ import click
     type=click.FloatRange(0.0, min_open=True),
     default=5.0,
     show_default=True,
-    help='How long to wait for an answer [s].',
+    help='Longest time to wait for an answer [s].',
 )
 def call(action: str, share: float | None, node: str, timeout: float) -> None:
     """

@@ -1,6 +1,6 @@
 # Copyright 2026 The armid_ros developers
 # SPDX-License-Identifier: Apache-2.0
-"""What is shipped and what can be named."""
+"""Lists of the shipped robots and of the effects."""
 
 from __future__ import annotations
 

@@ -1,9 +1,9 @@
 # Copyright 2026 The armid_ros developers
 # SPDX-License-Identifier: Apache-2.0
 """
-What options offer, as the packages have it: help shows it without importing them.
+Choices of options, copied from the packages: help shows them without an import.
 
-A test holds each against what the package says.
+A test compares each with the package.
 
 """
 
@@ -23,7 +23,7 @@ SPEED_CLASSES = ('slow', 'medium', 'fast')
 HOW_OFTEN = ('often', 'usual', 'seldom', 'never')
 #: The longest run [s]; `armid_ros.excitation.schedule.MAX_DURATION`.
 MAX_DURATION = 86400.0
-#: What a design makes best, with what it is; `armid_ros.excitation.CRITERIA`.
+#: Criteria of a design, with their meaning; `armid_ros.excitation.CRITERIA`.
 CRITERIA = {
     'D': 'volume of the confidence ellipsoid, log det of the information',
     'A': 'mean variance of the parameters, each scaled to the torque it makes',
@@ -31,7 +31,7 @@ CRITERIA = {
     'condition': 'condition number of the weighted regressor',
     'T': 'torque that a rival model cannot explain',
 }
-#: Of which parameters; `armid_ros.excitation.TARGETS`.
+#: Parameters that count in the criterion; `armid_ros.excitation.TARGETS`.
 TARGETS = {
     'all': 'all base parameters of the rigid body, and those of the effects',
     'gravity': 'masses and first moments as an arm moving slowly shows them, and the effects',

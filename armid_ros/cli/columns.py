@@ -1,6 +1,6 @@
 # Copyright 2026 The armid_ros developers
 # SPDX-License-Identifier: Apache-2.0
-"""Options that say what a recording holds: which columns of a table are what, and the units."""
+"""Options for the content of a recording: columns of a table, and units."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ import click
 if TYPE_CHECKING:
     from armid_ros.recording.columns import ColumnSettings
 
-#: Where the context keeps what they say.
+#: Key of the context for the values of these options.
 META = 'armid.columns'
 
 
@@ -68,7 +68,7 @@ options = together(
     _option(
         '--velocity',
         metavar='C',
-        help="Columns of velocities, written as for --position; 'none' leaves them out.",
+        help="Columns of velocities, written as for --position; 'none' skips velocities.",
     ),
     _option(
         '--effort',
@@ -86,48 +86,48 @@ options = together(
         help='Sample rate [Hz] of a table without a time column.',
     ),
     _option(
-        '--degrees', is_flag=True, help='Positions and velocities are in degrees; of bags too.'
+        '--degrees', is_flag=True, help='Positions and velocities are in degrees; for bags too.'
     ),
     _option(
         '--position-scale',
         callback=_numbers,
         metavar='X,...',
-        help='Makes positions and velocities rad (or m): one number, or one a joint; of bags too.',
+        help='Factor of positions and velocities to rad or m, one or one per joint; for bags too.',
     ),
     _option(
         '--effort-scale',
         '--current-gain',
         callback=_numbers,
         metavar='X,...',
-        help='Makes efforts N m: torque constants [N m/A], gear ratios as 1798/7, signs; of bags '
-        'too.',
+        help='Factor of efforts to N m or N: torque constant [N m/A], gear ratio as 1798/7, sign; '
+        'for bags too.',
     ),
     _option(
         '--zero',
         callback=_numbers,
         metavar='X,...',
-        help="Added to the positions [rad or m], as '-pi/2'; of bags too.",
+        help="Offset added to the positions [rad or m], as '-pi/2'; for bags too.",
     ),
     _option(
         '--gear',
         callback=_numbers,
         metavar='X,...',
-        help='Values are those of the motors, which turn X times for a turn of the joint; of bags '
-        'too.',
+        help='Gear ratio: turns of the motor per turn of the joint. The values are then those of '
+        'the motors; for bags too.',
     ),
     _option(
         '--coupling',
         multiple=True,
         callback=lambda ctx, one, texts: _kept(ctx, one, tuple(map(_coupling, texts))),
         metavar='I,J=X',
-        help='With --gear: motor I turns X times for a turn of joint J, too.',
+        help='With --gear: motor I also turns X times per turn of joint J.',
     ),
     _option(
         '--rename',
         multiple=True,
         callback=_rules,
         metavar='OLD:NEW',
-        help='Beginning of joint names in the file, and in the description; of bags too.',
+        help='Beginning of joint names in the file, and in the description; for bags too.',
     ),
     _option('--episode', type=int, metavar='N', help='Episode of a LeRobot dataset.'),
 )

@@ -1,6 +1,6 @@
 # Copyright 2026 The armid_ros developers
 # SPDX-License-Identifier: Apache-2.0
-"""The group of all commands, and what happens when one of them is given bad input."""
+"""The group of all commands, and the report of bad input."""
 
 from __future__ import annotations
 
@@ -47,9 +47,9 @@ COMMANDS = {
 FILE = 'armid.toml'
 #: Exit code after Ctrl-C: 128 and the number of SIGINT.
 INTERRUPTED = 130
-#: Where the context keeps what is said on stderr when the work was done: an error is one line.
+#: Key of the context for notes that stderr shows after the work; an error is one line.
 NOTES = 'armid.notes'
-#: Where it keeps the arguments of the command as they were typed.
+#: Key of the context for the arguments of the command as they were typed.
 TYPED = 'armid.typed'
 
 
@@ -57,7 +57,7 @@ class Commands(click.Group):
     """Imports commands late, and reports bad input as one line on stderr and exit code 2."""
 
     def list_commands(self, ctx: click.Context) -> list[str]:
-        """List the commands in the order of the work, those of plug-ins last."""
+        """List the commands in the order of the work, commands of plug-ins last."""
         return [*COMMANDS, *sorted(plug_ins('commands').keys() - COMMANDS)]
 
     def get_command(self, ctx: click.Context, cmd_name: str) -> click.Command | None:
@@ -72,7 +72,7 @@ class Commands(click.Group):
         """
         Find the command and apply the options of armid.toml.
 
-        Of one that does not exist the error names the nearest.
+        The error on an unknown command names the most similar one.
 
         """
         try:
@@ -88,7 +88,7 @@ class Commands(click.Group):
         return name, command, rest
 
     def format_commands(self, ctx: click.Context, formatter: click.HelpFormatter) -> None:
-        """List the commands with the first sentence of their help, whole; or with their error."""
+        """List the commands with the first sentence of their help, or the error of the import."""
         rows = []
         for name in self.list_commands(ctx):
             try:
@@ -127,7 +127,7 @@ class Commands(click.Group):
             click.echo(f'armid: {said}', err=True)
             sys.exit(2)
         except OSError as error:  # a disk that is full, a folder that went away
-            if error.errno == errno.EPIPE:  # whoever reads has read enough
+            if error.errno == errno.EPIPE:  # the reader has closed the pipe
                 os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
                 sys.exit(141)  # 128 and the number of SIGPIPE
             where = f'{error.filename}: ' if error.filename else ''
@@ -142,7 +142,7 @@ def _tell_notes(context: click.Context) -> None:
 
 @cache
 def _imported(name: str) -> click.Command:
-    """Import a command; no option of it takes a number that is not finite."""
+    """Import a command; its options refuse numbers that are not finite."""
     command: click.Command
     if name in COMMANDS:
         module = import_module(f'armid_ros.cli.{COMMANDS[name]}')
@@ -184,19 +184,19 @@ def project_options(
     """
     Return the defaults of a command from armid.toml, and print them on stderr.
 
-    A key outside of a table is for every command that has an option of this name; a key in the
-    table of a command is for that one.
+    A key outside of a table sets the option of this name of every command. A key in the table of
+    a command sets the option of that command only.
 
     Parameters
     ----------
     name : str
-        Of the command; of one in a group with that before it, and its table below the group's.
+        Name of the command, after the name of its group if any; tables are nested likewise.
     command : click.Command
         The command.
     typed : sequence of str
-        Its arguments as they were typed: an option among them is not looked up.
+        Arguments as typed; an option among them is not read from the file.
     others : callable
-        Returns all commands; called where a key is no option of this one.
+        Returns all commands; called if a key is no option of this command.
 
     Raises
     ------
@@ -240,7 +240,7 @@ def project_options(
 
 
 def _options(command: click.Command) -> dict[str, click.Option]:
-    """Return the options of a command, and of those in a group, by their long names."""
+    """Return the options of a command and of its subcommands, by name without dashes."""
     inner = command.commands.values() if isinstance(command, click.Group) else ()
     own = [one for one in command.params if isinstance(one, click.Option)]
     found = {text.lstrip('-'): one for one in own for text in one.opts}
@@ -251,7 +251,7 @@ def _options(command: click.Command) -> dict[str, click.Option]:
 @click.version_option(__version__, prog_name='armid')
 def main() -> None:
     """
-    Identify a robot arm: excite, record, identify, and find what the model lacks.
+    Identify a robot arm: excite, record, identify, and find effects that the model lacks.
 
     Exit codes: 0 done, 1 a defect of the program, 2 bad input or data, 130 interrupted. With
     --strict of identify and diagnose, 3 is a result not to be used.

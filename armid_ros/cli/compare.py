@@ -1,6 +1,6 @@
 # Copyright 2026 The armid_ros developers
 # SPDX-License-Identifier: Apache-2.0
-"""What changed between two identifications."""
+"""Comparison of two identifications."""
 
 from __future__ import annotations
 
@@ -14,11 +14,11 @@ import click
 @click.argument('before', metavar='A', type=click.Path(path_type=Path))
 @click.argument('after', metavar='B', type=click.Path(path_type=Path))
 @parameters.folder
-@click.option('--strict', is_flag=True, help='End with code 3 if one of them is unusable.')
+@click.option('--strict', is_flag=True, help='End with code 3 if an identification is unusable.')
 @parameters.as_json
 def compare(before: Path, after: Path, out: Path, strict: bool, as_json: bool) -> None:
     """
-    Say what changed between two identifications of one robot.
+    Find the changes between two identifications of one robot.
 
     A and B are folders that identify wrote, identification.json or model.yaml.
 

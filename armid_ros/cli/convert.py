@@ -1,6 +1,6 @@
 # Copyright 2026 The armid_ros developers
 # SPDX-License-Identifier: Apache-2.0
-"""From tables and bags of ROS 1 to bags."""
+"""Conversion of tables and ROS 1 bags to ROS 2 bags."""
 
 from __future__ import annotations
 
@@ -23,13 +23,13 @@ if TYPE_CHECKING:
 )
 @click.argument('files', nargs=-1, required=True, type=click.Path(path_type=Path))
 @parameters.robot_described(
-    help='Shipped name or path of a URDF, whose joints the columns become; without it, joints '
-    'are called as the columns are.',
+    help='Shipped name or path of a URDF with the joints of the columns; by default joints get '
+    'the names of the columns.',
 )
 @click.option(
     '--out', type=parameters.OutPath(path_type=Path), help='Bag to write; must not exist.'
 )
-@click.option('--dry-run', is_flag=True, help='Show what would be read from where; write nothing.')
+@click.option('--dry-run', is_flag=True, help='Show which columns are read; write nothing.')
 @columns.options
 @parameters.reading
 @parameters.joints
@@ -44,8 +44,8 @@ def convert(
     Convert a CSV, NPZ, ... table or a ROS 1 bag into a ROS 2 bag.
 
     Tables are CSV (.tsv, .txt, .gz too), NPZ and NPY, MAT, HDF5, Parquet, and folders of LeRobot
-    datasets. Columns that are not named are guessed, and shown. Several tables hold columns of the
-    same rows. Bags of ROS 1 and ROS 2 are copied, joints renamed.
+    datasets. Columns without an option are guessed, and shown. Several tables hold columns of the
+    same rows. Bags of ROS 1 and ROS 2 are copied; joints may be renamed.
 
     """
     from armid_ros.cli import options
@@ -84,7 +84,7 @@ def _table(
     rate = 1.0 / recording.period
     say(f'  {recording.report.describe()} {recording.duration:.2f} s at {rate:.4g} Hz')
     if out is None:
-        say('nothing was written; without --dry-run and with --out BAG it is')
+        say('nothing was written; give --out BAG without --dry-run to write a bag')
         return
     write_recording(
         out,

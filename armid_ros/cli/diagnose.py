@@ -1,6 +1,6 @@
 # Copyright 2026 The armid_ros developers
 # SPDX-License-Identifier: Apache-2.0
-"""From bags and a model to what the model lacks."""
+"""Diagnosis of bags: the effects that a model lacks."""
 
 from __future__ import annotations
 
@@ -44,13 +44,13 @@ _partner_options = parameters.together(
         help='Shipped name, URDF or xacro of a machine or person in the same bags that the arm '
         'may be tied to.',
     ),
-    click.option('--partner-topic', help="The partner's JointState topic, where several name it."),
+    click.option('--partner-topic', help='JointState topic of the partner, if not unique.'),
     click.option(
         '--tie',
         'ties',
         multiple=True,
         metavar='JOINT=JOINT',
-        help='Where they may be tied: a joint of the arm and one of the partner. JOINT@X,Y,Z sets '
+        help='Possible tie: a joint of the arm and a joint of the partner. JOINT@X,Y,Z sets '
         'a point of the link [m]; the centroid by default. By default links of equal number.',
     ),
 )
@@ -64,29 +64,29 @@ _partner_options = parameters.together(
 @click.option(
     '--model',
     type=click.Path(path_type=Path),
-    help='model.yaml with what is known of the arm; its effects are part of the model.',
+    help='model.yaml of the arm; its effects are part of the model in question.',
 )
 @click.option(
     '--baseline',
     multiple=True,
     type=click.Path(path_type=Path),
     metavar='BAG',
-    help='A bag from when nothing was wrong, to ask what has changed since; may be given several '
-    'times. By default what --model was identified from, where it is there.',
+    help='A bag from when the model was right, to find changes since then; may be given several '
+    'times. By default the bags that --model was identified from, if they exist.',
 )
 @click.option(
     '--no-baseline',
     is_flag=True,
-    help='Ask without those recordings: the misfit that identify wrote into --model is what the '
-    'gap is beyond.',
+    help='Diagnose without a baseline: the gap is then the residual beyond the misfit that '
+    'identify wrote into --model.',
 )
 @click.option(
     '--against',
     multiple=True,
     type=click.Path(path_type=Path),
     metavar='BAG',
-    help='A bag of a simulated arm, to ask what the simulator lacks; may be given several times. '
-    "The simulator's model is identified from it, with --effects if given.",
+    help='A bag of a simulated arm, to find effects that the simulator lacks; may be given '
+    'several times. The model is then identified from this bag, with --effects if given.',
 )
 @click.option(
     '--material',
@@ -96,16 +96,14 @@ _partner_options = parameters.together(
     metavar='PERCENT',
     help="Share of a joint's torque (rms) below which an effect does not matter.",
 )
-@click.option(
-    '--everything', is_flag=True, help='Add effects to the model that do not matter, too.'
-)
+@click.option('--everything', is_flag=True, help='Add immaterial effects to the model as well.')
 @click.option(
     '--prior',
     'priors',
     shell_complete=parameters.completed,
     multiple=True,
     metavar='E=HOW',
-    help='How often an effect happens to this arm: often, usual, seldom or never; may be given '
+    help='Frequency of an effect on this arm: often, usual, seldom or never; may be given '
     'several times.',
 )
 @click.option(
@@ -113,7 +111,7 @@ _partner_options = parameters.together(
     shell_complete=parameters.completed,
     default='',
     metavar='E,...',
-    help="Effects that the model has already, fitted anew; 'E@joint+joint' for some joints only.",
+    help="Effects that the model has, to fit them anew; 'E@joint+joint' for some joints only.",
 )
 @click.option(
     '--residual',
@@ -124,7 +122,7 @@ _partner_options = parameters.together(
 @click.option(
     '--strict',
     is_flag=True,
-    help='End with code 3 if something is there and has no name (unknown, not_repeatable). Data '
+    help='End with code 3 if a gap has no named effect (unknown, not_repeatable). Data '
     'that cannot be diagnosed (bad_data) end with code 2 in any case.',
 )
 @parameters.cutoff
@@ -235,7 +233,7 @@ def _identified_from(model: Path, asked: list[Path]) -> tuple[Path, ...]:
 
 
 def _model_of(path: Path, robot: Robot) -> ArmModel:
-    """Read a model; ArmidError if its description is still there, and is of another arm."""
+    """Read a model; ArmidError if its description still exists and has other kinematics."""
     from armid_ros.arm import load_model
     from armid_ros.cli import options
     from armid_ros.identification.output import kinematics_digest
@@ -248,7 +246,7 @@ def _model_of(path: Path, robot: Robot) -> ArmModel:
     if known.joints == robot.joints and kinematics_digest(known) != kinematics_digest(robot):
         raise ArmidError(
             f'{path}: was made with a description whose joints are elsewhere than those of '
-            f'{robot.name}; give --robot the one that it names, or identify this arm'
+            f'{robot.name}; give that description as --robot, or identify this arm'
         )
     return arm
 
@@ -271,7 +269,7 @@ def open_partner(
 
     if source is None:
         if ties:
-            raise ModelError('give both --tie, where the arm is tied, and --partner, to what')
+            raise ModelError('give both --tie and --partner, the machine or person at the tie')
         return None
     other = load_robot(source, gravity=gravity)
     kept = str(Path(source).resolve()) if Path(source).is_file() else source
@@ -281,8 +279,8 @@ def open_partner(
         found = list(leg_ties(robot, other))
     elif robot.n_joints != other.n_joints:
         raise ModelError(
-            f'{robot.name} has {robot.n_joints} joints and {other.name} {other.n_joints}: say '
-            f'where they may be tied with --tie JOINT=JOINT; joints of {robot.name} are '
+            f'{robot.name} has {robot.n_joints} joints and {other.name} {other.n_joints}: give '
+            f'the possible ties with --tie JOINT=JOINT; joints of {robot.name} are '
             f'{", ".join(robot.joints)}, of {other.name} {", ".join(other.joints)}'
         )
     else:

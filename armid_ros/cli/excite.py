@@ -1,6 +1,6 @@
 # Copyright 2026 The armid_ros developers
 # SPDX-License-Identifier: Apache-2.0
-"""A trajectory worth running."""
+"""Design of an excitation trajectory."""
 
 from __future__ import annotations
 
@@ -41,7 +41,7 @@ class Speed(click.ParamType[str | float]):
     name = 'speed'
 
     def convert(self, value: Any, param: Any, ctx: Any) -> str | float:
-        """Read it."""
+        """Parse a class or a share."""
         if value in SPEED_CLASSES:
             return str(value)
         try:
@@ -79,7 +79,7 @@ class Speed(click.ParamType[str | float]):
     type=click.IntRange(min=2),
     default=2,
     show_default=True,
-    help='Number of identical periods in it; their difference is the noise.',
+    help='Number of identical periods; their difference is the noise floor.',
 )
 @click.option(
     '--harmonics', default=5, show_default=True, help='Number of Fourier harmonics per joint.'
@@ -112,7 +112,7 @@ class Speed(click.ParamType[str | float]):
     shell_complete=parameters.completed,
     default='',
     metavar='E,...',
-    help='Effects to show best while everything else is fitted too; none by default.',
+    help='Effects to identify best while all other parameters are fitted too; none by default.',
 )
 @parameters.effects
 @click.option(
@@ -130,7 +130,7 @@ class Speed(click.ParamType[str | float]):
     help='With --criterion T: effects that may be there in place of --effect.',
 )
 @click.option(
-    '--model', type=click.Path(path_type=Path), help='model.yaml with what is known of the arm.'
+    '--model', type=click.Path(path_type=Path), help='model.yaml of the arm with its effects.'
 )
 @click.option(
     '--start',
@@ -164,7 +164,7 @@ class Speed(click.ParamType[str | float]):
 @click.option(
     '--environment',
     type=click.Path(path_type=Path),
-    help='YAML with what stands around the arm, or a planning scene of MoveIt.',
+    help='YAML file of obstacles around the arm, or a planning scene of MoveIt.',
 )
 @click.option(
     '--floor',
@@ -177,8 +177,8 @@ class Speed(click.ParamType[str | float]):
     multiple=True,
     type=click.Path(path_type=Path),
     metavar='BAG',
-    help='A bag recorded already, to whose information this trajectory adds. May be given several '
-    'times.',
+    help='An existing bag; the trajectory adds to the information of this bag. May be given '
+    'several times.',
 )
 @click.option(
     '--starts',
@@ -196,8 +196,8 @@ class Speed(click.ParamType[str | float]):
 @click.option(
     '--show-isolability',
     is_flag=True,
-    help='Add to report.html and excitation.json which effects of the catalogue the run shows, '
-    'from which size, and which it cannot distinguish.',
+    help='Add the isolability of effects to report.html and excitation.json: detectable sizes, '
+    'and effects that the run cannot distinguish.',
 )
 @parameters.setting
 @parameters.as_json
@@ -228,7 +228,7 @@ def excite(
     as_json: bool,
     **settings: Any,
 ) -> None:
-    """Design a trajectory that shows the parameters, inside all limits and free of collisions."""
+    """Design a trajectory that excites the parameters, inside all limits, free of collisions."""
     from armid_ros.api.design import design_excitation
     from armid_ros.api.excitation import ExcitationResult
     from armid_ros.arm import ArmModel
@@ -334,7 +334,7 @@ def require_free(folder: Path) -> None:
 def write_course(
     kind: str, space: CollisionScene, duration: float, share: float, seed: int, out: Path
 ) -> None:
-    """Write the trajectory that shows elastic joints as a bag."""
+    """Write a trajectory that makes elastic joints identifiable, as a bag."""
     from armid_ros.api.excitation import BAG, ExcitationResult
     from armid_ros.cli import options
     from armid_ros.excitation import ClearanceModel, Limits

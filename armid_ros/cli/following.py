@@ -1,6 +1,6 @@
 # Copyright 2026 The armid_ros developers
 # SPDX-License-Identifier: Apache-2.0
-"""The command that follows another one, with its robot, its bags and how they are read."""
+"""The next command after a command, with the same robot, bags and options of reading."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ from armid_ros.errors import ModelError
 from armid_ros.identification.output import identified_from
 import click
 
-#: What a command fills, beside the folder of the command before.
+#: Output folder of each command, in the parent of the folder of the command before.
 _OUT = {
     'identify': 'model',
     'diagnose': 'diagnosis',
@@ -33,7 +33,7 @@ _OUT = {
 }
 #: Commands that take no recordings.
 _ALONE = ('excite', 'simulate')
-#: Options that only this run has.
+#: Options of a run that the next command does not repeat.
 _OWN = {'robot_source', 'out', 'as_json', 'strict', 'every', 'no_baseline'}
 
 
@@ -46,7 +46,7 @@ def following(then: str, result: Shown) -> str:
     then : str
         Name of the command that follows.
     result : Shown
-        What the running command found.
+        Result of the running command.
 
     """
     context = click.get_current_context()
@@ -77,7 +77,7 @@ def following(then: str, result: Shown) -> str:
 def _subject(
     then: str, result: Shown, given: dict[str, Any]
 ) -> tuple[str | Path, list[Path], list[Any]]:
-    """Return the robot, the recordings, and what is known of the arm."""
+    """Return the robot, the recordings and further options of the next command."""
     robot, out = given.get('robot_source'), Path(given.get('out') or '')
     bags = list(given.get('bags') or filter(None, [given.get('bag')]))
     more: list[Any] = []

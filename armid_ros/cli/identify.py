@@ -1,6 +1,6 @@
 # Copyright 2026 The armid_ros developers
 # SPDX-License-Identifier: Apache-2.0
-"""From bags to a model with uncertainties."""
+"""Identification of a model with uncertainties from bags."""
 
 from __future__ import annotations
 
@@ -24,8 +24,8 @@ import click
     type=click.Choice(ESTIMATORS),
     default='wls',
     show_default=True,
-    help='Least squares: all joints alike, weighted by their noise, or robust as well. Against '
-    'encoder noise: instrumental variables.',
+    help='Least squares: ordinary, weighted by the noise of joints, or weighted and robust. '
+    'Against encoder noise: instrumental variables.',
 )
 @parameters.cutoff
 @parameters.decimation
@@ -33,8 +33,8 @@ import click
 @click.option(
     '--physical/--no-physical',
     default=None,
-    help='Fit links that can be bodies, for identified.urdf and identified.mjcf.xml. By default '
-    'where the torque error grows by a tenth at most.',
+    help='Fit physically consistent links, for identified.urdf and identified.mjcf.xml. By '
+    'default if the torque error grows by a tenth at most.',
 )
 @click.option('--total-mass', type=float, help='Mass of all moving links [kg], with --physical.')
 @click.option(
@@ -56,8 +56,8 @@ import click
     'payloads',
     multiple=True,
     metavar='BAG=KG@LINK[:X,Y,Z]',
-    help='Known load of a bag, with its centre in the frame of the link [m]. With a bag without '
-    'it, the gains of the drives are identified. May be given several times.',
+    help='Known payload of a bag, with its centre in the frame of the link [m]. A loaded and an '
+    'unloaded bag determine the gains of the drives. May be given several times.',
 )
 @click.option(
     '--verify/--no-verify',
@@ -101,7 +101,7 @@ def identify(
     robot = options.open_robot(robot_source, gravity, joints, bags, tell=False)
     arm = options.with_effects(ArmModel(robot, quasi_static=quasi_static), effects)
     if not physical and (total_mass is not None or mass_range is not None or boxes):
-        raise IdentificationError('--total-mass, --mass-range and --box go with --physical')
+        raise IdentificationError('--total-mass, --mass-range and --box need --physical')
     corners = dict(options.box(text, robot) for text in boxes)
     known = PhysicalSettings(total_mass=total_mass, boxes=corners, mass_range=mass_range)
     with progress('reading') as tick:

@@ -1,6 +1,6 @@
 # Copyright 2026 The armid_ros developers
 # SPDX-License-Identifier: Apache-2.0
-"""What is in a recording or a description, and what is wrong with it."""
+"""Inspection of a recording, and check of a description."""
 
 from __future__ import annotations
 
@@ -14,8 +14,8 @@ import click
 @click.command(epilog='Example: armid inspect run.mcap --robot ur10.urdf --out look')
 @click.argument('bag', type=click.Path(path_type=Path))
 @parameters.robot_described(
-    help='Shipped name, path of a URDF, or - for the one in the bag. With it, limits and units '
-    'are checked and an identification is tried.',
+    help='Shipped name, path of a URDF, or - for the description in the bag. With a robot, '
+    'limits and units are checked, and an identification is tried.',
 )
 @click.option(
     '--out',
@@ -35,10 +35,10 @@ def inspect(
     as_json: bool,
 ) -> None:
     """
-    Look at a recording: a bag, or a table.
+    Inspect a recording: a bag, or a table.
 
-    Topics, joints, rate, gaps, ranges, units that look wrong, whether the motion repeats, and with
-    a robot whether identify takes it. Without --out it is printed only.
+    Topics, joints, rate, gaps, ranges, doubtful units, and repetition of the motion; with a robot,
+    a trial identification. Without --out, the result is printed only.
 
     """
     from armid_ros.api.arguments import topics_of
@@ -91,7 +91,7 @@ def inspect(
     help='Folder to put report.html and check.json into.',
 )
 @parameters.force
-@click.option('--strict', is_flag=True, help='End with code 3 if something is wrong.')
+@click.option('--strict', is_flag=True, help='End with code 3 if a value is found to be wrong.')
 @parameters.effects
 @columns.recordings
 def check(
@@ -110,10 +110,10 @@ def check(
     Check a URDF: alone, or against recordings.
 
     R is a URDF, MJCF or xacro ('arm.xacro tool:=true' with arguments), a shipped name, or - for
-    the description in the bag. It is left out where armid.toml names the robot.
+    the description in the bag. R may be left out if armid.toml names the robot.
 
-    Without a recording: impossible inertias, densities of links with shapes, units of limits. With
-    one: mass and centre of each link as described and as measured.
+    Without recordings: impossible inertias, densities of links with shapes, units of limits. With
+    recordings: described and measured mass and centre of each link.
 
     """
     from armid_ros.api.arguments import describes_robot

@@ -1,6 +1,6 @@
 # Copyright 2026 The armid_ros developers
 # SPDX-License-Identifier: Apache-2.0
-"""What the executables of the nodes run, and what is said where ROS 2 is not there."""
+"""Entry point of the executables of the nodes, with an error if ROS 2 is missing."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ _ROS = re.compile(r'rclpy|ros\w+_runtime_py|\w+_(msgs|interfaces|srvs)')
 
 
 def main(name: str | None = None) -> int | None:
-    """Run a node of the core or of a plug-in; by default the one of the executable."""
+    """Run a node of the core or of a plug-in; by default the node named as the executable."""
     name = name or Path(sys.argv[0]).name
     try:
         if find_spec(f'armid_ros.nodes.{name}') is None and name in plug_ins('nodes'):
@@ -35,16 +35,16 @@ def main(name: str | None = None) -> int | None:
 
 
 def lacking(error: ModuleNotFoundError) -> str | None:
-    """Return what to install for a missing module; None if it is not part of ROS 2."""
+    """Return how to install a missing module; None if the module is not part of ROS 2."""
     module = (error.name or '').partition('.')[0]
     if module == 'armid_msgs':
         return (
-            'the message package armid_msgs is not there; it is compiled and on no index: in a '
+            'the message package armid_msgs is missing; it is compiled and on no index: in a '
             'clone `make`, or pip install --no-build-isolation ./msg_schemas, or `colcon build`'
         )
     if _ROS.fullmatch(module):
         return (
-            f'{module} is not there: nodes need ROS 2 Jazzy. `make` in a clone sets it up, '
+            f'{module} is missing: nodes need ROS 2 Jazzy. `make` in a clone sets it up, '
             "pip install 'armid_ros[ros]' installs it from wheels, or source a Jazzy workspace"
         )
     return None

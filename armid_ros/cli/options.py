@@ -1,6 +1,6 @@
 # Copyright 2026 The armid_ros developers
 # SPDX-License-Identifier: Apache-2.0
-"""What options that several commands have stand for."""
+"""Values of options that several commands have."""
 
 from __future__ import annotations
 
@@ -56,7 +56,7 @@ if TYPE_CHECKING:
 
 Corners = tuple[Sequence[float], Sequence[float]]
 
-#: Where the context keeps which plans of tables have been shown.
+#: Key of the context for the plans of tables that have been shown.
 _SHOWN = 'armid.columns.shown'
 
 
@@ -64,20 +64,20 @@ def stage(out: Path, schema: str, robot: str = '', also: Collection[str] = ()) -
     """
     Create and lock a folder for the results of this command; return the staging folder.
 
-    Nothing of it gets to the folder unless the command keeps it. Files of an earlier result that
-    the new one has not go with it, except a description that --robot names; with --force, which
-    leaves what it does not replace, they stay.
+    The folder gets no file unless the command keeps the staging folder. Other files of an earlier
+    result are then removed, except a description that --robot names. With --force, files that
+    are not replaced stay.
 
     Parameters
     ----------
     out : Path
         The folder.
     schema : str
-        Of the results.
+        Schema of the results.
     robot : str
-        What the results call the robot.
+        Name of the robot in the results.
     also : collection of str
-        Names of what the command writes beside such results.
+        Names of further files that the command writes.
 
     """
     context = click.get_current_context()
@@ -103,13 +103,13 @@ def deliver(
     result : Shown
         The result.
     staged : Staged or None
-        Where it goes.
+        Staging folder; None: the result is only printed.
     origin : ResultOrigin
-        Where it comes from.
+        Provenance of the result.
     as_json : bool
         Whether the document is printed in place of the summary.
     summary : Summary, optional
-        What is printed; by default that of the result.
+        Summary to print; by default that of the result.
 
     """
     document, shown = None, summary or result.summary()
@@ -140,7 +140,7 @@ def deliver_page(
     verdict: VerdictSection,
     table: tuple[Sequence[str], Sequence[Sequence[str]]] | None,
 ) -> None:
-    """Write report.html and the document NAME.json; print its verdict and a table, or as JSON."""
+    """Write report.html and NAME.json; print verdict and table, or JSON without a table."""
     write_file(staged.folder / 'report.html', page)
     write_document(staged.folder / f'{name}.json', document)
     staged.keep()
@@ -164,11 +164,11 @@ def provenance(
     Parameters
     ----------
     paths : iterable of Path
-        What it reads; files and folders.
+        Files and folders that the command reads.
     settings : mapping of str to object, optional
-        What it uses.
+        Settings that the command uses.
     seed : int, optional
-        Of its random numbers.
+        Seed of the random numbers.
 
     """
 
@@ -188,7 +188,7 @@ def provenance(
 
 
 def read_settings() -> ReadSettings:
-    """Return how this command is to read bags."""
+    """Return the settings of this command for reading bags."""
     meta = click.get_current_context().meta
     limit = meta.get(MEMORY)
     size = default_memory_limit() if limit is None else int(limit * 1e6)
@@ -238,12 +238,12 @@ def open_robot(
 
 def model_of(path: Path, robot: Robot | None) -> ArmModel:
     """
-    Read the model.yaml of a robot, or of the one that it names.
+    Read a model.yaml for a given robot, or for the robot that the file names.
 
     Raises
     ------
     ModelError
-        It cannot be read, or has another gravity than --gravity asks for.
+        If the file cannot be read, or has another gravity than --gravity.
 
     """
     arm = load_model(path, robot)
@@ -322,7 +322,7 @@ def read(paths: Sequence[Path], robot: Robot, topic: str | None) -> list[Recordi
 
 
 def kept_source(source: str, robot: Robot, out: Path) -> str:
-    """Return how files in a folder refer to the robot; copy one from a bag beside them."""
+    """Return the robot as files in a folder name it; write a robot from a bag to the folder."""
     if source == '-':
         write_file(out / 'robot.urdf', robot.urdf)
         return 'robot.urdf'

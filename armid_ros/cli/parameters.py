@@ -14,7 +14,7 @@ import click
 
 _Command = TypeVar('_Command', bound=Callable[..., Any])
 
-#: Where the context keeps what its commands share.
+#: Keys of the context for values that several options and commands share.
 FORCE, CRC, MEMORY = 'armid.force', 'armid.crc', 'armid.memory'
 PACKAGES = 'armid.packages'
 
@@ -82,15 +82,15 @@ force = click.option(
     is_flag=True,
     expose_value=False,
     callback=lambda context, _, value: context.meta.update({FORCE: value}),
-    help='Write over results of another kind or robot, and over files of others.',
+    help='Overwrite results of another kind or robot, and files of other programs.',
 )
-#: A folder of results, and leave to write over others.
+#: A folder of results, and permission to overwrite others.
 folder = together(
     click.option(
         '--out',
         required=True,
         type=OutPath(file_okay=False, path_type=Path),
-        help='Folder to fill.',
+        help='Folder for the results.',
     ),
     force,
 )
@@ -100,7 +100,7 @@ _crc = click.option(
     show_default=True,
     expose_value=False,
     callback=lambda context, _, value: context.meta.update({CRC: value}),
-    help='Compare the checksums of bags, and leave out what is damaged.',
+    help='Compare the checksums of bags, and skip damaged parts.',
 )
 _memory = click.option(
     '--memory-limit',
@@ -121,12 +121,12 @@ validate = click.option(
     multiple=True,
     type=click.Path(path_type=Path),
     metavar='BAG',
-    help='A bag to predict and not to fit; may be given several times.',
+    help='Held-out bag, predicted and not fitted; may be given several times.',
 )
 cutoff = click.option(
     '--cutoff', type=float, help='Cut-off of the position filter [Hz]; from the data by default.'
 )
-decimation = click.option('--decimation', type=int, help='Keep one sample of this many.')
+decimation = click.option('--decimation', type=int, help='Keep one of this many samples.')
 topic = click.option('--topic', help='JointState topic, where a bag has several.')
 seed = click.option(
     '--seed',
@@ -135,7 +135,7 @@ seed = click.option(
     show_default=True,
     help='Random seed.',
 )
-#: Where the arm is, what is driven, and how recordings of it are read.
+#: Options on gravity, driven joints, random seed and reading of bags.
 setting = together(gravity, joints, seed, reading)
 every = click.option('--all', 'every', is_flag=True, help='Print all values.')
 as_json = click.option('--json', 'as_json', is_flag=True, help='Print the result as JSON.')
@@ -153,7 +153,7 @@ packages = click.option(
 
 
 def robot_described(**values: Any) -> Callable[[_Command], _Command]:
-    """Add --robot, with what differs from any other option, and --package for its description."""
+    """Add --robot, with further arguments of the option, and --package for its description."""
     source = click.option(
         '--robot',
         'robot_source',

@@ -1,6 +1,6 @@
 # Copyright 2026 The armid_ros developers
 # SPDX-License-Identifier: Apache-2.0
-"""Bags without a robot: simulated ones, and those whose writer was killed."""
+"""Bags of a simulated arm, and repair of bags whose writer was killed."""
 
 from __future__ import annotations
 
@@ -30,8 +30,8 @@ if TYPE_CHECKING:
     shell_complete=parameters.completed,
     multiple=True,
     metavar='NAME:k=v',
-    help=f'Such as {EFFECT_EXAMPLES}. Every joint gets the values; for others in single joints '
-    'give it several times, as NAME@A:k=v and NAME@B:k=w.',
+    help=f'Effect such as {EFFECT_EXAMPLES}. Every joint gets the values; for different joints '
+    'give the option several times, as NAME@A:k=v and NAME@B:k=w.',
 )
 @click.option('--model', type=click.Path(path_type=Path), help='A model.yaml of armid identify.')
 @click.option(
@@ -138,7 +138,7 @@ def _blaming(texts: Sequence[str], robot: Robot) -> Iterator[None]:
             if effect.changes_body and moments:
                 where = ', '.join(effect.joints) or 'the last joint'
                 raise ModelError(
-                    f"--effect '{text}': with it what {where} moves is no body. A mass whose "
+                    f"--effect '{text}': it makes the body of {where} impossible. A mass whose "
                     'centre is off the joint has moments of inertia about it, mass times distance '
                     f'squared. Give {moments[0]} and the others too, or a smaller first moment'
                 ) from error
@@ -198,7 +198,7 @@ def _tell_impossible(text: str, values: FloatArray, robot: Robot) -> None:
 @parameters.bag
 @parameters.reading
 def recover(file: Path, out: Path) -> None:
-    """Make a recording whole whose writer was killed; the file itself is left as it is."""
+    """Repair a recording whose writer was killed; the file itself does not change."""
     from armid_ros.cli import options
     from armid_ros.recording import recover as run
 

@@ -1,6 +1,6 @@
 # Copyright 2026 The armid_ros developers
 # SPDX-License-Identifier: Apache-2.0
-"""What a person sees: tables on stdout, progress on stderr."""
+"""Terminal output: tables on stdout, progress on stderr."""
 
 from __future__ import annotations
 

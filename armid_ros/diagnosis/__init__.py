@@ -1,7 +1,7 @@
 # Copyright 2026 The armid_ros developers
 # SPDX-License-Identifier: Apache-2.0
 """
-Diagnosis: where model and measurement disagree, and which effect is missing.
+Diagnosis of the effects that a model lacks, and of the joints with a gap.
 
 ``diagnose`` names the missing effects, ``diagnosis_document`` returns the result as a document,
 ``next_run`` plans the motion that separates two names, ``known_misfit`` measures the misfit of a

@@ -89,10 +89,10 @@ def diagnose(
     validate : sequence of Recording
         Recordings that are predicted and not fitted.
     baseline : sequence of Recording
-        Recordings from when nothing was wrong, such as those the model was identified from. Their
-        residual is the misfit of the model, and the diagnosis finds what has changed since.
+        Recordings from when the model was right, such as the recordings of its identification.
+        Their residual is the misfit of the model, and the diagnosis finds changes since then.
     misfit : Misfit, optional
-        Misfit of the model when it was identified. The result is in doubt if the residual of the
+        Misfit of the model at its identification. The result is in doubt if the residual of the
         baseline is much larger.
     settings : DiagnosisSettings, optional
         Catalogue and thresholds.
@@ -343,7 +343,7 @@ def _remarks(
 def _unseen(
     data: Sequence[Trajectory], explanation: Explanation, chosen: Chosen
 ) -> Evidence | None:
-    """Return the held-out recordings in the unit of the gap."""
+    """Return the held-out recordings, weighted by the noise, or the misfit if larger."""
     if not data:
         return None
     noise = [noise_floor(part, explanation.fitted.arm).sigma for part in data]

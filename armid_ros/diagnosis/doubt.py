@@ -1,6 +1,6 @@
 # Copyright 2026 The armid_ros developers
 # SPDX-License-Identifier: Apache-2.0
-"""Whether a model may belong to another arm: its residual in the baseline is too large."""
+"""Doubt that a model belongs to the arm: its residual in the baseline is too large."""
 
 from __future__ import annotations
 
@@ -34,14 +34,14 @@ def doubt_of(
     thresholds: Thresholds,
 ) -> str:
     """
-    Return a sentence on why the model itself may be wrong; empty if there is no reason.
+    Return a sentence on why the given model may be wrong; empty without a reason.
 
     Parameters
     ----------
     arm : ArmModel
         The model.
     baseline : Baseline or None
-        Residual of the model in recordings in which nothing was wrong.
+        Residual of the model in recordings from when the model was right.
     recordings : sequence of Recording
         Recordings of the baseline.
     misfit : Misfit or None
@@ -114,5 +114,5 @@ def _poor(arm: ArmModel, baseline: Baseline) -> str:
         return ''
     return (
         f'In the baseline, the residual of the model is {", ".join(bad)}: is it the model of this '
-        'arm? Smaller changes are not seen.'
+        'arm? Smaller changes are not detectable.'
     )

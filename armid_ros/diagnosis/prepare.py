@@ -1,6 +1,6 @@
 # Copyright 2026 The armid_ros developers
 # SPDX-License-Identifier: Apache-2.0
-"""From recordings to rows and their noise."""
+"""Preparation of recordings: repair, filters, rows and their noise."""
 
 from __future__ import annotations
 

@@ -107,7 +107,7 @@ class DiagnosisSettings:
     spans : bool
         Whether causes that act for a part of the time are tried if a gap stays open.
     prior : mapping of str to str
-        How often effects happen to this arm, by name: often, usual, seldom or never.
+        Frequency of effects on this arm, by name: often, usual, seldom or never.
     thresholds : Thresholds
         The thresholds of the decisions.
 

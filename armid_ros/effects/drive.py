@@ -232,7 +232,7 @@ class ActuatorSaturation(TorqueReading):
         return np.asarray((1.0 + slope * (np.abs(tau) > level))[:, :, np.newaxis] * columns)
 
     def sensitivity(self, values: FloatArray, motion: Motion, tau: FloatArray) -> FloatArray:
-        """Return the excess over the level, of the report and of the torque, shape (N, n, P)."""
+        """Return the derivative of the reported torque by both shares, shape (N, n, P) [N m]."""
         lost, _, level = self._spread(values, motion)
         beyond = _beyond(tau, level)
         asked = beyond / (1.0 - lost) ** 2 if motion.tau is None else _beyond(motion.tau, level)

@@ -120,7 +120,7 @@ class GravityVector(_GravityEffect):
 
     @property
     def said_as(self) -> str:
-        """Return the name of the effect in the catalogue, that of the tilt."""
+        """Return the name of the effect in the catalogue: tilt of the base."""
         return BaseTilt.name
 
     def columns(self, motion: Motion, arm: Arm) -> FloatArray:

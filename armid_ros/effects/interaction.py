@@ -95,7 +95,7 @@ class Attached(Effect):
     def _columns(
         self, frames: LinkFrames, dq: FloatArray, anchors: FloatArray, velocities: FloatArray
     ) -> FloatArray:
-        """Return the columns (N, n, P) along positions and velocities of links and anchors."""
+        """Return the torque per quantity, shape (N, n, P), for motions of links and anchors."""
 
 
 @dataclass(frozen=True)

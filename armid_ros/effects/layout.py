@@ -58,7 +58,7 @@ def scatter(effect: Effect, values: FloatArray, robot: Robot) -> FloatArray:
 def _flat_places(
     joints: tuple[str, ...], among: tuple[str, ...], count: int
 ) -> tuple[npt.NDArray[np.intp], tuple[npt.NDArray[np.intp], ...]]:
-    """Return indices of joints, and of each quantity in the flattened columns of a sample."""
+    """Return indices of joints, and of the columns of each quantity in a flattened sample."""
     own = np.array([among.index(joint) for joint in joints], dtype=np.intp)
     size = count * len(own)
     return own, tuple(own * size + np.arange(first, size, count) for first in range(count))

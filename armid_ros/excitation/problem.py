@@ -260,8 +260,8 @@ class DesignProblem:
         elif not np.isfinite(criterion.cost(matrix)):
             names = ', '.join(effect.name for effect in self.arm.effects) or 'nothing'
             raise TrajectoryError(
-                f'no motion can tell the two models apart, which have {names} between them: the '
-                'rival can make the same torques; give what it lacks another size'
+                f'no motion distinguishes the model with {names} from its rival, which can make '
+                'the same torques; give the effects that the rival lacks another size'
             )
 
     def columns(self, motion: Motion) -> FloatArray:

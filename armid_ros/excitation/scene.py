@@ -205,7 +205,7 @@ class Fitness:
 
     @property
     def remedy(self) -> str:
-        """Return a sentence on what makes the run fit; empty if it is fit."""
+        """Return a sentence with the remedy for a run that is not fit; empty if it is fit."""
         if self.word == UNFIT:
             return 'Do not run it. Design it with another --start or --seed, or more --clearance.'
         items = ' '.join(self.unchecked)

@@ -115,7 +115,7 @@ class Excitation:
         """
         if set(joints) != set(self.joints):
             raise TrajectoryError(
-                f'moves {", ".join(self.joints)}, but {", ".join(joints)} are to be moved'
+                f'its joints are {", ".join(self.joints)}, those of the robot {", ".join(joints)}'
             )
         order = [self.joints.index(joint) for joint in joints]
         path = self.trajectory

@@ -89,10 +89,10 @@ class TransferPlanner:
         inside = np.clip(start, limits.lower, limits.upper)
         # tolerance beyond a position limit for a measured position [rad or m]
         start = np.where(np.abs(start - inside) <= 0.01, inside, start)
-        for name, q in (('it would leave from', start), ('it would go to', goal)):
+        for name, q in (('leave', start), ('go to', goal)):
             fault = self.fault(q)
             if fault:
-                raise TrajectoryError(f'the pose that {name} is not free: {fault}')
+                raise TrajectoryError(f'the pose to {name} is not free: {fault}')
         poses = find_path(
             self.clearance,
             (start, goal),

@@ -265,7 +265,7 @@ def diagnose(
     alpha: float,
     as_json: bool,
 ) -> None:
-    """Name what has happened to arms, each with its own past as baseline."""
+    """Diagnose arms of a fleet, each with its own past as baseline."""
     from armid_ros.fleet.cluster import connected
     from armid_ros.fleet.diagnose import cases, diagnose_fleet
     from armid_ros.fleet.pages import write_pages

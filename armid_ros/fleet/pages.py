@@ -148,7 +148,7 @@ def _arm_page(found: Watch, arm: WatchedArm, diagnoses: Diagnoses) -> str:
 
 
 def _step(arm: WatchedArm, is_diagnosed: bool, fault: str) -> str:
-    """Return what to do next about an arm."""
+    """Return the next step for an arm."""
     if not (arm.named or fault):
         first = 'Record more' if arm.health == 'too few bags' else 'After the next'
         return f'{first} recordings, run armid fleet identify and armid fleet watch again.'

@@ -131,7 +131,7 @@ class Job:
 
     @cached_property
     def facts(self) -> dict[str, Any]:
-        """Return the entry of fleet.json: what results depend on, beside bag and kinematics."""
+        """Return the entry of fleet.json: settings on which the results of a bag depend."""
         robot, effects = self.arm.robot, self.arm.effects
         return {
             'robot': robot.name,

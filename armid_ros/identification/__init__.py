@@ -1,7 +1,7 @@
 # Copyright 2026 The armid_ros developers
 # SPDX-License-Identifier: Apache-2.0
 """
-Identification: recordings in, models with uncertainties out.
+Identification of models with uncertainties from recordings.
 
 ``identify`` works offline on whole recordings; ``online`` updates an estimate sample by sample.
 

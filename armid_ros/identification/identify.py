@@ -1,6 +1,6 @@
 # Copyright 2026 The armid_ros developers
 # SPDX-License-Identifier: Apache-2.0
-"""Offline identification: recordings in, a model with uncertainties out."""
+"""Offline identification of a model with uncertainties from recordings."""
 
 from __future__ import annotations
 
@@ -280,7 +280,7 @@ def _among_bodies(
     settings: IdentificationSettings,
     rng: np.random.Generator,
 ) -> tuple[IdentificationSettings, BaseParameters, FittedValues, PhysicalCertificate] | None:
-    """Fit physically consistent links; None if not asked for, or impossible and not required."""
+    """Fit physically consistent links; None if not requested, or impossible and not required."""
     if settings.method == 'iv' or not (settings.physical or settings.prefers_bodies):
         return None
     known = settings.physical or PhysicalSettings()

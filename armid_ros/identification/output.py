@@ -3,8 +3,8 @@
 """
 Document of an identification in the file identification.json, and the recordings that it names.
 
-They are the baseline of a diagnosis. The file has a size and a digest of each, as another
-recording may have replaced it at the same path.
+These recordings are the baseline of a diagnosis. The file has the size and a digest of each, as
+another recording may have replaced it at the same path.
 
 """
 
@@ -186,7 +186,7 @@ def require_as_identified(path: str | Path) -> None:
         if known is not None and _content(place) != known:
             raise ModelError(
                 f'{place}: is not the recording any more that {path} was identified from, its '
-                'content is another. Name the baseline (--baseline), ask without one '
+                'content is another. Give the baseline (--baseline), diagnose without one '
                 '(--no-baseline), or identify the arm again'
             )
 

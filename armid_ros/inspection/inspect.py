@@ -185,7 +185,7 @@ def inspection_document(found: Inspection) -> dict[str, Any]:
 
 
 def notes_on(robot: Robot) -> list[str]:
-    """Return doubts and notes on a description, those on joints that are not driven as one."""
+    """Return doubts and notes on a description, with one note on all joints not driven."""
     held = {f"joint '{joint.name}'" for joint in held_joints(robot)}
     others = [note for note in robot.notes if note.partition(': not')[0] not in held]
     return list(

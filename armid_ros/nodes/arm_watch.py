@@ -82,7 +82,7 @@ class ArmWatch:
         return np.array([known.get(joint, math.nan) for joint in self._joints])
 
     def now(self) -> float:
-        """Return the time for ages [s]: steady, or simulated time without clock steps."""
+        """Return the time for ages of messages [s], steady or simulated, without clock steps."""
         clock = self._node.get_clock()
         if not clock.ros_time_is_active:
             return float(self._steady.now().nanoseconds * 1e-9)

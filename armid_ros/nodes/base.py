@@ -230,7 +230,7 @@ class ArmidNode(Node):
         return text
 
     def value(self, parameter: str) -> Any:
-        """Return the value of a parameter; of a list of names, those that are not empty."""
+        """Return the value of a parameter, without the empty names of a list."""
         value = self.get_parameter(parameter).value
         is_list = isinstance(value, list) and all(isinstance(one, str) for one in value)
         return tuple(filter(None, value)) if is_list else value

@@ -83,7 +83,7 @@ class ListeningNode(ArmidNode):
 
     @property
     def awaited(self) -> str:
-        """Return what the node waits for; empty if for nothing."""
+        """Return the input that the node waits for; empty if all inputs have arrived."""
         if self.robot is None:
             return 'waiting for robot_description'
         return '' if self.received else 'no joint states so far'

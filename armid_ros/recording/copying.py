@@ -69,7 +69,7 @@ class Copied:
 
 def recover(file: str | Path, out: str | Path, settings: ReadSettings = DEFAULT) -> Copied:
     """
-    Copy what can be read of an MCAP file into a complete bag, with index and metadata.yaml.
+    Copy the readable part of an MCAP file into a complete bag, with index and metadata.yaml.
 
     Complete chunks are copied if their checksum is correct. If the file ends inside a chunk, the
     messages before the end are copied.
@@ -154,8 +154,8 @@ def copy_bag(
         ]
         if len(left_out) == len(topics):
             raise RecordingError(
-                f'{path}: nothing in it has a type that ROS 2 has; left out: '
-                f'{"; ".join(left_out) or "it is empty"}'
+                f'{path}: no topic has a message type of ROS 2; left out: '
+                f'{"; ".join(left_out) or "the bag is empty"}'
             )
         for topic in topics:
             if rename and topic.type_name == JOINT_STATE and not is_plain(topic):

@@ -1,7 +1,7 @@
 # Copyright 2026 The armid_ros developers
 # SPDX-License-Identifier: Apache-2.0
 """
-Reports: what was found, for a person to read.
+Reports of results, for a person to read.
 
 A `page.Page` of `page.Section`s is the frame of every report; a module `*_report` makes each.
 

@@ -92,7 +92,7 @@ def draw_poses(
     collision: CollisionModel, poses: FloatArray, captions: Sequence[str], way: FloatArray
 ) -> ArmDrawing:
     """
-    Draw an arm and what stands around it in several poses.
+    Draw an arm and the obstacles around it in several poses.
 
     Parameters
     ----------

@@ -1,6 +1,6 @@
 # Copyright 2026 The armid_ros developers
 # SPDX-License-Identifier: Apache-2.0
-"""What pages are made of: blocks, and the sections that every page has."""
+"""Elements of pages: blocks, and the sections that every page has."""
 
 from __future__ import annotations
 
@@ -97,7 +97,7 @@ class IntervalTrack:
     reference: float | None
 
     def place(self, number: float) -> float:
-        """Return where a number is, 0 to 100."""
+        """Return the position of a number on the axis [% of the width]."""
         span = max(abs(self.value) + self.reach, abs(self.reference or 0.0)) or 1.0
         return round(50.0 + 48.0 * max(-1.0, min(1.0, number / span)), 2)
 

@@ -110,7 +110,7 @@ class Chart(Templated):
 
     @property
     def json(self) -> Markup:
-        """Return what assets/report.js draws."""
+        """Return the data that assets/report.js draws."""
         data = {
             'x': rounded(self.x),
             'xlabel': self.xlabel,
@@ -179,7 +179,7 @@ def joined(parts: Sequence[FloatArray]) -> FloatArray:
 
 
 def joined_time(parts: Sequence[FloatArray]) -> FloatArray:
-    """Return times to go with ``joined`` values; at a break, that of the sample before."""
+    """Return times to go with ``joined`` values; at a break, the time of the sample before."""
     pieces = [part for stretch in parts for part in (stretch, stretch[-1:])]
     return read_only(np.concatenate(pieces[:-1]))
 

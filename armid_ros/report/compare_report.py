@@ -114,7 +114,7 @@ def change_rows(comparison: Comparison) -> list[tuple[str, ...]]:
 
 
 def tell(comparison: Comparison) -> tuple[str, ...]:
-    """Return sentences on what changed, the headline first, the details last."""
+    """Return sentences on the changes, the headline first, the details last."""
     if comparison.factors:
         units = tell_units(comparison.before.source, comparison.after.source, comparison.factors)
         return (*(_unusable(one) for one in comparison.unusable), units)
@@ -242,7 +242,7 @@ def _together(group: GroupChange) -> str:
 
 
 def _least_visible(changes: Sequence[ParameterChange]) -> str:
-    """Return a sentence on the smallest detectable change of what wear changes."""
+    """Return a sentence on the smallest detectable change of wearing parameters."""
     worn = [c for c in changes if not c.parameter.rigid] or list(changes)
     known = [c for c in worn if excludes_zero(c.before, c.before_std)]
     if not known:
@@ -255,7 +255,7 @@ def _least_visible(changes: Sequence[ParameterChange]) -> str:
 
 
 def _tell_not_compared(comparison: Comparison) -> tuple[str, ...]:
-    """Return a sentence for each side and reason that something is not compared."""
+    """Return a sentence for each reason why parameters of a side are not compared."""
     lines = []
     if comparison.left_out:
         files = ' and '.join(

@@ -1,6 +1,6 @@
 # Copyright 2026 The armid_ros developers
 # SPDX-License-Identifier: Apache-2.0
-"""The report of a diagnosis: the story first, then the evidence, then what was looked at."""
+"""The report of a diagnosis: the story first, then the evidence, then the data."""
 
 from __future__ import annotations
 
@@ -71,20 +71,20 @@ def tone_of(diagnosis: Diagnosis, worse: Sequence[str] = ()) -> str:
 @dataclass(frozen=True)
 class Extras:
     """
-    What follows from a diagnosis: next run, simulation, learned residual.
+    Results that follow from a diagnosis: next run, simulation, learned residual.
 
     Attributes
     ----------
     forward : tuple of ForwardValidation
-        Held-out recordings simulated, with the model as it was and as it is patched.
+        Held-out recordings simulated with the given and with the patched model.
     next_run : NextRun or None
         A motion that separates names in doubt.
     no_run : str
         Why there is no next run, where names are in doubt.
     notes : tuple of str
-        Why there is not more.
+        Reasons why a result is missing.
     residual : Residual or None
-        What is left without a name, learned.
+        Learned map of the unexplained residual.
 
     """
 
@@ -95,7 +95,7 @@ class Extras:
     residual: Residual | None = None
 
     def steps(self, diagnosis: Diagnosis, model: str = MODEL) -> list[str]:
-        """Return what to do next, for the page and the terminal, and where the model is."""
+        """Return the next steps for the page and the terminal, with the path of the model."""
         learned = self.residual is not None
         return next_steps(diagnosis, self.next_run, self.no_run, model, self.worse, learned)
 

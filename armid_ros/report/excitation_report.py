@@ -1,6 +1,6 @@
 # Copyright 2026 The armid_ros developers
 # SPDX-License-Identifier: Apache-2.0
-"""The report of a designed excitation: is it fit to run, and what will it show."""
+"""The report of a designed excitation: fitness to run, and predicted precision."""
 
 from __future__ import annotations
 
@@ -189,7 +189,7 @@ def _verdict(
 
 
 def identifiable(design: Design, links: Sequence[str]) -> list[str]:
-    """Say how many parameters can be identified, and how well those of the best design."""
+    """Return sentences on the number of identifiable parameters and on their precision."""
     information = design.information
     std, names = information.std, information.parameters
     seen = int(np.sum(np.isfinite(std)))

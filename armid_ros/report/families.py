@@ -175,7 +175,7 @@ def parameter_section(
     reference: str = 'description',
 ) -> ContentSection:
     """
-    Return every parameter beside the description's.
+    Return every parameter with its described value.
 
     Parameters
     ----------

@@ -320,7 +320,7 @@ def _physical_section(
 
 
 def _without_place(exports: Mapping[str, Sequence[str]]) -> list[Paragraph]:
-    """List what each exported file cannot hold."""
+    """List the values that each exported file cannot contain."""
     homeless = []
     for file, lines in exports.items():
         kinds = Counter(line.split(':')[0] for line in lines)

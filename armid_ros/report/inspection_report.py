@@ -89,13 +89,13 @@ def inspection_report(found: Inspection, origin: ResultOrigin = DEFAULT_ORIGIN) 
 
 
 def inspection_word(found: Inspection) -> str:
-    """Return what a recording is in a word: ready, doubtful or unfit."""
+    """Return the verdict on a recording in a word: ready, doubtful or unfit."""
     weights = {remark.weight for remark in found.remarks}
     return 'unfit' if 'bad' in weights else 'doubtful' if 'doubt' in weights else 'ready'
 
 
 def check_word(remarks: Sequence[Remark], found: LinkCheck | None) -> str:
-    """Return what a description is in a word: clean, look or wrong."""
+    """Return the verdict on a description in a word: clean, look or wrong."""
     weights = {remark.weight for remark in remarks}
     if 'bad' in weights or (found is not None and found.wrong):
         return 'wrong'

@@ -1,6 +1,6 @@
 # Copyright 2026 The armid_ros developers
 # SPDX-License-Identifier: Apache-2.0
-"""What an identification comes to, in words: what was found, what to beware of, what to do."""
+"""Judgement of an identification in words: findings, warnings and next steps."""
 
 from __future__ import annotations
 

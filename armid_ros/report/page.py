@@ -1,7 +1,7 @@
 # Copyright 2026 The armid_ros developers
 # SPDX-License-Identifier: Apache-2.0
 """
-The page that every report is: one file, nothing to load, sections one below the other.
+The page of a report: one file that loads nothing, with sections one below the other.
 
 A section is a small frozen dataclass with a title and a template of its own.
 
@@ -55,7 +55,7 @@ class Templated:
     short_names: ClassVar[bool] = False
 
     def html(self) -> Markup:
-        """Return it as HTML, everything in it escaped."""
+        """Return the page as HTML, with all text escaped."""
         text = render(self.template, {'block': self, 'section': self}, self.package)
         return _short(text) if self.short_names else text
 

@@ -20,7 +20,7 @@ _PACKAGES = ('armid_ros', 'numpy', 'scipy', 'pin', 'clarabel', 'mcap')
 @dataclass(frozen=True)
 class Provenance:
     """
-    What is needed to reproduce the result.
+    Data that are needed to reproduce the result.
 
     Attributes
     ----------
@@ -71,7 +71,7 @@ class ResultOrigin:
     step: str = ''
 
     def of(self, known: str) -> ResultOrigin:
-        """Fill in what files call the robot, where nothing else is given."""
+        """Fill in the name of the robot in files, if no name is given."""
         return replace(self, robot=self.robot or known, source=self.source or known)
 
 
@@ -80,7 +80,7 @@ DEFAULT_ORIGIN = ResultOrigin()
 
 
 def hash_files(paths: Iterable[str | Path]) -> tuple[tuple[str, int, str], ...]:
-    """Hash files, and all files in folders such as bags; skip what is no file."""
+    """Hash files, and all files in folders such as bags; skip other paths."""
     found = []
     for path in map(Path, paths):
         inside = sorted(path.rglob('*')) if path.is_dir() else [path]

@@ -1,6 +1,6 @@
 # Copyright 2026 The armid_ros developers
 # SPDX-License-Identifier: Apache-2.0
-"""What residuals and excitation say, in numbers to be drawn or put in words."""
+"""Statistics of residuals and excitation, for charts and sentences."""
 
 from __future__ import annotations
 
@@ -33,7 +33,7 @@ POINT_99 = 2.576
 @dataclass(frozen=True)
 class Trend:
     """
-    Mean of a residual in bins of something else.
+    Mean of a residual in bins of another quantity.
 
     Attributes
     ----------

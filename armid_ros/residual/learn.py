@@ -82,7 +82,7 @@ class Residual:
         return {one.joint: one.gain for one in self.joints}
 
     def steps(self) -> list[str]:
-        """Return what to do next about each joint."""
+        """Return the next step for each joint."""
         return [
             f'Inspect gear, cables and stops of {one.joint} where its map is strong.'
             if one.law is None

@@ -350,7 +350,7 @@ SUFFIX = '.mounting.yaml'
 
 def read_mounting(robot: Robot) -> tuple[float | None, Path] | None:
     """
-    Read NAME.mounting.yaml beside the description of a robot; return None without a file.
+    Read NAME.mounting.yaml in the folder of a description; return None without a file.
 
     Returns
     -------

@@ -155,7 +155,7 @@ def _hull(points: FloatArray) -> coal.ConvexBase:
         raise ValueError('fewer than four points')
     spread = np.linalg.svd(points - points.mean(axis=0), compute_uv=False)
     if spread[2] < FLAT * spread[0]:
-        raise ValueError('points in a plane')
+        raise ValueError('all points lie in one plane')
     corners = coal.StdVec_Vec3s()
     corners.extend(list(points))
     return coal.Convex.convexHull(corners, True, 'Qt')

@@ -3,7 +3,7 @@
 """
 Zeros and gains of torque sensors, gravity and tool, from an arm at rest: ``armid zero``.
 
-`plan_zero` chooses poses and the way through them; `find_rests` and `fit_rests` evaluate a
-recording of it.
+`plan_zero` chooses poses and a tour through them; `find_rests` and `fit_rests` evaluate a
+recording of the tour.
 
 """

@@ -23,11 +23,11 @@ def zero() -> None:
     """
     Find torque zeros and gains, tilt of the base and tool from an arm at rest.
 
-    plan: some minutes of static poses, each reached from both sides, as a trajectory of armid
-    excite; excitation_publisher plays it with all its checks. fit: what the rests of a recording
-    show. Links of the description and the size of gravity are trusted; with --known gain the size
-    is found, with --link-error links are doubted. Friction at rest is a bound below that in
-    motion. The centre of the tool is in the frame of the last joint. model.yaml is for --model.
+    plan writes a trajectory of static poses, each reached from both sides, for
+    excitation_publisher. fit estimates the quantities from the rests of a recording. It takes the
+    described links and the size of gravity as exact: --link-error allows for errors of links,
+    --known gain fits the size. Friction at rest is a lower bound of friction in motion. The centre
+    of the tool is in the frame of the last joint. --model of other commands takes model.yaml.
 
     """
 
@@ -50,7 +50,7 @@ def zero() -> None:
 def plan(
     robot_source: str, gravity: str, joints: str | None, out: Path, as_json: bool, **given: Any
 ) -> None:
-    """Plan static poses and the way through them, as a trajectory of armid excite."""
+    """Plan static poses and a tour through them, as a trajectory of armid excite."""
     from armid_ros.api.excitation import ExcitationResult
     from armid_ros.cli import options
     from armid_ros.excitation import CollisionScene, with_joint_limits
@@ -90,8 +90,8 @@ plan.params += [one for one in excite.params if one.name in _AROUND]
     '--known',
     type=click.Choice(['gain', 'tilt', 'tool']),
     multiple=True,
-    help='Held as described: gains of 1, no tilt, no tool; may be given several times. With known '
-    'gains, the size of gravity is found.',
+    help='Held at the described value: gains of 1, no tilt, no tool; may be given several times. '
+    'With known gains, the size of gravity is fitted.',
 )
 @click.option(
     '--link-error',
@@ -99,13 +99,13 @@ plan.params += [one for one in excite.params if one.name in _AROUND]
     default=0.0,
     show_default=True,
     help='Standard deviation of the described masses and first moments of links, as a share; 0: '
-    'trusted.',
+    'exact.',
 )
 @click.option(
     '--external',
     is_flag=True,
-    help='Efforts are an estimate of external torque (--topic, --effort): find the constants and '
-    'the payload that explain it.',
+    help='Efforts are an estimate of external torque (--topic, --effort): fit the zeros and the '
+    'payload that explain this torque.',
 )
 @columns.recordings
 def fit(

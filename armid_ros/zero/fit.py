@@ -3,8 +3,8 @@
 """
 Torque zeros and gains, gravity, tool and dry friction from an arm at rest.
 
-The reading of a joint is gain (weight + offset + friction against the approach), as an `ArmModel`
-has it; weight is that of the described links and of a tool. The fit is generalised least squares
+The reading of a joint is gain (weight + offset + friction against the approach), as in `ArmModel`.
+The weight is that of the described links and of a tool. The fit is generalised least squares
 with a variance of each joint that is estimated from the residuals. Weak priors keep confounded
 parameters finite. A quantity with a wide interval is not determined.
 
@@ -25,9 +25,9 @@ import numpy.typing as npt
 import pinocchio as pin
 from scipy.stats import t as student
 
-#: What may be held known, and the effect that then is not fitted.
+#: Quantities that may be held known, and the effects that are then not fitted.
 KNOWN = {'gain': 'torque_gain', 'tilt': 'base_tilt', 'tool': 'payload'}
-#: FittedQuantity of each effect, without which it is not in the model.
+#: Quantity of each effect; if it is not determined, the effect is not in the model.
 _OF = {'torque_gain': 'gain', 'torque_offset': 'zero', 'base_tilt': 'tilt', 'payload': 'mass'}
 #: Largest half of a 95 % interval of a determined quantity: of zeros and friction as a share of
 #: the largest reading of the joint, of gravity [m/s^2], tilt [deg], mass as a share of that of the
@@ -39,11 +39,11 @@ _USEFUL['center'] = 0.1
 _PRIORS = {'torque_offset': 1.0, 'coulomb_torque': 1.0, 'gain_error': 0.5, 'payload_m': 0.3}
 _PRIORS |= {'tilt_x': 0.3, 'tilt_y': 0.3, 'gravity_difference': 2.0}
 _PRIORS |= dict.fromkeys(('payload_mx', 'payload_my', 'payload_mz'), 0.1)
-#: Residual of a reading that is left out, over the median one of its joint: 4.5 standard
-#: deviations, as where dry friction acts the other way. Redundant readings of a joint from which
-#: this is done, and below which nothing is determined.
+#: Residual of an outlier over the median residual of its joint: 4.5 standard deviations, as where
+#: dry friction acts the other way. Redundant readings of a joint from which outliers are left out,
+#: and below which no quantity is determined.
 _OUTLYING, _REDUNDANT, _FEW = 6.7, 8.0, 3.0
-#: What determines most quantities.
+#: Remedy for most quantities that are not determined.
 MORE = 'record a run of armid zero plan'
 
 
@@ -52,8 +52,8 @@ class FittedQuantity:
     """
     A fitted quantity with half of its 95 % interval; 0: held known.
 
-    The joint of a quantity of the whole arm is empty. The reason, which ends with a remedy, is
-    that of a quantity that is not determined.
+    The joint is empty for a quantity of the whole arm. The reason why the quantity is not
+    determined ends with a remedy; it is empty for a determined one.
 
     """
 
@@ -68,7 +68,7 @@ class FittedQuantity:
 @dataclass(frozen=True)
 class ZeroFit:
     """
-    The fit of K rests in some poses.
+    Fit of an arm to K rests.
 
     Attributes
     ----------
@@ -99,7 +99,7 @@ class ZeroFit:
         return next(one for one in self.quantities if (one.name, one.joint) == (name, joint))
 
     def model(self) -> ArmModel:
-        """Return the arm with what is determined, the tool as a point; friction is left out."""
+        """Return the arm with the determined effects but no friction; the tool is a point mass."""
         arm = ArmModel(self.arm.robot)
         for effect, values in zip(self.arm.effects, self.arm.values, strict=True):
             if effect.name == 'payload' and values[0] > 0.0:
@@ -168,8 +168,8 @@ def fit_rests(
     known : collection of str
         Quantities of `KNOWN` that are held at their described values.
     link_error : float
-        Standard deviation of masses and first moments of links, as a share of their size; 0: they
-        are trusted.
+        Standard deviation of masses and first moments of links, as a share of their size; 0: the
+        description is exact.
 
     """
     arms = [arm_at_rest(robot, known) for robot in robots]
@@ -216,7 +216,7 @@ def _predicted(
 
 
 def _sided(rests: Sequence[Motion]) -> npt.NDArray[np.bool_]:
-    """Mark readings after an approach; without one, dry friction is anything up to its bound."""
+    """Mark readings after an approach; without approach, dry friction is only bounded."""
     return np.concatenate([one.dq for one in rests]).astype(bool)
 
 
@@ -235,7 +235,7 @@ def _solved(
     used : ndarray of bool, shape (K, n)
         Readings that count.
     freedom : float
-        Readings minus parameters of the joint with the fewest.
+        Smallest number of redundant readings of a joint.
 
     """
     y, sided = np.concatenate([np.asarray(one.tau) for one in rests]), _sided(rests)
@@ -298,18 +298,18 @@ class _Judge:
         return tuple(found)
 
     def _reason(self, most: int, slope: FloatArray, limit: float) -> str:
-        """Return why a quantity is not determined that depends most on one of the parameters."""
+        """Return why a quantity that depends most on parameter `most` is not determined."""
         correlation = np.abs(self.covariance[most]) / np.sqrt(np.diag(self.covariance))
         correlation[most] = 0.0
         own, other = (self.arm.parameters[self.free[k]] for k in (most, np.argmax(correlation)))
         alone = abs(slope[most]) / np.sqrt(max(self.information[most, most], 1e-300)) < limit
         names = own.name + (other.name if alone else '')
-        remedy = 'say --known tilt if the base is level'
+        remedy = 'give --known tilt if the base is level'
         if 'payload' in names:
-            remedy = 'record a known payload as well (--payload), or say --known tool'
+            remedy = 'record a known payload as well (--payload), or give --known tool'
         elif 'gain_error' in names:
-            remedy = 'gravity hardly turns the joint: say --known gain, or record it with a tool'
+            remedy = 'gravity hardly turns the joint: give --known gain, or record it with a tool'
         elif own.name == 'coulomb_torque':
             remedy = MORE
         mixed = f'not separable from {other.words} of {other.joint or "the base"}'
-        return f'{mixed if alone else "no rest shows it"}; {remedy}'
+        return f'{mixed if alone else "no rest depends on it"}; {remedy}'

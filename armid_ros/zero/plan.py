@@ -1,11 +1,11 @@
 # Copyright 2026 The armid_ros developers
 # SPDX-License-Identifier: Apache-2.0
 """
-Static poses that determine zeros, gains, gravity and tool, and the way through them.
+Static poses that determine zeros, gains, gravity and tool, and a closed tour through them.
 
-The way is a closed tour: transfer, rest, a short motion onwards and back, and rest again, so that
-the arm comes to each pose from both sides. A Gaussian smooths it, which keeps all limits. As a
-Fourier series it is an `Excitation` like any other: the publisher checks and plays it.
+The tour has for each pose a transfer, a rest, a short motion onwards and back, and another rest.
+So the arm comes to each pose from both sides. A Gaussian filter smooths the tour, which keeps all
+limits. The tour is a Fourier series, so the publisher checks and plays it as any `Excitation`.
 
 """
 
@@ -35,7 +35,7 @@ import numpy as np
 
 #: Standard deviation of the smoothing, and its effect at either end of a rest [s].
 SMOOTHING, SMOOTHED = 0.5, 1.5
-#: Highest frequency of the series [Hz], of which the smoothing leaves a tenth.
+#: Highest frequency of the series [Hz]; the smoothing reduces it to a tenth of its amplitude.
 CUTOFF = 0.7
 #: Motion beyond a pose and back [rad or m], and its duration [s].
 BEYOND, BACK = 0.1, 4.0
@@ -54,10 +54,10 @@ def plan_zero(
     seed: int = 0,
 ) -> ExcitationResult:
     """
-    Plan a tour of static poses, at rest for a time from each side [s].
+    Plan a tour of static poses, with a rest of `hold` [s] in each pose from each side.
 
-    The seed is that of the random poses. TrajectoryError: too few poses are free, or no way is
-    found.
+    `seed` is the seed of the random poses. TrajectoryError: too few poses are free, or no tour
+    is found.
 
     """
     arm, model, rng = ArmModel(robot), arm_at_rest(robot), np.random.default_rng(seed)
@@ -72,7 +72,7 @@ def plan_zero(
     trajectory = _tour(careful, inside, chosen, hold)
     faults = trajectory_faults(arm, limits, trajectory, planner.clearance)
     if faults:
-        raise TrajectoryError(f'the way through the poses: {faults}; take another --seed')
+        raise TrajectoryError(f'the tour through the poses: {faults}; take another --seed')
     settings = replace(settings, period=trajectory.period, harmonics=trajectory.harmonics)
     core = evaluate(DesignProblem.of(model, settings, rng), trajectory)
     return ExcitationResult(core, arm, scene, seed=seed)
@@ -87,7 +87,7 @@ def _poses(
     rng: np.random.Generator,
 ) -> FloatArray:
     """
-    Return free poses of a model, shape (count, n), in the order of a short way.
+    Return free poses of a model, shape (count, n), ordered for a short tour.
 
     The determinant of the information on all effects is maximised, pose by pose and then by
     exchange. Source: Fedorov 1972.
@@ -128,7 +128,7 @@ def _poses(
 def _tour(
     planner: TransferPlanner, limits: Limits, poses: FloatArray, hold: float
 ) -> FourierTrajectory:
-    """Return the tour without poses that no way leads to, and motions beyond that are not free."""
+    """Return the tour, without unreachable poses and without motions that are not free."""
     count = round((hold + 2.0 * SMOOTHED) * _RATE)
     u = np.arange(BACK * _RATE)[:, np.newaxis] / (BACK * _RATE)
     bump = (4.0 * u * (1.0 - u)) ** 4  # begins and ends smoothly

@@ -12,7 +12,7 @@ import numpy as np
 from scipy.ndimage import maximum_filter1d, median_filter, minimum_filter1d, uniform_filter1d
 
 #: Time in which a joint at rest stays within `REST_RANGE` [s]; half of it at either end of a rest
-#: is left out. Time after that in which the torque settles, and shortest time that is left [s].
+#: is left out. Time in which the torque then settles, and shortest rest after that time [s].
 WINDOW, SETTLING, SHORTEST = 1.0, 0.5, 0.5
 #: Motion to a pose after which dry friction acts against its direction [rad or m].
 APPROACH = 0.03
@@ -20,11 +20,11 @@ APPROACH = 0.03
 
 def find_rests(recording: Recording) -> Motion:
     """
-    Return the K rests of a recording as samples, with the time of their begin.
+    Return the K rests of a recording as samples, with their start times.
 
-    Position and torque are means. The velocity is the direction from which a joint came, 1
-    or -1, 0 where it hardly moved since the rest before. IdentificationError: efforts are
-    missing or constant, or the arm is never at rest.
+    Position and torque are means over a rest. The velocity is the direction of the approach of
+    a joint, 1 or -1; it is 0 if the joint hardly moved since the rest before.
+    IdentificationError: efforts are missing or constant, or the arm is never at rest.
 
     """
     tau, t = recording.tau, recording.t

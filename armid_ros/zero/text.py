@@ -1,6 +1,6 @@
 # Copyright 2026 The armid_ros developers
 # SPDX-License-Identifier: Apache-2.0
-"""What ``armid zero`` prints and writes."""
+"""Summary and document of ``armid zero``."""
 
 from __future__ import annotations
 
@@ -16,14 +16,14 @@ import numpy as np
 SCHEMA = 'armid/zero/1'
 #: Quantities of an estimate of external torque.
 _EXTERNAL = ('zero', 'friction', 'mass', 'center_x', 'center_y', 'center_z')
-#: Residual over the largest reading of a joint, above which the model does not explain it.
+#: Residual over the largest reading of a joint, above which readings are not explained.
 _POOR = 0.1
 
 
 def fit_document(
     found: ZeroFit, known: Collection[str], link_error: float, external: bool
 ) -> dict[str, Any]:
-    """Return what zero.json holds."""
+    """Return the content of zero.json."""
     shown = [one for one in found.quantities if one.name in _EXTERNAL or not external]
     gains = [one.value for one in shown if one.name == 'gain' and not one.reason] or [1.0]
     links = f'links within {100.0 * link_error:g} %' if link_error else 'links as described'
@@ -51,7 +51,7 @@ def fit_document(
 
 
 def fit_summary(found: ZeroFit, document: dict[str, Any], step: str) -> Summary:
-    """Return the summary of a fit with the step that follows if it is good."""
+    """Return the summary of a fit; `step` is the next step after a good fit."""
     names = ('zero', 'friction') if document['external'] else ('zero', 'gain', 'friction')
     rows = [
         (joint, *(_cell(found.of(name, joint)) for name in names), f'{left:.2g}')
@@ -64,14 +64,14 @@ def fit_summary(found: ZeroFit, document: dict[str, Any], step: str) -> Summary:
     title = ', '.join(parts) or 'neither tilt nor tool is determined'
     if document['external']:
         share = 100.0 * _explained(found)
-        title += f'; with the constants it explains {share:.0f} % of the external torque'
+        title += f'; zeros and payload explain {share:.0f} % of the external torque'
     lines = [f'{found.rests} rests in {found.poses} poses; {found.outliers} outliers left out']
     if held := document['held']:
         lines[0] += f'; held known: {", ".join(held)}'
     shown = {row['name'] for row in document['quantities']}
     lines += _undetermined(q for q in found.quantities if q.name in shown)
     if document['verdict'] == 'not explained':
-        step = 'check --robot, --gravity, --effort-scale and what touched the arm'
+        step = 'check --robot, --gravity, --effort-scale and contacts of the arm'
     elif document['verdict'] == 'not determined':
         step = MORE
     heads = ('joint', *names, 'residual [N m or N]')

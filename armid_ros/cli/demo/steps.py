@@ -77,7 +77,7 @@ def hidden_change(robot: Robot, rng: np.random.Generator, hide: str = '') -> Hid
     fitting = [text for text in known if text.startswith(hide)]
     if not fitting:
         names = ', '.join(text.partition(':')[0] for text in known)
-        raise ModelError(f'--hide {hide}: give its values as E@joint:k=v, or one of {names}')
+        raise ModelError(f'--hide {hide}: give an effect as E@joint:k=v, or one of {names}')
     return HiddenChange(*parse_effect(str(rng.choice(fitting)), robot))
 
 
@@ -99,13 +99,13 @@ class HiddenChange:
     values: FloatArray
 
     def found_by(self, diagnosis: Diagnosis) -> bool:
-        """Return whether the first name is that of the effect, and its joint."""
+        """Return whether the first finding is the hidden effect, on the same joints."""
         first = diagnosis.findings[:1]
         named = self.effect.name, self.effect.joints
         return any((one.name, one.joints) == named for one in first)
 
     def outcome(self, diagnosis: Diagnosis) -> str:
-        """Return a sentence: what was hidden, and whether it was found."""
+        """Return a sentence on the hidden change, and whether it was found."""
         parameters = self.effect.parameters(diagnosis.arm.robot)
         shown = [
             f'{name.name.replace("_", " ")} {digits(float(value), 3)} {pretty(name.unit)}'.rstrip()

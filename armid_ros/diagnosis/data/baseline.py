@@ -3,7 +3,7 @@
 """
 Prior knowledge of an arm: from recordings of a baseline, and from its description.
 
-The misfit is the residual of a model in recordings in which nothing was wrong: no real arm agrees
+The misfit is the residual of a model in recordings from when it was right: no real arm agrees
 with its model to within the noise. The residual is smaller in recordings that the model was
 identified from, so each fold is also predicted with parameters fitted to the other folds. The
 description is their prior, for parameters that the other folds do not determine: a joint may have

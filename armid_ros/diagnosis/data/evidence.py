@@ -99,7 +99,7 @@ class Evidence:
         return np.asarray(squares / np.maximum(self.count, 1.0))
 
     def residuals(self, arm: ArmModel) -> list[FloatArray]:
-        """Return measured torques minus those of an arm, each (M, n) [N m]."""
+        """Return measured torques minus the torques of an arm, each (M, n) [N m]."""
         return [part.residual(arm) for part in self.data]
 
     def block_squares(self, residual: Sequence[FloatArray]) -> FloatArray:

@@ -122,7 +122,7 @@ class Trajectory:
         return self.reduce(self.motion.tau)
 
     def residual(self, arm: ArmModel) -> FloatArray:
-        """Return measured torque minus that of a model, in rows, shape (M, n) [N m]."""
+        """Return measured torque minus torque of a model, in rows, shape (M, n) [N m]."""
         assert self.motion.tau is not None
         return self.reduce(self.motion.tau - arm.torque(self.motion))
 

@@ -1,7 +1,7 @@
 # Copyright 2026 The armid_ros developers
 # SPDX-License-Identifier: Apache-2.0
 """
-Which effects a planned motion shows, and which it cannot distinguish.
+Isolability: effects that a planned motion makes detectable, and distinguishable.
 
 The model of the arm counts as known. Columns of effects are divided by the noise; two effects are
 distinguishable if the angle between their columns is large (Basseville and Nikiforov 1993).

@@ -109,7 +109,7 @@ class NextRun:
 
 
 def _many(deviations: float) -> str:
-    """Format a z-score; one above `_CERTAIN` becomes "more than" that."""
+    """Format a z-score; above `_CERTAIN` it becomes "more than `_CERTAIN`"."""
     return f'{deviations:.0f}' if deviations < _CERTAIN else f'more than {_CERTAIN:.0f}'
 
 
@@ -125,7 +125,7 @@ def next_run(
     Parameters
     ----------
     diagnosis : Diagnosis
-        The names and their rivals.
+        Diagnosis with named effects and their rivals.
     rng : numpy.random.Generator
         Draws the motions.
     collision : CollisionModel, optional

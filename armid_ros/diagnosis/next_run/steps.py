@@ -1,7 +1,7 @@
 # Copyright 2026 The armid_ros developers
 # SPDX-License-Identifier: Apache-2.0
 """
-What to do after a diagnosis: inspect the robot, then record motion that separates rivals.
+Next steps after a diagnosis: inspect the robot, then record motion that separates rivals.
 
 An experiment is advised only for effects that the planned run does not separate.
 
@@ -89,8 +89,8 @@ def _use_of_model(diagnosis: Diagnosis, model: str, worse: Sequence[str]) -> lis
         return [f'Move {", ".join(diagnosis.not_checked)} as well, and record again.']
     if worse:
         return [
-            f'Do not simulate with {model} yet: driven by the recorded torques, it is farther off '
-            f'than the model before in {", ".join(worse)}. Record more motions of '
+            f'Do not simulate with {model} yet: driven by the recorded torques, its error is '
+            f'larger than that of the given model in {", ".join(worse)}. Record more motions of '
             f'{", ".join(worse)}, and diagnose all recordings together.'
         ]
     if diagnosis.verdict not in ('named', 'consistent'):
@@ -135,10 +135,10 @@ def _centre(finding: Finding) -> str:
 
 def _look_at(name: str, diagnosis: Diagnosis) -> str:
     """
-    Return an effect's hint on parts to inspect; also for effects outside the catalogue.
+    Return the part of the robot to inspect for an effect of the catalogue or of a plug-in.
 
-    It is empty for usual effects, such as friction, that the given model lacks: nearly every arm
-    has them.
+    The text is empty for a usual effect that the given model lacks: friction of a joint without
+    a friction model is no fault of the robot.
 
     """
     if name not in CATALOGUE:

@@ -101,7 +101,7 @@ class Causes:
         self, singles: Sequence[Cause], nuisance: Nuisance, under: Marginal
     ) -> Iterator[Cause]:
         """
-        Yield one law of friction in those joints that maximise its evidence, if two or more do.
+        Yield a law of friction in the joints that maximise its evidence, if two or more.
 
         Values of joints are independent under a common prior; each number of joints is as likely.
 
@@ -218,7 +218,7 @@ def _torque_of(columns: Sequence[FloatArray], rows: Rows) -> FloatArray:
 
 
 def _unit(own: SelectedEffect, torque: FloatArray, rows: Rows, robot: Robot) -> FloatArray:
-    """Return values whose torque is that of the joint, at most the largest plausible ones."""
+    """Return values with the torque of the joint, at most the largest plausible values."""
     effect, kept = own.effect, list(own.kept)
     spread = effect.spread(robot)[kept]
     if effect.adds_to(robot):  # a load and an error of a link are bodies alike

@@ -22,7 +22,7 @@ class Cause:
     Attributes
     ----------
     effect : Effect
-        Joints and shape included.
+        The effect, with its joints and shape.
     kept : tuple of int
         Its parameters that are fitted; the others are zero.
     unit : ndarray, shape (p,)

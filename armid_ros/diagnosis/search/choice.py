@@ -185,7 +185,7 @@ class Explainer:
 
     def _beside(self, written: Misfit) -> Chosen:
         """
-        Explain the change since identification, of whose misfit only the size is known.
+        Explain the change since an identification of which only the size of the misfit is known.
 
         Without the recordings, its form is unknown: any cause may be a part of it. See `odds`.
 

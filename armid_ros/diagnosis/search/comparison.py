@@ -3,8 +3,8 @@
 """
 The comparison of causes: the best cause is accepted, until no cause is significant.
 
-Whether anything has changed is decided with the spread of values between recordings. Which cause
-it was is decided by the explained torque. A difference of 2 % does not count, as laws are inexact.
+The spread of values between recordings decides whether a change is significant. The explained
+torque decides between causes. A difference of 2 % does not count, as laws are inexact.
 
 """
 
@@ -44,7 +44,7 @@ _SHARES = ((0.0, 0.0), (0.02, -1.0), (0.06, -2.0), (0.15, -3.0))
 _BODIES = (0.0, 0.1, 1.0)
 #: Amplitudes of the noise without a baseline, over that of two equal periods; log prior odds.
 _FACTORS = ((1.0, 0.0), (1.3, -1.0), (2.0, -3.0), (4.0, -5.0))
-#: Number of causes whose shapes are refined, of causes compared at last, most accepted causes.
+#: Number of causes with refined shapes, and of causes compared last; most accepted causes.
 _REFINED, _COMPARED, _MOST = 5, 14, 5
 #: Every eighth cause is used to estimate the usual spread.
 _SAMPLED = 8
@@ -240,7 +240,7 @@ class CauseComparison:
         return Look(ranking, others, nuisance, likeliest, self.usual)
 
     def ranked(self, cause: Cause, nuisance: Nuisance) -> Ranked:
-        """Compare the models with and without a cause, averaged over all settings."""
+        """Return the evidence of a cause, averaged over the amplitudes of errors and noise."""
         settings = self._settings(nuisance)
         fits = [(odds(cause, nuisance, one), one) for one in settings]
         nothing = np.logaddexp.reduce([under.evidence for _, under in fits])
@@ -325,7 +325,7 @@ def settings_of_misfit(body: float) -> tuple[Setting, ...]:
 
 
 def _leading(settings: Sequence[Marginal]) -> list[Marginal]:
-    """Return the best setting and that of noise alone, for each size of the body's errors."""
+    """Return the best setting and the one of noise alone, for each size of errors of the body."""
     found = []
     for body in dict.fromkeys(one.setting.body for one in settings):
         own = [one for one in settings if one.setting.body == body]

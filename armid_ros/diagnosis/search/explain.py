@@ -147,7 +147,7 @@ def survey_of(
     settings: DiagnosisSettings,
     named: Collection[Key] = (),
 ) -> Survey:
-    """Summarise the first comparison of all causes, named ones first."""
+    """Summarise the first comparison of all causes; the named causes come first."""
     look, material = result.first, settings.material
     # Without the causes, the likeliest setting may be one that hides others.
     under = look.nuisance.marginal(result.under.setting)

@@ -46,7 +46,7 @@ class Explanation:
     reference : Fitted
         The arm without named effects.
     steps : tuple of Trial
-        The named causes, in the order of those in ``fitted``.
+        The named causes, in the order of ``fitted``.
     survey : Survey or None
         The first comparison of all candidates.
     evidence : Evidence
@@ -71,7 +71,7 @@ class Explanation:
     refitted: bool = False
 
     def without(self, *names: int) -> Explanation:
-        """Return the explanation without some of its causes, the others fitted anew."""
+        """Return the explanation without some of its causes; the other causes are fitted anew."""
         fewer = self.only([k for k in range(len(self.steps)) if k not in names])
         return replace(fewer, minor=(*self.minor, *(self.steps[k] for k in names)))
 

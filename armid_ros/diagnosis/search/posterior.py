@@ -281,7 +281,7 @@ class JointFit:
         return both.means(under)[size : len(means)] - means[size:]
 
     def linear(self, state: Patch) -> Nuisance:
-        """Return the nuisance columns with those of the named causes, linearised at a state."""
+        """Return the columns of nuisance parameters and named causes, linearised at a state."""
         if not state.named:
             return self.nuisance
         rows, result = self.nuisance.rows, self.nuisance

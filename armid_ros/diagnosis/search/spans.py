@@ -3,7 +3,7 @@
 """
 The seconds in which a cause acts: a payload that is picked up and put down, a hose that pulls.
 
-Every cause is compared with its columns zero outside of a span of each recording. The span with
+Every cause is tried with columns of zero outside of a span of each recording. The span with
 the largest evidence is found over pairs of change points, one recording after the other.
 
 """

@@ -1,7 +1,7 @@
 # Copyright 2026 The armid_ros developers
 # SPDX-License-Identifier: Apache-2.0
 """
-The share of the gap that each cause explains of held-out data, and which causes are the headline.
+Shares of the held-out gap that the causes explain, and the choice of the headline.
 
 The gap is the sum of squares of the weighted residual of the model. Causes are added one by one,
 in order of gain; intervals come from resampled blocks (bootstrap). The headline lists the causes
@@ -66,7 +66,7 @@ def headline(
     explanation: Explanation, least: float, settings: DiagnosisSettings
 ) -> tuple[Explanation, Attribution]:
     """
-    Move causes of a small share to the minor ones; return the shares of the others.
+    Move causes with a small share to the minor causes; return the shares of all others.
 
     A cause is minor if its cross-validated share of the gap is below `least`, and no joint has a
     gap without it.

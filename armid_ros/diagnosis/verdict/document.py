@@ -3,7 +3,7 @@
 """
 diagnosis.json, schema armid/diagnosis/1.
 
-It includes the smallest detectable size of each effect: smaller ones may be there unnamed.
+It includes the smallest detectable size of each effect: smaller effects may exist without a name.
 
 """
 

@@ -274,8 +274,8 @@ def floor_obstacles(
         highest[link] = np.minimum(highest.get(link, np.inf), lowest)
     if all(lowest.max() < floor.height for lowest in highest.values()):
         raise TrajectoryError(
-            f'{robot.name}: no link is above the floor in any pose, {floor}; --floor Z is its '
-            'height above the origin of the base [m]'
+            f'{robot.name}: every link is below the floor in all poses, {floor}; give its height '
+            'above the origin of the base [m] with --floor'
         )
     touching = tuple(k for k, lowest in highest.items() if lowest.max() < floor.height + margin)
     x, y, z = floor.up

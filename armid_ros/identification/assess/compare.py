@@ -172,8 +172,8 @@ class _Side:
     """Values, standard deviations and scatter of the shared parameters in one result."""
 
     values: FloatArray  # (p,)
-    #: Standard deviations: those of noise, times the scatter between recordings of each joint over
-    #: the noise, if that is above 1.
+    #: Standard deviations by noise, times the ratio of scatter between recordings to noise of each
+    #: joint, if this ratio is above 1.
     std: FloatArray
     scatter: FloatArray  # changes of the values without each recording, (K, p)
     #: Degrees of freedom of each deviation: a mean square of n values with correlations R has
@@ -246,7 +246,7 @@ def _squares(rows: FloatArray, covariance: FloatArray) -> tuple[float, int]:
 def _find_load(
     terms: Sequence[Mapping[str, float]], difference: FloatArray, covariance: FloatArray
 ) -> LoadChange | None:
-    """Return the load on the outermost link whose load explains the changes, or None."""
+    """Return the load that explains the changes, on the outermost such link; None without."""
     # arms hold things at the outermost link; a mass that may be zero is no load
     std = np.sqrt(np.diag(covariance))
     if not len(std) or not np.all(std > 0.0):

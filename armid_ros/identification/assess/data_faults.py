@@ -38,9 +38,9 @@ from armid_ros.robots import Robot
 import numpy as np
 import numpy.typing as npt
 
-#: Median factor of torques from which they are in other units; putting down a load makes less.
+#: Median factor of torques from which the unit is another; loads cause smaller factors.
 _GAINS = 4.0
-#: Largest ratio of a factor since a baseline to that of a unit of force: masses cancel.
+#: Largest ratio of a factor since a baseline to the factor of a unit of force: masses cancel.
 _NEAR_SINCE = 1.05
 #: Ratio of a torque to the limit of its drive above which a note is given.
 _BEYOND = 1.5

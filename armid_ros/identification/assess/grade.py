@@ -217,7 +217,7 @@ def _halves(result: Identification, word: Word, error: str) -> Fault:
         text += (
             f', but the training error of {result.arm.robot.joints[joint]} is '
             f'{training[joint]:.2g} %: {time:.2g} s of this motion do not determine '
-            f'{result.base.rank} parameters; record longer, or move more'
+            f'{result.base.rank} parameters; record longer, or more motion'
         )
     return Fault(text, word)
 

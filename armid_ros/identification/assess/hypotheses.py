@@ -97,7 +97,7 @@ def hypotheses(robot: Robot, motions: Sequence[Motion]) -> Iterator[Hypothesis]:
     """
     Yield the possible mistakes in recorded motions of an arm, except delays.
 
-    Positions in degrees exceed a turn even if an arm hardly moves; only such ones are tested.
+    Only values beyond 2 pi are tested for degrees: even small angles in degrees exceed it.
 
     """
     turned = np.max([np.abs(one.q).max(axis=0) for one in motions], axis=0) > 2.0 * np.pi

@@ -3,7 +3,7 @@
 """
 Delay of the torques of a recording against its positions, with a confidence interval.
 
-A delay shifts the whole torque in time. Presliding friction only comes late itself: after a
+A delay shifts the whole torque in time. Presliding friction delays only the friction: after a
 reversal it grows with the distance that the joint has travelled (Dahl 1968), which takes tens of
 milliseconds at low speed. So a delay is estimated from weight and inertia: its column is the rate
 of the body's torque, and friction with several presliding lengths is fitted as well. If a motion

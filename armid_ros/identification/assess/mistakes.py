@@ -100,7 +100,7 @@ def shared_mistakes(
     robot: Robot, recordings: Sequence[Recording], used: Conditioning
 ) -> list[tuple[Mistake, tuple[str, ...]]]:
     """
-    Find the mistakes in recordings, those of one kind and place together.
+    Find the mistakes in recordings, grouped by kind and place.
 
     Parameters
     ----------

@@ -41,7 +41,7 @@ class PredictionError:
     torque : ndarray, shape (n,)
         Root mean square torque of each joint [N m or N].
     off : float
-        Squared distance of the body from that of the description, in prior standard deviations.
+        Squared distance of the body from the described body, in prior standard deviations.
 
     """
 
@@ -62,8 +62,8 @@ class PredictionError:
         """
         Return the likelihood ratio of another prediction, per independent sample.
 
-        It is the ratio of two models with unknown noise, times that of their bodies by the prior
-        of the description. Errors are limited to the range from the floor to the torque itself.
+        It is the likelihood ratio of models with unknown noise, times the ratio of their priors of
+        the body. Errors are limited to the range from the floor to the torque itself.
 
         """
         return self.of_data(better) * float(np.exp((self.off - better.off) / (2.0 * FREEDOM)))

@@ -63,7 +63,7 @@ _DEGREE = float(np.deg2rad(1.0))
 _RATIOS = {
     1.0 / _DEGREE: 'are in degrees/s while positions are in rad',
     _DEGREE: 'are in rad/s while positions are in degrees',
-    -1.0: 'have the opposite sign of what the positions do',
+    -1.0: 'have the opposite sign of the rates of the positions',
 }
 
 
@@ -346,10 +346,10 @@ def velocity_faults(recording: Recording) -> Iterator[Fault]:
     known = any(abs(factor / one - 1.0) <= _TOLERANCE for one in (1.0, _DEGREE, 1.0 / _DEGREE))
     if not known and np.all(np.abs(plain / factor - 1.0) <= _ALIKE):
         yield Fault(
-            f'velocities of all joints that move are {factor:.3g} times what positions do in the '
-            f'recorded time. Either time stamps run {factor:.3g} times the true time, and '
-            'inertias are off by the square of that, or velocities are in another unit. Correct '
-            'which it is',
+            f'velocities of all moving joints are {factor:.3g} times the rates of the positions. '
+            f'Either time stamps run {factor:.3g} times the true time, and inertias are off by '
+            'the square of this factor, or velocities are in another unit. Correct the stamps '
+            'or the velocities',
             'poor',
             recording.source,
         )

@@ -177,7 +177,7 @@ def _smoothed(spectrum: FloatArray, reach: int) -> FloatArray:
 
 def scatter(problem: Sequence[Regression], weights: FloatArray, values: FloatArray) -> FloatArray:
     """
-    Return jackknife changes of the values, whose sum of squares is their variance.
+    Return the jackknife changes of each value; the squared changes sum to its variance.
 
     A change is weighted by how well the other recordings determine the value. For white noise, the
     sum of squares is then the variance of least squares, also if one recording determines most of

@@ -339,7 +339,7 @@ class ChangeWatch:
         return float(np.exp(np.mean(np.log(self._residual_scale.value))))
 
     def _name(self, found: FoundChange) -> Job:
-        """Report a change in a block, and reopen its parameters."""
+        """Report a change, and restart without information on the changed parameters."""
         values, covariance = yield from self._search.size(found, self._residual_scale_of_all)
         yield
         size = Estimate(found.best.parameters, values, covariance)
@@ -351,7 +351,7 @@ class ChangeWatch:
         )
 
     def _learn_again(self, found: FoundChange, reopened: FloatArray) -> Job:
-        """Restore the state before a change, reopen directions, and learn later samples again."""
+        """Restart from the state before a change, without information on changed parameters."""
         last = found.blocks[found.before]
         since = [sample for block in found.blocks[found.after :] for sample in block.samples]
         stretches = (*self._unseen, *([self._open] if self._open else ()))

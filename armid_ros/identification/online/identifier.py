@@ -294,9 +294,7 @@ class OnlineIdentifier:
         for part in fields(settings):
             same = getattr(settings, part.name) == getattr(self.settings, part.name)
             if part.name not in self.CHANGEABLE and not same:
-                raise IdentificationError(
-                    f'{part.name} cannot change during identification: restart it'
-                )
+                raise IdentificationError(f'{part.name} cannot change; restart the identification')
         if self._watch is None and settings.false_alarm_time is not None:
             raise IdentificationError(
                 'change detection was off from the start: restart the identification'

@@ -131,7 +131,7 @@ class NullCalibration:
 
     def learning(self, ratios: FloatArray, strength: FloatArray) -> Job:
         """
-        Learn from a window without a change, in pieces.
+        Update the factors with a window without a change; yield between pieces of the work.
 
         Parameters
         ----------

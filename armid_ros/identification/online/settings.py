@@ -1,6 +1,6 @@
 # Copyright 2026 The armid_ros developers
 # SPDX-License-Identifier: Apache-2.0
-"""Settings of online identification, and what it returns for a row."""
+"""Settings of online identification, and its result for a row."""
 
 from __future__ import annotations
 

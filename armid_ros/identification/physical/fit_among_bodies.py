@@ -218,7 +218,7 @@ def far_from_described(robot: Robot, masses: FloatArray) -> tuple[str, ...]:
         return ()
     return (
         f'masses more than {HEAVY:g} times off the description: {"; ".join(named)}; correct the '
-        'masses, or add what is missing, such as rotors, springs or a load',
+        'masses, or add missing parts, such as rotors, springs or a load',
     )
 
 

@@ -95,7 +95,7 @@ class PhysicalCertificate:
         if self.active:
             said.append(
                 f'at the limit of what a body can be: {", ".join(self.active)}; '
-                'the model lacks an effect there, or the data say little'
+                'the model lacks an effect there, or the data are poor'
             )
         if self.at_wall:
             said.append(f'at the limit of the box: {", ".join(self.at_wall)}')

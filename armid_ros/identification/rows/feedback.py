@@ -88,8 +88,8 @@ def laws_of_controllers(
             return ()
         said.append(
             f'the torque of {name} is a law of position and direction of motion alone, to '
-            f'{100 * left / size:.1f} %. It holds the weight or pushes along, as a controller '
-            f'commands it, and has nothing of the {lacking:.2g} {unit} that inertia takes. '
+            f'{100 * left / size:.1f} %. A controller that holds the weight or pushes along '
+            f'makes such a torque. The {lacking:.2g} {unit} of the inertia are missing in it. '
             'Something else moves the arm, or body and friction cannot be distinguished: record '
             'the arm while it follows a trajectory'
         )

@@ -101,7 +101,7 @@ class Regression(Stretch):
         return np.asarray(self.target - self.columns @ values)
 
     def restrict(self, columns: Sequence[int] | npt.NDArray[np.intp]) -> Regression:
-        """Return the problem with some of its columns; itself for all columns in order."""
+        """Return the problem with the given columns only; no copy if all are given in order."""
         if np.array_equal(columns, np.arange(self.columns.shape[2])):
             return self
         return replace(self, columns=self.columns[:, :, columns])

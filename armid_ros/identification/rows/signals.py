@@ -338,7 +338,7 @@ def decimated_samples(n_samples: int, used: Conditioning) -> range:
 
 
 def _even(t: FloatArray, period: float, *signals: FloatArray) -> tuple[FloatArray, ...]:
-    """Return even times and signals there, by a cubic spline if the stamps jitter."""
+    """Return equidistant times and the signals at them, by cubic splines if stamps jitter."""
     grid = np.linspace(t[0], t[-1], round((t[-1] - t[0]) / period) + 1)
     if len(grid) == len(t) and np.max(np.abs(grid - t)) < JITTER_TOLERANCE * period:
         return grid, *signals

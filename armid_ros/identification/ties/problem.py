@@ -289,7 +289,7 @@ def _free_body(
     if len(left) and left.min() < _RANK_TOLERANCE:
         raise IdentificationError(
             f'{names[int(np.argmin(left))]}: its stiffness cannot be distinguished from weight '
-            'and inertia along this motion; keep the inertias known, or move more'
+            'and inertia along this motion; keep the inertias known, or record more motion'
         )
     spread = base.grouping * described_spread(robot).ravel()
     return _Body(

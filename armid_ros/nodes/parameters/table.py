@@ -180,7 +180,7 @@ def is_as(node: Node, parameter: Parameter) -> bool:
 
 
 def _has_type(parameter: Parameter) -> bool:
-    """Return whether the type of a value is known; that of an empty list is not."""
+    """Return whether the type of a value is known; it is unknown for an empty list."""
     return parameter.type_ is not Parameter.Type.NOT_SET and parameter.value != []
 
 

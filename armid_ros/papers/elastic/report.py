@@ -86,7 +86,7 @@ def elastic_report(
 
 
 def verdict(result: TwoInertiaIdentification) -> VerdictSection:
-    """Say how stiff the springs are, how surely, and what is not known."""
+    """Return the verdict: stiffness of the springs, intervals, and poor joints."""
     springs = []
     for k, joint in enumerate(result.joints):
         value = f'{result.parameters.stiffness[k]:.0f}'

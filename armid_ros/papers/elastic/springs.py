@@ -135,7 +135,7 @@ def identify_springs(
 
 
 def _row(found: SpringEstimate) -> tuple[str, ...]:
-    """Return what was found of a joint; dashes for what the recording does not show."""
+    """Return the values of a joint; dashes for values that are not identifiable."""
     if not found.informative:
         return (found.joint, *['-'] * 5)
     fit = found.transmission

@@ -55,7 +55,7 @@ def lunar_report(found: Reproduction, provenance: Provenance) -> str:
 
 
 def verdict(found: Reproduction) -> VerdictSection:
-    """Say how the errors compare with those of the paper, and what load was found."""
+    """Return the verdict: ratios of errors to the errors of the paper, and the load."""
     lines, held = [], True
     for one in found.repeated:
         slow, whole = (one.ratio(method.held_out) for method in one.methods)

@@ -96,7 +96,7 @@ def _inside(described: MessageType) -> str:
 
 @cache
 def _standard(described: MessageType) -> bool:
-    """Return whether the definition of JointState in a bag is that of ROS 2."""
+    """Return whether a bag defines JointState as ROS 2 does."""
     if not described.definition:
         return True
     standard, store = get_typestore(Stores.ROS2_JAZZY), store_for(described)

@@ -127,7 +127,7 @@ class JointStateLayout:
 
     @cached_property
     def spare(self) -> int:
-        """Largest number of bytes behind the last value."""
+        """Largest number of padding bytes after the last value."""
         # A writer reserves room to align what follows, and for each empty sequence as well.
         return 7 + 4 * self.counts.count(0)
 
@@ -161,7 +161,7 @@ class JointStateLayout:
 
     @cached_property
     def fixed(self) -> tuple[npt.NDArray[np.void], npt.NDArray[np.void]]:
-        """What the messages of this layout share, and which of their bits these are, (1,)."""
+        """Values that all messages of this layout share, and a mask of their bits, (1,)."""
         expected, mask = np.zeros((2, 1), self.record)
         numbers = {'encapsulation': int(self.order == '<'), 'frame_length': self.frame_length}
         numbers |= {f'n_{name}': n for name, n in zip(QUANTITIES, self.counts, strict=True)}
@@ -182,7 +182,7 @@ class JointStateLayout:
 
     @cached_property
     def _fixed_bits(self) -> tuple[int, int]:
-        """What messages share, and its mask, as integers: a comparison takes a microsecond."""
+        """Shared values and mask of `fixed`, as integers: a comparison takes a microsecond."""
         fixed, mask = (int.from_bytes(record.tobytes(), 'little') for record in self.fixed)
         return fixed, mask
 

@@ -373,5 +373,5 @@ def words_of(name: str) -> list[str]:
 
 
 def is_quantity(word: str) -> bool:
-    """Return whether a word says position, velocity or effort."""
+    """Return whether a word means position, velocity or effort."""
     return any(word.lower() in words for words in WORDS.values())

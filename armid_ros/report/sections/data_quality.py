@@ -1,6 +1,6 @@
 # Copyright 2026 The armid_ros developers
 # SPDX-License-Identifier: Apache-2.0
-"""What the recordings are like."""
+"""Quality of the recordings."""
 
 from __future__ import annotations
 
@@ -131,18 +131,18 @@ def _repeatability(
 
 def repeatability(fits: Sequence[Fit]) -> tuple[float, FloatArray, FloatArray] | None:
     """
-    Return the period of a motion, what does not repeat after it, and the residual.
+    Return the period of a motion, the part that does not repeat, and the residual.
 
     Two periods are compared in the longest stretch of a recording; None where nothing repeats. The
-    difference is of the residual, in which each period has its own positions: what depends on the
-    motion alone cancels, be it modelled or not.
+    difference is of the residual, in which each period has its own positions. Torque that depends
+    on the motion alone cancels, be it modelled or not.
 
     Returns
     -------
     period : float
         [s].
     varying : ndarray, shape (n,)
-        Standard deviation of what does not repeat [N m].
+        Standard deviation of the part that does not repeat [N m].
     residual : ndarray, shape (n,)
         Root mean square of the residual of the same samples [N m].
 

@@ -1,6 +1,6 @@
 # Copyright 2026 The armid_ros developers
 # SPDX-License-Identifier: Apache-2.0
-"""The short sections of a diagnosis: what was named, where it shows, what else was tried."""
+"""The short sections of a diagnosis: named effects, evidence, and other candidates."""
 
 from __future__ import annotations
 
@@ -60,7 +60,7 @@ _DETECTABLE = (
 
 
 def share_of(diagnosis: Diagnosis) -> str:
-    """Return what the shares of joints refer to: the gap, or what the named causes explain."""
+    """Return the reference of the shares of joints: the gap, or its explained part."""
     return 'the explained part' if diagnosis.findings else 'the gap'
 
 
@@ -88,7 +88,7 @@ def named_rows(
     findings: Sequence[Finding], certain: bool = False
 ) -> list[tuple[str, str, str, str]]:
     """
-    Return effect, parameter, joint and value with its 95 % interval of what was named.
+    Return effect, parameter, joint, and value with 95 % interval of the named effects.
 
     Parameters
     ----------
@@ -127,7 +127,7 @@ def named_rows(
 
 
 def named_section(findings: Sequence[Finding]) -> ContentSection:
-    """Return the values of what was named, with 95 % intervals."""
+    """Return the values of the named effects, with 95 % intervals."""
     heads = ('Effect', 'Parameter', 'Joint', 'Value, 95 %')
     return ContentSection(
         'Parameters', [DataTable(heads, named_rows(findings), (0, 1, 2), 'both')]
@@ -135,7 +135,7 @@ def named_section(findings: Sequence[Finding]) -> ContentSection:
 
 
 def evidence_section(diagnosis: Diagnosis) -> ContentSection:
-    """Return the residuals without what was named, in the worst joints."""
+    """Return the residuals without the named effects, in the worst joints."""
     folds = []
     for number, place in enumerate(diagnosis.where[:_JOINTS]):
         blocks: list[Templated] = []
@@ -274,7 +274,7 @@ def _detectable_row(name: str, sizes: Sequence[Detectable]) -> tuple[str, str, s
 
 
 def patch_section(findings: Sequence[Finding], text: str) -> ContentSection:
-    """Return what was added to the model, with the effects of the text of model.yaml."""
+    """Return the effects added to the model, with the part of model.yaml on effects."""
     start, end = max(text.find('effects:'), 0), text.find('\nmisfit:')
     yaml = text[start:end] if end > start else text[start:]
     own = 'an effect of your own'
@@ -287,7 +287,7 @@ def patch_section(findings: Sequence[Finding], text: str) -> ContentSection:
 
 
 def candidates_section(diagnosis: Diagnosis) -> ContentSection:
-    """Return what each cause alone would explain, in ranking order."""
+    """Return the part of the gap that each cause alone would explain, in ranking order."""
     explanation = diagnosis.explanation
     survey = None if explanation is None else explanation.survey
     names = {finding.name for finding in diagnosis.findings}

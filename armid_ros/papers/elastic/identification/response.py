@@ -42,7 +42,7 @@ def unpack(parameters: TwoLinkParameters) -> FloatArray:
 
 
 def pack(values: npt.ArrayLike, like: TwoLinkParameters) -> TwoLinkParameters:
-    """Return parameters with new values; friction and drives are copied from others."""
+    """Return the parameters of a vector; friction and drives are copied from `like`."""
     vector = np.asarray(values, dtype=float)
     pairs = vector[3:].reshape(len(PER_JOINT), 2)
     fields = {field: pair for (field, _, _), pair in zip(PER_JOINT, pairs, strict=True)}

@@ -85,7 +85,7 @@ def exo_report(
 
 
 def verdict(found: Sequence[Interaction], walked: SimulatedWalk | None) -> VerdictSection:
-    """Say what ties the two, how surely, and whether the torques walk."""
+    """Return the verdict: stiffness of the straps, interval, and joint errors over a walk."""
     overall = found[0]
     k, reach = overall.stiffness[0], HALF_WIDTH * overall.std[0]
     sentences = [
