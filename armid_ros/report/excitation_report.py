@@ -199,21 +199,17 @@ def identifiable(design: Design, links: Sequence[str]) -> list[str]:
     size = np.abs(design.described)
     sure, known = int(np.sum(std <= 0.1 * size)), int(np.sum(size > 0.0))
     small = '; the others hardly change the torque' * (sure < known)
+    word = 'good'
+    if information.condition >= GOOD_CONDITION:
+        word = 'fair' if information.condition < WEAK_CONDITION else 'weak'
+        word += f'; below {GOOD_CONDITION:g} is good'
     return [
         f'All {len(names)} parameters can be identified (condition number '
-        f'{plain(information.condition)}: {_conditioning(information.condition)}).',
+        f'{plain(information.condition)}: {word}).',
         f'{sure} of {known} described parameters will be known to 10 %{small}. The least accurate '
         f'will be {full_label(names[worst], links)}: ± {digits(float(std[worst]))} '
         f'{pretty(names[worst].unit)}.',
     ]
-
-
-def _conditioning(condition: float) -> str:
-    """Describe a condition number by the usual limits."""
-    word = 'good' if condition < GOOD_CONDITION else 'weak'
-    if GOOD_CONDITION <= condition < WEAK_CONDITION:
-        word = 'fair'
-    return word if word == 'good' else f'{word}; below {GOOD_CONDITION:g} is good'
 
 
 def _asked(

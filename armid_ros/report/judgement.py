@@ -77,6 +77,11 @@ def judge(
     training = Score.of(result.training)
     fits = [fit for part in validation.values() for fit in part]
     held_out = Score.of(fits) if fits else None
+    # of a physical certificate only active constraints and its notes
+    told = set()
+    if result.physical is not None:
+        given = result.physical
+        told = set(given.sentences()) - set(given.activity) - set(given.notes)
     findings: list[Caution] = [
         *(
             (f'{recording.source or "A recording"}: {recording.report.describe()}', '')
@@ -86,7 +91,7 @@ def judge(
         *_of_errors(result, training, held_out),
         *_of_residuals(result, fits or result.training),
         *([] if verification is None else _of_verification(verification)),
-        *((note[0].upper() + note[1:] + '.', '') for note in _notes(result)),
+        *((note[0].upper() + note[1:] + '.', '') for note in result.notes if note not in told),
     ]
     steps = [step for _, step in findings if step]
     if held_out is not None and not steps:
@@ -96,15 +101,6 @@ def judge(
         beware=tuple(text for text, _ in findings if text),
         next_steps=tuple(dict.fromkeys(steps)),
     )
-
-
-def _notes(result: Identification) -> list[str]:
-    """Return the notes; of a physical certificate only active constraints and its notes."""
-    given = result.physical
-    if given is None:
-        return list(result.notes)
-    said = set(given.sentences()) - set(given.activity) - set(given.notes)
-    return [note for note in result.notes if note not in said]
 
 
 def _what(result: Identification) -> str:

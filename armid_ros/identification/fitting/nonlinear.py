@@ -212,21 +212,15 @@ def moved(arm: ArmModel, base: BaseParameters, values: FloatArray, free: FloatAr
     rigid = _rigid(arm)
     change[:rigid] -= free @ (free.T @ change[:rigid])
     theta = arm.theta + change
-    theta[:rigid] = _carried(theta[:rigid], free)
-    return arm.with_theta(theta)
-
-
-def _carried(rigid: FloatArray, free: FloatArray) -> FloatArray:
-    """Give a mass to links with a first moment but no mass, shape (10 n,)."""
-    links = rigid.reshape(-1, len(LINK_PARAMETERS))
+    links = theta[:rigid].reshape(-1, len(LINK_PARAMETERS))
     lacking = (np.abs(links[:, 0]) < NO_MASS) & np.any(np.abs(links[:, 1:4]) >= NO_MASS, axis=1)
-    if not np.any(lacking):
-        return rigid
-    # the data gave a moment to a link that is described without mass, and do not determine its
-    # mass: a mass changes no torque if the parameters of links before it change as well
-    mass = np.zeros_like(links)
-    mass[lacking, 0] = np.linalg.norm(links[lacking, 1:4], axis=1) / _REACH
-    return np.asarray(rigid + free @ (free.T @ mass.ravel()))
+    if np.any(lacking):
+        # the data gave a moment to a link that is described without mass, and do not determine
+        # its mass: a mass changes no torque if the parameters of links before it change as well
+        mass = np.zeros_like(links)
+        mass[lacking, 0] = np.linalg.norm(links[lacking, 1:4], axis=1) / _REACH
+        theta[:rigid] += free @ (free.T @ mass.ravel())
+    return arm.with_theta(theta)
 
 
 def linearised(

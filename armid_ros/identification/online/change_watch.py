@@ -345,7 +345,18 @@ class ChangeWatch:
         size = Estimate(found.best.parameters, values, covariance)
         change = Change(found.best, found.rivals, found.blocks[found.first].begin, size)
         yield from self._learn_again(found, change.reopened)
-        louder = yield from self._louder(found.blocks[found.after :], change.reopened.shape[1])
+        # A change shakes the arm, and the parameters were not learned from such motion: the
+        # covariance grows by the ratio of squared residuals to the usual ones.
+        squares = count = 0.0
+        for block in found.blocks[found.after :]:
+            rows, tau, weights = (np.stack(part) for part in zip(*block.samples, strict=True))
+            residual = self._estimator.scale(weights) * (tau - rows @ self._wider.values)
+            squares += float(np.sum((residual / self._residual_scale.value) ** 2))
+            count += float(np.sum(weights))
+            yield
+        louder, free = 1.0, change.reopened.shape[1]
+        if self._left and count > free:
+            louder = max(1.0, squares / (count - free) / float(np.median(self._left)))
         self.changes.append(
             replace(change, size=replace(size, covariance=louder * size.covariance))
         )
@@ -378,20 +389,6 @@ class ChangeWatch:
         yield from self._learn(self._wider, samples)
         own = [sample._replace(rows=sample.rows[:, : self._own]) for sample in samples]
         yield from self._learn(again, own)
-
-    def _louder(self, blocks: Sequence[Block], free: int) -> Pieces[float]:
-        """Return the ratio of squared residuals to the usual ones, at least 1."""
-        # A change shakes the arm, and the parameters were not learned from such motion.
-        squares = count = 0.0
-        for block in blocks:
-            rows, tau, weights = (np.stack(part) for part in zip(*block.samples, strict=True))
-            residual = self._estimator.scale(weights) * (tau - rows @ self._wider.values)
-            squares += float(np.sum((residual / self._residual_scale.value) ** 2))
-            count += float(np.sum(weights))
-            yield
-        if not self._left or count <= free:
-            return 1.0
-        return max(1.0, squares / (count - free) / float(np.median(self._left)))
 
 
 def _parts(items: Sequence[Item], size: int) -> Iterator[Sequence[Item]]:
