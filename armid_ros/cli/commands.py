@@ -45,8 +45,6 @@ COMMANDS = {
 
 #: Defaults of options, in the current folder.
 FILE = 'armid.toml'
-#: Exit code after Ctrl-C: 128 and the number of SIGINT.
-INTERRUPTED = 130
 #: Where the context keeps what is said on stderr when the work was done: an error is one line.
 NOTES = 'armid.notes'
 #: Where it keeps the arguments of the command as they were typed.
@@ -116,7 +114,7 @@ class Commands(click.Group):
             raise
         except KeyboardInterrupt:
             click.echo('armid: interrupted', err=True)
-            sys.exit(INTERRUPTED)
+            sys.exit(130)  # 128 and the number of SIGINT
         except ArmidError as error:
             click.echo(f'armid: {" ".join(str(error).split())}', err=True)
             sys.exit(2)

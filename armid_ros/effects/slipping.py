@@ -9,9 +9,6 @@ from dataclasses import dataclass
 from armid_ros.motion import FloatArray
 import numpy as np
 
-#: Share of the top speed of a motion below which a joint is at rest.
-_REST = 0.02
-
 
 @dataclass(frozen=True)
 class Hysteresis:
@@ -63,7 +60,7 @@ class Hysteresis:
         """
         way = q @ self.directions.T
         states = np.empty_like(way)
-        moves = np.abs(dq[0]) > _REST * np.abs(dq).max(axis=0)  # slower motion is sensor noise
+        moves = np.abs(dq[0]) > 0.02 * np.abs(dq).max(axis=0)  # slower motion is sensor noise
         states[0] = self.start(np.where(moves, dq[0], 0.0))
         for element, distance in enumerate(self.distance):
             own, state = way[:, element], states[:, element]

@@ -22,8 +22,6 @@ _OVERFIT = 1.3
 #: Condition numbers below which an excitation is good, as is the usual advice (Presse and Gautier
 #: 1993), and from which on it is weak.
 GOOD_CONDITION, WEAK_CONDITION = 100.0, 1000.0
-#: Joints that a sentence names; more are counted.
-_LISTED = 3
 #: Share of the lags outside their 99 % band from which a residual is far from white.
 COLOURED_SHARE = 0.25
 
@@ -170,7 +168,7 @@ def residual_trends(joints: Sequence[str], fits: Sequence[Fit]) -> tuple[str, ..
             if share > TELLING_SHARE:
                 depends.setdefault(key, []).append(name)
     parts = [
-        f'{key} ({", ".join(names) if len(names) <= _LISTED else f"{len(names)} joints"})'
+        f'{key} ({", ".join(names) if len(names) <= 3 else f"{len(names)} joints"})'
         for key, names in depends.items()
     ]
     text = f'The residual depends on {", ".join(parts)}: the model lacks an effect.'
