@@ -153,7 +153,6 @@ def _hull(points: FloatArray) -> coal.ConvexBase:
     if len(points) < 4:
         raise ValueError('fewer than four points')
     spread = np.linalg.svd(points - points.mean(axis=0), compute_uv=False)
-    # such points span no volume
     if spread[2] < 1e-5 * spread[0]:
         raise ValueError('points in a plane')
     corners = coal.StdVec_Vec3s()

@@ -132,8 +132,7 @@ class OnlineIdentifier:
             robot.prismatic,
             'qvt' if settings.measured_velocity else 'qt',
             torque_limit=robot.torque_limit,
-            # successive damaged samples; a longer deviation is real
-            max_gap=10,
+            max_gap=10,  # successive damaged samples; a longer deviation is real
             false_alarm_time=settings.false_alarm_time or FALSE_ALARM_TIME,
         )
         self._checks = StreamChecks(robot, self._gate)

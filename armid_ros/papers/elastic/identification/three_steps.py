@@ -116,9 +116,8 @@ def tune(
         [np.hstack([run.motor.dq[:count], run.link.dq[:count]]) for run in runs], axis=1
     )
     base = np.concatenate([unpack(start), start.coulomb])
-    # prior of the logarithms of factors, rows of unit standard deviation
+    # prior of the logarithms of the factors dl (7, 8) and dm (9, 10), rows of unit deviation
     prior = np.zeros((4, SIZE + 2))
-    # dl and dm of both joints are at 7 and 8, and at 9 and 10
     prior[[0, 1], [7, 8]], prior[[0, 1], [9, 10]] = 1.0 / _SPLIT, -1.0 / _SPLIT
     # the standard deviation of the logarithms of the Coulomb torques is 0.1
     prior[[2, 3], [SIZE, SIZE + 1]] = 10.0
