@@ -95,36 +95,33 @@ def judge(
     if held_out is not None and not steps:
         steps = ['The model can be used within the range of the held-out data.']
     return Judgement(
-        sentences=(_what(result), *_simulated(verification)),
+        sentences=tuple(_sentences(result, verification)),
         beware=tuple(text for text, _ in findings if text),
         next_steps=tuple(dict.fromkeys(steps)),
     )
 
 
-def _what(result: Identification) -> str:
+def _sentences(result: Identification, verification: Verification | None) -> Iterator[str]:
+    """Yield what was identified, and the position error when it is simulated."""
     robot = result.arm.robot
     effects = [name_in_words(effect.name) for effect in result.arm.effects]
     time = sum(float(fit.motion.t[-1] - fit.motion.t[0]) for fit in result.training)
     count = counted(result.base.rank, 'parameter')
     if result.base.rank < result.theory.rank:
         count = f'{result.base.rank} of the {counted(result.theory.rank, "parameter")}'
-    return (
+    yield (
         f'{count} of {robot.name} '
         f'({counted(robot.n_joints, "joint")}; rigid body'
         + ''.join(f', {effect}' for effect in effects)
         + f') identified from {time:.0f} s of motion.'
     )
-
-
-def _simulated(verification: Verification | None) -> list[str]:
-    if verification is None or not verification.forward:
-        return []
-    worst = max(verification.forward, key=lambda pair: float(pair.after.position_error.max()))
-    before = '' if worst.before is None else f'; with the description, {worst.before.worst}'
-    return [
-        f'Driven by the recorded torques, its position error is at most {worst.after.worst} rms'
-        f'{before}.'
-    ]
+    if verification is not None and verification.forward:
+        worst = max(verification.forward, key=lambda pair: float(pair.after.position_error.max()))
+        before = '' if worst.before is None else f'; with the description, {worst.before.worst}'
+        yield (
+            f'Driven by the recorded torques, its position error is at most {worst.after.worst} '
+            f'rms{before}.'
+        )
 
 
 def _of_errors(
