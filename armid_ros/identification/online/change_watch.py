@@ -283,7 +283,7 @@ class ChangeWatch:
     def _widened(self, rows: Sequence[Row]) -> Pieces[list[WeightedSample]]:
         """Return successive samples with the columns of all parameters."""
         samples: list[WeightedSample] = []
-        for part in _parts(rows, 3):
+        for part in _parts(rows, 3):  # rows in one piece of work
             own = np.stack([row.sample.rows for row in part])
             wide = np.concatenate([own, self._nuisance.columns(part)], axis=2)
             samples += [
