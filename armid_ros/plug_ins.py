@@ -33,8 +33,17 @@ def plug_ins(kind: str) -> dict[str, EntryPoint]:
     """
     from importlib.metadata import entry_points  # slow import, not needed to start core commands
 
-    found = entry_points(group=f'armid_ros.{kind}')
-    return {entry.name: entry for entry in found if _is_there(entry.module)}
+    found = {}
+    for entry in entry_points(group=f'armid_ros.{kind}'):
+        try:
+            there = find_spec(entry.module) is not None
+        except ModuleNotFoundError:
+            there = False
+        except Exception:  # importing the parent package fails: load_plug_in reports the error
+            there = True
+        if there:
+            found[entry.name] = entry
+    return found
 
 
 def load_plug_in(entry: EntryPoint) -> Any:
@@ -59,12 +68,3 @@ def load_plug_in(entry: EntryPoint) -> Any:
             f'{package}: {entry.value} cannot be loaded: {type(error).__name__}: {error}; repair '
             'or uninstall the package'
         ) from error
-
-
-def _is_there(module: str) -> bool:
-    try:
-        return find_spec(module) is not None
-    except ModuleNotFoundError:
-        return False
-    except Exception:  # importing the parent package fails: load_plug_in reports the error
-        return True

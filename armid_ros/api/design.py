@@ -188,7 +188,15 @@ def _searched(
         planner.free_start()  # raises before the search if no pose is free
     elif fault := planner.fault(start):
         raise TrajectoryError(f'--start: {fault}')
-    prior = _information(model, asked, earlier, rng) if earlier else None
+    prior = None
+    if earlier:  # information matrix of existing recordings
+        used = conditioning(list(earlier), SignalSettings())
+        problem = DesignProblem.of(model, asked, np.random.default_rng(rng))
+        prior = np.zeros(2 * [len(problem.base.parameters)])
+        for recording in earlier:
+            for motion in segments(recording, used):
+                rows = motion.select(slice(None, None, used.decimation))
+                prior += problem.information(rows, np.ptp(motion.t) * asked.rate).matrix
     found = design(
         model,
         asked,
@@ -208,17 +216,3 @@ def _limited(model: ArmModel, given: str | Path | Mapping[str, float]) -> ArmMod
     file = None if isinstance(given, Mapping) else given
     velocity = [f'{joint}:={limit}' for joint, limit in named.items()]
     return replace(model, robot=with_joint_limits(model.robot, file, velocity))
-
-
-def _information(
-    arm: ArmModel, settings: DesignSettings, recordings: Sequence[Recording], rng: Rng
-) -> FloatArray:
-    """Return the information matrix of existing recordings, shape (r, r)."""
-    used = conditioning(list(recordings), SignalSettings())
-    problem = DesignProblem.of(arm, settings, np.random.default_rng(rng))
-    matrix = np.zeros(2 * [len(problem.base.parameters)])
-    for recording in recordings:
-        for motion in segments(recording, used):
-            thinned = motion.select(slice(None, None, used.decimation))
-            matrix += problem.information(thinned, np.ptp(motion.t) * settings.rate).matrix
-    return matrix

@@ -235,28 +235,23 @@ class DiagnosisResult(ShownModel):
         if residual:
             progress(1.0, 'learning the residual')
             result = self.with_residual(seed)
-        result = result._with_simulations(progress)
+        if self.held_out and self.core.gap is not None:
+
+            def simulated() -> tuple[tuple[ForwardValidation, ...], tuple[str, ...]]:
+                used = conditioning(list(self.recordings), self.settings.signals)
+                return simulate_held_out(
+                    self.description, self.arm, used, self.held_out,
+                    progress=lambda _, what: progress(1.0, what),
+                )  # fmt: skip
+
+            found, why = _tried('simulation', simulated)
+            forward, left_out = found or ((), ())
+            result = replace(result, extras=replace(result.extras, forward=forward))
+            result = result._with_notes(*left_out, *why)
         progress(1.0, 'next run')
         run, why = _tried('next run', lambda: next_run(self.core, np.random.default_rng(seed)))
         extras = replace(result.extras, next_run=run, no_run='; '.join(why))
         return replace(result, extras=extras)
-
-    def _with_simulations(self, progress: Progress) -> DiagnosisResult:
-        """Simulate the held-out recordings, with the given and with the patched model."""
-        if not self.held_out or self.core.gap is None:
-            return self
-
-        def simulated() -> tuple[tuple[ForwardValidation, ...], tuple[str, ...]]:
-            used = conditioning(list(self.recordings), self.settings.signals)
-            return simulate_held_out(
-                self.description, self.arm, used, self.held_out,
-                progress=lambda _, what: progress(1.0, what),
-            )  # fmt: skip
-
-        found, why = _tried('simulation', simulated)
-        forward, left_out = found or ((), ())
-        extras = replace(self.extras, forward=forward)
-        return replace(self, extras=extras)._with_notes(*left_out, *why)
 
     def _with_notes(self, *notes: str) -> DiagnosisResult:
         return replace(self, extras=replace(self.extras, notes=(*self.extras.notes, *notes)))

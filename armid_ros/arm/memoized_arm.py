@@ -16,9 +16,6 @@ import numpy as np
 
 _Result = TypeVar('_Result')
 
-#: Memory of the cached regressors [bytes]; regressors beyond it are not kept.
-_MEMORY = 1_000_000_000
-
 
 @dataclass
 class _Regressor:
@@ -69,7 +66,8 @@ class _Memoized(ArmModel):
         key = *places, len(motion), tuple(self.body.gravity.tolist()), self.quasi_static
         if key not in self.regressors:
             used = sum(one.columns.nbytes for one in self.regressors.values())
-            if used + 10 * motion.q.nbytes * motion.n_joints > _MEMORY:
+            # memory of the cached regressors [bytes]; regressors beyond it are not kept
+            if used + 10 * motion.q.nbytes * motion.n_joints > 1_000_000_000:
                 return None
             self.regressors[key] = _Regressor(motion, regressor(self.body, self.felt(motion)))
         return self.regressors[key]

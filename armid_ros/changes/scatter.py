@@ -35,16 +35,8 @@ from scipy import optimize, special
 FEWEST = 4
 #: Number of neighbouring bags for the median, itself included, and z-score of an outlier.
 _WINDOW, _ODD = 5, 3.0
-#: Degrees of freedom of a variance from the median of n squares, over n.
-_EFFICIENCY = 0.37
 #: Smallest number of siblings with a bag on a day for an effect of that day.
 _SIBLINGS = 8
-#: Relative standard error of a variance from the median of n absolute deviations, times sqrt(n).
-_ERROR = 2.33
-#: Number of rounds of the median polish.
-_ROUNDS = 4
-#: Number of series with the same weight as the prior that scatter is not correlated over days.
-_EXPECTED = 10.0
 #: Prior degrees of freedom of the variances of arms if these do not differ.
 _ALIKE = 1e6
 
@@ -210,7 +202,7 @@ def _polished(group: Sequence[ParameterHistory]) -> list[FloatArray]:
     alike = bool(np.all(level * middle > 0.0))
     share = level / middle if alike else np.ones(len(level))
     common = np.zeros(len(arms_of_day))
-    for _ in range(_ROUNDS):
+    for _ in range(4):
         common = _medians((values - level[arm]) / share[arm], day)
         common[arms_of_day < _SIBLINGS] = 0.0
         level = _medians(values - share[arm] * common[day], arm)
@@ -232,7 +224,8 @@ def _spread(group: Sequence[ParameterHistory]) -> Spread:
     """Solve median(d^2 / (s_k^2 + s_k+1^2 + 2 t^2)) = median of chi^2 for t."""
     squares = np.concatenate([np.diff(one.values) ** 2 for one in group])
     stated = np.concatenate([one.std[1:] ** 2 + one.std[:-1] ** 2 for one in group])
-    freedom = max(1.0, _EFFICIENCY * len(squares))
+    # degrees of freedom of a variance from the median of n squares
+    freedom = max(1.0, 0.37 * len(squares))
     if not len(squares):
         return Spread(0.0, freedom)
 
@@ -260,7 +253,8 @@ def _alike(group: Sequence[ParameterHistory], found: Mapping[tuple[str, str], Sp
         return _ALIKE
     logs = np.log([_ratio(one, found[one.parameter]) for one in tested])
     own = [_trigamma(0.5 * _freedom(len(one.values))) for one in tested]
-    sure = 1.0 - _ERROR / np.sqrt(len(logs))
+    # relative standard error of a variance from the median of n absolute deviations
+    sure = 1.0 - 2.33 / np.sqrt(len(logs))
     beyond = sure * _robust_scale(logs) ** 2 - float(np.mean(own))
     return _inverse_trigamma(beyond)
 
@@ -321,7 +315,8 @@ def _lasting(
         trends.append(cut.trend**2)
     if not steps:
         return 1.0, 1.0
-    weight = len(steps) / (len(steps) + _EXPECTED)
+    # 10 series have the weight of the prior that scatter is not correlated over days
+    weight = len(steps) / (len(steps) + 10.0)
     step, trend = (
         max(1.0, float(np.median(squares)) / MEDIAN_SQUARE) ** (0.5 * weight)
         for squares in (steps, trends)

@@ -45,8 +45,6 @@ COMMANDS = {
 
 #: Defaults of options, in the current folder.
 FILE = 'armid.toml'
-#: Exit code after Ctrl-C: 128 and the number of SIGINT.
-INTERRUPTED = 130
 #: Key of the context for notes that stderr shows after the work; an error is one line.
 NOTES = 'armid.notes'
 #: Key of the context for the arguments of the command as they were typed.
@@ -116,7 +114,7 @@ class Commands(click.Group):
             raise
         except KeyboardInterrupt:
             click.echo('armid: interrupted', err=True)
-            sys.exit(INTERRUPTED)
+            sys.exit(130)  # 128 and the number of SIGINT
         except ArmidError as error:
             click.echo(f'armid: {" ".join(str(error).split())}', err=True)
             sys.exit(2)

@@ -166,7 +166,8 @@ def _of_some_size(text: str, robot: Robot) -> tuple[Effect, FloatArray]:
 
 def _tell_impossible(text: str, values: FloatArray, robot: Robot) -> None:
     """Warn of a payload that no body can be, or whose centre is beyond the arm's length."""
-    from armid_ros.model.pseudo_inertia import Consistency, PER_LINK
+    from armid_ros.model.pseudo_inertia import Consistency
+    from armid_ros.robots.robot import PER_LINK
     import numpy as np
 
     places = [placement.translation for placement in robot.model.jointPlacements]

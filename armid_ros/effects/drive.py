@@ -44,10 +44,10 @@ class RotorInertia(Effect):
         return Action(inertia=np.diag(inertia))
 
 
-#: Lowest order of a ripple [1/rev] (gravity has lower ones); factor by which fits exceed it.
-_SLOWEST, _EDGE = 1.5, 1.05
-#: Number of returned orders, of likely orders that are refined, and of finer steps per step.
-_MOST_PEAKS, _LIKELY, _FINER = 3, 12, 8
+#: Lowest order of a ripple [1/rev]; gravity has lower ones.
+_SLOWEST = 1.5
+#: Number of returned orders.
+_MOST_PEAKS = 3
 
 
 @dataclass(frozen=True)
@@ -90,7 +90,7 @@ class TorqueRipple(Effect):
 
     def plausible(self, values: FloatArray, std: FloatArray, arm: Arm) -> bool:
         """Return whether the order is above the lowest one, which other causes explain."""
-        return bool(np.all(self.shape_values > _EDGE * _SLOWEST))
+        return bool(np.all(self.shape_values > 1.05 * _SLOWEST))
 
     def columns(self, motion: Motion, arm: Arm) -> FloatArray:
         """Return dtau/d(A, B) = (sin(n q), cos(n q)) [-], shape (N, n, P)."""
@@ -136,9 +136,9 @@ def wave_orders(unexplained: Unexplained, joint: int, between: tuple[float, floa
     gain = wave_gains(angle, rest, scale, orders)
     padded = np.concatenate([[0.0], gain, [0.0]])
     peaks = np.flatnonzero((gain >= padded[:-2]) & (gain > padded[2:]))
-    likely = orders[peaks[np.argsort(-gain[peaks])[:_LIKELY]]]
+    likely = orders[peaks[np.argsort(-gain[peaks])[:12]]]
     likely = likely if len(likely) else orders[:1]
-    fine = likely[:, np.newaxis] + step * np.linspace(-1.0, 1.0, 2 * _FINER + 1)
+    fine = likely[:, np.newaxis] + step * np.linspace(-1.0, 1.0, 2 * 8 + 1)
     gain = wave_gains(angle, rest, scale, fine.ravel()).reshape(fine.shape)
     best = np.argsort(-gain.max(axis=1))[:_MOST_PEAKS]
     return np.resize(fine[best, np.argmax(gain[best], axis=1)], _MOST_PEAKS)

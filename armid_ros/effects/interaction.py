@@ -27,8 +27,6 @@ import numpy as np
 #: Positions and velocities of all k anchors [m, m/s] at times of shape (N,), each (N or 1, k, 3).
 Anchor = Callable[[FloatArray], tuple[FloatArray, FloatArray]]
 
-#: Assumed reach of a link from its joint if the arm has no other joint [m].
-_REACH = 1.0
 #: Distance below which a direction is undefined [m].
 _SHORTEST = 1e-12
 
@@ -53,7 +51,8 @@ class Attached(Effect):
         for row, joint in zip(values, self.joints, strict=True):
             lever = model.inertias[model.getJointId(joint)].lever
             away = float(np.linalg.norm(lever))
-            row[:3] = lever * min((reach or _REACH) / max(away, _SHORTEST), 1.0)
+            # the link of an arm without other joints has an assumed reach of 1 m
+            row[:3] = lever * min((reach or 1.0) / max(away, _SHORTEST), 1.0)
         return values
 
     def shape_starts(self, unexplained: Unexplained, arm: Arm) -> tuple[FloatArray, ...]:

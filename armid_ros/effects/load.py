@@ -103,7 +103,18 @@ class Payload(_LinkBody):
 
     def plausible(self, values: FloatArray, std: FloatArray, arm: Arm) -> bool:
         """Return whether a body can have the values, with its centre within the arm's length."""
-        return self._weighs(values, std, arm) and not self._is_no_body(values, std, arm)
+        if not self._weighs(values, std, arm):
+            return False
+        # the inertia of a body about the joint is at least that of a point mass at its centre
+        axis = arm.robot.geometry[self.indices(arm.robot.joints)[0]].turn
+        x, y, z = axis
+        share = np.array([x * x, 2.0 * x * y, y * y, 2.0 * x * z, 2.0 * y * z, z * z])
+        if not np.all(std[4:][share != 0.0] > 0.0) or not axis.any():  # noqa: RUF069 - exact zero from the description
+            return True
+        aside = np.linalg.norm(np.cross(axis, values[1:4])) - SURELY * np.linalg.norm(std[1:4])
+        most = share @ values[4:] + SURELY * np.abs(share) @ std[4:]
+        heaviest = np.maximum(values[0] + SURELY * std[0], 0.0)
+        return not most * heaviest < np.maximum(aside, 0.0) ** 2
 
     def _weighs(self, values: FloatArray, std: FloatArray, arm: Arm) -> bool:
         """Return whether a positive mass with a centre within the arm's length is possible."""
@@ -113,19 +124,6 @@ class Payload(_LinkBody):
         length = float(np.sum(np.linalg.norm(places, axis=1))) + _REACH
         heaviest = float(values[0] + SURELY * std[0])
         return bool(heaviest > 0.0 and np.linalg.norm(values[1:4]) < length * heaviest)
-
-    def _is_no_body(self, values: FloatArray, std: FloatArray, arm: Arm) -> bool:
-        """Return whether no body can have the values, as far as the motion identifies them."""
-        # its inertia about the joint is at least that of a point mass at its centre
-        axis = arm.robot.geometry[self.indices(arm.robot.joints)[0]].turn
-        x, y, z = axis
-        share = np.array([x * x, 2.0 * x * y, y * y, 2.0 * x * z, 2.0 * y * z, z * z])
-        if not np.all(std[4:][share != 0.0] > 0.0) or not axis.any():  # noqa: RUF069 - exact zero from the description
-            return False
-        aside = np.linalg.norm(np.cross(axis, values[1:4])) - SURELY * np.linalg.norm(std[1:4])
-        most = share @ values[4:] + SURELY * np.abs(share) @ std[4:]
-        heaviest = np.maximum(values[0] + SURELY * std[0], 0.0)
-        return bool(most * heaviest < np.maximum(aside, 0.0) ** 2)
 
     def spread(self, robot: Robot) -> FloatArray:
         """

@@ -32,8 +32,6 @@ _MIXED_UNITS = {
     '': ('1/m', 'm'),
 }
 
-#: Ratio of half width to value above which a confidence interval is uninformative.
-_SCALE_KNOWN = 3.0
 #: Number of standard deviations of a significant difference.
 SURELY = 3.0
 
@@ -138,7 +136,8 @@ class Shape:
             return False
         if self.lower >= 0.0:
             least = min((start for start in self.grid if start > 0.0), default=0.0)
-            return half_width <= _SCALE_KNOWN * max(value, least)
+            # a wider confidence interval is uninformative
+            return half_width <= 3.0 * max(value, least)
         span = max(self.grid, default=0.0) - min(self.grid, default=0.0)
         return span <= 0.0 or half_width <= span
 

@@ -9,9 +9,6 @@ from dataclasses import dataclass
 from armid_ros.motion import FloatArray
 import numpy as np
 
-#: Share of the top speed of a motion below which a joint is at rest.
-_REST = 0.02
-
 
 @dataclass(frozen=True)
 class Hysteresis:
@@ -63,7 +60,7 @@ class Hysteresis:
         """
         way = q @ self.directions.T
         states = np.empty_like(way)
-        moves = np.abs(dq[0]) > _REST * np.abs(dq).max(axis=0)  # slower motion is sensor noise
+        moves = np.abs(dq[0]) > 0.02 * np.abs(dq).max(axis=0)  # slower motion is sensor noise
         states[0] = self.start(np.where(moves, dq[0], 0.0))
         for element, distance in enumerate(self.distance):
             own, state = way[:, element], states[:, element]
@@ -93,12 +90,15 @@ class Hysteresis:
         by_state = (weights @ self.directions.T) * self.level
         by_way = np.zeros_like(way)
         for element in np.flatnonzero(by_state.any(axis=0)):
-            by_way[:, element] = _slip_pullback(
-                way[:, element],
-                states[:, element],
-                by_state[:, element],
-                float(self.distance[element]),
-            )
+            path, state, distance = way[:, element], states[:, element], self.distance[element]
+            # backwards, as the state of a stretch begins with that of the one before
+            for first, last, end in reversed(_stretches(path)):
+                own = slice(first + 1, last + 1)
+                decay = np.exp(-np.abs(path[own] - path[first]) / distance)
+                slope = by_state[own, element] * (end - state[own]) * end / distance
+                by_way[own, element] += slope
+                by_way[first, element] -= slope.sum()
+                by_state[first, element] += by_state[own, element] @ decay
         return np.asarray(by_way @ self.directions)
 
 
@@ -108,18 +108,3 @@ def _stretches(way: FloatArray) -> list[tuple[int, int, float]]:
     turns = np.flatnonzero(np.diff(step)) + 1
     ends = zip(np.append(0, turns), np.append(turns, len(step)), strict=True)
     return [(int(a), int(b), float(step[a])) for a, b in ends if b > a]
-
-
-def _slip_pullback(
-    way: FloatArray, state: FloatArray, by_state: FloatArray, distance: float
-) -> FloatArray:
-    """Convert derivatives by the states of one element to derivatives by its travel, both (N,)."""
-    by_way, by_state = np.zeros_like(way), by_state.copy()
-    for first, last, end in reversed(_stretches(way)):
-        own = slice(first + 1, last + 1)
-        decay = np.exp(-np.abs(way[own] - way[first]) / distance)
-        slope = by_state[own] * (end - state[own]) * end / distance
-        by_way[own] += slope
-        by_way[first] -= slope.sum()
-        by_state[first] += by_state[own] @ decay
-    return by_way

@@ -112,7 +112,30 @@ def load_yaml(text: str) -> Any:
         If the text is not YAML, is nested too deep, or has too many nodes with aliases expanded.
 
     """
-    _check_size(text)
+    # depth and number of nodes, from the events alone
+    open_nodes: list[tuple[str | None, int]] = []
+    sizes: dict[str | None, int] = {}  # of nodes with an anchor
+    total = 0
+    for event in yaml.parse(text, Loader=_Loader):
+        if isinstance(event, yaml.AliasEvent):
+            if event.anchor not in sizes:
+                raise ValueError(f"line {_line(event)}: the alias '{event.anchor}' has no anchor")
+            total += sizes[event.anchor]
+        elif isinstance(event, (yaml.SequenceStartEvent, yaml.MappingStartEvent)):
+            total += 1
+            open_nodes.append((event.anchor, total))
+            if len(open_nodes) > MAX_DEPTH:
+                raise ValueError(f'line {_line(event)}: nested more than {MAX_DEPTH} levels deep')
+        elif isinstance(event, (yaml.SequenceEndEvent, yaml.MappingEndEvent)):
+            anchor, begin = open_nodes.pop()
+            sizes[anchor] = total - begin + 1
+        elif isinstance(event, yaml.ScalarEvent):
+            total += 1
+            sizes[event.anchor] = 1
+        if total > MAX_NODES:
+            raise ValueError(
+                f'line {_line(event)}: more than {MAX_NODES} nodes with aliases expanded'
+            )
     return yaml.load(text, Loader=_Loader)
 
 
@@ -155,33 +178,6 @@ def load_json(text: str) -> Any:
 
     """
     return json.loads(text)
-
-
-def _check_size(text: str) -> None:
-    """Raise ValueError for a YAML text that is too deep or too large, from its events alone."""
-    open_nodes: list[tuple[str | None, int]] = []
-    sizes: dict[str | None, int] = {}  # of nodes with an anchor
-    total = 0
-    for event in yaml.parse(text, Loader=_Loader):
-        if isinstance(event, yaml.AliasEvent):
-            if event.anchor not in sizes:
-                raise ValueError(f"line {_line(event)}: the alias '{event.anchor}' has no anchor")
-            total += sizes[event.anchor]
-        elif isinstance(event, (yaml.SequenceStartEvent, yaml.MappingStartEvent)):
-            total += 1
-            open_nodes.append((event.anchor, total))
-            if len(open_nodes) > MAX_DEPTH:
-                raise ValueError(f'line {_line(event)}: nested more than {MAX_DEPTH} levels deep')
-        elif isinstance(event, (yaml.SequenceEndEvent, yaml.MappingEndEvent)):
-            anchor, begin = open_nodes.pop()
-            sizes[anchor] = total - begin + 1
-        elif isinstance(event, yaml.ScalarEvent):
-            total += 1
-            sizes[event.anchor] = 1
-        if total > MAX_NODES:
-            raise ValueError(
-                f'line {_line(event)}: more than {MAX_NODES} nodes with aliases expanded'
-            )
 
 
 def _line(event: yaml.Event) -> int:

@@ -98,8 +98,6 @@ GENERATOR = '<meta name="generator" content="armid_ros">'
 #: Pattern of message types in metadata.yaml, and message types of a bag with a planned motion.
 _KIND = re.compile(r'^ *type: *(\S+)', re.MULTILINE)
 _OF_A_PLAN = {'trajectory_msgs/msg/JointTrajectory', 'std_msgs/msg/String'}
-#: Size of the beginning of a file that contains its mark [bytes].
-_HEAD = 4096
 _MARK = re.compile(re.escape(GENERATOR).encode() + rb'|schema"?: *"?armid/[a-z_]+/[0-9]')
 #: Endings of files with a mark.
 _MARKED = ('.html', '.json', '.yaml', '.rviz', 'plotjuggler.xml')
@@ -356,6 +354,6 @@ def is_own(path: Path) -> bool:
         return False
     try:
         with open_regular(path, OutputError) as stream:
-            return _MARK.search(stream.read(_HEAD)) is not None
+            return _MARK.search(stream.read(4096)) is not None  # the beginning
     except (OutputError, OSError):
         return False

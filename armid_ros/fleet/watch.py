@@ -38,8 +38,6 @@ import numpy as np
 import pyarrow as pa
 import pyarrow.compute as pc
 
-#: Share of healthy arms among those named, in the long run.
-ALPHA = 0.05
 #: Name of the series of residuals: logarithms of their standard deviations.
 RESIDUAL = 'residual'
 
@@ -156,7 +154,7 @@ class Watch:
     alpha: float
 
 
-def watch_fleet(store: Store, alpha: float = ALPHA) -> Watch:
+def watch_fleet(store: Store, alpha: float = 0.05) -> Watch:
     """
     Test the results of a fleet for changes over time.
 

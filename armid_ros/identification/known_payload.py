@@ -33,8 +33,6 @@ import numpy as np
 import pinocchio as pin
 from scipy.stats import t as student
 
-#: Smallest share of the payload's squared torque that the columns of a joint do not explain.
-_APART = 1e-8
 #: Largest relative standard deviation of a gain that is determined.
 _SURE = 0.05
 
@@ -230,7 +228,8 @@ def _gain(
     # The coefficient of a column is that of its residual after the other columns (Frisch, Waugh).
     rest = known - columns @ np.linalg.lstsq(columns, known, rcond=1e-10)[0]
     size = float(rest @ rest)
-    if size <= _APART * float(known @ known):
+    # the columns of the joint explain the torque of the payload
+    if size <= 1e-8 * float(known @ known):
         return 1.0, np.inf, np.inf
     gain = float(rest @ tau) / size
     left = tau - gain * known

@@ -24,24 +24,17 @@ from armid_ros.motion import FloatArray
 from armid_ros.robots import NO_MASS, Robot
 from armid_ros.robots.description import MOVABLE, parse_xml
 from armid_ros.robots.geometry import all_in_one, collision_geometry
-from armid_ros.robots.robot import PARAMETERS_PER_BODY
+from armid_ros.robots.robot import PER_LINK
 import numpy as np
 
 #: Least and largest plausible density of a link within its shape [kg/m^3]: foam and steel.
 _DENSITIES = 30.0, 8000.0
-#: A position limit beyond three turns [rad] is probably not in rad.
-_TURNS = 6.0 * np.pi
-#: A velocity limit above this [rad/s], or a shape above this [m], has probably another unit.
-_FASTEST, _LONGEST = 50.0, 10.0
-#: Deviation from unit length that makes an axis doubtful; distance of a centre of mass from the
-#: box of its shapes that makes it doubtful, over the diagonal of the box.
-_ROUNDED, _OUTSIDE = 0.01, 1.0
+#: A shape above this [m] has probably another unit.
+_LONGEST = 10.0
 #: A fitted model whose torque error is smaller by less than this shows no wrong link [%].
 _MATERIAL = 1.0
 #: Share of the residual that a further link has to explain; chi-squared per row that may remain.
 _FURTHER, _REMAINS = 0.5, 10.0
-#: More wrong links than this cannot be distinguished from a wrong model.
-_MOST = 3
 #: A mass is determined if its standard deviation is below this share of the prior's.
 _DETERMINED = 0.1
 
@@ -126,9 +119,9 @@ def _of_joints(robot: Robot) -> Iterator[Remark]:
         if robot.prismatic[k]:
             continue
         reach = max(-robot.lower[k], robot.upper[k])
-        if _TURNS < reach < np.inf:
+        if 6.0 * np.pi < reach < np.inf:  # three turns
             yield Remark('bad', f"joint '{name}': limit {reach:g} rad; is it in degrees?")
-        if _FASTEST < robot.velocity_limit[k] < np.inf:
+        if 50.0 < robot.velocity_limit[k] < np.inf:
             fast = f"joint '{name}': velocity limit {robot.velocity_limit[k]:g} rad/s"
             yield Remark('doubt', f'{fast}; is it in degrees per second?')
     for joint in parse_xml(robot.urdf).iter('joint'):
@@ -136,7 +129,7 @@ def _of_joints(robot: Robot) -> Iterator[Remark]:
         if axis is None or joint.get('type') not in MOVABLE:
             continue
         length = float(np.linalg.norm([float(x) for x in axis.get('xyz', '').split()]))
-        if abs(length - 1.0) > _ROUNDED:
+        if abs(length - 1.0) > 0.01:
             yield Remark(
                 'doubt', f"joint '{joint.get('name')}': its axis has length {length:.3g}, not 1"
             )
@@ -182,7 +175,7 @@ def _of_centre(link: str, centre: FloatArray, corners: Sequence[FloatArray]) -> 
         return
     low, high = np.min(corners, axis=0), np.max(corners, axis=0)
     outside = float(np.linalg.norm(centre - np.clip(centre, low, high)))
-    if outside > _OUTSIDE * np.linalg.norm(high - low):
+    if outside > np.linalg.norm(high - low):  # the diagonal of the box
         yield Remark('doubt', f"link '{link}': centre of mass {outside:.3g} m outside its shape")
 
 
@@ -201,7 +194,7 @@ def check_links(found: Identification, described: ArmModel, grade: str, fault: s
         Grade of the identification, and the fault of the recording if there is one.
 
     """
-    robot, size = described.robot, PARAMETERS_PER_BODY
+    robot, size = described.robot, PER_LINK
     rigid = size * robot.n_joints
     difference = found.estimate.values - found.base.values(described.theta)
     factor = np.linalg.cholesky(found.estimate.covariance)
@@ -270,10 +263,11 @@ def _errors(found: Identification, described: ArmModel) -> tuple[float, float]:
 
 def _selected(rows: FloatArray, spread: FloatArray, total: float) -> list[int]:
     """Return the wrong links by forward selection, without a link that became redundant."""
-    every = range(len(spread) // PARAMETERS_PER_BODY)
+    every = range(len(spread) // PER_LINK)
     wrong: list[int] = []
     rest = total
-    while len(wrong) < min(_MOST, len(every)) and rest > _REMAINS * len(rows):
+    # more wrong links cannot be distinguished from a wrong model
+    while len(wrong) < min(3, len(every)) and rest > _REMAINS * len(rows):
         left = {k: _fit(rows, spread, [*wrong, k])[2] for k in every if k not in wrong}
         best = min(left, key=left.__getitem__)
         if left[best] > (1.0 - _FURTHER) * rest:
@@ -290,7 +284,7 @@ def _fit(
     rows: FloatArray, spread: FloatArray, links: Sequence[int]
 ) -> tuple[FloatArray, FloatArray, float]:
     """Return change, covariance and remaining chi-squared of links that may be wrong."""
-    size = PARAMETERS_PER_BODY
+    size = PER_LINK
     own = [size * k + i for k in links for i in range(size)]
     columns, target = rows[:, own] * spread[own], rows[:, -1]
     inverse = np.linalg.inv(columns.T @ columns + np.eye(len(own)))

@@ -15,6 +15,7 @@ from armid_ros.identification.assess.grade_limits import LIMITS
 from armid_ros.identification.assess.sensor_faults import held_elsewhere, velocity_ratio
 from armid_ros.identification.rows.checks import FOLLOWS, torque_factors
 from armid_ros.identification.rows.period import find_period, mean_change, parabola_minimum
+from armid_ros.identification.rows.regression import REST_SPEED
 from armid_ros.motion import FloatArray
 from armid_ros.recording import Recording
 from armid_ros.recording.recording import GAP_PERIODS
@@ -23,8 +24,6 @@ from armid_ros.robots import Robot
 import numpy as np
 from scipy.signal import savgol_filter
 
-#: A joint slower than this share of its own top speed is at rest.
-_REST = 0.02
 #: A joint whose range is smaller than this is at rest [rad or m].
 STILL = 1e-3
 
@@ -154,7 +153,7 @@ def joint_facts(recording: Recording) -> tuple[JointFacts, ...]:
         zip(recording.joints, *velocity_ratio(recording), strict=True)
     ):
         q, top = recording.q[:, j], float(np.percentile(speeds[:, j], 99))
-        moves = speeds[:, j] > _REST * max(top, 1e-12)
+        moves = speeds[:, j] > REST_SPEED * max(top, 1e-12)
         changes = np.abs(np.diff(q))
         still = float(np.ptp(q)) < STILL
         tau = None if recording.tau is None else recording.tau[:, j]

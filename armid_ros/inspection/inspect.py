@@ -25,11 +25,6 @@ import numpy as np
 SCHEMA = 'armid/inspection/1'
 Weight = Literal['bad', 'doubt', 'note']
 
-#: Positions of an arm beyond two turns [rad] are probably not in rad.
-_TURNS = 4.0 * np.pi
-#: If the sampling period varies by more than this share, derivatives are inaccurate.
-_JITTER = 0.2
-
 
 @dataclass(frozen=True)
 class Remark:
@@ -236,7 +231,8 @@ def _of_time(recording: Recording, sampling: Sampling) -> Iterator[Remark]:
             f'{sampling.gaps} {"gap" if sampling.gaps == 1 else "gaps"} in time, the longest '
             f'{sampling.longest_step:.3g} s; segments between gaps are filtered separately',
         )
-    if sampling.jitter > _JITTER:
+    # with more jitter, derivatives are inaccurate
+    if sampling.jitter > 0.2:
         yield Remark(
             'doubt',
             f'steps between samples vary by {100 * sampling.jitter:.0f} %; velocities and '
@@ -259,7 +255,7 @@ def _of_units(
     turned = [
         joint
         for k, joint in enumerate(joints)
-        if max(abs(joint.lower), abs(joint.upper)) > _TURNS
+        if max(abs(joint.lower), abs(joint.upper)) > 4.0 * np.pi  # two turns
         and not (robot is not None and robot.prismatic[k])
     ]
     if turned:

@@ -29,13 +29,7 @@ import numpy.typing as npt
 #: Part of a unit column beyond the kept columns, below which it is dependent. It is 1e-15 to 1e-13
 #: for dependent columns, by rounding, and rarely below 1e-5 for independent ones.
 RANK_TOLERANCE = 1e-9
-#: Smallest factor that a name states. Angles rounded to four digits make factors of 4e-6.
-_NAMED = 1e-5
 
-
-#: Share of gravity across an axis below which gravity counts as along the axis, as angles of a
-#: description are rounded.
-_ROUNDED = 2e-3
 
 #: Order in which the parameters of a link are kept: inertia first, mass last, so that masses are
 #: grouped with moments, and moments of later links with those of earlier ones.
@@ -222,7 +216,7 @@ def levelled(robot: Robot) -> Robot:
     """
     turn = robot.model.jointPlacements[1].rotation
     own = turn.T @ robot.gravity
-    across = np.abs(own) < _ROUNDED * np.linalg.norm(own)
+    across = np.abs(own) < 2e-3 * np.linalg.norm(own)
     return robot.with_gravity(turn @ np.where(across, 0.0, own)) if np.any(own[across]) else robot
 
 
@@ -258,7 +252,8 @@ def _expression(row: FloatArray, leader: int, standard: tuple[ParameterName, ...
     """Format a grouping with equal factors in front of their sum."""
     text = standard[leader].name
     factors: dict[float, list[tuple[float, str]]] = {}
-    for column in np.flatnonzero(np.abs(row) >= _NAMED):
+    # angles rounded to four digits make factors of 4e-6
+    for column in np.flatnonzero(np.abs(row) >= 1e-5):
         if column != leader:
             factor = float(f'{abs(row[column]):.6g}')
             sign = float(np.sign(row[column]))

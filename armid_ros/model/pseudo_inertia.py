@@ -18,11 +18,9 @@ from dataclasses import dataclass
 from armid_ros.errors import ModelError
 from armid_ros.motion import FloatArray
 from armid_ros.robots import NO_MASS
+from armid_ros.robots.robot import PER_LINK
 import numpy as np
 import numpy.typing as npt
-
-#: Number of inertial parameters of a link; their order is ``LINK_PARAMETERS``.
-PER_LINK = 10
 
 
 def _basis() -> FloatArray:

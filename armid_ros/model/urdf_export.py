@@ -17,21 +17,19 @@ from xml.dom import expatbuilder, minidom
 from armid_ros.errors import ModelError
 from armid_ros.model.pseudo_inertia import (
     Consistency,
-    PER_LINK,
     pseudo_inertia,
     require_consistent,
 )
 from armid_ros.motion import FloatArray
 from armid_ros.robots import Robot, robot_from_urdf
 from armid_ros.robots.meshes import find_mesh
+from armid_ros.robots.robot import PER_LINK
 import numpy as np
 import pinocchio as pin
 import scipy.linalg
 
 #: Least share of a body's pseudo-inertia, in any direction, that its own link keeps.
 LEAST_SHARE = 0.05
-#: Largest error of the parameters when the file is read again, over the largest parameter.
-ROUNDING = 1e-11
 
 
 def export_urdf(
@@ -211,7 +209,7 @@ def _check(robot: Robot, urdf: str) -> None:
     found, wanted = _parameters(robot, urdf), robot.rigid_parameters.reshape(-1, PER_LINK)
     worst = np.max(np.abs(found - wanted), axis=1)
     scale = float(np.max(np.abs(wanted)))
-    if np.any(worst > ROUNDING * scale):
+    if np.any(worst > 1e-11 * scale):
         link = robot.links[int(np.argmax(worst))]
         raise ModelError(
             f"{robot.name}: the exported description has other parameters of link '{link}' when "

@@ -24,8 +24,8 @@ import numpy as np
 import pinocchio as pin
 from scipy.spatial import ConvexHull
 
-#: Size of one pose of a strip and of a single drawing [px], and space around it [m].
-_POSE, _SINGLE, _MARGIN = (190.0, 230.0), (300.0, 240.0), 0.03
+#: Space around a drawing [m].
+_MARGIN = 0.03
 #: Corners of the outline of a ball.
 _ROUND = 16
 #: Colour of what stands around the arm.
@@ -111,7 +111,7 @@ def draw_poses(
     last = max(solids, key=lambda solid: solid.joint)
     middle = last.points.mean(axis=0)
     track = np.array([flat(CORNER, _frames(model, q)[last.joint].act(middle)) for q in way])
-    strip = _strip(solids, frames, _POSE, track)
+    strip = _strip(solids, frames, (190.0, 230.0), track)
     bodies = []
     for solid, points in _outlines(solids, frames, strip):
         share = round(100.0 * solid.joint / collision.robot.n_joints)
@@ -160,7 +160,7 @@ def draw_arm(
     tried = [[_frames(model, pose)] for pose in poses]
     seen = [np.array([flat(CORNER, one.translation) for one in frames]) for (frames,) in tried]
     frames = tried[int(np.argmax([np.prod(np.ptp(one, axis=0) + _POINT) for one in seen]))]
-    strip = _strip(solids, frames, _SINGLE)
+    strip = _strip(solids, frames, (300.0, 240.0))
     bodies = []
     for solid, points in _outlines(solids, frames, strip):
         chosen = solid.joint > 0 and robot.joints[solid.joint - 1] in marked

@@ -26,9 +26,6 @@ import numpy.typing as npt
 Role = Literal['measured', 'predicted', 'residual', 'before', 'after', 'floor', 'trend', 'faint']
 Kind = Literal['line', 'trend', 'points', 'sticks', 'band']
 
-#: Samples of a series beyond which the extremes of equal stretches stand for all.
-MOST_SAMPLES = 3000
-
 
 @dataclass(frozen=True)
 class Series:
@@ -136,7 +133,7 @@ class Chart(Templated):
         return script_json(data)
 
 
-def thinned(*series: npt.ArrayLike, most: int = MOST_SAMPLES) -> npt.NDArray[np.intp]:
+def thinned(*series: npt.ArrayLike, most: int = 3000) -> npt.NDArray[np.intp]:
     """
     Thin samples so that the curve looks the same.
 

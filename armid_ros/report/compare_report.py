@@ -4,14 +4,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from math import inf
 
 from armid_ros.identification.assess.comparison import (
     Comparison,
-    GroupChange,
     ParameterChange,
-    ResidualChange,
 )
 from armid_ros.identification.fitting.identifiability import excludes_zero, HALF_WIDTH
 from armid_ros.identification.parameters_file import ParameterFile
@@ -122,8 +120,7 @@ def tell(comparison: Comparison) -> tuple[str, ...]:
         *(_unusable(one) for one in comparison.unusable),
         *([] if comparison.load is None else _load(comparison)),
         _sum(comparison),
-        *(_residual(one) for one in comparison.changed_residuals),
-        *([_why_left(comparison)] if comparison.changed_residuals else []),
+        *_residuals(comparison),
         *_tell_not_compared(comparison),
         *_details(comparison),
     )
@@ -167,7 +164,13 @@ def _details(comparison: Comparison) -> Sequence[str]:
     if not comparison.anything:
         return [_least_visible(comparison.changes)]
     changed = comparison.changed
-    told = [_together(group) for group in comparison.changed_together]
+    told = []
+    for group in comparison.changed_together:
+        what = f'Effects at {group.joint}' if group.joint else 'The rigid body'
+        told.append(
+            f'{what} changed as a group (p = {group.p_value:.1g}), though none of its '
+            f'{len(group.parameters)} parameters alone is significant.'
+        )
     rigid = [c for c in changed if c.parameter.rigid]
     if comparison.load is None and len(rigid) >= 3 and len(rigid) > len(changed) - len(rigid):
         last = rigid[0].parameter.joint
@@ -185,24 +188,24 @@ def _unusable(one: ParameterFile) -> str:
     return f'{one.source} is unusable: {reason}. Run armid diagnose to find what the model lacks.'
 
 
-def _residual(change: ResidualChange) -> str:
-    errors = change.before_error, change.after_error
-    ranks = ('second', 'first') if change.ratio > 1.0 else ('first', 'second')
-    times = change.ratio if change.ratio > 1.0 else 1.0 / change.ratio if change.ratio else inf
-    said = ''
-    if errors[0] is not None and errors[1] is not None:
-        said = f' ({digits(errors[0])} and {digits(errors[1])} % of the torque)'
-    return (
-        f'{change.joint}: the residual of the {ranks[0]} model is {digits(times)} times that of '
-        f'the {ranks[1]}{said}.'
-    )
-
-
-def _why_left(comparison: Comparison) -> str:
-    """Return the possible reason of residuals that differ."""
-    if any(one.why == 'effect' for one in comparison.not_compared):
-        return 'The models have different effects, which may be the reason.'
-    return 'No parameter of either model explains that.'
+def _residuals(comparison: Comparison) -> Iterator[str]:
+    """Yield a sentence for each residual that differs, and the possible reason."""
+    for change in comparison.changed_residuals:
+        errors = change.before_error, change.after_error
+        ranks = ('second', 'first') if change.ratio > 1.0 else ('first', 'second')
+        times = change.ratio if change.ratio > 1.0 else 1.0 / change.ratio if change.ratio else inf
+        said = ''
+        if errors[0] is not None and errors[1] is not None:
+            said = f' ({digits(errors[0])} and {digits(errors[1])} % of the torque)'
+        yield (
+            f'{change.joint}: the residual of the {ranks[0]} model is {digits(times)} times that '
+            f'of the {ranks[1]}{said}.'
+        )
+    if comparison.changed_residuals:
+        if any(one.why == 'effect' for one in comparison.not_compared):
+            yield 'The models have different effects, which may be the reason.'
+        else:
+            yield 'No parameter of either model explains that.'
 
 
 def _load(comparison: Comparison) -> tuple[str, str]:
@@ -230,14 +233,6 @@ def _load(comparison: Comparison) -> tuple[str, str]:
     return (
         f'A load of {mass} kg {verb} {named[0]}{rivals}.',
         f'{where}It explains every change of the inertial parameters.',
-    )
-
-
-def _together(group: GroupChange) -> str:
-    what = f'Effects at {group.joint}' if group.joint else 'The rigid body'
-    return (
-        f'{what} changed as a group (p = {group.p_value:.1g}), though none of its '
-        f'{len(group.parameters)} parameters alone is significant.'
     )
 
 

@@ -52,8 +52,6 @@ from armid_ros.report.sections.fit import ZOOM
 from armid_ros.robots import Robot
 import numpy as np
 
-_SAMPLES, _POSES, _WAY = 600, 6, 150
-
 
 def excitation_report(
     design: Design,
@@ -92,7 +90,7 @@ def excitation_report(
 
     """
     excitation, limits = design.excitation, design.limits
-    motion = run.at(np.linspace(0.0, run.duration, _SAMPLES))
+    motion = run.at(np.linspace(0.0, run.duration, 600))
     collision, obstacles = scene.collision, scene.obstacles
     motion = replace(motion, tau=arm.joint_torque(motion))
     shares = design.limits_used(arm)
@@ -105,12 +103,13 @@ def excitation_report(
         if len(model.geometry.collisionPairs)
     }
     said = (*collision.notes, *filter(None, [collision.excluded]))
-    instants = excitation.run_in + np.arange(_POSES) * excitation.trajectory.period / _POSES
+    # six poses of a period
+    instants = excitation.run_in + np.arange(6) * excitation.trajectory.period / 6
     poses = draw_poses(
         with_obstacles(collision, obstacles),
         excitation.at(instants).q,
         [f'{t:.1f} s' for t in instants],
-        excitation.trajectory.one_period(_WAY).q,
+        excitation.trajectory.one_period(150).q,
     )
     colours = [
         ('residual', 'the arm, bluer towards its end'),
@@ -199,21 +198,17 @@ def identifiable(design: Design, links: Sequence[str]) -> list[str]:
     size = np.abs(design.described)
     sure, known = int(np.sum(std <= 0.1 * size)), int(np.sum(size > 0.0))
     small = '; the others hardly change the torque' * (sure < known)
+    word = 'good'
+    if information.condition >= GOOD_CONDITION:
+        word = 'fair' if information.condition < WEAK_CONDITION else 'weak'
+        word += f'; below {GOOD_CONDITION:g} is good'
     return [
         f'All {len(names)} parameters can be identified (condition number '
-        f'{plain(information.condition)}: {_conditioning(information.condition)}).',
+        f'{plain(information.condition)}: {word}).',
         f'{sure} of {known} described parameters will be known to 10 %{small}. The least accurate '
         f'will be {full_label(names[worst], links)}: ± {digits(float(std[worst]))} '
         f'{pretty(names[worst].unit)}.',
     ]
-
-
-def _conditioning(condition: float) -> str:
-    """Describe a condition number by the usual limits."""
-    word = 'good' if condition < GOOD_CONDITION else 'weak'
-    if GOOD_CONDITION <= condition < WEAK_CONDITION:
-        word = 'fair'
-    return word if word == 'good' else f'{word}; below {GOOD_CONDITION:g} is good'
 
 
 def _asked(

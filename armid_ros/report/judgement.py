@@ -22,8 +22,6 @@ _OVERFIT = 1.3
 #: Condition numbers below which an excitation is good, as is the usual advice (Presse and Gautier
 #: 1993), and from which on it is weak.
 GOOD_CONDITION, WEAK_CONDITION = 100.0, 1000.0
-#: Joints that a sentence names; more are counted.
-_LISTED = 3
 #: Share of the lags outside their 99 % band from which a residual is far from white.
 COLOURED_SHARE = 0.25
 
@@ -77,6 +75,11 @@ def judge(
     training = Score.of(result.training)
     fits = [fit for part in validation.values() for fit in part]
     held_out = Score.of(fits) if fits else None
+    # of a physical certificate only active constraints and its notes
+    told = set()
+    if result.physical is not None:
+        given = result.physical
+        told = set(given.sentences()) - set(given.activity) - set(given.notes)
     findings: list[Caution] = [
         *(
             (f'{recording.source or "A recording"}: {recording.report.describe()}', '')
@@ -86,51 +89,39 @@ def judge(
         *_of_errors(result, training, held_out),
         *_of_residuals(result, fits or result.training),
         *([] if verification is None else _of_verification(verification)),
-        *((note[0].upper() + note[1:] + '.', '') for note in _notes(result)),
+        *((note[0].upper() + note[1:] + '.', '') for note in result.notes if note not in told),
     ]
     steps = [step for _, step in findings if step]
     if held_out is not None and not steps:
         steps = ['The model can be used within the range of the held-out data.']
     return Judgement(
-        sentences=(_what(result), *_simulated(verification)),
+        sentences=tuple(_sentences(result, verification)),
         beware=tuple(text for text, _ in findings if text),
         next_steps=tuple(dict.fromkeys(steps)),
     )
 
 
-def _notes(result: Identification) -> list[str]:
-    """Return the notes; of a physical certificate only active constraints and its notes."""
-    given = result.physical
-    if given is None:
-        return list(result.notes)
-    said = set(given.sentences()) - set(given.activity) - set(given.notes)
-    return [note for note in result.notes if note not in said]
-
-
-def _what(result: Identification) -> str:
+def _sentences(result: Identification, verification: Verification | None) -> Iterator[str]:
+    """Yield what was identified, and the position error when it is simulated."""
     robot = result.arm.robot
     effects = [name_in_words(effect.name) for effect in result.arm.effects]
     time = sum(float(fit.motion.t[-1] - fit.motion.t[0]) for fit in result.training)
     count = counted(result.base.rank, 'parameter')
     if result.base.rank < result.theory.rank:
         count = f'{result.base.rank} of the {counted(result.theory.rank, "parameter")}'
-    return (
+    yield (
         f'{count} of {robot.name} '
         f'({counted(robot.n_joints, "joint")}; rigid body'
         + ''.join(f', {effect}' for effect in effects)
         + f') identified from {time:.0f} s of motion.'
     )
-
-
-def _simulated(verification: Verification | None) -> list[str]:
-    if verification is None or not verification.forward:
-        return []
-    worst = max(verification.forward, key=lambda pair: float(pair.after.position_error.max()))
-    before = '' if worst.before is None else f'; with the description, {worst.before.worst}'
-    return [
-        f'Driven by the recorded torques, its position error is at most {worst.after.worst} rms'
-        f'{before}.'
-    ]
+    if verification is not None and verification.forward:
+        worst = max(verification.forward, key=lambda pair: float(pair.after.position_error.max()))
+        before = '' if worst.before is None else f'; with the description, {worst.before.worst}'
+        yield (
+            f'Driven by the recorded torques, its position error is at most {worst.after.worst} '
+            f'rms{before}.'
+        )
 
 
 def _of_errors(
@@ -174,7 +165,7 @@ def residual_trends(joints: Sequence[str], fits: Sequence[Fit]) -> tuple[str, ..
             if share > TELLING_SHARE:
                 depends.setdefault(key, []).append(name)
     parts = [
-        f'{key} ({", ".join(names) if len(names) <= _LISTED else f"{len(names)} joints"})'
+        f'{key} ({", ".join(names) if len(names) <= 3 else f"{len(names)} joints"})'
         for key, names in depends.items()
     ]
     text = f'The residual depends on {", ".join(parts)}: the model lacks an effect.'

@@ -26,8 +26,6 @@ import numpy as np
 
 #: Share of a joint's residual that one variable explains, from which there is something to find.
 TELLING_SHARE = 0.15
-#: Two-sided 99 % point of the normal distribution.
-POINT_99 = 2.576
 
 
 @dataclass(frozen=True)
@@ -104,7 +102,8 @@ class Whiteness:
                 products[lag] += residual[lag:] @ residual[: max(0, len(residual) - lag)]
         correlation = products[1:] / max(float(products[0]), 1e-300)
         lag_times = np.asarray(period * np.arange(1, len(products)))
-        return Whiteness(lag_times, correlation, POINT_99 / np.sqrt(max(count, 1)))
+        # two-sided 99 % point of the normal distribution
+        return Whiteness(lag_times, correlation, 2.576 / np.sqrt(max(count, 1)))
 
 
 def torque_scale(result: Identification) -> FloatArray:

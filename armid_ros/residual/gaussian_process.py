@@ -23,11 +23,6 @@ import numpy.typing as npt
 #: Bounds of the length scales, as shares of the span of an input; an input at the upper bound is
 #: irrelevant.
 _LENGTHS = (0.02, 10.0)
-#: Bounds of the amplitude, relative to the root mean square of the residual. The upper bound
-#: limits the torque outside the data.
-_AMPLITUDES = (0.1, 2.0)
-#: Bounds of the noise variance of a cell, relative to the mean square of the residual.
-_NOISES = (1e-6, 2.0)
 
 
 class _Cells(NamedTuple):
@@ -113,9 +108,11 @@ def _fitted(cells: _Cells, knee: float) -> tuple[float, _Scales]:
     from sklearn.gaussian_process import GaussianProcessRegressor, kernels
 
     size = max(float(np.sqrt(np.mean(cells.torque**2))), 1e-12)
-    amplitudes = tuple(one**2 for one in _AMPLITUDES)
+    # bounds relative to the residual; the upper one limits the torque outside the data
+    amplitudes = tuple(one**2 for one in (0.1, 2.0))
     smooth = kernels.ConstantKernel(1.0, amplitudes) * kernels.RBF([0.3, 0.3, 1.0], _LENGTHS)
-    regressor = GaussianProcessRegressor(smooth + kernels.WhiteKernel(0.1, _NOISES))
+    # bounds of the noise variance of a cell, over the mean square of the residual
+    regressor = GaussianProcessRegressor(smooth + kernels.WhiteKernel(0.1, (1e-6, 2.0)))
     points = counted(cells.points, knee)
     span = _span(points)
     # a hundred points are enough for the scales; cells are in no order

@@ -24,7 +24,7 @@ from armid_ros.residual.law import Law
 from markupsafe import Markup
 import numpy as np
 
-_POSITIVE, _NEGATIVE, _UNSURE = (0.0, 0.447, 0.698), (0.835, 0.369, 0.0), (0.5, 0.5, 0.5)
+_POSITIVE, _NEGATIVE = (0.0, 0.447, 0.698), (0.835, 0.369, 0.0)
 
 
 @dataclass(frozen=True)
@@ -145,7 +145,7 @@ def _pictures(one: JointResidual, unit: str, length: str) -> list[tuple[str, str
         ),
         (
             f'{one.joint}: standard deviation (shaded: large; {unsure} far from data)',
-            image_data(np.broadcast_to(_UNSURE, (*std.shape, 3)), std / one.learned.amplitude),
+            image_data(np.broadcast_to(0.5, (*std.shape, 3)), std / one.learned.amplitude),
             'Standard deviation of that torque',
         ),
     )

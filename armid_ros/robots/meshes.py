@@ -27,7 +27,6 @@ import numpy as np
 import numpy.typing as npt
 
 GROWTH = 1.1  # largest accepted ratio of the volume of a hull to the volume that it replaces
-FLAT = 1e-5  # thickness over length of points that span no volume
 NO_VOLUME = (RuntimeError, ValueError)  # errors that qhull raises for degenerate points
 
 
@@ -154,7 +153,7 @@ def _hull(points: FloatArray) -> coal.ConvexBase:
     if len(points) < 4:
         raise ValueError('fewer than four points')
     spread = np.linalg.svd(points - points.mean(axis=0), compute_uv=False)
-    if spread[2] < FLAT * spread[0]:
+    if spread[2] < 1e-5 * spread[0]:
         raise ValueError('all points lie in one plane')
     corners = coal.StdVec_Vec3s()
     corners.extend(list(points))

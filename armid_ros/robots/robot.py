@@ -17,7 +17,8 @@ import numpy.typing as npt
 import pinocchio as pin
 
 GRAVITIES = {'earth': (0.0, 0.0, -9.81), 'moon': (0.0, 0.0, -1.62)}
-PARAMETERS_PER_BODY = 10
+#: Number of inertial parameters of a link.
+PER_LINK = 10
 
 #: A mass [kg] or a first moment [kg m] below this counts as zero. Each BLAS kernel rounds
 #: differently; a first moment of 1 kg m over more mass than this keeps the inertia about its
@@ -221,14 +222,14 @@ class Robot:
 
         """
         pi = np.asarray(parameters, dtype=np.float64)
-        expected = (PARAMETERS_PER_BODY * self.n_joints,)
+        expected = (PER_LINK * self.n_joints,)
         if pi.shape != expected or not np.all(np.isfinite(pi)):
             raise RobotError(
                 f'{self.name}: rigid parameters have to be {expected[0]} finite numbers, '
                 f'not an array of shape {pi.shape}'
             )
         model, place = self.model.copy(), self.path or self.name
-        for body, values in enumerate(pi.reshape(self.n_joints, PARAMETERS_PER_BODY)):
+        for body, values in enumerate(pi.reshape(self.n_joints, PER_LINK)):
             model.inertias[body + 1] = _inertia(f"{place}: link '{self.links[body]}'", values)
         return replace(self, model=model)
 

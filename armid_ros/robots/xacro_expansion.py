@@ -125,32 +125,26 @@ def package_folders(
     around = [] if file is None else list(file.resolve().parents)
     path = [Path(part) for part in _paths('ROS_PACKAGE_PATH')]
     for root in (*around, *path):
-        yield from (folder for folder in _below(root, name) if _is_package(folder, name))
+        yield from _packages(root, name)
     yield from (Path(prefix) / 'share' / name for prefix in _paths('AMENT_PREFIX_PATH'))
     yield from (root / name for root in (*around, *path, *(root.parent for root in path)))
 
 
-def _below(root: Path, name: str) -> Iterator[Path]:
-    """Yield a folder, its subfolders, and folders of the given name one level deeper."""
-    yield root
-    if root == root.parent:
-        return
-    try:
-        inside = sorted(entry.path for entry in os.scandir(root) if entry.is_dir())
-    except OSError:
-        return
-    yield root / name
-    yield from map(Path, inside)
-    yield from (Path(folder) / name for folder in inside)
-
-
-def _is_package(folder: Path, name: str) -> bool:
-    try:
-        text = (folder / 'package.xml').read_text(encoding='utf-8', errors='replace')
-    except OSError:
-        return False
-    found = re.search(r'<name>\s*([^<]*?)\s*</name>', text)
-    return found is not None and found[1] == name
+def _packages(root: Path, name: str) -> Iterator[Path]:
+    """Yield packages of a name among a folder, its subfolders, and such folders in these."""
+    folders = [root]
+    if root != root.parent:
+        with suppress(OSError):
+            inside = sorted(Path(entry.path) for entry in os.scandir(root) if entry.is_dir())
+            folders += [root / name, *inside, *(folder / name for folder in inside)]
+    for folder in folders:
+        try:
+            text = (folder / 'package.xml').read_text(encoding='utf-8', errors='replace')
+        except OSError:
+            continue
+        found = re.search(r'<name>\s*([^<]*?)\s*</name>', text)
+        if found is not None and found[1] == name:
+            yield folder
 
 
 def _paths(variable: str) -> list[str]:

@@ -35,12 +35,6 @@ REGULARISATION = 1e-10
 TORQUE_TOLERANCE = 1e-12
 SPEED_TOLERANCE = 1e-13
 
-#: Rounds in which all elements that break their law change at once. A typical step needs one
-#: round. Some problems cycle; after these rounds only the first such element changes, which always
-#: terminates.
-BLOCK_ROUNDS = 12
-ROUNDS = 500
-
 
 @dataclass(frozen=True, eq=False)
 class BoxLaw:
@@ -146,12 +140,15 @@ def solve_box_complementarity(
 
     """
     f = law.torques(g, w_free, modes)
-    for rounds in range(ROUNDS):
+    for rounds in range(500):
         broken = law.violations(w_free - g.dot(f), f, modes)
         if not broken:
             break
         changed = list(modes)
-        for element, mode in broken if rounds < BLOCK_ROUNDS else broken[:1]:
+        # A typical step needs one round, in which all elements that break their law change at
+        # once. Some problems cycle; after 12 rounds only the first such element changes, which
+        # always terminates.
+        for element, mode in broken if rounds < 12 else broken[:1]:
             changed[element] = mode
         modes = tuple(changed)
         f = law.torques(g, w_free, modes)

@@ -12,10 +12,11 @@ from armid_ros.arm import ArmModel
 from armid_ros.effects import Action, DryFriction, TorqueLaw
 from armid_ros.effects.action import sum_laws
 from armid_ros.errors import ModelError, TrajectoryError
-from armid_ros.model.pseudo_inertia import PER_LINK, pseudo_inertia
+from armid_ros.model.pseudo_inertia import pseudo_inertia
 from armid_ros.motion import FloatArray, read_only
 from armid_ros.robots import NO_MASS, Robot
 from armid_ros.robots.reference import limit_slack
+from armid_ros.robots.robot import PER_LINK
 from armid_ros.simulation.contacts import Contacts, Modes, split_constant
 from armid_ros.simulation.springs import Elasticity, ElasticJoints
 import numpy as np

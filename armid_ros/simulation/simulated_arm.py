@@ -20,8 +20,6 @@ import numpy.typing as npt
 
 #: Largest velocity of a trajectory at its beginning and end [rad/s or m/s].
 _AT_REST = 1e-3
-#: Steps of the reference that are evaluated at once.
-_BLOCK = 1000
 
 
 @dataclass(frozen=True, eq=False)
@@ -331,7 +329,7 @@ class SimulatedArm:
         """Return the torque of the controller for the present targets."""
         self._torque = command(self.plant, self._acting, self._state, self._targets.at(0))
 
-    def _look_ahead(self, asked: FloatArray | None = None, steps: int = _BLOCK) -> None:
+    def _look_ahead(self, asked: FloatArray | None = None, steps: int = 1000) -> None:
         """Evaluate the reference for the next steps, given the last commanded motor position."""
         self._first = self._state.steps
         self._targets = self.controller.targets(self._desired(steps + 1), asked)

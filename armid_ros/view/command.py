@@ -56,7 +56,13 @@ def view(
         assert robot is not None
         arm = ArmModel(robot)
     (recording,) = options.read([bag], arm.robot, topic)
-    marked = listed(mark) if mark else _named(model)
+    marked = listed(mark) if mark else ()
+    if model is not None and not mark:  # the joints of the effects that a diagnosis names
+        path = (model if model.is_dir() else model.parent) / 'diagnosis.json'
+        if path.is_file():
+            effects = json.loads(path.read_text(encoding='utf-8'))['effects']
+            named = [joint for effect in effects for joint in effect['joints']]
+            marked = tuple(dict.fromkeys(named))
     for joint in marked:
         arm.robot.index(joint)
     with _whole(out) as file:
@@ -87,14 +93,3 @@ def _whole(out: Path | None) -> Iterator[Path | None]:
         raise OutputError(f'{out}: cannot be written: {error.strerror}') from error
     finally:
         beside.unlink(missing_ok=True)
-
-
-def _named(model: Path | None) -> tuple[str, ...]:
-    """Return the joints of the effects named in diagnosis.json in the folder of the model."""
-    if model is None:
-        return ()
-    path = (model if model.is_dir() else model.parent) / 'diagnosis.json'
-    if not path.is_file():
-        return ()
-    effects = json.loads(path.read_text(encoding='utf-8'))['effects']
-    return tuple(dict.fromkeys(joint for effect in effects for joint in effect['joints']))

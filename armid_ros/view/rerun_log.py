@@ -61,13 +61,6 @@ def rerun() -> ModuleType:
     return module
 
 
-def _has_screen() -> bool:
-    """Return whether a window can be opened; on Linux this needs a display server."""
-    if not sys.platform.startswith('linux'):
-        return True
-    return bool(os.environ.get('DISPLAY') or os.environ.get('WAYLAND_DISPLAY'))
-
-
 def open_stream(name: str, out: Path | None = None) -> Any:
     """
     Open a window or a file for the logged data.
@@ -90,7 +83,9 @@ def open_stream(name: str, out: Path | None = None) -> Any:
 
     """
     rr = rerun()
-    if out is None and not _has_screen():
+    # a window needs a display server on Linux
+    screen = os.environ.get('DISPLAY') or os.environ.get('WAYLAND_DISPLAY')
+    if out is None and sys.platform.startswith('linux') and not screen:
         raise ArmidError('there is no screen for a window; --out run.rrd writes a file instead')
     stream = rr.RecordingStream('armid', recording_id=None)
     stream.send_recording_name(name)

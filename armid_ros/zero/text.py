@@ -4,7 +4,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Collection, Iterable
+from collections.abc import Collection
 from dataclasses import asdict
 from typing import Any
 
@@ -69,7 +69,13 @@ def fit_summary(found: ZeroFit, document: dict[str, Any], step: str) -> Summary:
     if held := document['held']:
         lines[0] += f'; held known: {", ".join(held)}'
     shown = {row['name'] for row in document['quantities']}
-    lines += _undetermined(q for q in found.quantities if q.name in shown)
+    undetermined: dict[str, list[str]] = {}
+    for one in found.quantities:
+        if one.name in shown and one.reason:
+            undetermined.setdefault(one.reason, []).append(f'{one.name} {one.joint}'.strip())
+    for why, which in undetermined.items():
+        text = ', '.join(which) if len(which) < 9 else f'{len(which)} values'
+        lines.append(f'not determined: {text}: {why}')
     if document['verdict'] == 'not explained':
         step = 'check --robot, --gravity, --effort-scale and contacts of the arm'
     elif document['verdict'] == 'not determined':
@@ -84,16 +90,6 @@ def _cell(one: FittedQuantity) -> str:
         return 'not det.'
     value, half = measured(one.value, one.half_width)
     return f'{value} ± {half}' if one.half_width else f'{value} (known)'
-
-
-def _undetermined(quantities: Iterable[FittedQuantity]) -> list[str]:
-    """Return a line for each reason why quantities are not determined."""
-    groups: dict[str, list[str]] = {}
-    for one in quantities:
-        if one.reason:
-            groups.setdefault(one.reason, []).append(f'{one.name} {one.joint}'.strip())
-    texts = {why: ', '.join(n) if len(n) < 9 else f'{len(n)} values' for why, n in groups.items()}
-    return [f'not determined: {names}: {why}' for why, names in texts.items()]
 
 
 def _explained(found: ZeroFit) -> float:

@@ -187,7 +187,7 @@ def test_a_window_is_reached_from_this_machine_alone(monkeypatch, tmp_path):
         free.bind(('127.0.0.1', 0))
         port = free.getsockname()[1]
     popen = subprocess.Popen
-    monkeypatch.setattr(rerun_log, '_has_screen', lambda: True)
+    monkeypatch.setenv('DISPLAY', ':0')
     monkeypatch.setattr(rerun_log, '_PORT', port)
     monkeypatch.setattr(subprocess, 'Popen', start)
     try:

@@ -59,8 +59,6 @@ _LEAST_RESIDUAL = 1e-3
 _NUMBERED = re.compile(r'(?:m[xyz]?|I[xyz]{2})(\d+)$')
 #: Significance at which a load is rejected as the explanation of the changes.
 _REFUSED = 0.01
-#: Singular values of a load below this share of the largest are not identifiable.
-_UNSEEN = 1e-9
 
 
 def compare(before: ParameterFile, after: ParameterFile) -> Comparison:
@@ -272,7 +270,8 @@ def _load(link: int, columns: FloatArray, white: FloatArray) -> LoadChange | Non
     lengths = np.linalg.norm(columns, axis=0)
     scale = np.where(lengths > 0.0, lengths, 1.0)
     left, sizes, right = np.linalg.svd(columns / scale, full_matrices=False)
-    seen = sizes > _UNSEEN * sizes[0]
+    # directions with smaller singular values are not identifiable
+    seen = sizes > 1e-9 * sizes[0]
     left, sizes, right = left[:, seen], sizes[seen], right[seen]
     along = left.T @ white
     rest = float(white @ white - along @ along)

@@ -28,7 +28,7 @@ from armid_ros.identification.rows.signals import Conditioning, decimate, segmen
 from armid_ros.motion import FloatArray, Motion
 from armid_ros.recording import Recording
 from armid_ros.simulation import Controller, Plant, simulate
-from armid_ros.simulation.controller import LinearFeedback
+from armid_ros.simulation.controller import BANDWIDTH, LinearFeedback
 import numpy as np
 
 #: Total simulated motion of all held-out recordings, and of one recording at most [s]. Simulation
@@ -37,9 +37,6 @@ _SIMULATED, _LONGEST = 60.0, 30.0
 #: Growth of an error that counts as worse, as a share of it and of the largest error of joints of
 #: the same unit; reversals of friction vary by less between models.
 _WORSE = 0.05
-#: Natural frequency of the feedback [rad/s]: 8 Hz, as of arms. With less, a light joint depends on
-#: its friction, whose change of sign at a reversal no model predicts to the millisecond.
-_BANDWIDTH = 50.0
 
 Progress = Callable[[float, str], None]
 
@@ -154,7 +151,9 @@ def forward_validation(
         raise IdentificationError(f'{recording.source}: no stretch is long enough to be filtered')
     motion = motion.select(motion.t <= motion.t[0] + duration)
     reference = replace(motion, t=motion.t - motion.t[0])
-    feedback = LinearFeedback.of(nominal, bandwidth=_BANDWIDTH, weighs=False)
+    # With a slower feedback, a light joint depends on its friction, whose change of sign at a
+    # reversal no model predicts to the millisecond.
+    feedback = LinearFeedback.of(nominal, bandwidth=BANDWIDTH, weighs=False)
     controller = _RecordedTorque(reference, feedback)
     along = arm.along(reference)
     # limits so far away that no joint reaches them [rad or m]

@@ -34,8 +34,6 @@ _OF_HALVES, _OF_CUTOFFS = 4000, 6000
 #: Number of evenly spread windows for the comparison of cut-offs on longer data. Together they
 #: have twice as many rows; at 1 kHz, a filter of 1 Hz loses a tenth of each at its ends.
 _WINDOWS = 8
-#: Ratio of each tested cut-off to the one before.
-_STEP = 0.5
 #: Smallest share of rows remaining with a cut-off; with less, it is too low for the stretches.
 _KEPT = 0.8
 #: Number of stretches that are predicted in turn; their losses give the standard error of a mean.
@@ -163,7 +161,7 @@ def cutoff_of_torques(
         best = min(losses.values(), key=np.mean)
         if not _as_good(losses[cutoff], best):
             break
-        cutoff *= _STEP
+        cutoff *= 0.5
     if not tried:
         return used
     return replace(used, cutoff_hz=max(hz for hz, own in losses.items() if _as_good(own, best)))

@@ -38,13 +38,6 @@ import scipy.linalg
 
 #: Band of the instruments over that of the regressor, which is ten times the band of the motion.
 _SHARE = 0.2
-#: Largest number of padding samples at both ends of a stretch: three times the length of the
-#: filter, two sections of second order, which is the default of scipy.
-_EDGE = 15
-#: Largest number of linearisations of an arm whose torque is not linear in its parameters.
-_MOST_ROUNDS = 4
-#: Change of the values, in standard deviations, below which the iteration ends.
-_SETTLED = 0.02
 
 
 @dataclass(frozen=True)
@@ -89,7 +82,8 @@ def fit_by_instruments(
     """
     base, free, linear = fit.base, ungrouped(fit.arm, fit.base), fit.passes == 1
     limits, calm, weights = bounds(fit.arm, base), smoothed(recordings, used), fit.solution.weights
-    for _ in range(_MOST_ROUNDS):
+    # the torque of an arm may be nonlinear in its parameters
+    for _ in range(4):
         exact = linear_problem(fit.arm, base, calm, used, linear=linear)
         found = by_instruments(fit.problem, [part.columns for part in exact], weights, limits)
         step = np.abs(found.values - fit.values) / np.sqrt(np.diag(found.covariance))
@@ -100,7 +94,7 @@ def fit_by_instruments(
             return replace(fit, predicted=torques(arm, recordings, used))
         problem, predicted = linearised(arm, base, recordings, used)
         fit = replace(fit, problem=problem, predicted=predicted)
-        if np.max(step, initial=0.0) < _SETTLED:
+        if np.max(step, initial=0.0) < 0.02:  # standard deviations
             break
     return fit
 
@@ -171,7 +165,8 @@ def smoothed(recordings: Sequence[Recording], used: Conditioning) -> list[Record
         sections = signal.butter(4, min(0.9, cutoff), output='sos')
         q = recording.q.copy()
         for part in unbroken(recording, 1.0 / recording.period):
-            edge = min(_EDGE, len(part) - 1)
+            # three times the length of the filter of two sections of second order, as scipy pads
+            edge = min(15, len(part) - 1)
             q[part] = signal.sosfiltfilt(sections, recording.q[part], axis=0, padlen=edge)
         calm.append(replace(recording, q=q, dq=None))
     return calm

@@ -33,18 +33,12 @@ from armid_ros.robots import NO_MASS
 import numpy as np
 import scipy.linalg
 
-#: Number of samples of a stretch for the test of nonlinearity.
-_SAMPLES = 2000
-#: Nonlinear share of the torque below which it is a rounding error.
-_ROUNDING = 1e-9
 #: Linear model and arm agree where they differ by less than this share of the residual ...
 AGREED = 1e-4
 #: ... or of the torque, where there is no noise.
 _EXACT = 1e-8
 #: Largest number of linearisations; converging fits take three to eight.
 MOST_PASSES = 20
-#: A residual torque below this share counts as zero.
-_FINE = 1e-6
 #: Decrease of the cost that corresponds to one standard deviation of one parameter.
 _NOTHING = 1.0
 #: Decrease of the cost by a step below which the iteration ends.
@@ -55,12 +49,8 @@ _STUCK = 0.5
 _DAMPINGS = tuple(10.0 ** np.arange(-8.0, 3.0))
 #: Largest cost of an undamped step, over the cost that the linear model predicts.
 _KEPT = 2.0
-#: Assumed distance of the centre of mass of a link whose mass is not identifiable [m].
-_REACH = 0.2
 #: Negligible deviation due to inertia, over the standard deviation of the fit.
 _NEGLIGIBLE = 0.1
-#: Slowest motion that the note recommends, as a share of the speed.
-_SLOWEST = 0.02
 
 Torques = tuple[FloatArray, ...]
 
@@ -180,10 +170,12 @@ def curved(before: ArmModel, after: ArmModel, motions: Sequence[Motion]) -> bool
         return False
     middle = before.with_theta(0.5 * (before.theta + after.theta))
     for motion in motions:
-        some = motion.select(slice(None, None, -(-len(motion) // _SAMPLES)))
+        # at most 2000 samples of a stretch
+        some = motion.select(slice(None, None, -(-len(motion) // 2000)))
         ends, half = (before.torque(some), after.torque(some)), middle.torque(some)
         size = max(float(np.max(np.abs(tau))) for tau in (*ends, half))
-        if float(np.max(np.abs(ends[0] + ends[1] - 2.0 * half))) > _ROUNDING * size:
+        # a smaller nonlinear share of the torque is a rounding error
+        if float(np.max(np.abs(ends[0] + ends[1] - 2.0 * half))) > 1e-9 * size:
             return True
     return False
 
@@ -212,21 +204,16 @@ def moved(arm: ArmModel, base: BaseParameters, values: FloatArray, free: FloatAr
     rigid = _rigid(arm)
     change[:rigid] -= free @ (free.T @ change[:rigid])
     theta = arm.theta + change
-    theta[:rigid] = _carried(theta[:rigid], free)
-    return arm.with_theta(theta)
-
-
-def _carried(rigid: FloatArray, free: FloatArray) -> FloatArray:
-    """Give a mass to links with a first moment but no mass, shape (10 n,)."""
-    links = rigid.reshape(-1, len(LINK_PARAMETERS))
+    links = theta[:rigid].reshape(-1, len(LINK_PARAMETERS))
     lacking = (np.abs(links[:, 0]) < NO_MASS) & np.any(np.abs(links[:, 1:4]) >= NO_MASS, axis=1)
-    if not np.any(lacking):
-        return rigid
-    # the data gave a moment to a link that is described without mass, and do not determine its
-    # mass: a mass changes no torque if the parameters of links before it change as well
-    mass = np.zeros_like(links)
-    mass[lacking, 0] = np.linalg.norm(links[lacking, 1:4], axis=1) / _REACH
-    return np.asarray(rigid + free @ (free.T @ mass.ravel()))
+    if np.any(lacking):
+        # the data gave a moment to a link that is described without mass, and do not determine
+        # its mass: a mass changes no torque if the parameters of links before it change as well
+        mass = np.zeros_like(links)
+        # the centre of mass of such a link is assumed 0.2 m away
+        mass[lacking, 0] = np.linalg.norm(links[lacking, 1:4], axis=1) / 0.2
+        theta[:rigid] += free @ (free.T @ mass.ravel())
+    return arm.with_theta(theta)
 
 
 def linearised(
@@ -335,7 +322,8 @@ class _State:
 
     def gain(self, predicted: Torques) -> float:
         """Return the decrease of the cost with predicted torques; zero without a residual."""
-        if np.linalg.norm(self._used * self._left) <= _FINE * np.linalg.norm(
+        # a smaller residual torque counts as zero
+        if np.linalg.norm(self._used * self._left) <= 1e-6 * np.linalg.norm(
             self._used * self._tau
         ):
             return 0.0
@@ -409,7 +397,7 @@ def with_uncertain_inertia(
         speed = float(np.sqrt(_NEGLIGIBLE / ratio))
         slower = (
             'no speed is slow enough for torques as free of noise as these'
-            if speed < _SLOWEST
+            if speed < 0.02
             else f'at {speed:.2g} times the speed it would not matter'
         )
         notes = (

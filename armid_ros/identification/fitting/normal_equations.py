@@ -22,8 +22,6 @@ import scipy.optimize
 
 #: Largest number of rounds of reweighting; the weights converge in three to ten.
 ROUNDS = 20
-#: Share of the squared target below which squared residuals are rounding errors of products.
-_ROUNDING = 1e-12
 #: Share of the largest eigenvalue of normalised columns below which a direction is not
 #: identifiable: products of columns have no more digits.
 UNINFORMATIVE = 1e-10
@@ -108,7 +106,8 @@ class NormalEquations:
     def squares(self, values: FloatArray) -> FloatArray:
         """Return the sum of the squared residuals of each joint, shape (n,) [(N m)^2]."""
         ends = np.append(values, -1.0)
-        return np.asarray(np.maximum(self.products @ ends @ ends, _ROUNDING * self.target_squares))
+        # smaller residuals are rounding errors of products
+        return np.asarray(np.maximum(self.products @ ends @ ends, 1e-12 * self.target_squares))
 
     def joint_std(self, values: FloatArray) -> FloatArray:
         """Return the standard deviation of the residual of each joint, shape (n,) [N m]."""

@@ -60,8 +60,6 @@ _LEARNING = 10.0
 _CORRECTION = 0.3
 #: Eigenvalues of an information matrix below this share of the largest count as zero [-].
 _NOTHING = 1e-9
-#: Share of a change that the data do not determine, above which its variance is infinite [-].
-_HIDDEN = 1e-6
 
 
 @dataclass(frozen=True, eq=False)
@@ -140,7 +138,8 @@ class ScoreStatistics:
         covariance = np.linalg.pinv(information, hermitian=True)
         values = np.asarray(covariance @ self.score[some])
         shown = np.einsum('pq,qp->p', covariance, information)  # 1 for a change that is determined
-        hidden = np.flatnonzero(shown < 1.0 - _HIDDEN)
+        # the variance of a change is infinite that the data do not determine
+        hidden = np.flatnonzero(shown < 1.0 - 1e-6)
         covariance[hidden, hidden] = np.inf
         return values, np.asarray(covariance)
 

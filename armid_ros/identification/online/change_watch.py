@@ -27,7 +27,7 @@ from armid_ros.estimate import Estimate
 from armid_ros.identification.online.background import at_once, Background, Job, Pieces
 from armid_ros.identification.online.change import Change, ChangeCandidate
 from armid_ros.identification.online.change_search import Block, ChangeSearch, FoundChange
-from armid_ros.identification.online.null_calibration import ResidualScale
+from armid_ros.identification.online.null_calibration import BLOCKS, ResidualScale
 from armid_ros.identification.online.recursive import (
     Learned,
     RecursiveLeastSquares,
@@ -42,13 +42,9 @@ BLOCK = 0.25
 #: Smallest residual scale where only the ratios of the noise between joints are known: 0.01 of the
 #: assumed noise, which is 1e-4 of the torque limit [-].
 _LEAST_NOISE = 0.01
-#: Number of blocks whose residuals are kept: one minute at four blocks per second.
-_REMEMBERED = 240
 #: Samples learned in one piece of work: together, or one by one with forgetting. Fewer samples
 #: arrive in the meantime, so that the backlog shrinks.
 _TOGETHER, _ONE_BY_ONE = 10, 4
-#: Rows whose nuisance columns are computed in one piece of work.
-_WIDENED = 3
 Item = TypeVar('Item')
 
 
@@ -203,7 +199,7 @@ class ChangeWatch:
         self._residual_scale = ResidualScale(
             _LEAST_NOISE if self._estimator.noise_is_relative else 1.0
         )
-        self._left: deque[float] = deque(maxlen=_REMEMBERED)
+        self._left: deque[float] = deque(maxlen=BLOCKS)
         self._open: _Stretch | None = None
         self._unseen: deque[_Stretch] = deque()
         self._late: list[Row] | None = None
@@ -287,7 +283,7 @@ class ChangeWatch:
     def _widened(self, rows: Sequence[Row]) -> Pieces[list[WeightedSample]]:
         """Return successive samples with the columns of all parameters."""
         samples: list[WeightedSample] = []
-        for part in _parts(rows, _WIDENED):
+        for part in _parts(rows, 3):  # rows in one piece of work
             own = np.stack([row.sample.rows for row in part])
             wide = np.concatenate([own, self._nuisance.columns(part)], axis=2)
             samples += [
@@ -345,7 +341,18 @@ class ChangeWatch:
         size = Estimate(found.best.parameters, values, covariance)
         change = Change(found.best, found.rivals, found.blocks[found.first].begin, size)
         yield from self._learn_again(found, change.reopened)
-        louder = yield from self._louder(found.blocks[found.after :], change.reopened.shape[1])
+        # A change shakes the arm, and the parameters were not learned from such motion: the
+        # covariance grows by the ratio of squared residuals to the usual ones.
+        squares = count = 0.0
+        for block in found.blocks[found.after :]:
+            rows, tau, weights = (np.stack(part) for part in zip(*block.samples, strict=True))
+            residual = self._estimator.scale(weights) * (tau - rows @ self._wider.values)
+            squares += float(np.sum((residual / self._residual_scale.value) ** 2))
+            count += float(np.sum(weights))
+            yield
+        louder, free = 1.0, change.reopened.shape[1]
+        if self._left and count > free:
+            louder = max(1.0, squares / (count - free) / float(np.median(self._left)))
         self.changes.append(
             replace(change, size=replace(size, covariance=louder * size.covariance))
         )
@@ -378,20 +385,6 @@ class ChangeWatch:
         yield from self._learn(self._wider, samples)
         own = [sample._replace(rows=sample.rows[:, : self._own]) for sample in samples]
         yield from self._learn(again, own)
-
-    def _louder(self, blocks: Sequence[Block], free: int) -> Pieces[float]:
-        """Return the ratio of squared residuals to the usual ones, at least 1."""
-        # A change shakes the arm, and the parameters were not learned from such motion.
-        squares = count = 0.0
-        for block in blocks:
-            rows, tau, weights = (np.stack(part) for part in zip(*block.samples, strict=True))
-            residual = self._estimator.scale(weights) * (tau - rows @ self._wider.values)
-            squares += float(np.sum((residual / self._residual_scale.value) ** 2))
-            count += float(np.sum(weights))
-            yield
-        if not self._left or count <= free:
-            return 1.0
-        return max(1.0, squares / (count - free) / float(np.median(self._left)))
 
 
 def _parts(items: Sequence[Item], size: int) -> Iterator[Sequence[Item]]:

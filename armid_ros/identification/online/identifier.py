@@ -53,10 +53,6 @@ _FORGOTTEN = 10.0
 #: A joint below this velocity [rad/s or m/s] for longer than this time [s] is at rest; a reversal
 #: is shorter. Dry friction may hold a joint at rest with any torque, so its torque is not used.
 _REST_VELOCITY, _REST_TIME = 0.01, 0.1
-#: Largest number of successive damaged samples; a longer deviation is real.
-_LONGEST_DAMAGE = 10
-#: Pieces of background work per second, at least; each sample without other work runs one or more.
-_PIECES = 400.0
 #: Samples per row from which the update with a row has a sample to itself. With fewer samples, the
 #: update shares its sample with pieces of background work.
 _SPARE = 4.0
@@ -136,7 +132,7 @@ class OnlineIdentifier:
             robot.prismatic,
             'qvt' if settings.measured_velocity else 'qt',
             torque_limit=robot.torque_limit,
-            max_gap=_LONGEST_DAMAGE,
+            max_gap=10,  # successive damaged samples; a longer deviation is real
             false_alarm_time=settings.false_alarm_time or FALSE_ALARM_TIME,
         )
         self._checks = StreamChecks(robot, self._gate)
@@ -228,7 +224,8 @@ class OnlineIdentifier:
             busy = learned and _SPARE * period <= self._row_period
         if not busy:
             self._settle()
-            self._work.advance(max(1, round(_PIECES * period)))
+            # pieces per second, at least
+            self._work.advance(max(1, round(400.0 * period)))
         self._crowded = bool(self.latest)
         return self.latest[-1] if self.latest else None
 

@@ -14,8 +14,6 @@ from armid_ros.model import BaseParameters, inverse_dynamics, random_motion
 from armid_ros.motion import FloatArray
 import numpy as np
 
-#: Number of random states over which torques are predicted.
-_STATES = 100
 #: A parameter is identified if it makes a torque uncertain by less than this share of the usual.
 _KNOWN = 0.1
 #: Progress: a standard deviation falls within this time [s] below this share of its value.
@@ -25,8 +23,6 @@ _LEARNED = 0.9
 #: standard deviations depend on the noise alone and have to fall below this share.
 _NOTHING = 100.0
 _BEGUN = 0.5
-#: Number of standard deviations by which an estimate has to exceed zero to be certain.
-_CERTAIN = 2.0
 #: Largest number of joints in the message.
 _NAMED = 3
 #: Unit of a kind of rigid parameter, its name, and the motion that identifies it.
@@ -88,7 +84,7 @@ class LearningProgress:
     """
 
     def __init__(self, arm: ArmModel, base: BaseParameters, rng: np.random.Generator) -> None:
-        motion = random_motion(arm.robot, rng, _STATES)
+        motion = random_motion(arm.robot, rng, 100)  # states
         columns = arm.columns(motion)[:, :, base.independent]
         self._rigid = np.sqrt(np.mean(inverse_dynamics(arm.robot, motion) ** 2, axis=0))
         self._size = np.sqrt(np.mean(columns**2, axis=0))
@@ -120,7 +116,8 @@ class LearningProgress:
             return ()
         # the usual torque of a joint: that of the described links, and that of the effects (mainly
         # friction) as far as their estimates exceed their uncertainty
-        known = np.maximum(np.abs(estimate.values) - _CERTAIN * estimate.std, 0.0)
+        # what is certain to two standard deviations
+        known = np.maximum(np.abs(estimate.values) - 2.0 * estimate.std, 0.0)
         effects = self._size * np.where(self._of_effects, known, 0.0)
         usual = np.sqrt(self._rigid**2 + np.sum(effects**2, axis=1))
         share = self._size / np.maximum(usual, 1e-3 * usual.max())[:, np.newaxis]

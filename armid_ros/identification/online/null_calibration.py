@@ -33,18 +33,10 @@ _RARE = 0.01
 _LEAST_SPREAD = 0.1
 #: Allowance for a next motion with more model discrepancy than the motions before [-].
 _MARGIN = 1.3
-#: Lower bound of a divisor.
-_SMALLEST = 1e-100
-#: Share of the windows whose torques are stronger than usual.
-_STRONG = 0.1
-#: Number of iterations in which factors and limited statistics converge.
-_ROUNDS = 8
 #: Smallest number of independent windows for a test.
 _FEWEST = 12.0
-#: Numbers that are processed in one piece of work.
-_AT_A_TIME = 4_000
 #: Number of blocks kept: one minute at four blocks per second.
-_BLOCKS = 240
+BLOCKS = 240
 #: Number of blocks after which the measured noise replaces the assumed one.
 _FEWEST_BLOCKS = 16
 
@@ -153,7 +145,7 @@ class NullCalibration:
         strengths = self._strengths.values
         for columns in _in_pieces(strengths):
             some = strengths[:, columns]
-            self._strength[columns] = np.quantile(some, 1.0 - _STRONG, axis=0)
+            self._strength[columns] = np.quantile(some, 0.9, axis=0)
             yield
         yield from self._look(self._ratios.values[len(self._ratios) // 4 :])
 
@@ -170,7 +162,7 @@ class NullCalibration:
             # factors that bring the means of the limited statistics to their values in white noise
             seen, most, mean = later[:, some], self._most[some], self._mean[some] * counts[some]
             factor = np.sum(seen, axis=0) / (self._sizes[some] * counts[some])
-            for _ in range(_ROUNDS):
+            for _ in range(8):  # until both converge
                 factor = factor * np.sum(np.minimum(seen / factor, most), axis=0) / mean
             single[some] = np.log(factor)
             yield
@@ -225,9 +217,8 @@ class NullCalibration:
         if self._limits is None or self._limits[0] != chance:
             self._limits = chance, limits(chance, self._sizes[judged], self._freedom[judged])
         result = np.zeros(len(self._sizes))
-        stronger = np.maximum.reduceat(
-            strength / self._strength.clip(_SMALLEST), self._first
-        ).clip(1.0)
+        relative = strength / self._strength.clip(1e-100)
+        stronger = np.maximum.reduceat(relative, self._first).clip(1.0)
         usual = 1.0 + (_MARGIN * self._tail * self.factors[judged] - 1.0) * stronger[judged]
         result[judged] = ratios[judged] / (usual * self._limits[1])
         return result
@@ -235,7 +226,7 @@ class NullCalibration:
 
 def _in_pieces(values: FloatArray) -> Iterator[slice]:
     """Yield slices of the columns, one for each piece of work."""
-    width = max(1, _AT_A_TIME // max(1, len(values)))
+    width = max(1, 4_000 // max(1, len(values)))
     for first in range(0, values.shape[1], width):
         yield slice(first, first + width)
 
@@ -271,7 +262,7 @@ class ResidualScale:
             return  # an arm at rest must not forget the residuals of its motion
         squares = np.sum(residual, axis=0) ** 2
         if self._seen is None:
-            self._seen = History(len(squares), _BLOCKS)
+            self._seen = History(len(squares), BLOCKS)
         self._seen.append(np.where(used > 0, squares / np.maximum(used, 1), np.nan))
         if len(self._seen) < _FEWEST_BLOCKS:
             return

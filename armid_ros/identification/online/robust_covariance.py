@@ -26,18 +26,12 @@ from armid_ros.motion import FloatArray
 import numpy as np
 from scipy import linalg, stats
 
-#: Rows of a window per frequency that is used: the low-pass filter stops all higher ones.
-_ROWS_OF_BIN = 8
 #: Number of columns transformed in one piece of work.
 _COLUMNS = 24
 #: Ridge that keeps the information invertible in directions that were never excited [-].
 _RIDGE = 1e-9
 #: Lower bound of a divisor.
 _SMALLEST = 1e-100
-#: Smallest noise power as a share of the torque power, by rounding errors [-].
-_LEAST_NOISE = 1e-20
-#: Lower bound of the degrees of freedom of a variance.
-_FEWEST = 3.0
 #: Level of the upper end of an interval.
 _LEVEL = 0.975
 
@@ -209,7 +203,8 @@ def _sum(some: _Bands, more: _Bands) -> Pieces[_Bands]:
 def _transformed(columns: FloatArray) -> Pieces[_Bands]:
     """Return the products of a window of rows [W, y] of shape (m, k, P + 1), in octaves."""
     joints, count, size = columns.shape
-    bins = max(2, count // _ROWS_OF_BIN)
+    # the low-pass filter stops all frequencies above one per 8 rows
+    bins = max(2, count // 8)
     edges = [0, *(2 ** np.arange(1, (bins - 1).bit_length())), bins]
     products = np.zeros((joints, len(edges) - 1, size, size))
     counts = np.zeros((joints, len(edges) - 1))
@@ -252,7 +247,8 @@ def _shape(bands: _Bands, values: FloatArray) -> Pieces[tuple[FloatArray, FloatA
     taken, power = (np.array(part) for part in zip(*parts, strict=True))
     counts = bands.counts.clip(_SMALLEST)
     freedom = counts * (1.0 - taken / counts).clip(LEAST_LEFT)
-    noise = np.maximum(power, _LEAST_NOISE * bands.products[..., -1, -1]) / freedom
+    # noise below this share of the torque power is a rounding error
+    noise = np.maximum(power, 1e-20 * bands.products[..., -1, -1]) / freedom
 
     usual = float(np.sum(noise * taken) / np.sum(taken))
     meat = usual * inverse.T @ ridge @ inverse
@@ -271,7 +267,7 @@ def _shape(bands: _Bands, values: FloatArray) -> Pieces[tuple[FloatArray, FloatA
         uncertain += shares**2 / freedom[joint, band]
         yield
     known = all_shares**2 / uncertain.clip(_SMALLEST)
-    student = stats.t.ppf(_LEVEL, np.maximum(known, _FEWEST))
+    student = stats.t.ppf(_LEVEL, np.maximum(known, 3.0))  # at least 3 degrees of freedom
     return half, student / stats.norm.ppf(_LEVEL)
 
 

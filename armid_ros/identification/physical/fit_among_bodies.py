@@ -29,10 +29,11 @@ from armid_ros.identification.physical.physical_program import Box, PhysicalProg
 from armid_ros.identification.rows.regression import regressions, weighted_rows
 from armid_ros.identification.rows.signals import Conditioning
 from armid_ros.model import BaseParameters
-from armid_ros.model.pseudo_inertia import Consistency, link_parameters, PER_LINK, pseudo_inertia
+from armid_ros.model.pseudo_inertia import Consistency, link_parameters, pseudo_inertia
 from armid_ros.motion import FloatArray
 from armid_ros.recording import Recording
 from armid_ros.robots import Robot
+from armid_ros.robots.robot import PER_LINK
 import numpy as np
 import scipy.linalg
 

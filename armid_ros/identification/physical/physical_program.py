@@ -28,14 +28,13 @@ from typing import Any
 
 from armid_ros.errors import IdentificationError
 from armid_ros.model import BaseParameters
-from armid_ros.model.pseudo_inertia import link_parameters, PER_LINK, pseudo_inertia
+from armid_ros.model.pseudo_inertia import link_parameters, pseudo_inertia
 from armid_ros.motion import FloatArray
+from armid_ros.robots.robot import PER_LINK
 import clarabel
 import numpy as np
 from scipy import sparse
 
-#: Weight of the prior of each effect, which decides directions without data or another prior.
-_RIDGE = 1e-9
 #: Weight c of the prior of a mass: a mass three times as large must reduce the squares by 0.2 %.
 _MASS = 1e-3
 #: Numbers of variables of a log-determinant: a triangle, then the logarithms of its diagonal.
@@ -122,7 +121,8 @@ class PhysicalProgram:
         variables = size + _LOG_DETERMINANT * self.n_links
         hessian = np.zeros((variables, variables))
         hessian[:size, :size] = change.T @ information @ change
-        hessian[range(rigid, size), range(rigid, size)] += _RIDGE
+        # decides directions of effects without data or another prior
+        hessian[range(rigid, size), range(rigid, size)] += 1e-9
         identity = [float(i == j) for j in range(4) for i in range(j + 1)]
         gradient = np.zeros(variables)
         gradient[:size] = -change.T @ aim

@@ -29,8 +29,6 @@ from scipy import signal as signals
 
 #: Cut-off frequency (-3 dB) of three equal lags in series, over the cut-off of a single lag.
 _CUTOFF_OF_POLE = float(np.sqrt(2.0 ** (1.0 / 3.0) - 1.0))
-#: Largest pole of G times the sampling period; beyond, the signal between samples matters.
-_FASTEST_POLE = 1.0
 #: G is faster than F by this factor, where the sampling rate allows it.
 MOTION_FILTER_RATIO = 4.0
 #: Rate of regressor rows over the cut-off frequency of F. It is high enough for the steps of
@@ -318,7 +316,8 @@ class CausalFilter:
         if len(self._intervals) < 20:  # too few for a median
             return
         self.period = period = float(np.median(self._intervals))
-        fastest = _FASTEST_POLE / period * _CUTOFF_OF_POLE / (2.0 * np.pi)
+        # with a faster pole, the signal between samples matters
+        fastest = 1.0 / period * _CUTOFF_OF_POLE / (2.0 * np.pi)
         self._lag = TripleLag(min(MOTION_FILTER_RATIO * self._cutoff, fastest))
         pole = self._lag.pole
         # Gain of the lag for a second derivative of 1. The signal is straight between samples, so

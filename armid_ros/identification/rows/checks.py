@@ -30,10 +30,6 @@ LIMIT_EXCESS_TURNING, LIMIT_EXCESS_SLIDING = 4.0 * np.pi, 1.0
 _LIMIT_SLACK = 0.01
 #: Shortest recording with a movement [s].
 SHORTEST = 1.0
-#: Total duration of recordings below which few parameters are identifiable [s].
-_SHORT = 5.0
-#: Range of a torque, as a share of its size, below which it is constant up to rounding errors.
-_ROUNDING = 1e-9
 #: Correlation with the direction of motion above which a torque is friction alone.
 _CLEAR = 0.8
 #: Correlation of measured and described torque above which their ratio is meaningful: four fifths
@@ -113,7 +109,7 @@ def check_held_out(robot: Robot, held_out: Sequence[Recording]) -> None:
 def too_short_to_tell(recordings: Sequence[Recording]) -> tuple[str, ...]:
     """Return a note if the recordings are short in total."""
     duration = sum(recording.duration for recording in recordings)
-    return (f'{duration:.2g} s is short; record 20 s or more',) if duration < _SHORT else ()
+    return (f'{duration:.2g} s is short; record 20 s or more',) if duration < 5.0 else ()
 
 
 def check_stamps(recordings: Sequence[Recording], used: Conditioning) -> None:
@@ -163,7 +159,8 @@ def check_torque(
     robot = arm.robot
     tau = np.concatenate([part.tau for part in problem])
     span, size = np.ptp(tau, axis=0), np.abs(tau).max(axis=0)
-    constant = span <= np.maximum(NOTHING, _ROUNDING * size)
+    # a smaller range is a rounding error
+    constant = span <= np.maximum(NOTHING, 1e-9 * size)
     silent = [name for name, still in zip(robot.joints, constant, strict=True) if still]
     source = recordings[0].source
     if len(silent) == robot.n_joints:

@@ -32,8 +32,6 @@ _DRIVEN = 0.5
 #: Number of rows on either side of a reversal that filters smear, and speed below which a joint
 #: may reverse, as a share of its top speed.
 _BESIDE, _TURNING = 3, 0.02
-#: Number of rows per column below which a law fits any torque.
-_ROWS_PER_COLUMN = 10
 
 
 def laws_of_controllers(
@@ -99,7 +97,8 @@ def laws_of_controllers(
 def _left(law: FloatArray, torque: FloatArray) -> float | None:
     """Return the RMS residual of a torque after the fit of a law; None with too few rows."""
     rank = int(np.linalg.matrix_rank(law)) if len(law) else 0
-    if len(law) < _ROWS_PER_COLUMN * max(rank, 1):
+    # fewer rows fit any torque
+    if len(law) < 10 * max(rank, 1):
         return None
     return float(np.sqrt(np.sum(residual_of_fit(torque, law) ** 2) / (len(law) - rank)))
 

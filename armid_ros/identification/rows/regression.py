@@ -29,8 +29,6 @@ from armid_ros.recording import Recording
 import numpy as np
 import numpy.typing as npt
 
-#: Full-rate samples whose regressor is in memory at once; 7 joints of 70 columns are 80 MB.
-_CHUNK = 20_000
 #: A joint is at rest while it is slower than this share of its own top speed ...
 REST_SPEED = 0.02
 #: ... for at least this long [s]; a reversal of direction is shorter.
@@ -325,7 +323,8 @@ def filtered_columns(
     sure = ~np.pad(unsure, ((1, 1), (0, 0)))
     longest = max(int(np.diff(np.flatnonzero(column)).max()) - 1 for column in sure.T)
     margin, overlap, row = max(margin, longest), len(used.taps()) - 1, 0
-    step = max(used.decimation, _CHUNK // used.decimation * used.decimation)
+    # samples whose regressor is in memory at once; 7 joints of 70 columns are 80 MB
+    step = max(used.decimation, 20_000 // used.decimation * used.decimation)
     for start in range(0, max(1, len(motion) - overlap), step):
         stop, before = min(len(motion), start + step + overlap), max(0, start - margin)
         around, inside = slice(before, stop + margin), slice(start - before, stop - before)

@@ -34,8 +34,6 @@ from scipy.ndimage import correlate1d
 SLOWEST = 2.0
 #: Rates at which arms are recorded [Hz].
 USUAL_RATES = (20.0, 20_000.0)
-#: Stamps within this share of a period of an even grid are taken as even.
-JITTER_TOLERANCE = 0.05
 #: Band of torque and regressor over the band of the motion, with room for steps of friction.
 MODEL_BANDS = 10.0
 #: Largest cut-off of positions over the band of the rows. The Butterworth filter, run both ways,
@@ -58,9 +56,6 @@ _HALF_TAPS = 4
 #: Band of second derivatives of torques (fourth of positions), over that of the motion. From two
 #: to five, elasticity is found as well; at ten, there is only noise.
 _CURVATURE_BANDS = 2.0
-#: Samples per period of the cut-off from which the band of a motion is computed: differences of
-#: two samples damp the cut-off by sinc(1 / 20), 0.4 %.
-_RATE_OF_BAND = 20.0
 #: Smallest number of samples of a stretch for a spectrum.
 _LEAST_SAMPLES = 4
 
@@ -340,7 +335,8 @@ def decimated_samples(n_samples: int, used: Conditioning) -> range:
 def _even(t: FloatArray, period: float, *signals: FloatArray) -> tuple[FloatArray, ...]:
     """Return equidistant times and the signals at them, by cubic splines if stamps jitter."""
     grid = np.linspace(t[0], t[-1], round((t[-1] - t[0]) / period) + 1)
-    if len(grid) == len(t) and np.max(np.abs(grid - t)) < JITTER_TOLERANCE * period:
+    # stamps within a twentieth of a period are taken as even
+    if len(grid) == len(t) and np.max(np.abs(grid - t)) < 0.05 * period:
         return grid, *signals
     return grid, *(CubicSpline(t, one)(grid) for one in signals)
 
@@ -363,7 +359,8 @@ def _differentiated(
     ddq = _central_difference(dq[:, :n], t[1] - t[0])
     edge = int(np.ceil(EDGE_PERIODS * used.rate_hz / used.cutoff_hz))
     inner = slice(edge, len(t) - edge)
-    few = max(1, int(used.rate_hz / (_RATE_OF_BAND * used.cutoff_hz)))
+    # differences of two samples damp the cut-off by sinc(1 / 20), 0.4 %
+    few = max(1, int(used.rate_hz / (20.0 * used.cutoff_hz)))
     bands = [(smooth[::few, :n], used.cutoff_hz)]
     band = _CURVATURE_BANDS * _motion_band(bands, used.rate_hz / few)
     beside = None

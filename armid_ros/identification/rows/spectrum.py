@@ -11,15 +11,12 @@ from armid_ros.motion import FloatArray
 import numpy as np
 from scipy import signal
 
-#: Length of the segments whose spectra are averaged [s].
-_SEGMENT = 8.0
-
 
 def mean_spectrum(
     stretches: Sequence[FloatArray],
     rate: float,
     detrend: Literal['constant', 'linear'] = 'constant',
-    segment: float = _SEGMENT,
+    segment: float = 8.0,
 ) -> tuple[FloatArray, FloatArray]:
     """
     Return the mean power spectrum of stretches that last as long as a segment (Welch 1967).

@@ -13,8 +13,6 @@ import numpy as np
 _UNEVEN = 0.05
 #: Harmless error by jitter of stamps, as a share of a signal at the upper end of the band.
 _BLURRED = 0.1
-#: Largest deviation of a time step from a multiple of the smallest step, as a share of that.
-_WHOLE = 0.01
 #: Samples over which stamps are compared with an even grid: jitter is visible over them, and slow
 #: drift of the clock is not.
 _WINDOW = 50
@@ -71,7 +69,8 @@ def rounded_stamps(recording: Recording) -> str:
     if report.duplicates <= _UNEVEN * report.messages or len(steps) == 0:
         return ''
     step = float(steps.min())
-    if np.any(np.abs(steps / step - np.round(steps / step)) > _WHOLE):
+    # time steps that are multiples of the smallest step, to a hundredth of it
+    if np.any(np.abs(steps / step - np.round(steps / step)) > 0.01):
         return ''
     return (
         f'time stamps seem to be rounded to {1e3 * step:.4g} ms: all are multiples of that. '

@@ -23,8 +23,6 @@ from scipy import special
 
 #: Correlation of successive errors of a straight line in white noise.
 _NOISE_CORRELATION = -2.0 / 3.0
-#: Limit of errors in the computation of their correlation, in usual errors.
-_CLIPPED = 3.0
 #: Smallest jump that may be a full turn [rad].
 _HALF_A_TURN = np.pi
 #: Number of predictions in a window, whose usual error is computed together.
@@ -198,7 +196,7 @@ def robust_scale(missed: FloatArray, share: float) -> FloatArray:
 
 def share_of_noise(missed: FloatArray, size: FloatArray) -> FloatArray:
     """Return the share of white noise in the squares of successive errors of shape (k, m)."""
-    most = _CLIPPED * size
+    most = 3.0 * size  # larger errors are limited
     errors = np.minimum(np.maximum(missed, -most), most)
     squares = np.einsum('k...,k...->...', errors, errors)
     products = np.einsum('k...,k...->...', errors[1:], errors[:-1])

@@ -34,8 +34,6 @@ import numpy as np
 
 #: Order of the differences from which noise is computed.
 _ORDER = 6
-#: Pass band of the filter over the band of the motion, so that the motion is not changed.
-_MARGIN = 2.0
 #: Ratio of a spectrum to the noise that ends the band of the motion.
 _ABOVE = 3.0
 
@@ -184,7 +182,7 @@ def band_of_motion(
     recordings: Sequence[Recording],
     used: Conditioning,
     settings: SignalSettings,
-    margin: float = _MARGIN,
+    margin: float = 2.0,
 ) -> Conditioning:
     """
     Return filters with the band of the motion, except where settings define them.

@@ -33,8 +33,6 @@ _CONVERGED = 1e-3
 _LEAST_SHARE = 0.01
 #: Smallest z-score of an existing stiffness: a false one has a probability of 3e-5.
 LEAST_Z = 4.0
-#: RMS torque per stiffness below which a spring is not extended [m^2].
-_DRAWN_OUT = 1e-9
 
 
 @dataclass(frozen=True)
@@ -174,7 +172,8 @@ def _least_squares(problem: InteractionProblem, columns: FloatArray) -> FloatArr
     w = columns.reshape(-1, columns.shape[2])
     scale = np.linalg.norm(w, axis=0)
     springs = scale[: columns.shape[2] - len(problem.rigid)]
-    if not np.all(springs > _DRAWN_OUT * np.sqrt(len(w))):
+    # a smaller RMS torque per stiffness [m^2] is that of a spring that is not extended
+    if not np.all(springs > 1e-9 * np.sqrt(len(w))):
         name = problem.segments[int(np.argmin(springs))]
         raise IdentificationError(f'{name}: its spring is never extended, so nothing shows it')
     y = problem.tau - problem.known

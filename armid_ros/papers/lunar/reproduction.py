@@ -123,8 +123,6 @@ TABLES = (
 
 #: Sampling rate of the recording [Hz].
 _RATE = 100.0
-#: Number of held-out trajectories for the errors, and their period [s].
-HELD_OUT, _TEST = 5, 60.0
 
 
 @dataclass(frozen=True, eq=False)
@@ -265,9 +263,9 @@ def reproduce(
     limits, bodies = Limits.of(nominal, speed='slow'), ClearanceModel.of(collision, 0.01)
     tests = [
         Excitation(
-            random_feasible(ArmModel(nominal), limits, _TEST, 3, rng, clearance=bodies)
+            random_feasible(ArmModel(nominal), limits, 60.0, 3, rng, clearance=bodies)
         ).motion(_RATE)
-        for _ in range(HELD_OUT)
+        for _ in range(5)
     ]
     repeated = []
     for index, table in enumerate(TABLES):

@@ -15,10 +15,6 @@ from armid_ros.recording.source import IntArray, MessageBlock, records_at
 import numpy as np
 import numpy.typing as npt
 
-_NOTHING = np.empty(0)
-# Layouts of one length that are kept.
-_LAYOUTS = 32
-
 
 @dataclass(frozen=True)
 class JointSamples:
@@ -175,7 +171,7 @@ class JointStateDecoder:
             return None
         self._names.update(dict.fromkeys(layout.names))
         known.insert(0, plan)
-        del known[_LAYOUTS:]
+        del known[32:]  # layouts of one length that are kept
         return plan
 
 
@@ -307,7 +303,7 @@ class JointStateMessages:
             self._known = [layout, *self._known[:7]]  # one layout per sender on a topic
         row = np.frombuffer(data, layout.record, 1)[0]
         position, velocity, effort = (
-            row[name] if count else _NOTHING
+            row[name] if count else np.empty(0)
             for name, count in zip(QUANTITIES, layout.counts, strict=True)
         )
         stamp = int(row['sec']), int(row['nanosec'])

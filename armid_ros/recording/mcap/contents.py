@@ -30,9 +30,8 @@ import numpy.typing as npt
 _COMPRESSIONS = ('', 'zstd', 'lz4')
 #: Threads that decompress chunks ahead of the reader. Decompression and checksums release the GIL.
 _THREADS = 2
-#: Size that a thread decompresses at a time, and limit of decompressed data ahead of the reader
-#: [bytes]. A larger chunk is decompressed alone.
-_AT_A_TIME, _AHEAD = 2 << 20, 16 << 20
+#: Limit of decompressed data ahead of the reader [bytes]. A larger chunk is decompressed alone.
+_AHEAD = 16 << 20
 
 
 class Content(NamedTuple):
@@ -81,7 +80,7 @@ def _unpacked_ahead(
 
     parts: list[list[Chunk]] = [[]]
     for chunk in chunks:
-        if sum(one.size for one in parts[-1]) >= _AT_A_TIME:
+        if sum(one.size for one in parts[-1]) >= 2 << 20:  # bytes at a time
             parts.append([])
         parts[-1].append(chunk)
     begun: deque[tuple[int, Future[list[tuple[Chunk, Content | str]]]]] = deque()

@@ -4,7 +4,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable
 from contextlib import suppress
 from dataclasses import replace
 from datetime import datetime
@@ -139,7 +139,19 @@ def _with_dates(table: Table) -> Table:
 
 def _with_stamps(table: Table) -> Table:
     """Merge seconds and nanoseconds of a stamp into one column."""
-    for seconds, nanoseconds, name in _pairs(table.columns):
+    arrays: dict[str, list[TableColumn]] = {}
+    for column in table.columns:
+        if column.array and any(word in TIMES for word in words_of(column.array)):
+            arrays.setdefault(column.array, []).append(column)
+    pairs = [(two[0], two[1], name) for name, two in arrays.items() if len(two) == 2]
+    starts = {
+        match[1]: column for column in table.columns if (match := _SECONDS.fullmatch(column.name))
+    }
+    for column in table.columns:
+        match = _NANOSECONDS.fullmatch(column.name)
+        if match and match[1] in starts:
+            pairs.append((starts[match[1]], column, match[1].strip(' ._/') or 'time'))
+    for seconds, nanoseconds, name in pairs:
         finite = nanoseconds.values[np.isfinite(nanoseconds.values)]
         whole = np.all(finite == np.rint(finite)) and np.all((finite >= 0.0) & (finite < 1e9))
         if not whole or not np.any(finite):
@@ -148,17 +160,3 @@ def _with_stamps(table: Table) -> Table:
         rest = [one for one in table.columns if one not in (seconds, nanoseconds)]
         table = replace(table, columns=(stamp, *rest))
     return table
-
-
-def _pairs(columns: Sequence[TableColumn]) -> Iterator[tuple[TableColumn, TableColumn, str]]:
-    """Yield columns that may be the seconds and nanoseconds of one stamp, and its name."""
-    arrays: dict[str, list[TableColumn]] = {}
-    for column in columns:
-        if column.array and any(word in TIMES for word in words_of(column.array)):
-            arrays.setdefault(column.array, []).append(column)
-    yield from ((*two, name) for name, two in arrays.items() if len(two) == 2)  # type: ignore
-    starts = {match[1]: column for column in columns if (match := _SECONDS.fullmatch(column.name))}
-    for column in columns:
-        match = _NANOSECONDS.fullmatch(column.name)
-        if match and match[1] in starts:
-            yield starts[match[1]], column, match[1].strip(' ._/') or 'time'

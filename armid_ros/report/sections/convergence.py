@@ -15,9 +15,6 @@ from armid_ros.report.families import full_label, parameter_families
 from armid_ros.report.notation import pretty
 import numpy as np
 
-#: Parameters that are drawn.
-_SHOWN = 6
-
 
 def convergence_section(
     history: Sequence[tuple[float, Estimate]], truth: FloatArray
@@ -44,7 +41,7 @@ def convergence_section(
     longest = max(map(len, kinds))
     turns = [kind[turn] for turn in range(longest) for kind in kinds if turn < len(kind)]
     panels = []
-    for k in sorted(turns[:_SHOWN]):
+    for k in sorted(turns[:6]):
         reach = HALF_WIDTH * std[:, k]
         known = np.isfinite(reach) & (reach < 3.0 * (abs(truth[k]) + reach[-1]))
         lower, upper, drawn = (

@@ -10,6 +10,7 @@ from armid_ros.identification import Fit
 from armid_ros.identification.rows.period import find_period
 from armid_ros.motion import FloatArray
 from armid_ros.recording import Recording
+from armid_ros.recording.recording import GAP_PERIODS
 from armid_ros.report.blocks import (
     BulletList,
     ContentSection,
@@ -23,12 +24,8 @@ from armid_ros.report.page import Templated
 from armid_ros.robots import Robot
 import numpy as np
 
-#: Steps longer than this many periods are gaps, and no jitter.
-_GAP = 5.0
 #: Share of the residual that repeats, from which a better model would help [%].
 _TELLING = 50.0
-#: Motion in which a period is looked for [s].
-_SEARCHED = 150.0
 #: Fewer pairs of samples tell no deviation.
 _FEWEST = 20
 
@@ -60,7 +57,7 @@ def data_quality_section(
         source = names.get(recording.source, recording.source) or 'in memory'
         steps = np.diff(recording.t) if len(recording) > 1 else np.zeros(1)
         period = recording.period or 1.0
-        ordinary = steps[steps < _GAP * period]
+        ordinary = steps[steps < GAP_PERIODS * period]
         rows.append(
             (
                 source,
@@ -148,7 +145,8 @@ def repeatability(fits: Sequence[Fit]) -> tuple[float, FloatArray, FloatArray] |
 
     """
     fit = max(fits, key=lambda one: len(one.motion))
-    count = int(np.searchsorted(fit.motion.t, fit.motion.t[0] + _SEARCHED))
+    # a period is looked for in the first 150 s
+    count = int(np.searchsorted(fit.motion.t, fit.motion.t[0] + 150.0))
     motion = fit.motion.select(slice(count))
     found = find_period(motion.t, motion.q) if count > _FEWEST else None
     if found is None or found[1].stop - found[1].start < _FEWEST:

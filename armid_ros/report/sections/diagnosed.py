@@ -15,6 +15,7 @@ from armid_ros.diagnosis.verdict.document import Detectable
 from armid_ros.diagnosis.verdict.finding import Gap
 from armid_ros.diagnosis.verdict.words import by_cause, share_interval_in_words
 from armid_ros.effects import CATALOGUE
+from armid_ros.effects.quantities import SURELY
 from armid_ros.estimate import name_in_words
 from armid_ros.identification.fitting.identifiability import excludes_zero
 from armid_ros.motion import FloatArray
@@ -43,12 +44,8 @@ from armid_ros.report.notation import (
 from armid_ros.report.page import Templated
 import numpy as np
 
-#: Joints that are shown, and candidates.
-_JOINTS, _CANDIDATES = 3, 15
 #: Smallest share of the mean square of a residual at which a page states its mean.
 _MEAN_SAID = 0.005
-#: Standard deviations by which a value has to differ from zero, and from what is possible.
-_SIGNIFICANT = 3.0
 #: Background of the largest of several cells [%].
 SHADE = 55.0
 _DETECTABLE = (
@@ -137,7 +134,7 @@ def named_section(findings: Sequence[Finding]) -> ContentSection:
 def evidence_section(diagnosis: Diagnosis) -> ContentSection:
     """Return the residuals without the named effects, in the worst joints."""
     folds = []
-    for number, place in enumerate(diagnosis.where[:_JOINTS]):
+    for number, place in enumerate(diagnosis.where[:3]):
         blocks: list[Templated] = []
         if place.axes and place.mean_share >= _MEAN_SAID:
             blocks.append(
@@ -303,7 +300,7 @@ def candidates_section(diagnosis: Diagnosis) -> ContentSection:
             _candidate_value(diagnosis, trial),
             percent(trial.visible),
         )
-        for trial in (() if survey is None else survey.ranking[:_CANDIDATES])
+        for trial in (() if survey is None else survey.ranking[:15])
     ]
     if not rows:
         nothing = Paragraph('No effect explains any of the residual.')
@@ -335,7 +332,7 @@ def _candidate_value(diagnosis: Diagnosis, trial: Trial) -> str:
     if diagnosis.explanation is not None:
         arm = diagnosis.explanation.given
     lower, upper = (bound[kept] for bound in room(effect, arm))
-    slack = _SIGNIFICANT * trial.std
+    slack = SURELY * trial.std
     if not np.all((trial.values > lower - slack) & (trial.values < upper + slack)):
         return 'not possible'
     if not np.any(np.abs(trial.values) > slack):

@@ -45,8 +45,6 @@ import numpy as np
 import numpy.typing as npt
 from scipy.optimize import least_squares
 
-#: Places of dl and dm of both joints in the parameter vector, and of the Coulomb torques after it.
-_LINK, _MOTOR = (7, 8), (9, 10)
 #: Prior standard deviation of the logarithm of the friction ratio.
 _SPLIT = np.log(2.0)
 #: Standard deviations of the initial vibration: twist of the springs [rad] and velocity of the
@@ -118,9 +116,9 @@ def tune(
         [np.hstack([run.motor.dq[:count], run.link.dq[:count]]) for run in runs], axis=1
     )
     base = np.concatenate([unpack(start), start.coulomb])
-    # prior of the logarithms of factors, rows of unit standard deviation
+    # prior of the logarithms of the factors dl (7, 8) and dm (9, 10), rows of unit deviation
     prior = np.zeros((4, SIZE + 2))
-    prior[[0, 1], _LINK], prior[[0, 1], _MOTOR] = 1.0 / _SPLIT, -1.0 / _SPLIT
+    prior[[0, 1], [7, 8]], prior[[0, 1], [9, 10]] = 1.0 / _SPLIT, -1.0 / _SPLIT
     # the standard deviation of the logarithms of the Coulomb torques is 0.1
     prior[[2, 3], [SIZE, SIZE + 1]] = 10.0
     weight = np.ones(measured.shape[-1])

@@ -38,14 +38,8 @@ _HARMONICS = 8
 _SAMPLES = 100
 #: Intervals with heel and toe on the ground, in cycles since heel strike.
 HEEL_DOWN, TOE_DOWN = (0.0, 0.42), (0.12, 0.62)
-#: Standard deviations of the least squares: angles from the given curves [rad], and foot on the
-#: ground from its fixed position [m].
-_FREEDOM = np.radians([3.0, 3.0, 10.0])
+#: Standard deviation of a foot on the ground from its fixed position [m].
 _PLACE = 0.3e-3
-#: Standard deviation of the acceleration of the hips forward and up [m/s^2]: walking is smooth.
-_HURRY = np.array([1.0, 1.5])
-#: Height of the swing foot in mid-swing [m], its phase, and its standard deviation [m].
-_CLEARANCE, _SWING, _CLEAR = 0.02, (0.68, 0.93), 3e-3
 
 
 @dataclass(frozen=True)
@@ -142,7 +136,7 @@ def walkable(
     phase, count, paths = curves.phase, curves.basis.shape[1], curves.even.shape[1]
     wanted = gait(phase)
     heel_down, toe_down = _inside(phase, HEEL_DOWN), _inside(phase, TOE_DOWN)
-    swing = _inside(phase, _SWING)
+    swing = _inside(phase, (0.68, 0.93))
 
     def feet(x: FloatArray) -> tuple[FloatArray, FloatArray, FloatArray]:
         """Return distances of heel and toe from the fixed foot, and height of the lower."""
@@ -156,11 +150,13 @@ def walkable(
         heel, toe, lowest = feet(x)
         return np.concatenate(
             [
-                ((curves.of(x)[0] - wanted) / _FREEDOM).ravel() / 10.0,
+                # angles keep to the given curves, the hips accelerate little [m/s^2], and the foot
+                # is 20 mm above the ground in mid-swing
+                ((curves.of(x)[0] - wanted) / np.radians([3.0, 3.0, 10.0])).ravel() / 10.0,
                 heel[heel_down].ravel() / _PLACE / 10.0,
                 toe[toe_down].ravel() / _PLACE / 10.0,
-                (curves.hurry(x) / _HURRY).ravel() / 10.0,
-                np.minimum(lowest[swing] - _CLEARANCE, 0.0) / _CLEAR,
+                (curves.hurry(x) / np.array([1.0, 1.5])).ravel() / 10.0,
+                np.minimum(lowest[swing] - 0.02, 0.0) / 3e-3,
             ]
         )
 

@@ -20,8 +20,8 @@ from armid_ros.robots import Robot
 from markupsafe import Markup
 import numpy as np
 
-#: Size of the drawing [px], scale [px/m], and positions of hips and ground [px].
-_WIDTH, _HEIGHT, _SCALE, _HIPS, _GROUND = 640, 420, 260.0, 300.0, 385.0
+#: Scale of the drawing [px/m], and position of the ground [px].
+_SCALE, _GROUND = 260.0, 385.0
 _ABSCISSA = 'gait cycle of the right leg'
 
 
@@ -99,7 +99,7 @@ class Walk(Section):
     package: ClassVar[str] = 'armid_ros.papers.exo.report'
     template: ClassVar[str] = 'walk.html'
     #: Width and height of the drawing, and height of the ground [px].
-    size: ClassVar[tuple[int, int, float]] = (_WIDTH, _HEIGHT, _GROUND)
+    size: ClassVar[tuple[int, int, float]] = (640, 420, _GROUND)
 
     cycle: GaitCycle
     driven: Sequence[Driven]
@@ -260,7 +260,7 @@ def _bodies(robot: Robot, motion: Motion, ahead: FloatArray) -> list[Any]:
 def _placed(points: FloatArray, ahead: FloatArray) -> FloatArray:
     """Return points forward and up [m] in px, relative to the wearer."""
     shape = (-1,) + (1,) * (points.ndim - 2)
-    x = _HIPS + _SCALE * (points[..., 0] - ahead.reshape(shape))
+    x = 300.0 + _SCALE * (points[..., 0] - ahead.reshape(shape))
     return np.stack([x, _GROUND - _SCALE * points[..., 1]], axis=-1)
 
 
