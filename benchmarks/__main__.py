@@ -18,9 +18,10 @@ BENCHMARKS = (
     *('changes', 'coverage', 'excitation', 'exo', 'exo_diagnosis', 'fleet', 'growth'),
     *('healthy_arms', 'hidden_effects', 'live_diagnosis', 'lived', 'nodes'),
     *('offline_speed', 'online', 'part_time', 'reading', 'real_changes', 'real_diagnosis'),
+    'simulation',
 )
 #: Benchmarks whose output is kept.
-SPEED = {'nodes', 'offline_speed', 'online', 'reading'}
+SPEED = {'nodes', 'offline_speed', 'online', 'reading', 'simulation'}
 RESULTS = Path(__file__).parent / 'results' / 'speed.json'
 
 

@@ -1,0 +1,139 @@
+# Copyright 2026 The armid_ros developers
+# SPDX-License-Identifier: Apache-2.0
+"""
+Speed of the simulated arm over real time, and the time of its parts.
+
+Every arm has rotor inertias, and viscous and Coulomb friction in each joint. It follows a smooth
+reference at 1 kHz by computed torque; sensors have noise, quantisation and a delay. The aim is 60
+times real time. Times are processor times, the least of many short repetitions, as on an idle
+processor.
+
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from importlib.metadata import files
+import time
+
+from armid_ros.arm import ArmModel
+from armid_ros.effects import make_effect
+from armid_ros.robots import load_robot, Robot
+from armid_ros.simulation import (
+    ComputedTorque,
+    Plant,
+    Reference,
+    Sensors,
+    simulate,
+    SimulatedArm,
+    step,
+)
+import numpy as np
+import pinocchio as pin
+
+REACH = 60.0
+SECONDS = 0.5
+REPETITIONS = 100
+
+
+def main() -> None:
+    """Print a table per arm."""
+    panda = next(
+        str(entry.locate()) for entry in files('example-robot-data') if entry.name == 'panda.urdf'
+    )
+    for name, source in (('humanoid arm, 6 joints', 'humanoid_arm'), ('Panda, 7 joints', panda)):
+        report(name, load_robot(source))
+
+
+def report(name: str, robot: Robot) -> None:
+    """Measure one arm and print its table."""
+    arm, reference = with_friction(robot), swinging(robot)
+    plant, controller = Plant(arm), ComputedTorque(ArmModel(robot))
+    sensors = Sensors(
+        torque_noise=0.05,
+        position_noise=1e-6,
+        velocity_noise=1e-3,
+        resolution=1e-5,
+        torque_delay=2,
+    )
+    rng = np.random.default_rng(0)
+    steps = round(SECONDS / plant.dt)
+
+    def all_in() -> None:
+        simulate(plant, reference, rng=rng, controller=controller, sensors=sensors)
+
+    run = simulate(plant, reference, rng=rng, controller=controller, sensors=sensors)
+    stuck = np.mean(run.truth.dq == 0.0)
+    arm_by_step = SimulatedArm(
+        plant, rng=rng, controller=controller, sensors=sensors, start=reference.q[0]
+    )
+    state = plant.state(run.truth.q[steps // 2], run.truth.dq[steps // 2])
+    torque = run.truth.tau[steps // 2]
+    rigid = Plant(ArmModel(robot), hard_stops=False)
+    free = rigid.state(state.q, state.dq)
+    desired = (state.q, state.dq, state.dq)
+    model, data = robot.model, robot.model.createData()
+
+    def dynamics() -> None:
+        pin.nonLinearEffects(model, data, state.q, state.dq)
+        pin.crba(model, data, state.q)
+
+    times = repeated(all_in, 1)
+    whole = min(times) / steps
+    factor, usual = plant.dt / whole, plant.dt * steps / float(np.median(times))
+    verdict = 'reached' if factor >= REACH else 'NOT reached'
+    print(f'{name}: {factor:.1f} x real time, {REACH:.0f} x wanted: {verdict}')
+    print(f'  median of the repetitions                          {usual:6.1f} x')
+    print(f'  joints at rest, of all samples                     {100 * stuck:6.1f} %')
+    for what, seconds in (
+        ('simulate(), all in, per 1 ms step', whole),
+        (
+            '  step() as it moves, friction that sticks, stops',
+            best(lambda: step(plant, state, torque)),
+        ),
+        ('  step() of the rigid body alone', best(lambda: step(rigid, free, torque))),
+        ('    of it inertia matrix and nonlinear effects', best(dynamics)),
+        ('  controller', best(lambda: controller.torque(state.q, state.dq, desired, torque))),
+        ('SimulatedArm.advance(1), read every step', best(arm_by_step.advance)),
+        ('SimulatedArm.advance(5), read at 200 Hz', best(lambda: arm_by_step.advance(5))),
+    ):
+        print(f'  {what:50s} {1e6 * seconds:6.1f} us')
+
+
+def with_friction(robot: Robot) -> ArmModel:
+    """Return the robot with friction of a few per cent of its drives, and rotors."""
+    drive = np.minimum(robot.torque_limit, 100.0)
+    arm = ArmModel(robot).with_effect(make_effect('viscous_friction', robot), 0.02 * drive)
+    arm = arm.with_effect(make_effect('coulomb_friction', robot), 0.03 * drive)
+    return arm.with_effect(make_effect('rotor_inertia', robot), 1e-3 * drive)
+
+
+def swinging(robot: Robot) -> Reference:
+    """Return a motion of all joints in a quarter of their range, at different frequencies."""
+    t = np.linspace(0.0, SECONDS, 26)[:, np.newaxis]
+    w = np.linspace(4.0, 8.0, robot.n_joints)
+    middle, reach = (robot.upper + robot.lower) / 2, (robot.upper - robot.lower) / 8
+    reach = np.minimum(reach, 0.5 * robot.velocity_limit / w)
+    q = middle + reach * np.sin(w * t)
+    dq, ddq = reach * w * np.cos(w * t), -reach * w**2 * np.sin(w * t)
+    return Reference(robot.joints, t[:, 0], q, dq, ddq)
+
+
+def best(call: Callable[[], object], number: int = 50) -> float:
+    """Return the shortest time of a call [s], averaged over `number` calls."""
+    return min(repeated(call, number))
+
+
+def repeated(call: Callable[[], object], number: int) -> list[float]:
+    """Return the times of a call [s], each averaged over `number` calls."""
+    times = []
+    for _ in range(REPETITIONS):
+        start = time.process_time()
+        for _ in range(number):
+            call()
+        times.append((time.process_time() - start) / number)
+    return times
+
+
+if __name__ == '__main__':
+    main()
