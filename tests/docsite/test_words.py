@@ -13,16 +13,16 @@ import pytest
 ROOT = Path(__file__).parents[2]
 #: Largest count in the package; a commit that lowers a count lowers it here.
 CEILING = {
-    'told': 92,
-    'said': 220,
-    'says': 30,
-    'tells': 27,
-    'asks': 5,
-    'asked': 108,
+    'told': 83,
+    'said': 198,
+    'says': 2,
+    'tells': 1,
+    'asks': 0,
+    'asked': 90,
     'believes': 0,
-    'believed': 24,
-    'beside': 116,
-    'knows': 3,
+    'believed': 17,
+    'beside': 71,
+    'knows': 0,
     'heard': 5,
 }
 #: Words that messages, help, headings, pages and examples do not have: verbs of speech for a
