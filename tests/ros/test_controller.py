@@ -49,7 +49,7 @@ def free_planner():
 
 
 def waiting(bench, excitation, **parameters):
-    """Make a publisher on simulated time, at 99 s, that begins when it is told."""
+    """Make a publisher on simulated time, at 99 s, that begins when `start` is called."""
     options = {'start': False, 'use_sim_time': True, 'approach': 1.0, 'state_timeout': 0.5}
     planner = None if excitation is None else free_planner()
     node = bench.add(ExcitationPublisherNode, excitation, planner, **(options | parameters))

@@ -6,6 +6,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from functools import cached_property
 
 from armid_ros.effects import Effect
 from armid_ros.motion import FloatArray
@@ -122,7 +123,7 @@ class CauseTerm:
     acts: npt.NDArray[np.bool_]
     known: tuple[FloatArray, float, float] | None = None
 
-    @property
+    @cached_property
     def prior(self) -> tuple[FloatArray, FloatArray, float]:
         """Return the prior precision (p, p), its product with the mean, and half of its loss."""
         precision = np.diag((self.size * self.cause.unit) ** -2.0)

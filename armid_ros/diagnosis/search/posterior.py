@@ -29,7 +29,7 @@ from armid_ros.estimate import Estimate
 from armid_ros.motion import FloatArray
 import numpy as np
 
-#: Relative differences of gravity on one celestial body that do not count: those of Earth.
+#: Relative standard deviation of gravity on one celestial body: Earth has 9.78 to 9.83 m/s^2.
 SAME_GRAVITY = 0.003
 #: Largest number of Gauss-Newton steps; the comparison has refined the shapes already.
 _MOST_ROUNDS = 4
