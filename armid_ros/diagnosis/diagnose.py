@@ -272,11 +272,12 @@ def _said(
     worse = measured.harmed(explanation)
     floors = tuple(noise_floor(part, patched) for part in evidence.data)
     left, resting = measured.beside(explanation), measured.resting(explanation)
+    laws = measured.laws(explanation)
     strange = not_repeating(floors, settings.thresholds, settings.material * evidence.torque_rms)
     word = decide(
         found,
         [arm.robot.joints[k] for k in strange] if chosen.measured else (),
-        [*left, *resting],
+        [*left, *resting, *laws],
         arm,
         NOISE if chosen.measured else chosen.floor_in_words,
         measured.as_it_is(explanation),
@@ -286,7 +287,8 @@ def _said(
     if not found:
         explanation = replace(explanation, reference=explanation.fitted)
     open_in = measured.shown_in(left, explanation)
-    places = where_it_is(explanation, (unseen or evidence) if found else open_in, settings)
+    new = np.max([np.zeros(arm.robot.n_joints), *(one.ratio for one in laws)], axis=0) > 1.0
+    places = where_it_is(explanation, (unseen or evidence) if found else open_in, settings, new)
     explainer.tell(1.0, word.word)
     remarks = _remarks(found, worse, chosen, word, doubt, explainer)
     return Diagnosis(
@@ -295,7 +297,7 @@ def _said(
         findings=found,
         minor=minor,
         where=places or places_held(arm, resting),
-        left=where_left(explanation, patched, open_in, settings),
+        left=where_left(explanation, patched, open_in, settings, new),
         gap=measure_gap(explanation, unseen),
         explanation=explanation.forgetting(),
         arm=plain_arm(patched) if found and not worse else given,

@@ -64,8 +64,8 @@ def discrepancy_columns(data: Sequence[Trajectory], arm: Arm) -> list[FloatArray
         for joint in range(motion.n_joints):
             columns[:, joint, joint * count : (joint + 1) * count] = np.column_stack(
                 [
-                    *_hats(link.q[:, joint], positions[:, joint]),
-                    *_hats(link.dq[:, joint], velocities[:, joint]),
+                    *hats(link.q[:, joint], positions[:, joint]),
+                    *hats(link.dq[:, joint], velocities[:, joint]),
                     own[:, joint],
                 ]
             )
@@ -79,6 +79,6 @@ def _unasked_friction(motion: Motion, arm: Arm) -> FloatArray:
     return np.stack([np.diagonal(columns, axis1=1, axis2=2) for columns in laws], axis=2)
 
 
-def _hats(x: FloatArray, knots: FloatArray) -> list[FloatArray]:
+def hats(x: FloatArray, knots: FloatArray) -> list[FloatArray]:
     """Return the linear B-spline (hat) basis at x, one array of the shape of x per knot."""
     return [np.interp(x, knots, row) for row in np.eye(len(knots))]

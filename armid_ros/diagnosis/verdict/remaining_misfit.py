@@ -18,8 +18,9 @@ from armid_ros.arm import ArmModel
 from armid_ros.diagnosis.data.baseline import Baseline
 from armid_ros.diagnosis.data.evidence import Evidence
 from armid_ros.diagnosis.data.trajectory import REST_TIME
-from armid_ros.diagnosis.search.explanation import Chosen, ESTIMATED, Explanation
+from armid_ros.diagnosis.search.explanation import Chosen, ESTIMATED, Explanation, NOISE
 from armid_ros.diagnosis.settings import DiagnosisSettings
+from armid_ros.diagnosis.verdict.unlisted_law import unlisted_laws
 from armid_ros.diagnosis.verdict.where import Excess, Where
 from armid_ros.motion import FloatArray
 import numpy as np
@@ -77,6 +78,12 @@ class RemainingMisfit:
             first = len(explanation.evidence.data)
             left = [rest[:first], *(rest[first:] or one for one in left[1:])]
         return list(self._of_whole(parts, left))
+
+    def laws(self, explanation: Explanation) -> list[Excess]:
+        """Return the excess of laws that the catalogue lacks, if the misfit is known."""
+        if explanation.problem is None or self.chosen.floor_in_words in (NOISE, ESTIMATED):
+            return []
+        return unlisted_laws(explanation, self.settings.thresholds)
 
     def as_it_is(self, explanation: Explanation) -> Excess | None:
         """Return the excess with the body as given; None if it is not refitted."""

@@ -14,6 +14,7 @@ from armid_ros.diagnosis.search.explanation import Explanation
 from armid_ros.diagnosis.settings import DiagnosisSettings
 from armid_ros.motion import FloatArray, read_only
 import numpy as np
+import numpy.typing as npt
 
 #: Bins of a quantity over which the residual is averaged.
 _BINS = 16
@@ -101,7 +102,10 @@ class Excess:
 
 
 def where_it_is(
-    explanation: Explanation, shown: Evidence, settings: DiagnosisSettings
+    explanation: Explanation,
+    shown: Evidence,
+    settings: DiagnosisSettings,
+    new: npt.NDArray[np.bool_],
 ) -> tuple[Where, ...]:
     """
     Locate the gap in the data on which it is measured.
@@ -112,7 +116,7 @@ def where_it_is(
     """
     reference, fitted = explanation.reference.arm, explanation.fitted.arm
     if not explanation.steps:
-        return where_left(explanation, reference, shown, settings)
+        return where_left(explanation, reference, shown, settings, new)
     before, after = shown.residuals(reference), shown.residuals(fitted)
     taken = shown.chi2_per_row(before) - shown.chi2_per_row(after)
     least = settings.thresholds.inexact * max(float(taken.sum()), 0.0)
@@ -120,12 +124,16 @@ def where_it_is(
 
 
 def where_left(
-    explanation: Explanation, arm: ArmModel, shown: Evidence, settings: DiagnosisSettings
+    explanation: Explanation,
+    arm: ArmModel,
+    shown: Evidence,
+    settings: DiagnosisSettings,
+    new: npt.NDArray[np.bool_],
 ) -> tuple[Where, ...]:
-    """Locate the residual of an arm beyond the limits of the patched model."""
+    """Locate the residual of an arm beyond the limits of the patched model, or of a new law."""
     patched, left = (shown.residuals(one) for one in (explanation.fitted.arm, arm))
     losses, limits = shown.chi2_per_row(left), shown.limits(patched, settings)
-    beyond = np.where(losses > limits, losses - 1.0, 0.0)
+    beyond = np.where(new, losses, np.where(losses > limits, losses - 1.0, 0.0))
     return locate(explanation.given, shown, left, beyond)
 
 

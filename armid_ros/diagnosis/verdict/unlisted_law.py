@@ -1,0 +1,96 @@
+# Copyright 2026 The armid_ros developers
+# SPDX-License-Identifier: Apache-2.0
+"""
+Laws that the catalogue lacks: a new torque of one joint over its velocity or position.
+
+The discrepancy of a model differs between motions by its usual size. A law that is new on the day
+in question is a discrepancy several times larger, the same in all recordings of that day. The
+log odds of the larger size are compared with the alarm odds, while the named causes, the body and
+the usual discrepancy are fitted as well.
+
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+
+from armid_ros.diagnosis.data.discrepancy import hats
+from armid_ros.diagnosis.search.candidates import cause_of
+from armid_ros.diagnosis.search.cause import SelectedEffect
+from armid_ros.diagnosis.search.explanation import Explanation
+from armid_ros.diagnosis.search.patch import Patch
+from armid_ros.diagnosis.settings import Thresholds
+from armid_ros.diagnosis.verdict.where import Excess
+from armid_ros.effects import Effect, Quantity
+from armid_ros.effects.base import Arm
+from armid_ros.motion import FloatArray, Motion
+import numpy as np
+
+#: Size of the usual discrepancy, and sizes of a new law, over the misfit of the joint. Of 40 arms
+#: with a right name or without a change, one has log odds above 3 (6.4, of a smaller torque).
+_USUAL, _NEW = 1.0, (3.0, 10.0)
+#: Knots over the range of positions, and of velocities on each side over the top speed.
+_POSITIONS, _SPEEDS = 12, np.array([0.03, 0.1, 0.25, 0.5, 0.75, 1.0])
+
+
+@dataclass(frozen=True)
+class UnlistedLaw(Effect):
+    """A torque of one joint over its velocity or position, linear between knots."""
+
+    of: str = 'velocity'
+    knots: tuple[float, ...] = ()
+
+    name = 'unlisted_law'
+    summary = 'law of one joint that the catalogue lacks'
+    quantities = (Quantity('knot_torque', 'N m'),)
+
+    def columns(self, motion: Motion, arm: Arm) -> FloatArray:
+        """Return the torque of a unit at each knot, (N, n, number of knots)."""
+        link, (joint,) = arm.link_motion(motion), self.indices(motion.joints)
+        x = (link.dq if self.of == 'velocity' else link.q)[:, joint]
+        columns = np.zeros((len(x), motion.n_joints, len(self.knots)))
+        columns[:, joint] = np.column_stack(hats(x, np.array(self.knots)))
+        return columns
+
+
+def unlisted_laws(explanation: Explanation, thresholds: Thresholds) -> list[Excess]:
+    """
+    Return the squared torque of new laws over the squared misfit, for velocity and position.
+
+    It is zero in joints whose log odds of a new law are below the alarm odds.
+
+    """
+    problem, named = explanation.problem, explanation.fitted
+    assert problem is not None
+    linear = problem.linear(Patch(problem.arm, named.named, named.values))
+    rows, joints = linear.rows, linear.arm.robot.joints
+    misfit = rows.amplitude[-1]
+    ratio = {of: np.zeros(len(joints)) for of in ('velocity', 'position')}
+    alarm = thresholds.alarm + np.log(len(ratio) * len(joints))
+    for law in _laws([linear.arm.link_motion(part.at_rows) for part in rows.data], joints):
+        joint = joints.index(law.joints[0])
+        columns = [law.columns(part.at_rows, linear.arm) for part in rows.data]
+        evidence = []
+        for size in (_USUAL, *_NEW):
+            unit = np.full(len(law.knots), size * misfit[joint])
+            cause = cause_of(linear, SelectedEffect(law, ()), columns, unit)
+            with_law = linear.and_cause(cause, 1.0)
+            under = with_law.marginal(problem.setting, problem.recordings)
+            evidence.append(under.evidence)
+        odds = np.logaddexp.reduce(evidence[1:]) - np.log(len(_NEW)) - evidence[0]
+        if odds > alarm:
+            values = with_law.means(under)[with_law.spans[-1]]
+            torque = np.concatenate([columns[k][:, joint] @ values for k in rows.in_question])
+            ratio[law.of][joint] = np.mean(torque**2) / misfit[joint] ** 2
+    return [Excess(own, f'that varies with its {of}') for of, own in ratio.items()]
+
+
+def _laws(motions: list[Motion], joints: tuple[str, ...]) -> Iterator[UnlistedLaw]:
+    """Yield the laws of velocity and of position of every joint."""
+    q, dq = (np.concatenate([getattr(one, x) for one in motions]) for x in ('q', 'dq'))
+    for k, joint in enumerate(joints):
+        speeds = float(np.abs(dq[:, k]).max()) * _SPEEDS
+        yield UnlistedLaw((joint,), of='velocity', knots=(*-speeds[::-1], *speeds))
+        knots = np.linspace(q[:, k].min(), q[:, k].max(), _POSITIONS)
+        yield UnlistedLaw((joint,), of='position', knots=tuple(knots))
