@@ -136,6 +136,21 @@ def test_a_law_that_all_joints_have_since_is_one_cause(new):
     np.testing.assert_allclose(one.values, more * (1.0 if coulomb else 0.3), atol=0.03)
 
 
+@pytest.mark.parametrize('of', ['velocity', 'position'])
+def test_a_new_law_that_the_catalogue_lacks_leaves_the_gap_open(bench, of):
+    """A cubic drag resembles quadratic friction, and a bump resembles torque ripple."""
+
+    def law(motion, tau):
+        dq, q = motion.dq, motion.q
+        new = 2.0 * dq**3 if of == 'velocity' else 8.0 * np.exp(-(((q - 0.3) / 0.15) ** 2))
+        return 0.1 * hose(motion, tau) + np.array([0.0, 1.0]) * new
+
+    before = bench.recordings(lambda motion, tau: 0.1 * hose(motion, tau), seed=1)
+    found = asked(bench, before, bench.recordings(law, seed=2), bench.recordings(law, seed=3))
+    assert found.verdict in {'partial', 'unknown'}, found.summary
+    assert {one.joint for one in (*found.where, *found.left)} == {'elbow'}
+
+
 def test_recordings_with_more_noise_than_the_baseline_have_a_floor_of_their_own(bench):
     """A simulated baseline has no noise at all."""
     floors = []

@@ -83,7 +83,7 @@ class RemainingMisfit:
         """Return the excess of laws that the catalogue lacks, if the misfit is known."""
         if explanation.problem is None or self.chosen.floor_in_words in (NOISE, ESTIMATED):
             return []
-        return unlisted_laws(explanation, self.settings.thresholds)
+        return unlisted_laws(explanation, self.settings)
 
     def as_it_is(self, explanation: Explanation) -> Excess | None:
         """Return the excess with the body as given; None if it is not refitted."""

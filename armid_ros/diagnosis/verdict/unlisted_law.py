@@ -20,7 +20,7 @@ from armid_ros.diagnosis.search.candidates import cause_of
 from armid_ros.diagnosis.search.cause import SelectedEffect
 from armid_ros.diagnosis.search.explanation import Explanation
 from armid_ros.diagnosis.search.patch import Patch
-from armid_ros.diagnosis.settings import Thresholds
+from armid_ros.diagnosis.settings import DiagnosisSettings
 from armid_ros.diagnosis.verdict.where import Excess
 from armid_ros.effects import Effect, Quantity
 from armid_ros.effects.base import Arm
@@ -54,35 +54,37 @@ class UnlistedLaw(Effect):
         return columns
 
 
-def unlisted_laws(explanation: Explanation, thresholds: Thresholds) -> list[Excess]:
+def unlisted_laws(explanation: Explanation, settings: DiagnosisSettings) -> list[Excess]:
     """
-    Return the squared torque of new laws over the squared misfit, for velocity and position.
+    Return the squared torque of new laws over its limit, for velocity and for position.
 
-    It is zero in joints whose log odds of a new law are below the alarm odds.
+    The limit is the squared unit of the gap plus a torque that is not material. The ratio is zero
+    in joints whose log odds of a new law are below the alarm odds.
 
     """
-    problem, named = explanation.problem, explanation.fitted
+    problem, named, evidence = explanation.problem, explanation.fitted, explanation.evidence
     assert problem is not None
     linear = problem.linear(Patch(problem.arm, named.named, named.values))
     rows, joints = linear.rows, linear.arm.robot.joints
     misfit = rows.amplitude[-1]
+    limit = np.mean(np.square(evidence.sigma), axis=0) * (1.0 + evidence.matters(settings))
     ratio = {of: np.zeros(len(joints)) for of in ('velocity', 'position')}
-    alarm = thresholds.alarm + np.log(len(ratio) * len(joints))
+    alarm = settings.thresholds.alarm + np.log(len(ratio) * len(joints))
     for law in _laws([linear.arm.link_motion(part.at_rows) for part in rows.data], joints):
         joint = joints.index(law.joints[0])
         columns = [law.columns(part.at_rows, linear.arm) for part in rows.data]
-        evidence = []
+        fits = []
         for size in (_USUAL, *_NEW):
             unit = np.full(len(law.knots), size * misfit[joint])
             cause = cause_of(linear, SelectedEffect(law, ()), columns, unit)
             with_law = linear.and_cause(cause, 1.0)
             under = with_law.marginal(problem.setting, problem.recordings)
-            evidence.append(under.evidence)
-        odds = np.logaddexp.reduce(evidence[1:]) - np.log(len(_NEW)) - evidence[0]
+            fits.append(under.evidence)
+        odds = np.logaddexp.reduce(fits[1:]) - np.log(len(_NEW)) - fits[0]
         if odds > alarm:
             values = with_law.means(under)[with_law.spans[-1]]
             torque = np.concatenate([columns[k][:, joint] @ values for k in rows.in_question])
-            ratio[law.of][joint] = np.mean(torque**2) / misfit[joint] ** 2
+            ratio[law.of][joint] = np.mean(torque**2) / limit[joint]
     return [Excess(own, f'that varies with its {of}') for of, own in ratio.items()]
 
 
