@@ -121,15 +121,10 @@ def deliver(
         click.echo(json_text(document or result.document(origin)))
         return
     files = [] if staged is None else [f'{staged.out}: {", ".join(result.files)}']
-    show(shown, *files)
+    for line in shown.full_text(*files):
+        say(line)
     if step:
         say(f'next: {step}')
-
-
-def show(summary: Summary, *below: str) -> None:
-    """Print a summary, the verdict first, with lines above the next steps."""
-    for line in summary.full_text(*below):
-        say(line)
 
 
 def deliver_page(
@@ -142,17 +137,25 @@ def deliver_page(
 ) -> None:
     """Write report.html and NAME.json; print verdict and table, or JSON without a table."""
     write_file(staged.folder / 'report.html', page)
+    summary = None
+    if table is not None:
+        first, *others = verdict.sentences
+        lines, steps = [*others, *verdict.beware], [verdict.step] if verdict.step else []
+        summary = Summary(first, verdict.grade, *table, lines, steps)
+    deliver_document(staged, name, document, summary, 'report.html')
+
+
+def deliver_document(
+    staged: Staged, name: str, document: Mapping[str, Any], summary: Summary | None, *files: str
+) -> None:
+    """Write NAME.json, and keep the folder; print a summary with all files, or the document."""
     write_document(staged.folder / f'{name}.json', document)
     staged.keep()
-    if table is None:
+    if summary is None:
         click.echo(json_text(document))
         return
-    first, *others = verdict.sentences
-    lines, steps = [*others, *verdict.beware], [verdict.step] if verdict.step else []
-    show(
-        Summary(first, verdict.grade, *table, lines, steps),
-        f'{staged.out}: {name}.json, report.html',
-    )
+    for line in summary.full_text(f'{staged.out}: {", ".join([f"{name}.json", *files])}'):
+        say(line)
 
 
 def provenance(

@@ -14,6 +14,7 @@ from __future__ import annotations
 
 from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass
+from typing import NamedTuple
 
 from armid_ros.arm import ArmModel
 from armid_ros.effects import CATALOGUE
@@ -184,25 +185,22 @@ def fit_rests(
         share = name.effect in ('torque_offset', 'coulomb_friction', 'payload')
         owner = '' if name.effect == 'payload' else name.joint
         prior.append(_PRIORS.get(name.name, 0.0) * (units[owner] if share else 1.0))
-    x, covariance, scattered, information, used, freedom = _solved(
-        arms, rests, np.array(prior), scales
-    )
-    arm = arms[-1].with_theta(arms[-1].theta + x)
+    solved = _solved(arms, rests, np.array(prior), scales)
+    arm = arms[-1].with_theta(arms[-1].theta + solved.x)
     q = np.concatenate([one.q for one in rests])
     # poses that are 0.1 rad or m apart from all before
     poses = sum(bool(np.all(np.abs(q[:k] - q[k]).max(axis=1) > 0.1)) for k in range(len(q)))
-    judge = _Judge(arm, np.flatnonzero(prior), covariance, scattered, information, units)
-    few = f'{poses} poses are too few; {MORE}' if freedom < _FEW else ''
-    factor = float(student.ppf(0.975, max(freedom, 1.0)))
+    few = f'{poses} poses are too few; {MORE}' if solved.freedom < _FEW else ''
+    before, after = (y - _predicted(arms, rests, x)[0] for x in (0.0 * solved.x, solved.x))
     return ZeroFit(
         arm,
-        judge.quantities(factor, few),
-        np.sqrt(np.mean((y - _predicted(arms, rests, 0.0 * x)[0]) ** 2, axis=0)),
-        np.sqrt(np.mean((y - _predicted(arms, rests, x)[0]) ** 2, axis=0, where=used)),
+        _quantities(arm, solved, units, few),
+        np.sqrt(np.mean(before**2, axis=0)),
+        np.sqrt(np.mean(after**2, axis=0, where=solved.used)),
         scales,
         len(y),
         poses,
-        int(np.sum(_sided(rests) & ~used)),
+        int(np.sum(_sided(rests) & ~solved.used)),
     )
 
 
@@ -220,24 +218,29 @@ def _sided(rests: Sequence[Motion]) -> npt.NDArray[np.bool_]:
     return np.concatenate([one.dq for one in rests]).astype(bool)
 
 
+class _Solution(NamedTuple):
+    """
+    Change x of all parameters (P,), and numbers of the F free ones.
+
+    Covariances (F, F) from the variances of joints and from the scatter of the rests, information
+    (F, F) without the prior, readings that count (K, n), and the smallest number of redundant
+    readings of a joint.
+
+    """
+
+    x: FloatArray
+    free: npt.NDArray[np.intp]
+    covariance: FloatArray
+    scattered: FloatArray
+    information: FloatArray
+    used: npt.NDArray[np.bool_]
+    freedom: float
+
+
 def _solved(
     arms: Sequence[ArmModel], rests: Sequence[Motion], prior: FloatArray, scales: FloatArray
-) -> tuple[FloatArray, FloatArray, FloatArray, FloatArray, npt.NDArray[np.bool_], float]:
-    """
-    Solve by Gauss-Newton iterations; estimate variances and leave out outliers on the way.
-
-    Returns
-    -------
-    x : ndarray, shape (P,)
-        Change of all parameters.
-    covariance, information : ndarray, shape (F, F)
-        Covariance of the free parameters, and information of the rests without the prior.
-    used : ndarray of bool, shape (K, n)
-        Readings that count.
-    freedom : float
-        Smallest number of redundant readings of a joint.
-
-    """
+) -> _Solution:
+    """Solve by Gauss-Newton iterations; estimate variances and leave out outliers on the way."""
     y, sided = np.concatenate([np.asarray(one.tau) for one in rests]), _sided(rests)
     x, free, used, sigma = np.zeros(len(prior)), np.flatnonzero(prior), sided, 0.02 * scales
     for _ in range(60):
@@ -260,56 +263,50 @@ def _solved(
     leverage = np.minimum(np.einsum('kjp,pr,kjr->kj', w, covariance, w), 0.9)
     rest = (y - _predicted(arms, rests, x)[0]) / sigma / (1.0 - leverage)
     moved = np.einsum('kjp,kj->kp', w, rest) @ covariance
-    return x, covariance, moved.T @ moved, information, used, float(freedom.min())
+    return _Solution(
+        x, free, covariance, moved.T @ moved, information, used, float(freedom.min())
+    )
 
 
-@dataclass(frozen=True)
-class _Judge:
-    """A fitted arm, its free parameters, their covariances and information, units of limits."""
+def _quantities(
+    arm: ArmModel, solved: _Solution, units: Mapping[str, float], few: str
+) -> tuple[FittedQuantity, ...]:
+    """Return the quantities of a fitted arm, with intervals; `few`: reason for all of them."""
+    factor = float(student.ppf(0.975, max(solved.freedom, 1.0)))
+    middle, std, found = quantities_of(arm), np.sqrt(np.diag(solved.covariance)), []
+    slopes = np.zeros((len(middle), len(std)))
+    for k, place in enumerate(solved.free):
+        step = 0.01 * std[k] * np.eye(1, len(arm.theta), place)[0]
+        ends = [quantities_of(arm.with_theta(arm.theta + s * step)) for s in (-1.0, 1.0)]
+        low, high = (np.array([*end.values()]) for end in ends)
+        slopes[:, k] = (high - low) / (0.02 * std[k])
+    for ((name, joint, unit), value), slope in zip(middle.items(), slopes, strict=True):
+        variance = max(slope @ one @ slope for one in (solved.covariance, solved.scattered))
+        half = factor * float(np.sqrt(variance))
+        scale = units[joint] if name in ('zero', 'friction', 'mass') else 1.0
+        limit = scale * _USEFUL[name.split('_')[0]]
+        reason = few if half > 0.0 else ''
+        if half > limit:
+            reason = few or _reason(arm, solved, slope, limit / factor)
+        found.append(FittedQuantity(name, joint, unit, value, half, reason))
+    return tuple(found)
 
-    arm: ArmModel
-    free: npt.NDArray[np.intp]
-    covariance: FloatArray
-    scattered: FloatArray
-    information: FloatArray
-    units: Mapping[str, float]
 
-    def quantities(self, factor: float, few: str) -> tuple[FittedQuantity, ...]:
-        """Return the quantities, with intervals of a factor times the standard deviation."""
-        arm, std = self.arm, np.sqrt(np.diag(self.covariance))
-        middle, found = quantities_of(arm), []
-        slopes = np.zeros((len(middle), len(std)))
-        for k, place in enumerate(self.free):
-            step = 0.01 * std[k] * np.eye(1, len(arm.theta), place)[0]
-            ends = [quantities_of(arm.with_theta(arm.theta + s * step)) for s in (-1.0, 1.0)]
-            low, high = (np.array([*end.values()]) for end in ends)
-            slopes[:, k] = (high - low) / (0.02 * std[k])
-        for ((name, joint, unit), value), slope in zip(middle.items(), slopes, strict=True):
-            variance = max(slope @ one @ slope for one in (self.covariance, self.scattered))
-            half = factor * float(np.sqrt(variance))
-            scale = self.units[joint] if name in ('zero', 'friction', 'mass') else 1.0
-            limit = scale * _USEFUL[name.split('_')[0]]
-            reason = few if half > 0.0 else ''
-            if half > limit:
-                reason = few or self._reason(
-                    int(np.argmax(np.abs(slope) * std)), slope, limit / factor
-                )
-            found.append(FittedQuantity(name, joint, unit, value, half, reason))
-        return tuple(found)
-
-    def _reason(self, most: int, slope: FloatArray, limit: float) -> str:
-        """Return why a quantity that depends most on parameter `most` is not determined."""
-        correlation = np.abs(self.covariance[most]) / np.sqrt(np.diag(self.covariance))
-        correlation[most] = 0.0
-        own, other = (self.arm.parameters[self.free[k]] for k in (most, np.argmax(correlation)))
-        alone = abs(slope[most]) / np.sqrt(max(self.information[most, most], 1e-300)) < limit
-        names = own.name + (other.name if alone else '')
-        remedy = 'give --known tilt if the base is level'
-        if 'payload' in names:
-            remedy = 'record a known payload as well (--payload), or give --known tool'
-        elif 'gain_error' in names:
-            remedy = 'gravity hardly turns the joint: give --known gain, or record it with a tool'
-        elif own.name == 'coulomb_torque':
-            remedy = MORE
-        mixed = f'not separable from {other.words} of {other.joint or "the base"}'
-        return f'{mixed if alone else "no rest depends on it"}; {remedy}'
+def _reason(arm: ArmModel, solved: _Solution, slope: FloatArray, limit: float) -> str:
+    """Return why a quantity with these slopes over the free parameters is not determined."""
+    std = np.sqrt(np.diag(solved.covariance))
+    most = int(np.argmax(np.abs(slope) * std))
+    correlation = np.abs(solved.covariance[most]) / std
+    correlation[most] = 0.0
+    own, other = (arm.parameters[solved.free[k]] for k in (most, np.argmax(correlation)))
+    alone = abs(slope[most]) / np.sqrt(max(solved.information[most, most], 1e-300)) < limit
+    names = own.name + (other.name if alone else '')
+    remedy = 'give --known tilt if the base is level'
+    if 'payload' in names:
+        remedy = 'record a known payload as well (--payload), or give --known tool'
+    elif 'gain_error' in names:
+        remedy = 'gravity hardly turns the joint: give --known gain, or record it with a tool'
+    elif own.name == 'coulomb_torque':
+        remedy = MORE
+    mixed = f'not separable from {other.words} of {other.joint or "the base"}'
+    return f'{mixed if alone else "no rest depends on it"}; {remedy}'

@@ -14,8 +14,6 @@ from armid_ros.zero.fit import FittedQuantity, MORE, ZeroFit
 import numpy as np
 
 SCHEMA = 'armid/zero/1'
-#: Quantities of an estimate of external torque.
-_EXTERNAL = ('zero', 'friction', 'mass', 'center_x', 'center_y', 'center_z')
 #: Residual over the largest reading of a joint, above which readings are not explained.
 _POOR = 0.1
 
@@ -24,54 +22,49 @@ def fit_document(
     found: ZeroFit, known: Collection[str], link_error: float, external: bool
 ) -> dict[str, Any]:
     """Return the content of zero.json."""
-    shown = [one for one in found.quantities if one.name in _EXTERNAL or not external]
-    gains = [one.value for one in shown if one.name == 'gain' and not one.reason] or [1.0]
+    gains = [one.value for one in found.quantities if one.name == 'gain' and not one.reason]
     links = f'links within {100.0 * link_error:g} %' if link_error else 'links as described'
     held = [links, *known]
     held += [] if 'gain' in known else [f'gravity of {found.of("gravity").value:.4g} m/s^2']
-    poor = np.any(found.residual > _POOR * found.largest) or min(gains) < 0.0
-    if external:
-        poor = _explained(found) < 0.8
-    verdict = 'in part' if any(one.reason for one in shown) else 'determined'
-    if all(one.reason for one in shown if one.name == 'zero'):
+    verdict = 'in part' if any(one.reason for one in found.quantities) else 'determined'
+    if all(one.reason for one in found.quantities if one.name == 'zero'):
         verdict = 'not determined'
+    if np.any(found.residual > _POOR * found.largest) or min(gains, default=1.0) < 0.0:
+        verdict = 'not explained'
     rms = zip(found.arm.robot.joints, found.before, found.residual, strict=True)
     return {
         'schema': SCHEMA,
         'robot': found.arm.robot.name,
-        'verdict': 'not explained' if poor else verdict,
+        'verdict': verdict,
         'external': external,
-        'held': [] if external else held,
+        'held': held,
         'rests': found.rests,
         'poses': found.poses,
         'outliers': found.outliers,
-        'quantities': [asdict(one) for one in shown],
+        'quantities': [asdict(one) for one in found.quantities],
         'joints': [{'joint': j, 'before': float(b), 'residual': float(r)} for j, b, r in rms],
     }
 
 
 def fit_summary(found: ZeroFit, document: dict[str, Any], step: str) -> Summary:
     """Return the summary of a fit; `step` is the next step after a good fit."""
-    names = ('zero', 'friction') if document['external'] else ('zero', 'gain', 'friction')
+    names = ('zero', 'gain', 'friction')
     rows = [
-        (joint, *(_cell(found.of(name, joint)) for name in names), f'{left:.2g}')
-        for joint, left in zip(found.arm.robot.joints, found.residual, strict=True)
+        (joint, *(_cell(found.of(name, joint)) for name in names), f'{residual:.2g}')
+        for joint, residual in zip(found.arm.robot.joints, found.residual, strict=True)
     ]
     tilt, mass = found.of('tilt'), found.of('mass')
     place = ', '.join(_cell(found.of(f'center_{axis}')).split(' ± ')[0] for axis in 'xyz')
-    parts = [] if tilt.reason or document['external'] else [f'base tilted by {_cell(tilt)} deg']
+    parts = [] if tilt.reason else [f'base tilted by {_cell(tilt)} deg']
     parts += [] if mass.reason else [f'tool of {_cell(mass)} kg at {place} m']
     title = ', '.join(parts) or 'neither tilt nor tool is determined'
-    if document['external']:
-        share = 100.0 * _explained(found)
-        title += f'; zeros and payload explain {share:.0f} % of the external torque'
-    lines = [f'{found.rests} rests in {found.poses} poses; {found.outliers} outliers left out']
-    if held := document['held']:
-        lines[0] += f'; held known: {", ".join(held)}'
-    shown = {row['name'] for row in document['quantities']}
+    lines = [
+        f'{found.rests} rests in {found.poses} poses; {found.outliers} outliers left out; '
+        f'held known: {", ".join(document["held"])}'
+    ]
     undetermined: dict[str, list[str]] = {}
     for one in found.quantities:
-        if one.name in shown and one.reason:
+        if one.reason:
             undetermined.setdefault(one.reason, []).append(f'{one.name} {one.joint}'.strip())
     for why, which in undetermined.items():
         text = ', '.join(which) if len(which) < 9 else f'{len(which)} values'
@@ -90,8 +83,3 @@ def _cell(one: FittedQuantity) -> str:
         return 'not det.'
     value, half = measured(one.value, one.half_width)
     return f'{value} ± {half}' if one.half_width else f'{value} (known)'
-
-
-def _explained(found: ZeroFit) -> float:
-    """Return the share of the squared readings that the fit explains."""
-    return float(1.0 - np.sum(found.residual**2) / np.sum(found.before**2))
