@@ -14,7 +14,6 @@ from armid_ros.api.arguments import (
     recordings_of,
     Rng,
     RobotLike,
-    spelled,
 )
 from armid_ros.api.excitation import ExcitationResult, planner_of, WAYPOINT_RATE
 from armid_ros.arm import ArmModel
@@ -35,7 +34,6 @@ from armid_ros.recording import Recording
 import numpy as np
 
 
-@spelled
 def design_excitation(
     arm: RobotLike,
     *,

@@ -19,7 +19,6 @@ from armid_ros.api.arguments import (
     RobotLike,
     some_recordings_of,
     source_of,
-    spelled,
     USUAL,
     with_sources_apart,
 )
@@ -326,7 +325,6 @@ class IdentificationResult(ShownModel):
         return aligned(('parameter', 'value, 95 %', 'described'), rows)
 
 
-@spelled
 def identify(
     arm: RobotLike,
     recordings: RecordingLike | Sequence[RecordingLike],

@@ -10,13 +10,11 @@ from pathlib import Path
 from typing import Any, TYPE_CHECKING
 
 from armid_ros.api.arguments import (
-    describes_robot,
     RecordingLike,
     recordings_of,
     Rng,
     robot_of,
     RobotLike,
-    spelled,
     topics_of,
     USUAL,
 )
@@ -124,10 +122,9 @@ class InspectionResult(Shown):
         )
 
 
-@spelled
 def inspect(
     robot: RobotLike | RecordingLike | None = None,
-    recording: RecordingLike | RobotLike | None = None,
+    recording: RecordingLike | None = None,
     *,
     topics: tuple[Topic, ...] | None = None,
     rng: Rng = 0,
@@ -163,8 +160,8 @@ def inspect(
     ()
 
     """
-    if recording is None or describes_robot(recording):  # alone, or in the order of before
-        robot, recording = recording, robot
+    if recording is None:  # the only argument
+        robot, recording = None, robot
     if recording is None or isinstance(recording, Robot | ArmModel):
         raise RecordingError('no recording: give the path of a bag or a table, or a Recording')
     if isinstance(robot, Recording):
@@ -263,7 +260,6 @@ class CheckResult(Shown):
         return Summary(first, word, heads, rows, lines, then=then)
 
 
-@spelled
 def check(
     robot: RobotLike,
     recordings: RecordingLike | Sequence[RecordingLike] = (),

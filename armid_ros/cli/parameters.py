@@ -10,6 +10,7 @@ import shlex
 from typing import Any, TypeVar
 
 from armid_ros.cli.choices import HOW_OFTEN, SPEED_CLASSES, USUAL_EFFECTS
+from armid_ros.files.cells import listed
 import click
 
 _Command = TypeVar('_Command', bound=Callable[..., Any])
@@ -54,6 +55,11 @@ def completed(_: click.Context, parameter: click.Parameter, incomplete: str) -> 
 
         names = CATALOGUE
     return [f'{before}{sign}{name}' for name in names if name.startswith(last)]
+
+
+def names(_: click.Context, parameter: click.Parameter, value: str | None) -> tuple[str, ...]:
+    """Split a list of names at commas, except within double quotes."""
+    return listed(value) if value else ()
 
 
 gravity = click.option(

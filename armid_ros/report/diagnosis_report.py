@@ -5,14 +5,13 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 import re
-from typing import ClassVar, TYPE_CHECKING
+from typing import ClassVar
 
-from armid_ros.diagnosis import Diagnosis, Finding, NextRun
-from armid_ros.diagnosis.next_run.steps import MODEL, next_steps
+from armid_ros.diagnosis import Diagnosis, Finding
 from armid_ros.diagnosis.verdict.document import detectable
-from armid_ros.diagnosis.verdict.words import by_cause, names_and_places, share_in_words
+from armid_ros.diagnosis.verdict.words import by_cause
 from armid_ros.estimate import name_in_words
 from armid_ros.identification.assess.verification import ForwardValidation
 from armid_ros.recording import Recording
@@ -23,7 +22,6 @@ from armid_ros.report.notation import (
     digits,
     percent,
     pretty,
-    probability,
     robot_label,
     short_names,
     with_names,
@@ -38,16 +36,12 @@ from armid_ros.report.sections.diagnosed import (
     gap_section,
     minor_section,
     named_section,
-    patch_section,
     share_bars,
     share_of,
 )
 from armid_ros.report.sections.fit import forward_section
 from armid_ros.report.sections.overlay import overlay_section, whole_overlays
 import numpy as np
-
-if TYPE_CHECKING:
-    from armid_ros.residual import Residual
 
 #: Colour of each verdict; the others are bad.
 _TONES = {'consistent': 'good', 'named': 'good', 'ambiguous': 'fair', 'partial': 'fair'}
@@ -68,63 +62,6 @@ def tone_of(diagnosis: Diagnosis, worse: Sequence[str] = ()) -> str:
     return 'fair' if tone == 'good' and (any(open_ends) or worse) else tone
 
 
-@dataclass(frozen=True)
-class Extras:
-    """
-    Results that follow from a diagnosis: next run, simulation, learned residual.
-
-    Attributes
-    ----------
-    forward : tuple of ForwardValidation
-        Held-out recordings simulated with the given and with the patched model.
-    next_run : NextRun or None
-        A motion that separates names in doubt.
-    no_run : str
-        Why there is no next run, where names are in doubt.
-    notes : tuple of str
-        Reasons why a result is missing.
-    residual : Residual or None
-        Learned map of the unexplained residual.
-
-    """
-
-    forward: tuple[ForwardValidation, ...] = ()
-    next_run: NextRun | None = None
-    no_run: str = ''
-    notes: tuple[str, ...] = ()
-    residual: Residual | None = None
-
-    def steps(self, diagnosis: Diagnosis, model: str = MODEL) -> list[str]:
-        """Return the next steps for the page and the terminal, with the path of the model."""
-        learned = self.residual is not None
-        return next_steps(diagnosis, self.next_run, self.no_run, model, self.worse, learned)
-
-    def sentences(self, diagnosis: Diagnosis) -> list[str]:
-        """Return sentences on shares, minor effects, consequences and notes."""
-        lines = [
-            f'{names_and_places(group)}: {share_in_words(group[0])}'
-            + (', together' if len(group) > 1 else '')
-            for group in by_cause(diagnosis.findings)
-        ]
-        lines += [
-            f'minor (significant, but negligible or not confirmed): '
-            f'{name_in_words(one.name)} in {", ".join(one.joints) or "the whole arm"}, '
-            f'p {probability(one.p)}'
-            for one in diagnosis.minor
-        ]
-        lines += [] if self.residual is None else self.residual.sentences()
-        lines += [pair.sentence() for pair in self.forward]
-        if diagnosis.verdict == 'consistent':
-            lines.append('note: how large each effect has to be to be seen is in report.html')
-        lines += [f'note: {note}' for note in (*diagnosis.notes, *self.notes)]
-        return lines
-
-    @property
-    def worse(self) -> tuple[str, ...]:
-        """Joints in which a simulation with the patched model is worse than before."""
-        return tuple(dict.fromkeys(joint for pair in self.forward for joint in pair.worse))
-
-
 #: What recordings were used for, and the words for some of them.
 _ROLES = (
     ('training', 'recording', '{}'),
@@ -138,9 +75,11 @@ def diagnosis_report(
     diagnosis: Diagnosis,
     read: Mapping[str, Sequence[Recording]],
     *,
+    steps: Sequence[str] = (),
     everything: bool = False,
-    extras: Extras | None = None,
-    patch: str = '',
+    forward: Sequence[ForwardValidation] = (),
+    learned: Section | None = None,
+    gains: Mapping[str, float] | None = None,
     origin: ResultOrigin = DEFAULT_ORIGIN,
 ) -> str:
     """
@@ -153,12 +92,16 @@ def diagnosis_report(
     read : mapping of str to sequence of Recording
         Recordings by what they were used for: 'training', 'held-out',
         'baseline', 'simulator'.
+    steps : sequence of str
+        Next steps, the first one for the verdict box.
     everything : bool
         Whether negligible effects were added to the model.
-    extras : Extras, optional
-        What was made of it.
-    patch : str
-        model.yaml of the patched model.
+    forward : sequence of ForwardValidation
+        Held-out recordings simulated with the given and with the patched model.
+    learned : Section, optional
+        Section on the learned residual.
+    gains : mapping of str to float, optional
+        Share of the residual that the learned map of each joint predicts.
     origin : ResultOrigin
         Robot, files, versions, settings, seed.
 
@@ -168,45 +111,39 @@ def diagnosis_report(
         One HTML file that loads nothing.
 
     """
-    extras, arm = extras or Extras(), diagnosis.arm
+    arm = diagnosis.arm
     recordings = [(one, role) for role, several in read.items() for one in several]
     names = short_names([one.source for one, _ in recordings])
-    residual, patched = extras.residual, bool(diagnosis.findings)
-    steps = list(map(pretty, extras.steps(diagnosis)))
-    if residual is not None:
-        steps += residual.steps()
-    sections: list[Section] = [_verdict(diagnosis, names, extras.worse, ''.join(steps[:1]))]
+    worse = tuple(dict.fromkeys(joint for pair in forward for joint in pair.worse))
+    sections: list[Section] = [_verdict(diagnosis, names, worse, ''.join(steps[:1]))]
     curves = whole_overlays(diagnosis, [one for one, _ in recordings])
     if curves is not None and diagnosis.gap is not None:
         sections += [
             overlay_section(diagnosis, curves, names),
-            Story(diagnosis, residual),
+            Story(diagnosis, gains or {}),
             gap_section(diagnosis, diagnosis.gap),
-            *([named_section(diagnosis.findings)] if patched else []),
+            *([named_section(diagnosis.findings)] if diagnosis.findings else []),
         ]
         if diagnosis.where:
             sections.append(evidence_section(diagnosis))
-    if residual is not None:
-        sections.append(residual.section())
+    if learned is not None:
+        sections.append(learned)
     sections.append(next_steps_section(steps))
     if diagnosis.minor:
         sections.append(minor_section(diagnosis, everything))
     if diagnosis.gap is not None:
         sizes = detectable(diagnosis.explanation)
         sections += [candidates_section(diagnosis), detectable_section(sizes)]
-    if extras.forward:
+    if forward:
+        sources = [names.get(pair.after.source, pair.after.source) for pair in forward]
         pairs = [
-            replace(pair, after=replace(pair.after, source=names[pair.after.source]))
-            if pair.after.source in names
-            else pair
-            for pair in extras.forward
+            replace(pair, after=replace(pair.after, source=source))
+            for pair, source in zip(forward, sources, strict=True)
         ]
         sections.append(forward_section(arm.robot, pairs, ('as it was', 'patched')))
     quality = [(one, role, ()) for one, role in recordings]
     at_fault = _at_fault(diagnosis, read, names)
     sections.append(data_quality_section(quality, at_fault=at_fault, names=names))
-    if patched and not diagnosis.harmful:
-        sections.append(patch_section(diagnosis.findings, patch))
     sections.append(Origin(origin.provenance))
     used = [
         kind.format(counted(len(read[role]), noun))
@@ -260,8 +197,8 @@ class Story(Section):
     ----------
     diagnosis : Diagnosis
         What was found.
-    residual : Residual or None
-        The learned residual.
+    gains : mapping of str to float
+        Share of the residual that the learned map of each joint predicts.
 
     """
 
@@ -269,7 +206,7 @@ class Story(Section):
     template: ClassVar[str] = 'story.html'
 
     diagnosis: Diagnosis
-    residual: Residual | None = None
+    gains: Mapping[str, float] = field(default_factory=dict)
 
     @property
     def drawing(self) -> ArmDrawing:
@@ -277,7 +214,7 @@ class Story(Section):
         data, robot = self.diagnosis.data, self.diagnosis.arm.robot
         cause: list[Finding] = next(iter(by_cause(self.diagnosis.findings)), [])
         names = ', '.join(name_in_words(one.name) for one in cause)
-        found = [*(place.joint for place in self.diagnosis.where), *self._gains]
+        found = [*(place.joint for place in self.diagnosis.where), *self.gains]
         named = {joint for one in cause for joint in one.joints}
         joints = [joint for joint in robot.joints if joint in named] if cause else found[:1]
         caption = f'coloured: {", ".join(joints)} ({names or "the largest gap"})'
@@ -306,10 +243,6 @@ class Story(Section):
             answers.append(('Unexplained', [f'{w.joint}: {w.signature}' for w in rest[:_JOINTS]]))
         return answers
 
-    @property
-    def _gains(self) -> Mapping[str, float]:
-        return {} if self.residual is None else self.residual.gains
-
     def _where(self) -> list[str]:
         places, whole = self.diagnosis.where, share_of(self.diagnosis)
         lines = [
@@ -337,8 +270,8 @@ class Story(Section):
         diagnosis = self.diagnosis
         patched = not diagnosis.harmful
         added = [name_in_words(finding.name) for finding in diagnosis.findings if patched]
-        if self._gains:
-            added.append(f'the learned residual of {", ".join(self._gains)}')
+        if self.gains:
+            added.append(f'the learned residual of {", ".join(self.gains)}')
         if not added:
             return ['The model is unchanged.']
         more = ', with rigid body and friction refitted' * (diagnosis.refitted and patched)
@@ -360,6 +293,6 @@ class Story(Section):
             f'The floor, {floor}, is {self.diagnosis.baseline}.',
             *(
                 f'{joint}: the map predicts {percent(gain)} of the residual without a known cause.'
-                for joint, gain in self._gains.items()
+                for joint, gain in self.gains.items()
             ),
         ]

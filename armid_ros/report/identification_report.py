@@ -26,7 +26,6 @@ from armid_ros.report.blocks import (
     TableCell,
     VerdictSection,
 )
-from armid_ros.report.charts import Chart, Series
 from armid_ros.report.families import effects_in_words, full_label, parameter_section
 from armid_ros.report.judgement import judge
 from armid_ros.report.notation import counted, digits, plain, pretty, robot_label
@@ -34,19 +33,13 @@ from armid_ros.report.page import Page, Section
 from armid_ros.report.provenance import DEFAULT_ORIGIN, ResultOrigin
 from armid_ros.report.sections.data_quality import data_quality_section
 from armid_ros.report.sections.fit import by_recording, error_bars, fit_section, forward_section
-from armid_ros.report.statistics import (
-    directions,
-    residual_section,
-    torque_reach,
-    torque_scale,
-    whiteness_section,
-)
+from armid_ros.report.statistics import residual_section, torque_reach, whiteness_section
 from armid_ros.robots import Robot
 import numpy as np
 
 #: Colour of each grade.
 TONES = {'good': 'good', 'poor': 'fair', 'unusable': 'bad'}
-#: Parameters and combinations of them that are listed.
+#: Biases that are listed.
 _WORST = 6
 
 
@@ -148,7 +141,6 @@ def identification_report(
             assessment.reference,
         ),
         *([_physical_section(result.physical, assessment.exports)] if result.physical else []),
-        _excitation_section(result),
         whiteness_section(described, shown, role),
         *([] if noise is None else [_noise_section(described, noise)]),
         *assessment.sections,
@@ -182,41 +174,13 @@ def _asked(
         ),
         ('Fitted to', ', '.join(training)),
         ('Held out', ', '.join(validation) or 'nothing'),
+        (
+            'Excitation',
+            f'identifies {counted(result.base.rank, "parameter")}; condition number of the '
+            f'weighted regressor {plain(result.condition_number)}',
+        ),
     ]
     return ContentSection('Input', [FactList(facts)])
-
-
-def _excitation_section(result: Identification) -> ContentSection:
-    """Return how well a motion determines the parameters."""
-    rows, links = [], result.arm.robot.links
-    worst = directions(result.estimate, torque_scale(result))
-    for uncertainty, parts in worst[:_WORST]:
-        named = [f'{full_label(one, links)} {100.0 * x:.0f} %' for one, x in parts]
-        rows.append((', '.join(named), digits(uncertainty)))
-    values = np.array([uncertainty for uncertainty, _ in worst])
-    return ContentSection(
-        'Excitation',
-        [
-            Paragraph(
-                f'This motion identifies {counted(result.base.rank, "parameter")}. The condition '
-                f'number of the weighted regressor is {plain(result.condition_number)}.'
-            ),
-            Paragraph(
-                'The worst-determined combinations are listed first. Each number is the torque '
-                'uncertainty that the combination causes, over the standard deviation of the '
-                'residual.'
-            ),
-            DataTable((), rows),
-            Chart(
-                np.arange(1.0, len(values) + 1.0),
-                [Series('uncertainty', values, 'residual', 'sticks')],
-                'combination of parameters, worst known first',
-                'uncertainty / residual',
-                height=190,
-                legend=False,
-            ),
-        ],
-    )
 
 
 def _noise_section(robot: Robot, check: NoiseCheck) -> ContentSection:
@@ -295,6 +259,13 @@ def _physical_section(
         )
         for weight, ratio in certificate.tried
     ]
+    homeless = []
+    for file, lines in exports.items():
+        kinds = Counter(line.split(':')[0] for line in lines)
+        if kinds:
+            named = ', '.join(f'{kind} ({counted(n, "value")})' for kind, n in kinds.items())
+            text = f'{file} has no place for {named}: a comment in it lists them.'
+            homeless.append(Paragraph(text))
     head = 'Cross-validation error relative to the unconstrained fit'
     return ContentSection(
         'Physical consistency',
@@ -314,19 +285,6 @@ def _physical_section(
                     DataTable(('Weight', head), tried, ()),
                 ],
             ),
-            *_without_place(exports),
+            *homeless,
         ],
     )
-
-
-def _without_place(exports: Mapping[str, Sequence[str]]) -> list[Paragraph]:
-    """List the values that each exported file cannot contain."""
-    homeless = []
-    for file, lines in exports.items():
-        kinds = Counter(line.split(':')[0] for line in lines)
-        if kinds:
-            said = ', '.join(f'{kind} ({counted(n, "value")})' for kind, n in kinds.items())
-            homeless.append(
-                Paragraph(f'{file} has no place for {said}: a comment in it lists them.')
-            )
-    return homeless

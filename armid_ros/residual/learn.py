@@ -7,7 +7,6 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 from itertools import product
-from pathlib import Path
 from typing import Any, ClassVar
 
 from armid_ros.arm import ArmModel
@@ -16,7 +15,6 @@ from armid_ros.diagnosis.data.trajectory import Trajectory
 from armid_ros.diagnosis.diagnose import OPEN
 from armid_ros.effects.learned import LearnedTorque, TorqueMap
 from armid_ros.errors import IdentificationError
-from armid_ros.files import write_file
 from armid_ros.files.cells import csv_cell
 from armid_ros.report.blocks import ContentSection
 from armid_ros.residual.gaussian_process import learn_map
@@ -25,13 +23,11 @@ from armid_ros.residual.rows import BLOCKS, joint_rows, JointRows
 from armid_ros.residual.section import JointResidual, residual_map_section
 import numpy as np
 import numpy.typing as npt
-from threadpoolctl import threadpool_limits
 
 #: A joint with fewer rows has too few data for a map.
 _FEW = 100
 #: A map is informative if its standard deviation is less than this share of the prior's.
 _KNOWN = 0.5
-_HEAD = 'joint,position,velocity,load,torque,std'
 
 
 @dataclass(frozen=True)
@@ -95,9 +91,32 @@ class Residual:
         """Return the section of a report with the maps."""
         return residual_map_section(self.base, self.joints, self.table_file)
 
-    def write_table(self, folder: Path) -> None:
-        """Write the maps as a table into a folder."""
-        write_file(folder / self.table_file, lookup_table(self))
+    def table(self) -> str:
+        """
+        Return the maps as CSV on a grid over the range of the data, in SI units.
+
+        Returns
+        -------
+        str
+            Joint, position, velocity, load, torque and its standard deviation; the load is empty
+            if the map does not depend on load. Position varies slowest.
+
+        """
+        lines = ['joint,position,velocity,load,torque,std']
+        for one in self.joints:
+            # points along position, velocity and load
+            axes = [one.axis(number, count) for number, count in enumerate((41, 31, 9))]
+            loaded = one.learned.takes_load
+            if not loaded:
+                axes[2] = np.zeros(1)
+            inputs = np.array(list(product(*axes)))
+            torque, std = one.learned.torque(inputs), one.learned.std(inputs)
+            name = csv_cell(one.joint)
+            lines += [
+                f'{name},{q:.6g},{dq:.6g},{f"{w:.6g}" if loaded else ""},{tau:.6g},{s:.4g}'
+                for (q, dq, w), tau, s in zip(inputs, torque, std, strict=True)
+            ]
+        return '\n'.join(lines) + '\n'
 
     def document(self) -> dict[str, Any]:
         """Return the entry of diagnosis.json."""
@@ -175,6 +194,7 @@ def learn_residual(diagnosis: Diagnosis, rng: np.random.Generator) -> Residual |
     unseen = joint_rows(base, validation) if validation else [None] * len(every)
     # two threads would spend most of the time waiting, as each system has only a hundred rows
     import sklearn.linear_model  # noqa: F401 - so that its threads are limited as well
+    from threadpoolctl import threadpool_limits
 
     with threadpool_limits(1):
         learned = [
@@ -227,31 +247,3 @@ def _learned(
 def near_data(learned: TorqueMap, rows: JointRows) -> npt.NDArray[np.bool_]:
     """Return a mask of the rows near those from which a map was learned, shape (N,)."""
     return np.asarray(learned.std(rows.inputs) < _KNOWN * learned.amplitude)
-
-
-def lookup_table(residual: Residual) -> str:
-    """
-    Return the maps as CSV on a grid over the range of the data, in SI units.
-
-    Returns
-    -------
-    str
-        Joint, position, velocity, load, torque and its standard deviation; the load is empty if
-        the map does not depend on load. Position varies slowest.
-
-    """
-    lines = [_HEAD]
-    for one in residual.joints:
-        # points along position, velocity and load
-        axes = [one.axis(number, count) for number, count in enumerate((41, 31, 9))]
-        loaded = one.learned.takes_load
-        if not loaded:
-            axes[2] = np.zeros(1)
-        inputs = np.array(list(product(*axes)))
-        torque, std = one.learned.torque(inputs), one.learned.std(inputs)
-        name = csv_cell(one.joint)
-        lines += [
-            f'{name},{q:.6g},{dq:.6g},{f"{w:.6g}" if loaded else ""},{tau:.6g},{s:.4g}'
-            for (q, dq, w), tau, s in zip(inputs, torque, std, strict=True)
-        ]
-    return '\n'.join(lines) + '\n'

@@ -25,7 +25,12 @@ import click
 )
 @parameters.robot_described(help='Shipped name or path; that of the model by default.')
 @click.option('--out', type=click.Path(path_type=Path), help='File to write, .rrd; no window.')
-@click.option('--mark', metavar='A,B,...', help='Joints to colour; default: those named.')
+@click.option(
+    '--mark',
+    metavar='A,B,...',
+    callback=parameters.names,
+    help='Joints to colour; default: those named.',
+)
 @columns.options
 @parameters.topic
 @parameters.gravity
@@ -38,13 +43,12 @@ def view(
     gravity: str,
     joints: str | None,
     out: Path | None,
-    mark: str | None,
+    mark: tuple[str, ...],
     topic: str | None,
 ) -> None:
     """Look at a recording in rerun: the moving arm, torques, and the residual of a model."""
     from armid_ros.arm import ArmModel
     from armid_ros.cli import options
-    from armid_ros.files.cells import listed
     from armid_ros.view.rerun_log import log_recording, open_stream
 
     robot = None
@@ -56,7 +60,7 @@ def view(
         assert robot is not None
         arm = ArmModel(robot)
     (recording,) = options.read([bag], arm.robot, topic)
-    marked = listed(mark) if mark else ()
+    marked = mark
     if model is not None and not mark:  # the joints of the effects that a diagnosis names
         path = (model if model.is_dir() else model.parent) / 'diagnosis.json'
         if path.is_file():

@@ -263,9 +263,7 @@ def _solved(
     leverage = np.minimum(np.einsum('kjp,pr,kjr->kj', w, covariance, w), 0.9)
     rest = (y - _predicted(arms, rests, x)[0]) / sigma / (1.0 - leverage)
     moved = np.einsum('kjp,kj->kp', w, rest) @ covariance
-    return _Solution(
-        x, free, covariance, moved.T @ moved, information, used, float(freedom.min())
-    )
+    return _Solution(x, free, covariance, moved.T @ moved, information, used, float(freedom.min()))
 
 
 def _quantities(

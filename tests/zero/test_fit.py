@@ -7,7 +7,6 @@ from dataclasses import replace
 from armid_ros.robots import load_robot, robot_from_urdf
 from armid_ros.zero.fit import fit_rests
 import numpy as np
-import pinocchio as pin
 import pytest
 
 from tests.zero.machine import rests_of, Secret

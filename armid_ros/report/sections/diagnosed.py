@@ -14,7 +14,6 @@ from armid_ros.diagnosis.search.trial import Trial
 from armid_ros.diagnosis.verdict.document import Detectable
 from armid_ros.diagnosis.verdict.finding import Gap
 from armid_ros.diagnosis.verdict.words import by_cause, share_interval_in_words
-from armid_ros.effects import CATALOGUE
 from armid_ros.effects.quantities import SURELY
 from armid_ros.estimate import name_in_words
 from armid_ros.identification.fitting.identifiability import excludes_zero
@@ -22,7 +21,6 @@ from armid_ros.motion import FloatArray
 from armid_ros.report.blocks import (
     Bar,
     BarChart,
-    BulletList,
     Cells,
     ContentSection,
     DataTable,
@@ -268,19 +266,6 @@ def _detectable_row(name: str, sizes: Sequence[Detectable]) -> tuple[str, str, s
     best, worst = (size(finite[0]), size(finite[-1])) if finite else ('', '')
     never = '; '.join(place(s) for s in own if not math.isfinite(s.size))
     return name_in_words(name), best, worst if worst != best else '', never
-
-
-def patch_section(findings: Sequence[Finding], text: str) -> ContentSection:
-    """Return the effects added to the model, with the part of model.yaml on effects."""
-    start, end = max(text.find('effects:'), 0), text.find('\nmisfit:')
-    yaml = text[start:end] if end > start else text[start:]
-    own = 'an effect of your own'
-    added = [
-        (f'{f.name}: {CATALOGUE[f.name].summary if f.name in CATALOGUE else own}', '')
-        for f in findings
-    ]
-    line = 'Effects of model.yaml, which armid simulate --model reads'
-    return ContentSection('Patch', [BulletList(added), Fold(line, [Paragraph(yaml, 'code')])])
 
 
 def candidates_section(diagnosis: Diagnosis) -> ContentSection:
