@@ -227,7 +227,7 @@ def read_recording(
     True
 
     """
-    said = ColumnSettings(
+    settings = ColumnSettings(
         time=time,
         position=position,
         velocity=velocity,
@@ -250,14 +250,14 @@ def read_recording(
             raise RecordingError(
                 f'{path}: topics of JointState: {", ".join(named)}; give one as topic'
             )
-        return read_anything(path, topics=topics, topic=topic, columns=said)
+        return read_anything(path, topics=topics, topic=topic, columns=settings)
     if isinstance(robot, (Robot, ArmModel, str, Path)):
         described = robot_of(robot)
         slides = [bool(one) for one in described.prismatic]
         return read_anything(
-            path, joints=described.joints, slides=slides, topic=topic, columns=said
+            path, joints=described.joints, slides=slides, topic=topic, columns=settings
         )
-    return read_anything(path, joints=tuple(robot), topic=topic, columns=said)
+    return read_anything(path, joints=tuple(robot), topic=topic, columns=settings)
 
 
 def topics_of(path: Path, settings: ReadSettings = DEFAULT) -> tuple[Topic, ...]:

@@ -8,13 +8,7 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
 
-from armid_ros.api.arguments import (
-    drivable,
-    RecordingLike,
-    recordings_of,
-    Rng,
-    RobotLike,
-)
+from armid_ros.api.arguments import drivable, RecordingLike, recordings_of, Rng, RobotLike
 from armid_ros.api.excitation import ExcitationResult, planner_of, WAYPOINT_RATE
 from armid_ros.arm import ArmModel
 from armid_ros.errors import TrajectoryError
@@ -144,7 +138,7 @@ def design_excitation(
     searches, seconds = (1, 25.0) if model.robot.n_joints > 20 else (4, 120.0)
     run_in = min(2.0, 0.1 * duration)  # [s]
     period = whole_period(duration, periods, run_in, WAYPOINT_RATE)
-    asked = DesignSettings(
+    settings = DesignSettings(
         period=period,
         n_periods=periods,
         run_in=run_in,
@@ -162,9 +156,9 @@ def design_excitation(
     )
     if scene is None:
         height = None if floor is None else str(floor)
-        scene = CollisionScene.of(model.robot, asked.clearance, height, environment)
+        scene = CollisionScene.of(model.robot, settings.clearance, height, environment)
     earlier = recordings_of(after, model.robot)
-    return _searched(model, asked, scene, start, earlier, rng, rival, progress)
+    return _searched(model, settings, scene, start, earlier, rng, rival, progress)
 
 
 excite = design_excitation  # as the command is called
@@ -172,7 +166,7 @@ excite = design_excitation  # as the command is called
 
 def _searched(
     model: ArmModel,
-    asked: DesignSettings,
+    settings: DesignSettings,
     scene: CollisionScene,
     start: FloatArray | None,
     earlier: Sequence[Recording],
@@ -181,7 +175,7 @@ def _searched(
     progress: Callable[[DesignProgress], None] | None,
 ) -> ExcitationResult:
     """Check that a start pose is free, then search for the trajectory."""
-    planner = planner_of(model, asked, scene)
+    planner = planner_of(model, settings, scene)
     if start is None:
         planner.free_start()  # raises before the search if no pose is free
     elif fault := planner.fault(start):
@@ -189,15 +183,15 @@ def _searched(
     prior = None
     if earlier:  # information matrix of existing recordings
         used = conditioning(list(earlier), SignalSettings())
-        problem = DesignProblem.of(model, asked, np.random.default_rng(rng))
+        problem = DesignProblem.of(model, settings, np.random.default_rng(rng))
         prior = np.zeros(2 * [len(problem.base.parameters)])
         for recording in earlier:
             for motion in segments(recording, used):
                 rows = motion.select(slice(None, None, used.decimation))
-                prior += problem.information(rows, np.ptp(motion.t) * asked.rate).matrix
+                prior += problem.information(rows, np.ptp(motion.t) * settings.rate).matrix
     found = design(
         model,
-        asked,
+        settings,
         np.random.default_rng(rng),
         collision=scene.bodies,
         prior_information=prior,

@@ -21,12 +21,7 @@ from armid_ros.api.arguments import (
 )
 from armid_ros.api.identification import IdentificationResult
 from armid_ros.api.since import misfit_of, model_in_question, recordings_since
-from armid_ros.api.table import (
-    data_frame,
-    ResidualPart,
-    ShownModel,
-    Summary,
-)
+from armid_ros.api.table import data_frame, ResidualPart, ShownModel, Summary
 from armid_ros.arm import ArmModel, Misfit, save_model
 from armid_ros.diagnosis import diagnose as run
 from armid_ros.diagnosis import (
@@ -108,6 +103,7 @@ class DiagnosisResult(ShownModel):
     """
 
     schema = SCHEMA
+    plan_file = EXPERIMENT_FILE
 
     core: Diagnosis
     description: ArmModel
@@ -206,7 +202,7 @@ class DiagnosisResult(ShownModel):
         if self.residual is not None:
             write_file(folder / self.residual.table_file, self.residual.table())
         if self.next_run is not None:
-            save_excitation(self.next_run.excitation, folder / EXPERIMENT_FILE)
+            save_excitation(self.next_run.excitation, folder / self.plan_file)
         write_file(folder / 'report.html', self.page(origin))
         return document
 
@@ -216,7 +212,7 @@ class DiagnosisResult(ShownModel):
         return [
             *('diagnosis.json', 'report.html', 'model.yaml'),
             *([] if self.residual is None else [self.residual.table_file]),
-            *([] if self.next_run is None else [EXPERIMENT_FILE]),
+            *([] if self.next_run is None else [self.plan_file]),
         ]
 
     def with_residual(self, seed: int) -> DiagnosisResult:
@@ -399,10 +395,10 @@ def diagnose(
         require_residual()
     arm, model, simulated = model_in_question(arm, effects, against, baseline, rng)
     robot = model.robot
-    looked_at, held_out = some_recordings_of(recordings, robot), recordings_of(validate, robot)
-    before = recordings_since(arm, model, baseline, [*looked_at, *held_out])
-    looked_at, held_out, before = with_sources_apart(looked_at, held_out, before)
-    require_once([*looked_at, *before], held_out)
+    diagnosed, held_out = some_recordings_of(recordings, robot), recordings_of(validate, robot)
+    before = recordings_since(arm, model, baseline, [*diagnosed, *held_out])
+    diagnosed, held_out, before = with_sources_apart(diagnosed, held_out, before)
+    require_once([*diagnosed, *before], held_out)
     misfit = misfit or misfit_of(arm, model)
     settings = DiagnosisSettings(
         signals=SignalSettings(cutoff, decimation),
@@ -414,7 +410,7 @@ def diagnose(
     found = DiagnosisResult(
         run(
             model,
-            looked_at,
+            diagnosed,
             validate=held_out,
             baseline=before,
             misfit=misfit,
@@ -423,7 +419,7 @@ def diagnose(
             progress=progress,
         ),
         model,
-        tuple(looked_at),
+        tuple(diagnosed),
         tuple(held_out),
         tuple(before),
         settings,

@@ -22,13 +22,7 @@ from armid_ros.api.arguments import (
     USUAL,
     with_sources_apart,
 )
-from armid_ros.api.table import (
-    aligned,
-    data_frame,
-    ResidualPart,
-    ShownModel,
-    Summary,
-)
+from armid_ros.api.table import aligned, data_frame, ResidualPart, ShownModel, Summary
 from armid_ros.arm import ArmModel, Misfit, save_model
 from armid_ros.arm.export import arm_mjcf, arm_urdf, Exported, torque_check
 from armid_ros.diagnosis import known_misfit

@@ -9,14 +9,7 @@ from itertools import product
 from pathlib import Path
 from typing import TypeGuard
 
-from armid_ros.api.arguments import (
-    arm_of,
-    is_model,
-    RecordingLike,
-    recordings_of,
-    Rng,
-    RobotLike,
-)
+from armid_ros.api.arguments import arm_of, is_model, RecordingLike, recordings_of, Rng, RobotLike
 from armid_ros.api.identification import IdentificationResult, identify
 from armid_ros.arm import ArmModel, Misfit
 from armid_ros.effects import CATALOGUE
@@ -39,7 +32,7 @@ def recordings_since(
     arm: RobotLike | IdentificationResult,
     model: ArmModel,
     baseline: RecordingLike | Sequence[RecordingLike] | None,
-    asked: Sequence[Recording],
+    diagnosed: Sequence[Recording],
 ) -> list[Recording]:
     """
     Return the given baseline; by default the recordings of the identification.
@@ -55,7 +48,7 @@ def recordings_since(
         found = recordings_of(identified_from(arm), model.robot)
     else:
         return []
-    for one, other in product(found, asked):
+    for one, other in product(found, diagnosed):
         if np.array_equal(one.t, other.t) and np.array_equal(one.q, other.q):
             return []
     if not isinstance(arm, IdentificationResult):

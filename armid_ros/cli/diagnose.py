@@ -155,7 +155,7 @@ def diagnose(
     every: bool,
     as_json: bool,
     priors: tuple[str, ...],
-    **asked: Any,
+    **settings: Any,
 ) -> None:
     """Find which effect a model lacks, and add it."""
     if baseline and no_baseline:
@@ -175,18 +175,18 @@ def diagnose(
     robot = options.open_robot(robot_source, gravity, joints, bags)
     arm = ArmModel(robot) if model is None else _model_of(model, robot)
     arm = options.with_effects(arm, effects)
-    beside = open_partner(partner, ties, robot, gravity)
+    other = open_partner(partner, ties, robot, gravity)
     misfit = None if model is None else read_misfit(model, arm)
-    if model is not None and beside is None and not (baseline or no_baseline):
+    if model is not None and other is None and not (baseline or no_baseline):
         baseline = _identified_from(model, [*bags, *validate])
     with progress('reading') as tick:
         recordings, held_out, before, simulated = (
             options.read(paths, robot, topic) for paths in (bags, validate, baseline, against)
         )
         options.tell_damage(*recordings, *held_out, *before, *simulated)
-        if beside is not None:
+        if other is not None:
             recordings, held_out = (
-                read_together(named, some, beside, partner_topic)
+                read_together(named, some, other, partner_topic)
                 for named, some in ((bags, recordings), (validate, held_out))
             )
         result = run(
@@ -197,11 +197,11 @@ def diagnose(
             against=simulated,
             effects=effects,
             misfit=misfit,
-            partner=beside,
+            partner=other,
             prior=dict(one.partition('=')[::2] for one in priors),
             rng=seed,
             progress=tick,
-            **asked,
+            **settings,
         )
         source = options.kept_source(robot_source, robot, staged.folder)
         origin = ResultOrigin(
@@ -219,12 +219,12 @@ def diagnose(
     click.get_current_context().exit(stopped.get(result.verdict, 0))
 
 
-def _identified_from(model: Path, asked: list[Path]) -> tuple[Path, ...]:
+def _identified_from(model: Path, diagnosed: list[Path]) -> tuple[Path, ...]:
     """Return the recordings of the identification as baseline; none if one is diagnosed."""
     from armid_ros.identification.output import identified_from, require_as_identified
 
     found = identified_from(model)
-    if not found or {path.resolve() for path in found} & {path.resolve() for path in asked}:
+    if not found or {path.resolve() for path in found} & {path.resolve() for path in diagnosed}:
         return ()
     require_as_identified(model)
     origin = 'which the model was identified from'

@@ -10,14 +10,7 @@ from pathlib import Path
 from typing import Any, TYPE_CHECKING
 
 from armid_ros.cli import parameters
-from armid_ros.cli.choices import (
-    COURSES,
-    CRITERIA,
-    FOURIER,
-    MAX_DURATION,
-    SPEED_CLASSES,
-    TARGETS,
-)
+from armid_ros.cli.choices import COURSES, CRITERIA, FOURIER, MAX_DURATION, SPEED_CLASSES, TARGETS
 from armid_ros.cli.terminal import progress, say
 from armid_ros.errors import RecordingError, TrajectoryError
 import click
@@ -255,8 +248,8 @@ def excite(
         arm = arm.with_effect(*parse_effect(text, robot))
     require_free(out)
     staged = options.stage(out, ExcitationResult.schema, robot_source)
-    beside = [path for path in (model, environment, joint_limits) if path is not None]
-    read = [Path(robot_source.split(' ')[0]), *after, *beside]
+    files = [path for path in (model, environment, joint_limits) if path is not None]
+    read = [Path(robot_source.split(' ')[0]), *after, *files]
     with progress('designing') as tick:
         result = design_excitation(
             arm,

@@ -86,7 +86,7 @@ def identify(
     strict: bool,
     seed: int,
     as_json: bool,
-    **asked: Any,
+    **settings: Any,
 ) -> None:
     """Fit a model with uncertainties to recordings."""
     from armid_ros.api.identification import IdentificationResult
@@ -112,7 +112,7 @@ def identify(
             physical=known if physical else physical,
             rng=seed,
             progress=tick,
-            **asked,
+            **settings,
         )
         tick(1.0, 'writing')
         origin = ResultOrigin(
@@ -120,7 +120,7 @@ def identify(
             options.kept_source(robot_source, robot, staged.folder),
             options.provenance([*bags, *validate], result.document()['settings'], seed),
         )
-        told = None if as_json else result.summary(every)
-        options.deliver(result, staged, origin, as_json, told)
+        summary = None if as_json else result.summary(every)
+        options.deliver(result, staged, origin, as_json, summary)
     if strict and result.grade == 'unusable':
         click.get_current_context().exit(3)

@@ -40,13 +40,7 @@ from armid_ros.recording.columns import numbers
 from armid_ros.recording.columns import per_joint as values_per_joint
 from armid_ros.report.blocks import VerdictSection
 from armid_ros.report.provenance import hash_files, Provenance, ResultOrigin, versions
-from armid_ros.robots import (
-    driven_in_words,
-    load_robot,
-    parse_gravity,
-    Robot,
-    robot_from_urdf,
-)
+from armid_ros.robots import driven_in_words, load_robot, parse_gravity, Robot, robot_from_urdf
 import click
 from click.core import ParameterSource
 import numpy as np
@@ -253,11 +247,11 @@ def model_of(path: Path, robot: Robot | None) -> ArmModel:
     context = click.get_current_context()
     if context.get_parameter_source('gravity') is not ParameterSource.COMMANDLINE:
         return arm
-    asked, own = parse_gravity(context.params['gravity']), arm.robot.gravity
-    if not np.allclose(asked, own):
-        told, known = (','.join(f'{part:g}' for part in vector) for vector in (asked, own))
+    given, own = parse_gravity(context.params['gravity']), arm.robot.gravity
+    if not np.allclose(given, own):
+        typed, known = (','.join(f'{part:g}' for part in vector) for vector in (given, own))
         raise ModelError(
-            f'{path}: its gravity is {known}, and --gravity is {told}: leave --gravity out, or '
+            f'{path}: its gravity is {known}, and --gravity is {typed}: leave --gravity out, or '
             'write that gravity into the file if the arm stands there now'
         )
     return arm
@@ -294,7 +288,7 @@ def per_joint(text: str | None, robot: Robot, option: str) -> FloatArray | None:
 
 def read(paths: Sequence[Path], robot: Robot, topic: str | None) -> list[Recording]:
     """Read the joints of bags and tables; print guesses on stderr, equal ones once."""
-    said, reading = columns.settings(), read_settings()
+    settings, reading = columns.settings(), read_settings()
     shown: set[str] = click.get_current_context().meta.setdefault(_SHOWN, set())
 
     def show(plan: TablePlan) -> None:
@@ -304,11 +298,11 @@ def read(paths: Sequence[Path], robot: Robot, topic: str | None) -> list[Recordi
             click.echo('\n'.join(lines) if body not in shown else f'{lines[0]}, alike', err=True)
         shown.add(body)
 
-    for path in paths if said.rename else ():
+    for path in paths if settings.rename else ():
         if ':' in path.name and not path.exists():  # a second pair without an option of its own
             raise RecordingError(
                 f"there is no recording '{path}'; to rename several names, repeat the option: "
-                f"--rename '{said.rename[-1][0]}:{said.rename[-1][1]}' --rename '{path}'"
+                f"--rename '{settings.rename[-1][0]}:{settings.rename[-1][1]}' --rename '{path}'"
             )
     return [
         read_anything(
@@ -316,7 +310,7 @@ def read(paths: Sequence[Path], robot: Robot, topic: str | None) -> list[Recordi
             joints=robot.joints,
             slides=list(robot.prismatic),
             topic=topic,
-            columns=said,
+            columns=settings,
             show=show,
             settings=reading,
         )

@@ -10,13 +10,24 @@ import re
 from typing import ClassVar
 
 from armid_ros.diagnosis import Diagnosis, Finding
+from armid_ros.diagnosis.data.trajectory import trajectories
 from armid_ros.diagnosis.verdict.document import detectable
+from armid_ros.diagnosis.verdict.finding import Gap, Overlay
 from armid_ros.diagnosis.verdict.words import by_cause
 from armid_ros.estimate import name_in_words
 from armid_ros.identification.assess.verification import ForwardValidation
+from armid_ros.identification.rows.signals import conditioning, SignalSettings
+from armid_ros.motion import FloatArray
 from armid_ros.recording import Recording
 from armid_ros.report.arm_drawing import ArmDrawing, draw_arm
-from armid_ros.report.blocks import next_steps_section, Origin, VerdictSection
+from armid_ros.report.blocks import (
+    ContentSection,
+    next_steps_section,
+    Origin,
+    Paragraph,
+    VerdictSection,
+)
+from armid_ros.report.charts import Chart, joined, joined_time, Series, thinned
 from armid_ros.report.notation import (
     counted,
     digits,
@@ -39,8 +50,7 @@ from armid_ros.report.sections.diagnosed import (
     share_bars,
     share_of,
 )
-from armid_ros.report.sections.fit import forward_section
-from armid_ros.report.sections.overlay import overlay_section, whole_overlays
+from armid_ros.report.sections.fit import forward_section, ZOOM
 import numpy as np
 
 #: Colour of each verdict; the others are bad.
@@ -296,3 +306,113 @@ class Story(Section):
                 for joint, gain in self.gains.items()
             ),
         ]
+
+
+def overlay_section(diagnosis: Diagnosis, gap: Gap, names: Mapping[str, str]) -> ContentSection:
+    """
+    Return measured and modelled torque, in the joint and recording where the gap was largest.
+
+    Parameters
+    ----------
+    diagnosis : Diagnosis
+        What was found, and the seconds in which the causes act.
+    gap : Gap
+        The curves.
+    names : mapping of str to str
+        What each recording is called.
+
+    """
+    robot, patched = diagnosis.arm.robot, bool(diagnosis.findings)
+    j = int(np.argmax(gap.chi2_before))
+
+    def size(overlay: Overlay) -> float:
+        residual = (overlay.measured - overlay.before)[:, j] / overlay.sigma[j]
+        return float(np.mean(residual**2))
+
+    shown = max(gap.overlays, key=size)
+    source = names.get(shown.source, shown.source) or 'the recording'
+    t, measured, before, after = _of_recording(gap, shown, j)
+    unit = robot.torque_units[j]
+    acting = [one for one in diagnosis.spans if one.source == shown.source and not one.whole]
+    marks = [(one.start, f'from {one.start:.1f} s', True) for one in acting]
+    marks += [(one.stop, f'to {one.stop:.1f} s', False) for one in acting]
+    kept = thinned(measured, measured - before, measured - after)
+    band: FloatArray = np.full(len(kept), 2.0 * shown.sigma[j])
+
+    def models(first: FloatArray, second: FloatArray) -> list[Series]:
+        if not patched:
+            return [Series('model', second[kept], 'before')]
+        return [Series('before', first[kept], 'before'), Series('after', second[kept], 'after')]
+
+    dashes = ', dashes on it are the model after' * patched
+    return ContentSection(
+        'Measured and modelled',
+        [
+            Paragraph(f'Joint {robot.joints[j]} in recording {source}: the largest error.'),
+            Chart(
+                t[kept],
+                [Series('measured', measured[kept], 'measured'), *models(before, after)],
+                '',
+                f'torque [{unit}]',
+                link='overlay',
+                marks=marks,
+            ),
+            Chart(
+                t[kept],
+                [
+                    Series('twice the floor', -band, 'floor', 'band', band),
+                    *models(measured - before, measured - after),
+                ],
+                'time [s]',
+                f'residual [{unit}]',
+                height=170,
+                link='overlay',
+                marks=marks,
+                symmetric=True,
+            ),
+            Paragraph(
+                f'The broad line is what was measured{dashes}. {ZOOM} Where the joint turns '
+                'round, friction is undetermined and nothing is judged.',
+                'hint',
+            ),
+        ],
+    )
+
+
+def _of_recording(gap: Gap, shown: Overlay, joint: int) -> tuple[FloatArray, ...]:
+    """Return time, measured torque and both models for all stretches of a recording."""
+    here = shown.source, shown.trajectory.fold
+    own = [one for one in gap.overlays if (one.source, one.trajectory.fold) == here]
+    curves = zip(*((one.measured, one.before, one.after) for one in own), strict=True)
+    t = joined_time([one.trajectory.t for one in own])
+    return t, *(joined([part[:, joint] for part in parts]) for parts in curves)
+
+
+def whole_overlays(diagnosis: Diagnosis, recordings: Sequence[Recording]) -> Gap | None:
+    """
+    Return the gap with curves of whole recordings if a cause acts for part of the time.
+
+    Parameters
+    ----------
+    diagnosis : Diagnosis
+        What was found; outside of its spans the model after is that before.
+    recordings : sequence of Recording
+        What was read.
+
+    """
+    gap, explanation = diagnosis.gap, diagnosis.explanation
+    if gap is None or explanation is None or not diagnosis.spans:
+        return gap
+    firsts, overlays = {one.source: one for one in reversed(gap.overlays)}, []
+    for span in diagnosis.spans:
+        first, read = firsts.get(span.source), [r for r in recordings if r.source == span.source]
+        if first is None or not read:
+            continue
+        settings = SignalSettings(cutoff_hz=first.trajectory.used.cutoff_hz)
+        for part in trajectories(read, conditioning(read, settings)):
+            arms = explanation.reference.arm, explanation.fitted.arm
+            before, after = (part.torque - part.residual(arm) for arm in arms)
+            acts = (part.t >= span.start) & (part.t <= span.stop)
+            after = np.where(acts[:, np.newaxis], after, before)
+            overlays.append(Overlay(span.source, part, part.torque, before, after, first.sigma))
+    return replace(gap, overlays=tuple(overlays) or gap.overlays)

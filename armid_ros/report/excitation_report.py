@@ -101,7 +101,7 @@ def excitation_report(
         for name, model in bodies.items()
         if len(model.geometry.collisionPairs)
     }
-    said = (*collision.notes, *filter(None, [collision.excluded]))
+    remarks = (*collision.notes, *filter(None, [collision.excluded]))
     # six poses of a period
     instants = excitation.run_in + np.arange(6) * excitation.trajectory.period / 6
     poses = draw_poses(
@@ -125,7 +125,7 @@ def excitation_report(
         _foreseen_section(design, arm.robot.links),
         *([] if isolability is None else [isolability_section(isolability)]),
         _motion_section(limits, motion, shares),
-        _clearance_section(motion.t, curves, design.settings.clearance, said),
+        _clearance_section(motion.t, curves, design.settings.clearance, remarks),
         _asked(design, arm, origin.robot, obstacles, run),
         Origin(origin.provenance),
     ]

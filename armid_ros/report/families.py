@@ -198,11 +198,11 @@ def parameter_section(
 
     def cells(k: int) -> Cells:
         number, half = estimate_text(float(values[k]), float(estimate.std[k]))
-        told = number != 'includes 0'
+        sure = number != 'includes 0'
         return (
-            TableCell(number, '' if told else 'unknown'),
+            TableCell(number, '' if sure else 'unknown'),
             half,
-            f'{digits(100.0 * float(reach[k]) / abs(float(values[k])))} %' if told else '> 100 %',
+            f'{digits(100.0 * float(reach[k]) / abs(float(values[k])))} %' if sure else '> 100 %',
             TableCell(f'{described[k]:.3g}' if known[k] else 'none', 'changed' * bool(changed[k])),
             IntervalTrack(
                 float(values[k]), float(reach[k]), float(described[k]) if known[k] else None

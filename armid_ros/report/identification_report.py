@@ -9,10 +9,13 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 
 from armid_ros.arm import ArmModel
+from armid_ros.estimate import Estimate
 from armid_ros.identification import Fit, Grade, Identification, PhysicalCertificate, Verification
 from armid_ros.identification import grade as graded
 from armid_ros.identification.assess.consistency import NoiseCheck
+from armid_ros.identification.fitting.identifiability import HALF_WIDTH
 from armid_ros.identification.fitting.least_squares import IN_WORDS
+from armid_ros.motion import FloatArray
 from armid_ros.recording import Recording
 from armid_ros.report.blocks import (
     BulletList,
@@ -22,11 +25,18 @@ from armid_ros.report.blocks import (
     Fold,
     next_steps_section,
     Origin,
+    Panels,
     Paragraph,
     TableCell,
     VerdictSection,
 )
-from armid_ros.report.families import effects_in_words, full_label, parameter_section
+from armid_ros.report.charts import Chart, Series
+from armid_ros.report.families import (
+    effects_in_words,
+    full_label,
+    parameter_families,
+    parameter_section,
+)
 from armid_ros.report.judgement import judge
 from armid_ros.report.notation import counted, digits, plain, pretty, robot_label
 from armid_ros.report.page import Page, Section
@@ -252,13 +262,6 @@ def _physical_section(
         'Constraint',
     )
     activity = [(line[:1].upper() + line[1:], '') for line in certificate.activity]
-    tried = [
-        tuple(
-            TableCell(text, 'changed' if weight == certificate.weight else '')
-            for text in (f'{weight:g}', f'{100 * (ratio - 1):+.2f} %')
-        )
-        for weight, ratio in certificate.tried
-    ]
     homeless = []
     for file, lines in exports.items():
         kinds = Counter(line.split(':')[0] for line in lines)
@@ -266,7 +269,6 @@ def _physical_section(
             named = ', '.join(f'{kind} ({counted(n, "value")})' for kind, n in kinds.items())
             text = f'{file} has no place for {named}: a comment in it lists them.'
             homeless.append(Paragraph(text))
-    head = 'Cross-validation error relative to the unconstrained fit'
     return ContentSection(
         'Physical consistency',
         [
@@ -274,17 +276,65 @@ def _physical_section(
                 f'{quantifier} link is physically consistent: all four eigenvalues of the '
                 'pseudo-inertia have to be positive. The constraints change the torque error by '
                 f'{training:.2f} % on the training data and by {held_out:+.2f} % in '
-                'cross-validation.'
+                f'cross-validation, which chose {certificate.weight:g} as the weight of the '
+                'description.'
             ),
             DataTable(heads, rows, (0, 5)),
             BulletList(activity or [('No constraint is active.', 'fine')]),
-            Fold(
-                f'Weight of the description: {certificate.weight:g}, chosen by cross-validation',
-                [
-                    Paragraph('The largest weight whose error is not above the smallest one.'),
-                    DataTable(('Weight', head), tried, ()),
-                ],
-            ),
             *homeless,
         ],
     )
+
+
+def convergence_section(
+    history: Sequence[tuple[float, Estimate]], truth: FloatArray
+) -> ContentSection:
+    """
+    Return online estimates over time with their 95 % intervals and the true values.
+
+    Parameters
+    ----------
+    history : sequence of (float, Estimate)
+        Times since the start [s], and estimates of P parameters.
+    truth : ndarray, shape (P,)
+        True values.
+
+    """
+    t, parameters = np.array([at for at, _ in history]), history[-1][1].parameters
+    values = np.array([estimate.values for _, estimate in history])
+    std = np.array([estimate.std for _, estimate in history])
+    certainty = np.abs(truth) / np.maximum(std[-1], 1e-300)
+    kinds = [
+        sorted(members, key=lambda k: -certainty[k])
+        for members in parameter_families(parameters).values()
+    ]
+    longest = max(map(len, kinds))
+    turns = [kind[turn] for turn in range(longest) for kind in kinds if turn < len(kind)]
+    panels = []
+    for k in sorted(turns[:6]):
+        reach = HALF_WIDTH * std[:, k]
+        known = np.isfinite(reach) & (reach < 3.0 * (abs(truth[k]) + reach[-1]))
+        lower, upper, drawn = (
+            np.where(known, x, np.nan)
+            for x in (values[:, k] - reach, values[:, k] + reach, values[:, k])
+        )
+        chart = Chart(
+            t,
+            [
+                Series('95 % interval', lower, 'floor', 'band', upper),
+                Series('online estimate', drawn, 'residual'),
+            ],
+            'time [s]',
+            f'estimate [{pretty(parameters[k].unit)}]',
+            height=170,
+            link='convergence',
+            levels=[(float(truth[k]), 'truth')],
+            legend=False,
+        )
+        panels.append((full_label(parameters[k]), '', [chart]))
+    text = (
+        'Six parameters over time, the best-determined one of each kind first. The band is the '
+        '95 % interval of the online estimate; the line is the true value.'
+    )
+    title = 'Convergence of the online estimate'
+    return ContentSection(title, [Paragraph(text), Panels(panels, three=True)])

@@ -178,13 +178,13 @@ def description_check_report(
         VerdictSection(grade, _TONES[grade], [first, *others], texts, step=origin.step)
     ]
     if links is not None:
-        said = (
+        hint = (
             'Centres are in the frame of the joint that moves the link. Intervals are 95 %. A '
             'dash: as described, or not determined by this motion. Explains: share of the '
             'difference between URDF and recording that this link explains if others are right.'
         )
         table = DataTable(HEADS, link_rows(links), kind='tight')
-        sections.append(ContentSection('Links', [table, Paragraph(said, 'hint')]))
+        sections.append(ContentSection('Links', [table, Paragraph(hint, 'hint')]))
     sections.append(Origin(origin.provenance))
     names = () if links is None else (*links.joints, *links.links)
     title = f'Check of {robot_label(origin.robot)}'
@@ -239,13 +239,13 @@ def _joints_section(found: Inspection) -> ContentSection:
         for column, like in ((2, 1), (5, 1), (8, 7)):
             heads[column] += heads[like][heads[like].index(' [') :]
     heads = [head.replace('N m', 'N\N{NO-BREAK SPACE}m') for head in heads]
-    said = (
+    hint = (
         'Speed: 99th percentile, from the positions. Step: smallest change of position between '
         'samples. Velocity ratio: recorded velocity over the derivative of the positions; 1 if '
         'units and signs agree.'
     )
     table = DataTable(heads, joint_rows(found), kind='tight')
-    return ContentSection('Joints', [table, Paragraph(said, 'hint')])
+    return ContentSection('Joints', [table, Paragraph(hint, 'hint')])
 
 
 def _curves_section(found: Inspection) -> ContentSection:

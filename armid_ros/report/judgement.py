@@ -76,10 +76,10 @@ def judge(
     fits = [fit for part in validation.values() for fit in part]
     held_out = Score.of(fits) if fits else None
     # of a physical certificate only active constraints and its notes
-    told = set()
+    known = set()
     if result.physical is not None:
         given = result.physical
-        told = set(given.sentences()) - set(given.activity) - set(given.notes)
+        known = set(given.sentences()) - set(given.activity) - set(given.notes)
     findings: list[Caution] = [
         *(
             (f'{recording.source or "A recording"}: {recording.report.describe()}', '')
@@ -89,7 +89,7 @@ def judge(
         *_of_errors(result, training, held_out),
         *_of_residuals(result, fits or result.training),
         *([] if verification is None else _of_verification(verification)),
-        *((note[0].upper() + note[1:] + '.', '') for note in result.notes if note not in told),
+        *((note[0].upper() + note[1:] + '.', '') for note in result.notes if note not in known),
     ]
     steps = [step for _, step in findings if step]
     if held_out is not None and not steps:

@@ -176,9 +176,9 @@ def many_counted(text: str, names: Sequence[str]) -> str:
 def explained(text: str) -> Markup:
     """Return HTML in which the first use of each of the `TERMS` has a tooltip."""
     html = str(escape(text))
-    for term, said in TERMS.items():
+    for term, meaning in TERMS.items():
         words = rf'(?<!>)\b({term.replace(" ", "[ -]")})\b'
-        html = re.sub(words, rf'<abbr title="{said}">\1</abbr>', html, count=1, flags=re.I)
+        html = re.sub(words, rf'<abbr title="{meaning}">\1</abbr>', html, count=1, flags=re.I)
     return Markup(html)
 
 

@@ -213,11 +213,11 @@ def whiteness_section(robot: Robot, fits: Sequence[Fit], role: str) -> ContentSe
             legend=False,
         )
         panels.append((name, f'{100 * found.outside:.0f} % of the lags outside', [chart]))
-    said = (
+    text = (
         f'Autocorrelation of the {role} residual. Of white noise 1 % of the lags lie outside the '
         'band; the filters colour the first lag or two.'
     )
-    return ContentSection('Whiteness', [Paragraph(said), Panels(panels, three=True)])
+    return ContentSection('Whiteness', [Paragraph(text), Panels(panels, three=True)])
 
 
 def residual_by_variable(

@@ -219,16 +219,16 @@ def _learned(
         return None
     learned, predicted = learn_map(rows, rng)
     # the map has to reduce the error of held-out blocks, even without the best block
-    saved = rows.left**2 - (rows.left - predicted) ** 2
+    saved = rows.residual**2 - (rows.residual - predicted) ** 2
     blocks = np.bincount(rows.block, saved, BLOCKS)
     if not blocks.sum() - blocks.max() > 0.0:
         return None
-    parts = [(rows.left, predicted)]
+    parts = [(rows.residual, predicted)]
     near = None if unseen is None else unseen.select(near_data(learned, unseen))
     if near is not None and len(near) >= _FEW:
-        parts.append((near.left, learned.torque(near.inputs)))
-    left, torque = (np.concatenate(one) for one in zip(*parts, strict=True))
-    gain = share_of(left, torque)
+        parts.append((near.residual, learned.torque(near.inputs)))
+    residual, torque = (np.concatenate(one) for one in zip(*parts, strict=True))
+    gain = share_of(residual, torque)
     if gain <= 0.0:
         return None
     prismatic = bool(base.robot.prismatic[base.robot.joints.index(joint)])
@@ -236,8 +236,8 @@ def _learned(
         joint,
         learned,
         np.array([rows.inputs.min(axis=0), rows.inputs.max(axis=0)]).T,
-        float(np.sqrt(np.mean(left**2))),
-        float(np.sqrt(np.mean((left - torque) ** 2))),
+        float(np.sqrt(np.mean(residual**2))),
+        float(np.sqrt(np.mean((residual - torque) ** 2))),
         gain,
         share_of(*parts[1]) if len(parts) > 1 else None,
         suggest_law(rows, prismatic),

@@ -10,13 +10,7 @@ from dataclasses import dataclass
 from armid_ros.arm import ArmModel
 from armid_ros.effects.learned import TorqueMap
 from armid_ros.motion import FloatArray
-from armid_ros.report.blocks import (
-    ContentSection,
-    DataTable,
-    Paragraph,
-    SmallMultiples,
-    TableCell,
-)
+from armid_ros.report.blocks import ContentSection, DataTable, Paragraph, SmallMultiples, TableCell
 from armid_ros.report.charts import image_data
 from armid_ros.report.notation import digits, percent
 from armid_ros.report.page import render

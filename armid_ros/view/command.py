@@ -75,9 +75,10 @@ def view(
         stream.disconnect()
     for note in notes:
         say(f'note: {note}')
-    said = f', coloured: {", ".join(marked)}' if marked else ''
     if out is not None:
-        say(f'{out}: {len(recording)} samples of {arm.robot.n_joints} joints{said}; rerun {out}')
+        coloured = f', coloured: {", ".join(marked)}' if marked else ''
+        samples = f'{len(recording)} samples of {arm.robot.n_joints} joints'
+        say(f'{out}: {samples}{coloured}; rerun {out}')
 
 
 @contextmanager
@@ -86,14 +87,14 @@ def _whole(out: Path | None) -> Iterator[Path | None]:
     if out is None:
         yield None
         return
-    beside = out.with_name(f'.{out.name}.part')
+    part = out.with_name(f'.{out.name}.part')
     try:
         out.parent.mkdir(parents=True, exist_ok=True)
-        beside.unlink(missing_ok=True)
-        beside.touch(exist_ok=False)
-        yield beside
-        beside.replace(out)
+        part.unlink(missing_ok=True)
+        part.touch(exist_ok=False)
+        yield part
+        part.replace(out)
     except OSError as error:
         raise OutputError(f'{out}: cannot be written: {error.strerror}') from error
     finally:
-        beside.unlink(missing_ok=True)
+        part.unlink(missing_ok=True)

@@ -231,9 +231,7 @@ def test_a_seed_is_no_negative_number(command, tmp_path):
 def test_an_effect_that_makes_a_link_no_body_is_named(tmp_path):
     """The mass is as far from the joint as its first moment says, and has no inertia there."""
     effect = 'payload@wrist_pitch:payload_m=0.4,payload_mz=0.4'
-    said = armid(
-        'simulate', '--robot', ROBOT, '--effect', effect, '--out', tmp_path / 'x', code=2
-    )
+    said = armid('simulate', '--robot', ROBOT, '--effect', effect, '--out', tmp_path / 'x', code=2)
     (line,) = (line for line in said.stderr.splitlines() if not PROGRESS.fullmatch(line))
     assert 'hand' in line and effect in said.stdout and 'payload_Ixx' in said.stdout
     assert not (tmp_path / 'x').exists()

@@ -11,7 +11,13 @@ from armid_ros.diagnosis.search.spans import Span
 from armid_ros.effects import CATALOGUE
 from armid_ros.identification.assess.verification import simulate_held_out
 from armid_ros.identification.rows.signals import conditioning, SignalSettings
-from armid_ros.report.diagnosis_report import diagnosis_report, Story, tone_of
+from armid_ros.report.diagnosis_report import (
+    diagnosis_report,
+    overlay_section,
+    Story,
+    tone_of,
+    whole_overlays,
+)
 from armid_ros.report.notation import (
     DASH,
     digits,
@@ -27,7 +33,6 @@ from armid_ros.report.sections.diagnosed import (
     evidence_section,
     share_bars,
 )
-from armid_ros.report.sections.overlay import overlay_section, whole_overlays
 import numpy as np
 import pytest
 

@@ -41,7 +41,7 @@ def explained(known, other):
     learned, _ = learn_map(known, np.random.default_rng(0))
     near = near_data(learned, other)
     assert near.mean() > 0.7
-    left = other.left[near]
+    left = other.residual[near]
     after = left - learned.torque(other.inputs[near])
     can = np.sum(left**2) - NOISE**2 * near.sum()
     return (np.sum(left**2) - np.sum(after**2)) / can
@@ -64,7 +64,7 @@ def test_a_map_predicts_most_of_what_has_no_name_on_another_motion(torque):
 def test_noise_teaches_nothing():
     still = rows(lambda q, dq, w: 0.0 * q)
     learned, predicted = learn_map(still, np.random.default_rng(0))
-    assert np.sum((still.left - predicted) ** 2) > 0.99 * np.sum(still.left**2)
+    assert np.sum((still.residual - predicted) ** 2) > 0.99 * np.sum(still.residual**2)
     assert suggest_law(still, False) is None
     inputs = rows(lambda q, dq, w: 0.0 * q, seed=1).inputs
     assert np.sqrt(np.mean(learned.torque(inputs) ** 2)) < 0.3 * NOISE

@@ -69,13 +69,13 @@ def data_quality_section(
                 recording.clock,
             )
         )
-        said = with_names(recording.report.describe(), names)
+        text = with_names(recording.report.describe(), names)
         clean, faulty = recording.report.unharmed, source in at_fault
         if clean:
-            said += ' The recorded signals are at fault: see the verdict.' * faulty or (
+            text += ' The recorded signals are at fault: see the verdict.' * faulty or (
                 ' Nothing dropped, nothing repaired.'
             )
-        notes.append((f'{source}: {said}', 'fine' if clean and not faulty else 'warn'))
+        notes.append((f'{source}: {text}', 'fine' if clean and not faulty else 'warn'))
     heads = ('Recording', 'Used for', 'Duration', 'Rate', 'Jitter', 'Longest step', 'Clock')
     blocks: list[Templated] = [DataTable(heads, rows, (0, 1, 6)), BulletList(notes)]
     if robot is not None:

@@ -219,8 +219,8 @@ def isolability_section(isolability: Isolability) -> ContentSection:
     rows: list[Cells] = []
     for name in dict.fromkeys(one.name for one in isolability.effects):
         others = np.flatnonzero(near[kinds.index(name)]) if name in kinds else ()
-        said = ', '.join(names[k] for k in others)
-        rows.append((*_detectable_row(name, isolability.effects), said))
+        alike = ', '.join(names[k] for k in others)
+        rows.append((*_detectable_row(name, isolability.effects), alike))
     shares: list[Cells] = [
         (
             f'{k + 1} {name}',
