@@ -28,8 +28,6 @@ from armid_ros.report.provenance import ResultOrigin
 
 #: Columns of what changed.
 HEADS = ('parameter', 'before', 'after', 'difference, 95 %')
-#: Parameters that a line names.
-_NAMED = 6
 _WHY = {
     'motion': 'the motion of the {other} does not show {them}',
     'effect': 'the model of the {other} does not have {them}',
@@ -242,8 +240,9 @@ def _tell_not_compared(comparison: Comparison) -> tuple[str, ...]:
             some = [one for one in found if one.why == why]
             if some:
                 reason = template.format(other=other, them='it' if len(some) == 1 else 'them')
-                shown = ', '.join(full_label(one.parameter) for one in some[:_NAMED])
-                more = f' and {len(some) - _NAMED} more' * (len(some) > _NAMED)
+                # a line names six parameters
+                shown = ', '.join(full_label(one.parameter) for one in some[:6])
+                more = f' and {len(some) - 6} more' * (len(some) > 6)
                 count = counted(len(some), 'parameter')
                 lines.append(f'{count} of the {side} only: {reason} ({shown}{more}).')
     return tuple(lines)

@@ -49,8 +49,6 @@ import numpy as np
 
 #: Colour of each grade.
 TONES = {'good': 'good', 'poor': 'fair', 'unusable': 'bad'}
-#: Biases that are listed.
-_WORST = 6
 
 
 @dataclass(frozen=True)
@@ -209,7 +207,7 @@ def _noise_section(robot: Robot, check: NoiseCheck) -> ContentSection:
             f'{check.bias_std[k]:.1g}',
             f'{check.relative_bias[k]:+.2f}',
         )
-        for k in np.argsort(-np.abs(check.relative_bias))[:_WORST]
+        for k in np.argsort(-np.abs(check.relative_bias))[:6]
     ]
     return ContentSection(
         'Encoder noise',

@@ -26,8 +26,6 @@ from armid_ros.report.page import Page, Section, Templated
 from armid_ros.report.provenance import DEFAULT_ORIGIN, ResultOrigin
 import numpy as np
 
-#: Links that explain less than this share of the difference are not named as the cause.
-_MOSTLY = 0.9
 HEADS = (
     'link',
     'mass, URDF [kg]',
@@ -41,10 +39,6 @@ _TONES = {
     **{'unfit': 'bad', 'doubtful': 'fair', 'ready': 'good'},
     **{'wrong': 'bad', 'look': 'fair', 'clean': 'good'},
 }
-#: Samples of one curve on the page.
-_MOST = 2000
-#: No encoder of an arm resolves less [rad or m].
-_FINEST = 1e-7
 
 
 def inspection_report(found: Inspection, origin: ResultOrigin = DEFAULT_ORIGIN) -> str:
@@ -120,7 +114,7 @@ def headline(remarks: Sequence[Remark], found: LinkCheck | None) -> tuple[str, .
         first = f'The recording cannot check the links: {found.fault.rstrip(".")}.'
     elif found.agrees:
         first = 'The links of the URDF agree with the recording.'
-    elif found.explained < _MOSTLY:
+    elif found.explained < 0.9:  # share of the difference below which links are not the cause
         first = 'The URDF differs from the recording in more than three links.'
     else:
         known = [text for k in found.wrong if (text := _wrong_mass(found, k))]
@@ -276,7 +270,7 @@ def _curves_section(found: Inspection) -> ContentSection:
         panels: list[tuple[str, str, list[Templated]]] = []
         for quantity, own, values, lines in quantities:
             if values is not None:
-                chosen = thinned(values[:, k], most=_MOST)
+                chosen = thinned(values[:, k])
                 chart = Chart(
                     recording.t[chosen],
                     [Series(quantity, values[chosen, k], 'after')],
@@ -290,7 +284,7 @@ def _curves_section(found: Inspection) -> ContentSection:
                 panels.append((name if not panels else '\N{NO-BREAK SPACE}', '', [chart]))
         blocks.append(Panels(panels, three=True))
     steps = 1e3 * np.diff(recording.t)
-    chosen = thinned(steps, most=_MOST)
+    chosen = thinned(steps)
     chart = Chart(
         recording.t[1:][chosen],
         [Series('step', steps[chosen], 'residual')],
@@ -327,8 +321,8 @@ def joint_rows(found: Inspection) -> list[tuple[str, ...]]:
     rows = []
     for joint, unit in zip(found.joints, found.units, strict=True):
         step = f'{joint.step:.2g}' if joint.step else '-'
-        if 0.0 < joint.step < _FINEST:
-            step = f'< {_FINEST:.0e}'.replace('e-0', 'e-')
+        if 0.0 < joint.step < 1e-7:  # [rad or m]; no encoder of an arm resolves less
+            step = '< 1e-7'
         efforts = (joint.effort_rms, joint.effort_largest)
         rows.append(
             (

@@ -17,13 +17,9 @@ from armid_ros.report.notation import counted, digits, plain
 from armid_ros.report.statistics import explained_shares, TELLING_SHARE, Whiteness
 import numpy as np
 
-#: Ratio of the held-out to the training residual from which the model is fitted to the noise.
-_OVERFIT = 1.3
 #: Condition numbers below which an excitation is good, as is the usual advice (Presse and Gautier
 #: 1993), and from which on it is weak.
 GOOD_CONDITION, WEAK_CONDITION = 100.0, 1000.0
-#: Share of the lags outside their 99 % band from which a residual is far from white.
-COLOURED_SHARE = 0.25
 
 
 #: Something to beware of, and what to do about it; either may be empty.
@@ -135,7 +131,7 @@ def _of_errors(
         stronger = np.linalg.norm(held_out.torque_rms) / np.linalg.norm(training.torque_rms)
         ratio = held_out.relative_error_percent / max(training.relative_error_percent, 1e-9)
         ratio *= min(float(stronger), 1.0)
-        if ratio > _OVERFIT:
+        if ratio > 1.3:  # the model is fitted to the noise
             yield (
                 f'The held-out residual is {digits(ratio)} times the training residual, in N m '
                 'and relative to the torque: the model overfits, the held-out motion leaves its '
@@ -180,7 +176,7 @@ def _of_residuals(result: Identification, fits: Sequence[Fit]) -> Iterator[Cauti
     coloured = [
         name
         for joint, name in enumerate(joints)
-        if Whiteness.of(fits, joint).outside > COLOURED_SHARE
+        if Whiteness.of(fits, joint).outside > 0.25  # share of lags, 0.01 for white noise
     ]
     if coloured:
         yield (

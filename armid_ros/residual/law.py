@@ -20,9 +20,6 @@ from armid_ros.motion import FloatArray
 from armid_ros.residual.rows import BLOCKS, JointRows
 import numpy as np
 
-#: A law has to predict at least this share of the squared residual.
-_LEAST_SHARE = 0.5
-
 
 class Term(NamedTuple):
     """Text of a function of q, dq and the load w, such as 'dq^3', its factor and its unit."""
@@ -137,7 +134,7 @@ def suggest_law(rows: JointRows, prismatic: bool) -> Law | None:
     factors = _fit(x, rows.residual, count)
     chosen = np.flatnonzero(factors)
     share = 1.0 - float(losses[count - 1].sum()) / max(float(np.sum(rows.residual**2)), 1e-300)
-    if share < _LEAST_SHARE:
+    if share < 0.5:  # a law predicts at least half of the squared residual
         return None
     size = np.abs(factors) * np.sqrt(np.mean(x**2, axis=0))
     order = sorted(chosen, key=lambda k: -size[k])

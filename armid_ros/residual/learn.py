@@ -26,8 +26,6 @@ import numpy.typing as npt
 
 #: A joint with fewer rows has too few data for a map.
 _FEW = 100
-#: A map is informative if its standard deviation is less than this share of the prior's.
-_KNOWN = 0.5
 
 
 @dataclass(frozen=True)
@@ -246,4 +244,5 @@ def _learned(
 
 def near_data(learned: TorqueMap, rows: JointRows) -> npt.NDArray[np.bool_]:
     """Return a mask of the rows near those from which a map was learned, shape (N,)."""
-    return np.asarray(learned.std(rows.inputs) < _KNOWN * learned.amplitude)
+    # a map is informative where its standard deviation is less than half of that of the prior
+    return np.asarray(learned.std(rows.inputs) < 0.5 * learned.amplitude)

@@ -18,8 +18,6 @@ from armid_ros.residual.law import Law
 from markupsafe import Markup
 import numpy as np
 
-_POSITIVE, _NEGATIVE = (0.0, 0.447, 0.698), (0.835, 0.369, 0.0)
-
 
 @dataclass(frozen=True)
 class JointResidual:
@@ -124,7 +122,8 @@ def _pictures(one: JointResidual, unit: str, length: str) -> list[tuple[str, str
     peak = max(float(np.abs(torque).max()), 1e-12)
     row, column = np.unravel_index(np.argmax(np.abs(torque)), torque.shape)
     most = f'most at {digits(q[column])} {length} and {digits(dq[::-1][row])} {length}/s'
-    colours = np.where((torque >= 0.0)[..., None], _POSITIVE, _NEGATIVE)
+    blue, orange = (0.0, 0.447, 0.698), (0.835, 0.369, 0.0)
+    colours = np.where((torque >= 0.0)[..., None], blue, orange)
     unsure = f'{digits(one.learned.amplitude)} {unit}'
     ends = {
         **{name: f'{digits(x)} {length}' for name, x in (('left', q[0]), ('right', q[-1]))},

@@ -40,10 +40,6 @@ _USEFUL['center'] = 0.1
 _PRIORS = {'torque_offset': 1.0, 'coulomb_torque': 1.0, 'gain_error': 0.5, 'payload_m': 0.3}
 _PRIORS |= {'tilt_x': 0.3, 'tilt_y': 0.3, 'gravity_difference': 2.0}
 _PRIORS |= dict.fromkeys(('payload_mx', 'payload_my', 'payload_mz'), 0.1)
-#: Residual of an outlier over the median residual of its joint: 4.5 standard deviations, as where
-#: dry friction acts the other way. Redundant readings of a joint from which outliers are left out,
-#: and below which no quantity is determined.
-_OUTLYING, _REDUNDANT, _FEW = 6.7, 8.0, 3.0
 #: Remedy for most quantities that are not determined.
 MORE = 'record a run of armid zero plan'
 
@@ -190,7 +186,7 @@ def fit_rests(
     q = np.concatenate([one.q for one in rests])
     # poses that are 0.1 rad or m apart from all before
     poses = sum(bool(np.all(np.abs(q[:k] - q[k]).max(axis=1) > 0.1)) for k in range(len(q)))
-    few = f'{poses} poses are too few; {MORE}' if solved.freedom < _FEW else ''
+    few = f'{poses} poses are too few; {MORE}' if solved.freedom < 3.0 else ''
     before, after = (y - _predicted(arms, rests, x)[0] for x in (0.0 * solved.x, solved.x))
     return ZeroFit(
         arm,
@@ -252,11 +248,12 @@ def _solved(
         step = covariance @ pull
         x[free] += step
         freedom = used.sum(axis=0) - np.einsum('kjp,pr,kjr->j', w, covariance, w)
-        left = np.abs(y - torque - columns[:, :, free] @ step)
+        residual = np.abs(y - torque - columns[:, :, free] @ step)
         before, least = sigma, 1e-6 * scales
-        sigma = np.sqrt((used * left**2).sum(axis=0) / np.maximum(freedom, 0.1)) + least
-        if freedom.min() > _REDUNDANT:
-            used = sided & (left <= _OUTLYING * np.median(left, axis=0) + least)
+        sigma = np.sqrt((used * residual**2).sum(axis=0) / np.maximum(freedom, 0.1)) + least
+        if freedom.min() > 8.0:  # readings are enough to leave out outliers
+            # 6.7 median residuals are 4.5 standard deviations, as where dry friction is reversed
+            used = sided & (residual <= 6.7 * np.median(residual, axis=0) + least)
         small = np.all(step**2 < 1e-6 * np.diag(covariance))
         if small and np.all(np.abs(before / sigma - 1.0) < 1e-3):
             break

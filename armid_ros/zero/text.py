@@ -14,8 +14,6 @@ from armid_ros.zero.fit import FittedQuantity, MORE, ZeroFit
 import numpy as np
 
 SCHEMA = 'armid/zero/1'
-#: Residual over the largest reading of a joint, above which readings are not explained.
-_POOR = 0.1
 
 
 def fit_document(
@@ -29,7 +27,8 @@ def fit_document(
     verdict = 'in part' if any(one.reason for one in found.quantities) else 'determined'
     if all(one.reason for one in found.quantities if one.name == 'zero'):
         verdict = 'not determined'
-    if np.any(found.residual > _POOR * found.largest) or min(gains, default=1.0) < 0.0:
+    # readings are explained to a tenth of the largest one of the joint
+    if np.any(found.residual > 0.1 * found.largest) or min(gains, default=1.0) < 0.0:
         verdict = 'not explained'
     rms = zip(found.arm.robot.joints, found.before, found.residual, strict=True)
     return {

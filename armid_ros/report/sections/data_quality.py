@@ -24,11 +24,6 @@ from armid_ros.report.page import Templated
 from armid_ros.robots import Robot
 import numpy as np
 
-#: Share of the residual that repeats, from which a better model would help [%].
-_TELLING = 50.0
-#: Fewer pairs of samples tell no deviation.
-_FEWEST = 20
-
 
 def data_quality_section(
     read: Sequence[tuple[Recording, str, Sequence[Fit]]],
@@ -102,7 +97,8 @@ def _repeatability(
                     joint,
                     f'{digits(varying[k])} {unit}',
                     f'{digits(residual[k])} {unit}',
-                    TableCell(f'{shares[k]:.0f} %', 'telling' if shares[k] > _TELLING else ''),
+                    # from half of the residual on, a better model would help
+                    TableCell(f'{shares[k]:.0f} %', 'telling' if shares[k] > 50.0 else ''),
                 )
             )
         source = recording.source or 'in memory'
@@ -148,8 +144,9 @@ def repeatability(fits: Sequence[Fit]) -> tuple[float, FloatArray, FloatArray] |
     # a period is looked for in the first 150 s
     count = int(np.searchsorted(fit.motion.t, fit.motion.t[0] + 150.0))
     motion = fit.motion.select(slice(count))
-    found = find_period(motion.t, motion.q) if count > _FEWEST else None
-    if found is None or found[1].stop - found[1].start < _FEWEST:
+    fewest = 20  # pairs of samples for a standard deviation
+    found = find_period(motion.t, motion.q) if count > fewest else None
+    if found is None or found[1].stop - found[1].start < fewest:
         return None
     lag, where = found
     first = slice(where.start, where.stop)

@@ -42,10 +42,6 @@ from armid_ros.report.notation import (
 from armid_ros.report.page import Templated
 import numpy as np
 
-#: Smallest share of the mean square of a residual at which a page states its mean.
-_MEAN_SAID = 0.005
-#: Background of the largest of several cells [%].
-SHADE = 55.0
 _DETECTABLE = (
     'Effect',
     'Detectable from',
@@ -134,7 +130,7 @@ def evidence_section(diagnosis: Diagnosis) -> ContentSection:
     folds = []
     for number, place in enumerate(diagnosis.where[:3]):
         blocks: list[Templated] = []
-        if place.axes and place.mean_share >= _MEAN_SAID:
+        if place.axes and place.mean_share >= 0.005:
             blocks.append(
                 Paragraph(
                     f'The mean of the residual, {digits(place.mean)} {place.unit} or '
@@ -225,7 +221,7 @@ def isolability_section(isolability: Isolability) -> ContentSection:
         (
             f'{k + 1} {name}',
             *(
-                TableCell('=' if near[k, j] else '', shade=round(SHADE * (1.0 - apart[k, j])))
+                TableCell('=' if near[k, j] else '', shade=round(55.0 * (1.0 - apart[k, j])))
                 for j in range(len(kinds))
             ),
         )
