@@ -129,8 +129,11 @@ def design_excitation(
 
     """
     model = drivable(arm)
-    if joint_limits is not None:
-        model = _limited(model, joint_limits)
+    if isinstance(joint_limits, Mapping):
+        velocity = [f'{joint}:={limit}' for joint, limit in joint_limits.items()]
+        model = replace(model, robot=with_joint_limits(model.robot, None, velocity))
+    elif joint_limits is not None:
+        model = replace(model, robot=with_joint_limits(model.robot, joint_limits, ()))
     if acceleration is not None:
         given = np.nan_to_num(acceleration, nan=np.inf)
         model = replace(model, robot=replace(model.robot, acceleration_limit=given))
@@ -200,11 +203,3 @@ def _searched(
     )
     names = tuple(one.source for one in earlier)
     return ExcitationResult(found, model, scene, start, names, rng if isinstance(rng, int) else 0)
-
-
-def _limited(model: ArmModel, given: str | Path | Mapping[str, float]) -> ArmModel:
-    """Return the model with the joint limits of a file or mapping."""
-    named = given if isinstance(given, Mapping) else {}
-    file = None if isinstance(given, Mapping) else given
-    velocity = [f'{joint}:={limit}' for joint, limit in named.items()]
-    return replace(model, robot=with_joint_limits(model.robot, file, velocity))

@@ -115,7 +115,7 @@ def deliver(
         click.echo(json_text(document or result.document(origin)))
         return
     files = [] if staged is None else [f'{staged.out}: {", ".join(result.files)}']
-    for line in shown.full_text(*files):
+    for line in shown.text(*files):
         say(line)
     if step:
         say(f'next: {step}')
@@ -148,7 +148,7 @@ def deliver_document(
     if summary is None:
         click.echo(json_text(document))
         return
-    for line in summary.full_text(f'{staged.out}: {", ".join([f"{name}.json", *files])}'):
+    for line in summary.text(f'{staged.out}: {", ".join([f"{name}.json", *files])}'):
         say(line)
 
 

@@ -26,7 +26,7 @@ from armid_ros.report.notation import counted, digits, measured, pretty, robot_l
 from armid_ros.report.page import Page, Section
 from armid_ros.report.provenance import ResultOrigin
 
-#: Columns of what changed.
+#: Columns of the table of changes.
 HEADS = ('parameter', 'before', 'after', 'difference, 95 %')
 _WHY = {
     'motion': 'the motion of the {other} does not show {them}',
@@ -45,7 +45,7 @@ def compare_report(comparison: Comparison, origin: ResultOrigin) -> str:
     comparison : Comparison
         Two identifications.
     origin : ResultOrigin
-        Files, versions, and what to do next.
+        Files, versions, and the next step.
 
     Returns
     -------

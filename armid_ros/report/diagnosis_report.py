@@ -63,8 +63,8 @@ def tone_of(diagnosis: Diagnosis, worse: Sequence[str] = ()) -> str:
     """
     Return the colour of a verdict.
 
-    None is good if the model is doubted, or not patched with what was named, if a joint is not
-    checked, or a simulation got worse in some joints.
+    A good verdict is only fair if the model is doubted or not patched with the named effects, if
+    a joint is not checked, or if some joints simulate worse than before.
 
     """
     tone = _TONES.get(diagnosis.verdict, 'bad')
@@ -72,7 +72,7 @@ def tone_of(diagnosis: Diagnosis, worse: Sequence[str] = ()) -> str:
     return 'fair' if tone == 'good' and (any(open_ends) or worse) else tone
 
 
-#: What recordings were used for, and the words for some of them.
+#: Uses of recordings, and the words for some of them.
 _ROLES = (
     ('training', 'recording', '{}'),
     ('held-out', 'held-out recording', '{}'),
@@ -98,10 +98,9 @@ def diagnosis_report(
     Parameters
     ----------
     diagnosis : Diagnosis
-        What was found.
+        The diagnosis.
     read : mapping of str to sequence of Recording
-        Recordings by what they were used for: 'training', 'held-out',
-        'baseline', 'simulator'.
+        Recordings by their use: 'training', 'held-out', 'baseline', 'simulator'.
     steps : sequence of str
         Next steps, the first one for the verdict box.
     everything : bool
@@ -206,7 +205,7 @@ class Story(Section):
     Attributes
     ----------
     diagnosis : Diagnosis
-        What was found.
+        The diagnosis.
     gains : mapping of str to float
         Share of the residual that the learned map of each joint predicts.
 
@@ -315,11 +314,11 @@ def overlay_section(diagnosis: Diagnosis, gap: Gap, names: Mapping[str, str]) ->
     Parameters
     ----------
     diagnosis : Diagnosis
-        What was found, and the seconds in which the causes act.
+        The diagnosis, with the seconds in which the causes act.
     gap : Gap
         The curves.
     names : mapping of str to str
-        What each recording is called.
+        Names of the recordings.
 
     """
     robot, patched = diagnosis.arm.robot, bool(diagnosis.findings)
@@ -371,8 +370,8 @@ def overlay_section(diagnosis: Diagnosis, gap: Gap, names: Mapping[str, str]) ->
                 symmetric=True,
             ),
             Paragraph(
-                f'The broad line is what was measured{dashes}. {ZOOM} Where the joint turns '
-                'round, friction is undetermined and nothing is judged.',
+                f'The broad line is the measured torque{dashes}. {ZOOM} Where the joint turns '
+                'round, friction is undetermined and no error counts.',
                 'hint',
             ),
         ],
@@ -395,9 +394,9 @@ def whole_overlays(diagnosis: Diagnosis, recordings: Sequence[Recording]) -> Gap
     Parameters
     ----------
     diagnosis : Diagnosis
-        What was found; outside of its spans the model after is that before.
+        The diagnosis; outside of its spans the model after is that before.
     recordings : sequence of Recording
-        What was read.
+        All recordings.
 
     """
     gap, explanation = diagnosis.gap, diagnosis.explanation

@@ -68,17 +68,17 @@ def excitation_report(
     Parameters
     ----------
     design : Design
-        What was found.
+        The design.
     arm : ArmModel
         Prior model, for the torque.
     run : Run
-        The design with the way there and back.
+        The design with approach and return.
     checked : Fitness
-        What was checked of it.
+        Results of the checks of the run.
     scene : CollisionScene
-        Bodies of the arm, its floor, and what stands around it.
+        Bodies of the arm, floor and obstacles.
     isolability : Isolability, optional
-        What it shows of the effects of the catalogue.
+        Detectable sizes of the effects, and effects that are not distinguishable.
     origin : ResultOrigin
         Robot, files, versions, settings, seed, and the command that follows.
 

@@ -1,6 +1,6 @@
 # Copyright 2026 The armid_ros developers
 # SPDX-License-Identifier: Apache-2.0
-"""Parameters in the kinds that a reader compares with each other."""
+"""Tables and labels of parameters."""
 
 from __future__ import annotations
 
@@ -34,26 +34,6 @@ _SYMBOL = re.compile(r'\b(m[xyz]?|I[xyz]{2})(\d+)\b')
 _FRICTION = {'viscous': 'viscous_coefficient', 'Coulomb': 'coulomb_torque'}
 
 
-def parameter_families(names: tuple[ParameterName, ...]) -> dict[tuple[str, str], list[int]]:
-    """
-    Sort parameters into kinds that share an axis.
-
-    Returns
-    -------
-    dict of (str, str) to list of int
-        Heading and unit, and the positions of its parameters: the rigid ones by their unit, those
-        of the effects by name and unit, which joints that slide and that turn do not share.
-
-    """
-    families: dict[tuple[str, str], list[int]] = {}
-    kinds = {'kg m^2': 'Inertias', 'kg m': 'First moments', 'kg': 'Masses'}
-    for position, name in enumerate(names):
-        kind = kinds.get(name.unit) if name.rigid else None
-        title = kind or name_in_words(name.name).capitalize()
-        families.setdefault((title, pretty(name.unit)), []).append(position)
-    return families
-
-
 def full_label(name: ParameterName, links: Sequence[str] = ()) -> str:
     """
     Return the full label of a parameter with its link or joint.
@@ -61,15 +41,15 @@ def full_label(name: ParameterName, links: Sequence[str] = ()) -> str:
     Parameters
     ----------
     name : ParameterName
-        Of a link, then with its number, or of an effect.
+        A parameter of a link or of an effect.
     links : sequence of str
         Names of the links in the order of their numbers; without them a link is that of its joint.
 
     Returns
     -------
     str
-        'moment of inertia about z of forearm', with '(grouped)' where it is the first of several
-        that no motion tells apart; or 'Coulomb torque of elbow'.
+        'moment of inertia about z of forearm', with '(grouped)' for the first one of a linear
+        combination; or 'Coulomb torque of elbow'.
 
     """
     if name.rigid:
@@ -123,22 +103,23 @@ def parameter_folds(
     heads : sequence of str
         Of the columns after those that name the parameter.
     cells : callable
-        Returns the cells of these columns for the number of a parameter.
+        Returns the cells of these columns for the position of a parameter.
     links : sequence of str
         Names of the links, in the order of their numbers.
     suffix, opened : callable
-        Return what stands behind the heading of a table, and whether it is open, for the numbers
-        of its parameters; by default how many there are, and True.
+        Return the text after the heading of a table, and whether the table is open, for the
+        positions of its parameters; by default their number, and True.
     order : callable
-        Returns what the rows of a table are sorted by, for the number of a parameter.
+        Returns the sorting key of a row for the position of a parameter.
 
     """
     tables: dict[str, list[int]] = {}
-    for (kind, unit), members in parameter_families(names).items():
-        for k in members:
-            link = _words_and_link(names[k], links)[1] if names[k].rigid else ''
-            body = f'Link of {names[k].joint}{f" ({link})" if link else ""}'
-            tables.setdefault(body if names[k].rigid else f'{kind} [{unit}]', []).append(k)
+    for k, name in enumerate(names):
+        title = f'{name_in_words(name.name).capitalize()} [{pretty(name.unit)}]'
+        if name.rigid:
+            link = _words_and_link(name, links)[1]
+            title = f'Link of {name.joint}{f" ({link})" if link else ""}'
+        tables.setdefault(title, []).append(k)
     folds = []
     for title, members in tables.items():
         rigid = names[members[0]].rigid
@@ -182,13 +163,13 @@ def parameter_section(
     estimate : Estimate
         P parameters.
     described : ndarray, shape (P,)
-        Values of the description; zero for effects that it does not know.
+        Values of the description; zero for effects that it lacks.
     unidentified : sequence of Unidentified
-        What the data do not determine.
+        Parameters that the data do not determine.
     links : sequence of str
         Names of the links, in the order of their numbers.
     reference : str
-        What ``described`` is: 'description', or 'truth' of a simulated arm.
+        Name of ``described``: 'description', or 'truth' of a simulated arm.
 
     """
     names, values = estimate.parameters, estimate.values

@@ -31,12 +31,7 @@ from armid_ros.report.blocks import (
     VerdictSection,
 )
 from armid_ros.report.charts import Chart, Series
-from armid_ros.report.families import (
-    effects_in_words,
-    full_label,
-    parameter_families,
-    parameter_section,
-)
+from armid_ros.report.families import effects_in_words, full_label, parameter_section
 from armid_ros.report.judgement import judge
 from armid_ros.report.notation import counted, digits, plain, pretty, robot_label
 from armid_ros.report.page import Page, Section
@@ -54,18 +49,18 @@ TONES = {'good': 'good', 'poor': 'fair', 'unusable': 'bad'}
 @dataclass(frozen=True)
 class Assessment:
     """
-    How an identification was assessed, apart from predicting recordings.
+    Tests, grade and exports of an identification.
 
     Attributes
     ----------
     verification : Verification or None
         Test for encoder noise, and simulations.
     grade : Grade or None
-        What it is good for; found out where it is not given.
+        Grade; computed if it is None.
     exports : mapping of str to sequence of str
-        Files for other programs, and what each has no place for.
+        Exported files, and the values that each cannot contain.
     reference : str
-        What parameters are compared with: the 'description', or in a simulation the 'truth'.
+        Reference of the parameters: the 'description', or in a simulation the 'truth'.
     sections : sequence of Section
         Further sections, shown before the next steps.
 
@@ -94,7 +89,7 @@ def identification_report(
     Parameters
     ----------
     result : Identification
-        What was found.
+        The identified model.
     description : ArmModel
         The model before the identification, to compare parameters with.
     recordings : sequence of Recording
@@ -104,7 +99,7 @@ def identification_report(
     validation_recordings : sequence of Recording
         Those recordings.
     assessment : Assessment, optional
-        What the identification was put to.
+        Tests and exports of the identification.
     origin : ResultOrigin
         Robot, files, versions, settings, seed.
 
@@ -302,10 +297,9 @@ def convergence_section(
     values = np.array([estimate.values for _, estimate in history])
     std = np.array([estimate.std for _, estimate in history])
     certainty = np.abs(truth) / np.maximum(std[-1], 1e-300)
-    kinds = [
-        sorted(members, key=lambda k: -certainty[k])
-        for members in parameter_families(parameters).values()
-    ]
+    ranked = sorted(range(len(parameters)), key=lambda k: -certainty[k])
+    units = dict.fromkeys(one.unit for one in parameters)
+    kinds = [[k for k in ranked if parameters[k].unit == unit] for unit in units]
     longest = max(map(len, kinds))
     turns = [kind[turn] for turn in range(longest) for kind in kinds if turn < len(kind)]
     panels = []
@@ -331,7 +325,7 @@ def convergence_section(
         )
         panels.append((full_label(parameters[k]), '', [chart]))
     text = (
-        'Six parameters over time, the best-determined one of each kind first. The band is the '
+        'Six parameters over time, the best-determined one of each unit first. The band is the '
         '95 % interval of the online estimate; the line is the true value.'
     )
     title = 'Convergence of the online estimate'

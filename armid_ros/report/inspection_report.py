@@ -48,9 +48,9 @@ def inspection_report(found: Inspection, origin: ResultOrigin = DEFAULT_ORIGIN) 
     Parameters
     ----------
     found : Inspection
-        What was found.
+        Result of the inspection.
     origin : ResultOrigin
-        Name or path of the description, files, versions, and what to do next.
+        Name or path of the description, files, versions, and the next step.
 
     Returns
     -------

@@ -22,7 +22,7 @@ import numpy as np
 GOOD_CONDITION, WEAK_CONDITION = 100.0, 1000.0
 
 
-#: Something to beware of, and what to do about it; either may be empty.
+#: A limitation and its remedy; either may be empty.
 Caution = tuple[str, str]
 
 
@@ -34,11 +34,11 @@ class Judgement:
     Attributes
     ----------
     sentences : tuple of str
-        What was identified, and how exactly it moves.
+        Findings, with the position error in simulation.
     beware : tuple of str
-        What the reader should not overlook.
+        Limitations.
     next_steps : tuple of str
-        What to do.
+        Next steps.
 
     """
 
@@ -59,13 +59,13 @@ def judge(
     Parameters
     ----------
     result : Identification
-        What was found.
+        The identified model.
     validation : mapping of str to sequence of Fit
         Predictions of held-out recordings.
     recordings : sequence of Recording
-        What was read, for what was wrong with it.
+        Recordings, for the damage that their reader reports.
     verification : Verification, optional
-        What the identification was put to.
+        Test for encoder noise, and simulations.
 
     """
     training = Score.of(result.training)
@@ -98,7 +98,7 @@ def judge(
 
 
 def _sentences(result: Identification, verification: Verification | None) -> Iterator[str]:
-    """Yield what was identified, and the position error when it is simulated."""
+    """Yield the findings, and the position error in simulation."""
     robot = result.arm.robot
     effects = [name_in_words(effect.name) for effect in result.arm.effects]
     time = sum(float(fit.motion.t[-1] - fit.motion.t[0]) for fit in result.training)

@@ -268,7 +268,8 @@ def _quantities(
 ) -> tuple[FittedQuantity, ...]:
     """Return the quantities of a fitted arm, with intervals; `few`: reason for all of them."""
     factor = float(student.ppf(0.975, max(solved.freedom, 1.0)))
-    middle, std, found = quantities_of(arm), np.sqrt(np.diag(solved.covariance)), []
+    middle, std = quantities_of(arm), np.sqrt(np.diag(solved.covariance))
+    found, tool = [], True
     slopes = np.zeros((len(middle), len(std)))
     for k, place in enumerate(solved.free):
         step = 0.01 * std[k] * np.eye(1, len(arm.theta), place)[0]
@@ -283,6 +284,10 @@ def _quantities(
         reason = few if half > 0.0 else ''
         if half > limit:
             reason = few or _reason(arm, solved, slope, limit / factor)
+        if name == 'mass':
+            tool = abs(value) > half
+        elif reason and name.startswith('center') and not tool:
+            reason = 'no mass of a tool is found; give --known tool'
         found.append(FittedQuantity(name, joint, unit, value, half, reason))
     return tuple(found)
 

@@ -53,10 +53,16 @@ def fit_summary(found: ZeroFit, document: dict[str, Any], step: str) -> Summary:
         for joint, residual in zip(found.arm.robot.joints, found.residual, strict=True)
     ]
     tilt, mass = found.of('tilt'), found.of('mass')
-    place = ', '.join(_cell(found.of(f'center_{axis}')).split(' ± ')[0] for axis in 'xyz')
-    parts = [] if tilt.reason else [f'base tilted by {_cell(tilt)} deg']
-    parts += [] if mass.reason else [f'tool of {_cell(mass)} kg at {place} m']
-    title = ', '.join(parts) or 'neither tilt nor tool is determined'
+    center = [found.of(f'center_{axis}') for axis in 'xyz']
+    parts = []
+    if tilt.half_width and not tilt.reason:
+        parts.append(f'base tilted by {_cell(tilt)} deg')
+    if mass.half_width and not mass.reason:
+        place = f' at {", ".join(_cell(one).split(" ± ")[0] for one in center)} m'
+        known = any(not one.reason for one in center)
+        parts.append(f'tool of {_cell(mass)} kg{place if known else ""}')
+    determined = sum(not one.reason for one in found.quantities)
+    title = ', '.join(parts) or f'{determined} of {len(found.quantities)} quantities'
     lines = [
         f'{found.rests} rests in {found.poses} poses; {found.outliers} outliers left out; '
         f'held known: {", ".join(document["held"])}'

@@ -61,7 +61,7 @@ def hidden_change(robot: Robot, rng: np.random.Generator, hide: str = '') -> Hid
     rng : numpy.random.Generator
         Draws one of the changes that are shipped.
     hide : str
-        Which of them, as the beginning of 'effect@joint'; or any effect with its values, as for
+        Beginning of 'effect@joint' of a shipped change; or any effect with its values, as for
         ``armid simulate``.
 
     Raises
@@ -148,13 +148,13 @@ def diagnose_hidden(
     out : Path
         Folder to fill.
     hidden : HiddenChange
-        What is changed, which the page says as well.
+        The hidden effect, which the page shows as well.
     truth : ArmModel
         The arm without it.
     known : ArmModel
         The model that was identified.
     baseline : Recording
-        What it was identified from.
+        The recording of its identification.
     rng : numpy.random.Generator
         Draws motions and noise.
     rate : float

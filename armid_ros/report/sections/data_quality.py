@@ -37,13 +37,13 @@ def data_quality_section(
     Parameters
     ----------
     read : sequence of (Recording, str, sequence of Fit)
-        Each with what it was used for, and its fits.
+        Each recording with its use and its fits.
     robot : Robot, optional
-        Gives joints and units, where repeatability is shown.
+        Joints and units; without a robot, repeatability is not shown.
     at_fault : collection of str
         Names of recordings that the verdict calls faulty, however well they were read.
     names : mapping of str to str, optional
-        What recordings are called.
+        Names of recordings by source.
 
     """
     names = names or {}

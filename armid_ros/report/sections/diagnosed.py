@@ -232,8 +232,8 @@ def isolability_section(isolability: Isolability) -> ContentSection:
         'Isolability',
         [
             Paragraph(
-                'What this run shows of an arm whose model is known, at the assumed noise of the '
-                'torque. An effect is detectable at five standard deviations of its value. It is '
+                'Effects that this run shows of an arm with a known model, at the assumed torque '
+                'noise. An effect is detectable at five standard deviations of its value. It is '
                 'not distinguishable from an effect that reproduces its torque to 10 % (rms).'
             ),
             DataTable(heads, rows, tuple(range(len(heads)))),
@@ -295,8 +295,8 @@ def candidates_section(diagnosis: Diagnosis) -> ContentSection:
                 f'{counted(len(rows), "cause")} that {verb} compared, the likeliest first',
                 [
                     Paragraph(
-                        'Each cause alone, in its best shape. Share: what its torque has of the '
-                        'squared residual; similar causes explain the same part. Evidence: '
+                        'Each cause alone, in its best shape. Share: part of the squared residual '
+                        'that it explains; similar causes explain the same part. Evidence: '
                         'logarithm of how much likelier the data are with it than without. A '
                         'value outside the possible range is no explanation.'
                     ),

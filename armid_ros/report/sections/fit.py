@@ -69,9 +69,9 @@ def fit_section(
     Parameters
     ----------
     robot : Robot
-        Gives joints and units.
+        Joints and units.
     training, validation : mapping of str to sequence of Fit
-        Data that it was fitted to, and held-out data, by recording.
+        Fits of the training and of the held-out data, by recording.
     reach : ndarray, shape (n,)
         Half width of the 95 % interval of the predicted torque [N m].
 
@@ -183,11 +183,11 @@ def forward_section(
     Parameters
     ----------
     robot : Robot
-        Gives joints and units.
+        Joints and units.
     pairs : sequence of ForwardValidation
         One for each held-out recording.
     labels : tuple of str
-        What both models are called.
+        Names of both models.
 
     """
     blocks: list[Templated] = [
