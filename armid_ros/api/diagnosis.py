@@ -227,7 +227,7 @@ class DiagnosisResult(ShownModel):
 
             return learn_residual(self.core, np.random.default_rng(seed))
 
-        found, why = _tried('map', learned, None)
+        found, why = _tried('map', learned)
         if found is None and not why:
             why = ('nothing was learned: the residual does not depend on the state of any joint',)
         return replace(self, residual=found, notes=(*self.notes, *why))
@@ -247,11 +247,12 @@ class DiagnosisResult(ShownModel):
                     progress=lambda _, what: progress(1.0, what),
                 )  # fmt: skip
 
-            (forward, left_out), why = _tried('simulation', simulated, ((), ()))
+            found, why = _tried('simulation', simulated)
+            forward, left_out = found or ((), ())
             result = replace(result, forward=forward, notes=(*result.notes, *left_out, *why))
         progress(1.0, 'next run')
         rng = np.random.default_rng(seed)
-        run, why = _tried('next run', lambda: next_run(self.core, rng), None)
+        run, why = _tried('next run', lambda: next_run(self.core, rng))
         return replace(result, next_run=run, no_run='; '.join(why))
 
     def _steps(self, model: str) -> list[str]:
@@ -440,9 +441,9 @@ def require_residual() -> None:
     require_libraries()
 
 
-def _tried(what: str, make: Callable[[], _Made], failed: _Made) -> tuple[_Made, tuple[str, ...]]:
-    """Return the result of a step; if it fails, the given value and the reason."""
+def _tried(what: str, make: Callable[[], _Made]) -> tuple[_Made | None, tuple[str, ...]]:
+    """Return the result of a step; if it fails, None and the reason."""
     try:
         return make(), ()
     except Exception as error:  # whatever it is, the diagnosis itself stands
-        return failed, (f'there is no {what}: {error or type(error).__name__}',)
+        return None, (f'there is no {what}: {error or type(error).__name__}',)

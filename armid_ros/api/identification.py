@@ -52,6 +52,10 @@ from armid_ros.identification.physical.fit_among_bodies import far_from_describe
 from armid_ros.identification.rows.checks import check_held_out
 from armid_ros.recording import Recording, require_once
 from armid_ros.recording.curves import draw_joints
+from armid_ros.report.families import estimate_text, full_label, joint_columns
+from armid_ros.report.identification_report import Assessment, identification_report
+from armid_ros.report.judgement import judge, residual_trends
+from armid_ros.report.notation import counted, digits, plain, pretty
 from armid_ros.report.provenance import DEFAULT_ORIGIN, ResultOrigin
 import numpy as np
 import numpy.typing as npt
@@ -221,8 +225,6 @@ class IdentificationResult(ShownModel):
 
     def page(self, origin: ResultOrigin = DEFAULT_ORIGIN) -> str:
         """Return report.html with all curves, numbers and doubts."""
-        from armid_ros.report.identification_report import Assessment, identification_report
-
         without_place = {name: one.without_place for name, one in self.exports.items()}
         return identification_report(
             self.core,
@@ -253,10 +255,6 @@ class IdentificationResult(ShownModel):
 
     def summary(self, every: bool = False) -> Summary:
         """Return errors and friction of each joint, doubts, and next step; `every`: all values."""
-        from armid_ros.report.families import joint_columns
-        from armid_ros.report.judgement import judge, residual_trends
-        from armid_ros.report.notation import counted, plain
-
         core, estimate, joints = self.core, self.estimate, self.arm.robot.joints
         others = self.graded.reasons[1:]
         shown = [fit for fits in self.validation.values() for fit in fits] or core.training
@@ -304,9 +302,6 @@ class IdentificationResult(ShownModel):
 
     def _parameters(self) -> list[str]:
         """Return a table of all parameters with their described values, one line each."""
-        from armid_ros.report.families import estimate_text, full_label
-        from armid_ros.report.notation import digits, pretty
-
         estimate, links = self.estimate, self.arm.robot.links
         described = self.core.base.values(self.description.theta)
         rows = []

@@ -34,6 +34,18 @@ from armid_ros.inspection import inspect as look
 from armid_ros.inspection.inspect import SCHEMA
 from armid_ros.recording import Recording, Topic
 from armid_ros.recording.anything import read_anything
+from armid_ros.report.inspection_report import (
+    check_word,
+    description_check_report,
+    headline,
+    HEADS,
+    inspection_report,
+    inspection_word,
+    joint_heads,
+    joint_rows,
+    link_rows,
+    recording_facts,
+)
 from armid_ros.report.provenance import DEFAULT_ORIGIN, ResultOrigin
 from armid_ros.robots import Robot
 import numpy as np
@@ -86,19 +98,10 @@ class InspectionResult(Shown):
 
     def page(self, origin: ResultOrigin = DEFAULT_ORIGIN) -> str:
         """Return inspection.html with all curves."""
-        from armid_ros.report.inspection_report import inspection_report
-
         return inspection_report(self.core, self.stated(origin))
 
     def summary(self) -> Summary:
         """Return verdict, table of joints, remarks and sampling."""
-        from armid_ros.report.inspection_report import (
-            inspection_word,
-            joint_heads,
-            joint_rows,
-            recording_facts,
-        )
-
         heads, found = joint_heads(self.core), self.core
         refused, trial = bool(found.trial and found.trial.refused), found.trial
         good = trial and not refused and trial.grade != 'unusable'
@@ -210,8 +213,6 @@ class CheckResult(Shown):
     @property
     def finding(self) -> str:
         """Return the finding in one sentence."""
-        from armid_ros.report.inspection_report import headline
-
         return headline(self.remarks, self.links)[0]
 
     @property
@@ -234,14 +235,10 @@ class CheckResult(Shown):
 
     def page(self, origin: ResultOrigin = DEFAULT_ORIGIN) -> str:
         """Return report.html with a table of the links."""
-        from armid_ros.report.inspection_report import description_check_report
-
         return description_check_report(self.remarks, self.links, self.stated(origin, self.robot))
 
     def summary(self) -> Summary:
         """Return the finding and the links, with measured values if any are known."""
-        from armid_ros.report.inspection_report import check_word, headline, HEADS, link_rows
-
         links = self.links
         wrong = links is not None and not np.isnan(links.measured_mass).all()
         columns = slice(None) if wrong else slice(0, 4, 2)

@@ -129,6 +129,7 @@ def fit(
     from armid_ros.zero.fit import fit_rests
     from armid_ros.zero.rests import find_rests
     from armid_ros.zero.text import fit_document, fit_summary, SCHEMA
+    import numpy as np
 
     staged = options.stage(out, SCHEMA, robot_source)
     robot = options.open_robot(robot_source, gravity, joints, bags)
@@ -139,7 +140,7 @@ def fit(
     rests = [find_rests(one) for one in recordings]
     if external:  # the controller has subtracted the weight of the described arm
         bare = ArmModel(robot, quasi_static=True)
-        rests = [one.with_torque(one.tau + bare.torque(one)) for one in rests]
+        rests = [one.with_torque(np.asarray(one.tau) + bare.torque(one)) for one in rests]
     found = fit_rests(rests, robots, known, link_error)
     source = options.kept_source(robot_source, robot, staged.folder)
     save_model(staged.folder / 'model.yaml', found.model(), source)
