@@ -26,7 +26,8 @@ def robots(as_json: bool) -> None:
         click.echo(json_text(rows, indent=1))
         return
     for row in rows:
-        say(f'{row["name"]}: {row["what it is"]}')
+        text = f'{row["name"]}: {row["what it is"]}'
+        say(textwrap.fill(text, 80, subsequent_indent='    ', break_on_hyphens=False))
 
 
 @click.command(epilog='Example: armid effects --json')

@@ -167,7 +167,6 @@ def diagnose(
     from armid_ros.arm import ArmModel
     from armid_ros.cli import options
     from armid_ros.identification.parameters_file import read_misfit
-    from armid_ros.report.provenance import ResultOrigin
 
     if residual is not None:
         require_residual()
@@ -204,11 +203,8 @@ def diagnose(
             **settings,
         )
         source = options.kept_source(robot_source, robot, staged.folder)
-        origin = ResultOrigin(
-            robot_source,
-            source,
-            options.provenance([*bags, *validate, *baseline, *against], seed=seed),
-        )
+        files = [*bags, *validate, *baseline, *against]
+        origin = options.origin(robot_source, files, seed, source=source)
         result.fill(staged.folder, origin)
         staged.keep()
         result = result.with_extras(residual is not None, seed, tick)

@@ -230,7 +230,6 @@ def excite(
     from armid_ros.excitation import CollisionScene, with_joint_limits
     from armid_ros.excitation.search.local import INTERRUPTED
     from armid_ros.files.cells import parted
-    from armid_ros.report.provenance import ResultOrigin
 
     _refuse_other_options(click.get_current_context(), kind)
     robot = _driven(robot_source, gravity, joints, after)
@@ -268,7 +267,7 @@ def excite(
         )
         result = replace(result, with_isolability=show_isolability)
         tick(1.0, 'writing')
-        origin = ResultOrigin(robot_source, provenance=options.provenance(read, seed=seed))
+        origin = options.origin(robot_source, read, seed)
         try:
             options.deliver(result, staged, origin, as_json)
         except TrajectoryError as error:  # a design without a way to it is kept, in a new folder

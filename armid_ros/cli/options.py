@@ -184,6 +184,18 @@ def provenance(
     )
 
 
+def origin(
+    robot: str,
+    paths: Iterable[Path],
+    seed: int | None = None,
+    *,
+    source: str = '',
+    settings: Mapping[str, Any] | None = None,
+) -> ResultOrigin:
+    """Return the origin of a result: --robot, how model.yaml names it, and the `provenance`."""
+    return ResultOrigin(robot, source, provenance(paths, settings, seed))
+
+
 def read_settings() -> ReadSettings:
     """Return the settings of this command for reading bags."""
     meta = click.get_current_context().meta

@@ -54,7 +54,6 @@ def plan(
     from armid_ros.api.excitation import ExcitationResult
     from armid_ros.cli import options
     from armid_ros.excitation import CollisionScene, with_joint_limits
-    from armid_ros.report.provenance import ResultOrigin
     from armid_ros.zero.plan import plan_zero
 
     joint_limits, velocity, *place = (given.pop(name) for name in _AROUND)
@@ -66,7 +65,6 @@ def plan(
         scene = CollisionScene.of(robot, *place)
         result = plan_zero(robot, scene, **given)
         read = [Path(robot_source.split(' ')[0]), *filter(None, (joint_limits, place[-1]))]
-        kept = options.provenance(read, seed=result.seed)
         step = (
             f'play {out / "excitation.yaml"} with excitation_publisher, record it, then '
             f'armid zero fit BAG --robot {robot_source} --out zeros'
@@ -74,9 +72,8 @@ def plan(
         shown = result.summary()
         # the last line is on the precision relative to zeros, tilt and tool described as 0
         summary = replace(shown, then='', lines=shown.lines[:-1], steps=[step])
-        options.deliver(
-            result, staged, ResultOrigin(robot_source, provenance=kept), as_json, summary
-        )
+        origin = options.origin(robot_source, read, result.seed)
+        options.deliver(result, staged, origin, as_json, summary)
 
 
 plan.params += [one for one in excite.params if one.name in _AROUND]
