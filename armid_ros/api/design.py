@@ -129,20 +129,19 @@ def design_excitation(
 
     """
     model = drivable(arm)
+    robot = model.robot
     if isinstance(joint_limits, Mapping):
-        velocity = [f'{joint}:={limit}' for joint, limit in joint_limits.items()]
-        model = replace(model, robot=with_joint_limits(model.robot, None, velocity))
+        robot = with_joint_limits(robot, None, [f'{j}:={v}' for j, v in joint_limits.items()])
     elif joint_limits is not None:
-        model = replace(model, robot=with_joint_limits(model.robot, joint_limits, ()))
+        robot = with_joint_limits(robot, joint_limits)
     if acceleration is not None:
-        given = np.nan_to_num(acceleration, nan=np.inf)
-        model = replace(model, robot=replace(model.robot, acceleration_limit=given))
+        robot = replace(robot, acceleration_limit=np.nan_to_num(acceleration, nan=np.inf))
+    model = replace(model, robot=robot)
     # one search of an arm of many joints: each step of it takes seconds
-    searches, seconds = (1, 25.0) if model.robot.n_joints > 20 else (4, 120.0)
+    searches, seconds = (1, 25.0) if robot.n_joints > 20 else (4, 120.0)
     run_in = min(2.0, 0.1 * duration)  # [s]
-    period = whole_period(duration, periods, run_in, WAYPOINT_RATE)
     settings = DesignSettings(
-        period=period,
+        period=whole_period(duration, periods, run_in, WAYPOINT_RATE),
         n_periods=periods,
         run_in=run_in,
         speed=speed,
@@ -159,8 +158,8 @@ def design_excitation(
     )
     if scene is None:
         height = None if floor is None else str(floor)
-        scene = CollisionScene.of(model.robot, settings.clearance, height, environment)
-    earlier = recordings_of(after, model.robot)
+        scene = CollisionScene.of(robot, clearance, height, environment)
+    earlier = recordings_of(after, robot)
     return _searched(model, settings, scene, start, earlier, rng, rival, progress)
 
 

@@ -105,6 +105,7 @@ class InspectionResult(Shown):
         heads, found = joint_heads(self.core), self.core
         refused, trial = bool(found.trial and found.trial.refused), found.trial
         good = trial and not refused and trial.grade != 'unusable'
+        again = 'inspect' if found.robot is None else 'check'
         topics = [
             f'{one.name}: {one.count} x {one.type_name}'
             + ' (read)' * (one.name == found.recording.topic)
@@ -121,7 +122,7 @@ class InspectionResult(Shown):
                 *topics,
             ),
             steps=['Correct that, and inspect the recording again.'] if refused else (),
-            then='' if refused else 'identify' if good else 'inspect',
+            then='' if refused else 'identify' if good else again,
         )
 
 

@@ -52,8 +52,6 @@ def following(then: str, result: Shown) -> str:
     given, own = context.params, str(context.command.name)
     if then == 'diagnose' == own and given['residual']:
         then = 'excite'
-    if then == 'inspect' == own and given['robot_source'] and given['out']:
-        then = 'check'
     robot, bags, more = _subject(then, result, given)
     if isinstance(result, DiagnosisResult) and then == 'diagnose':
         more = ['--residual', 'gp'] if result.baseline else ['--baseline', 'BAG']

@@ -51,32 +51,27 @@ def view(
     from armid_ros.cli import options
     from armid_ros.view.rerun_log import log_recording, open_stream
 
-    robot = None
-    if robot_source is not None or model is None:
-        robot = options.open_robot(robot_source or '-', gravity, joints, [bag])
-    if model is not None:
-        arm = options.model_of(model / 'model.yaml' if model.is_dir() else model, robot)
+    if model is None:
+        arm = ArmModel(options.open_robot(robot_source or '-', gravity, joints, [bag]))
     else:
-        assert robot is not None
-        arm = ArmModel(robot)
+        robot = options.open_robot(robot_source, gravity, joints, [bag]) if robot_source else None
+        arm = options.model_of(model / 'model.yaml' if model.is_dir() else model, robot)
     (recording,) = options.read([bag], arm.robot, topic)
-    marked = mark
     if model is not None and not mark:  # the joints of the effects that a diagnosis names
         path = (model if model.is_dir() else model.parent) / 'diagnosis.json'
         if path.is_file():
             effects = json.loads(path.read_text(encoding='utf-8'))['effects']
-            named = [joint for effect in effects for joint in effect['joints']]
-            marked = tuple(dict.fromkeys(named))
-    for joint in marked:
+            mark = tuple(dict.fromkeys(joint for one in effects for joint in one['joints']))
+    for joint in mark:
         arm.robot.index(joint)
     with _whole(out) as file:
         stream = open_stream(Path(recording.source).name or arm.robot.name, file)
-        notes = log_recording(stream, arm, recording, marked)
+        notes = log_recording(stream, arm, recording, mark)
         stream.disconnect()
     for note in notes:
         say(f'note: {note}')
     if out is not None:
-        coloured = f', coloured: {", ".join(marked)}' if marked else ''
+        coloured = f', coloured: {", ".join(mark)}' if mark else ''
         samples = f'{len(recording)} samples of {arm.robot.n_joints} joints'
         say(f'{out}: {samples}{coloured}; rerun {out}')
 
