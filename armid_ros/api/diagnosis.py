@@ -243,7 +243,7 @@ class DiagnosisResult(ShownModel):
             def simulated() -> tuple[tuple[ForwardValidation, ...], tuple[str, ...]]:
                 used = conditioning(list(self.recordings), self.settings.signals)
                 return simulate_held_out(
-                    self.description, result.arm, used, self.held_out,
+                    self.description, self.arm, used, self.held_out,
                     progress=lambda _, what: progress(1.0, what),
                 )  # fmt: skip
 

@@ -305,7 +305,8 @@ class Strip:
     def place(self, points: FloatArray, pose: int) -> FloatArray:
         """Return where flat points, shape (..., 2) [m], are in the frame of a pose [px]."""
         right = pose * self.pitch + self.scale * (points[..., 0] - self.left)
-        return np.round(np.stack([right, self.scale * (self.top - points[..., 1])], axis=-1), 1)
+        down = self.scale * (self.top - points[..., 1])
+        return np.asarray(np.round(np.stack([right, down], axis=-1), 1))
 
     def captions(self, texts: Sequence[str]) -> tuple[tuple[float, str], ...]:
         """Return texts with the middle of their frames [px]."""

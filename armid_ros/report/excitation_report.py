@@ -231,7 +231,7 @@ def _asked(
         ('Robot', robot),
         ('Joints', ', '.join(run.joints)),
         ('Gravity', f'({_numbers(arm.robot.gravity)}) m/s²'),
-        ('Effects', effects_in_words(arm.effects)),
+        ('Effects', effects_in_words(arm)),
         ('Target', f'{TARGETS[settings.target]}{focus}'),
         ('Criterion', criterion),
         ('Speed', speed),

@@ -8,7 +8,6 @@ from collections.abc import Callable, Sequence
 import re
 
 from armid_ros.arm import ArmModel
-from armid_ros.effects import Effect
 from armid_ros.estimate import Estimate, name_in_words, ParameterName, symbol_in_words
 from armid_ros.identification import Identification, Score
 from armid_ros.identification.fitting.identifiability import HALF_WIDTH, Unidentified
@@ -78,9 +77,9 @@ def grouping(name: ParameterName, links: Sequence[str] = ()) -> str:
     return _SYMBOL.sub(named, name.name)
 
 
-def effects_in_words(effects: Sequence[Effect]) -> str:
-    """List effects by name, or state that there are none."""
-    return ', '.join(name_in_words(effect.name) for effect in effects) or 'none'
+def effects_in_words(arm: ArmModel) -> str:
+    """List the effects of an arm by name, or state that there are none."""
+    return ', '.join(name_in_words(effect.name) for effect in arm.effects) or 'none'
 
 
 def parameter_folds(

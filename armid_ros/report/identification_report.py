@@ -168,7 +168,7 @@ def _asked(
         ('Robot', robot),
         ('Joints', ', '.join(result.arm.robot.joints)),
         ('Gravity', f'({gravity}) m/s²'),
-        ('Effects', effects_in_words(result.arm.effects)),
+        ('Effects', effects_in_words(result.arm)),
         ('Method', IN_WORDS[result.settings.method]),
         (
             'Filter',

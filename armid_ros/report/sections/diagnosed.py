@@ -14,9 +14,8 @@ from armid_ros.diagnosis.search.trial import Trial
 from armid_ros.diagnosis.verdict.document import Detectable
 from armid_ros.diagnosis.verdict.finding import Gap
 from armid_ros.diagnosis.verdict.words import by_cause, share_interval_in_words
-from armid_ros.effects.quantities import SURELY
 from armid_ros.estimate import name_in_words
-from armid_ros.identification.fitting.identifiability import excludes_zero
+from armid_ros.identification.fitting.identifiability import excludes_zero, HALF_WIDTH
 from armid_ros.motion import FloatArray
 from armid_ros.report.blocks import (
     Bar,
@@ -313,10 +312,10 @@ def _candidate_value(diagnosis: Diagnosis, trial: Trial) -> str:
     if diagnosis.explanation is not None:
         arm = diagnosis.explanation.given
     lower, upper = (bound[kept] for bound in room(effect, arm))
-    slack = SURELY * trial.std
+    slack = HALF_WIDTH * trial.std
     if not np.all((trial.values > lower - slack) & (trial.values < upper + slack)):
         return 'not possible'
-    if not np.any(np.abs(trial.values) > slack):
+    if not excludes_zero(trial.values, trial.std).any():
         return 'includes 0'
     name = effect.parameters(arm.robot)[kept[0]]
     return with_interval(float(trial.values[0]), float(trial.std[0]), name.unit)
