@@ -10,7 +10,7 @@ from pathlib import Path
 from typing import Any, TYPE_CHECKING
 
 from armid_ros.cli import parameters
-from armid_ros.cli.choices import COURSES, CRITERIA, FOURIER, MAX_DURATION, SPEED_CLASSES, TARGETS
+from armid_ros.cli.choices import CRITERIA, MAX_DURATION, SPEED_CLASSES, TARGETS
 from armid_ros.cli.terminal import progress, say
 from armid_ros.errors import RecordingError, TrajectoryError
 import click
@@ -21,6 +21,8 @@ if TYPE_CHECKING:
     from armid_ros.robots import Robot
 
 
+#: Kinds of trajectories for elastic joints.
+COURSES = ('multisine', 'steps')
 #: Options that both a course, for elastic joints, and a design take; a course takes --share too.
 _SHARED = {
     'robot_source', 'out', 'kind', 'duration', 'clearance', 'environment', 'floor', 'gravity',
@@ -48,8 +50,8 @@ class Speed(click.ParamType[str | float]):
 @parameters.folder
 @click.option(
     '--kind',
-    type=click.Choice([FOURIER, *COURSES]),
-    default=FOURIER,
+    type=click.Choice(['fourier', *COURSES]),
+    default='fourier',
     show_default=True,
     help='Kind of trajectory; multisine (of torque) and steps are for elastic joints.',
 )
