@@ -123,9 +123,8 @@ def fit(
     from armid_ros.arm import ArmModel, save_model
     from armid_ros.cli import options
     from armid_ros.identification.known_payload import payloads_of
-    from armid_ros.zero.fit import fit_rests
+    from armid_ros.zero.fit import fit_document, fit_rests, fit_summary, SCHEMA
     from armid_ros.zero.rests import find_rests
-    from armid_ros.zero.text import fit_document, fit_summary, SCHEMA
     import numpy as np
 
     staged = options.stage(out, SCHEMA, robot_source)
