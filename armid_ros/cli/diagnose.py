@@ -37,25 +37,6 @@ def share_of_percent(
     return share
 
 
-_partner_options = parameters.together(
-    click.option(
-        '--partner',
-        metavar='R',
-        help='Shipped name, URDF or xacro of a machine or person in the same bags that the arm '
-        'may be tied to.',
-    ),
-    click.option('--partner-topic', help='JointState topic of the partner, if not unique.'),
-    click.option(
-        '--tie',
-        'ties',
-        multiple=True,
-        metavar='JOINT=JOINT',
-        help='Possible tie: a joint of the arm and a joint of the partner. JOINT@X,Y,Z sets '
-        'a point of the link [m]; the centroid by default. By default links of equal number.',
-    ),
-)
-
-
 @click.command(epilog='Example: armid diagnose slow.mcap fast.mcap --robot ur10.urdf --out found')
 @parameters.bags
 @parameters.robot
@@ -129,7 +110,21 @@ _partner_options = parameters.together(
 @parameters.decimation
 @columns.options
 @parameters.topic
-@_partner_options
+@click.option(
+    '--partner',
+    metavar='R',
+    help='Shipped name, URDF or xacro of a machine or person in the same bags that the arm '
+    'may be tied to.',
+)
+@click.option('--partner-topic', help='JointState topic of the partner, if not unique.')
+@click.option(
+    '--tie',
+    'ties',
+    multiple=True,
+    metavar='JOINT=JOINT',
+    help='Possible tie: a joint of the arm and a joint of the partner. JOINT@X,Y,Z sets '
+    'a point of the link [m]; the centroid by default. By default links of equal number.',
+)
 @parameters.setting
 @parameters.every
 @parameters.as_json

@@ -100,24 +100,25 @@ folder = together(
     ),
     force,
 )
-_crc = click.option(
-    '--crc/--no-crc',
-    default=True,
-    show_default=True,
-    expose_value=False,
-    callback=lambda context, _, value: context.meta.update({CRC: value}),
-    help='Compare the checksums of bags, and skip damaged parts.',
-)
-_memory = click.option(
-    '--memory-limit',
-    type=click.FloatRange(0.0, min_open=True),
-    metavar='MB',
-    expose_value=False,
-    callback=lambda context, _, value: context.meta.update({MEMORY: value}),
-    help='Memory limit for reading bags [MB]; a quarter of the memory by default.',
-)
 #: How bags are read.
-reading = together(_crc, _memory)
+reading = together(
+    click.option(
+        '--crc/--no-crc',
+        default=True,
+        show_default=True,
+        expose_value=False,
+        callback=lambda context, _, value: context.meta.update({CRC: value}),
+        help='Compare the checksums of bags, and skip damaged parts.',
+    ),
+    click.option(
+        '--memory-limit',
+        type=click.FloatRange(0.0, min_open=True),
+        metavar='MB',
+        expose_value=False,
+        callback=lambda context, _, value: context.meta.update({MEMORY: value}),
+        help='Memory limit for reading bags [MB]; a quarter of the memory by default.',
+    ),
+)
 bag = click.option(
     '--out', required=True, type=OutPath(path_type=Path), help='Bag to write; must not exist.'
 )
