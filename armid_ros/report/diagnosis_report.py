@@ -223,7 +223,7 @@ class Story(Section):
         data, robot = self.diagnosis.data, self.diagnosis.arm.robot
         cause: list[Finding] = next(iter(by_cause(self.diagnosis.findings)), [])
         names = ', '.join(name_in_words(one.name) for one in cause)
-        found = [*(place.joint for place in self.diagnosis.where), *self.gains]
+        found = [place.joint for place in self.diagnosis.where]
         named = {joint for one in cause for joint in one.joints}
         joints = [joint for joint in robot.joints if joint in named] if cause else found[:1]
         caption = f'coloured: {", ".join(joints)} ({names or "the largest gap"})'
@@ -235,22 +235,19 @@ class Story(Section):
     @property
     def rows(self) -> list[tuple[str, list[str]]]:
         """Questions and answers."""
-        answers = [('Where', self._where()), ('Patch', self._patch()), ('Gap', self._gap())]
-        if self.diagnosis.spans:
-            answers.insert(
-                0,
-                (
-                    'When',
-                    [
-                        f'{one.source} from {one.start:.1f} to {one.stop:.1f} s'
-                        for one in self.diagnosis.spans
-                    ],
-                ),
-            )
-        rest = self.diagnosis.left
-        if self.diagnosis.findings and rest:
-            answers.append(('Unexplained', [f'{w.joint}: {w.signature}' for w in rest[:_JOINTS]]))
-        return answers
+        spans = [
+            f'{one.source} from {one.start:.1f} to {one.stop:.1f} s'
+            for one in self.diagnosis.spans
+        ]
+        unexplained = [f'{w.joint}: {w.signature}' for w in self.diagnosis.left[:_JOINTS]]
+        answers = [
+            ('When', spans),
+            ('Where', self._where()),
+            ('Patch', self._patch()),
+            ('Gap', self._gap()),
+            ('Unexplained', unexplained if self.diagnosis.findings else []),
+        ]
+        return [(question, answer) for question, answer in answers if answer]
 
     def _where(self) -> list[str]:
         places, whole = self.diagnosis.where, share_of(self.diagnosis)
@@ -262,18 +259,11 @@ class Story(Section):
             rest = sum(place.share_of_gap for place in places[_JOINTS:])
             others = ', '.join(place.joint for place in places[_JOINTS:])
             lines.append(f'{others}: {percent(rest)}')
-        unseen = self.diagnosis.not_checked
         if not lines and self.diagnosis.verdict != 'consistent':
             return ['No joint is far above its floor.']
+        unseen = self.diagnosis.not_checked
         none = 'No joint that was checked has a gap.' if unseen else 'No joint has a gap.'
-        gap, joints = self.diagnosis.gap, self.diagnosis.arm.robot.joints
-        if gap is not None and gap.predicted and places:
-            joint = places[0].joint
-            if gap.chi2_before[joints.index(joint)] <= 1.0:
-                held_out = f'in the held-out ones {joint} is below its floor'
-                lines.insert(0, f'In the fitted recordings only; {held_out}:')
-        lines = lines or [none]
-        return [*lines, f'Not checked: {", ".join(unseen)}.'] if unseen else lines
+        return [*(lines or [none]), *([f'Not checked: {", ".join(unseen)}.'] if unseen else [])]
 
     def _patch(self) -> list[str]:
         diagnosis = self.diagnosis
@@ -288,8 +278,7 @@ class Story(Section):
 
     def _gap(self) -> list[str]:
         gap, robot = self.diagnosis.gap, self.diagnosis.arm.robot
-        if gap is None:
-            return ['Not measured.']
+        assert gap is not None
         j = int(np.argmax(gap.chi2_before))
         before, after, floor = (
             f'{digits(float(x[j]))} {robot.torque_units[j]}'
