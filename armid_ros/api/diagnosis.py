@@ -20,7 +20,7 @@ from armid_ros.api.arguments import (
     with_sources_apart,
 )
 from armid_ros.api.identification import IdentificationResult
-from armid_ros.api.since import misfit_of, model_in_question, recordings_since
+from armid_ros.api.since import model_in_question, recordings_since
 from armid_ros.api.table import data_frame, ResidualPart, ShownModel, Summary
 from armid_ros.arm import ArmModel, Misfit, save_model
 from armid_ros.diagnosis import diagnose as run
@@ -35,10 +35,8 @@ from armid_ros.diagnosis import (
 from armid_ros.diagnosis.diagnose import OPEN
 from armid_ros.diagnosis.next_run.steps import MODEL, next_steps
 from armid_ros.diagnosis.verdict.document import SCHEMA
-from armid_ros.diagnosis.verdict.words import by_cause, names_and_places, share_in_words
 from armid_ros.effects.tied import Partner
 from armid_ros.errors import IdentificationError
-from armid_ros.estimate import name_in_words
 from armid_ros.excitation import save_excitation
 from armid_ros.files import json_text, write_file
 from armid_ros.identification import SignalSettings
@@ -46,8 +44,8 @@ from armid_ros.identification.assess.verification import ForwardValidation, simu
 from armid_ros.identification.rows.signals import conditioning
 from armid_ros.recording import Recording, require_once
 from armid_ros.recording.curves import draw_joints
-from armid_ros.report.diagnosis_report import diagnosis_report
-from armid_ros.report.notation import pretty, probability
+from armid_ros.report.diagnosis_report import cause_sentences, diagnosis_report
+from armid_ros.report.notation import pretty
 from armid_ros.report.provenance import DEFAULT_ORIGIN, ResultOrigin
 from armid_ros.report.sections.diagnosed import named_rows
 import numpy as np
@@ -267,17 +265,7 @@ class DiagnosisResult(ShownModel):
         lines = [] if self.simulated is None else [f'simulator: {self.simulated.fitted_to}']
         if self.baseline:
             lines.append(f'baseline: {", ".join(one.source for one in self.baseline)}')
-        lines += [
-            f'{names_and_places(group)}: {share_in_words(group[0])}'
-            + (', together' if len(group) > 1 else '')
-            for group in by_cause(self.core.findings)
-        ]
-        lines += [
-            f'minor (significant, but negligible or not confirmed): '
-            f'{name_in_words(one.name)} in {", ".join(one.joints) or "the whole arm"}, '
-            f'p {probability(one.p)}'
-            for one in self.core.minor
-        ]
+        lines += cause_sentences(self.core)
         lines += [] if self.residual is None else self.residual.sentences()
         lines += [pair.sentence() for pair in self.forward]
         if self.verdict == 'consistent':
@@ -394,13 +382,13 @@ def diagnose(
     """
     if residual is not None:
         require_residual()
-    arm, model, simulated = model_in_question(arm, effects, against, baseline, rng)
+    arm, model, known, simulated = model_in_question(arm, effects, against, baseline, rng)
     robot = model.robot
     diagnosed, held_out = some_recordings_of(recordings, robot), recordings_of(validate, robot)
     before = recordings_since(arm, model, baseline, [*diagnosed, *held_out])
     diagnosed, held_out, before = with_sources_apart(diagnosed, held_out, before)
     require_once([*diagnosed, *before], held_out)
-    misfit = misfit or misfit_of(arm, model)
+    misfit = misfit or known
     settings = DiagnosisSettings(
         signals=SignalSettings(cutoff, decimation),
         material=material,

@@ -21,13 +21,6 @@ from armid_ros.simulation.plant import require_any_mass
 import numpy as np
 
 
-def misfit_of(arm: RobotLike | IdentificationResult, model: ArmModel) -> Misfit | None:
-    """Return the misfit of a model at its identification, if it is known."""
-    if isinstance(arm, IdentificationResult):
-        return arm.misfit
-    return read_misfit(arm, model) if _is_written(arm) else None
-
-
 def recordings_since(
     arm: RobotLike | IdentificationResult,
     model: ArmModel,
@@ -62,25 +55,28 @@ def model_in_question(
     against: RecordingLike | Sequence[RecordingLike],
     baseline: RecordingLike | Sequence[RecordingLike] | None,
     rng: Rng,
-) -> tuple[RobotLike | IdentificationResult, ArmModel, IdentificationResult | None]:
+) -> tuple[RobotLike | IdentificationResult, ArmModel, Misfit | None, IdentificationResult | None]:
     """
-    Return the given or simulated arm, its model, and the identification of a simulator.
+    Return the given or simulated arm, its model and misfit, and the identification of a simulator.
 
-    The model of a simulator is identified from its recordings (`against`). Without given effects,
-    it has the usual effects and the effects that a MJCF can describe.
+    The misfit is that of the model at its identification; None if it is unknown. The model of a
+    simulator is identified from its recordings (`against`). Without given effects, it has the
+    usual effects and the effects that a MJCF can describe.
 
     """
     model = arm.arm if isinstance(arm, IdentificationResult) else arm_of(arm, effects)
     require_any_mass(model.robot)
     recordings = recordings_of(against, model.robot)
     if not recordings:
-        return arm, model, None
+        if isinstance(arm, IdentificationResult):
+            return arm, model, arm.misfit, None
+        return arm, model, read_misfit(arm, model) if _is_written(arm) else None, None
     if baseline:
         raise IdentificationError('give recordings of a simulator or a baseline, not both')
     kinds = CATALOGUE.items()
     usual = [name for name, kind in kinds if kind.traits.usual or kind.traits.mjcf_attribute]
     found = identify(model.robot, recordings, effects=effects or ','.join(usual), rng=rng)
-    return found.arm, found.arm, found
+    return found.arm, found.arm, None, found
 
 
 def _is_written(arm: RobotLike | IdentificationResult) -> TypeGuard[str | Path]:

@@ -13,7 +13,7 @@ from armid_ros.diagnosis import Diagnosis, Finding
 from armid_ros.diagnosis.data.trajectory import trajectories
 from armid_ros.diagnosis.verdict.document import detectable
 from armid_ros.diagnosis.verdict.finding import Gap, Overlay
-from armid_ros.diagnosis.verdict.words import by_cause
+from armid_ros.diagnosis.verdict.words import by_cause, names_and_places, share_in_words
 from armid_ros.estimate import name_in_words
 from armid_ros.identification.assess.verification import ForwardValidation
 from armid_ros.identification.rows.signals import conditioning, SignalSettings
@@ -33,6 +33,7 @@ from armid_ros.report.notation import (
     digits,
     percent,
     pretty,
+    probability,
     robot_label,
     short_names,
     with_names,
@@ -70,6 +71,22 @@ def tone_of(diagnosis: Diagnosis, worse: Sequence[str] = ()) -> str:
     tone = _TONES.get(diagnosis.verdict, 'bad')
     open_ends = diagnosis.not_checked, diagnosis.doubt, diagnosis.harmful
     return 'fair' if tone == 'good' and (any(open_ends) or worse) else tone
+
+
+def cause_sentences(diagnosis: Diagnosis) -> list[str]:
+    """Return sentences on the shares of the causes, and on minor effects."""
+    shares = [
+        f'{names_and_places(group)}: {share_in_words(group[0])}'
+        + (', together' if len(group) > 1 else '')
+        for group in by_cause(diagnosis.findings)
+    ]
+    minor = [
+        'minor (significant, but negligible or not confirmed): '
+        f'{name_in_words(one.name)} in {", ".join(one.joints) or "the whole arm"}, '
+        f'p {probability(one.p)}'
+        for one in diagnosis.minor
+    ]
+    return [*shares, *minor]
 
 
 #: Uses of recordings, and the words for some of them.
@@ -268,7 +285,12 @@ class Story(Section):
     def _patch(self) -> list[str]:
         diagnosis = self.diagnosis
         patched = not diagnosis.harmful
-        added = [name_in_words(finding.name) for finding in diagnosis.findings if patched]
+        meaning = {effect.name: f' ({effect.summary})' for effect in diagnosis.arm.effects}
+        added = [
+            name_in_words(finding.name) + meaning.get(finding.name, '')
+            for finding in diagnosis.findings
+            if patched
+        ]
         if self.gains:
             added.append(f'the learned residual of {", ".join(self.gains)}')
         if not added:
