@@ -135,8 +135,55 @@ class Residual:
         ]
 
     def section(self) -> ContentSection:
-        """Return the section of a report with the maps."""
-        return _section(self)
+        """Return the section of a report with the maps at the middle load of each joint."""
+        robot = self.base.robot
+        rows, pictures = [], []
+        for one in self.joints:
+            j = robot.joints.index(one.joint)
+            unit, length = robot.torque_units[j], robot.position_units[j]
+            held_out = '' if one.held_out is None else percent(one.held_out)
+            if one.held_out is not None and one.held_out < 0.0:
+                held_out = 'worse'
+            rows.append(
+                (
+                    one.joint,
+                    f'{digits(one.before)} {unit}',
+                    f'{digits(one.after)} {unit}',
+                    percent(one.gain),
+                    held_out,
+                    TableCell('no simple law' if one.law is None else one.law.text, 'law'),
+                    '' if one.law is None else percent(one.law.share),
+                )
+            )
+            pictures += _pictures(one, unit, length)
+        heads = (
+            'Joint',
+            'Residual, rms',
+            'With the map',
+            'Share, map',
+            'Held-out alone',
+            'Looks like',
+            'Share, law',
+        )
+        return ContentSection(
+            'Learned residual',
+            [
+                Paragraph(
+                    'No effect of the catalogue explains the residual of these joints. A Gaussian '
+                    'process over position, velocity and load has learned it. model.yaml has it '
+                    f'as an effect, {self.table_file} as a table. It is zero where there were no '
+                    'data. Shares are of the squared residual in cross-validation, and in '
+                    'held-out recordings close to the data.'
+                ),
+                DataTable(heads, rows, (0, 5)),
+                Paragraph(
+                    'q: position, dq: velocity, w: gravity torque. A law is a suggestion: write '
+                    'it as an effect of your own if it is plausible, and diagnose again.',
+                    'hint',
+                ),
+                SmallMultiples(pictures),
+            ],
+        )
 
     def table(self) -> str:
         """
@@ -290,58 +337,6 @@ def near_data(learned: TorqueMap, rows: JointRows) -> npt.NDArray[np.bool_]:
     """Return a mask of the rows near those from which a map was learned, shape (N,)."""
     # a map is informative where its standard deviation is less than half of that of the prior
     return np.asarray(learned.std(rows.inputs) < 0.5 * learned.amplitude)
-
-
-def _section(residual: Residual) -> ContentSection:
-    """Return maps of the unexplained residual at the middle load of some joints."""
-    robot = residual.base.robot
-    rows, pictures = [], []
-    for one in residual.joints:
-        j = robot.joints.index(one.joint)
-        unit, length = robot.torque_units[j], robot.position_units[j]
-        held_out = '' if one.held_out is None else percent(one.held_out)
-        if one.held_out is not None and one.held_out < 0.0:
-            held_out = 'worse'
-        rows.append(
-            (
-                one.joint,
-                f'{digits(one.before)} {unit}',
-                f'{digits(one.after)} {unit}',
-                percent(one.gain),
-                held_out,
-                TableCell('no simple law' if one.law is None else one.law.text, 'law'),
-                '' if one.law is None else percent(one.law.share),
-            )
-        )
-        pictures += _pictures(one, unit, length)
-    heads = (
-        'Joint',
-        'Residual, rms',
-        'With the map',
-        'Share, map',
-        'Held-out alone',
-        'Looks like',
-        'Share, law',
-    )
-    return ContentSection(
-        'Learned residual',
-        [
-            Paragraph(
-                'No effect of the catalogue explains the residual of these joints. A Gaussian '
-                'process over position, velocity and load has learned it. model.yaml has it as '
-                f'an effect, {residual.table_file} as a table. It is zero where there were no '
-                'data. Shares are of the squared residual in cross-validation, and in held-out '
-                'recordings close to the data.'
-            ),
-            DataTable(heads, rows, (0, 5)),
-            Paragraph(
-                'q: position, dq: velocity, w: gravity torque. A law is a suggestion: write it as '
-                'an effect of your own if it is plausible, and diagnose again.',
-                'hint',
-            ),
-            SmallMultiples(pictures),
-        ],
-    )
 
 
 def _pictures(one: JointResidual, unit: str, length: str) -> list[tuple[str, str, Markup, str]]:
