@@ -6,14 +6,11 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import replace
-from functools import wraps
-from inspect import signature
 from pathlib import Path
-from typing import ParamSpec, TypeVar
 
 from armid_ros.arm import ArmModel, load_model
 from armid_ros.effects import USUAL_EFFECTS
-from armid_ros.errors import meant, RecordingError, TrajectoryError
+from armid_ros.errors import RecordingError, TrajectoryError
 from armid_ros.identification import SignalSettings
 from armid_ros.identification.rows.signals import conditioning, no_stretch, segments
 from armid_ros.motion import Motion
@@ -37,35 +34,11 @@ Progress = Callable[..., None]
 
 #: A number, one a joint, or these as text: '1798/7, 50'.
 _Numbers = float | str | Sequence[float]
-_Given = ParamSpec('_Given')
-_Result = TypeVar('_Result')
 
 #: Ends of the names of files that describe a robot.
 _DESCRIPTIONS = ('.urdf', '.xacro', '.xml')
-#: Keywords that are named otherwise than the options of the commands.
-_OPTIONS = {'seed': 'rng'}
 #: Effects that are fitted with the rigid body by default.
 USUAL = ','.join(USUAL_EFFECTS)
-
-
-def spelled(function: Callable[_Given, _Result]) -> Callable[_Given, _Result]:
-    """Let the error on an unknown keyword of a function name the most similar keyword."""
-    known = signature(function).parameters
-
-    @wraps(function)
-    def called(*values: _Given.args, **keywords: _Given.kwargs) -> _Result:
-        for name in keywords.keys() - known.keys():
-            near = (
-                f"; did you mean '{_OPTIONS[name]}'?"
-                if _OPTIONS.get(name) in known
-                else meant(name, known)
-            )
-            raise TypeError(
-                f"{function.__name__}() has no keyword '{name}'{near}; it takes {', '.join(known)}"
-            )
-        return function(*values, **keywords)
-
-    return called
 
 
 def robot_of(robot: RobotLike) -> Robot:
@@ -178,7 +151,6 @@ def motion_of(recording: Recording, cutoff: float | None = None) -> Motion:
     return found if measured else replace(found, tau=None)
 
 
-@spelled
 def read_recording(
     path: str | Path,
     robot: RobotLike | Sequence[str] | None = None,
@@ -255,7 +227,7 @@ def read_recording(
     True
 
     """
-    said = ColumnSettings(
+    settings = ColumnSettings(
         time=time,
         position=position,
         velocity=velocity,
@@ -278,14 +250,14 @@ def read_recording(
             raise RecordingError(
                 f'{path}: topics of JointState: {", ".join(named)}; give one as topic'
             )
-        return read_anything(path, topics=topics, topic=topic, columns=said)
+        return read_anything(path, topics=topics, topic=topic, columns=settings)
     if isinstance(robot, (Robot, ArmModel, str, Path)):
         described = robot_of(robot)
         slides = [bool(one) for one in described.prismatic]
         return read_anything(
-            path, joints=described.joints, slides=slides, topic=topic, columns=said
+            path, joints=described.joints, slides=slides, topic=topic, columns=settings
         )
-    return read_anything(path, joints=tuple(robot), topic=topic, columns=said)
+    return read_anything(path, joints=tuple(robot), topic=topic, columns=settings)
 
 
 def topics_of(path: Path, settings: ReadSettings = DEFAULT) -> tuple[Topic, ...]:

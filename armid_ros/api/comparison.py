@@ -13,6 +13,7 @@ from armid_ros.api.table import data_frame, Shown, Summary
 from armid_ros.identification.assess.compare import compare as run
 from armid_ros.identification.assess.comparison import Comparison, SCHEMA
 from armid_ros.identification.parameters_file import ParameterFile, parameters_of, read_parameters
+from armid_ros.report.compare_report import change_rows, compare_report, HEADS, tell, verdict
 from armid_ros.report.provenance import DEFAULT_ORIGIN, ResultOrigin
 
 if TYPE_CHECKING:
@@ -64,14 +65,10 @@ class ComparisonResult(Shown):
 
     def page(self, origin: ResultOrigin = DEFAULT_ORIGIN) -> str:
         """Return report.html."""
-        from armid_ros.report.compare_report import compare_report
-
         return compare_report(self.core, self.stated(origin))
 
     def summary(self) -> Summary:
         """Return the changes, most significant first."""
-        from armid_ros.report.compare_report import change_rows, HEADS, tell, verdict
-
         rows = change_rows(self.core)
         first, *more = tell(self.core)
         then = 'diagnose' if self.anything else 'identify'

@@ -8,14 +8,7 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
 
-from armid_ros.api.arguments import (
-    drivable,
-    RecordingLike,
-    recordings_of,
-    Rng,
-    RobotLike,
-    spelled,
-)
+from armid_ros.api.arguments import drivable, RecordingLike, recordings_of, Rng, RobotLike
 from armid_ros.api.excitation import ExcitationResult, planner_of, WAYPOINT_RATE
 from armid_ros.arm import ArmModel
 from armid_ros.errors import TrajectoryError
@@ -35,7 +28,6 @@ from armid_ros.recording import Recording
 import numpy as np
 
 
-@spelled
 def design_excitation(
     arm: RobotLike,
     *,
@@ -137,17 +129,19 @@ def design_excitation(
 
     """
     model = drivable(arm)
-    if joint_limits is not None:
-        model = _limited(model, joint_limits)
+    robot = model.robot
+    if isinstance(joint_limits, Mapping):
+        robot = with_joint_limits(robot, None, [f'{j}:={v}' for j, v in joint_limits.items()])
+    elif joint_limits is not None:
+        robot = with_joint_limits(robot, joint_limits)
     if acceleration is not None:
-        given = np.nan_to_num(acceleration, nan=np.inf)
-        model = replace(model, robot=replace(model.robot, acceleration_limit=given))
+        robot = replace(robot, acceleration_limit=np.nan_to_num(acceleration, nan=np.inf))
+    model = replace(model, robot=robot)
     # one search of an arm of many joints: each step of it takes seconds
-    searches, seconds = (1, 25.0) if model.robot.n_joints > 20 else (4, 120.0)
+    searches, seconds = (1, 25.0) if robot.n_joints > 20 else (4, 120.0)
     run_in = min(2.0, 0.1 * duration)  # [s]
-    period = whole_period(duration, periods, run_in, WAYPOINT_RATE)
-    asked = DesignSettings(
-        period=period,
+    settings = DesignSettings(
+        period=whole_period(duration, periods, run_in, WAYPOINT_RATE),
         n_periods=periods,
         run_in=run_in,
         speed=speed,
@@ -164,9 +158,9 @@ def design_excitation(
     )
     if scene is None:
         height = None if floor is None else str(floor)
-        scene = CollisionScene.of(model.robot, asked.clearance, height, environment)
-    earlier = recordings_of(after, model.robot)
-    return _searched(model, asked, scene, start, earlier, rng, rival, progress)
+        scene = CollisionScene.of(robot, clearance, height, environment)
+    earlier = recordings_of(after, robot)
+    return _searched(model, settings, scene, start, earlier, rng, rival, progress)
 
 
 excite = design_excitation  # as the command is called
@@ -174,7 +168,7 @@ excite = design_excitation  # as the command is called
 
 def _searched(
     model: ArmModel,
-    asked: DesignSettings,
+    settings: DesignSettings,
     scene: CollisionScene,
     start: FloatArray | None,
     earlier: Sequence[Recording],
@@ -183,7 +177,7 @@ def _searched(
     progress: Callable[[DesignProgress], None] | None,
 ) -> ExcitationResult:
     """Check that a start pose is free, then search for the trajectory."""
-    planner = planner_of(model, asked, scene)
+    planner = planner_of(model, settings, scene)
     if start is None:
         planner.free_start()  # raises before the search if no pose is free
     elif fault := planner.fault(start):
@@ -191,15 +185,15 @@ def _searched(
     prior = None
     if earlier:  # information matrix of existing recordings
         used = conditioning(list(earlier), SignalSettings())
-        problem = DesignProblem.of(model, asked, np.random.default_rng(rng))
+        problem = DesignProblem.of(model, settings, np.random.default_rng(rng))
         prior = np.zeros(2 * [len(problem.base.parameters)])
         for recording in earlier:
             for motion in segments(recording, used):
                 rows = motion.select(slice(None, None, used.decimation))
-                prior += problem.information(rows, np.ptp(motion.t) * asked.rate).matrix
+                prior += problem.information(rows, np.ptp(motion.t) * settings.rate).matrix
     found = design(
         model,
-        asked,
+        settings,
         np.random.default_rng(rng),
         collision=scene.bodies,
         prior_information=prior,
@@ -208,11 +202,3 @@ def _searched(
     )
     names = tuple(one.source for one in earlier)
     return ExcitationResult(found, model, scene, start, names, rng if isinstance(rng, int) else 0)
-
-
-def _limited(model: ArmModel, given: str | Path | Mapping[str, float]) -> ArmModel:
-    """Return the model with the joint limits of a file or mapping."""
-    named = given if isinstance(given, Mapping) else {}
-    file = None if isinstance(given, Mapping) else given
-    velocity = [f'{joint}:={limit}' for joint, limit in named.items()]
-    return replace(model, robot=with_joint_limits(model.robot, file, velocity))

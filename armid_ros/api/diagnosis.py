@@ -6,7 +6,6 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
-from importlib.util import find_spec
 from pathlib import Path
 from typing import Any, Literal, TYPE_CHECKING, TypeVar
 
@@ -18,17 +17,11 @@ from armid_ros.api.arguments import (
     RobotLike,
     some_recordings_of,
     source_of,
-    spelled,
     with_sources_apart,
 )
 from armid_ros.api.identification import IdentificationResult
-from armid_ros.api.since import misfit_of, model_in_question, recordings_since
-from armid_ros.api.table import (
-    data_frame,
-    ResidualPart,
-    ShownModel,
-    Summary,
-)
+from armid_ros.api.since import model_in_question, recordings_since
+from armid_ros.api.table import data_frame, ResidualPart, ShownModel, Summary
 from armid_ros.arm import ArmModel, Misfit, save_model
 from armid_ros.diagnosis import diagnose as run
 from armid_ros.diagnosis import (
@@ -37,9 +30,10 @@ from armid_ros.diagnosis import (
     DiagnosisSettings,
     EXPERIMENT_FILE,
     next_run,
+    NextRun,
 )
 from armid_ros.diagnosis.diagnose import OPEN
-from armid_ros.diagnosis.next_run.steps import MODEL
+from armid_ros.diagnosis.next_run.steps import MODEL, next_steps
 from armid_ros.diagnosis.verdict.document import SCHEMA
 from armid_ros.effects.tied import Partner
 from armid_ros.errors import IdentificationError
@@ -50,7 +44,7 @@ from armid_ros.identification.assess.verification import ForwardValidation, simu
 from armid_ros.identification.rows.signals import conditioning
 from armid_ros.recording import Recording, require_once
 from armid_ros.recording.curves import draw_joints
-from armid_ros.report.diagnosis_report import diagnosis_report, Extras
+from armid_ros.report.diagnosis_report import cause_sentences, diagnosis_report
 from armid_ros.report.notation import pretty
 from armid_ros.report.provenance import DEFAULT_ORIGIN, ResultOrigin
 from armid_ros.report.sections.diagnosed import named_rows
@@ -81,10 +75,18 @@ class DiagnosisResult(ShownModel):
         Settings of the diagnosis.
     misfit : Misfit or None
         Misfit of the model at its identification; None with a baseline, or if unknown.
-    extras : Extras
-        Learned residual, simulations of held-out recordings, and next run.
     simulated : IdentificationResult or None
         Identification of a simulator's model; None without recordings of a simulator.
+    residual : Residual or None
+        Learned map of the unexplained residual; None if none was learned.
+    forward : tuple of ForwardValidation
+        Held-out recordings simulated with the given and with the patched model.
+    next_run : NextRun or None
+        A motion that separates ambiguous names.
+    no_run : str
+        Why no motion separates them.
+    notes : tuple of str
+        Reasons why the residual or a simulation is missing.
 
     Examples
     --------
@@ -99,6 +101,7 @@ class DiagnosisResult(ShownModel):
     """
 
     schema = SCHEMA
+    plan_file = EXPERIMENT_FILE
 
     core: Diagnosis
     description: ArmModel
@@ -107,13 +110,12 @@ class DiagnosisResult(ShownModel):
     baseline: tuple[Recording, ...] = ()
     settings: DiagnosisSettings = field(default_factory=DiagnosisSettings)
     misfit: Misfit | None = None
-    extras: Extras = field(default_factory=Extras)
     simulated: IdentificationResult | None = None
-
-    @property
-    def residual(self) -> Residual | None:
-        """Return the learned map of the unexplained residual; None if none was learned."""
-        return self.extras.residual
+    residual: Residual | None = None
+    forward: tuple[ForwardValidation, ...] = ()
+    next_run: NextRun | None = None
+    no_run: str = ''
+    notes: tuple[str, ...] = ()
 
     @property
     def verdict(self) -> str:
@@ -164,16 +166,16 @@ class DiagnosisResult(ShownModel):
 
     def document(self, origin: ResultOrigin = DEFAULT_ORIGIN) -> dict[str, Any]:
         """Return the content of diagnosis.json."""
-        extras = self.extras
         return {
             **diagnosis_document(self.core),
             'residual': None if self.residual is None else self.residual.document(),
-            'forward': [pair.document() for pair in extras.forward],
-            'next_run': None if extras.next_run is None else extras.next_run.document(),
+            'forward': [pair.document() for pair in self.forward],
+            'next_run': None if self.next_run is None else self.next_run.document(),
         }
 
-    def page(self, origin: ResultOrigin = DEFAULT_ORIGIN, patch: str = '') -> str:
-        """Return report.html with verdict and evidence; `patch` is the text of model.yaml."""
+    def page(self, origin: ResultOrigin = DEFAULT_ORIGIN) -> str:
+        """Return report.html with verdict and evidence."""
+        learned = self.residual
         return diagnosis_report(
             self.core,
             {
@@ -182,24 +184,24 @@ class DiagnosisResult(ShownModel):
                 'baseline': self.baseline,
                 'simulator': self.simulated.recordings if self.simulated else (),
             },
+            steps=[*self._steps(MODEL), *([] if learned is None else learned.steps())],
             everything=self.settings.everything,
-            extras=self.extras,
-            patch=patch,
+            forward=self.forward,
+            learned=None if learned is None else learned.section(),
+            gains={} if learned is None else learned.gains,
             origin=origin.of(source_of(self.description.robot)),
         )
 
     def fill(self, folder: Path, origin: ResultOrigin = DEFAULT_ORIGIN) -> dict[str, Any]:
         """Write diagnosis.json, model.yaml and report.html into a folder, the page last."""
-        model, document = folder / 'model.yaml', self.document()
-        source = origin.of(source_of(self.description.robot)).source
-        save_model(model, self.arm, source, self.core.estimate, self.misfit)
+        source, document = origin.of(source_of(self.description.robot)).source, self.document()
+        save_model(folder / 'model.yaml', self.arm, source, self.core.estimate, self.misfit)
         write_file(folder / 'diagnosis.json', json_text(document, indent=1))
         if self.residual is not None:
-            self.residual.write_table(folder)
-        if self.extras.next_run is not None:
-            save_excitation(self.extras.next_run.excitation, folder / EXPERIMENT_FILE)
-        page = self.page(origin, model.read_text(encoding='utf-8'))
-        write_file(folder / 'report.html', page)
+            write_file(folder / self.residual.table_file, self.residual.table())
+        if self.next_run is not None:
+            save_excitation(self.next_run.excitation, folder / self.plan_file)
+        write_file(folder / 'report.html', self.page(origin))
         return document
 
     @property
@@ -208,14 +210,14 @@ class DiagnosisResult(ShownModel):
         return [
             *('diagnosis.json', 'report.html', 'model.yaml'),
             *([] if self.residual is None else [self.residual.table_file]),
-            *([] if self.extras.next_run is None else [EXPERIMENT_FILE]),
+            *([] if self.next_run is None else [self.plan_file]),
         ]
 
     def with_residual(self, seed: int) -> DiagnosisResult:
         """Learn the unexplained residual as a map of the state, or add a note with the reason."""
         if self.verdict not in OPEN:
-            said = self.verdict.replace('_', ' ')
-            return self._with_notes(f'nothing is learned where the verdict is {said}')
+            note = f'nothing is learned where the verdict is {self.verdict.replace("_", " ")}'
+            return replace(self, notes=(*self.notes, note))
 
         def learned() -> Residual | None:
             require_residual()
@@ -224,10 +226,9 @@ class DiagnosisResult(ShownModel):
             return learn_residual(self.core, np.random.default_rng(seed))
 
         found, why = _tried('map', learned)
-        if found is None:
-            nothing = 'nothing was learned: the residual does not depend on the state of any joint'
-            return self._with_notes(*(why or (nothing,)))
-        return replace(self, extras=replace(self.extras, residual=found))
+        if found is None and not why:
+            why = ('nothing was learned: the residual does not depend on the state of any joint',)
+        return replace(self, residual=found, notes=(*self.notes, *why))
 
     def with_extras(self, residual: bool, seed: int, progress: Progress) -> DiagnosisResult:
         """Learn the residual if requested, simulate held-out recordings, and plan the next run."""
@@ -246,15 +247,30 @@ class DiagnosisResult(ShownModel):
 
             found, why = _tried('simulation', simulated)
             forward, left_out = found or ((), ())
-            result = replace(result, extras=replace(result.extras, forward=forward))
-            result = result._with_notes(*left_out, *why)
+            result = replace(result, forward=forward, notes=(*result.notes, *left_out, *why))
         progress(1.0, 'next run')
-        run, why = _tried('next run', lambda: next_run(self.core, np.random.default_rng(seed)))
-        extras = replace(result.extras, next_run=run, no_run='; '.join(why))
-        return replace(result, extras=extras)
+        rng = np.random.default_rng(seed)
+        run, why = _tried('next run', lambda: next_run(self.core, rng))
+        return replace(result, next_run=run, no_run='; '.join(why))
 
-    def _with_notes(self, *notes: str) -> DiagnosisResult:
-        return replace(self, extras=replace(self.extras, notes=(*self.extras.notes, *notes)))
+    def _steps(self, model: str) -> list[str]:
+        """Return the next steps, with the path of the model."""
+        worse = dict.fromkeys(joint for pair in self.forward for joint in pair.worse)
+        learned = self.residual is not None
+        steps = next_steps(self.core, self.next_run, self.no_run, model, tuple(worse), learned)
+        return list(map(pretty, steps))
+
+    def _lines(self) -> list[str]:
+        """Return sentences on references, shares, minor effects, consequences and notes."""
+        lines = [] if self.simulated is None else [f'simulator: {self.simulated.fitted_to}']
+        if self.baseline:
+            lines.append(f'baseline: {", ".join(one.source for one in self.baseline)}')
+        lines += cause_sentences(self.core)
+        lines += [] if self.residual is None else self.residual.sentences()
+        lines += [pair.sentence() for pair in self.forward]
+        if self.verdict == 'consistent':
+            lines.append('note: how large each effect has to be to be seen is in report.html')
+        return [*lines, *(f'note: {note}' for note in (*self.core.notes, *self.notes))]
 
     def summary(self, model: str = MODEL, every: bool = True) -> Summary:
         """Return verdict, values that differ from zero, notes, and next steps for a model file."""
@@ -266,28 +282,22 @@ class DiagnosisResult(ShownModel):
             then = 'inspect'
         elif self.verdict in OPEN and self.residual is None:
             then = 'diagnose'
-        elif self.verdict == 'ambiguous' and self.extras.next_run is None:
+        elif self.verdict == 'ambiguous' and self.next_run is None:
             then = ''  # a person has to separate the names
         else:
             anew = self.core.doubt or self.core.harmful or self.verdict in OPEN
             then = 'identify' if anew else 'simulate'
-        lines = self.extras.sentences(self.core)
-        if self.baseline:
-            lines.insert(0, f'baseline: {", ".join(one.source for one in self.baseline)}')
-        if self.simulated is not None:
-            lines.insert(0, f'simulator: {self.simulated.fitted_to}')
         return Summary(
             pretty(self.core.summary),
             self.core.verdict.replace('_', ' '),
             ('effect', 'parameter', 'joint', 'value, 95 %') if rows else (),
             rows,
-            lines,
-            list(map(pretty, self.extras.steps(self.core, model))),
+            self._lines(),
+            self._steps(model),
             then,
         )
 
 
-@spelled
 def diagnose(
     arm: RobotLike | IdentificationResult,
     recordings: RecordingLike | Sequence[RecordingLike],
@@ -372,13 +382,13 @@ def diagnose(
     """
     if residual is not None:
         require_residual()
-    arm, model, simulated = model_in_question(arm, effects, against, baseline, rng)
+    arm, model, known, simulated = model_in_question(arm, effects, against, baseline, rng)
     robot = model.robot
-    looked_at, held_out = some_recordings_of(recordings, robot), recordings_of(validate, robot)
-    before = recordings_since(arm, model, baseline, [*looked_at, *held_out])
-    looked_at, held_out, before = with_sources_apart(looked_at, held_out, before)
-    require_once([*looked_at, *before], held_out)
-    misfit = misfit or misfit_of(arm, model)
+    diagnosed, held_out = some_recordings_of(recordings, robot), recordings_of(validate, robot)
+    before = recordings_since(arm, model, baseline, [*diagnosed, *held_out])
+    diagnosed, held_out, before = with_sources_apart(diagnosed, held_out, before)
+    require_once([*diagnosed, *before], held_out)
+    misfit = misfit or known
     settings = DiagnosisSettings(
         signals=SignalSettings(cutoff, decimation),
         material=material,
@@ -389,7 +399,7 @@ def diagnose(
     found = DiagnosisResult(
         run(
             model,
-            looked_at,
+            diagnosed,
             validate=held_out,
             baseline=before,
             misfit=misfit,
@@ -398,7 +408,7 @@ def diagnose(
             progress=progress,
         ),
         model,
-        tuple(looked_at),
+        tuple(diagnosed),
         tuple(held_out),
         tuple(before),
         settings,
@@ -410,17 +420,17 @@ def diagnose(
 
 def require_residual() -> None:
     """Raise IdentificationError if the package or a library that learns residuals is missing."""
-    if find_spec('armid_ros.residual') is None:
+    try:
+        from armid_ros.residual import require_libraries
+    except ModuleNotFoundError:
         raise IdentificationError(
             'learning a residual needs armid_ros.residual, which this installation does not have'
-        )
-    from armid_ros.residual import require_libraries
-
+        ) from None
     require_libraries()
 
 
 def _tried(what: str, make: Callable[[], _Made]) -> tuple[_Made | None, tuple[str, ...]]:
-    """Return the result of a step, or None and the reason."""
+    """Return the result of a step; if it fails, None and the reason."""
     try:
         return make(), ()
     except Exception as error:  # whatever it is, the diagnosis itself stands

@@ -35,6 +35,7 @@ from armid_ros.files import json_text, settled, write_file
 from armid_ros.motion import FloatArray, Motion
 from armid_ros.recording import write_joint_trajectory
 from armid_ros.recording.curves import draw_joints
+from armid_ros.report.excitation_report import excitation_report, identifiable
 from armid_ros.report.provenance import DEFAULT_ORIGIN, ResultOrigin
 import numpy as np
 import numpy.typing as npt
@@ -192,8 +193,6 @@ class ExcitationResult(Shown):
 
     def page(self, origin: ResultOrigin = DEFAULT_ORIGIN) -> str:
         """Return report.html on the quality of the run."""
-        from armid_ros.report.excitation_report import excitation_report
-
         return excitation_report(
             replace(self.core, excitation=self.run.excitation),
             self.arm,
@@ -235,8 +234,6 @@ class ExcitationResult(Shown):
 
     def summary(self) -> Summary:
         """Return the identifiable parameters, and the share of its limits that each joint uses."""
-        from armid_ros.report.excitation_report import identifiable
-
         shares = self.core.limits_used(self.arm)
         rows = [
             (joint, *(f'{100 * share[k]:.0f} %' for share in shares.values()))

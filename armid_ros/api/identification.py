@@ -19,17 +19,10 @@ from armid_ros.api.arguments import (
     RobotLike,
     some_recordings_of,
     source_of,
-    spelled,
     USUAL,
     with_sources_apart,
 )
-from armid_ros.api.table import (
-    aligned,
-    data_frame,
-    ResidualPart,
-    ShownModel,
-    Summary,
-)
+from armid_ros.api.table import aligned, data_frame, ResidualPart, ShownModel, Summary
 from armid_ros.arm import ArmModel, Misfit, save_model
 from armid_ros.arm.export import arm_mjcf, arm_urdf, Exported, torque_check
 from armid_ros.diagnosis import known_misfit
@@ -59,6 +52,10 @@ from armid_ros.identification.physical.fit_among_bodies import far_from_describe
 from armid_ros.identification.rows.checks import check_held_out
 from armid_ros.recording import Recording, require_once
 from armid_ros.recording.curves import draw_joints
+from armid_ros.report.families import estimate_text, full_label, joint_columns
+from armid_ros.report.identification_report import Assessment, identification_report
+from armid_ros.report.judgement import judge, residual_trends
+from armid_ros.report.notation import counted, digits, plain, pretty
 from armid_ros.report.provenance import DEFAULT_ORIGIN, ResultOrigin
 import numpy as np
 import numpy.typing as npt
@@ -228,8 +225,6 @@ class IdentificationResult(ShownModel):
 
     def page(self, origin: ResultOrigin = DEFAULT_ORIGIN) -> str:
         """Return report.html with all curves, numbers and doubts."""
-        from armid_ros.report.identification_report import Assessment, identification_report
-
         without_place = {name: one.without_place for name, one in self.exports.items()}
         return identification_report(
             self.core,
@@ -260,10 +255,6 @@ class IdentificationResult(ShownModel):
 
     def summary(self, every: bool = False) -> Summary:
         """Return errors and friction of each joint, doubts, and next step; `every`: all values."""
-        from armid_ros.report.families import joint_columns
-        from armid_ros.report.judgement import judge, residual_trends
-        from armid_ros.report.notation import counted, plain
-
         core, estimate, joints = self.core, self.estimate, self.arm.robot.joints
         others = self.graded.reasons[1:]
         shown = [fit for fits in self.validation.values() for fit in fits] or core.training
@@ -311,9 +302,6 @@ class IdentificationResult(ShownModel):
 
     def _parameters(self) -> list[str]:
         """Return a table of all parameters with their described values, one line each."""
-        from armid_ros.report.families import estimate_text, full_label
-        from armid_ros.report.notation import digits, pretty
-
         estimate, links = self.estimate, self.arm.robot.links
         described = self.core.base.values(self.description.theta)
         rows = []
@@ -326,7 +314,6 @@ class IdentificationResult(ShownModel):
         return aligned(('parameter', 'value, 95 %', 'described'), rows)
 
 
-@spelled
 def identify(
     arm: RobotLike,
     recordings: RecordingLike | Sequence[RecordingLike],

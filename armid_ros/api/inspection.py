@@ -10,13 +10,11 @@ from pathlib import Path
 from typing import Any, TYPE_CHECKING
 
 from armid_ros.api.arguments import (
-    describes_robot,
     RecordingLike,
     recordings_of,
     Rng,
     robot_of,
     RobotLike,
-    spelled,
     topics_of,
     USUAL,
 )
@@ -36,6 +34,18 @@ from armid_ros.inspection import inspect as look
 from armid_ros.inspection.inspect import SCHEMA
 from armid_ros.recording import Recording, Topic
 from armid_ros.recording.anything import read_anything
+from armid_ros.report.inspection_report import (
+    check_word,
+    description_check_report,
+    headline,
+    HEADS,
+    inspection_report,
+    inspection_word,
+    joint_heads,
+    joint_rows,
+    link_rows,
+    recording_facts,
+)
 from armid_ros.report.provenance import DEFAULT_ORIGIN, ResultOrigin
 from armid_ros.robots import Robot
 import numpy as np
@@ -88,22 +98,14 @@ class InspectionResult(Shown):
 
     def page(self, origin: ResultOrigin = DEFAULT_ORIGIN) -> str:
         """Return inspection.html with all curves."""
-        from armid_ros.report.inspection_report import inspection_report
-
         return inspection_report(self.core, self.stated(origin))
 
     def summary(self) -> Summary:
         """Return verdict, table of joints, remarks and sampling."""
-        from armid_ros.report.inspection_report import (
-            inspection_word,
-            joint_heads,
-            joint_rows,
-            recording_facts,
-        )
-
         heads, found = joint_heads(self.core), self.core
         refused, trial = bool(found.trial and found.trial.refused), found.trial
         good = trial and not refused and trial.grade != 'unusable'
+        again = 'inspect' if found.robot is None else 'check'
         topics = [
             f'{one.name}: {one.count} x {one.type_name}'
             + ' (read)' * (one.name == found.recording.topic)
@@ -120,14 +122,13 @@ class InspectionResult(Shown):
                 *topics,
             ),
             steps=['Correct that, and inspect the recording again.'] if refused else (),
-            then='' if refused else 'identify' if good else 'inspect',
+            then='' if refused else 'identify' if good else again,
         )
 
 
-@spelled
 def inspect(
     robot: RobotLike | RecordingLike | None = None,
-    recording: RecordingLike | RobotLike | None = None,
+    recording: RecordingLike | None = None,
     *,
     topics: tuple[Topic, ...] | None = None,
     rng: Rng = 0,
@@ -163,8 +164,8 @@ def inspect(
     ()
 
     """
-    if recording is None or describes_robot(recording):  # alone, or in the order of before
-        robot, recording = recording, robot
+    if recording is None:  # the only argument
+        robot, recording = None, robot
     if recording is None or isinstance(recording, Robot | ArmModel):
         raise RecordingError('no recording: give the path of a bag or a table, or a Recording')
     if isinstance(robot, Recording):
@@ -213,8 +214,6 @@ class CheckResult(Shown):
     @property
     def finding(self) -> str:
         """Return the finding in one sentence."""
-        from armid_ros.report.inspection_report import headline
-
         return headline(self.remarks, self.links)[0]
 
     @property
@@ -237,14 +236,10 @@ class CheckResult(Shown):
 
     def page(self, origin: ResultOrigin = DEFAULT_ORIGIN) -> str:
         """Return report.html with a table of the links."""
-        from armid_ros.report.inspection_report import description_check_report
-
         return description_check_report(self.remarks, self.links, self.stated(origin, self.robot))
 
     def summary(self) -> Summary:
         """Return the finding and the links, with measured values if any are known."""
-        from armid_ros.report.inspection_report import check_word, headline, HEADS, link_rows
-
         links = self.links
         wrong = links is not None and not np.isnan(links.measured_mass).all()
         columns = slice(None) if wrong else slice(0, 4, 2)
@@ -263,7 +258,6 @@ class CheckResult(Shown):
         return Summary(first, word, heads, rows, lines, then=then)
 
 
-@spelled
 def check(
     robot: RobotLike,
     recordings: RecordingLike | Sequence[RecordingLike] = (),

@@ -6,7 +6,7 @@ from __future__ import annotations
 
 from pathlib import Path
 
-from armid_ros.api.arguments import arm_of, Rng, RobotLike, spelled
+from armid_ros.api.arguments import arm_of, Rng, RobotLike
 from armid_ros.api.excitation import ExcitationResult
 from armid_ros.arm import ArmModel
 from armid_ros.excitation import design, DesignSettings, Excitation, load_excitation
@@ -19,7 +19,6 @@ from armid_ros.simulation import simulate as run
 import numpy as np
 
 
-@spelled
 def simulate(
     arm: RobotLike,
     trajectory: ExcitationResult | Excitation | Motion | str | Path | None = None,

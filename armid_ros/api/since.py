@@ -9,14 +9,7 @@ from itertools import product
 from pathlib import Path
 from typing import TypeGuard
 
-from armid_ros.api.arguments import (
-    arm_of,
-    is_model,
-    RecordingLike,
-    recordings_of,
-    Rng,
-    RobotLike,
-)
+from armid_ros.api.arguments import arm_of, is_model, RecordingLike, recordings_of, Rng, RobotLike
 from armid_ros.api.identification import IdentificationResult, identify
 from armid_ros.arm import ArmModel, Misfit
 from armid_ros.effects import CATALOGUE
@@ -28,18 +21,11 @@ from armid_ros.simulation.plant import require_any_mass
 import numpy as np
 
 
-def misfit_of(arm: RobotLike | IdentificationResult, model: ArmModel) -> Misfit | None:
-    """Return the misfit of a model at its identification, if it is known."""
-    if isinstance(arm, IdentificationResult):
-        return arm.misfit
-    return read_misfit(arm, model) if _is_written(arm) else None
-
-
 def recordings_since(
     arm: RobotLike | IdentificationResult,
     model: ArmModel,
     baseline: RecordingLike | Sequence[RecordingLike] | None,
-    asked: Sequence[Recording],
+    diagnosed: Sequence[Recording],
 ) -> list[Recording]:
     """
     Return the given baseline; by default the recordings of the identification.
@@ -55,7 +41,7 @@ def recordings_since(
         found = recordings_of(identified_from(arm), model.robot)
     else:
         return []
-    for one, other in product(found, asked):
+    for one, other in product(found, diagnosed):
         if np.array_equal(one.t, other.t) and np.array_equal(one.q, other.q):
             return []
     if not isinstance(arm, IdentificationResult):
@@ -69,25 +55,28 @@ def model_in_question(
     against: RecordingLike | Sequence[RecordingLike],
     baseline: RecordingLike | Sequence[RecordingLike] | None,
     rng: Rng,
-) -> tuple[RobotLike | IdentificationResult, ArmModel, IdentificationResult | None]:
+) -> tuple[RobotLike | IdentificationResult, ArmModel, Misfit | None, IdentificationResult | None]:
     """
-    Return the given or simulated arm, its model, and the identification of a simulator.
+    Return the given or simulated arm, its model and misfit, and the identification of a simulator.
 
-    The model of a simulator is identified from its recordings (`against`). Without given effects,
-    it has the usual effects and the effects that a MJCF can describe.
+    The misfit is that of the model at its identification; None if it is unknown. The model of a
+    simulator is identified from its recordings (`against`). Without given effects, it has the
+    usual effects and the effects that a MJCF can describe.
 
     """
     model = arm.arm if isinstance(arm, IdentificationResult) else arm_of(arm, effects)
     require_any_mass(model.robot)
     recordings = recordings_of(against, model.robot)
     if not recordings:
-        return arm, model, None
+        if isinstance(arm, IdentificationResult):
+            return arm, model, arm.misfit, None
+        return arm, model, read_misfit(arm, model) if _is_written(arm) else None, None
     if baseline:
         raise IdentificationError('give recordings of a simulator or a baseline, not both')
     kinds = CATALOGUE.items()
     usual = [name for name, kind in kinds if kind.traits.usual or kind.traits.mjcf_attribute]
     found = identify(model.robot, recordings, effects=effects or ','.join(usual), rng=rng)
-    return found.arm, found.arm, found
+    return found.arm, found.arm, None, found
 
 
 def _is_written(arm: RobotLike | IdentificationResult) -> TypeGuard[str | Path]:

@@ -1,6 +1,6 @@
 # Copyright 2026 The armid_ros developers
 # SPDX-License-Identifier: Apache-2.0
-"""Display of results: ten lines in a terminal, the report in a notebook."""
+"""Display of results: text in a terminal, the report in a notebook."""
 
 from __future__ import annotations
 
@@ -8,7 +8,6 @@ from abc import ABC, abstractmethod
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
-import textwrap
 from typing import Any, ClassVar, TYPE_CHECKING
 
 from armid_ros.api.arguments import source_of
@@ -24,10 +23,6 @@ import numpy as np
 
 if TYPE_CHECKING:
     import pandas
-
-#: Lines of a result in a terminal.
-LINES = 10
-WIDTH = 80
 
 
 @dataclass(frozen=True)
@@ -62,32 +57,12 @@ class Summary:
     steps: Sequence[str] = ()
     then: str = ''
 
-    def text(self) -> str:
-        """Return at most ten lines of 80 columns, followed by the next steps."""
-        title = textwrap.wrap(self._headline, WIDTH, max_lines=3)
-        below = [piece for line in self.lines for piece in textwrap.wrap(line, WIDTH)]
-        if len(below) > 2:
-            below = [below[0], textwrap.shorten(below[1], WIDTH - 4, placeholder='') + ' ...']
-        room = LINES - len(title) - len(below) - (1 if self.heads else 0)
-        rows = list(self.rows)
-        if len(rows) > room:
-            hidden = len(rows) - room + 1
-            rows = [*rows[: room - 1], (f'... and {hidden} more',)]
-        steps = [piece for line in self._next for piece in textwrap.wrap(line, WIDTH)]
-        return '\n'.join([*title, *aligned(self.heads, rows, WIDTH), *below, *steps])
-
-    def full_text(self, *below: str) -> list[str]:
-        """Return the whole text, as the commands print it; `below` comes before the next steps."""
+    def text(self, *below: str) -> list[str]:
+        """Return the lines of the text; `below` comes before the next steps."""
+        headline = f'{self.badge.upper()}: {self.title}' if self.badge else self.title
+        steps = [f'next: {step}' for step in self.steps]
         table = aligned(self.heads, self.rows)
-        return [self._headline, *table, *filter(None, self.lines), *below, *self._next]
-
-    @property
-    def _next(self) -> list[str]:
-        return [f'next: {step}' for step in self.steps]
-
-    @property
-    def _headline(self) -> str:
-        return f'{self.badge.upper()}: {self.title}' if self.badge else self.title
+        return [headline, *table, *filter(None, self.lines), *below, *steps]
 
 
 #: Source of a recording, times [s] and residual torques [N m or N], shapes (M,) and (M, n).
@@ -164,8 +139,8 @@ class Shown(ABC):
         return result.out
 
     def __repr__(self) -> str:
-        """Return at most ten lines."""
-        return self.summary().text()
+        """Return the summary as text."""
+        return '\n'.join(self.summary().text())
 
     def _repr_html_(self) -> str:
         """Show the report in a notebook, in a frame of its own; without a report, the text."""
@@ -213,22 +188,15 @@ class ShownModel(Shown):
         return text
 
 
-def aligned(
-    heads: Sequence[str], rows: Sequence[Sequence[str]], width: int | None = None
-) -> list[str]:
-    """Align columns: names left, all others right."""
+def aligned(heads: Sequence[str], rows: Sequence[Sequence[str]]) -> list[str]:
+    """Align columns: names left, all others right; a row of one cell has no columns."""
     if not heads:
         return []
     table = [tuple(heads), *(tuple(row) for row in rows)]
     full = [row for row in table if len(row) == len(heads)]
-    widths = [max(len(row[k]) for row in full) for k in range(len(heads))]
-    spare = 0 if width is None else width - sum(widths) - 2 * len(widths)
-    widths[0] = max(8, widths[0] + min(0, spare))
+    first, *widths = (max(len(row[k]) for row in full) for k in range(len(heads)))
     lines = []
-    for row in table:
-        name, own = row[0], widths[0]
-        fitted = name.ljust(own) if len(name) <= own else name[: own - 1] + '…'
-        first = name if len(row) == 1 else fitted
-        rest = (cell.rjust(one) for cell, one in zip(row[1:], widths[1:], strict=False))
-        lines.append('  '.join(['', first, *rest]).rstrip()[:width])
+    for name, *cells in table:
+        rest = (cell.rjust(width) for cell, width in zip(cells, widths, strict=False))
+        lines.append('  '.join(['', name.ljust(first) if cells else name, *rest]).rstrip())
     return lines

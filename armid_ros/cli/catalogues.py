@@ -20,19 +20,14 @@ def robots(as_json: bool) -> None:
     """List the robots that are shipped."""
     from armid_ros.files import json_text
     from armid_ros.robots import shipped_robots
-    from rich.console import Console
-    from rich.table import Table
 
     rows = [{'name': name, 'what it is': text} for name, text in shipped_robots().items()]
     if as_json:
         click.echo(json_text(rows, indent=1))
         return
-    table = Table(box=None, header_style='bold')
-    table.add_column('name', no_wrap=True)
-    table.add_column('what it is', overflow='fold')
     for row in rows:
-        table.add_row(*row.values())
-    Console().print(table)
+        text = f'{row["name"]}: {row["what it is"]}'
+        say(textwrap.fill(text, 80, subsequent_indent='    ', break_on_hyphens=False))
 
 
 @click.command(epilog='Example: armid effects --json')

@@ -37,6 +37,3 @@ TARGETS = {
     'gravity': 'masses and first moments as an arm moving slowly shows them, and the effects',
     'effects': 'those of the effects alone, the rigid body being known',
 }
-#: The kind of trajectory that is designed, and those for elastic joints.
-FOURIER = 'fourier'
-COURSES = ('multisine', 'steps')

@@ -119,10 +119,10 @@ class Commands(click.Group):
             click.echo(f'armid: {" ".join(str(error).split())}', err=True)
             sys.exit(2)
         except ModuleNotFoundError as error:
-            said = lacking(error)
-            if said is None:
+            remedy = lacking(error)
+            if remedy is None:
                 raise
-            click.echo(f'armid: {said}', err=True)
+            click.echo(f'armid: {remedy}', err=True)
             sys.exit(2)
         except OSError as error:  # a disk that is full, a folder that went away
             if error.errno == errno.EPIPE:  # the reader has closed the pipe

@@ -26,11 +26,10 @@ def compare(before: Path, after: Path, out: Path, strict: bool, as_json: bool) -
     from armid_ros.api.comparison import compare as run
     from armid_ros.api.comparison import ComparisonResult
     from armid_ros.cli import options
-    from armid_ros.report.provenance import ResultOrigin
 
     staged = options.stage(out, ComparisonResult.schema)
     result = run(before, after)
     sources = [Path(one.source) for one in (result.core.before, result.core.after)]
-    options.deliver(result, staged, ResultOrigin(provenance=options.provenance(sources)), as_json)
+    options.deliver(result, staged, options.origin('', sources), as_json)
     if strict and result.core.unusable:
         click.get_current_context().exit(3)

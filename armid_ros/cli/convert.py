@@ -100,16 +100,16 @@ def _bag(path: Path, out: Path | None) -> None:
     from armid_ros.recording.columns import refuse_columns
     from armid_ros.recording.copying import copy_bag
 
-    said = columns.settings()
-    refuse_columns(path, said, copied=True)
+    settings = columns.settings()
+    refuse_columns(path, settings, copied=True)
     if out is None:
         raise RecordingError(f'{path}: --dry-run is for tables; armid inspect shows a bag')
-    if not is_ros1(path) and not said.rename:
+    if not is_ros1(path) and not settings.rename:
         topics(path)  # refuses what is no bag
         raise RecordingError(
             f'{path}: nothing to do: a bag of ROS 2 stays as it is without --rename'
         )
-    copied = copy_bag(path, out, said.rename, options.read_settings())
+    copied = copy_bag(path, out, settings.rename, options.read_settings())
     for topic in copied.topics:
         say(f'  {topic.name} ({topic.type_name}): {topic.count} messages')
     for text in copied.left_out:

@@ -37,25 +37,6 @@ def share_of_percent(
     return share
 
 
-_partner_options = parameters.together(
-    click.option(
-        '--partner',
-        metavar='R',
-        help='Shipped name, URDF or xacro of a machine or person in the same bags that the arm '
-        'may be tied to.',
-    ),
-    click.option('--partner-topic', help='JointState topic of the partner, if not unique.'),
-    click.option(
-        '--tie',
-        'ties',
-        multiple=True,
-        metavar='JOINT=JOINT',
-        help='Possible tie: a joint of the arm and a joint of the partner. JOINT@X,Y,Z sets '
-        'a point of the link [m]; the centroid by default. By default links of equal number.',
-    ),
-)
-
-
 @click.command(epilog='Example: armid diagnose slow.mcap fast.mcap --robot ur10.urdf --out found')
 @parameters.bags
 @parameters.robot
@@ -129,7 +110,21 @@ _partner_options = parameters.together(
 @parameters.decimation
 @columns.options
 @parameters.topic
-@_partner_options
+@click.option(
+    '--partner',
+    metavar='R',
+    help='Shipped name, URDF or xacro of a machine or person in the same bags that the arm '
+    'may be tied to.',
+)
+@click.option('--partner-topic', help='JointState topic of the partner, if not unique.')
+@click.option(
+    '--tie',
+    'ties',
+    multiple=True,
+    metavar='JOINT=JOINT',
+    help='Possible tie: a joint of the arm and a joint of the partner. JOINT@X,Y,Z sets '
+    'a point of the link [m]; the centroid by default. By default links of equal number.',
+)
 @parameters.setting
 @parameters.every
 @parameters.as_json
@@ -155,7 +150,7 @@ def diagnose(
     every: bool,
     as_json: bool,
     priors: tuple[str, ...],
-    **asked: Any,
+    **settings: Any,
 ) -> None:
     """Find which effect a model lacks, and add it."""
     if baseline and no_baseline:
@@ -167,7 +162,6 @@ def diagnose(
     from armid_ros.arm import ArmModel
     from armid_ros.cli import options
     from armid_ros.identification.parameters_file import read_misfit
-    from armid_ros.report.provenance import ResultOrigin
 
     if residual is not None:
         require_residual()
@@ -175,18 +169,18 @@ def diagnose(
     robot = options.open_robot(robot_source, gravity, joints, bags)
     arm = ArmModel(robot) if model is None else _model_of(model, robot)
     arm = options.with_effects(arm, effects)
-    beside = open_partner(partner, ties, robot, gravity)
+    other = open_partner(partner, ties, robot, gravity)
     misfit = None if model is None else read_misfit(model, arm)
-    if model is not None and beside is None and not (baseline or no_baseline):
+    if model is not None and other is None and not (baseline or no_baseline):
         baseline = _identified_from(model, [*bags, *validate])
     with progress('reading') as tick:
         recordings, held_out, before, simulated = (
             options.read(paths, robot, topic) for paths in (bags, validate, baseline, against)
         )
         options.tell_damage(*recordings, *held_out, *before, *simulated)
-        if beside is not None:
+        if other is not None:
             recordings, held_out = (
-                read_together(named, some, beside, partner_topic)
+                read_together(named, some, other, partner_topic)
                 for named, some in ((bags, recordings), (validate, held_out))
             )
         result = run(
@@ -197,18 +191,15 @@ def diagnose(
             against=simulated,
             effects=effects,
             misfit=misfit,
-            partner=beside,
+            partner=other,
             prior=dict(one.partition('=')[::2] for one in priors),
             rng=seed,
             progress=tick,
-            **asked,
+            **settings,
         )
         source = options.kept_source(robot_source, robot, staged.folder)
-        origin = ResultOrigin(
-            robot_source,
-            source,
-            options.provenance([*bags, *validate, *baseline, *against], seed=seed),
-        )
+        files = [*bags, *validate, *baseline, *against]
+        origin = options.origin(robot_source, files, seed, source=source)
         result.fill(staged.folder, origin)
         staged.keep()
         result = result.with_extras(residual is not None, seed, tick)
@@ -219,12 +210,12 @@ def diagnose(
     click.get_current_context().exit(stopped.get(result.verdict, 0))
 
 
-def _identified_from(model: Path, asked: list[Path]) -> tuple[Path, ...]:
+def _identified_from(model: Path, diagnosed: list[Path]) -> tuple[Path, ...]:
     """Return the recordings of the identification as baseline; none if one is diagnosed."""
     from armid_ros.identification.output import identified_from, require_as_identified
 
     found = identified_from(model)
-    if not found or {path.resolve() for path in found} & {path.resolve() for path in asked}:
+    if not found or {path.resolve() for path in found} & {path.resolve() for path in diagnosed}:
         return ()
     require_as_identified(model)
     origin = 'which the model was identified from'

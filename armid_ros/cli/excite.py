@@ -10,14 +10,7 @@ from pathlib import Path
 from typing import Any, TYPE_CHECKING
 
 from armid_ros.cli import parameters
-from armid_ros.cli.choices import (
-    COURSES,
-    CRITERIA,
-    FOURIER,
-    MAX_DURATION,
-    SPEED_CLASSES,
-    TARGETS,
-)
+from armid_ros.cli.choices import CRITERIA, MAX_DURATION, SPEED_CLASSES, TARGETS
 from armid_ros.cli.terminal import progress, say
 from armid_ros.errors import RecordingError, TrajectoryError
 import click
@@ -28,6 +21,8 @@ if TYPE_CHECKING:
     from armid_ros.robots import Robot
 
 
+#: Kinds of trajectories for elastic joints.
+COURSES = ('multisine', 'steps')
 #: Options that both a course, for elastic joints, and a design take; a course takes --share too.
 _SHARED = {
     'robot_source', 'out', 'kind', 'duration', 'clearance', 'environment', 'floor', 'gravity',
@@ -55,8 +50,8 @@ class Speed(click.ParamType[str | float]):
 @parameters.folder
 @click.option(
     '--kind',
-    type=click.Choice([FOURIER, *COURSES]),
-    default=FOURIER,
+    type=click.Choice(['fourier', *COURSES]),
+    default='fourier',
     show_default=True,
     help='Kind of trajectory; multisine (of torque) and steps are for elastic joints.',
 )
@@ -237,7 +232,6 @@ def excite(
     from armid_ros.excitation import CollisionScene, with_joint_limits
     from armid_ros.excitation.search.local import INTERRUPTED
     from armid_ros.files.cells import parted
-    from armid_ros.report.provenance import ResultOrigin
 
     _refuse_other_options(click.get_current_context(), kind)
     robot = _driven(robot_source, gravity, joints, after)
@@ -255,8 +249,8 @@ def excite(
         arm = arm.with_effect(*parse_effect(text, robot))
     require_free(out)
     staged = options.stage(out, ExcitationResult.schema, robot_source)
-    beside = [path for path in (model, environment, joint_limits) if path is not None]
-    read = [Path(robot_source.split(' ')[0]), *after, *beside]
+    files = [path for path in (model, environment, joint_limits) if path is not None]
+    read = [Path(robot_source.split(' ')[0]), *after, *files]
     with progress('designing') as tick:
         result = design_excitation(
             arm,
@@ -275,7 +269,7 @@ def excite(
         )
         result = replace(result, with_isolability=show_isolability)
         tick(1.0, 'writing')
-        origin = ResultOrigin(robot_source, provenance=options.provenance(read, seed=seed))
+        origin = options.origin(robot_source, read, seed)
         try:
             options.deliver(result, staged, origin, as_json)
         except TrajectoryError as error:  # a design without a way to it is kept, in a new folder

@@ -18,7 +18,6 @@ from armid_ros.api.inspection import InspectionResult
 from armid_ros.api.table import Shown
 from armid_ros.cli import columns
 from armid_ros.cli.commands import TYPED
-from armid_ros.diagnosis import EXPERIMENT_FILE
 from armid_ros.errors import ModelError
 from armid_ros.identification.output import identified_from
 import click
@@ -53,8 +52,6 @@ def following(then: str, result: Shown) -> str:
     given, own = context.params, str(context.command.name)
     if then == 'diagnose' == own and given['residual']:
         then = 'excite'
-    if then == 'inspect' == own and given['robot_source'] and given['out']:
-        then = 'check'
     robot, bags, more = _subject(then, result, given)
     if isinstance(result, DiagnosisResult) and then == 'diagnose':
         more = ['--residual', 'gp'] if result.baseline else ['--baseline', 'BAG']
@@ -92,8 +89,9 @@ def _subject(
     if isinstance(result, ExcitationResult):
         more = ['--trajectory', out / 'excitation.yaml']
     elif isinstance(result, DiagnosisResult) and then == 'simulate':
-        plans = [out / name for name in result.files if name == EXPERIMENT_FILE]
-        more = [*chain(*(('--trajectory', plan) for plan in plans)), '--model', out / 'model.yaml']
+        more = ['--model', out / 'model.yaml']
+        if result.next_run is not None:
+            more += ['--trajectory', out / result.plan_file]
     elif then == 'diagnose':
         held_out = chain(*(('--validate', bag) for bag in given['validate']))
         more = [*held_out, '--effects', given['effects']]

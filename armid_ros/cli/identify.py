@@ -86,7 +86,7 @@ def identify(
     strict: bool,
     seed: int,
     as_json: bool,
-    **asked: Any,
+    **settings: Any,
 ) -> None:
     """Fit a model with uncertainties to recordings."""
     from armid_ros.api.identification import IdentificationResult
@@ -95,7 +95,6 @@ def identify(
     from armid_ros.cli import options
     from armid_ros.errors import IdentificationError
     from armid_ros.identification import PhysicalSettings
-    from armid_ros.report.provenance import ResultOrigin
 
     staged = options.stage(out, IdentificationResult.schema, robot_source)
     robot = options.open_robot(robot_source, gravity, joints, bags, tell=False)
@@ -112,15 +111,16 @@ def identify(
             physical=known if physical else physical,
             rng=seed,
             progress=tick,
-            **asked,
+            **settings,
         )
         tick(1.0, 'writing')
-        origin = ResultOrigin(
+        origin = options.origin(
             robot_source,
-            options.kept_source(robot_source, robot, staged.folder),
-            options.provenance([*bags, *validate], result.document()['settings'], seed),
+            [*bags, *validate],
+            seed,
+            source=options.kept_source(robot_source, robot, staged.folder),
+            settings=result.document()['settings'],
         )
-        told = None if as_json else result.summary(every)
-        options.deliver(result, staged, origin, as_json, told)
+        options.deliver(result, staged, origin, as_json, result.summary(every))
     if strict and result.grade == 'unusable':
         click.get_current_context().exit(3)

@@ -47,7 +47,6 @@ def inspect(
     from armid_ros.cli import options
     from armid_ros.files.cells import listed
     from armid_ros.recording.anything import read_anything
-    from armid_ros.report.provenance import ResultOrigin
 
     staged = (
         None if out is None else options.stage(out, InspectionResult.schema, robot_source or '')
@@ -71,7 +70,7 @@ def inspect(
             (recording,) = options.read([bag], robot, topic)
         tick(0.5, 'trying to identify' if robot else 'looking')
         found = run(robot, recording, topics=topics, rng=seed)
-    origin = ResultOrigin(robot_source or '', provenance=options.provenance([bag], seed=seed))
+    origin = options.origin(robot_source or '', [bag], seed)
     options.deliver(found, staged, origin, as_json)
 
 
@@ -120,7 +119,6 @@ def check(
     from armid_ros.api.inspection import check as run
     from armid_ros.api.inspection import CheckResult
     from armid_ros.cli import options
-    from armid_ros.report.provenance import ResultOrigin
 
     context = click.get_current_context()
     given = context.get_parameter_source('robot_source')
@@ -142,7 +140,7 @@ def check(
     with progress('checking'):
         found = run(robot, options.read(bags, robot, topic), effects=effects, rng=seed)
     source = [path for path in (Path(robot_source), *bags) if path.exists()]
-    origin = ResultOrigin(robot_source, '', options.provenance(source, seed=seed))
+    origin = options.origin(robot_source, source, seed)
     options.deliver(found, staged, origin, as_json)
     if strict and found.wrong:
         context.exit(3)

@@ -25,10 +25,10 @@ def main(name: str | None = None) -> int | None:
         else:
             node = import_module(f'armid_ros.nodes.{name}')
     except ModuleNotFoundError as error:
-        said = lacking(error)
-        if said is None:
+        remedy = lacking(error)
+        if remedy is None:
             raise
-        print(f'{name}: {said}', file=sys.stderr)
+        print(f'{name}: {remedy}', file=sys.stderr)
         raise SystemExit(2) from None
     code: int | None = node.main()
     return code

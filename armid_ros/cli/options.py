@@ -40,13 +40,7 @@ from armid_ros.recording.columns import numbers
 from armid_ros.recording.columns import per_joint as values_per_joint
 from armid_ros.report.blocks import VerdictSection
 from armid_ros.report.provenance import hash_files, Provenance, ResultOrigin, versions
-from armid_ros.robots import (
-    driven_in_words,
-    load_robot,
-    parse_gravity,
-    Robot,
-    robot_from_urdf,
-)
+from armid_ros.robots import driven_in_words, load_robot, parse_gravity, Robot, robot_from_urdf
 import click
 from click.core import ParameterSource
 import numpy as np
@@ -121,15 +115,10 @@ def deliver(
         click.echo(json_text(document or result.document(origin)))
         return
     files = [] if staged is None else [f'{staged.out}: {", ".join(result.files)}']
-    show(shown, *files)
+    for line in shown.text(*files):
+        say(line)
     if step:
         say(f'next: {step}')
-
-
-def show(summary: Summary, *below: str) -> None:
-    """Print a summary, the verdict first, with lines above the next steps."""
-    for line in summary.full_text(*below):
-        say(line)
 
 
 def deliver_page(
@@ -142,17 +131,25 @@ def deliver_page(
 ) -> None:
     """Write report.html and NAME.json; print verdict and table, or JSON without a table."""
     write_file(staged.folder / 'report.html', page)
+    summary = None
+    if table is not None:
+        first, *others = verdict.sentences
+        lines, steps = [*others, *verdict.beware], [verdict.step] if verdict.step else []
+        summary = Summary(first, verdict.grade, *table, lines, steps)
+    deliver_document(staged, name, document, summary, 'report.html')
+
+
+def deliver_document(
+    staged: Staged, name: str, document: Mapping[str, Any], summary: Summary | None, *files: str
+) -> None:
+    """Write NAME.json, and keep the folder; print a summary with all files, or the document."""
     write_document(staged.folder / f'{name}.json', document)
     staged.keep()
-    if table is None:
+    if summary is None:
         click.echo(json_text(document))
         return
-    first, *others = verdict.sentences
-    lines, steps = [*others, *verdict.beware], [verdict.step] if verdict.step else []
-    show(
-        Summary(first, verdict.grade, *table, lines, steps),
-        f'{staged.out}: {name}.json, report.html',
-    )
+    for line in summary.text(f'{staged.out}: {", ".join([f"{name}.json", *files])}'):
+        say(line)
 
 
 def provenance(
@@ -185,6 +182,18 @@ def provenance(
         command=shlex.join(['armid', *sys.argv[1:]]),
         created=datetime.now().astimezone().isoformat(' ', 'seconds'),
     )
+
+
+def origin(
+    robot: str,
+    paths: Iterable[Path],
+    seed: int | None = None,
+    *,
+    source: str = '',
+    settings: Mapping[str, Any] | None = None,
+) -> ResultOrigin:
+    """Return the origin of a result: --robot, how model.yaml names it, and the `provenance`."""
+    return ResultOrigin(robot, source, provenance(paths, settings, seed))
 
 
 def read_settings() -> ReadSettings:
@@ -250,11 +259,11 @@ def model_of(path: Path, robot: Robot | None) -> ArmModel:
     context = click.get_current_context()
     if context.get_parameter_source('gravity') is not ParameterSource.COMMANDLINE:
         return arm
-    asked, own = parse_gravity(context.params['gravity']), arm.robot.gravity
-    if not np.allclose(asked, own):
-        told, known = (','.join(f'{part:g}' for part in vector) for vector in (asked, own))
+    given, own = parse_gravity(context.params['gravity']), arm.robot.gravity
+    if not np.allclose(given, own):
+        typed, known = (','.join(f'{part:g}' for part in vector) for vector in (given, own))
         raise ModelError(
-            f'{path}: its gravity is {known}, and --gravity is {told}: leave --gravity out, or '
+            f'{path}: its gravity is {known}, and --gravity is {typed}: leave --gravity out, or '
             'write that gravity into the file if the arm stands there now'
         )
     return arm
@@ -291,7 +300,7 @@ def per_joint(text: str | None, robot: Robot, option: str) -> FloatArray | None:
 
 def read(paths: Sequence[Path], robot: Robot, topic: str | None) -> list[Recording]:
     """Read the joints of bags and tables; print guesses on stderr, equal ones once."""
-    said, reading = columns.settings(), read_settings()
+    settings, reading = columns.settings(), read_settings()
     shown: set[str] = click.get_current_context().meta.setdefault(_SHOWN, set())
 
     def show(plan: TablePlan) -> None:
@@ -301,11 +310,11 @@ def read(paths: Sequence[Path], robot: Robot, topic: str | None) -> list[Recordi
             click.echo('\n'.join(lines) if body not in shown else f'{lines[0]}, alike', err=True)
         shown.add(body)
 
-    for path in paths if said.rename else ():
+    for path in paths if settings.rename else ():
         if ':' in path.name and not path.exists():  # a second pair without an option of its own
             raise RecordingError(
                 f"there is no recording '{path}'; to rename several names, repeat the option: "
-                f"--rename '{said.rename[-1][0]}:{said.rename[-1][1]}' --rename '{path}'"
+                f"--rename '{settings.rename[-1][0]}:{settings.rename[-1][1]}' --rename '{path}'"
             )
     return [
         read_anything(
@@ -313,7 +322,7 @@ def read(paths: Sequence[Path], robot: Robot, topic: str | None) -> list[Recordi
             joints=robot.joints,
             slides=list(robot.prismatic),
             topic=topic,
-            columns=said,
+            columns=settings,
             show=show,
             settings=reading,
         )

@@ -10,6 +10,7 @@ import shlex
 from typing import Any, TypeVar
 
 from armid_ros.cli.choices import HOW_OFTEN, SPEED_CLASSES, USUAL_EFFECTS
+from armid_ros.files.cells import listed
 import click
 
 _Command = TypeVar('_Command', bound=Callable[..., Any])
@@ -56,6 +57,11 @@ def completed(_: click.Context, parameter: click.Parameter, incomplete: str) -> 
     return [f'{before}{sign}{name}' for name in names if name.startswith(last)]
 
 
+def names(_: click.Context, parameter: click.Parameter, value: str | None) -> tuple[str, ...]:
+    """Split a list of names at commas, except within double quotes."""
+    return listed(value) if value else ()
+
+
 gravity = click.option(
     '--gravity',
     shell_complete=completed,
@@ -94,24 +100,25 @@ folder = together(
     ),
     force,
 )
-_crc = click.option(
-    '--crc/--no-crc',
-    default=True,
-    show_default=True,
-    expose_value=False,
-    callback=lambda context, _, value: context.meta.update({CRC: value}),
-    help='Compare the checksums of bags, and skip damaged parts.',
-)
-_memory = click.option(
-    '--memory-limit',
-    type=click.FloatRange(0.0, min_open=True),
-    metavar='MB',
-    expose_value=False,
-    callback=lambda context, _, value: context.meta.update({MEMORY: value}),
-    help='Memory limit for reading bags [MB]; a quarter of the memory by default.',
-)
 #: How bags are read.
-reading = together(_crc, _memory)
+reading = together(
+    click.option(
+        '--crc/--no-crc',
+        default=True,
+        show_default=True,
+        expose_value=False,
+        callback=lambda context, _, value: context.meta.update({CRC: value}),
+        help='Compare the checksums of bags, and skip damaged parts.',
+    ),
+    click.option(
+        '--memory-limit',
+        type=click.FloatRange(0.0, min_open=True),
+        metavar='MB',
+        expose_value=False,
+        callback=lambda context, _, value: context.meta.update({MEMORY: value}),
+        help='Memory limit for reading bags [MB]; a quarter of the memory by default.',
+    ),
+)
 bag = click.option(
     '--out', required=True, type=OutPath(path_type=Path), help='Bag to write; must not exist.'
 )

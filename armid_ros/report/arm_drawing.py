@@ -28,9 +28,9 @@ from scipy.spatial import ConvexHull
 _MARGIN = 0.03
 #: Corners of the outline of a ball.
 _ROUND = 16
-#: Colour of what stands around the arm.
+#: Colour of obstacles.
 OBSTACLE = 'var(--line)'
-#: What is smaller stands for a link without a body and cannot be seen [m].
+#: Smaller bodies stand for a link without a body, and are not drawn [m].
 _POINT = 1e-3
 #: Height of a line of text [px].
 _LINE = 16.0
@@ -60,17 +60,17 @@ class ArmDrawing(Templated):
     bodies : tuple of (str, str)
         Outline of each body as coordinates of SVG, far ones first, and its colour.
     paths : tuple of str
-        Way of the last body in each pose.
+        Path of the last body, for each pose.
     dots : tuple of (float, float, str, str)
-        Place, colour and name of joints, or of the last body in each pose [px].
+        Position [px], colour and name of joints, or of the last body in each pose.
     captions : tuple of (float, str)
-        Where each pose is, and when.
+        Position [px] and text of each caption.
     labels : tuple of (float, float, float, float, str)
-        A line from a joint to its name, and the name [px].
+        Ends of a line from a joint to its name [px], and the name.
     gravity : bool
-        Whether an arrow shows gravity, which points down.
+        Whether an arrow shows gravity.
     label : str
-        The drawing in words.
+        Description of the drawing, for screen readers.
 
     """
 
@@ -101,7 +101,7 @@ def draw_poses(
     poses : ndarray, shape (K, n)
         Poses to draw [rad or m].
     captions : sequence of str, length K
-        What is written below.
+        Text below each pose.
     way : ndarray, shape (N, n)
         Poses between which the last body moves.
 
@@ -121,7 +121,9 @@ def draw_poses(
     return ArmDrawing(
         *strip.size,
         tuple(bodies),
-        tuple((*_placed(strip, tip, k), 'var(--predicted)', '') for k, tip in enumerate(tips)),
+        tuple(
+            (*strip.place(tip, k).tolist(), 'var(--predicted)', '') for k, tip in enumerate(tips)
+        ),
         tuple(svg_points(strip.place(track, pose)) for pose in range(len(poses))),
         strip.captions(captions),
     )
@@ -138,22 +140,15 @@ def draw_arm(
     robot : Robot
         The arm.
     marked : sequence of str
-        Joints to be coloured, each with its body, and to be named.
+        Joints that are coloured, with their bodies, and named.
     q : ndarray, shape (N, n), optional
-        Poses that it was in; the middle of its range by default [rad or m].
+        Recorded poses [rad or m]; by default the middle of the range.
     label : str
-        The drawing in words.
+        Description of the drawing, for screen readers.
 
     """
     solids, model = _solids(collision_model(robot)), robot.model
-    lower, upper = model.lowerPositionLimit, model.upperPositionLimit
-    # joint range beyond which a joint counts as endless [rad or m]
-    ended = np.isfinite(lower) & np.isfinite(upper) & (upper - lower < 1e3)
-    poses = [
-        np.array(
-            [(a + b) / 2.0 if e else 0.0 for a, b, e in zip(lower, upper, ended, strict=True)]
-        )
-    ]
+    poses = [robot.middle_pose]
     if q is not None and len(q):
         # poses that a single drawing is tried in
         poses = list(q[np.linspace(0, len(q) - 1, min(12, len(q))).astype(np.intp)])
@@ -166,7 +161,7 @@ def draw_arm(
         chosen = solid.joint > 0 and robot.joints[solid.joint - 1] in marked
         bodies.append((points, 'var(--predicted)' if chosen else 'var(--faint)'))
     dots = [
-        (*_placed(strip, flat(CORNER, frames[0][k].translation), 0), name)
+        (*strip.place(flat(CORNER, frames[0][k].translation), 0).tolist(), name)
         for k, name in enumerate(robot.joints, start=1)
     ]
     labels, y = [], 0.0
@@ -230,11 +225,6 @@ def _outlines(
         seen = [(solid, *solid.seen(frame[solid.joint])) for solid in solids]
         for solid, hull, _ in sorted(seen, key=lambda one: one[2]):
             yield solid, svg_points(strip.place(hull, pose))
-
-
-def _placed(strip: Strip, point: FloatArray, pose: int) -> tuple[float, float]:
-    x, y = strip.place(point, pose)
-    return round(float(x), 1), round(float(y), 1)
 
 
 def _solids(collision: CollisionModel) -> list[_Solid]:
@@ -315,7 +305,8 @@ class Strip:
     def place(self, points: FloatArray, pose: int) -> FloatArray:
         """Return where flat points, shape (..., 2) [m], are in the frame of a pose [px]."""
         right = pose * self.pitch + self.scale * (points[..., 0] - self.left)
-        return np.stack([right, self.scale * (self.top - points[..., 1])], axis=-1)
+        down = self.scale * (self.top - points[..., 1])
+        return np.asarray(np.round(np.stack([right, down], axis=-1), 1))
 
     def captions(self, texts: Sequence[str]) -> tuple[tuple[float, str], ...]:
         """Return texts with the middle of their frames [px]."""

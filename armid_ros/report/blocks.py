@@ -24,7 +24,7 @@ class ContentSection(Section):
     title : str
         Heading; empty for none.
     blocks : sequence of Templated
-        Its content in order.
+        Content, in order.
 
     """
 
@@ -42,9 +42,9 @@ class Paragraph(Templated):
     Attributes
     ----------
     text : str
-        Its sentences.
+        Text.
     kind : str
-        'hint' for small print; 'code' for text as it is in a file.
+        'hint' for small print, 'code' for text of a file.
 
     """
 
@@ -64,7 +64,7 @@ class TableCell:
     text : str
         Content.
     kind : str
-        'telling', 'changed' or 'unknown'; what is not as expected.
+        Class of the style sheet, such as 'telling', 'changed' or 'unknown'.
     note : str
         Small print below it.
     shade : int
@@ -88,7 +88,7 @@ class IntervalTrack:
     value, reach : float
         Middle and half width of the interval.
     reference : float or None
-        What it is compared with; None where that has no value.
+        Reference; None if it has no value.
 
     """
 
@@ -112,7 +112,7 @@ class ShareBar:
     percent : float
         Length [%].
     role : str
-        What it is, which gives the colour.
+        Role of the series, which gives the colour.
 
     """
 
@@ -132,13 +132,13 @@ class DataTable(Templated):
     Attributes
     ----------
     heads : sequence of str
-        Of the columns; none for a table without.
+        Headings of the columns; may be empty.
     rows : sequence of sequence of (str, TableCell, IntervalTrack or ShareBar)
         Cells.
     words : collection of int
-        Columns of words; the others are numbers.
+        Columns with text; the others have numbers.
     kind : str
-        'tight', 'both' or 'parameters': how it is set on a small screen.
+        'tight', 'both' or 'parameters': layout on a small screen.
 
     """
 
@@ -178,7 +178,7 @@ class BulletList(Templated):
     items : sequence of (str, str)
         Text, and 'fine', 'warn', 'code' or ''.
     numbered : bool
-        Whether the order counts.
+        Whether the items are numbered.
 
     """
 
@@ -198,7 +198,7 @@ class Fold(Templated):
     summary : str
         The line.
     blocks : sequence of Templated
-        What is below it.
+        Content below the line.
     opened : bool
         Whether it is open at first.
 
@@ -219,9 +219,9 @@ class Panels(Templated):
     Attributes
     ----------
     panels : sequence of (str, str, sequence of Templated)
-        Heading, small print beside it, and content.
+        Heading, small print next to it, and content.
     three : bool
-        Whether there is room for three in a row, and not for two.
+        Whether three panels are in a row, and not two.
 
     """
 
@@ -240,7 +240,7 @@ class Legend(Templated):
     Attributes
     ----------
     roles : sequence of (str, str)
-        Role of a series, or 'tick' for the mark of a reference, and what it stands for.
+        Role of a series, or 'tick' for the mark of a reference, and its meaning.
 
     """
 
@@ -257,7 +257,7 @@ class SmallMultiples(Templated):
     Attributes
     ----------
     figures : sequence of (str, str, Markup, str)
-        Caption, small print beside it, picture, and 'heat', 'changed' or ''.
+        Caption, small print next to it, picture, and 'heat', 'changed' or ''.
 
     """
 
@@ -277,9 +277,9 @@ class Bar:
     value : float
         Length, in the unit of all bars; not negative.
     role : str
-        What it is, which gives the colour.
+        Role of the series, which gives the colour.
     text : str
-        What is written beside it.
+        Text next to the bar.
 
     """
 
@@ -298,12 +298,12 @@ class BarChart(Templated):
     rows : sequence of (str, sequence of Bar)
         Label of each row, and its bars one below the other.
     roles : sequence of (str, str)
-        Legend: role, and what it stands for.
+        Legend: role and meaning.
     scale_by_row : bool
         Whether each row fills the width with its own longest bar, as for joints of different
         strength.
     full : float
-        What fills the width; the longest bar if zero.
+        Value that fills the width; 0: that of the longest bar.
 
     """
 
@@ -339,13 +339,13 @@ class VerdictSection(Section):
     tone : {'good', 'fair', 'bad', ''}
         Colour of the badge.
     sentences : sequence of str
-        What was found; the first stands out.
+        Findings; the first one is emphasised.
     beware : sequence of str
-        What not to overlook.
+        Limitations.
     bars : BarChart or None
-        The number of the verdict for each joint.
+        Error or share of each joint or cause.
     step : str
-        What to do next; empty for nothing.
+        Next step; may be empty.
 
     """
 

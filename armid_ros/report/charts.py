@@ -39,9 +39,9 @@ class Series:
     y : ndarray, shape (N,)
         Values; NaN where there is none.
     role : str
-        What it is, which gives the colour.
+        Role of the series, which gives the colour.
     kind : str
-        How it is drawn: 'line', broken at NaN; 'trend', with dots and not broken; 'points';
+        Kind of drawing: 'line', broken at NaN; 'trend', with dots and not broken; 'points';
         'sticks' from zero; or a 'band' from y to ``upper``.
     upper : ndarray, shape (N,), or None
         Upper edge of a band.
@@ -65,7 +65,7 @@ class Chart(Templated):
     x : ndarray, shape (N,)
         Common abscissa, not decreasing.
     series : sequence of Series
-        What is drawn, the first at the bottom.
+        Curves, the first one at the bottom.
     xlabel, ylabel : str
         Axes with units; no xlabel where the chart below has it.
     height : int
@@ -73,9 +73,9 @@ class Chart(Templated):
     link : str
         Charts with the same name zoom together; empty for none.
     levels : sequence of (float, str)
-        Horizontal lines: ordinate, and what is written at the right end.
+        Horizontal lines: ordinate, and text at the right end.
     marks : sequence of (float, str, bool)
-        Vertical lines: abscissa, what is written beside the foot, and whether to the left of it.
+        Vertical lines: abscissa, text at the foot, and whether it is on the left.
     logarithmic : bool
         Whether the abscissa is; it has to be positive.
     symmetric : bool
@@ -102,7 +102,7 @@ class Chart(Templated):
 
     @property
     def label(self) -> str:
-        """Return the chart in words."""
+        """Return the description of the chart, for screen readers."""
         return f'{self.ylabel} over {self.xlabel}' if self.xlabel else self.ylabel
 
     @property

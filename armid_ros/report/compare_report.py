@@ -4,15 +4,11 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterator, Sequence
 from math import inf
 
-from armid_ros.identification.assess.comparison import (
-    Comparison,
-    ParameterChange,
-)
+from armid_ros.identification.assess.comparison import Comparison, LoadChange, ParameterChange
 from armid_ros.identification.fitting.identifiability import excludes_zero, HALF_WIDTH
-from armid_ros.identification.parameters_file import ParameterFile
 from armid_ros.report.blocks import (
     Cells,
     ContentSection,
@@ -30,10 +26,8 @@ from armid_ros.report.notation import counted, digits, measured, pretty, robot_l
 from armid_ros.report.page import Page, Section
 from armid_ros.report.provenance import ResultOrigin
 
-#: Columns of what changed.
+#: Columns of the table of changes.
 HEADS = ('parameter', 'before', 'after', 'difference, 95 %')
-#: Parameters that a line names.
-_NAMED = 6
 _WHY = {
     'motion': 'the motion of the {other} does not show {them}',
     'effect': 'the model of the {other} does not have {them}',
@@ -51,7 +45,7 @@ def compare_report(comparison: Comparison, origin: ResultOrigin) -> str:
     comparison : Comparison
         Two identifications.
     origin : ResultOrigin
-        Files, versions, and what to do next.
+        Files, versions, and the next step.
 
     Returns
     -------
@@ -62,8 +56,8 @@ def compare_report(comparison: Comparison, origin: ResultOrigin) -> str:
     facts = []
     for heading, side in (('First', comparison.before), ('Second', comparison.after)):
         error = side.error_percent
-        said = '' if error is None else f'; relative torque error {error:.2f} %'
-        facts.append((heading, f'{side.source}: {robot_label(side.robot)}{said}'))
+        error_text = '' if error is None else f'; relative torque error {error:.2f} %'
+        facts.append((heading, f'{side.source}: {robot_label(side.robot)}{error_text}'))
     rows = change_rows(comparison)
     sections: list[Section] = [
         VerdictSection(
@@ -113,79 +107,58 @@ def change_rows(comparison: Comparison) -> list[tuple[str, ...]]:
 
 def tell(comparison: Comparison) -> tuple[str, ...]:
     """Return sentences on the changes, the headline first, the details last."""
+    lines = []
+    for one in comparison.unusable:
+        assert one.fit is not None
+        reason = one.fit.reason[:1].lower() + one.fit.reason[1:].rstrip('.')
+        remedy = 'Run armid diagnose to find what the model lacks.'
+        lines.append(f'{one.source} is unusable: {reason}. {remedy}')
     if comparison.factors:
-        units = tell_units(comparison.before.source, comparison.after.source, comparison.factors)
-        return (*(_unusable(one) for one in comparison.unusable), units)
-    return (
-        *(_unusable(one) for one in comparison.unusable),
-        *([] if comparison.load is None else _load(comparison)),
-        _sum(comparison),
-        *_residuals(comparison),
-        *_tell_not_compared(comparison),
-        *_details(comparison),
-    )
-
-
-def tell_units(before: str, after: str, factors: Mapping[str, float]) -> str:
-    """Return the sentences for identifications whose torques differ in unit."""
-    named = ', '.join(f'{joint} {factor:.3g}' for joint, factor in factors.items())
-    return (
-        f'Inertia and friction of {after} are those of {before} times one factor a joint '
-        f'({named}). Torques of one of the two are in another unit, or are currents, as drivers '
-        'change with their version. Convert them with --current-gain, and identify again.'
-    )
-
-
-def _sum(comparison: Comparison) -> str:
-    changed, count = comparison.changed, len(comparison.changes)
-    left = len(comparison.not_compared)
-    both = ' that both have' if left else ''
-    also = f'; {left} more {"was" if left == 1 else "were"} not compared' if left else ''
-    if not changed and not comparison.changed_together:
-        but = ''
-        if comparison.unusable:
-            but = ', but an unusable model is no evidence'
-        elif comparison.changed_residuals:
-            but = ', but the residuals did'
-        return (
-            f'None of {counted(count, "parameter")}{both} changed beyond its uncertainty'
-            f'{but}{also}.'
+        before, after = comparison.before.source, comparison.after.source
+        named = ', '.join(f'{joint} {factor:.3g}' for joint, factor in comparison.factors.items())
+        lines.append(
+            f'Inertia and friction of {after} are those of {before} times one factor a joint '
+            f'({named}). Torques of one of the two are in another unit, or are currents, as '
+            'drivers change with their version. Convert them with --current-gain, and identify '
+            'again.'
         )
-    joints = list(dict.fromkeys(c.parameter.joint for c in changed if c.parameter.joint))
-    where = f', at {", ".join(joints)}' if joints else ''
-    return (
-        f'{len(changed)} of {counted(count, "parameter")}{both} changed beyond uncertainty'
-        f'{where}{also}.'
-    )
-
-
-def _details(comparison: Comparison) -> Sequence[str]:
-    """Return sentences on changed groups, or one on the smallest detectable change."""
-    if not comparison.anything:
-        return [_least_visible(comparison.changes)]
+        return tuple(lines)
+    if comparison.load is not None:
+        lines += _load(comparison, comparison.load)
+    lines += [_sum(comparison), *_residuals(comparison), *_tell_not_compared(comparison)]
     changed = comparison.changed
-    told = []
     for group in comparison.changed_together:
         what = f'Effects at {group.joint}' if group.joint else 'The rigid body'
-        told.append(
+        lines.append(
             f'{what} changed as a group (p = {group.p_value:.1g}), though none of its '
             f'{len(group.parameters)} parameters alone is significant.'
         )
     rigid = [c for c in changed if c.parameter.rigid]
     if comparison.load is None and len(rigid) >= 3 and len(rigid) > len(changed) - len(rigid):
-        last = rigid[0].parameter.joint
-        told.append(
-            f'Mostly inertial parameters changed, most clearly at {last}: a tool or load was '
-            'added or removed, or gravity or mounting differ.'
+        lines.append(
+            f'Mostly inertial parameters changed, most clearly at {rigid[0].parameter.joint}: a '
+            'tool or load was added or removed, or gravity or mounting differ.'
         )
-    return told
+    if not comparison.anything:
+        lines.append(_least_visible(comparison.changes))
+    return tuple(lines)
 
 
-def _unusable(one: ParameterFile) -> str:
-    assert one.fit is not None
-    reason = one.fit.reason.rstrip('.')
-    reason = reason[:1].lower() + reason[1:]
-    return f'{one.source} is unusable: {reason}. Run armid diagnose to find what the model lacks.'
+def _sum(comparison: Comparison) -> str:
+    """Return a sentence on the number of changed parameters."""
+    changed, others = comparison.changed, len(comparison.not_compared)
+    count = counted(len(comparison.changes), 'parameter') + ' that both have' * bool(others)
+    also = f'; {others} more {"was" if others == 1 else "were"} not compared' if others else ''
+    if changed or comparison.changed_together:
+        joints = ', '.join(dict.fromkeys(c.parameter.joint for c in changed if c.parameter.joint))
+        where = f', at {joints}' if joints else ''
+        return f'{len(changed)} of {count} changed beyond uncertainty{where}{also}.'
+    but = ''
+    if comparison.unusable:
+        but = ', but an unusable model is no evidence'
+    elif comparison.changed_residuals:
+        but = ', but the residuals did'
+    return f'None of {count} changed beyond its uncertainty{but}{also}.'
 
 
 def _residuals(comparison: Comparison) -> Iterator[str]:
@@ -194,12 +167,12 @@ def _residuals(comparison: Comparison) -> Iterator[str]:
         errors = change.before_error, change.after_error
         ranks = ('second', 'first') if change.ratio > 1.0 else ('first', 'second')
         times = change.ratio if change.ratio > 1.0 else 1.0 / change.ratio if change.ratio else inf
-        said = ''
+        shares = ''
         if errors[0] is not None and errors[1] is not None:
-            said = f' ({digits(errors[0])} and {digits(errors[1])} % of the torque)'
+            shares = f' ({digits(errors[0])} and {digits(errors[1])} % of the torque)'
         yield (
             f'{change.joint}: the residual of the {ranks[0]} model is {digits(times)} times that '
-            f'of the {ranks[1]}{said}.'
+            f'of the {ranks[1]}{shares}.'
         )
     if comparison.changed_residuals:
         if any(one.why == 'effect' for one in comparison.not_compared):
@@ -208,9 +181,8 @@ def _residuals(comparison: Comparison) -> Iterator[str]:
             yield 'No parameter of either model explains that.'
 
 
-def _load(comparison: Comparison) -> tuple[str, str]:
-    load = comparison.load
-    assert load is not None
+def _load(comparison: Comparison, load: LoadChange) -> tuple[str, str]:
+    """Return sentences on a load that explains the changes of the inertial parameters."""
     joints = {
         (
             int(c.parameter.name.split(' ')[0].lstrip('Imxyz')) if c.parameter.rigid else 0
@@ -264,12 +236,13 @@ def _tell_not_compared(comparison: Comparison) -> tuple[str, ...]:
         )
     sides = ('first', 'second', comparison.only_before), ('second', 'first', comparison.only_after)
     for side, other, found in sides:
-        for why, said in _WHY.items():
+        for why, template in _WHY.items():
             some = [one for one in found if one.why == why]
             if some:
-                reason = said.format(other=other, them='it' if len(some) == 1 else 'them')
-                shown = ', '.join(full_label(one.parameter) for one in some[:_NAMED])
-                more = f' and {len(some) - _NAMED} more' * (len(some) > _NAMED)
+                reason = template.format(other=other, them='it' if len(some) == 1 else 'them')
+                # a line names six parameters
+                shown = ', '.join(full_label(one.parameter) for one in some[:6])
+                more = f' and {len(some) - 6} more' * (len(some) > 6)
                 count = counted(len(some), 'parameter')
                 lines.append(f'{count} of the {side} only: {reason} ({shown}{more}).')
     return tuple(lines)

@@ -5,19 +5,29 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 import re
-from typing import ClassVar, TYPE_CHECKING
+from typing import ClassVar
 
-from armid_ros.diagnosis import Diagnosis, Finding, NextRun
-from armid_ros.diagnosis.next_run.steps import MODEL, next_steps
+from armid_ros.diagnosis import Diagnosis, Finding
+from armid_ros.diagnosis.data.trajectory import trajectories
 from armid_ros.diagnosis.verdict.document import detectable
+from armid_ros.diagnosis.verdict.finding import Gap, Overlay
 from armid_ros.diagnosis.verdict.words import by_cause, names_and_places, share_in_words
 from armid_ros.estimate import name_in_words
 from armid_ros.identification.assess.verification import ForwardValidation
+from armid_ros.identification.rows.signals import conditioning, SignalSettings
+from armid_ros.motion import FloatArray
 from armid_ros.recording import Recording
 from armid_ros.report.arm_drawing import ArmDrawing, draw_arm
-from armid_ros.report.blocks import next_steps_section, Origin, VerdictSection
+from armid_ros.report.blocks import (
+    ContentSection,
+    next_steps_section,
+    Origin,
+    Paragraph,
+    VerdictSection,
+)
+from armid_ros.report.charts import Chart, joined, joined_time, Series, thinned
 from armid_ros.report.notation import (
     counted,
     digits,
@@ -38,16 +48,11 @@ from armid_ros.report.sections.diagnosed import (
     gap_section,
     minor_section,
     named_section,
-    patch_section,
     share_bars,
     share_of,
 )
-from armid_ros.report.sections.fit import forward_section
-from armid_ros.report.sections.overlay import overlay_section, whole_overlays
+from armid_ros.report.sections.fit import forward_section, ZOOM
 import numpy as np
-
-if TYPE_CHECKING:
-    from armid_ros.residual import Residual
 
 #: Colour of each verdict; the others are bad.
 _TONES = {'consistent': 'good', 'named': 'good', 'ambiguous': 'fair', 'partial': 'fair'}
@@ -59,8 +64,8 @@ def tone_of(diagnosis: Diagnosis, worse: Sequence[str] = ()) -> str:
     """
     Return the colour of a verdict.
 
-    None is good if the model is doubted, or not patched with what was named, if a joint is not
-    checked, or a simulation got worse in some joints.
+    A good verdict is only fair if the model is doubted or not patched with the named effects, if
+    a joint is not checked, or if some joints simulate worse than before.
 
     """
     tone = _TONES.get(diagnosis.verdict, 'bad')
@@ -68,64 +73,23 @@ def tone_of(diagnosis: Diagnosis, worse: Sequence[str] = ()) -> str:
     return 'fair' if tone == 'good' and (any(open_ends) or worse) else tone
 
 
-@dataclass(frozen=True)
-class Extras:
-    """
-    Results that follow from a diagnosis: next run, simulation, learned residual.
-
-    Attributes
-    ----------
-    forward : tuple of ForwardValidation
-        Held-out recordings simulated with the given and with the patched model.
-    next_run : NextRun or None
-        A motion that separates names in doubt.
-    no_run : str
-        Why there is no next run, where names are in doubt.
-    notes : tuple of str
-        Reasons why a result is missing.
-    residual : Residual or None
-        Learned map of the unexplained residual.
-
-    """
-
-    forward: tuple[ForwardValidation, ...] = ()
-    next_run: NextRun | None = None
-    no_run: str = ''
-    notes: tuple[str, ...] = ()
-    residual: Residual | None = None
-
-    def steps(self, diagnosis: Diagnosis, model: str = MODEL) -> list[str]:
-        """Return the next steps for the page and the terminal, with the path of the model."""
-        learned = self.residual is not None
-        return next_steps(diagnosis, self.next_run, self.no_run, model, self.worse, learned)
-
-    def sentences(self, diagnosis: Diagnosis) -> list[str]:
-        """Return sentences on shares, minor effects, consequences and notes."""
-        lines = [
-            f'{names_and_places(group)}: {share_in_words(group[0])}'
-            + (', together' if len(group) > 1 else '')
-            for group in by_cause(diagnosis.findings)
-        ]
-        lines += [
-            f'minor (significant, but negligible or not confirmed): '
-            f'{name_in_words(one.name)} in {", ".join(one.joints) or "the whole arm"}, '
-            f'p {probability(one.p)}'
-            for one in diagnosis.minor
-        ]
-        lines += [] if self.residual is None else self.residual.sentences()
-        lines += [pair.sentence() for pair in self.forward]
-        if diagnosis.verdict == 'consistent':
-            lines.append('note: how large each effect has to be to be seen is in report.html')
-        lines += [f'note: {note}' for note in (*diagnosis.notes, *self.notes)]
-        return lines
-
-    @property
-    def worse(self) -> tuple[str, ...]:
-        """Joints in which a simulation with the patched model is worse than before."""
-        return tuple(dict.fromkeys(joint for pair in self.forward for joint in pair.worse))
+def cause_sentences(diagnosis: Diagnosis) -> list[str]:
+    """Return sentences on the shares of the causes, and on minor effects."""
+    shares = [
+        f'{names_and_places(group)}: {share_in_words(group[0])}'
+        + (', together' if len(group) > 1 else '')
+        for group in by_cause(diagnosis.findings)
+    ]
+    minor = [
+        'minor (significant, but negligible or not confirmed): '
+        f'{name_in_words(one.name)} in {", ".join(one.joints) or "the whole arm"}, '
+        f'p {probability(one.p)}'
+        for one in diagnosis.minor
+    ]
+    return [*shares, *minor]
 
 
-#: What recordings were used for, and the words for some of them.
+#: Uses of recordings, and the words for some of them.
 _ROLES = (
     ('training', 'recording', '{}'),
     ('held-out', 'held-out recording', '{}'),
@@ -138,9 +102,11 @@ def diagnosis_report(
     diagnosis: Diagnosis,
     read: Mapping[str, Sequence[Recording]],
     *,
+    steps: Sequence[str] = (),
     everything: bool = False,
-    extras: Extras | None = None,
-    patch: str = '',
+    forward: Sequence[ForwardValidation] = (),
+    learned: Section | None = None,
+    gains: Mapping[str, float] | None = None,
     origin: ResultOrigin = DEFAULT_ORIGIN,
 ) -> str:
     """
@@ -149,16 +115,19 @@ def diagnosis_report(
     Parameters
     ----------
     diagnosis : Diagnosis
-        What was found.
+        The diagnosis.
     read : mapping of str to sequence of Recording
-        Recordings by what they were used for: 'training', 'held-out',
-        'baseline', 'simulator'.
+        Recordings by their use: 'training', 'held-out', 'baseline', 'simulator'.
+    steps : sequence of str
+        Next steps, the first one for the verdict box.
     everything : bool
         Whether negligible effects were added to the model.
-    extras : Extras, optional
-        What was made of it.
-    patch : str
-        model.yaml of the patched model.
+    forward : sequence of ForwardValidation
+        Held-out recordings simulated with the given and with the patched model.
+    learned : Section, optional
+        Section on the learned residual.
+    gains : mapping of str to float, optional
+        Share of the residual that the learned map of each joint predicts.
     origin : ResultOrigin
         Robot, files, versions, settings, seed.
 
@@ -168,45 +137,39 @@ def diagnosis_report(
         One HTML file that loads nothing.
 
     """
-    extras, arm = extras or Extras(), diagnosis.arm
+    arm = diagnosis.arm
     recordings = [(one, role) for role, several in read.items() for one in several]
     names = short_names([one.source for one, _ in recordings])
-    residual, patched = extras.residual, bool(diagnosis.findings)
-    steps = list(map(pretty, extras.steps(diagnosis)))
-    if residual is not None:
-        steps += residual.steps()
-    sections: list[Section] = [_verdict(diagnosis, names, extras.worse, ''.join(steps[:1]))]
+    worse = tuple(dict.fromkeys(joint for pair in forward for joint in pair.worse))
+    sections: list[Section] = [_verdict(diagnosis, names, worse, ''.join(steps[:1]))]
     curves = whole_overlays(diagnosis, [one for one, _ in recordings])
     if curves is not None and diagnosis.gap is not None:
         sections += [
             overlay_section(diagnosis, curves, names),
-            Story(diagnosis, residual),
+            Story(diagnosis, gains or {}),
             gap_section(diagnosis, diagnosis.gap),
-            *([named_section(diagnosis.findings)] if patched else []),
+            *([named_section(diagnosis.findings)] if diagnosis.findings else []),
         ]
         if diagnosis.where:
             sections.append(evidence_section(diagnosis))
-    if residual is not None:
-        sections.append(residual.section())
+    if learned is not None:
+        sections.append(learned)
     sections.append(next_steps_section(steps))
     if diagnosis.minor:
         sections.append(minor_section(diagnosis, everything))
     if diagnosis.gap is not None:
         sizes = detectable(diagnosis.explanation)
         sections += [candidates_section(diagnosis), detectable_section(sizes)]
-    if extras.forward:
+    if forward:
+        sources = [names.get(pair.after.source, pair.after.source) for pair in forward]
         pairs = [
-            replace(pair, after=replace(pair.after, source=names[pair.after.source]))
-            if pair.after.source in names
-            else pair
-            for pair in extras.forward
+            replace(pair, after=replace(pair.after, source=source))
+            for pair, source in zip(forward, sources, strict=True)
         ]
         sections.append(forward_section(arm.robot, pairs, ('as it was', 'patched')))
     quality = [(one, role, ()) for one, role in recordings]
     at_fault = _at_fault(diagnosis, read, names)
     sections.append(data_quality_section(quality, at_fault=at_fault, names=names))
-    if patched and not diagnosis.harmful:
-        sections.append(patch_section(diagnosis.findings, patch))
     sections.append(Origin(origin.provenance))
     used = [
         kind.format(counted(len(read[role]), noun))
@@ -259,9 +222,9 @@ class Story(Section):
     Attributes
     ----------
     diagnosis : Diagnosis
-        What was found.
-    residual : Residual or None
-        The learned residual.
+        The diagnosis.
+    gains : mapping of str to float
+        Share of the residual that the learned map of each joint predicts.
 
     """
 
@@ -269,7 +232,7 @@ class Story(Section):
     template: ClassVar[str] = 'story.html'
 
     diagnosis: Diagnosis
-    residual: Residual | None = None
+    gains: Mapping[str, float] = field(default_factory=dict)
 
     @property
     def drawing(self) -> ArmDrawing:
@@ -277,7 +240,7 @@ class Story(Section):
         data, robot = self.diagnosis.data, self.diagnosis.arm.robot
         cause: list[Finding] = next(iter(by_cause(self.diagnosis.findings)), [])
         names = ', '.join(name_in_words(one.name) for one in cause)
-        found = [*(place.joint for place in self.diagnosis.where), *self._gains]
+        found = [place.joint for place in self.diagnosis.where]
         named = {joint for one in cause for joint in one.joints}
         joints = [joint for joint in robot.joints if joint in named] if cause else found[:1]
         caption = f'coloured: {", ".join(joints)} ({names or "the largest gap"})'
@@ -289,26 +252,19 @@ class Story(Section):
     @property
     def rows(self) -> list[tuple[str, list[str]]]:
         """Questions and answers."""
-        answers = [('Where', self._where()), ('Patch', self._patch()), ('Gap', self._gap())]
-        if self.diagnosis.spans:
-            answers.insert(
-                0,
-                (
-                    'When',
-                    [
-                        f'{one.source} from {one.start:.1f} to {one.stop:.1f} s'
-                        for one in self.diagnosis.spans
-                    ],
-                ),
-            )
-        rest = self.diagnosis.left
-        if self.diagnosis.findings and rest:
-            answers.append(('Unexplained', [f'{w.joint}: {w.signature}' for w in rest[:_JOINTS]]))
-        return answers
-
-    @property
-    def _gains(self) -> Mapping[str, float]:
-        return {} if self.residual is None else self.residual.gains
+        spans = [
+            f'{one.source} from {one.start:.1f} to {one.stop:.1f} s'
+            for one in self.diagnosis.spans
+        ]
+        unexplained = [f'{w.joint}: {w.signature}' for w in self.diagnosis.left[:_JOINTS]]
+        answers = [
+            ('When', spans),
+            ('Where', self._where()),
+            ('Patch', self._patch()),
+            ('Gap', self._gap()),
+            ('Unexplained', unexplained if self.diagnosis.findings else []),
+        ]
+        return [(question, answer) for question, answer in answers if answer]
 
     def _where(self) -> list[str]:
         places, whole = self.diagnosis.where, share_of(self.diagnosis)
@@ -320,25 +276,23 @@ class Story(Section):
             rest = sum(place.share_of_gap for place in places[_JOINTS:])
             others = ', '.join(place.joint for place in places[_JOINTS:])
             lines.append(f'{others}: {percent(rest)}')
-        unseen = self.diagnosis.not_checked
         if not lines and self.diagnosis.verdict != 'consistent':
             return ['No joint is far above its floor.']
+        unseen = self.diagnosis.not_checked
         none = 'No joint that was checked has a gap.' if unseen else 'No joint has a gap.'
-        gap, joints = self.diagnosis.gap, self.diagnosis.arm.robot.joints
-        if gap is not None and gap.predicted and places:
-            joint = places[0].joint
-            if gap.chi2_before[joints.index(joint)] <= 1.0:
-                held_out = f'in the held-out ones {joint} is below its floor'
-                lines.insert(0, f'In the fitted recordings only; {held_out}:')
-        lines = lines or [none]
-        return [*lines, f'Not checked: {", ".join(unseen)}.'] if unseen else lines
+        return [*(lines or [none]), *([f'Not checked: {", ".join(unseen)}.'] if unseen else [])]
 
     def _patch(self) -> list[str]:
         diagnosis = self.diagnosis
         patched = not diagnosis.harmful
-        added = [name_in_words(finding.name) for finding in diagnosis.findings if patched]
-        if self._gains:
-            added.append(f'the learned residual of {", ".join(self._gains)}')
+        meaning = {effect.name: f' ({effect.summary})' for effect in diagnosis.arm.effects}
+        added = [
+            name_in_words(finding.name) + meaning.get(finding.name, '')
+            for finding in diagnosis.findings
+            if patched
+        ]
+        if self.gains:
+            added.append(f'the learned residual of {", ".join(self.gains)}')
         if not added:
             return ['The model is unchanged.']
         more = ', with rigid body and friction refitted' * (diagnosis.refitted and patched)
@@ -346,8 +300,7 @@ class Story(Section):
 
     def _gap(self) -> list[str]:
         gap, robot = self.diagnosis.gap, self.diagnosis.arm.robot
-        if gap is None:
-            return ['Not measured.']
+        assert gap is not None
         j = int(np.argmax(gap.chi2_before))
         before, after, floor = (
             f'{digits(float(x[j]))} {robot.torque_units[j]}'
@@ -360,6 +313,116 @@ class Story(Section):
             f'The floor, {floor}, is {self.diagnosis.baseline}.',
             *(
                 f'{joint}: the map predicts {percent(gain)} of the residual without a known cause.'
-                for joint, gain in self._gains.items()
+                for joint, gain in self.gains.items()
             ),
         ]
+
+
+def overlay_section(diagnosis: Diagnosis, gap: Gap, names: Mapping[str, str]) -> ContentSection:
+    """
+    Return measured and modelled torque, in the joint and recording where the gap was largest.
+
+    Parameters
+    ----------
+    diagnosis : Diagnosis
+        The diagnosis, with the seconds in which the causes act.
+    gap : Gap
+        The curves.
+    names : mapping of str to str
+        Names of the recordings.
+
+    """
+    robot, patched = diagnosis.arm.robot, bool(diagnosis.findings)
+    j = int(np.argmax(gap.chi2_before))
+
+    def size(overlay: Overlay) -> float:
+        residual = (overlay.measured - overlay.before)[:, j] / overlay.sigma[j]
+        return float(np.mean(residual**2))
+
+    shown = max(gap.overlays, key=size)
+    source = names.get(shown.source, shown.source) or 'the recording'
+    t, measured, before, after = _of_recording(gap, shown, j)
+    unit = robot.torque_units[j]
+    acting = [one for one in diagnosis.spans if one.source == shown.source and not one.whole]
+    marks = [(one.start, f'from {one.start:.1f} s', True) for one in acting]
+    marks += [(one.stop, f'to {one.stop:.1f} s', False) for one in acting]
+    kept = thinned(measured, measured - before, measured - after)
+    band: FloatArray = np.full(len(kept), 2.0 * shown.sigma[j])
+
+    def models(first: FloatArray, second: FloatArray) -> list[Series]:
+        if not patched:
+            return [Series('model', second[kept], 'before')]
+        return [Series('before', first[kept], 'before'), Series('after', second[kept], 'after')]
+
+    dashes = ', dashes on it are the model after' * patched
+    return ContentSection(
+        'Measured and modelled',
+        [
+            Paragraph(f'Joint {robot.joints[j]} in recording {source}: the largest error.'),
+            Chart(
+                t[kept],
+                [Series('measured', measured[kept], 'measured'), *models(before, after)],
+                '',
+                f'torque [{unit}]',
+                link='overlay',
+                marks=marks,
+            ),
+            Chart(
+                t[kept],
+                [
+                    Series('twice the floor', -band, 'floor', 'band', band),
+                    *models(measured - before, measured - after),
+                ],
+                'time [s]',
+                f'residual [{unit}]',
+                height=170,
+                link='overlay',
+                marks=marks,
+                symmetric=True,
+            ),
+            Paragraph(
+                f'The broad line is the measured torque{dashes}. {ZOOM} Where the joint turns '
+                'round, friction is undetermined and no error counts.',
+                'hint',
+            ),
+        ],
+    )
+
+
+def _of_recording(gap: Gap, shown: Overlay, joint: int) -> tuple[FloatArray, ...]:
+    """Return time, measured torque and both models for all stretches of a recording."""
+    here = shown.source, shown.trajectory.fold
+    own = [one for one in gap.overlays if (one.source, one.trajectory.fold) == here]
+    curves = zip(*((one.measured, one.before, one.after) for one in own), strict=True)
+    t = joined_time([one.trajectory.t for one in own])
+    return t, *(joined([part[:, joint] for part in parts]) for parts in curves)
+
+
+def whole_overlays(diagnosis: Diagnosis, recordings: Sequence[Recording]) -> Gap | None:
+    """
+    Return the gap with curves of whole recordings if a cause acts for part of the time.
+
+    Parameters
+    ----------
+    diagnosis : Diagnosis
+        The diagnosis; outside of its spans the model after is that before.
+    recordings : sequence of Recording
+        All recordings.
+
+    """
+    gap, explanation = diagnosis.gap, diagnosis.explanation
+    if gap is None or explanation is None or not diagnosis.spans:
+        return gap
+    firsts, overlays = {one.source: one for one in reversed(gap.overlays)}, []
+    for span in diagnosis.spans:
+        first, read = firsts.get(span.source), [r for r in recordings if r.source == span.source]
+        if first is None or not read:
+            continue
+        settings = SignalSettings(cutoff_hz=first.trajectory.used.cutoff_hz)
+        for part in trajectories(read, conditioning(read, settings)):
+            arms = explanation.reference.arm, explanation.fitted.arm
+            before, after = (part.torque - part.residual(arm) for arm in arms)
+            acts = (part.t >= span.start) & (part.t <= span.stop)
+            after = np.where(acts[:, np.newaxis], after, before)
+            overlays.append(Overlay(span.source, part, part.torque, before, after, first.sigma))
+    return replace(gap, overlays=tuple(overlays) or gap.overlays)

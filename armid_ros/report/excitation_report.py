@@ -15,7 +15,6 @@ from armid_ros.excitation import (
     CRITERIA,
     Design,
     Fitness,
-    FourierTrajectory,
     Limits,
     Obstacle,
     obstacles_alone,
@@ -47,7 +46,7 @@ from armid_ros.report.judgement import GOOD_CONDITION, WEAK_CONDITION
 from armid_ros.report.notation import counted, digits, plain, pretty, robot_label
 from armid_ros.report.page import Page, Section, Templated
 from armid_ros.report.provenance import ResultOrigin
-from armid_ros.report.sections.diagnosed import isolability_section, SHADE
+from armid_ros.report.sections.diagnosed import isolability_section
 from armid_ros.report.sections.fit import ZOOM
 from armid_ros.robots import Robot
 import numpy as np
@@ -69,17 +68,17 @@ def excitation_report(
     Parameters
     ----------
     design : Design
-        What was found.
+        The design.
     arm : ArmModel
         Prior model, for the torque.
     run : Run
-        The design with the way there and back.
+        The design with approach and return.
     checked : Fitness
-        What was checked of it.
+        Results of the checks of the run.
     scene : CollisionScene
-        Bodies of the arm, its floor, and what stands around it.
+        Bodies of the arm, floor and obstacles.
     isolability : Isolability, optional
-        What it shows of the effects of the catalogue.
+        Detectable sizes of the effects, and effects that are not distinguishable.
     origin : ResultOrigin
         Robot, files, versions, settings, seed, and the command that follows.
 
@@ -102,7 +101,7 @@ def excitation_report(
         for name, model in bodies.items()
         if len(model.geometry.collisionPairs)
     }
-    said = (*collision.notes, *filter(None, [collision.excluded]))
+    remarks = (*collision.notes, *filter(None, [collision.excluded]))
     # six poses of a period
     instants = excitation.run_in + np.arange(6) * excitation.trajectory.period / 6
     poses = draw_poses(
@@ -126,8 +125,7 @@ def excitation_report(
         _foreseen_section(design, arm.robot.links),
         *([] if isolability is None else [isolability_section(isolability)]),
         _motion_section(limits, motion, shares),
-        _clearance_section(motion.t, curves, design.settings.clearance, said),
-        _harmonics_section(excitation.trajectory),
+        _clearance_section(motion.t, curves, design.settings.clearance, remarks),
         _asked(design, arm, origin.robot, obstacles, run),
         Origin(origin.provenance),
     ]
@@ -233,7 +231,7 @@ def _asked(
         ('Robot', robot),
         ('Joints', ', '.join(run.joints)),
         ('Gravity', f'({_numbers(arm.robot.gravity)}) m/s²'),
-        ('Effects', effects_in_words(arm.effects)),
+        ('Effects', effects_in_words(arm)),
         ('Target', f'{TARGETS[settings.target]}{focus}'),
         ('Criterion', criterion),
         ('Speed', speed),
@@ -327,28 +325,6 @@ def _clearance_section(
     if notes:
         blocks.append(BulletList([(note, 'warn') for note in notes]))
     return ContentSection('Clearance', blocks)
-
-
-def _harmonics_section(trajectory: FourierTrajectory) -> ContentSection:
-    """Return the velocity amplitude of each harmonic of each joint."""
-    size = np.hypot(trajectory.a, trajectory.b)
-    share = size / np.maximum(size.max(axis=1, keepdims=True), 1e-12)
-    frequencies = np.arange(1, trajectory.harmonics + 1) / trajectory.period
-    rows: list[Cells] = [
-        (
-            joint,
-            *(
-                TableCell(digits(a), shade=round(SHADE * s))
-                for a, s in zip(size[j], share[j], strict=True)
-            ),
-        )
-        for j, joint in enumerate(trajectory.joints)
-    ]
-    said = (
-        'Velocity amplitude of each harmonic [rad/s or m/s]. The motion has no other frequencies.'
-    )
-    heads = ('Joint', *(f'{frequency:.3g} Hz' for frequency in frequencies))
-    return ContentSection('Spectrum', [Paragraph(said), DataTable(heads, rows)])
 
 
 def _foreseen_section(design: Design, links: Sequence[str] = ()) -> ContentSection:

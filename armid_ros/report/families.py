@@ -1,6 +1,6 @@
 # Copyright 2026 The armid_ros developers
 # SPDX-License-Identifier: Apache-2.0
-"""Parameters in the kinds that a reader compares with each other."""
+"""Tables and labels of parameters."""
 
 from __future__ import annotations
 
@@ -8,7 +8,6 @@ from collections.abc import Callable, Sequence
 import re
 
 from armid_ros.arm import ArmModel
-from armid_ros.effects import Effect
 from armid_ros.estimate import Estimate, name_in_words, ParameterName, symbol_in_words
 from armid_ros.identification import Identification, Score
 from armid_ros.identification.fitting.identifiability import HALF_WIDTH, Unidentified
@@ -34,26 +33,6 @@ _SYMBOL = re.compile(r'\b(m[xyz]?|I[xyz]{2})(\d+)\b')
 _FRICTION = {'viscous': 'viscous_coefficient', 'Coulomb': 'coulomb_torque'}
 
 
-def parameter_families(names: tuple[ParameterName, ...]) -> dict[tuple[str, str], list[int]]:
-    """
-    Sort parameters into kinds that share an axis.
-
-    Returns
-    -------
-    dict of (str, str) to list of int
-        Heading and unit, and the positions of its parameters: the rigid ones by their unit, those
-        of the effects by name and unit, which joints that slide and that turn do not share.
-
-    """
-    families: dict[tuple[str, str], list[int]] = {}
-    kinds = {'kg m^2': 'Inertias', 'kg m': 'First moments', 'kg': 'Masses'}
-    for position, name in enumerate(names):
-        kind = kinds.get(name.unit) if name.rigid else None
-        title = kind or name_in_words(name.name).capitalize()
-        families.setdefault((title, pretty(name.unit)), []).append(position)
-    return families
-
-
 def full_label(name: ParameterName, links: Sequence[str] = ()) -> str:
     """
     Return the full label of a parameter with its link or joint.
@@ -61,15 +40,15 @@ def full_label(name: ParameterName, links: Sequence[str] = ()) -> str:
     Parameters
     ----------
     name : ParameterName
-        Of a link, then with its number, or of an effect.
+        A parameter of a link or of an effect.
     links : sequence of str
         Names of the links in the order of their numbers; without them a link is that of its joint.
 
     Returns
     -------
     str
-        'moment of inertia about z of forearm', with '(grouped)' where it is the first of several
-        that no motion tells apart; or 'Coulomb torque of elbow'.
+        'moment of inertia about z of forearm', with '(grouped)' for the first one of a linear
+        combination; or 'Coulomb torque of elbow'.
 
     """
     if name.rigid:
@@ -98,9 +77,9 @@ def grouping(name: ParameterName, links: Sequence[str] = ()) -> str:
     return _SYMBOL.sub(named, name.name)
 
 
-def effects_in_words(effects: Sequence[Effect]) -> str:
-    """List effects by name, or state that there are none."""
-    return ', '.join(name_in_words(effect.name) for effect in effects) or 'none'
+def effects_in_words(arm: ArmModel) -> str:
+    """List the effects of an arm by name, or state that there are none."""
+    return ', '.join(name_in_words(effect.name) for effect in arm.effects) or 'none'
 
 
 def parameter_folds(
@@ -123,22 +102,23 @@ def parameter_folds(
     heads : sequence of str
         Of the columns after those that name the parameter.
     cells : callable
-        Returns the cells of these columns for the number of a parameter.
+        Returns the cells of these columns for the position of a parameter.
     links : sequence of str
         Names of the links, in the order of their numbers.
     suffix, opened : callable
-        Return what stands behind the heading of a table, and whether it is open, for the numbers
-        of its parameters; by default how many there are, and True.
+        Return the text after the heading of a table, and whether the table is open, for the
+        positions of its parameters; by default their number, and True.
     order : callable
-        Returns what the rows of a table are sorted by, for the number of a parameter.
+        Returns the sorting key of a row for the position of a parameter.
 
     """
     tables: dict[str, list[int]] = {}
-    for (kind, unit), members in parameter_families(names).items():
-        for k in members:
-            link = _words_and_link(names[k], links)[1] if names[k].rigid else ''
-            body = f'Link of {names[k].joint}{f" ({link})" if link else ""}'
-            tables.setdefault(body if names[k].rigid else f'{kind} [{unit}]', []).append(k)
+    for k, name in enumerate(names):
+        title = f'{name_in_words(name.name).capitalize()} [{pretty(name.unit)}]'
+        if name.rigid:
+            link = _words_and_link(name, links)[1]
+            title = f'Link of {name.joint}{f" ({link})" if link else ""}'
+        tables.setdefault(title, []).append(k)
     folds = []
     for title, members in tables.items():
         rigid = names[members[0]].rigid
@@ -182,13 +162,13 @@ def parameter_section(
     estimate : Estimate
         P parameters.
     described : ndarray, shape (P,)
-        Values of the description; zero for effects that it does not know.
+        Values of the description; zero for effects that it lacks.
     unidentified : sequence of Unidentified
-        What the data do not determine.
+        Parameters that the data do not determine.
     links : sequence of str
         Names of the links, in the order of their numbers.
     reference : str
-        What ``described`` is: 'description', or 'truth' of a simulated arm.
+        Name of ``described``: 'description', or 'truth' of a simulated arm.
 
     """
     names, values = estimate.parameters, estimate.values
@@ -198,11 +178,11 @@ def parameter_section(
 
     def cells(k: int) -> Cells:
         number, half = estimate_text(float(values[k]), float(estimate.std[k]))
-        told = number != 'includes 0'
+        sure = number != 'includes 0'
         return (
-            TableCell(number, '' if told else 'unknown'),
+            TableCell(number, '' if sure else 'unknown'),
             half,
-            f'{digits(100.0 * float(reach[k]) / abs(float(values[k])))} %' if told else '> 100 %',
+            f'{digits(100.0 * float(reach[k]) / abs(float(values[k])))} %' if sure else '> 100 %',
             TableCell(f'{described[k]:.3g}' if known[k] else 'none', 'changed' * bool(changed[k])),
             IntervalTrack(
                 float(values[k]), float(reach[k]), float(described[k]) if known[k] else None

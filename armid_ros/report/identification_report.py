@@ -9,10 +9,13 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 
 from armid_ros.arm import ArmModel
+from armid_ros.estimate import Estimate
 from armid_ros.identification import Fit, Grade, Identification, PhysicalCertificate, Verification
 from armid_ros.identification import grade as graded
 from armid_ros.identification.assess.consistency import NoiseCheck
+from armid_ros.identification.fitting.identifiability import HALF_WIDTH
 from armid_ros.identification.fitting.least_squares import IN_WORDS
+from armid_ros.motion import FloatArray
 from armid_ros.recording import Recording
 from armid_ros.report.blocks import (
     BulletList,
@@ -22,6 +25,7 @@ from armid_ros.report.blocks import (
     Fold,
     next_steps_section,
     Origin,
+    Panels,
     Paragraph,
     TableCell,
     VerdictSection,
@@ -34,37 +38,29 @@ from armid_ros.report.page import Page, Section
 from armid_ros.report.provenance import DEFAULT_ORIGIN, ResultOrigin
 from armid_ros.report.sections.data_quality import data_quality_section
 from armid_ros.report.sections.fit import by_recording, error_bars, fit_section, forward_section
-from armid_ros.report.statistics import (
-    directions,
-    residual_section,
-    torque_reach,
-    torque_scale,
-    whiteness_section,
-)
+from armid_ros.report.statistics import residual_section, torque_reach, whiteness_section
 from armid_ros.robots import Robot
 import numpy as np
 
 #: Colour of each grade.
 TONES = {'good': 'good', 'poor': 'fair', 'unusable': 'bad'}
-#: Parameters and combinations of them that are listed.
-_WORST = 6
 
 
 @dataclass(frozen=True)
 class Assessment:
     """
-    How an identification was assessed, apart from predicting recordings.
+    Tests, grade and exports of an identification.
 
     Attributes
     ----------
     verification : Verification or None
         Test for encoder noise, and simulations.
     grade : Grade or None
-        What it is good for; found out where it is not given.
+        Grade; computed if it is None.
     exports : mapping of str to sequence of str
-        Files for other programs, and what each has no place for.
+        Exported files, and the values that each cannot contain.
     reference : str
-        What parameters are compared with: the 'description', or in a simulation the 'truth'.
+        Reference of the parameters: the 'description', or in a simulation the 'truth'.
     sections : sequence of Section
         Further sections, shown before the next steps.
 
@@ -93,7 +89,7 @@ def identification_report(
     Parameters
     ----------
     result : Identification
-        What was found.
+        The identified model.
     description : ArmModel
         The model before the identification, to compare parameters with.
     recordings : sequence of Recording
@@ -103,7 +99,7 @@ def identification_report(
     validation_recordings : sequence of Recording
         Those recordings.
     assessment : Assessment, optional
-        What the identification was put to.
+        Tests and exports of the identification.
     origin : ResultOrigin
         Robot, files, versions, settings, seed.
 
@@ -148,7 +144,6 @@ def identification_report(
             assessment.reference,
         ),
         *([_physical_section(result.physical, assessment.exports)] if result.physical else []),
-        _excitation_section(result),
         whiteness_section(described, shown, role),
         *([] if noise is None else [_noise_section(described, noise)]),
         *assessment.sections,
@@ -173,7 +168,7 @@ def _asked(
         ('Robot', robot),
         ('Joints', ', '.join(result.arm.robot.joints)),
         ('Gravity', f'({gravity}) m/s²'),
-        ('Effects', effects_in_words(result.arm.effects)),
+        ('Effects', effects_in_words(result.arm)),
         ('Method', IN_WORDS[result.settings.method]),
         (
             'Filter',
@@ -182,41 +177,13 @@ def _asked(
         ),
         ('Fitted to', ', '.join(training)),
         ('Held out', ', '.join(validation) or 'nothing'),
+        (
+            'Excitation',
+            f'identifies {counted(result.base.rank, "parameter")}; condition number of the '
+            f'weighted regressor {plain(result.condition_number)}',
+        ),
     ]
     return ContentSection('Input', [FactList(facts)])
-
-
-def _excitation_section(result: Identification) -> ContentSection:
-    """Return how well a motion determines the parameters."""
-    rows, links = [], result.arm.robot.links
-    worst = directions(result.estimate, torque_scale(result))
-    for uncertainty, parts in worst[:_WORST]:
-        named = [f'{full_label(one, links)} {100.0 * x:.0f} %' for one, x in parts]
-        rows.append((', '.join(named), digits(uncertainty)))
-    values = np.array([uncertainty for uncertainty, _ in worst])
-    return ContentSection(
-        'Excitation',
-        [
-            Paragraph(
-                f'This motion identifies {counted(result.base.rank, "parameter")}. The condition '
-                f'number of the weighted regressor is {plain(result.condition_number)}.'
-            ),
-            Paragraph(
-                'The worst-determined combinations are listed first. Each number is the torque '
-                'uncertainty that the combination causes, over the standard deviation of the '
-                'residual.'
-            ),
-            DataTable((), rows),
-            Chart(
-                np.arange(1.0, len(values) + 1.0),
-                [Series('uncertainty', values, 'residual', 'sticks')],
-                'combination of parameters, worst known first',
-                'uncertainty / residual',
-                height=190,
-                legend=False,
-            ),
-        ],
-    )
 
 
 def _noise_section(robot: Robot, check: NoiseCheck) -> ContentSection:
@@ -235,7 +202,7 @@ def _noise_section(robot: Robot, check: NoiseCheck) -> ContentSection:
             f'{check.bias_std[k]:.1g}',
             f'{check.relative_bias[k]:+.2f}',
         )
-        for k in np.argsort(-np.abs(check.relative_bias))[:_WORST]
+        for k in np.argsort(-np.abs(check.relative_bias))[:6]
     ]
     return ContentSection(
         'Encoder noise',
@@ -288,14 +255,13 @@ def _physical_section(
         'Constraint',
     )
     activity = [(line[:1].upper() + line[1:], '') for line in certificate.activity]
-    tried = [
-        tuple(
-            TableCell(text, 'changed' if weight == certificate.weight else '')
-            for text in (f'{weight:g}', f'{100 * (ratio - 1):+.2f} %')
-        )
-        for weight, ratio in certificate.tried
-    ]
-    head = 'Cross-validation error relative to the unconstrained fit'
+    homeless = []
+    for file, lines in exports.items():
+        kinds = Counter(line.split(':')[0] for line in lines)
+        if kinds:
+            named = ', '.join(f'{kind} ({counted(n, "value")})' for kind, n in kinds.items())
+            text = f'{file} has no place for {named}: a comment in it lists them.'
+            homeless.append(Paragraph(text))
     return ContentSection(
         'Physical consistency',
         [
@@ -303,30 +269,64 @@ def _physical_section(
                 f'{quantifier} link is physically consistent: all four eigenvalues of the '
                 'pseudo-inertia have to be positive. The constraints change the torque error by '
                 f'{training:.2f} % on the training data and by {held_out:+.2f} % in '
-                'cross-validation.'
+                f'cross-validation, which chose {certificate.weight:g} as the weight of the '
+                'description.'
             ),
             DataTable(heads, rows, (0, 5)),
             BulletList(activity or [('No constraint is active.', 'fine')]),
-            Fold(
-                f'Weight of the description: {certificate.weight:g}, chosen by cross-validation',
-                [
-                    Paragraph('The largest weight whose error is not above the smallest one.'),
-                    DataTable(('Weight', head), tried, ()),
-                ],
-            ),
-            *_without_place(exports),
+            *homeless,
         ],
     )
 
 
-def _without_place(exports: Mapping[str, Sequence[str]]) -> list[Paragraph]:
-    """List the values that each exported file cannot contain."""
-    homeless = []
-    for file, lines in exports.items():
-        kinds = Counter(line.split(':')[0] for line in lines)
-        if kinds:
-            said = ', '.join(f'{kind} ({counted(n, "value")})' for kind, n in kinds.items())
-            homeless.append(
-                Paragraph(f'{file} has no place for {said}: a comment in it lists them.')
-            )
-    return homeless
+def convergence_section(
+    history: Sequence[tuple[float, Estimate]], truth: FloatArray
+) -> ContentSection:
+    """
+    Return online estimates over time with their 95 % intervals and the true values.
+
+    Parameters
+    ----------
+    history : sequence of (float, Estimate)
+        Times since the start [s], and estimates of P parameters.
+    truth : ndarray, shape (P,)
+        True values.
+
+    """
+    t, parameters = np.array([at for at, _ in history]), history[-1][1].parameters
+    values = np.array([estimate.values for _, estimate in history])
+    std = np.array([estimate.std for _, estimate in history])
+    certainty = np.abs(truth) / np.maximum(std[-1], 1e-300)
+    ranked = sorted(range(len(parameters)), key=lambda k: -certainty[k])
+    units = dict.fromkeys(one.unit for one in parameters)
+    kinds = [[k for k in ranked if parameters[k].unit == unit] for unit in units]
+    longest = max(map(len, kinds))
+    turns = [kind[turn] for turn in range(longest) for kind in kinds if turn < len(kind)]
+    panels = []
+    for k in sorted(turns[:6]):
+        reach = HALF_WIDTH * std[:, k]
+        known = np.isfinite(reach) & (reach < 3.0 * (abs(truth[k]) + reach[-1]))
+        lower, upper, drawn = (
+            np.where(known, x, np.nan)
+            for x in (values[:, k] - reach, values[:, k] + reach, values[:, k])
+        )
+        chart = Chart(
+            t,
+            [
+                Series('95 % interval', lower, 'floor', 'band', upper),
+                Series('online estimate', drawn, 'residual'),
+            ],
+            'time [s]',
+            f'estimate [{pretty(parameters[k].unit)}]',
+            height=170,
+            link='convergence',
+            levels=[(float(truth[k]), 'truth')],
+            legend=False,
+        )
+        panels.append((full_label(parameters[k]), '', [chart]))
+    text = (
+        'Six parameters over time, the best-determined one of each unit first. The band is the '
+        '95 % interval of the online estimate; the line is the true value.'
+    )
+    title = 'Convergence of the online estimate'
+    return ContentSection(title, [Paragraph(text), Panels(panels, three=True)])

@@ -26,8 +26,6 @@ from armid_ros.report.page import Page, Section, Templated
 from armid_ros.report.provenance import DEFAULT_ORIGIN, ResultOrigin
 import numpy as np
 
-#: Links that explain less than this share of the difference are not named as the cause.
-_MOSTLY = 0.9
 HEADS = (
     'link',
     'mass, URDF [kg]',
@@ -41,10 +39,6 @@ _TONES = {
     **{'unfit': 'bad', 'doubtful': 'fair', 'ready': 'good'},
     **{'wrong': 'bad', 'look': 'fair', 'clean': 'good'},
 }
-#: Samples of one curve on the page.
-_MOST = 2000
-#: No encoder of an arm resolves less [rad or m].
-_FINEST = 1e-7
 
 
 def inspection_report(found: Inspection, origin: ResultOrigin = DEFAULT_ORIGIN) -> str:
@@ -54,9 +48,9 @@ def inspection_report(found: Inspection, origin: ResultOrigin = DEFAULT_ORIGIN) 
     Parameters
     ----------
     found : Inspection
-        What was found.
+        Result of the inspection.
     origin : ResultOrigin
-        Name or path of the description, files, versions, and what to do next.
+        Name or path of the description, files, versions, and the next step.
 
     Returns
     -------
@@ -120,7 +114,7 @@ def headline(remarks: Sequence[Remark], found: LinkCheck | None) -> tuple[str, .
         first = f'The recording cannot check the links: {found.fault.rstrip(".")}.'
     elif found.agrees:
         first = 'The links of the URDF agree with the recording.'
-    elif found.explained < _MOSTLY:
+    elif found.explained < 0.9:  # share of the difference below which links are not the cause
         first = 'The URDF differs from the recording in more than three links.'
     else:
         known = [text for k in found.wrong if (text := _wrong_mass(found, k))]
@@ -178,13 +172,13 @@ def description_check_report(
         VerdictSection(grade, _TONES[grade], [first, *others], texts, step=origin.step)
     ]
     if links is not None:
-        said = (
+        hint = (
             'Centres are in the frame of the joint that moves the link. Intervals are 95 %. A '
             'dash: as described, or not determined by this motion. Explains: share of the '
             'difference between URDF and recording that this link explains if others are right.'
         )
         table = DataTable(HEADS, link_rows(links), kind='tight')
-        sections.append(ContentSection('Links', [table, Paragraph(said, 'hint')]))
+        sections.append(ContentSection('Links', [table, Paragraph(hint, 'hint')]))
     sections.append(Origin(origin.provenance))
     names = () if links is None else (*links.joints, *links.links)
     title = f'Check of {robot_label(origin.robot)}'
@@ -239,13 +233,13 @@ def _joints_section(found: Inspection) -> ContentSection:
         for column, like in ((2, 1), (5, 1), (8, 7)):
             heads[column] += heads[like][heads[like].index(' [') :]
     heads = [head.replace('N m', 'N\N{NO-BREAK SPACE}m') for head in heads]
-    said = (
+    hint = (
         'Speed: 99th percentile, from the positions. Step: smallest change of position between '
         'samples. Velocity ratio: recorded velocity over the derivative of the positions; 1 if '
         'units and signs agree.'
     )
     table = DataTable(heads, joint_rows(found), kind='tight')
-    return ContentSection('Joints', [table, Paragraph(said, 'hint')])
+    return ContentSection('Joints', [table, Paragraph(hint, 'hint')])
 
 
 def _curves_section(found: Inspection) -> ContentSection:
@@ -276,7 +270,7 @@ def _curves_section(found: Inspection) -> ContentSection:
         panels: list[tuple[str, str, list[Templated]]] = []
         for quantity, own, values, lines in quantities:
             if values is not None:
-                chosen = thinned(values[:, k], most=_MOST)
+                chosen = thinned(values[:, k])
                 chart = Chart(
                     recording.t[chosen],
                     [Series(quantity, values[chosen, k], 'after')],
@@ -290,7 +284,7 @@ def _curves_section(found: Inspection) -> ContentSection:
                 panels.append((name if not panels else '\N{NO-BREAK SPACE}', '', [chart]))
         blocks.append(Panels(panels, three=True))
     steps = 1e3 * np.diff(recording.t)
-    chosen = thinned(steps, most=_MOST)
+    chosen = thinned(steps)
     chart = Chart(
         recording.t[1:][chosen],
         [Series('step', steps[chosen], 'residual')],
@@ -327,8 +321,8 @@ def joint_rows(found: Inspection) -> list[tuple[str, ...]]:
     rows = []
     for joint, unit in zip(found.joints, found.units, strict=True):
         step = f'{joint.step:.2g}' if joint.step else '-'
-        if 0.0 < joint.step < _FINEST:
-            step = f'< {_FINEST:.0e}'.replace('e-0', 'e-')
+        if 0.0 < joint.step < 1e-7:  # [rad or m]; no encoder of an arm resolves less
+            step = '< 1e-7'
         efforts = (joint.effort_rms, joint.effort_largest)
         rows.append(
             (

@@ -17,16 +17,12 @@ from armid_ros.report.notation import counted, digits, plain
 from armid_ros.report.statistics import explained_shares, TELLING_SHARE, Whiteness
 import numpy as np
 
-#: Ratio of the held-out to the training residual from which the model is fitted to the noise.
-_OVERFIT = 1.3
 #: Condition numbers below which an excitation is good, as is the usual advice (Presse and Gautier
 #: 1993), and from which on it is weak.
 GOOD_CONDITION, WEAK_CONDITION = 100.0, 1000.0
-#: Share of the lags outside their 99 % band from which a residual is far from white.
-COLOURED_SHARE = 0.25
 
 
-#: Something to beware of, and what to do about it; either may be empty.
+#: A limitation and its remedy; either may be empty.
 Caution = tuple[str, str]
 
 
@@ -38,11 +34,11 @@ class Judgement:
     Attributes
     ----------
     sentences : tuple of str
-        What was identified, and how exactly it moves.
+        Findings, with the position error in simulation.
     beware : tuple of str
-        What the reader should not overlook.
+        Limitations.
     next_steps : tuple of str
-        What to do.
+        Next steps.
 
     """
 
@@ -63,23 +59,23 @@ def judge(
     Parameters
     ----------
     result : Identification
-        What was found.
+        The identified model.
     validation : mapping of str to sequence of Fit
         Predictions of held-out recordings.
     recordings : sequence of Recording
-        What was read, for what was wrong with it.
+        Recordings, for the damage that their reader reports.
     verification : Verification, optional
-        What the identification was put to.
+        Test for encoder noise, and simulations.
 
     """
     training = Score.of(result.training)
     fits = [fit for part in validation.values() for fit in part]
     held_out = Score.of(fits) if fits else None
     # of a physical certificate only active constraints and its notes
-    told = set()
+    known = set()
     if result.physical is not None:
         given = result.physical
-        told = set(given.sentences()) - set(given.activity) - set(given.notes)
+        known = set(given.sentences()) - set(given.activity) - set(given.notes)
     findings: list[Caution] = [
         *(
             (f'{recording.source or "A recording"}: {recording.report.describe()}', '')
@@ -89,7 +85,7 @@ def judge(
         *_of_errors(result, training, held_out),
         *_of_residuals(result, fits or result.training),
         *([] if verification is None else _of_verification(verification)),
-        *((note[0].upper() + note[1:] + '.', '') for note in result.notes if note not in told),
+        *((note[0].upper() + note[1:] + '.', '') for note in result.notes if note not in known),
     ]
     steps = [step for _, step in findings if step]
     if held_out is not None and not steps:
@@ -102,7 +98,7 @@ def judge(
 
 
 def _sentences(result: Identification, verification: Verification | None) -> Iterator[str]:
-    """Yield what was identified, and the position error when it is simulated."""
+    """Yield the findings, and the position error in simulation."""
     robot = result.arm.robot
     effects = [name_in_words(effect.name) for effect in result.arm.effects]
     time = sum(float(fit.motion.t[-1] - fit.motion.t[0]) for fit in result.training)
@@ -135,7 +131,7 @@ def _of_errors(
         stronger = np.linalg.norm(held_out.torque_rms) / np.linalg.norm(training.torque_rms)
         ratio = held_out.relative_error_percent / max(training.relative_error_percent, 1e-9)
         ratio *= min(float(stronger), 1.0)
-        if ratio > _OVERFIT:
+        if ratio > 1.3:  # the model is fitted to the noise
             yield (
                 f'The held-out residual is {digits(ratio)} times the training residual, in N m '
                 'and relative to the torque: the model overfits, the held-out motion leaves its '
@@ -180,7 +176,7 @@ def _of_residuals(result: Identification, fits: Sequence[Fit]) -> Iterator[Cauti
     coloured = [
         name
         for joint, name in enumerate(joints)
-        if Whiteness.of(fits, joint).outside > COLOURED_SHARE
+        if Whiteness.of(fits, joint).outside > 0.25  # share of lags, 0.01 for white noise
     ]
     if coloured:
         yield (

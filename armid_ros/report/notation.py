@@ -1,6 +1,6 @@
 # Copyright 2026 The armid_ros developers
 # SPDX-License-Identifier: Apache-2.0
-"""How numbers and units are printed, in figures and in reports alike."""
+"""Formats of numbers, units and names in reports and on the terminal."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ from armid_ros.estimate import ParameterName
 from armid_ros.identification.fitting.identifiability import HALF_WIDTH
 from markupsafe import escape, Markup
 
-#: What is no number, or one that stands for none.
+#: Stands for a missing number.
 DASH = '\N{EN DASH}'
 #: No quantity of an arm in SI units is as large.
 _NO_NUMBER = 1e12
@@ -168,6 +168,8 @@ def without_prefix(text: str, names: Sequence[str]) -> str:
 
 def many_counted(text: str, names: Sequence[str]) -> str:
     """Replace four or more names in a row by their number: '7 joints'."""
+    if not names:
+        return text
     one = f'(?:{"|".join(map(re.escape, names))})(?!\\w)'
     run = rf'(?<![\w/.-]){one}(?:, {one}){{3,}}'
     return re.sub(run, lambda found: f'{found[0].count(",") + 1} joints', text)
@@ -176,9 +178,9 @@ def many_counted(text: str, names: Sequence[str]) -> str:
 def explained(text: str) -> Markup:
     """Return HTML in which the first use of each of the `TERMS` has a tooltip."""
     html = str(escape(text))
-    for term, said in TERMS.items():
+    for term, meaning in TERMS.items():
         words = rf'(?<!>)\b({term.replace(" ", "[ -]")})\b'
-        html = re.sub(words, rf'<abbr title="{said}">\1</abbr>', html, count=1, flags=re.I)
+        html = re.sub(words, rf'<abbr title="{meaning}">\1</abbr>', html, count=1, flags=re.I)
     return Markup(html)
 
 

@@ -87,13 +87,13 @@ class Page:
     Attributes
     ----------
     title : str
-        What it is about.
+        Heading.
     subtitle : str
         Robot, data, day; in a line.
     sections : sequence of Section
         Parts in order; the first is the verdict.
     charts : bool
-        Whether there are interactive charts, which need a library.
+        Whether the page has interactive charts.
     names : sequence of str
         Joints and links of the arm. Labels leave their common prefix out.
 
@@ -130,10 +130,6 @@ def _short(text: str) -> Markup:
     return Markup(without_prefix(text, _names.get()))
 
 
-def _few(text: str) -> Markup:
-    return Markup(many_counted(text, _names.get())) if _names.get() else Markup(text)
-
-
 def render(template: str, values: Mapping[str, Any], package: str = 'armid_ros.report') -> Markup:
     """Return a template of the templates/ of a package with values filled in and escaped."""
     return Markup(_environment(package).get_template(template).render(values))
@@ -149,7 +145,11 @@ def _environment(package: str) -> Environment:
         lstrip_blocks=True,
     )
     environment.filters.update(
-        digits=digits, pretty=pretty, short=_short, few=_few, explained=explained
+        digits=digits,
+        pretty=pretty,
+        short=_short,
+        few=lambda text: Markup(many_counted(text, _names.get())),
+        explained=explained,
     )
     environment.globals['counted'] = counted
     environment.globals['plain'] = plain

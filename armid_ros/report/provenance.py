@@ -1,6 +1,6 @@
 # Copyright 2026 The armid_ros developers
 # SPDX-License-Identifier: Apache-2.0
-"""Where a report comes from: files, versions, settings."""
+"""Provenance of results: files, versions, settings."""
 
 from __future__ import annotations
 
@@ -25,17 +25,17 @@ class Provenance:
     Attributes
     ----------
     files : tuple of (str, int, str)
-        What was read: path as it was given, size [bytes], SHA-256 in hexadecimal digits.
+        Files that were read: path as given, size [bytes], SHA-256 in hexadecimal digits.
     versions : mapping of str to str
         Software and its version.
     settings : mapping of str to str
-        What was asked for.
+        Settings of the command.
     seed : int or None
         Seed of the random numbers.
     command : str
-        Command line; empty when there was none.
+        Command line; may be empty.
     created : str
-        When, as the caller's clock has it; empty to leave it out.
+        Time of the command; may be empty.
 
     """
 
@@ -55,13 +55,13 @@ class ResultOrigin:
     Attributes
     ----------
     robot : str
-        What documents call the robot; by default its shipped name or its path.
+        Name of the robot in documents; by default its shipped name or its path.
     source : str
-        How model.yaml refers to its description; by default the same.
+        Reference to the description in model.yaml; by default the same.
     provenance : Provenance
         Files, versions and settings that the report names.
     step : str
-        Command that follows, for the report; by default without arguments.
+        Next command for the report; by default without arguments.
 
     """
 

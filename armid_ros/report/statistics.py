@@ -1,13 +1,12 @@
 # Copyright 2026 The armid_ros developers
 # SPDX-License-Identifier: Apache-2.0
-"""Statistics of residuals and excitation, for charts and sentences."""
+"""Statistics of residuals, for charts and sentences."""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
 
-from armid_ros.estimate import Estimate, ParameterName
 from armid_ros.identification import Fit, Identification
 from armid_ros.identification.fitting.identifiability import HALF_WIDTH
 from armid_ros.motion import FloatArray
@@ -106,13 +105,6 @@ class Whiteness:
         return Whiteness(lag_times, correlation, 2.576 / np.sqrt(max(count, 1)))
 
 
-def torque_scale(result: Identification) -> FloatArray:
-    """Return the rms torque of a unit of each parameter in residual deviations, shape (r,)."""
-    columns = _some_columns(result, result.training)
-    noise = np.where(result.joint_std > 0.0, result.joint_std, 1.0)
-    return np.asarray(np.sqrt(np.mean((columns / noise[:, np.newaxis]) ** 2, axis=(0, 1))))
-
-
 def torque_reach(result: Identification, fits: Sequence[Fit]) -> FloatArray:
     """
     Return the 95 % half-width of the torque due to uncertain parameters, shape (n,).
@@ -120,39 +112,12 @@ def torque_reach(result: Identification, fits: Sequence[Fit]) -> FloatArray:
     Half widths of 95 % intervals, root mean square over a motion [N m].
 
     """
-    columns = _some_columns(result, fits)
+    motion = max(fits, key=lambda fit: len(fit.motion)).motion
+    # samples of the longest stretch that the variance of the torque is averaged over
+    chosen = np.unique(np.linspace(0, len(motion) - 1, 300).astype(np.intp))
+    columns = result.arm.columns(motion.select(chosen))[:, :, result.base.independent]
     variance = np.sum((columns @ result.estimate.covariance) * columns, axis=2)
     return np.asarray(HALF_WIDTH * np.sqrt(variance.mean(axis=0)))
-
-
-def directions(
-    estimate: Estimate, scale: FloatArray
-) -> list[tuple[float, list[tuple[ParameterName, float]]]]:
-    """
-    Return uncorrelated combinations of the parameters, worst known first.
-
-    Each is the standard deviation of the torque that it makes on this motion, in standard
-    deviations of the residual, and the parameters with their shares of it, largest first.
-
-    """
-    covariance = estimate.covariance * np.outer(scale, scale)
-    variances, vectors = np.linalg.eigh(covariance)
-    found = []
-    for column in np.argsort(-variances):
-        weights = vectors[:, column] ** 2
-        order = np.argsort(-weights)
-        enough = 1 + int(np.searchsorted(np.cumsum(weights[order]), 0.8))
-        parts = [(estimate.parameters[k], float(weights[k])) for k in order[:enough][:6]]
-        found.append((float(np.sqrt(max(variances[column], 0.0))), parts))
-    return found
-
-
-def _some_columns(result: Identification, fits: Sequence[Fit]) -> FloatArray:
-    """Return columns of the base parameters at samples of the longest stretch, shape (M, n, r)."""
-    motion = max(fits, key=lambda fit: len(fit.motion)).motion
-    # samples of the motion that the sensitivity of the torque is averaged over
-    chosen = np.unique(np.linspace(0, len(motion) - 1, 300).astype(np.intp))
-    return np.asarray(result.arm.columns(motion.select(chosen))[:, :, result.base.independent])
 
 
 def residual_section(robot: Robot, fits: Sequence[Fit], role: str) -> ContentSection:
@@ -248,11 +213,11 @@ def whiteness_section(robot: Robot, fits: Sequence[Fit], role: str) -> ContentSe
             legend=False,
         )
         panels.append((name, f'{100 * found.outside:.0f} % of the lags outside', [chart]))
-    said = (
+    text = (
         f'Autocorrelation of the {role} residual. Of white noise 1 % of the lags lie outside the '
         'band; the filters colour the first lag or two.'
     )
-    return ContentSection('Whiteness', [Paragraph(said), Panels(panels, three=True)])
+    return ContentSection('Whiteness', [Paragraph(text), Panels(panels, three=True)])
 
 
 def residual_by_variable(

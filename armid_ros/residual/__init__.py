@@ -3,23 +3,11 @@
 """
 The residual of a diagnosis: learned as a map, and approximated by a law of few terms.
 
-``learn_residual`` returns an arm with the maps as an effect, and the shares of the residual that
-maps and laws predict. ``lookup_table`` returns the maps as a table for other programs.
+``learn_residual`` returns an arm with the maps as an effect, the maps as a table for other
+programs, and the shares of the residual that maps and laws predict.
 
 """
 
-from armid_ros.residual.learn import (
-    learn_residual,
-    lookup_table,
-    require_libraries,
-    Residual,
-)
-from armid_ros.residual.section import JointResidual
+from armid_ros.residual.learn import learn_residual, require_libraries, Residual
 
-__all__ = [
-    'JointResidual',
-    'Residual',
-    'learn_residual',
-    'lookup_table',
-    'require_libraries',
-]
+__all__ = ['Residual', 'learn_residual', 'require_libraries']

@@ -97,7 +97,7 @@ def _cells(rows: JointRows, labels: npt.NDArray[np.intp], used: npt.NDArray[np.b
     own, n = labels[used], int(labels.max()) + 1
     count = np.bincount(own, minlength=n)
     there = count > 0
-    columns = np.column_stack([rows.inputs[used], rows.left[used]])
+    columns = np.column_stack([rows.inputs[used], rows.residual[used]])
     sums: FloatArray = np.array([np.bincount(own, x, n) for x in columns.T], dtype=np.float64)
     means = (sums[:, there] / count[there]).T
     return _Cells(labels, means[:, :3], means[:, 3])

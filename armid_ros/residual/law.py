@@ -20,9 +20,6 @@ from armid_ros.motion import FloatArray
 from armid_ros.residual.rows import BLOCKS, JointRows
 import numpy as np
 
-#: A law has to predict at least this share of the squared residual.
-_LEAST_SHARE = 0.5
-
 
 class Term(NamedTuple):
     """Text of a function of q, dq and the load w, such as 'dq^3', its factor and its unit."""
@@ -52,13 +49,13 @@ class Law:
     @property
     def text(self) -> str:
         """Return the law in a line, such as '0.31 dq^3 - 0.02 q'."""
-        said = ''
+        text = ''
         for number, term in enumerate(self.terms):
             sign = '-' if term.coefficient < 0.0 else ('' if number == 0 else '+')
             factor = f'{abs(term.coefficient):.3g}'
             body = factor if term.text == '1' else f'{factor} {term.text}'
-            said += f' {sign} {body}' if number else f'{sign}{body}'
-        return said
+            text += f' {sign} {body}' if number else f'{sign}{body}'
+        return text
 
     def document(self) -> dict[str, Any]:
         """Return the law as a JSON document."""
@@ -127,17 +124,17 @@ def suggest_law(rows: JointRows, prismatic: bool) -> Law | None:
     losses = np.zeros((most, BLOCKS))
     for block, others in enumerate(rows.folds()):
         for more in range(most):
-            factors = _fit(x[others], rows.left[others], more + 1)
-            losses[more, block] = np.sum((rows.left[~others] - x[~others] @ factors) ** 2)
+            factors = _fit(x[others], rows.residual[others], more + 1)
+            losses[more, block] = np.sum((rows.residual[~others] - x[~others] @ factors) ** 2)
     best = int(np.argmin(losses.sum(axis=1)))
     # the fewest terms whose held-out error is within one standard deviation of the least error
     worse = losses[: best + 1] - losses[best]
     allowed = np.std(worse, axis=1, ddof=1) * np.sqrt(BLOCKS)
     count = int(np.argmax(worse.sum(axis=1) <= allowed)) + 1
-    factors = _fit(x, rows.left, count)
+    factors = _fit(x, rows.residual, count)
     chosen = np.flatnonzero(factors)
-    share = 1.0 - float(losses[count - 1].sum()) / max(float(np.sum(rows.left**2)), 1e-300)
-    if share < _LEAST_SHARE:
+    share = 1.0 - float(losses[count - 1].sum()) / max(float(np.sum(rows.residual**2)), 1e-300)
+    if share < 0.5:  # a law predicts at least half of the squared residual
         return None
     size = np.abs(factors) * np.sqrt(np.mean(x**2, axis=0))
     order = sorted(chosen, key=lambda k: -size[k])
@@ -145,12 +142,12 @@ def suggest_law(rows: JointRows, prismatic: bool) -> Law | None:
     return Law(terms, share)
 
 
-def share_of(left: FloatArray, torque: FloatArray) -> float:
+def share_of(residual: FloatArray, torque: FloatArray) -> float:
     """Return the share of the squared residual that a torque explains."""
-    return 1.0 - float(np.sum((left - torque) ** 2)) / max(float(np.sum(left**2)), 1e-300)
+    return 1.0 - float(np.sum((residual - torque) ** 2)) / max(float(np.sum(residual**2)), 1e-300)
 
 
-def _fit(x: FloatArray, left: FloatArray, count: int) -> FloatArray:
+def _fit(x: FloatArray, residual: FloatArray, count: int) -> FloatArray:
     """Return the factors of the terms, at most ``count`` of them nonzero, shape (L,)."""
     from sklearn.linear_model import orthogonal_mp
 
@@ -158,8 +155,8 @@ def _fit(x: FloatArray, left: FloatArray, count: int) -> FloatArray:
     scale = np.where(size > 0.0, size, 1.0)
     with warnings.catch_warnings():
         warnings.simplefilter('ignore')  # if terms depend on each other, the first one is used
-        found = orthogonal_mp(x / scale, left, n_nonzero_coefs=count)
+        found = orthogonal_mp(x / scale, residual, n_nonzero_coefs=count)
     chosen = np.flatnonzero(found)
     factors = np.zeros(x.shape[1])
-    factors[chosen] = np.linalg.lstsq(x[:, chosen], left, rcond=None)[0]
+    factors[chosen] = np.linalg.lstsq(x[:, chosen], residual, rcond=None)[0]
     return factors

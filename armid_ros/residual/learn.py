@@ -7,7 +7,6 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 from itertools import product
-from pathlib import Path
 from typing import Any, ClassVar
 
 from armid_ros.arm import ArmModel
@@ -16,22 +15,66 @@ from armid_ros.diagnosis.data.trajectory import Trajectory
 from armid_ros.diagnosis.diagnose import OPEN
 from armid_ros.effects.learned import LearnedTorque, TorqueMap
 from armid_ros.errors import IdentificationError
-from armid_ros.files import write_file
 from armid_ros.files.cells import csv_cell
-from armid_ros.report.blocks import ContentSection
+from armid_ros.motion import FloatArray
+from armid_ros.report.blocks import (
+    ContentSection,
+    DataTable,
+    Paragraph,
+    SmallMultiples,
+    TableCell,
+)
+from armid_ros.report.charts import image_data
+from armid_ros.report.notation import digits, percent
+from armid_ros.report.page import render
 from armid_ros.residual.gaussian_process import learn_map
-from armid_ros.residual.law import share_of, suggest_law
+from armid_ros.residual.law import Law, share_of, suggest_law
 from armid_ros.residual.rows import BLOCKS, joint_rows, JointRows
-from armid_ros.residual.section import JointResidual, residual_map_section
+from markupsafe import Markup
 import numpy as np
 import numpy.typing as npt
-from threadpoolctl import threadpool_limits
 
 #: A joint with fewer rows has too few data for a map.
 _FEW = 100
-#: A map is informative if its standard deviation is less than this share of the prior's.
-_KNOWN = 0.5
-_HEAD = 'joint,position,velocity,load,torque,std'
+
+
+@dataclass(frozen=True)
+class JointResidual:
+    """
+    The learned map and the suggested law of one joint.
+
+    Attributes
+    ----------
+    joint : str
+        The joint.
+    learned : TorqueMap
+        The map.
+    ranges : ndarray, shape (3, 2)
+        Smallest and largest position, velocity and load in the data.
+    before, after : float
+        Root mean square of the residual without and with the map [N m].
+    gain : float
+        Share of the squared residual that the map predicts in held-out data: blocks left out in
+        turn, and samples of held-out recordings near the training data.
+    held_out : float or None
+        The same share for held-out recordings alone; None if none is near the training data.
+    law : Law or None
+        Suggested law; None if no law approximates the residual.
+
+    """
+
+    joint: str
+    learned: TorqueMap
+    ranges: FloatArray
+    before: float
+    after: float
+    gain: float
+    held_out: float | None
+    law: Law | None
+
+    def axis(self, number: int, count: int) -> FloatArray:
+        """Return evenly spaced values over the range of an input, shape (count,)."""
+        return np.linspace(float(self.ranges[number, 0]), float(self.ranges[number, 1]), count)
 
 
 @dataclass(frozen=True)
@@ -64,14 +107,14 @@ class Residual:
         for one in self.joints:
             alone = ''
             if one.held_out is not None:
-                alone = f' ({percent_of(one.held_out)} of held-out recordings)'
+                alone = f' ({percent(one.held_out)} of held-out recordings)'
                 if one.held_out < 0.0:
                     alone = ' (held-out recordings get worse: they go beyond its data)'
             like = 'no law of few terms'
             if one.law is not None:
-                like = f'{one.law.text} ({percent_of(one.law.share)})'
+                like = f'{one.law.text} ({percent(one.law.share)})'
             lines.append(
-                f'{one.joint}: a learned map predicts {percent_of(one.gain)} of the '
+                f'{one.joint}: a learned map predicts {percent(one.gain)} of the '
                 f'residual{alone}; similar law: {like}'
             )
         return tuple(lines)
@@ -92,12 +135,82 @@ class Residual:
         ]
 
     def section(self) -> ContentSection:
-        """Return the section of a report with the maps."""
-        return residual_map_section(self.base, self.joints, self.table_file)
+        """Return the section of a report with the maps at the middle load of each joint."""
+        robot = self.base.robot
+        rows, pictures = [], []
+        for one in self.joints:
+            j = robot.joints.index(one.joint)
+            unit, length = robot.torque_units[j], robot.position_units[j]
+            held_out = '' if one.held_out is None else percent(one.held_out)
+            if one.held_out is not None and one.held_out < 0.0:
+                held_out = 'worse'
+            rows.append(
+                (
+                    one.joint,
+                    f'{digits(one.before)} {unit}',
+                    f'{digits(one.after)} {unit}',
+                    percent(one.gain),
+                    held_out,
+                    TableCell('no simple law' if one.law is None else one.law.text, 'law'),
+                    '' if one.law is None else percent(one.law.share),
+                )
+            )
+            pictures += _pictures(one, unit, length)
+        heads = (
+            'Joint',
+            'Residual, rms',
+            'With the map',
+            'Share, map',
+            'Held-out alone',
+            'Looks like',
+            'Share, law',
+        )
+        return ContentSection(
+            'Learned residual',
+            [
+                Paragraph(
+                    'No effect of the catalogue explains the residual of these joints. A Gaussian '
+                    'process over position, velocity and load has learned it. model.yaml has it '
+                    f'as an effect, {self.table_file} as a table. It is zero where there were no '
+                    'data. Shares are of the squared residual in cross-validation, and in '
+                    'held-out recordings close to the data.'
+                ),
+                DataTable(heads, rows, (0, 5)),
+                Paragraph(
+                    'q: position, dq: velocity, w: gravity torque. A law is a suggestion: write '
+                    'it as an effect of your own if it is plausible, and diagnose again.',
+                    'hint',
+                ),
+                SmallMultiples(pictures),
+            ],
+        )
 
-    def write_table(self, folder: Path) -> None:
-        """Write the maps as a table into a folder."""
-        write_file(folder / self.table_file, lookup_table(self))
+    def table(self) -> str:
+        """
+        Return the maps as CSV on a grid over the range of the data, in SI units.
+
+        Returns
+        -------
+        str
+            Joint, position, velocity, load, torque and its standard deviation; the load is empty
+            if the map does not depend on load. Position varies slowest.
+
+        """
+        lines = ['joint,position,velocity,load,torque,std']
+        for one in self.joints:
+            # points along position, velocity and load
+            axes = [one.axis(number, count) for number, count in enumerate((41, 31, 9))]
+            loaded = one.learned.takes_load
+            if not loaded:
+                axes[2] = np.zeros(1)
+            inputs = np.array(list(product(*axes)))
+            torque, std = one.learned.torque(inputs), one.learned.std(inputs)
+            name = csv_cell(one.joint)
+            lines += [
+                f'{name},{q:.6g},{dq:.6g},{f"{w:.6g}" if loaded else ""},{tau:.6g},{s:.4g}'
+                for (q, dq, w), tau, s in zip(inputs, torque, std, strict=True)
+            ]
+        return '\n'.join(lines) + '\n'
 
     def document(self) -> dict[str, Any]:
         """Return the entry of diagnosis.json."""
@@ -120,11 +233,6 @@ class Residual:
                 for one in self.joints
             ],
         }
-
-
-def percent_of(share: float) -> str:
-    """Return a share in whole per cent."""
-    return f'{100.0 * share:.0f} %'
 
 
 def require_libraries() -> None:
@@ -175,6 +283,7 @@ def learn_residual(diagnosis: Diagnosis, rng: np.random.Generator) -> Residual |
     unseen = joint_rows(base, validation) if validation else [None] * len(every)
     # two threads would spend most of the time waiting, as each system has only a hundred rows
     import sklearn.linear_model  # noqa: F401 - so that its threads are limited as well
+    from threadpoolctl import threadpool_limits
 
     with threadpool_limits(1):
         learned = [
@@ -199,16 +308,16 @@ def _learned(
         return None
     learned, predicted = learn_map(rows, rng)
     # the map has to reduce the error of held-out blocks, even without the best block
-    saved = rows.left**2 - (rows.left - predicted) ** 2
+    saved = rows.residual**2 - (rows.residual - predicted) ** 2
     blocks = np.bincount(rows.block, saved, BLOCKS)
     if not blocks.sum() - blocks.max() > 0.0:
         return None
-    parts = [(rows.left, predicted)]
+    parts = [(rows.residual, predicted)]
     near = None if unseen is None else unseen.select(near_data(learned, unseen))
     if near is not None and len(near) >= _FEW:
-        parts.append((near.left, learned.torque(near.inputs)))
-    left, torque = (np.concatenate(one) for one in zip(*parts, strict=True))
-    gain = share_of(left, torque)
+        parts.append((near.residual, learned.torque(near.inputs)))
+    residual, torque = (np.concatenate(one) for one in zip(*parts, strict=True))
+    gain = share_of(residual, torque)
     if gain <= 0.0:
         return None
     prismatic = bool(base.robot.prismatic[base.robot.joints.index(joint)])
@@ -216,8 +325,8 @@ def _learned(
         joint,
         learned,
         np.array([rows.inputs.min(axis=0), rows.inputs.max(axis=0)]).T,
-        float(np.sqrt(np.mean(left**2))),
-        float(np.sqrt(np.mean((left - torque) ** 2))),
+        float(np.sqrt(np.mean(residual**2))),
+        float(np.sqrt(np.mean((residual - torque) ** 2))),
         gain,
         share_of(*parts[1]) if len(parts) > 1 else None,
         suggest_law(rows, prismatic),
@@ -226,32 +335,41 @@ def _learned(
 
 def near_data(learned: TorqueMap, rows: JointRows) -> npt.NDArray[np.bool_]:
     """Return a mask of the rows near those from which a map was learned, shape (N,)."""
-    return np.asarray(learned.std(rows.inputs) < _KNOWN * learned.amplitude)
+    # a map is informative where its standard deviation is less than half of that of the prior
+    return np.asarray(learned.std(rows.inputs) < 0.5 * learned.amplitude)
 
 
-def lookup_table(residual: Residual) -> str:
-    """
-    Return the maps as CSV on a grid over the range of the data, in SI units.
-
-    Returns
-    -------
-    str
-        Joint, position, velocity, load, torque and its standard deviation; the load is empty if
-        the map does not depend on load. Position varies slowest.
-
-    """
-    lines = [_HEAD]
-    for one in residual.joints:
-        # points along position, velocity and load
-        axes = [one.axis(number, count) for number, count in enumerate((41, 31, 9))]
-        loaded = one.learned.takes_load
-        if not loaded:
-            axes[2] = np.zeros(1)
-        inputs = np.array(list(product(*axes)))
-        torque, std = one.learned.torque(inputs), one.learned.std(inputs)
-        name = csv_cell(one.joint)
-        lines += [
-            f'{name},{q:.6g},{dq:.6g},{f"{w:.6g}" if loaded else ""},{tau:.6g},{s:.4g}'
-            for (q, dq, w), tau, s in zip(inputs, torque, std, strict=True)
-        ]
-    return '\n'.join(lines) + '\n'
+def _pictures(one: JointResidual, unit: str, length: str) -> list[tuple[str, str, Markup, str]]:
+    """Return pictures of torque and deviation at the middle load, the largest velocity on top."""
+    # cells along position and velocity
+    q, dq = (one.axis(number, count) for number, count in enumerate((80, 60)))
+    load = np.full((len(dq), len(q)), one.ranges[2].mean())
+    inputs = np.stack([*np.meshgrid(q, dq[::-1]), load], axis=-1)
+    torque, std = one.learned.torque(inputs), one.learned.std(inputs)
+    peak = max(float(np.abs(torque).max()), 1e-12)
+    row, column = np.unravel_index(np.argmax(np.abs(torque)), torque.shape)
+    most = f'most at {digits(q[column])} {length} and {digits(dq[::-1][row])} {length}/s'
+    blue, orange = (0.0, 0.447, 0.698), (0.835, 0.369, 0.0)
+    colours = np.where((torque >= 0.0)[..., None], blue, orange)
+    unsure = f'{digits(one.learned.amplitude)} {unit}'
+    ends = {
+        **{name: f'{digits(x)} {length}' for name, x in (('left', q[0]), ('right', q[-1]))},
+        **{name: f'{digits(x)} {length}/s' for name, x in (('low', dq[0]), ('high', dq[-1]))},
+    }
+    maps = (
+        (
+            f'{one.joint}: torque, blue up to {digits(peak)} {unit}, orange down to '
+            f'-{digits(peak)} {unit}',
+            image_data(colours, torque / peak),
+            f'Learned torque of {one.joint} over position and velocity, {most}',
+        ),
+        (
+            f'{one.joint}: standard deviation (shaded: large; {unsure} far from data)',
+            image_data(np.broadcast_to(0.5, (*std.shape, 3)), std / one.learned.amplitude),
+            'Standard deviation of that torque',
+        ),
+    )
+    return [
+        (caption, '', render('heat_map.html', {'image': image, 'words': words, **ends}), 'heat')
+        for caption, image, words in maps
+    ]

@@ -27,7 +27,7 @@ class JointRows:
     ----------
     inputs : ndarray, shape (N, 3)
         Position, velocity, load.
-    left : ndarray, shape (N,)
+    residual : ndarray, shape (N,)
         Measured torque minus that of the model [N m].
     block : ndarray of int, shape (N,)
         Number of the block of each row, 0 to BLOCKS - 1.
@@ -35,16 +35,16 @@ class JointRows:
     """
 
     inputs: FloatArray
-    left: FloatArray
+    residual: FloatArray
     block: npt.NDArray[np.intp]
 
     def __len__(self) -> int:
         """Return the number of rows N."""
-        return len(self.left)
+        return len(self.residual)
 
     def select(self, chosen: npt.NDArray[np.bool_]) -> JointRows:
         """Return some of the rows, shape (N,) of bool."""
-        return JointRows(self.inputs[chosen], self.left[chosen], self.block[chosen])
+        return JointRows(self.inputs[chosen], self.residual[chosen], self.block[chosen])
 
     def folds(self) -> Iterator[npt.NDArray[np.bool_]]:
         """Yield a mask of the rows in all other blocks, shape (N,), for each block with rows."""
@@ -74,12 +74,12 @@ def joint_rows(arm: ArmModel, data: Sequence[Trajectory]) -> list[JointRows]:
     links = [arm.link_motion(part.at_rows) for part in data]
     q, dq = (np.concatenate([getattr(link, name) for link in links]) for name in ('q', 'dq'))
     inputs = np.stack([q, dq, weight(arm.body, q)], axis=-1)
-    left = np.concatenate([part.residual(arm) for part in data])
-    told = np.concatenate([part.informative for part in data])
+    residual = np.concatenate([part.residual(arm) for part in data])
+    informative = np.concatenate([part.informative for part in data])
     result = []
-    for joint in range(left.shape[1]):
-        use = told[:, joint]
+    for joint in range(residual.shape[1]):
+        use = informative[:, joint]
         count = int(use.sum())
         block = np.arange(count) * BLOCKS // max(count, 1)
-        result.append(JointRows(inputs[use, joint], left[use, joint], block))
+        result.append(JointRows(inputs[use, joint], residual[use, joint], block))
     return result

@@ -25,7 +25,12 @@ import click
 )
 @parameters.robot_described(help='Shipped name or path; that of the model by default.')
 @click.option('--out', type=click.Path(path_type=Path), help='File to write, .rrd; no window.')
-@click.option('--mark', metavar='A,B,...', help='Joints to colour; default: those named.')
+@click.option(
+    '--mark',
+    metavar='A,B,...',
+    callback=parameters.names,
+    help='Joints to colour; default: those named.',
+)
 @columns.options
 @parameters.topic
 @parameters.gravity
@@ -38,42 +43,37 @@ def view(
     gravity: str,
     joints: str | None,
     out: Path | None,
-    mark: str | None,
+    mark: tuple[str, ...],
     topic: str | None,
 ) -> None:
     """Look at a recording in rerun: the moving arm, torques, and the residual of a model."""
     from armid_ros.arm import ArmModel
     from armid_ros.cli import options
-    from armid_ros.files.cells import listed
     from armid_ros.view.rerun_log import log_recording, open_stream
 
-    robot = None
-    if robot_source is not None or model is None:
-        robot = options.open_robot(robot_source or '-', gravity, joints, [bag])
-    if model is not None:
-        arm = options.model_of(model / 'model.yaml' if model.is_dir() else model, robot)
+    if model is None:
+        arm = ArmModel(options.open_robot(robot_source or '-', gravity, joints, [bag]))
     else:
-        assert robot is not None
-        arm = ArmModel(robot)
+        robot = options.open_robot(robot_source, gravity, joints, [bag]) if robot_source else None
+        arm = options.model_of(model / 'model.yaml' if model.is_dir() else model, robot)
     (recording,) = options.read([bag], arm.robot, topic)
-    marked = listed(mark) if mark else ()
     if model is not None and not mark:  # the joints of the effects that a diagnosis names
         path = (model if model.is_dir() else model.parent) / 'diagnosis.json'
         if path.is_file():
             effects = json.loads(path.read_text(encoding='utf-8'))['effects']
-            named = [joint for effect in effects for joint in effect['joints']]
-            marked = tuple(dict.fromkeys(named))
-    for joint in marked:
+            mark = tuple(dict.fromkeys(joint for one in effects for joint in one['joints']))
+    for joint in mark:
         arm.robot.index(joint)
     with _whole(out) as file:
         stream = open_stream(Path(recording.source).name or arm.robot.name, file)
-        notes = log_recording(stream, arm, recording, marked)
+        notes = log_recording(stream, arm, recording, mark)
         stream.disconnect()
     for note in notes:
         say(f'note: {note}')
-    said = f', coloured: {", ".join(marked)}' if marked else ''
     if out is not None:
-        say(f'{out}: {len(recording)} samples of {arm.robot.n_joints} joints{said}; rerun {out}')
+        coloured = f', coloured: {", ".join(mark)}' if mark else ''
+        samples = f'{len(recording)} samples of {arm.robot.n_joints} joints'
+        say(f'{out}: {samples}{coloured}; rerun {out}')
 
 
 @contextmanager
@@ -82,14 +82,14 @@ def _whole(out: Path | None) -> Iterator[Path | None]:
     if out is None:
         yield None
         return
-    beside = out.with_name(f'.{out.name}.part')
+    part = out.with_name(f'.{out.name}.part')
     try:
         out.parent.mkdir(parents=True, exist_ok=True)
-        beside.unlink(missing_ok=True)
-        beside.touch(exist_ok=False)
-        yield beside
-        beside.replace(out)
+        part.unlink(missing_ok=True)
+        part.touch(exist_ok=False)
+        yield part
+        part.replace(out)
     except OSError as error:
         raise OutputError(f'{out}: cannot be written: {error.strerror}') from error
     finally:
-        beside.unlink(missing_ok=True)
+        part.unlink(missing_ok=True)

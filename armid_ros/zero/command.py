@@ -54,7 +54,6 @@ def plan(
     from armid_ros.api.excitation import ExcitationResult
     from armid_ros.cli import options
     from armid_ros.excitation import CollisionScene, with_joint_limits
-    from armid_ros.report.provenance import ResultOrigin
     from armid_ros.zero.plan import plan_zero
 
     joint_limits, velocity, *place = (given.pop(name) for name in _AROUND)
@@ -66,7 +65,6 @@ def plan(
         scene = CollisionScene.of(robot, *place)
         result = plan_zero(robot, scene, **given)
         read = [Path(robot_source.split(' ')[0]), *filter(None, (joint_limits, place[-1]))]
-        kept = options.provenance(read, seed=result.seed)
         step = (
             f'play {out / "excitation.yaml"} with excitation_publisher, record it, then '
             f'armid zero fit BAG --robot {robot_source} --out zeros'
@@ -74,9 +72,8 @@ def plan(
         shown = result.summary()
         # the last line is on the precision relative to zeros, tilt and tool described as 0
         summary = replace(shown, then='', lines=shown.lines[:-1], steps=[step])
-        options.deliver(
-            result, staged, ResultOrigin(robot_source, provenance=kept), as_json, summary
-        )
+        origin = options.origin(robot_source, read, result.seed)
+        options.deliver(result, staged, origin, as_json, summary)
 
 
 plan.params += [one for one in excite.params if one.name in _AROUND]
@@ -104,8 +101,8 @@ plan.params += [one for one in excite.params if one.name in _AROUND]
 @click.option(
     '--external',
     is_flag=True,
-    help='Efforts are an estimate of external torque (--topic, --effort): fit the zeros and the '
-    'payload that explain this torque.',
+    help='Efforts are the external torque that a controller estimates (--topic, --effort): '
+    'measured torque minus the weight of the described arm, which is added again.',
 )
 @columns.recordings
 def fit(
@@ -123,14 +120,12 @@ def fit(
     as_json: bool,
 ) -> None:
     """Find zeros, gains, gravity, tool and friction from the rests of recordings."""
-    from armid_ros.arm import save_model
+    from armid_ros.arm import ArmModel, save_model
     from armid_ros.cli import options
-    from armid_ros.files import json_text
-    from armid_ros.identification import write_document
     from armid_ros.identification.known_payload import payloads_of
-    from armid_ros.zero.fit import fit_rests
+    from armid_ros.zero.fit import fit_document, fit_rests, fit_summary, SCHEMA
     from armid_ros.zero.rests import find_rests
-    from armid_ros.zero.text import fit_document, fit_summary, SCHEMA
+    import numpy as np
 
     staged = options.stage(out, SCHEMA, robot_source)
     robot = options.open_robot(robot_source, gravity, joints, bags)
@@ -138,23 +133,17 @@ def fit(
     options.tell_damage(*recordings)
     loaded = payloads_of(payloads, recordings, robot)
     robots = [loaded.get(one.source, robot) for one in recordings]
-    if external:  # the torque of a payload alone
-        known = ('gain', 'tilt')
-        robots = [robot.with_inertias(0.0 * robot.rigid_parameters) for _ in bags]
-    found = fit_rests([find_rests(one) for one in recordings], robots, known, link_error)
+    rests = [find_rests(one) for one in recordings]
+    if external:  # the controller has subtracted the weight of the described arm
+        bare = ArmModel(robot, quasi_static=True)
+        rests = [one.with_torque(np.asarray(one.tau) + bare.torque(one)) for one in rests]
+    found = fit_rests(rests, robots, known, link_error)
+    source = options.kept_source(robot_source, robot, staged.folder)
+    save_model(staged.folder / 'model.yaml', found.model(), source)
     document = fit_document(found, known, link_error, external)
-    write_document(staged.folder / 'zero.json', document)
-    written, step = f'{out}: zero.json', 'enter the load in the controller'
-    if not external:
-        source = options.kept_source(robot_source, robot, staged.folder)
-        save_model(staged.folder / 'model.yaml', found.model(), source)
-        written = f'{written}, model.yaml'
-        step = f'armid diagnose RUN --robot {robot_source} --model {out / "model.yaml"}'
-    staged.keep()
-    if as_json:
-        click.echo(json_text(document))
-    else:
-        options.show(fit_summary(found, document, step), written)
+    step = f'armid diagnose RUN --robot {robot_source} --model {out / "model.yaml"}'
+    summary = None if as_json else fit_summary(found, document, step)
+    options.deliver_document(staged, 'zero', document, summary, 'model.yaml')
 
 
 fit.params += [one for one in identify.params if one.name == 'payloads']

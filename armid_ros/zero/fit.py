@@ -13,18 +13,22 @@ parameters finite. A quantity with a wide interval is not determined.
 from __future__ import annotations
 
 from collections.abc import Collection, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import asdict, dataclass
+from typing import Any, NamedTuple
 
+from armid_ros.api.table import Summary
 from armid_ros.arm import ArmModel
 from armid_ros.effects import CATALOGUE
 from armid_ros.effects.load import described_spread
 from armid_ros.motion import FloatArray, Motion
+from armid_ros.report.notation import measured
 from armid_ros.robots import Robot
 import numpy as np
 import numpy.typing as npt
 import pinocchio as pin
 from scipy.stats import t as student
 
+SCHEMA = 'armid/zero/1'
 #: Quantities that may be held known, and the effects that are then not fitted.
 KNOWN = {'gain': 'torque_gain', 'tilt': 'base_tilt', 'tool': 'payload'}
 #: Quantity of each effect; if it is not determined, the effect is not in the model.
@@ -39,10 +43,6 @@ _USEFUL['center'] = 0.1
 _PRIORS = {'torque_offset': 1.0, 'coulomb_torque': 1.0, 'gain_error': 0.5, 'payload_m': 0.3}
 _PRIORS |= {'tilt_x': 0.3, 'tilt_y': 0.3, 'gravity_difference': 2.0}
 _PRIORS |= dict.fromkeys(('payload_mx', 'payload_my', 'payload_mz'), 0.1)
-#: Residual of an outlier over the median residual of its joint: 4.5 standard deviations, as where
-#: dry friction acts the other way. Redundant readings of a joint from which outliers are left out,
-#: and below which no quantity is determined.
-_OUTLYING, _REDUNDANT, _FEW = 6.7, 8.0, 3.0
 #: Remedy for most quantities that are not determined.
 MORE = 'record a run of armid zero plan'
 
@@ -184,25 +184,22 @@ def fit_rests(
         share = name.effect in ('torque_offset', 'coulomb_friction', 'payload')
         owner = '' if name.effect == 'payload' else name.joint
         prior.append(_PRIORS.get(name.name, 0.0) * (units[owner] if share else 1.0))
-    x, covariance, scattered, information, used, freedom = _solved(
-        arms, rests, np.array(prior), scales
-    )
-    arm = arms[-1].with_theta(arms[-1].theta + x)
+    solved = _solved(arms, rests, np.array(prior), scales)
+    arm = arms[-1].with_theta(arms[-1].theta + solved.x)
     q = np.concatenate([one.q for one in rests])
     # poses that are 0.1 rad or m apart from all before
     poses = sum(bool(np.all(np.abs(q[:k] - q[k]).max(axis=1) > 0.1)) for k in range(len(q)))
-    judge = _Judge(arm, np.flatnonzero(prior), covariance, scattered, information, units)
-    few = f'{poses} poses are too few; {MORE}' if freedom < _FEW else ''
-    factor = float(student.ppf(0.975, max(freedom, 1.0)))
+    few = f'{poses} poses are too few; {MORE}' if solved.freedom < 3.0 else ''
+    before, after = (y - _predicted(arms, rests, x)[0] for x in (0.0 * solved.x, solved.x))
     return ZeroFit(
         arm,
-        judge.quantities(factor, few),
-        np.sqrt(np.mean((y - _predicted(arms, rests, 0.0 * x)[0]) ** 2, axis=0)),
-        np.sqrt(np.mean((y - _predicted(arms, rests, x)[0]) ** 2, axis=0, where=used)),
+        _quantities(arm, solved, units, few),
+        np.sqrt(np.mean(before**2, axis=0)),
+        np.sqrt(np.mean(after**2, axis=0, where=solved.used)),
         scales,
         len(y),
         poses,
-        int(np.sum(_sided(rests) & ~used)),
+        int(np.sum(_sided(rests) & ~solved.used)),
     )
 
 
@@ -220,24 +217,29 @@ def _sided(rests: Sequence[Motion]) -> npt.NDArray[np.bool_]:
     return np.concatenate([one.dq for one in rests]).astype(bool)
 
 
+class _Solution(NamedTuple):
+    """
+    Change x of all parameters (P,), and numbers of the F free ones.
+
+    Covariances (F, F) from the variances of joints and from the scatter of the rests, information
+    (F, F) without the prior, readings that count (K, n), and the smallest number of redundant
+    readings of a joint.
+
+    """
+
+    x: FloatArray
+    free: npt.NDArray[np.intp]
+    covariance: FloatArray
+    scattered: FloatArray
+    information: FloatArray
+    used: npt.NDArray[np.bool_]
+    freedom: float
+
+
 def _solved(
     arms: Sequence[ArmModel], rests: Sequence[Motion], prior: FloatArray, scales: FloatArray
-) -> tuple[FloatArray, FloatArray, FloatArray, FloatArray, npt.NDArray[np.bool_], float]:
-    """
-    Solve by Gauss-Newton iterations; estimate variances and leave out outliers on the way.
-
-    Returns
-    -------
-    x : ndarray, shape (P,)
-        Change of all parameters.
-    covariance, information : ndarray, shape (F, F)
-        Covariance of the free parameters, and information of the rests without the prior.
-    used : ndarray of bool, shape (K, n)
-        Readings that count.
-    freedom : float
-        Smallest number of redundant readings of a joint.
-
-    """
+) -> _Solution:
+    """Solve by Gauss-Newton iterations; estimate variances and leave out outliers on the way."""
     y, sided = np.concatenate([np.asarray(one.tau) for one in rests]), _sided(rests)
     x, free, used, sigma = np.zeros(len(prior)), np.flatnonzero(prior), sided, 0.02 * scales
     for _ in range(60):
@@ -249,67 +251,139 @@ def _solved(
         step = covariance @ pull
         x[free] += step
         freedom = used.sum(axis=0) - np.einsum('kjp,pr,kjr->j', w, covariance, w)
-        left = np.abs(y - torque - columns[:, :, free] @ step)
+        residual = np.abs(y - torque - columns[:, :, free] @ step)
         before, least = sigma, 1e-6 * scales
-        sigma = np.sqrt((used * left**2).sum(axis=0) / np.maximum(freedom, 0.1)) + least
-        if freedom.min() > _REDUNDANT:
-            used = sided & (left <= _OUTLYING * np.median(left, axis=0) + least)
+        sigma = np.sqrt((used * residual**2).sum(axis=0) / np.maximum(freedom, 0.1)) + least
+        if freedom.min() > 8.0:  # readings are enough to leave out outliers
+            # 6.7 median residuals are 4.5 standard deviations, as where dry friction is reversed
+            used = sided & (residual <= 6.7 * np.median(residual, axis=0) + least)
         small = np.all(step**2 < 1e-6 * np.diag(covariance))
         if small and np.all(np.abs(before / sigma - 1.0) < 1e-3):
             break
     leverage = np.minimum(np.einsum('kjp,pr,kjr->kj', w, covariance, w), 0.9)
     rest = (y - _predicted(arms, rests, x)[0]) / sigma / (1.0 - leverage)
     moved = np.einsum('kjp,kj->kp', w, rest) @ covariance
-    return x, covariance, moved.T @ moved, information, used, float(freedom.min())
+    return _Solution(x, free, covariance, moved.T @ moved, information, used, float(freedom.min()))
 
 
-@dataclass(frozen=True)
-class _Judge:
-    """A fitted arm, its free parameters, their covariances and information, units of limits."""
+def _quantities(
+    arm: ArmModel, solved: _Solution, units: Mapping[str, float], few: str
+) -> tuple[FittedQuantity, ...]:
+    """Return the quantities of a fitted arm, with intervals; `few`: reason for all of them."""
+    factor = float(student.ppf(0.975, max(solved.freedom, 1.0)))
+    middle, std = quantities_of(arm), np.sqrt(np.diag(solved.covariance))
+    found, tool = [], True
+    slopes = np.zeros((len(middle), len(std)))
+    for k, place in enumerate(solved.free):
+        step = 0.01 * std[k] * np.eye(1, len(arm.theta), place)[0]
+        ends = [quantities_of(arm.with_theta(arm.theta + s * step)) for s in (-1.0, 1.0)]
+        low, high = (np.array([*end.values()]) for end in ends)
+        slopes[:, k] = (high - low) / (0.02 * std[k])
+    for ((name, joint, unit), value), slope in zip(middle.items(), slopes, strict=True):
+        variance = max(slope @ one @ slope for one in (solved.covariance, solved.scattered))
+        half = factor * float(np.sqrt(variance))
+        scale = units[joint] if name in ('zero', 'friction', 'mass') else 1.0
+        limit = scale * _USEFUL[name.split('_')[0]]
+        reason = few if half > 0.0 else ''
+        if half > limit:
+            reason = few or _reason(arm, solved, slope, limit / factor)
+        if name == 'mass':
+            tool = abs(value) > half
+        elif reason and name.startswith('center') and not tool:
+            reason = 'no mass of a tool is found; give --known tool'
+        found.append(FittedQuantity(name, joint, unit, value, half, reason))
+    return tuple(found)
 
-    arm: ArmModel
-    free: npt.NDArray[np.intp]
-    covariance: FloatArray
-    scattered: FloatArray
-    information: FloatArray
-    units: Mapping[str, float]
 
-    def quantities(self, factor: float, few: str) -> tuple[FittedQuantity, ...]:
-        """Return the quantities, with intervals of a factor times the standard deviation."""
-        arm, std = self.arm, np.sqrt(np.diag(self.covariance))
-        middle, found = quantities_of(arm), []
-        slopes = np.zeros((len(middle), len(std)))
-        for k, place in enumerate(self.free):
-            step = 0.01 * std[k] * np.eye(1, len(arm.theta), place)[0]
-            ends = [quantities_of(arm.with_theta(arm.theta + s * step)) for s in (-1.0, 1.0)]
-            low, high = (np.array([*end.values()]) for end in ends)
-            slopes[:, k] = (high - low) / (0.02 * std[k])
-        for ((name, joint, unit), value), slope in zip(middle.items(), slopes, strict=True):
-            variance = max(slope @ one @ slope for one in (self.covariance, self.scattered))
-            half = factor * float(np.sqrt(variance))
-            scale = self.units[joint] if name in ('zero', 'friction', 'mass') else 1.0
-            limit = scale * _USEFUL[name.split('_')[0]]
-            reason = few if half > 0.0 else ''
-            if half > limit:
-                reason = few or self._reason(
-                    int(np.argmax(np.abs(slope) * std)), slope, limit / factor
-                )
-            found.append(FittedQuantity(name, joint, unit, value, half, reason))
-        return tuple(found)
+def _reason(arm: ArmModel, solved: _Solution, slope: FloatArray, limit: float) -> str:
+    """Return why a quantity with these slopes over the free parameters is not determined."""
+    std = np.sqrt(np.diag(solved.covariance))
+    most = int(np.argmax(np.abs(slope) * std))
+    correlation = np.abs(solved.covariance[most]) / std
+    correlation[most] = 0.0
+    own, other = (arm.parameters[solved.free[k]] for k in (most, np.argmax(correlation)))
+    alone = abs(slope[most]) / np.sqrt(max(solved.information[most, most], 1e-300)) < limit
+    names = own.name + (other.name if alone else '')
+    remedy = 'give --known tilt if the base is level'
+    if 'payload' in names:
+        remedy = 'record a known payload as well (--payload), or give --known tool'
+    elif 'gain_error' in names:
+        remedy = 'gravity hardly turns the joint: give --known gain, or record it with a tool'
+    elif own.name == 'coulomb_torque':
+        remedy = MORE
+    mixed = f'not separable from {other.words} of {other.joint or "the base"}'
+    return f'{mixed if alone else "no rest depends on it"}; {remedy}'
 
-    def _reason(self, most: int, slope: FloatArray, limit: float) -> str:
-        """Return why a quantity that depends most on parameter `most` is not determined."""
-        correlation = np.abs(self.covariance[most]) / np.sqrt(np.diag(self.covariance))
-        correlation[most] = 0.0
-        own, other = (self.arm.parameters[self.free[k]] for k in (most, np.argmax(correlation)))
-        alone = abs(slope[most]) / np.sqrt(max(self.information[most, most], 1e-300)) < limit
-        names = own.name + (other.name if alone else '')
-        remedy = 'give --known tilt if the base is level'
-        if 'payload' in names:
-            remedy = 'record a known payload as well (--payload), or give --known tool'
-        elif 'gain_error' in names:
-            remedy = 'gravity hardly turns the joint: give --known gain, or record it with a tool'
-        elif own.name == 'coulomb_torque':
-            remedy = MORE
-        mixed = f'not separable from {other.words} of {other.joint or "the base"}'
-        return f'{mixed if alone else "no rest depends on it"}; {remedy}'
+
+def fit_document(
+    found: ZeroFit, known: Collection[str], link_error: float, external: bool
+) -> dict[str, Any]:
+    """Return the content of zero.json."""
+    gains = [one.value for one in found.quantities if one.name == 'gain' and not one.reason]
+    links = f'links within {100.0 * link_error:g} %' if link_error else 'links as described'
+    held = [links, *known]
+    held += [] if 'gain' in known else [f'gravity of {found.of("gravity").value:.4g} m/s^2']
+    verdict = 'in part' if any(one.reason for one in found.quantities) else 'determined'
+    if all(one.reason for one in found.quantities if one.name == 'zero'):
+        verdict = 'not determined'
+    # readings are explained to a tenth of the largest one of the joint
+    if np.any(found.residual > 0.1 * found.largest) or min(gains, default=1.0) < 0.0:
+        verdict = 'not explained'
+    rms = zip(found.arm.robot.joints, found.before, found.residual, strict=True)
+    return {
+        'schema': SCHEMA,
+        'robot': found.arm.robot.name,
+        'verdict': verdict,
+        'external': external,
+        'held': held,
+        'rests': found.rests,
+        'poses': found.poses,
+        'outliers': found.outliers,
+        'quantities': [asdict(one) for one in found.quantities],
+        'joints': [{'joint': j, 'before': float(b), 'residual': float(r)} for j, b, r in rms],
+    }
+
+
+def fit_summary(found: ZeroFit, document: dict[str, Any], step: str) -> Summary:
+    """Return the summary of a fit; `step` is the next step after a good fit."""
+    names = ('zero', 'gain', 'friction')
+    rows = [
+        (joint, *(_cell(found.of(name, joint)) for name in names), f'{residual:.2g}')
+        for joint, residual in zip(found.arm.robot.joints, found.residual, strict=True)
+    ]
+    tilt, mass = found.of('tilt'), found.of('mass')
+    center = [found.of(f'center_{axis}') for axis in 'xyz']
+    parts = []
+    if tilt.half_width and not tilt.reason:
+        parts.append(f'base tilted by {_cell(tilt)} deg')
+    if mass.half_width and not mass.reason:
+        place = f' at {", ".join(_cell(one).split(" ± ")[0] for one in center)} m'
+        known = any(not one.reason for one in center)
+        parts.append(f'tool of {_cell(mass)} kg{place if known else ""}')
+    determined = sum(not one.reason for one in found.quantities)
+    title = ', '.join(parts) or f'{determined} of {len(found.quantities)} quantities'
+    lines = [
+        f'{found.rests} rests in {found.poses} poses; {found.outliers} outliers left out; '
+        f'held known: {", ".join(document["held"])}'
+    ]
+    undetermined: dict[str, list[str]] = {}
+    for one in found.quantities:
+        if one.reason:
+            undetermined.setdefault(one.reason, []).append(f'{one.name} {one.joint}'.strip())
+    for why, which in undetermined.items():
+        text = ', '.join(which) if len(which) < 9 else f'{len(which)} values'
+        lines.append(f'not determined: {text}: {why}')
+    if document['verdict'] == 'not explained':
+        step = 'check --robot, --gravity, --effort-scale and contacts of the arm'
+    elif document['verdict'] == 'not determined':
+        step = MORE
+    heads = ('joint', *names, 'residual [N m or N]')
+    return Summary(title, document['verdict'], heads, rows, lines, [step])
+
+
+def _cell(one: FittedQuantity) -> str:
+    """Write a quantity with its interval."""
+    if one.reason:
+        return 'not det.'
+    value, half = measured(one.value, one.half_width)
+    return f'{value} ± {half}' if one.half_width else f'{value} (known)'

@@ -33,16 +33,8 @@ from armid_ros.robots.robot import position_range
 from armid_ros.zero.fit import arm_at_rest
 import numpy as np
 
-#: Standard deviation of the smoothing, and its effect at either end of a rest [s].
-SMOOTHING, SMOOTHED = 0.5, 1.5
-#: Highest frequency of the series [Hz]; the smoothing reduces it to a tenth of its amplitude.
-CUTOFF = 0.7
-#: Motion beyond a pose and back [rad or m], and its duration [s].
-BEYOND, BACK = 0.1, 4.0
-#: Random poses to choose from; factor on the clearance, as the smoothing cuts corners.
-_CANDIDATES, _RESERVE = 400, 1.5
-#: Samples per second of the tour [Hz].
-_RATE = 20.0
+#: Motion beyond a pose and back [rad or m].
+BEYOND = 0.1
 
 
 def plan_zero(
@@ -66,7 +58,8 @@ def plan_zero(
     planner = planner_of(arm, settings, scene)
     assert planner.limits is not None and planner.clearance is not None
     inside = replace(planner.limits, lower=limits.lower, upper=limits.upper)
-    reserve = replace(planner.clearance, margin=_RESERVE * scene.clearance)
+    # half as much again, as the smoothing cuts corners
+    reserve = replace(planner.clearance, margin=1.5 * scene.clearance)
     careful = replace(planner, limits=inside, clearance=reserve)
     chosen = _poses(careful, inside, model, poses, torque_noise(arm, settings), rng)
     trajectory = _tour(careful, inside, chosen, hold)
@@ -98,11 +91,11 @@ def _poses(
     turn = np.where(robot.prismatic, np.inf, np.pi)  # weight repeats after a turn
     lower, upper = np.maximum(lower, -turn), np.minimum(upper, turn)
     room = np.minimum(BEYOND, 0.1 * (upper - lower))
-    drawn = rng.uniform(lower + room, upper - room, (_CANDIDATES, robot.n_joints))
+    drawn = rng.uniform(lower + room, upper - room, (400, robot.n_joints))
     free = np.array([q for q in drawn if not planner.fault(q)])
     if len(free) < count:
         raise TrajectoryError(
-            f'{len(free)} of {_CANDIDATES} random poses are free, fewer than {count}; in the '
+            f'{len(free)} of {len(drawn)} random poses are free, fewer than {count}; in the '
             f'first one {planner.fault(drawn[0])}'
         )
     sides = [Motion.of_states(robot.joints, free, side, 0.0) for side in (-1.0, 1.0)]
@@ -129,8 +122,10 @@ def _tour(
     planner: TransferPlanner, limits: Limits, poses: FloatArray, hold: float
 ) -> FourierTrajectory:
     """Return the tour, without unreachable poses and without motions that are not free."""
-    count = round((hold + 2.0 * SMOOTHED) * _RATE)
-    u = np.arange(BACK * _RATE)[:, np.newaxis] / (BACK * _RATE)
+    rate, smoothing = 20.0, 0.5  # [Hz], and standard deviation of the filter [s]
+    # the filter moves the arm for three standard deviations at either end of a rest
+    count = round((hold + 6.0 * smoothing) * rate)
+    u = np.linspace(0.0, 1.0, round(4.0 * rate), endpoint=False)[:, np.newaxis]  # 4 s
     bump = (4.0 * u * (1.0 - u)) ** 4  # begins and ends smoothly
     now, reason = poses[0], ''
     parts: list[FloatArray] = []
@@ -141,7 +136,7 @@ def _tour(
             reason = str(error)
             continue
         now, rest = pose, np.tile(pose, (count, 1))
-        parts += [way.at(np.arange(0.0, way.duration, 1.0 / _RATE)).q, rest]
+        parts += [way.at(np.arange(0.0, way.duration, 1.0 / rate)).q, rest]
         over = pose + np.where(way.q[-1] < way.q[-2], -BEYOND, BEYOND)
         over = np.clip(over, limits.lower, limits.upper)
         if not planner.fault(over):
@@ -149,9 +144,10 @@ def _tour(
     if not np.array_equal(now, poses[0]):
         raise TrajectoryError(f'there is no way back from the poses: {reason}')
     q = np.roll(np.concatenate(parts), count // 2, axis=0)  # begins and ends in a rest
-    q = np.concatenate([q, np.tile(q[-1], (-len(q) % int(_RATE), 1))])  # whole seconds
-    period = len(q) / _RATE
-    w = 2.0 * np.pi / period * np.arange(1, round(CUTOFF * period) + 1)
+    q = np.concatenate([q, np.tile(q[-1], (-len(q) % int(rate), 1))])  # whole seconds
+    period = len(q) / rate
+    # to 0.7 Hz, which the filter reduces to a tenth of its amplitude
+    w = 2.0 * np.pi / period * np.arange(1, round(0.7 * period) + 1)
     waves = np.fft.rfft(q, axis=0)[: len(w) + 1].T / len(q)
-    series = 2.0 * w * waves[:, 1:] * np.exp(-0.5 * (SMOOTHING * w) ** 2)
+    series = 2.0 * w * waves[:, 1:] * np.exp(-0.5 * (smoothing * w) ** 2)
     return FourierTrajectory(limits.joints, period, waves[:, 0].real, -series.imag, -series.real)

@@ -14,8 +14,6 @@ from scipy.ndimage import maximum_filter1d, median_filter, minimum_filter1d, uni
 #: Time in which a joint at rest stays within `REST_RANGE` [s]; half of it at either end of a rest
 #: is left out. Time in which the torque then settles, and shortest rest after that time [s].
 WINDOW, SETTLING, SHORTEST = 1.0, 0.5, 0.5
-#: Motion to a pose after which dry friction acts against its direction [rad or m].
-APPROACH = 0.03
 
 
 def find_rests(recording: Recording) -> Motion:
@@ -54,7 +52,8 @@ def find_rests(recording: Recording) -> Motion:
         first = int(np.searchsorted(t, t[begin] + SETTLING))
         pose, came = q[first:end].mean(axis=0), np.zeros(q.shape[1])
         for j, way in enumerate((pose - q[before:begin]).T):
-            apart = np.flatnonzero(np.abs(way) > APPROACH)
+            # motion after which dry friction acts against its direction [rad or m]
+            apart = np.flatnonzero(np.abs(way) > 0.03)
             came[j] = np.sign(way[apart[-1]]) if len(apart) else 0.0
         rests.append((t[begin], pose, came, tau[first:end].mean(axis=0)))
         before = first

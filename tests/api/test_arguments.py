@@ -2,8 +2,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """What cannot be an argument is refused in one line that says what to give."""
 
-import inspect
-
 import armid_ros as ar
 import numpy as np
 import pytest
@@ -43,21 +41,6 @@ def test_a_model_is_read_with_a_robot_in_any_form(arm, tmp_path):
         np.testing.assert_array_equal(ar.load_model(path, robot).theta, arm.theta)
     with pytest.raises(ar.ArmidError, match=r'absent\.urdf'):
         ar.load_model(path, 'absent.urdf')
-
-
-@pytest.mark.parametrize(
-    ('call', 'wrong', 'right'),
-    [
-        (ar.design_excitation, 'harmoncs', 'harmonics'),
-        (ar.read_recording, 'degree', 'degrees'),
-        (ar.diagnose, 'basline', 'baseline'),
-        (ar.simulate, 'torque_nois', 'torque_noise'),
-    ],
-)
-def test_a_misspelt_keyword_is_answered_with_the_one_that_was_meant(call, wrong, right):
-    assert right in inspect.signature(call).parameters
-    with pytest.raises(TypeError, match=rf"{call.__name__}.*'{wrong}'.*'{right}'"):
-        call('humanoid_arm', **{wrong: 1})
 
 
 def test_a_misspelt_robot_or_prior_is_answered_with_what_was_meant(run):

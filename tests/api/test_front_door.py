@@ -9,7 +9,6 @@ import subprocess
 import sys
 
 import armid_ros as ar
-from armid_ros.api.table import LINES, Summary, WIDTH
 import numpy as np
 import pytest
 
@@ -81,14 +80,7 @@ def test_an_unknown_name_is_answered_with_the_known_ones():
         _ = ar.identfy
 
 
-def short(result):
-    table, _, _ = repr(result).partition('\nnext: ')
-    lines = table.splitlines()
-    return len(lines) <= LINES and max(map(len, lines)) <= WIDTH
-
-
-def test_an_identification_shows_itself_in_ten_lines_and_in_a_notebook(model, tmp_path):
-    assert short(model)
+def test_an_identification_shows_itself_as_text_and_in_a_notebook(model, tmp_path):
     assert repr(model).startswith('GOOD') and 'elbow_pitch' in repr(model)
     html = model._repr_html_()
     assert html.startswith('<iframe ') and html.count('"') == 6
@@ -127,7 +119,6 @@ def test_recordings_and_residuals_of_a_model_are_its_baseline_from_memory_and_fi
 
 
 def test_a_diagnosis_and_a_comparison_find_the_load(model, found, loaded, tmp_path):
-    assert short(found)
     assert 'payload' in repr(found) and '\nnext: ' in repr(found)
     assert found.to_dict() == found.document()
     assert found.to_dataframe().effect.str.contains('payload').any()
@@ -135,7 +126,6 @@ def test_a_diagnosis_and_a_comparison_find_the_load(model, found, loaded, tmp_pa
     assert 'damping="0.' in found.urdf()
     after = ar.identify(ar.ArmModel.of('humanoid_arm', effects=EFFECTS), loaded)
     compared = ar.compare(model, after)
-    assert short(compared)
     assert compared.load == pytest.approx(0.2, abs=0.01)
     assert ar.compare(model.save(tmp_path / 'before'), after).load == compared.load
 
@@ -152,12 +142,10 @@ def test_what_a_simulator_lacks_is_named_without_a_model(runs, excitation):
 
 def test_an_inspection_and_an_excitation_show_themselves(runs, excitation, tmp_path):
     found = ar.inspect('humanoid_arm', runs[0])
-    assert short(found)
     assert 'armid identify' in ' '.join(repr(found).split())
     assert found.report(tmp_path / 'page.html').is_file()
     saved = found.save(tmp_path / 'inspection')
     assert json.loads((saved / 'inspection.json').read_text())['verdict'] == found.core.verdict
-    assert short(excitation)
     assert (excitation.save(tmp_path / 'plan') / 'trajectory').is_dir()
     again = ar.simulate('humanoid_arm', tmp_path / 'plan' / 'trajectory', rate=100.0)
     assert again.duration == pytest.approx(excitation.run.duration, abs=0.05)
@@ -182,19 +170,11 @@ def test_a_recording_of_other_joints_is_refused(runs):
         ar.identify('two_link_elastic', runs[0])
 
 
-def test_a_summary_of_many_joints_stays_short_and_says_so():
-    rows = [(f'a_joint_with_a_very_long_name_{k}', *['1.234 ± 0.001'] * 5) for k in range(30)]
-    text = Summary('t' * 300, 'good', tuple('abcdef'), rows, lines=['x ' * 200]).text()
-    assert len(text.splitlines()) <= LINES
-    assert max(map(len, text.splitlines())) <= WIDTH
-    assert 'more' in text
-
-
 def test_what_lies_inside_of_results_prints_in_a_few_lines(model, runs):
     """A person looks at these, too; arrays of a recording are no answer."""
     for one in (model.estimate, model.core, model.arm.robot, *model.predict(runs[0])):
         assert len(repr(one)) < 800
-        assert len(repr(one).splitlines()) <= LINES + 1
+        assert len(repr(one).splitlines()) <= 11
 
 
 def test_recordings_of_one_name_are_told_apart(model, runs):
@@ -267,15 +247,13 @@ def test_a_value_has_the_name_of_its_effect_or_parameter(model):
         _ = estimate['viscous_friction', 'elbow']
 
 
-def test_an_inspection_takes_robot_and_recording_in_either_order(runs, tmp_path):
+def test_an_inspection_takes_a_recording_with_or_without_a_robot(runs, tmp_path):
     path = ar.write_recording(tmp_path / 'run', runs[0]) or tmp_path / 'run'
-    given = [('humanoid_arm', path), (path, 'humanoid_arm'), (path,), (None, path)]
+    given = [('humanoid_arm', path), (path,), (None, path)]
     found = [ar.inspect(*one).core.robot is None for one in given]
-    assert found == [False, False, True, True]
+    assert found == [False, True, True]
     with pytest.raises(ar.ArmidError, match='two recordings'):
         ar.inspect(runs[0], runs[1])
-    with pytest.raises(TypeError, match="'rng'"):
-        ar.inspect(path, seed=1)
 
 
 def test_residuals_are_a_table_of_every_joint(model, found):

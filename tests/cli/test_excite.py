@@ -165,7 +165,7 @@ def test_a_report_that_fails_costs_nothing_else(tmp_path, monkeypatch):
     def fail(*_, **__):
         raise ZeroDivisionError('no picture')
 
-    monkeypatch.setattr('armid_ros.report.excitation_report.excitation_report', fail)
+    monkeypatch.setattr('armid_ros.api.excitation.excitation_report', fail)
     result = excite(ROBOT, tmp_path / 'plan')
     assert 'report.html' in result.stderr and 'no picture' in result.stderr
     for name in ('excitation.yaml', 'excitation.csv', 'excitation.json', 'trajectory'):

@@ -4,7 +4,7 @@
 
 from armid_ros.estimate import Estimate
 from armid_ros.report.families import full_label
-from armid_ros.report.sections.convergence import convergence_section
+from armid_ros.report.identification_report import convergence_section
 import numpy as np
 
 

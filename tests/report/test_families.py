@@ -3,7 +3,7 @@
 """Parameters that share an axis have one unit, which a heading says once."""
 
 from armid_ros.estimate import Estimate, ParameterName
-from armid_ros.report.families import full_label, grouping, parameter_families, parameter_section
+from armid_ros.report.families import full_label, grouping, parameter_folds, parameter_section
 import numpy as np
 import pytest
 
@@ -15,9 +15,12 @@ NAMES = (
 
 
 def test_joints_that_slide_and_that_turn_are_kept_apart():
-    families = parameter_families(NAMES)
-    assert list(families.values()) == [[0], [1], [2]]
-    assert [unit for _, unit in families] == [name.unit for name in NAMES]
+    folds = parameter_folds(NAMES, (), lambda _: ())
+    assert [fold.summary for fold in folds] == [
+        'Link of lift: 1',
+        'Viscous coefficient [N m s/rad]: 1',
+        'Viscous coefficient [N s/m]: 1',
+    ]
 
 
 @pytest.mark.parametrize(

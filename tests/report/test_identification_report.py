@@ -31,7 +31,6 @@ TITLES = [
     'Torque',
     'Residual by variable',
     'Parameters',
-    'Excitation',
     'Whiteness',
     'Data quality',
     'Input',

@@ -7,7 +7,7 @@ from dataclasses import replace
 from armid_ros.identification import Fit
 from armid_ros.motion import Motion
 from armid_ros.report.judgement import judge
-from armid_ros.report.statistics import directions, torque_reach, torque_scale, Trend, Whiteness
+from armid_ros.report.statistics import torque_reach, Trend, Whiteness
 import numpy as np
 import pytest
 
@@ -47,15 +47,6 @@ def test_autocorrelation_of_a_sine_is_a_cosine():
     expected = np.cos(2.0 * np.pi * 5.0 * whiteness.lag)
     np.testing.assert_allclose(whiteness.correlation, expected, atol=0.01)
     assert whiteness.outside > 0.8
-
-
-def test_worst_known_direction_is_the_largest_variance_of_the_torque(case):
-    estimate, scale = case.result.estimate, torque_scale(case.result)
-    found = directions(estimate, scale)
-    scaled = estimate.covariance * np.outer(scale, scale)
-    assert found[0][0] == pytest.approx(np.sqrt(np.linalg.norm(scaled, 2)))
-    values = [uncertainty for uncertainty, _ in found]
-    assert values == sorted(values, reverse=True) and len(values) == case.result.base.rank
 
 
 def test_missing_friction_is_seen_in_the_residual(case):

@@ -7,9 +7,9 @@ import sys
 
 from armid_ros.diagnosis import diagnose
 from armid_ros.errors import IdentificationError
-from armid_ros.report.diagnosis_report import diagnosis_report, Extras
+from armid_ros.report.diagnosis_report import diagnosis_report
 from armid_ros.report.provenance import ResultOrigin
-from armid_ros.residual import learn_residual, lookup_table
+from armid_ros.residual import learn_residual
 from armid_ros.residual.gaussian_process import learn_map
 from armid_ros.residual.law import suggest_law
 from armid_ros.residual.learn import near_data
@@ -41,7 +41,7 @@ def explained(known, other):
     learned, _ = learn_map(known, np.random.default_rng(0))
     near = near_data(learned, other)
     assert near.mean() > 0.7
-    left = other.left[near]
+    left = other.residual[near]
     after = left - learned.torque(other.inputs[near])
     can = np.sum(left**2) - NOISE**2 * near.sum()
     return (np.sum(left**2) - np.sum(after**2)) / can
@@ -64,7 +64,7 @@ def test_a_map_predicts_most_of_what_has_no_name_on_another_motion(torque):
 def test_noise_teaches_nothing():
     still = rows(lambda q, dq, w: 0.0 * q)
     learned, predicted = learn_map(still, np.random.default_rng(0))
-    assert np.sum((still.left - predicted) ** 2) > 0.99 * np.sum(still.left**2)
+    assert np.sum((still.residual - predicted) ** 2) > 0.99 * np.sum(still.residual**2)
     assert suggest_law(still, False) is None
     inputs = rows(lambda q, dq, w: 0.0 * q, seed=1).inputs
     assert np.sqrt(np.mean(learned.torque(inputs) ** 2)) < 0.3 * NOISE
@@ -111,7 +111,7 @@ def test_what_has_no_name_is_learned_and_becomes_part_of_the_model(unknown, lear
     part = unknown.data[0]
     before, after = (part.residual(arm)[:, 1] for arm in (learned.base, learned.arm))
     assert np.std(after) < 0.7 * np.std(before)
-    table = lookup_table(learned).splitlines()
+    table = learned.table().splitlines()
     assert table[0] == 'joint,position,velocity,load,torque,std'
     first = [float(x or 0.0) for x in table[1].split(',')[1:]]
     at = np.array(first[:3])
@@ -122,7 +122,7 @@ def test_a_map_that_harms_held_out_recordings_says_so(unknown, learned):
     harmful = replace(learned, joints=(replace(learned.joints[0], held_out=-140.0),))
     assert 'get worse' in harmful.sentences()[0]
     page = diagnosis_report(
-        unknown, {}, origin=ResultOrigin('two_links'), extras=Extras(residual=harmful)
+        unknown, {}, origin=ResultOrigin('two_links'), learned=harmful.section()
     )
     assert '>worse<' in page
     assert '-14000' not in page

@@ -8,6 +8,7 @@ import json
 import armid_ros as ar
 from armid_ros.errors import ArmidError, IdentificationError
 from armid_ros.excitation import load_excitation
+from armid_ros.identification.known_payload import parse_payload, with_payload
 from armid_ros.nodes.parameters.excitation import checked, make_planner, PUBLISHER_PARAMETERS
 from armid_ros.recording import write_recording
 from armid_ros.robots import load_robot
@@ -15,6 +16,7 @@ from armid_ros.zero.command import zero
 from armid_ros.zero.rests import find_rests
 from click.testing import CliRunner
 import numpy as np
+import pinocchio as pin
 import pytest
 
 from docsite.schemas import faults
@@ -100,6 +102,55 @@ def test_a_fit_finds_what_is_hidden_and_writes_it(tmp_path, robot, recorded, sec
     assert values['payload'][0] == rows['mass', '']['value']
     reading = values['torque_offset'] * (1.0 + values['torque_gain'])
     np.testing.assert_allclose(reading[:2], [rows['zero', j]['value'] for j in robot.joints[:2]])
+
+
+def fitted(folder, *arguments):
+    """Return the quantities that a fit finds, by name and joint."""
+    run('fit', *arguments, '--robot', 'humanoid_arm', '--out', folder)
+    document = json.loads((folder / 'zero.json').read_text())
+    assert faults('zero', document) == []
+    return {(row['name'], row['joint']): row for row in document['quantities']}
+
+
+def weight(robot, q):
+    """Return the torque that holds an arm, shape (N, n)."""
+    data = robot.model.createData()
+    return np.array([pin.computeGeneralizedGravity(robot.model, data, pose) for pose in q])
+
+
+def test_an_external_torque_has_the_zeros_and_the_tool_of_the_measured_one(
+    tmp_path, robot, recorded
+):
+    """The controller subtracts the described weight, with neither gains nor tilt."""
+    write_recording(tmp_path / 'run', recorded)
+    estimated = replace(recorded, tau=recorded.tau - weight(robot, recorded.q))
+    write_recording(tmp_path / 'external', estimated)
+    measured = fitted(tmp_path / 'a', tmp_path / 'run')
+    external = fitted(tmp_path / 'b', tmp_path / 'external', '--external')
+    for key, row in measured.items():
+        assert external[key]['value'] == pytest.approx(row['value'], abs=0.2 * row['half_width'])
+
+
+def test_a_known_payload_shows_the_gains_of_an_arm_whose_links_are_doubted(
+    tmp_path, robot, recorded, secret
+):
+    _, link, body = parse_payload('loaded=0.5@hand:0,0,0.05')
+    true = robot.with_gravity(secret.gravity(robot))
+    added = weight(with_payload(true, link, body), recorded.q) - weight(true, recorded.q)
+    write_recording(tmp_path / 'run', recorded)
+    loaded = replace(recorded, tau=recorded.tau + secret.gain * added)
+    write_recording(tmp_path / 'loaded', loaded)
+    doubts = '--link-error', 0.1
+    alone = fitted(tmp_path / 'a', tmp_path / 'run', *doubts)
+    known = 'loaded=0.5@hand:0,0,0.05'
+    both = fitted(
+        tmp_path / 'b', tmp_path / 'run', tmp_path / 'loaded', '--payload', known, *doubts
+    )
+    for k, joint in enumerate(robot.joints[:2]):
+        row = both['gain', joint]
+        assert abs(row['value'] - secret.gain[k]) < 1.5 * row['half_width']
+        assert row['half_width'] < 0.5 * alone['gain', joint]['half_width']
+    assert both['mass', '']['value'] == pytest.approx(secret.mass, rel=0.1)
 
 
 def test_a_run_without_rest_and_one_without_effort_are_refused(recorded):

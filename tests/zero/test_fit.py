@@ -7,7 +7,6 @@ from dataclasses import replace
 from armid_ros.robots import load_robot, robot_from_urdf
 from armid_ros.zero.fit import fit_rests
 import numpy as np
-import pinocchio as pin
 import pytest
 
 from tests.zero.machine import rests_of, Secret
@@ -100,14 +99,3 @@ def test_vertical_axes_show_their_zeros_and_no_gains():
     assert '--payload' in found.of('mass').reason
     told = fit_rests([rests], [robot], ['tilt', 'tool', 'gain'])
     assert told.of('zero', 'j2').value == pytest.approx(1.0, abs=0.02)
-
-
-def test_a_constant_and_a_payload_explain_an_external_torque(robot, secret):
-    level = replace(secret, gain=np.ones(robot.n_joints), tilt=np.zeros(2))
-    full = rests_of(robot, level, 16, np.random.default_rng(0))
-    weight = [pin.rnea(robot.model, robot.model.createData(), q, 0 * q, 0 * q) for q in full.q]
-    external = full.with_torque(full.tau - np.array(weight))
-    nothing = robot.with_inertias(0.0 * robot.rigid_parameters)
-    found = fit_rests([external], [nothing], ('gain', 'tilt'))
-    assert found.of('mass').value == pytest.approx(secret.mass, rel=0.02)
-    assert np.all(found.residual < 0.2 * found.before)

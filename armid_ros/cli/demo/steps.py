@@ -8,10 +8,9 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
-from armid_ros.api.diagnosis import diagnose
+from armid_ros.api.diagnosis import diagnose, DiagnosisResult
 from armid_ros.arm import ArmModel
 from armid_ros.cli.terminal import progress, say
-from armid_ros.diagnosis import Diagnosis
 from armid_ros.effects import Effect, make_effect, parse_effect
 from armid_ros.errors import ModelError
 from armid_ros.excitation import ClearanceModel, Excitation, Limits, random_feasible
@@ -62,7 +61,7 @@ def hidden_change(robot: Robot, rng: np.random.Generator, hide: str = '') -> Hid
     rng : numpy.random.Generator
         Draws one of the changes that are shipped.
     hide : str
-        Which of them, as the beginning of 'effect@joint'; or any effect with its values, as for
+        Beginning of 'effect@joint' of a shipped change; or any effect with its values, as for
         ``armid simulate``.
 
     Raises
@@ -98,15 +97,15 @@ class HiddenChange:
     effect: Effect
     values: FloatArray
 
-    def found_by(self, diagnosis: Diagnosis) -> bool:
+    def found_by(self, diagnosed: DiagnosisResult) -> bool:
         """Return whether the first finding is the hidden effect, on the same joints."""
-        first = diagnosis.findings[:1]
+        first = diagnosed.core.findings[:1]
         named = self.effect.name, self.effect.joints
         return any((one.name, one.joints) == named for one in first)
 
-    def outcome(self, diagnosis: Diagnosis) -> str:
+    def outcome(self, diagnosed: DiagnosisResult) -> str:
         """Return a sentence on the hidden change, and whether it was found."""
-        parameters = self.effect.parameters(diagnosis.arm.robot)
+        parameters = self.effect.parameters(diagnosed.arm.robot)
         shown = [
             f'{name.name.replace("_", " ")} {digits(float(value), 3)} {pretty(name.unit)}'.rstrip()
             for name, value in zip(parameters, self.values, strict=True)
@@ -114,27 +113,21 @@ class HiddenChange:
         ]
         where = ', '.join(self.effect.joints) or 'the whole arm'
         hidden = f'{self.effect.name.replace("_", " ")} in {where} ({", ".join(shown[:4])})'
-        rank = 'found it' if self.found_by(diagnosis) else 'did not rank it first'
+        rank = 'found it' if self.found_by(diagnosed) else 'did not rank it first'
         return f'Hidden was: {hidden}. The diagnosis {rank}.'
 
-    def document(self, diagnosis: Diagnosis) -> dict[str, Any]:
+    def document(self, diagnosed: DiagnosisResult) -> dict[str, Any]:
         """Return the hidden effect, the verdict and whether it was found, for JSON."""
-        gap, joints = diagnosis.gap, diagnosis.arm.robot.joints
         return {
             'hidden': {
                 'name': self.effect.name,
                 'joints': list(self.effect.joints),
                 'values': self.values.tolist(),
             },
-            'verdict': diagnosis.verdict,
-            'summary': diagnosis.summary,
-            'found': self.found_by(diagnosis),
-            'gap': None
-            if gap is None
-            else {
-                'before': dict(zip(joints, gap.before.tolist(), strict=True)),
-                'after': dict(zip(joints, gap.after.tolist(), strict=True)),
-            },
+            'verdict': diagnosed.verdict,
+            'summary': diagnosed.core.summary,
+            'found': self.found_by(diagnosed),
+            'gap': diagnosed.document()['gap'],
         }
 
 
@@ -146,7 +139,7 @@ def diagnose_hidden(
     baseline: Recording,
     rng: np.random.Generator,
     rate: float,
-) -> Diagnosis:
+) -> DiagnosisResult:
     """
     Record a changed arm over topics, and diagnose it with the model from before.
 
@@ -155,13 +148,13 @@ def diagnose_hidden(
     out : Path
         Folder to fill.
     hidden : HiddenChange
-        What is changed, which the page says as well.
+        The hidden effect, which the page shows as well.
     truth : ArmModel
         The arm without it.
     known : ArmModel
         The model that was identified.
     baseline : Recording
-        What it was identified from.
+        The recording of its identification.
     rng : numpy.random.Generator
         Draws motions and noise.
     rate : float
@@ -197,20 +190,20 @@ def diagnose_hidden(
             rng=rng,
             progress=tick,
         )
-        told = replace(found.core, summary=f'{found.core.summary} {hidden.outcome(found.core)}')
-        replace(found, core=told).fill(out, ResultOrigin(known.robot.name, known.robot.name))
-    return found.core
+        core = replace(found.core, summary=f'{found.core.summary} {hidden.outcome(found)}')
+        replace(found, core=core).fill(out, ResultOrigin(known.robot.name, known.robot.name))
+    return found
 
 
-def show_hidden(hidden: HiddenChange, found: Diagnosis) -> None:
+def show_hidden(hidden: HiddenChange, found: DiagnosisResult) -> None:
     """Print the diagnosis, its gain on the held-out run, and the hidden effect."""
     say('Then a change was hidden in the arm, and three runs were recorded. Diagnosis of two:')
-    say(pretty(f'{found.verdict.replace("_", " ").upper()}: {found.summary}'))
-    gap, arm = found.gap, found.arm
+    say(pretty(f'{found.verdict.replace("_", " ").upper()}: {found.core.summary}'))
+    gap = found.core.gap
     if gap is not None:
         worst = int(np.argmax(gap.chi2_before))
         say(
-            f'Held-out run: the error of {arm.robot.joints[worst]} is '
+            f'Held-out run: the error of {found.arm.robot.joints[worst]} is '
             f'{digits(float(gap.before[worst]))} N m, and {digits(float(gap.after[worst]))} N m '
             'with the named effect.'
         )

@@ -24,11 +24,6 @@ from armid_ros.report.page import Templated
 from armid_ros.robots import Robot
 import numpy as np
 
-#: Share of the residual that repeats, from which a better model would help [%].
-_TELLING = 50.0
-#: Fewer pairs of samples tell no deviation.
-_FEWEST = 20
-
 
 def data_quality_section(
     read: Sequence[tuple[Recording, str, Sequence[Fit]]],
@@ -42,13 +37,13 @@ def data_quality_section(
     Parameters
     ----------
     read : sequence of (Recording, str, sequence of Fit)
-        Each with what it was used for, and its fits.
+        Each recording with its use and its fits.
     robot : Robot, optional
-        Gives joints and units, where repeatability is shown.
+        Joints and units; without a robot, repeatability is not shown.
     at_fault : collection of str
         Names of recordings that the verdict calls faulty, however well they were read.
     names : mapping of str to str, optional
-        What recordings are called.
+        Names of recordings by source.
 
     """
     names = names or {}
@@ -69,13 +64,13 @@ def data_quality_section(
                 recording.clock,
             )
         )
-        said = with_names(recording.report.describe(), names)
+        text = with_names(recording.report.describe(), names)
         clean, faulty = recording.report.unharmed, source in at_fault
         if clean:
-            said += ' The recorded signals are at fault: see the verdict.' * faulty or (
+            text += ' The recorded signals are at fault: see the verdict.' * faulty or (
                 ' Nothing dropped, nothing repaired.'
             )
-        notes.append((f'{source}: {said}', 'fine' if clean and not faulty else 'warn'))
+        notes.append((f'{source}: {text}', 'fine' if clean and not faulty else 'warn'))
     heads = ('Recording', 'Used for', 'Duration', 'Rate', 'Jitter', 'Longest step', 'Clock')
     blocks: list[Templated] = [DataTable(heads, rows, (0, 1, 6)), BulletList(notes)]
     if robot is not None:
@@ -102,7 +97,8 @@ def _repeatability(
                     joint,
                     f'{digits(varying[k])} {unit}',
                     f'{digits(residual[k])} {unit}',
-                    TableCell(f'{shares[k]:.0f} %', 'telling' if shares[k] > _TELLING else ''),
+                    # from half of the residual on, a better model would help
+                    TableCell(f'{shares[k]:.0f} %', 'telling' if shares[k] > 50.0 else ''),
                 )
             )
         source = recording.source or 'in memory'
@@ -148,8 +144,9 @@ def repeatability(fits: Sequence[Fit]) -> tuple[float, FloatArray, FloatArray] |
     # a period is looked for in the first 150 s
     count = int(np.searchsorted(fit.motion.t, fit.motion.t[0] + 150.0))
     motion = fit.motion.select(slice(count))
-    found = find_period(motion.t, motion.q) if count > _FEWEST else None
-    if found is None or found[1].stop - found[1].start < _FEWEST:
+    fewest = 20  # pairs of samples for a standard deviation
+    found = find_period(motion.t, motion.q) if count > fewest else None
+    if found is None or found[1].stop - found[1].start < fewest:
         return None
     lag, where = found
     first = slice(where.start, where.stop)

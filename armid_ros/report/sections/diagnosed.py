@@ -14,15 +14,12 @@ from armid_ros.diagnosis.search.trial import Trial
 from armid_ros.diagnosis.verdict.document import Detectable
 from armid_ros.diagnosis.verdict.finding import Gap
 from armid_ros.diagnosis.verdict.words import by_cause, share_interval_in_words
-from armid_ros.effects import CATALOGUE
-from armid_ros.effects.quantities import SURELY
 from armid_ros.estimate import name_in_words
-from armid_ros.identification.fitting.identifiability import excludes_zero
+from armid_ros.identification.fitting.identifiability import excludes_zero, HALF_WIDTH
 from armid_ros.motion import FloatArray
 from armid_ros.report.blocks import (
     Bar,
     BarChart,
-    BulletList,
     Cells,
     ContentSection,
     DataTable,
@@ -44,10 +41,6 @@ from armid_ros.report.notation import (
 from armid_ros.report.page import Templated
 import numpy as np
 
-#: Smallest share of the mean square of a residual at which a page states its mean.
-_MEAN_SAID = 0.005
-#: Background of the largest of several cells [%].
-SHADE = 55.0
 _DETECTABLE = (
     'Effect',
     'Detectable from',
@@ -136,7 +129,7 @@ def evidence_section(diagnosis: Diagnosis) -> ContentSection:
     folds = []
     for number, place in enumerate(diagnosis.where[:3]):
         blocks: list[Templated] = []
-        if place.axes and place.mean_share >= _MEAN_SAID:
+        if place.axes and place.mean_share >= 0.005:
             blocks.append(
                 Paragraph(
                     f'The mean of the residual, {digits(place.mean)} {place.unit} or '
@@ -221,13 +214,13 @@ def isolability_section(isolability: Isolability) -> ContentSection:
     rows: list[Cells] = []
     for name in dict.fromkeys(one.name for one in isolability.effects):
         others = np.flatnonzero(near[kinds.index(name)]) if name in kinds else ()
-        said = ', '.join(names[k] for k in others)
-        rows.append((*_detectable_row(name, isolability.effects), said))
+        alike = ', '.join(names[k] for k in others)
+        rows.append((*_detectable_row(name, isolability.effects), alike))
     shares: list[Cells] = [
         (
             f'{k + 1} {name}',
             *(
-                TableCell('=' if near[k, j] else '', shade=round(SHADE * (1.0 - apart[k, j])))
+                TableCell('=' if near[k, j] else '', shade=round(55.0 * (1.0 - apart[k, j])))
                 for j in range(len(kinds))
             ),
         )
@@ -238,8 +231,8 @@ def isolability_section(isolability: Isolability) -> ContentSection:
         'Isolability',
         [
             Paragraph(
-                'What this run shows of an arm whose model is known, at the assumed noise of the '
-                'torque. An effect is detectable at five standard deviations of its value. It is '
+                'Effects that this run shows of an arm with a known model, at the assumed torque '
+                'noise. An effect is detectable at five standard deviations of its value. It is '
                 'not distinguishable from an effect that reproduces its torque to 10 % (rms).'
             ),
             DataTable(heads, rows, tuple(range(len(heads)))),
@@ -268,19 +261,6 @@ def _detectable_row(name: str, sizes: Sequence[Detectable]) -> tuple[str, str, s
     best, worst = (size(finite[0]), size(finite[-1])) if finite else ('', '')
     never = '; '.join(place(s) for s in own if not math.isfinite(s.size))
     return name_in_words(name), best, worst if worst != best else '', never
-
-
-def patch_section(findings: Sequence[Finding], text: str) -> ContentSection:
-    """Return the effects added to the model, with the part of model.yaml on effects."""
-    start, end = max(text.find('effects:'), 0), text.find('\nmisfit:')
-    yaml = text[start:end] if end > start else text[start:]
-    own = 'an effect of your own'
-    added = [
-        (f'{f.name}: {CATALOGUE[f.name].summary if f.name in CATALOGUE else own}', '')
-        for f in findings
-    ]
-    line = 'Effects of model.yaml, which armid simulate --model reads'
-    return ContentSection('Patch', [BulletList(added), Fold(line, [Paragraph(yaml, 'code')])])
 
 
 def candidates_section(diagnosis: Diagnosis) -> ContentSection:
@@ -314,8 +294,8 @@ def candidates_section(diagnosis: Diagnosis) -> ContentSection:
                 f'{counted(len(rows), "cause")} that {verb} compared, the likeliest first',
                 [
                     Paragraph(
-                        'Each cause alone, in its best shape. Share: what its torque has of the '
-                        'squared residual; similar causes explain the same part. Evidence: '
+                        'Each cause alone, in its best shape. Share: part of the squared residual '
+                        'that it explains; similar causes explain the same part. Evidence: '
                         'logarithm of how much likelier the data are with it than without. A '
                         'value outside the possible range is no explanation.'
                     ),
@@ -332,10 +312,10 @@ def _candidate_value(diagnosis: Diagnosis, trial: Trial) -> str:
     if diagnosis.explanation is not None:
         arm = diagnosis.explanation.given
     lower, upper = (bound[kept] for bound in room(effect, arm))
-    slack = SURELY * trial.std
+    slack = HALF_WIDTH * trial.std
     if not np.all((trial.values > lower - slack) & (trial.values < upper + slack)):
         return 'not possible'
-    if not np.any(np.abs(trial.values) > slack):
+    if not excludes_zero(trial.values, trial.std).any():
         return 'includes 0'
     name = effect.parameters(arm.robot)[kept[0]]
     return with_interval(float(trial.values[0]), float(trial.std[0]), name.unit)

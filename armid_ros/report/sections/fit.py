@@ -69,9 +69,9 @@ def fit_section(
     Parameters
     ----------
     robot : Robot
-        Gives joints and units.
+        Joints and units.
     training, validation : mapping of str to sequence of Fit
-        Data that it was fitted to, and held-out data, by recording.
+        Fits of the training and of the held-out data, by recording.
     reach : ndarray, shape (n,)
         Half width of the 95 % interval of the predicted torque [N m].
 
@@ -106,13 +106,13 @@ def fit_section(
         for joint in _worst_first(score):
             unit = robot.torque_units[joint]
             share = digits(score.joint_relative_error_percent[joint])
-            said = f'residual {digits(score.rms[joint])} {unit} rms, {share} %'
+            text = f'residual {digits(score.rms[joint])} {unit} rms, {share} %'
             charts = _fit_charts(group[worst], joint, unit, f'{role}-{joint}')
-            panels.append((robot.joints[joint], said, charts))
+            panels.append((robot.joints[joint], text, charts))
         which = f'{role} recording{" predicted worst" * several}: {worst}'
         if role == errors[0][1]:
-            name, said, charts = panels.pop(0)
-            blocks += [Paragraph(f'{name} is the worst joint: {said}.'), *charts, hint]
+            name, text, charts = panels.pop(0)
+            blocks += [Paragraph(f'{name} is the worst joint: {text}.'), *charts, hint]
             which = f'other joints of the {which}'
         else:
             which = f'torques of the {which}'
@@ -183,11 +183,11 @@ def forward_section(
     Parameters
     ----------
     robot : Robot
-        Gives joints and units.
+        Joints and units.
     pairs : sequence of ForwardValidation
         One for each held-out recording.
     labels : tuple of str
-        What both models are called.
+        Names of both models.
 
     """
     blocks: list[Templated] = [
@@ -221,10 +221,10 @@ def forward_section(
         ]
         own.append(BarChart(rows, [(role, label) for role, label, _ in models], True))
         own += _worst_joint(robot, pair, models)
-        said = pair.after.worst
+        text = pair.after.worst
         if pair.before is not None:
-            said = f'{pair.before.worst} before, {said} after'
-        blocks.append(Fold(f'{pair.after.source}: at most {said}', own, opened=number == 0))
+            text = f'{pair.before.worst} before, {text} after'
+        blocks.append(Fold(f'{pair.after.source}: at most {text}', own, opened=number == 0))
     return ContentSection('Forward validation', blocks)
 
 
