@@ -103,7 +103,12 @@ def lived_case(kind: str, index: int) -> LivedCase:
         Number, from 0.
 
     """
-    draft = draw_case(specify(kind, index))
+    return case_of(specify(kind, index))
+
+
+def case_of(spec: LivedSpec) -> LivedCase:
+    """Make the case of a specification."""
+    draft = draw_case(spec)
     spec, chain, cause = draft.spec, draft.arm.chain, draft.cause
     recordings = {run: _record(draft, run) for run in draft.paths}
     return LivedCase(
