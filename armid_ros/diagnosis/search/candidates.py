@@ -220,7 +220,11 @@ def _torque_of(columns: Sequence[FloatArray], rows: Rows) -> FloatArray:
 def _unit(own: SelectedEffect, torque: FloatArray, rows: Rows, robot: Robot) -> FloatArray:
     """Return values with the torque of the joint, at most the largest plausible values."""
     effect, kept = own.effect, list(own.kept)
-    spread = effect.spread(robot)[kept]
+    spread = effect.spread(robot)
+    if len(spread) == len(effect.owners) * len(effect.quantities):
+        most = [q.largest(owner, robot) for owner in effect.owners for q in effect.quantities]
+        spread = np.where(np.isinf(spread), most, spread)
+    spread = spread[kept]
     if effect.adds_to(robot):  # a load and an error of a link are bodies alike
         spread = (float(robot.rigid_parameters[::10].sum()) * _BODY)[kept]
     largest = 1.0 / np.maximum(np.max(torque / rows.torque[:, np.newaxis], axis=0), 1e-12)
