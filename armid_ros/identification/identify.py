@@ -42,6 +42,7 @@ from armid_ros.identification.rows.regression import (
     Score,
 )
 from armid_ros.identification.rows.signals import (
+    check_recordings,
     Conditioning,
     conditioning,
     no_stretch,
@@ -176,8 +177,8 @@ class Identification:
 
     def predict(self, recordings: Sequence[Recording]) -> tuple[Fit, ...]:
         """Predict the torques of other recordings, filtered like the training data."""
-        signals = SignalSettings(self.used.cutoff_hz, self.used.decimation)
-        recordings, _ = without_damage(recordings, signals)
+        check_recordings(recordings)
+        recordings, _ = without_damage(recordings, self.used)
         found = predictions(self.arm, recordings, self.used)
         if not found:
             raise no_stretch(recordings[0], self.used)
@@ -221,8 +222,10 @@ def identify(
 
     """
     settings = settings or IdentificationSettings()
-    recordings, damage = without_damage(recordings, settings.signals)
-    used = conditioning(list(recordings), settings.signals)
+    used = conditioning(recordings, settings.signals)
+    recordings, damage = without_damage(recordings, used)
+    if damage:
+        used = conditioning(recordings, settings.signals)
     notes = damage + check_motion(arm.robot, recordings)
     notes += beyond_limits(arm.robot, recordings) + too_short_to_tell(recordings)
     theory = arm.base_parameters(rng)

@@ -195,7 +195,7 @@ def drive_gains(
         If no gain is determined, as when all recordings have the same payload.
 
     """
-    used = conditioning(list(recordings), signals)
+    used = conditioning(recordings, signals)
     rows = regressions(arm, arm.base_parameters(rng).independent, recordings, used)
     torques = [_torque_of_payload(arm, one, loaded, used, filtered=True) for one in recordings]
     known = np.concatenate(torques)

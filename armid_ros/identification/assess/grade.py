@@ -28,7 +28,7 @@ from armid_ros.identification.identify import Identification
 from armid_ros.identification.rows.checks import moving
 from armid_ros.identification.rows.damage import without_damage
 from armid_ros.identification.rows.regression import Fit, Score
-from armid_ros.identification.rows.signals import Conditioning, SignalSettings
+from armid_ros.identification.rows.signals import Conditioning
 from armid_ros.motion import FloatArray
 from armid_ros.recording import Recording
 import numpy as np
@@ -137,8 +137,7 @@ def _mistakes(
     result: Identification, description: ArmModel, recordings: Sequence[Recording]
 ) -> list[Fault]:
     """Return mistakes in the recordings: names, signs, units, zeros, delays, gravity."""
-    settings = SignalSettings(result.used.cutoff_hz, result.used.decimation)
-    repaired = without_damage(recordings, settings)[0] if recordings else []
+    repaired, _ = without_damage(recordings, result.used)
     faults = []
     for worst, sources in shared_mistakes(description.body, repaired, result.used):
         text = worst.sentence(description.body)

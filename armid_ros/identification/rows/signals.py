@@ -140,7 +140,7 @@ class Conditioning:
         return max(d for d in divisors if d <= max(1.0, widest))
 
 
-def conditioning(recordings: list[Recording], settings: SignalSettings) -> Conditioning:
+def conditioning(recordings: Sequence[Recording], settings: SignalSettings) -> Conditioning:
     """
     Choose the cut-off and the decimation for recordings of one kind.
 
@@ -151,11 +151,7 @@ def conditioning(recordings: list[Recording], settings: SignalSettings) -> Condi
     times this band, and are decimated to 2.5 samples per period of the upper end.
 
     """
-    for recording in recordings:
-        _require_rate(recording)
-        mixed = two_senders(recording)
-        if mixed:
-            raise IdentificationError(f'{recording.source or "recording"}: {mixed}')
+    check_recordings(recordings)
     rate = float(np.median([1.0 / recording.period for recording in recordings]))
     cutoff, decimation = settings.cutoff_hz, settings.decimation
     if cutoff is None or decimation is None:
@@ -207,22 +203,34 @@ def velocity_error(recording: Recording, used: Conditioning) -> FloatArray:
     return np.asarray(2.0 * np.pi * np.sqrt(noise + lacking * frequency[1]))
 
 
-def _require_rate(recording: Recording) -> None:
-    """Raise an IdentificationError if samples are too far apart, as with stamps not in seconds."""
-    rate = 1.0 / recording.period
-    if rate >= SLOWEST:
-        return
-    units = (('milliseconds', 1e3), ('microseconds', 1e6), ('nanoseconds', 1e9))
-    likely = [
-        f'; the stamps seem to be {unit} in place of seconds, {factor * rate:.4g} samples/s: '
-        'write them in seconds'
-        for unit, factor in units
-        if USUAL_RATES[0] <= factor * rate <= USUAL_RATES[1]
-    ]
-    raise IdentificationError(
-        f'{recording.source}: {len(recording)} samples in {recording.duration:.4g} s, one every '
-        f'{1.0 / rate:.4g} s: too slow for a motion' + (likely[0] if likely else '')
-    )
+def check_recordings(recordings: Sequence[Recording]) -> None:
+    """
+    Raise an error for recordings that no filter can process.
+
+    Raises
+    ------
+    IdentificationError
+        If samples are too far apart, as with stamps that are not in seconds, or if a topic has two
+        senders.
+
+    """
+    for recording in recordings:
+        rate = 1.0 / recording.period
+        if rate < SLOWEST:
+            units = (('milliseconds', 1e3), ('microseconds', 1e6), ('nanoseconds', 1e9))
+            likely = [
+                f'; the stamps seem to be {unit} in place of seconds, {factor * rate:.4g} '
+                'samples/s: write them in seconds'
+                for unit, factor in units
+                if USUAL_RATES[0] <= factor * rate <= USUAL_RATES[1]
+            ]
+            raise IdentificationError(
+                f'{recording.source}: {len(recording)} samples in {recording.duration:.4g} s, one '
+                f'every {1.0 / rate:.4g} s: too slow for a motion' + (likely[0] if likely else '')
+            )
+        mixed = two_senders(recording)
+        if mixed:
+            raise IdentificationError(f'{recording.source or "recording"}: {mixed}')
 
 
 def segments(recording: Recording, used: Conditioning) -> Iterator[Motion]:

@@ -19,9 +19,9 @@ from armid_ros.arm import ArmModel
 from armid_ros.identification.rows.damage import without_damage
 from armid_ros.identification.rows.regression import Regression, regressions
 from armid_ros.identification.rows.signals import (
+    check_recordings,
     Conditioning,
     EDGE_PERIODS,
-    SignalSettings,
 )
 from armid_ros.recording import ReadSettings, Recording
 from armid_ros.recording.reader import read_pieces
@@ -89,7 +89,8 @@ def streamed(
         if not chosen:
             chosen.append(choose(piece))
         used = chosen[0]
-        (repaired,), _ = without_damage([piece], SignalSettings(used.cutoff_hz, used.decimation))
+        check_recordings([piece])
+        (repaired,), _ = without_damage([piece], used)
         stop = np.inf if last else float(_cuts(piece, used)[1])
         owned = []
         for rows in regressions(arm, columns, [repaired], used):
