@@ -156,8 +156,10 @@ def regressions(
     result = []
     for recording in recordings:
         for motion in segments(recording, used):
-            stacked = filtered_columns(arm, columns, motion, used, tick)
-            result.append(Regression(recording.source, *_rows(arm, motion, used), stacked))
+            rest, unsure = held_samples(arm, motion)
+            stacked = filtered_columns(arm, columns, motion, used, unsure, tick)
+            rows = _rows(motion, used, rest, unsure)
+            result.append(Regression(recording.source, *rows, stacked))
     return result
 
 
@@ -244,32 +246,23 @@ def predictions(arm: ArmModel, recordings: Sequence[Recording], used: Conditioni
     found = []
     for recording in recordings:
         for motion in segments(recording, used):
-            torque = filtered_torque(arm, motion, used)
-            found.append(Fit(recording.source, *_rows(arm, motion, used), torque))
+            rest, unsure = held_samples(arm, motion)
+            torque = decimate(bridged(arm.torque(motion), unsure), used)
+            found.append(Fit(recording.source, *_rows(motion, used, rest, unsure), torque))
     return found
 
 
-def filtered_torque(arm: ArmModel, motion: Motion, used: Conditioning) -> FloatArray:
-    """
-    Filter and decimate the torque of an arm along one unbroken stretch.
-
-    Returns
-    -------
-    ndarray, shape (M, n)
-
-    """
-    return decimate(bridged(arm.torque(motion), unsure_samples(arm, motion)), used)
-
-
 def _rows(
-    arm: ArmModel, motion: Motion, used: Conditioning
+    motion: Motion,
+    used: Conditioning,
+    rest: npt.NDArray[np.bool_],
+    unsure: npt.NDArray[np.bool_],
 ) -> tuple[Motion, npt.NDArray[np.bool_]]:
     """Return the decimated motion and torque of a stretch, and the mask of informative rows."""
     kept = np.array(decimated_samples(len(motion), used), dtype=np.intp)
     assert motion.tau is not None
-    tau = bridged(motion.tau, unsure_samples(arm, motion))
-    decimated = motion.select(kept).with_torque(decimate(tau, used))
-    return decimated, ~_at_rest(arm, motion)[kept]
+    tau = decimate(bridged(motion.tau, unsure), used)
+    return motion.select(kept).with_torque(tau), ~rest[kept]
 
 
 def filtered_columns(
@@ -277,6 +270,7 @@ def filtered_columns(
     columns: npt.NDArray[np.intp],
     motion: Motion,
     used: Conditioning,
+    unsure: npt.NDArray[np.bool_],
     tick: Callable[[int], None] = lambda samples: None,
 ) -> FloatArray:
     """
@@ -292,6 +286,8 @@ def filtered_columns(
         The stretch at the full rate.
     used : Conditioning
         Filters.
+    unsure : ndarray of bool, shape (N, n)
+        Samples of each joint that are interpolated; see `held_samples`.
     tick : callable, optional
         Called with the number of samples finished since the last call.
 
@@ -301,7 +297,6 @@ def filtered_columns(
 
     """
     result = np.empty((len(decimated_samples(len(motion), used)), motion.n_joints, len(columns)))
-    unsure = unsure_samples(arm, motion)
     parts = [(arm.rigid_columns, len(arm.robot.rigid_parameters), True)]
     parts += [
         (partial(arm.columns_of, effect), len(values), effect.instantaneous)
@@ -312,10 +307,11 @@ def filtered_columns(
     for function, size, instantaneous in parts:
         outer = np.flatnonzero((columns >= first) & (columns < first + size))
         inner = columns[outer] - first
+        chosen = slice(None) if len(inner) == size else inner  # a slice copies nothing
         if len(outer) and instantaneous:
-            local.append((function, inner, outer))
+            local.append((function, chosen, outer))
         elif len(outer):
-            whole = bridged(function(motion)[:, :, inner], unsure)
+            whole = bridged(function(motion)[:, :, chosen], unsure)
             result[:, :, outer] = decimate(whole, used)
         first += size
     margin = arm.neighbours(1.0 / used.rate_hz)
@@ -329,13 +325,14 @@ def filtered_columns(
         stop, before = min(len(motion), start + step + overlap), max(0, start - margin)
         around, inside = slice(before, stop + margin), slice(start - before, stop - before)
         rows = slice(row, row + len(decimated_samples(stop - start, used)))
+        piece = motion.select(around)
         for function, inner, outer in local:
             if function == arm.rigid_columns and stride > 1:
                 # smooth columns need no interpolation and fewer samples
                 block = function(motion.select(slice(start, stop, stride)))[:, :, inner]
                 result[rows, :, outer] = decimate(block, used, stride)
             else:
-                block = function(motion.select(around))[:, :, inner]
+                block = function(piece)[:, :, inner]
                 result[rows, :, outer] = decimate(bridged(block, unsure[around])[inside], used)
         row = rows.stop
         tick(stop - start)
@@ -343,14 +340,34 @@ def filtered_columns(
     return result
 
 
-def unsure_samples(arm: ArmModel, motion: Motion) -> npt.NDArray[np.bool_]:
-    """Return the samples next to a reversal of joints that have dry friction, shape (N, n)."""
-    held = _held(arm, motion)
-    turned = np.diff(np.sign(motion.dq[:, held]), axis=0) != 0
-    unsure = np.zeros(motion.q.shape, dtype=bool)
-    unsure[1:, held] = turned
-    unsure[:-1, held] |= turned
-    return unsure & ~_at_rest(arm, motion)
+def held_samples(
+    arm: ArmModel, motion: Motion
+) -> tuple[npt.NDArray[np.bool_], npt.NDArray[np.bool_]]:
+    """
+    Return the samples of joints with dry friction in which the friction is unknown.
+
+    Returns
+    -------
+    rest : ndarray of bool, shape (N, n)
+        Samples of a joint at rest, which friction may hold with any torque.
+    unsure : ndarray of bool, shape (N, n)
+        Samples next to a reversal of a moving joint.
+
+    """
+    rest, unsure = np.zeros((2, *motion.q.shape), dtype=bool)
+    shortest = REST_TIME / float(motion.t[1] - motion.t[0])
+    held = {joint for effect in arm.effects if effect.holds_at_rest for joint in effect.joints}
+    for joint in map(motion.joints.index, held):
+        velocity = motion.dq[:, joint]
+        direction, speed = np.sign(velocity), np.abs(velocity)
+        turned = direction[1:] != direction[:-1]
+        unsure[1:, joint] = turned
+        unsure[:-1, joint] |= turned
+        slow = np.concatenate([[False], speed < REST_SPEED * speed.max(), [False]])
+        edges = np.flatnonzero(slow[1:] != slow[:-1]).reshape(-1, 2)
+        for start, stop in edges[np.diff(edges, axis=1)[:, 0] >= shortest]:
+            rest[start:stop, joint] = True
+    return rest, unsure & ~rest
 
 
 def bridged(values: FloatArray, unsure: npt.NDArray[np.bool_]) -> FloatArray:
@@ -382,22 +399,3 @@ def bridged(values: FloatArray, unsure: npt.NDArray[np.bool_]) -> FloatArray:
         share = share.reshape(-1, *(1,) * (own.ndim - 1))
         result[gaps, joint] = own[left] + share * (own[right] - own[left])
     return result
-
-
-def _held(arm: ArmModel, motion: Motion) -> list[int]:
-    """Return the joints that dry friction may hold, as columns of the motion."""
-    held = {joint for effect in arm.effects if effect.holds_at_rest for joint in effect.joints}
-    return [motion.joints.index(name) for name in held]
-
-
-def _at_rest(arm: ArmModel, motion: Motion) -> npt.NDArray[np.bool_]:
-    """Return where joints with dry friction are at rest, shape (N, n)."""
-    rest = np.zeros(motion.q.shape, dtype=bool)
-    shortest = REST_TIME / float(motion.t[1] - motion.t[0])
-    for joint in _held(arm, motion):
-        speed = np.abs(motion.dq[:, joint])
-        slow = np.concatenate([[False], speed < REST_SPEED * speed.max(), [False]])
-        edges = np.flatnonzero(np.diff(slow.astype(int))).reshape(-1, 2)
-        for start, stop in edges[np.diff(edges, axis=1)[:, 0] >= shortest]:
-            rest[start:stop, joint] = True
-    return rest

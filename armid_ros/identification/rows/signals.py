@@ -26,7 +26,7 @@ from armid_ros.recording.recording import GAP_PERIODS
 from armid_ros.recording.series import NOTHING
 import numpy as np
 import numpy.typing as npt
-from scipy import signal
+from scipy import fft, signal
 from scipy.interpolate import CubicSpline
 from scipy.ndimage import correlate1d
 
@@ -405,17 +405,16 @@ def _motion_band(stretches: Sequence[tuple[FloatArray, npt.ArrayLike]], rate: fl
     # noise. Power above it does not count, as a joint that hardly moves has only noise where
     # another joint moves. All stretches count together, for the same reason.
     band = rate / max(len(q) for q, _ in stretches)
-    spectra = []
-    for q, end in stretches:  # the power of velocities
-        spectra.append((*signal.periodogram(np.diff(q, axis=0), rate, axis=0), end))
     for joint in range(stretches[0][0].shape[1]):
-        kept = [
-            (frequency[inside], power[inside, joint])
-            for frequency, power, end in spectra
-            for inside in [frequency <= np.broadcast_to(end, power.shape[1])[joint]]
-        ]
-        frequency, power = (np.concatenate(part) for part in zip(*kept, strict=True))
-        order = np.argsort(frequency)
+        spectra = []
+        for q, end in stretches:
+            velocity = np.diff(q[:, joint])
+            frequency = fft.rfftfreq(len(velocity), 1.0 / rate)
+            power = np.abs(fft.rfft(velocity - velocity.mean())) ** 2 / len(velocity)
+            inside = frequency <= np.broadcast_to(end, q.shape[1])[joint]
+            spectra.append((frequency[inside], power[inside]))
+        frequency, power = (np.concatenate(part) for part in zip(*spectra, strict=True))
+        order = np.argsort(frequency, kind='stable')
         share = np.cumsum(power[order])
         if share[-1] > 0.0:
             band = max(band, float(frequency[order[np.searchsorted(share, 0.99 * share[-1])]]))
