@@ -77,7 +77,8 @@ def late_torque(robot: Robot, recording: Recording, used: Conditioning) -> Delay
         (step,), (half,) = shared_values(own, shared / torque, near / torque)
         before = seconds
         seconds = float(np.clip(seconds + step, -_LONGEST, _LONGEST))
-        if abs(seconds - before) < 1e-4:  # [s]
+        # a smaller step [s], or a small share of the interval, changes no decision
+        if abs(seconds - before) < max(1e-4, 0.05 * half):
             break
     return Delay(seconds, float(half)) if abs(seconds) > half else None
 
