@@ -12,7 +12,7 @@ arm. Noise products add up over bags, so the result equals one identification of
 from __future__ import annotations
 
 from collections.abc import Iterable, Iterator, Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 import datetime
 
 from armid_ros.errors import ArmidError, IdentificationError
@@ -26,6 +26,7 @@ from armid_ros.identification.fitting.normal_equations import (
     NormalEquations,
     weighted_fit,
     WeightedFit,
+    within,
 )
 from armid_ros.identification.rows.checks import check_positions, check_torque, resting
 from armid_ros.identification.rows.regression import Regression
@@ -111,9 +112,9 @@ class FleetFit:
         base, kept = identifiable_base(job.theory, normal)
         if normal.counts.sum() < 2 * base.rank:
             return None
-        limits = bounds(job.arm, base)
-        fit = weighted_fit(normal.restrict(kept), weighted=job.settings.weighted, bounds=limits)
-        return cls(base, tuple(kept), fit)
+        fit = weighted_fit(normal.restrict(kept), weighted=job.settings.weighted)
+        values = within(fit.values, fit.factor, bounds(job.arm, base))
+        return cls(base, tuple(kept), replace(fit, values=values))
 
     def noise(self, rows: Iterable[Regression]) -> FloatArray:
         """Return the covariance of the products of columns and residuals of rows, (r, r)."""

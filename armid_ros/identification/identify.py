@@ -223,11 +223,10 @@ def identify(
     """
     settings = settings or IdentificationSettings()
     used = conditioning(recordings, settings.signals)
-    recordings, damage = without_damage(recordings, used)
-    if damage:
-        used = conditioning(recordings, settings.signals)
-    notes = damage + check_motion(arm.robot, recordings)
-    notes += beyond_limits(arm.robot, recordings) + too_short_to_tell(recordings)
+    recordings, notes = without_damage(recordings, used)
+    used = conditioning(recordings, settings.signals) if notes else used
+    notes += check_motion(arm.robot, recordings) + beyond_limits(arm.robot, recordings)
+    notes += too_short_to_tell(recordings)
     theory = arm.base_parameters(rng)
     # a quasi-static fit uses the described inertia, unless physical links are fitted to the weight
     described = arm.quasi_static and settings.physical is None
@@ -312,9 +311,9 @@ def _fitted(
     def fitted(arm: ArmModel, base: BaseParameters, problem: Sequence[Regression]) -> FittedValues:
         if not settings.holds_description:
             return fit_values(arm, base, problem, recordings, used, method)
-        told, problem, solution = determined(arm, base, problem, method)
-        free = None if told.rank == base.rank else ungrouped(arm, base)
-        return fit_values(arm, told, problem, recordings, used, method, free, solution)
+        kept, problem, solution = determined(arm, base, problem, method)
+        free = None if kept.rank == base.rank else ungrouped(arm, base)
+        return fit_values(arm, kept, problem, recordings, used, method, free, solution)
 
     fit = fitted(arm, base, problem)
     rigid = len(arm.robot.rigid_parameters)

@@ -262,9 +262,9 @@ def beyond_noise(errors: FloatArray, fits: Sequence[Fit], used: Conditioning) ->
         Errors without the noise [%]; zero for a joint at rest throughout.
 
     """
-    told = np.concatenate([fit.informative for fit in fits])
-    torque = told * np.concatenate([fit.tau for fit in fits])
-    rows = np.maximum(np.count_nonzero(told, axis=0), 1)
+    informative = np.concatenate([fit.informative for fit in fits])
+    torque = informative * np.concatenate([fit.tau for fit in fits])
+    rows = np.maximum(np.count_nonzero(informative, axis=0), 1)
     size = np.sqrt(np.sum(torque**2, axis=0) / rows)
     noise = np.divide(torque_noise(fits, used), size, out=np.zeros_like(size), where=size > 0.0)
     left = np.sqrt(np.maximum(np.square(errors) - 2.0 * np.square(100.0 * noise), 0.0))

@@ -358,8 +358,8 @@ def velocity_faults(recording: Recording) -> Iterator[Fault]:
         off = follows & (ratio / expected > 1.0 / _NEAR) & (ratio / expected < _NEAR)
         if off.any():
             named = ', '.join(recording.joints[k] for k in np.flatnonzero(off))
-            said = f'velocities of {named} {text}; the fit takes velocities from the positions'
-            yield Fault(said, 'good', recording.source)
+            what = f'velocities of {named} {text}; the fit takes velocities from the positions'
+            yield Fault(what, 'good', recording.source)
 
 
 def held_elsewhere(

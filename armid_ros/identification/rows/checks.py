@@ -247,14 +247,14 @@ def position_problem(robot: Robot, lowest: FloatArray, highest: FloatArray) -> s
     degrees = np.deg2rad(lowest) > robot.lower - slack
     degrees &= ~robot.prismatic & (np.deg2rad(highest) < robot.upper + slack) & (excess > allowed)
     hint = '' if robot.prismatic[worst] or degrees[worst] else ' (degrees?)'
-    said = f'{robot.joints[worst]} reaches {reach:.4g}{hint}, its'
+    text = f'{robot.joints[worst]} reaches {reach:.4g}{hint}, its'
     if degrees[worst]:
         names = ', '.join(np.array(robot.joints)[degrees])
-        said = (
-            f'{names} seem{"s" if degrees.sum() == 1 else ""} to be in degrees (--degrees): {said}'
+        text = (
+            f'{names} seem{"s" if degrees.sum() == 1 else ""} to be in degrees (--degrees): {text}'
         )
     return (
-        f'{said} limits are {robot.lower[worst]:.4g} to {robot.upper[worst]:.4g} '
+        f'{text} limits are {robot.lower[worst]:.4g} to {robot.upper[worst]:.4g} '
         f'{robot.position_units[worst]}; positions have to be in rad or m, with the zero of the '
         'description'
     )

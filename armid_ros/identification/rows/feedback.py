@@ -34,7 +34,7 @@ _BESIDE, _TURNING = 3, 0.02
 
 
 def laws_of_controllers(
-    robot: Robot, motion: Motion, told: npt.NDArray[np.bool_]
+    robot: Robot, motion: Motion, informative: npt.NDArray[np.bool_]
 ) -> tuple[str, ...]:
     """
     Return messages if the torque of every driven joint is a law of position and direction alone.
@@ -48,7 +48,7 @@ def laws_of_controllers(
         The arm.
     motion : Motion
         Filtered motion with the torque filtered alike, R samples of n joints.
-    told : ndarray of bool, shape (R, n)
+    informative : ndarray of bool, shape (R, n)
         False where a joint is at rest.
 
     Returns
@@ -65,14 +65,14 @@ def laws_of_controllers(
     smeared = maximum_filter1d(slow, 2 * _BESIDE + 1, axis=0, mode='constant')
     # 5000 rows are about sixty for every value of seven joints
     some = slice(None, None, max(1, len(motion) // 5000))
-    told = (told & ~smeared)[some]
+    informative = (informative & ~smeared)[some]
     motion = motion.select(some)
     assert motion.tau is not None
     weight, needed = regressor(robot, motion.at_rest()), inverse_dynamics(robot, motion)
-    said: list[str] = []
+    laws: list[str] = []
     silent = 0
     for joint, (name, unit) in enumerate(zip(robot.joints, robot.torque_units, strict=True)):
-        rows = told[:, joint]
+        rows = informative[:, joint]
         tau = motion.tau[rows, joint]
         direction = np.sign(motion.dq[rows, joint])
         law = np.column_stack([weight[rows, joint], direction, np.ones_like(tau)])
@@ -85,14 +85,14 @@ def laws_of_controllers(
             continue
         if left > _FOLLOWS * size or left > _WITHOUT_INERTIA * lacking:
             return ()
-        said.append(
+        laws.append(
             f'the torque of {name} is a law of position and direction of motion alone, to '
             f'{100 * left / size:.1f} %. A controller that holds the weight or pushes along '
             f'makes such a torque. The {lacking:.2g} {unit} of the inertia are missing in it. '
             'Something else moves the arm, or body and friction cannot be distinguished: record '
             'the arm while it follows a trajectory'
         )
-    return tuple(said) if len(said) > silent else ()
+    return tuple(laws) if len(laws) > silent else ()
 
 
 def _left(law: FloatArray, torque: FloatArray) -> float | None:

@@ -321,7 +321,7 @@ def decimate(values: FloatArray, used: Conditioning, stride: int = 1) -> FloatAr
     result = np.zeros((count, flat.shape[1]))
     # a link moves no joint after its own: half are zero
     active = np.flatnonzero(flat.any(axis=0))
-    flat = np.ascontiguousarray(flat[:, active])
+    flat = np.ascontiguousarray(flat[:, active] if len(active) < flat.shape[1] else flat)
     size = 16  # output samples of one matrix product; larger ones multiply more zeros of the band
     band = np.zeros((size, (size - 1) * factor + len(taps)))
     for row in range(size):
@@ -371,7 +371,7 @@ def _differentiated(
     few = max(1, int(used.rate_hz / (20.0 * used.cutoff_hz)))
     bands = [(smooth[::few, :n], used.cutoff_hz)]
     band = _CURVATURE_BANDS * _motion_band(bands, used.rate_hz / few)
-    beside = None
+    points = None
     if recording.partner is not None:
         # motion of the ends of the ties on the other machine
         other, ties = recording.partner, recording.partner.ties
@@ -382,9 +382,9 @@ def _differentiated(
             smooth[inner, n:],
         )
         velocity = np.einsum('nsxj,nj->nsx', jacobian, dq[inner, n:])
-        beside = MovingPoints(tuple(tie.name for tie in ties), position, velocity)
+        points = MovingPoints(tuple(tie.name for tie in ties), position, velocity)
     parts = (part[inner] for part in (smooth[:, :n], dq[:, :n], ddq, tau))
-    return Motion(recording.joints, t[inner], *parts, band_hz=band, partner=beside)
+    return Motion(recording.joints, t[inner], *parts, band_hz=band, partner=points)
 
 
 def _central_difference(x: FloatArray, step: float) -> FloatArray:
