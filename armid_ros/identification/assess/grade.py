@@ -284,7 +284,7 @@ def torque_noise(fits: Sequence[Fit], used: Conditioning) -> FloatArray:
         return np.zeros(fits[0].motion.n_joints)
     deviation = np.median(differences, axis=0) / float(stats.norm.ppf(0.75))
     # for filtered white noise: variance of second differences of rows over that of rows
-    taps, step = used.taps(), used.decimation
+    taps, step = used.taps, used.decimation
     own, next_one, after = (
         float(taps[: len(taps) - lag] @ taps[lag:]) if lag < len(taps) else 0.0
         for lag in (0, step, 2 * step)

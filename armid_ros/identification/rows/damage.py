@@ -37,7 +37,7 @@ def without_damage(
         Notes on the damage: recording, number of samples, and the first of them.
 
     """
-    peak = float(np.max(used.taps()) / np.sum(used.taps()))
+    peak = float(np.max(used.taps) / np.sum(used.taps))
     repaired, found = [], []
     for recording in recordings:
         repaired.append(recording)

@@ -12,6 +12,7 @@ without mass.
 
 from __future__ import annotations
 
+from armid_ros.identification.rows.regression import REST_SPEED
 from armid_ros.model import inverse_dynamics, regressor
 from armid_ros.motion import FloatArray, Motion
 from armid_ros.robots import Robot
@@ -28,9 +29,6 @@ _FOLLOWS = 0.03
 #: Smallest torque of a driven joint as a share of the torque of the model. With less, the joint
 #: swings freely, or the model is wrong.
 _DRIVEN = 0.5
-#: Number of rows on either side of a reversal that filters smear, and speed below which a joint
-#: may reverse, as a share of its top speed.
-_BESIDE, _TURNING = 3, 0.02
 
 
 def laws_of_controllers(
@@ -58,11 +56,11 @@ def laws_of_controllers(
         if at least as many joints cannot be tested.
 
     """
-    # rows where a joint reverses, and neighbours that filters smear
+    # rows where a joint reverses, and three on either side, which filters smear
     speed = np.abs(motion.dq)
-    slow = speed <= _TURNING * speed.max(axis=0, initial=0.0)
+    slow = speed <= REST_SPEED * speed.max(axis=0, initial=0.0)
     slow[1:] |= np.diff(np.sign(motion.dq), axis=0) != 0
-    smeared = maximum_filter1d(slow, 2 * _BESIDE + 1, axis=0, mode='constant')
+    smeared = maximum_filter1d(slow, 7, axis=0, mode='constant')
     # 5000 rows are about sixty for every value of seven joints
     some = slice(None, None, max(1, len(motion) // 5000))
     informative = (informative & ~smeared)[some]

@@ -144,22 +144,15 @@ def regressions(
         One per unbroken stretch.
 
     """
-    total = sum(len(recording.t) for recording in recordings)
-    done = 0
-
-    def tick(samples: int) -> None:
-        nonlocal done
-        done += samples
-        if progress is not None:
-            progress(min(1.0, done / total))
-
     result = []
-    for recording in recordings:
+    for number, recording in enumerate(recordings, start=1):
         for motion in segments(recording, used):
             rest, unsure = held_samples(arm, motion)
-            stacked = filtered_columns(arm, columns, motion, used, unsure, tick)
+            stacked = filtered_columns(arm, columns, motion, used, unsure)
             rows = _rows(motion, used, rest, unsure)
             result.append(Regression(recording.source, *rows, stacked))
+        if progress is not None:
+            progress(number / len(recordings))
     return result
 
 
@@ -271,7 +264,6 @@ def filtered_columns(
     motion: Motion,
     used: Conditioning,
     unsure: npt.NDArray[np.bool_],
-    tick: Callable[[int], None] = lambda samples: None,
 ) -> FloatArray:
     """
     Filter and decimate some columns of an arm's regressor along one unbroken stretch.
@@ -288,8 +280,6 @@ def filtered_columns(
         Filters.
     unsure : ndarray of bool, shape (N, n)
         Samples of each joint that are interpolated; see `held_samples`.
-    tick : callable, optional
-        Called with the number of samples finished since the last call.
 
     Returns
     -------
@@ -318,7 +308,7 @@ def filtered_columns(
     stride = used.smooth_stride if margin == 0 else 1
     sure = ~np.pad(unsure, ((1, 1), (0, 0)))
     longest = max(int(np.diff(np.flatnonzero(column)).max()) - 1 for column in sure.T)
-    margin, overlap, row = max(margin, longest), len(used.taps()) - 1, 0
+    margin, overlap, row = max(margin, longest), len(used.taps) - 1, 0
     # samples whose regressor is in memory at once; 7 joints of 70 columns are 80 MB
     step = max(used.decimation, 20_000 // used.decimation * used.decimation)
     for start in range(0, max(1, len(motion) - overlap), step):
@@ -335,7 +325,6 @@ def filtered_columns(
                 block = function(piece)[:, :, inner]
                 result[rows, :, outer] = decimate(bridged(block, unsure[around])[inside], used)
         row = rows.stop
-        tick(stop - start)
     result.setflags(write=False)  # a read-only array is frozen without a copy
     return result
 

@@ -114,12 +114,9 @@ class Conditioning:
         # the decimation filter ends at this share of the rate of the rows
         return 0.4 * self.rate_hz / self.decimation
 
-    def taps(self) -> FloatArray:
-        """Return the symmetric decimation filter; a single 1 where nothing is decimated."""
-        return self._taps
-
     @cached_property
-    def _taps(self) -> FloatArray:
+    def taps(self) -> FloatArray:
+        """Symmetric decimation filter; a single 1 where nothing is decimated."""
         if self.decimation == 1:
             return read_only(np.ones(1))
         count = 2 * _HALF_TAPS * self.decimation + 1
@@ -269,19 +266,15 @@ def unbroken(recording: Recording, rate: float) -> list[npt.NDArray[np.intp]]:
 
 def _shortest(used: Conditioning) -> float:
     """Return the shortest stretch that the filters can process [s]."""
-    return _decimated_edges(used) + _CUTOFF_PERIODS / used.cutoff_hz
-
-
-def _decimated_edges(used: Conditioning) -> float:
-    """Return the duration that the decimation filter removes at both ends together [s]."""
-    return 2 * _HALF_TAPS * used.decimation / used.rate_hz
+    edges = 2 * _HALF_TAPS * used.decimation / used.rate_hz  # of the decimation
+    return edges + _CUTOFF_PERIODS / used.cutoff_hz
 
 
 def no_stretch(recording: Recording, used: Conditioning) -> IdentificationError:
     """Return the error that no stretch is long enough for the filters, with the needed length."""
     spans = [recording.t[part[[0, -1]]] for part in unbroken(recording, used.rate_hz)]
     longest = max(float(last - first) for first, last in spans)
-    left = longest - _decimated_edges(used)
+    left = longest - _shortest(used) + _CUTOFF_PERIODS / used.cutoff_hz
     if 'cutoff' in used.given and left > 0.0:
         return IdentificationError(
             f'{recording.source}: --cutoff {used.cutoff_hz:g} Hz is too low for {longest:.2f} s '
@@ -314,7 +307,7 @@ def decimate(values: FloatArray, used: Conditioning, stride: int = 1) -> FloatAr
         Sample m belongs to input ``decimated_samples(N, used)[m]``.
 
     """
-    taps, factor = used.taps()[::stride], used.decimation // stride
+    taps, factor = used.taps[::stride], used.decimation // stride
     taps = taps / taps.sum()
     count = len(range(len(taps) // 2, len(values) - len(taps) // 2, factor))
     flat = values.reshape(len(values), -1)
@@ -336,7 +329,7 @@ def decimate(values: FloatArray, used: Conditioning, stride: int = 1) -> FloatAr
 
 def decimated_samples(n_samples: int, used: Conditioning) -> range:
     """Return the indices of the full-rate samples at the times of the decimated ones."""
-    half = (len(used.taps()) - 1) // 2
+    half = (len(used.taps) - 1) // 2
     return range(half, max(half, n_samples - half), used.decimation)
 
 

@@ -34,7 +34,7 @@ def _cuts(piece: Recording, used: Conditioning) -> tuple[int, int]:
     """Return the stamp of the first sample of the next piece, and that of its first row [ns]."""
     # after 16 periods, the start of a filter of order 4 has decayed to exp(-38)
     periods = (EDGE_PERIODS + 16.0) * used.rate_hz / used.cutoff_hz
-    margin = int(np.ceil(periods)) + len(used.taps())
+    margin = int(np.ceil(periods)) + len(used.taps)
     longest = GAP_PERIODS * max(1.0 / used.rate_hz, piece.period)
     gaps = np.flatnonzero(np.diff(piece.t) > longest)
     origin = int(gaps[-1]) + 1 if len(gaps) else 0

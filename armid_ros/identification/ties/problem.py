@@ -275,12 +275,12 @@ def _passed(used: Conditioning | None) -> tuple[FloatArray, FloatArray]:
     w = np.linspace(0.0, np.pi, 8001)
     sections = signal.butter(4, used.cutoff_hz, fs=used.rate_hz, output='sos')
     gain = np.abs(signal.sosfreqz(sections, w)[1]) ** 4
-    gain = gain * np.abs(signal.freqz(used.taps(), worN=w)[1]) ** 2
+    gain = gain * np.abs(signal.freqz(used.taps, worN=w)[1]) ** 2
     result = np.empty((1 + _LAGS, 3, 3))
     for lag, i, j in np.ndindex(result.shape):
         turned = np.cos(w * lag * used.decimation + (i + j) * np.pi / 2.0)
         result[lag, i, j] = (-1) ** i * np.mean(gain * (used.rate_hz * w) ** (i + j) * turned)
-    taps = used.taps()
+    taps = used.taps
     ends = [len(taps) - lag * used.decimation for lag in range(1 + _LAGS)]
     return result, np.array([taps[:end] @ taps[-end:] if end > 0 else 0.0 for end in ends])
 
