@@ -120,7 +120,7 @@ class FleetFit:
         """Return the covariance of the products of columns and residuals of rows, (r, r)."""
         products = np.zeros((len(self.kept), len(self.kept)))
         for part in rows:
-            some = part if len(self.kept) == part.columns.shape[2] else part.restrict(self.kept)
+            some = part.restrict(self.kept)
             weights = some.informative / self.fit.scale
             residual = some.tau - some.columns @ self.fit.values
             products += noise_products([some], residual * weights, weights, self.fit.inverse)
@@ -325,9 +325,8 @@ def _prepared(bag: BagFile, path: str, job: Job, budget: int) -> BagSummary:
     stamped = datetime.datetime.fromtimestamp(start_ns * 1e-9, datetime.UTC)
     day = bag.day or stamped.date().isoformat()
     apart = datetime.date.fromisoformat(day) - stamped.date()
-    if (
-        abs(apart.days) > 1
-    ):  # a clock that counts from its start; a difference of one day is a time zone
+    # a clock that counts from its start; a difference of one day is a time zone
+    if abs(apart.days) > 1:
         start_ns += apart.days * DAY_NS
     held = None if kept is None else tuple(kept)
     return BagSummary(bag, day, start_ns, seconds, normal, own, motion, rows=held)

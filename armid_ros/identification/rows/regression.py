@@ -24,7 +24,7 @@ from armid_ros.identification.rows.signals import (
     decimated_samples,
     segments,
 )
-from armid_ros.motion import FloatArray, Motion, read_only
+from armid_ros.motion import FloatArray, Motion, read_only, Samples
 from armid_ros.recording import Recording
 import numpy as np
 import numpy.typing as npt
@@ -293,15 +293,17 @@ def filtered_columns(
         for effect, values in zip(arm.effects, arm.values, strict=True)
     ]
     # functions of a part of the motion, with the indices of their columns there and in the result
-    local, first = [], 0
+    local: list[tuple[Callable[[Motion], FloatArray], Samples, npt.NDArray[np.intp]]] = []
+    first = 0
     for function, size, instantaneous in parts:
         outer = np.flatnonzero((columns >= first) & (columns < first + size))
-        inner = columns[outer] - first
-        chosen = slice(None) if len(inner) == size else inner  # a slice copies nothing
+        inner: Samples = columns[outer] - first
+        if np.array_equal(inner, np.arange(size)):
+            inner = slice(None)  # copies nothing
         if len(outer) and instantaneous:
-            local.append((function, chosen, outer))
+            local.append((function, inner, outer))
         elif len(outer):
-            whole = bridged(function(motion)[:, :, chosen], unsure)
+            whole = bridged(function(motion)[:, :, inner], unsure)
             result[:, :, outer] = decimate(whole, used)
         first += size
     margin = arm.neighbours(1.0 / used.rate_hz)

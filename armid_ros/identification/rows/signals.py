@@ -253,7 +253,8 @@ def segments(recording: Recording, used: Conditioning) -> Iterator[Motion]:
     period = 1.0 / used.rate_hz
     for part in unbroken(recording, used.rate_hz):
         if len(part) >= _LEAST_SAMPLES and np.ptp(recording.t[part]) > _shortest(used):
-            t, q, tau = _even(recording.t[part], period, positions[part], measured[part])
+            own = slice(int(part[0]), int(part[-1]) + 1)  # a slice copies nothing
+            t, q, tau = _even(recording.t[own], period, positions[own], measured[own])
             yield _differentiated(recording, t, q, tau, used)
 
 
@@ -358,6 +359,8 @@ def _differentiated(
     dq = _central_difference(smooth, t[1] - t[0])
     n = recording.n_joints
     ddq = _central_difference(dq[:, :n], t[1] - t[0])
+    for array in (smooth, dq, ddq):
+        array.setflags(write=False)  # a motion copies arrays that may change
     edge = int(np.ceil(EDGE_PERIODS * used.rate_hz / used.cutoff_hz))
     inner = slice(edge, len(t) - edge)
     # differences of two samples damp the cut-off by sinc(1 / 20), 0.4 %

@@ -68,8 +68,7 @@ def test_the_rigid_body_needs_no_more_samples_than_it_has_content(arm):
     assert used.smooth_stride == 10
     motion = multisine(arm.robot.joints, 30.0, rate, seed=3)
     rigid = np.arange(len(arm.robot.rigid_parameters))
-    _, unsure = held_samples(arm, motion)
-    strided = filtered_columns(arm, rigid, motion, used, unsure)
+    strided = filtered_columns(arm, rigid, motion, used, held_samples(arm, motion)[1])
     whole = decimate(arm.columns(motion)[:, :, rigid], used)
     scale = np.abs(whole).max(axis=(0, 1))
     np.testing.assert_array_less(np.abs(strided - whole).max(axis=(0, 1)), 3e-3 * scale + 1e-12)
