@@ -159,11 +159,12 @@ def _jumps(robot: Robot, recording: Recording) -> Iterator[Fault]:
             return
 
 
-def encoder_faults(recording: Recording, units: Sequence[str]) -> Iterator[Fault]:
+def encoder_faults(recording: Recording, units: Sequence[str] | None) -> Iterator[Fault]:
     """Yield position and velocity channels that are constant while the joint moves."""
     if recording.dq is None:
         return
-    t, moved = recording.t, np.ptp(recording.q, axis=0)
+    t, units = recording.t, units or ('rad',) * recording.n_joints
+    moved = np.ptp(recording.q, axis=0)
     # A wheel or a turntable may have constant speed, whose integral is its distance.
     way = np.ptp(recording.q - recording.dq * (t - t[0])[:, np.newaxis], axis=0)
     changes = np.ptp(recording.dq, axis=0) > 0.0

@@ -34,6 +34,8 @@ REST_SPEED = 0.02
 #: ... for at least this long [s]; a reversal of direction is shorter.
 REST_TIME = 0.2
 
+_Columns = Callable[[Motion], FloatArray]
+
 
 @dataclass(frozen=True)
 class Stretch:
@@ -287,19 +289,20 @@ def filtered_columns(
 
     """
     result = np.empty((len(decimated_samples(len(motion), used)), motion.n_joints, len(columns)))
-    parts = [(arm.rigid_columns, len(arm.robot.rigid_parameters), True)]
+    parts: list[tuple[_Columns, int, bool]] = []
+    parts.append((arm.rigid_columns, len(arm.robot.rigid_parameters), True))
     parts += [
         (partial(arm.columns_of, effect), len(values), effect.instantaneous)
         for effect, values in zip(arm.effects, arm.values, strict=True)
     ]
     # functions of a part of the motion, with the indices of their columns there and in the result
-    local: list[tuple[Callable[[Motion], FloatArray], Samples, npt.NDArray[np.intp]]] = []
+    local: list[tuple[_Columns, Samples, npt.NDArray[np.intp]]] = []
     first = 0
     for function, size, instantaneous in parts:
         outer = np.flatnonzero((columns >= first) & (columns < first + size))
-        inner: Samples = columns[outer] - first
-        if np.array_equal(inner, np.arange(size)):
-            inner = slice(None)  # copies nothing
+        own = columns[outer] - first
+        # a slice copies nothing
+        inner: Samples = slice(None) if np.array_equal(own, np.arange(size)) else own
         if len(outer) and instantaneous:
             local.append((function, inner, outer))
         elif len(outer):
