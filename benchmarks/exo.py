@@ -18,7 +18,6 @@ from armid_ros.errors import IdentificationError
 from armid_ros.identification.ties.problem import (
     interaction_problem,
     InteractionProblem,
-    MachineNoise,
 )
 from armid_ros.model.spring_ties import SEGMENTS
 from armid_ros.motion import FloatArray, Motion
@@ -144,7 +143,7 @@ def _planned(exact: PairMotion, degrees: float, separate: bool) -> InteractionPr
         PAIR.machines,
         exact.own,
         exact.other,
-        noise=MachineNoise(np.radians(degrees)),
+        noise=(np.radians(degrees), 0.0),
         inertias='free',
         separate=separate,
     )

@@ -6,7 +6,7 @@ from __future__ import annotations
 
 from dataclasses import replace
 
-from armid_ros.identification.ties.problem import Inertias, interaction_problem, MachineNoise
+from armid_ros.identification.ties.problem import Inertias, interaction_problem
 from armid_ros.identification.ties.recorded import recorded_interaction_problem
 from armid_ros.identification.ties.stiffness import identify_interaction, Interaction
 from armid_ros.motion import Motion
@@ -33,11 +33,11 @@ def find_springs(
             pair.machines,
             own,
             other,
-            noise=MachineNoise(np.radians(degrees)),
+            noise=(np.radians(degrees), TORQUE_NOISE),
             inertias=inertias,
             separate=separate,
         )
-        return identify_interaction(problem, TORQUE_NOISE)
+        return identify_interaction(problem)
     return identify_interaction(
         recorded_interaction_problem(
             pair.machines,

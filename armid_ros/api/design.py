@@ -184,7 +184,7 @@ def _searched(
         raise TrajectoryError(f'--start: {fault}')
     prior = None
     if earlier:  # information matrix of existing recordings
-        used = conditioning(list(earlier), SignalSettings())
+        used = conditioning(earlier, SignalSettings())
         problem = DesignProblem.of(model, settings, np.random.default_rng(rng))
         prior = np.zeros(2 * [len(problem.base.parameters)])
         for recording in earlier:

@@ -239,7 +239,7 @@ class DiagnosisResult(ShownModel):
         if self.held_out and self.core.gap is not None:
 
             def simulated() -> tuple[tuple[ForwardValidation, ...], tuple[str, ...]]:
-                used = conditioning(list(self.recordings), self.settings.signals)
+                used = conditioning(self.recordings, self.settings.signals)
                 return simulate_held_out(
                     self.description, self.arm, used, self.held_out,
                     progress=lambda _, what: progress(1.0, what),

@@ -177,10 +177,10 @@ def mended(
     notes: list[str] = []
     whole: list[list[Recording]] = []
     for part in (recordings, validate, baseline):
-        sound, repairs = without_damage(part, settings.signals) if part else ([], ())
+        used = conditioning(part, settings.signals) if part else None
+        sound, repairs = without_damage(part, used) if used else ([], ())
         whole.append(sound)
-        harmed_ones = [one for one in part if not one.report.unharmed]
-        notes += [f'{one.source}: {one.report.describe()}' for one in harmed_ones]
+        notes += [f'{x.source}: {x.report.describe()}' for x in part if not x.report.unharmed]
         notes += repairs
     notes += filter(None, [given_twice([*recordings, *baseline], validate)])
     return whole[0], whole[1], whole[2], notes

@@ -12,7 +12,7 @@ arm. Noise products add up over bags, so the result equals one identification of
 from __future__ import annotations
 
 from collections.abc import Iterable, Iterator, Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 import datetime
 
 from armid_ros.errors import ArmidError, IdentificationError
@@ -26,6 +26,7 @@ from armid_ros.identification.fitting.normal_equations import (
     NormalEquations,
     weighted_fit,
     WeightedFit,
+    within,
 )
 from armid_ros.identification.rows.checks import check_positions, check_torque, resting
 from armid_ros.identification.rows.regression import Regression
@@ -111,15 +112,15 @@ class FleetFit:
         base, kept = identifiable_base(job.theory, normal)
         if normal.counts.sum() < 2 * base.rank:
             return None
-        limits = bounds(job.arm, base)
-        fit = weighted_fit(normal.restrict(kept), weighted=job.settings.weighted, bounds=limits)
-        return cls(base, tuple(kept), fit)
+        fit = weighted_fit(normal.restrict(kept), weighted=job.settings.weighted)
+        values = within(fit.values, fit.factor, bounds(job.arm, base))
+        return cls(base, tuple(kept), replace(fit, values=values))
 
     def noise(self, rows: Iterable[Regression]) -> FloatArray:
         """Return the covariance of the products of columns and residuals of rows, (r, r)."""
         products = np.zeros((len(self.kept), len(self.kept)))
         for part in rows:
-            some = part if len(self.kept) == part.columns.shape[2] else part.restrict(self.kept)
+            some = part.restrict(self.kept)
             weights = some.informative / self.fit.scale
             residual = some.tau - some.columns @ self.fit.values
             products += noise_products([some], residual * weights, weights, self.fit.inverse)
@@ -324,9 +325,8 @@ def _prepared(bag: BagFile, path: str, job: Job, budget: int) -> BagSummary:
     stamped = datetime.datetime.fromtimestamp(start_ns * 1e-9, datetime.UTC)
     day = bag.day or stamped.date().isoformat()
     apart = datetime.date.fromisoformat(day) - stamped.date()
-    if (
-        abs(apart.days) > 1
-    ):  # a clock that counts from its start; a difference of one day is a time zone
+    # a clock that counts from its start; a difference of one day is a time zone
+    if abs(apart.days) > 1:
         start_ns += apart.days * DAY_NS
     held = None if kept is None else tuple(kept)
     return BagSummary(bag, day, start_ns, seconds, normal, own, motion, rows=held)

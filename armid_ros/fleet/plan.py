@@ -358,8 +358,8 @@ def choose_filters(
         raise FleetError(f'no bag of {arm.robot.name} can be read: {problem}')
     used = conditioning(recordings, wanted)
     if wanted.cutoff_hz is None:
-        repaired, _ = without_damage(recordings, SignalSettings(used.cutoff_hz, used.decimation))
-        used = cutoff_of_torques(arm, theory.independent, repaired, used)
+        recordings, _ = without_damage(recordings, used)
+        used = cutoff_of_torques(arm, theory.independent, recordings, used)
     return Conditioning(used.rate_hz, used.cutoff_hz, used.decimation)
 
 

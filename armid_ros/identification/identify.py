@@ -42,6 +42,7 @@ from armid_ros.identification.rows.regression import (
     Score,
 )
 from armid_ros.identification.rows.signals import (
+    check_recordings,
     Conditioning,
     conditioning,
     no_stretch,
@@ -176,8 +177,8 @@ class Identification:
 
     def predict(self, recordings: Sequence[Recording]) -> tuple[Fit, ...]:
         """Predict the torques of other recordings, filtered like the training data."""
-        signals = SignalSettings(self.used.cutoff_hz, self.used.decimation)
-        recordings, _ = without_damage(recordings, signals)
+        check_recordings(recordings)
+        recordings, _ = without_damage(recordings, self.used)
         found = predictions(self.arm, recordings, self.used)
         if not found:
             raise no_stretch(recordings[0], self.used)
@@ -221,10 +222,11 @@ def identify(
 
     """
     settings = settings or IdentificationSettings()
-    recordings, damage = without_damage(recordings, settings.signals)
-    used = conditioning(list(recordings), settings.signals)
-    notes = damage + check_motion(arm.robot, recordings)
-    notes += beyond_limits(arm.robot, recordings) + too_short_to_tell(recordings)
+    used = conditioning(recordings, settings.signals)
+    recordings, notes = without_damage(recordings, used)
+    used = conditioning(recordings, settings.signals) if notes else used
+    notes += check_motion(arm.robot, recordings) + beyond_limits(arm.robot, recordings)
+    notes += too_short_to_tell(recordings)
     theory = arm.base_parameters(rng)
     # a quasi-static fit uses the described inertia, unless physical links are fitted to the weight
     described = arm.quasi_static and settings.physical is None
@@ -309,9 +311,9 @@ def _fitted(
     def fitted(arm: ArmModel, base: BaseParameters, problem: Sequence[Regression]) -> FittedValues:
         if not settings.holds_description:
             return fit_values(arm, base, problem, recordings, used, method)
-        told, problem, solution = determined(arm, base, problem, method)
-        free = None if told.rank == base.rank else ungrouped(arm, base)
-        return fit_values(arm, told, problem, recordings, used, method, free, solution)
+        kept, problem, solution = determined(arm, base, problem, method)
+        free = None if kept.rank == base.rank else ungrouped(arm, base)
+        return fit_values(arm, kept, problem, recordings, used, method, free, solution)
 
     fit = fitted(arm, base, problem)
     rigid = len(arm.robot.rigid_parameters)

@@ -19,9 +19,8 @@ from pathlib import Path
 from armid_ros.arm import ArmModel
 from armid_ros.errors import IdentificationError, meant
 from armid_ros.files.cells import listed, parted
-from armid_ros.identification.rows.regression import filtered_torque, regressions
+from armid_ros.identification.rows.regression import predictions, regressions
 from armid_ros.identification.rows.signals import (
-    Conditioning,
     conditioning,
     segments,
     SignalSettings,
@@ -195,10 +194,14 @@ def drive_gains(
         If no gain is determined, as when all recordings have the same payload.
 
     """
-    used = conditioning(list(recordings), signals)
+    used = conditioning(recordings, signals)
     rows = regressions(arm, arm.base_parameters(rng).independent, recordings, used)
-    torques = [_torque_of_payload(arm, one, loaded, used, filtered=True) for one in recordings]
-    known = np.concatenate(torques)
+    known = np.zeros((0, arm.robot.n_joints))  # torque of the payloads
+    for one in recordings:
+        carrying = replace(arm, robot=loaded.get(one.source, arm.robot))
+        fits = zip(predictions(carrying, [one], used), predictions(arm, [one], used), strict=True)
+        added = [heavy.predicted - bare.predicted for heavy, bare in fits]
+        known = np.concatenate([known, *added])
     columns, tau, informative = (
         np.concatenate([getattr(part, name) for part in rows])
         for name in ('columns', 'tau', 'informative')
@@ -255,30 +258,10 @@ def corrected(
         assert recording.tau is not None
         tau = recording.tau / gains.values
         if recording.source in loaded:
-            used = conditioning([recording], signals)
-            motions = segments(recording, used)
+            motions = list(segments(recording, conditioning([recording], signals)))
             times = np.concatenate([motion.t for motion in motions])
-            torque = _torque_of_payload(arm, recording, loaded, used, filtered=False)
+            carrying = replace(arm, robot=loaded[recording.source])
+            torque = np.concatenate([carrying.torque(x) - arm.torque(x) for x in motions])
             tau = tau - np.column_stack([np.interp(recording.t, times, one) for one in torque.T])
         result.append(replace(recording, tau=tau))
     return result
-
-
-def _torque_of_payload(
-    arm: ArmModel,
-    recording: Recording,
-    loaded: Mapping[str, Robot],
-    used: Conditioning,
-    *,
-    filtered: bool,
-) -> FloatArray:
-    """Return the torque of the payload of a recording, at its rows or at full rate."""
-    found = []
-    for motion in segments(recording, used):
-        robots = (loaded.get(recording.source, arm.robot), arm.robot)
-        with_it, without = (
-            filtered_torque(one, motion, used) if filtered else one.torque(motion)
-            for one in (replace(arm, robot=robot) for robot in robots)
-        )
-        found.append(with_it - without)
-    return np.concatenate(found)

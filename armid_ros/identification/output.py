@@ -211,17 +211,17 @@ def _content(path: Path) -> dict[str, Any]:
 
 def _found(model: Path) -> dict[Path, dict[str, Any] | None]:
     """Return the existing recordings of a model, with their digests if known."""
-    beside = model.with_name('identification.json')
-    if not is_file(beside):
+    file = model.with_name('identification.json')
+    if not is_file(file):
         return {}
-    text = read_text(beside, ModelError)
-    with reading(beside, ModelError):
+    text = read_text(file, ModelError)
+    with reading(file, ModelError):
         document = load_json(text)
         known = {
             str(row['bag']): {'size': int(row['size']), 'digest': str(row['digest'])}
             for row in document.get('recordings', [])
         }
-        starts = (Path(), beside.parent, beside.parent.parent)
+        starts = (Path(), file.parent, file.parent.parent)
         places = [(name, [start / name for start in starts]) for name in _names(document)]
     return {
         place: known.get(name)

@@ -162,8 +162,7 @@ class ParameterFile:
             return None
         rows = [self.terms[name] for name in self.values]
         grouping = _matrix(rows, [symbol(name) for name in parameters])
-        told = scaled_inverse(self.covariance)
-        return np.asarray(grouping.T @ told @ grouping)
+        return np.asarray(grouping.T @ scaled_inverse(self.covariance) @ grouping)
 
     def regrouped_as(self, other: ParameterFile) -> ParameterFile:
         """
@@ -187,9 +186,9 @@ class ParameterFile:
         covariance = factors @ self.covariance @ factors.T
         values = factors[len(own) :] @ [value for value, _ in self.values.values()]
         std = np.sqrt(np.diag(covariance))[len(own) :]
-        told = [name for name, sure in zip(names, follows, strict=True) if sure]
-        more = {n: (float(v), float(s)) for n, v, s in zip(told, values, std, strict=True)}
-        terms = {**self.terms, **{name: other.terms[name] for name in told}}
+        found = [name for name, sure in zip(names, follows, strict=True) if sure]
+        more = {n: (float(v), float(s)) for n, v, s in zip(found, values, std, strict=True)}
+        terms = {**self.terms, **{name: other.terms[name] for name in found}}
         return replace(
             self,
             values={**self.values, **more},
@@ -237,9 +236,9 @@ def read_parameters(path: str | Path) -> ParameterFile:
         read = parameters_of(str(path), document)
     if document['schema'] != MODEL:
         return read
-    beside = _beside(path, document)
-    if beside is not None:
-        return beside
+    known = _identification_of(path, document)
+    if known is not None:
+        return known
     described = path.parent / read.robot
     try:
         robot = load_robot(str(described) if is_file(described) else read.robot)
@@ -249,7 +248,7 @@ def read_parameters(path: str | Path) -> ParameterFile:
     return replace(read, joints=robot.joints, kinematics=kinematics_digest(robot))
 
 
-def _beside(path: Path, model: Mapping[str, Any]) -> ParameterFile | None:
+def _identification_of(path: Path, model: Mapping[str, Any]) -> ParameterFile | None:
     """Read the identification.json in the folder of a model.yaml if it belongs to it."""
     # It has the groups of parameters from which the model was made, with their covariance. It
     # belongs to the model if the model's values yield those of every group.
@@ -296,10 +295,10 @@ def read_misfit(path: str | Path, arm: ArmModel) -> Misfit | None:
         With the file and the mistake in it.
 
     """
-    misfit, beside = load_misfit(path), Path(path).with_name('identification.json')
-    if misfit is None or not is_file(beside):
+    misfit, file = load_misfit(path), Path(path).with_name('identification.json')
+    if misfit is None or not is_file(file):
         return misfit
-    known = read_parameters(beside)
+    known = read_parameters(file)
     unusable = known.fit is not None and known.fit.unusable
     return replace(misfit, information=known.information(arm.parameters), unusable=unusable)
 
@@ -340,10 +339,10 @@ def parameters_of(source: str, document: dict[str, Any]) -> ParameterFile:
     ]
     terms = dict(zip(values, grouping, strict=False))
     scores = [*document.get('validation', []), document.get('training'), document.get('misfit')]
-    told = next((score for score in scores if score), None)
+    score = next((score for score in scores if score), None)
     error = None
-    if told is not None:
-        error = finite(told['relative_error_percent'], 'relative_error_percent')
+    if score is not None:
+        error = finite(score['relative_error_percent'], 'relative_error_percent')
     scatter = [[finite(v, 'a scatter') for v in row] for row in document.get('scatter', ())]
     if any(len(row) != len(values) for row in scatter):
         raise ValueError(f'the scatter has to have rows of {len(values)} values')

@@ -77,7 +77,7 @@ def test_noise_of_the_torque_sensor_alone_makes_a_false_stribeck_friction(bench)
     for seed in range(1, 7):
         data = cut(shaken(bench.recordings(seed=seed), 3e-4, seed))
         everywhere = [replace(part, unsure=np.zeros_like(part.unsure)) for part in data]
-        sensor = [np.full(2, TORQUE_NOISE * np.linalg.norm(part.used.taps())) for part in data]
+        sensor = [np.full(2, TORQUE_NOISE * np.linalg.norm(part.used.taps)) for part in data]
         floor = [noise_floor(part, bench.arm).sigma for part in data]
         assert np.all(np.mean(floor, axis=0) > np.mean(sensor, axis=0))
         by_sensor.append(significant(bench.arm, everywhere, sensor, FRICTION))

@@ -56,7 +56,7 @@ def test_model_predicts_any_motion_not_only_the_training_data(arm, result):
 def test_held_out_error_is_the_noise(arm, result):
     held_out = recorded(arm, multisine(arm.robot.joints, 15.0, 200.0, seed=7), 3, 0.02, 1e-6)
     score = Score.of(result.predict([held_out]))
-    taps = result.used.taps()
+    taps = result.used.taps
     np.testing.assert_allclose(score.rms, 0.02 * np.linalg.norm(taps), rtol=0.3)
 
 

@@ -200,7 +200,7 @@ def noise_floor(trajectory: Trajectory, arm: ArmModel) -> NoiseFloor:
     motion = trajectory.motion
     assert motion.tau is not None
     residual = motion.tau - arm.torque(motion)
-    taps = trajectory.used.taps()
+    taps = trajectory.used.taps
     half = (len(taps) - 1) // 2
     smooth = signal.fftconvolve(residual, taps[:, np.newaxis], mode='same', axes=0)
     found = trajectory.period

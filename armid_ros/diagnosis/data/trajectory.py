@@ -260,7 +260,7 @@ def _unsure(motion: Motion, used: Conditioning, least: FloatArray) -> FloatArray
     speed = np.abs(motion.dq)
     slow = speed < np.maximum(_REVERSAL_SPEED * speed.max(axis=0), least)
     slow[1:] |= np.diff(np.sign(motion.dq), axis=0) != 0
-    taps = np.abs(used.taps())
+    taps = np.abs(used.taps)
     share = signal.oaconvolve(slow.astype(float), taps[:, np.newaxis], mode='same', axes=0)
     return np.asarray(np.maximum(share, 0.0))
 

@@ -100,7 +100,7 @@ def check_data(
     notes = [note for one in recordings for note in _extremes(arm.robot, one)]
     notes += [*_described_friction(arm), *(one.text for one in sensors)]
     try:
-        notes += check_motion(arm.robot, recordings, used)
+        notes += check_motion(arm.robot, recordings)
     except IdentificationError as error:
         faults.append(str(error))
     return faults, notes

@@ -28,7 +28,7 @@ from armid_ros.identification.identify import Identification
 from armid_ros.identification.rows.checks import moving
 from armid_ros.identification.rows.damage import without_damage
 from armid_ros.identification.rows.regression import Fit, Score
-from armid_ros.identification.rows.signals import Conditioning, SignalSettings
+from armid_ros.identification.rows.signals import Conditioning
 from armid_ros.motion import FloatArray
 from armid_ros.recording import Recording
 import numpy as np
@@ -137,8 +137,7 @@ def _mistakes(
     result: Identification, description: ArmModel, recordings: Sequence[Recording]
 ) -> list[Fault]:
     """Return mistakes in the recordings: names, signs, units, zeros, delays, gravity."""
-    settings = SignalSettings(result.used.cutoff_hz, result.used.decimation)
-    repaired = without_damage(recordings, settings)[0] if recordings else []
+    repaired, _ = without_damage(recordings, result.used)
     faults = []
     for worst, sources in shared_mistakes(description.body, repaired, result.used):
         text = worst.sentence(description.body)
@@ -263,9 +262,9 @@ def beyond_noise(errors: FloatArray, fits: Sequence[Fit], used: Conditioning) ->
         Errors without the noise [%]; zero for a joint at rest throughout.
 
     """
-    told = np.concatenate([fit.informative for fit in fits])
-    torque = told * np.concatenate([fit.tau for fit in fits])
-    rows = np.maximum(np.count_nonzero(told, axis=0), 1)
+    informative = np.concatenate([fit.informative for fit in fits])
+    torque = informative * np.concatenate([fit.tau for fit in fits])
+    rows = np.maximum(np.count_nonzero(informative, axis=0), 1)
     size = np.sqrt(np.sum(torque**2, axis=0) / rows)
     noise = np.divide(torque_noise(fits, used), size, out=np.zeros_like(size), where=size > 0.0)
     left = np.sqrt(np.maximum(np.square(errors) - 2.0 * np.square(100.0 * noise), 0.0))
@@ -285,7 +284,7 @@ def torque_noise(fits: Sequence[Fit], used: Conditioning) -> FloatArray:
         return np.zeros(fits[0].motion.n_joints)
     deviation = np.median(differences, axis=0) / float(stats.norm.ppf(0.75))
     # for filtered white noise: variance of second differences of rows over that of rows
-    taps, step = used.taps(), used.decimation
+    taps, step = used.taps, used.decimation
     own, next_one, after = (
         float(taps[: len(taps) - lag] @ taps[lag:]) if lag < len(taps) else 0.0
         for lag in (0, step, 2 * step)

@@ -195,11 +195,11 @@ def other_gravity(robot: Robot, vector: FloatArray) -> Hypothesis | None:
         masses make all weight larger or smaller, but do not turn it.
 
     """
-    told = robot.gravity
-    size, length = (float(np.linalg.norm(one)) for one in (told, vector))
-    turned = np.linalg.norm(vector / max(length, 1e-9) - told / max(size, 1e-9))
+    described = robot.gravity
+    size, length = (float(np.linalg.norm(one)) for one in (described, vector))
+    turned = np.linalg.norm(vector / max(length, 1e-9) - described / max(size, 1e-9))
     weighs = length / size if size > 0.0 else np.inf
-    if np.linalg.norm(vector - told) <= LIMITS.gravity_change * max(size, 1.0):
+    if np.linalg.norm(vector - described) <= LIMITS.gravity_change * max(size, 1.0):
         return None
     # 24.8 m/s^2 is the gravity of Jupiter, the largest of a planet
     if length >= 24.8 or (turned <= LIMITS.gravity_change and not _beyond_masses(weighs)):

@@ -66,7 +66,7 @@ def late_torque(robot: Robot, recording: Recording, used: Conditioning) -> Delay
     stretches = list(segments(recording, used))
     seconds, half = 0.0, np.inf
     for _ in range(10):  # Gauss-Newton steps
-        moved = [shifted(motion, seconds) for motion in stretches]
+        moved = [shifted(motion, seconds) for motion in stretches] if seconds else stretches
         # the rate needs two samples
         rows = [_rows(robot, x, used) for x in moved if len(decimated_samples(len(x), used)) > 1]
         if not rows:
@@ -77,7 +77,8 @@ def late_torque(robot: Robot, recording: Recording, used: Conditioning) -> Delay
         (step,), (half,) = shared_values(own, shared / torque, near / torque)
         before = seconds
         seconds = float(np.clip(seconds + step, -_LONGEST, _LONGEST))
-        if abs(seconds - before) < 1e-4:  # [s]
+        # a smaller step [s], or a small share of the interval, changes no decision
+        if abs(seconds - before) < max(1e-4, 0.05 * half):
             break
     return Delay(seconds, float(half)) if abs(seconds) > half else None
 
@@ -89,12 +90,12 @@ def _rows(robot: Robot, motion: Motion, used: Conditioning) -> tuple[FloatArray,
     # steps within a sample
     assert motion.tau is not None
     n, kept = motion.n_joints, np.array(decimated_samples(len(motion), used), dtype=np.intp)
-    bent = Hysteresis(
-        np.tile(np.eye(n), (len(_LENGTHS), 1)), np.ones(n * len(_LENGTHS)), np.repeat(_LENGTHS, n)
-    ).along(motion.q, motion.dq)
     slow = motion.select(kept)
-    both = np.concatenate([motion.tau, np.sign(motion.dq), bent], axis=1)
-    tau, *dry = np.split(within_band(slow, decimate(both, used)), len(_LENGTHS) + 2, axis=1)
+    elements = [Hysteresis(np.eye(n), np.ones(n), np.full(n, length)) for length in _LENGTHS]
+    states = (one.along(motion.q, motion.dq) for one in elements)
+    tau, *dry = (
+        within_band(slow, decimate(x, used)) for x in (motion.tau, np.sign(motion.dq), *states)
+    )
     slow = smoothed(slow)
     body = inverse_dynamics(robot, slow)
     loaded = [np.abs(body) * part for part in dry]

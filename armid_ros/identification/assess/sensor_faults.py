@@ -159,7 +159,7 @@ def _jumps(robot: Robot, recording: Recording) -> Iterator[Fault]:
             return
 
 
-def encoder_faults(recording: Recording, units: Sequence[str] | None = None) -> Iterator[Fault]:
+def encoder_faults(recording: Recording, units: Sequence[str] | None) -> Iterator[Fault]:
     """Yield position and velocity channels that are constant while the joint moves."""
     if recording.dq is None:
         return
@@ -358,8 +358,8 @@ def velocity_faults(recording: Recording) -> Iterator[Fault]:
         off = follows & (ratio / expected > 1.0 / _NEAR) & (ratio / expected < _NEAR)
         if off.any():
             named = ', '.join(recording.joints[k] for k in np.flatnonzero(off))
-            said = f'velocities of {named} {text}; the fit takes velocities from the positions'
-            yield Fault(said, 'good', recording.source)
+            what = f'velocities of {named} {text}; the fit takes velocities from the positions'
+            yield Fault(what, 'good', recording.source)
 
 
 def held_elsewhere(

@@ -248,11 +248,6 @@ class Verification:
     forward: tuple[ForwardValidation, ...]
     left_out: tuple[str, ...]
 
-    def sentences(self) -> tuple[str, ...]:
-        """Return sentences on the results; ``left_out`` lists the tests that were not made."""
-        found = () if self.noise is None else self.noise.findings()
-        return (*(text for text, _ in found), *(pair.sentence() for pair in self.forward))
-
 
 def verify(
     result: Identification,

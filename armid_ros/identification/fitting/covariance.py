@@ -119,10 +119,10 @@ def noise_products(
             transformed = fft.rfft(weighted, 2 * count).view(float)
             fitted = active < rank
             taken = inverse[active[fitted]].T @ transformed[fitted]
-            told = weight[:, joint] > 0.0
+            informative = weight[:, joint] > 0.0
             shares = np.einsum('ab,ab->b', taken, taken).reshape(-1, 2).sum(axis=1)
-            leverage = shares / max(np.count_nonzero(told), 1)
-            spectrum = _noise_spectrum(left[:, joint], told, leverage)
+            leverage = shares / max(np.count_nonzero(informative), 1)
+            spectrum = _noise_spectrum(left[:, joint], informative, leverage)
             spectrum[1:-1] *= 2.0  # the constant and the Nyquist bin have no mirror image
             transformed *= np.repeat(np.sqrt(spectrum / (2 * count)), 2)
             products[np.ix_(active, active)] += transformed @ transformed.T
@@ -130,7 +130,7 @@ def noise_products(
 
 
 def _noise_spectrum(
-    residual: FloatArray, told: npt.NDArray[np.bool_], leverage: FloatArray
+    residual: FloatArray, informative: npt.NDArray[np.bool_], leverage: FloatArray
 ) -> FloatArray:
     """Estimate the power of noise (M + 1,) on the bins of an rfft from a residual (M,)."""
     count = len(residual)
@@ -139,7 +139,7 @@ def _noise_spectrum(
     # 1963), without the negative power that gaps may cause
     sums, pairs = (
         np.fft.irfft(np.abs(np.fft.rfft(signal, size)) ** 2)[:count]
-        for signal in (residual, told.astype(float))
+        for signal in (residual, informative.astype(float))
     )
     lags = sums / np.maximum(pairs, 1.0) * np.arange(count, 0, -1) / count
     power = np.fft.rfft(np.concatenate([lags, [0.0], lags[:0:-1]])).real.clip(0.0)

@@ -87,7 +87,7 @@ def halves_error(
         Errors of the predicted torque.
 
     """
-    columns, tau, target, told = _some_rows(problem, _OF_HALVES)
+    columns, tau, target, informative = _some_rows(problem, _OF_HALVES)
     rest, weight = target - columns @ described, weights[:: _step(problem, _OF_HALVES)]
     most = np.full(len(described), np.inf) if spread is None else spread
     middle = len(tau) // 2
@@ -104,7 +104,7 @@ def halves_error(
         share = np.where(size > 0.0, size, 1.0) / max(torque, 1.0)
         change = _fit(columns[fitted], rest[fitted], own, share**2 + most**-2.0)
         left[predicted] = rest[predicted] - columns[predicted] @ change
-    error, length = (np.linalg.norm(told * rows, axis=0) for rows in (left, tau))
+    error, length = (np.linalg.norm(informative * rows, axis=0) for rows in (left, tau))
     whole = float(np.linalg.norm(length))
     return HalvesError(
         float(100.0 * np.linalg.norm(error) / whole) if whole > 0.0 else 0.0,
@@ -209,24 +209,26 @@ def _losses(problem: Sequence[Regression]) -> FloatArray:
     # odd stretches are predicted from even ones, and vice versa. Every joint counts by the ratio
     # of its errors: a light joint, whose torque is mostly noise, gains by a low cut-off and must
     # not hide that a heavy one loses
-    x, _, y, told = _some_rows(problem, _OF_CUTOFFS)
+    x, _, y, informative = _some_rows(problem, _OF_CUTOFFS)
     stretch = np.arange(len(y)) * _STRETCHES // len(y)
     left = np.zeros_like(y)
-    whole = _fit(x, y, told)
-    weight = 1.0 / np.maximum(_rms(y - x @ whole, told), 1e-12)
+    whole = _fit(x, y, informative)
+    weight = 1.0 / np.maximum(_rms(y - x @ whole, informative), 1e-12)
     for odd in (0, 1):
         chosen = stretch % 2 == odd
-        value = _fit(x[chosen], y[chosen], told[chosen] * weight)
+        value = _fit(x[chosen], y[chosen], informative[chosen] * weight)
         left[~chosen] = y[~chosen] - x[~chosen] @ value
-    rms = np.array([_rms(left[stretch == k], told[stretch == k]) for k in range(_STRETCHES)])
-    least = np.maximum(TORQUE_RESOLUTION * _rms(y, told), 1e-12)
+    rms = np.array(
+        [_rms(left[stretch == k], informative[stretch == k]) for k in range(_STRETCHES)]
+    )
+    least = np.maximum(TORQUE_RESOLUTION * _rms(y, informative), 1e-12)
     return np.asarray(np.mean(np.log(np.maximum(rms, least)), axis=1))
 
 
-def _rms(values: FloatArray, told: npt.NDArray[np.bool_]) -> FloatArray:
+def _rms(values: FloatArray, informative: npt.NDArray[np.bool_]) -> FloatArray:
     """Return the root mean square over the informative rows, shape (n,)."""
-    count = np.maximum(told.sum(axis=0), 1)
-    return np.asarray(np.sqrt(np.sum(values**2, axis=0, where=told) / count))
+    count = np.maximum(informative.sum(axis=0), 1)
+    return np.asarray(np.sqrt(np.sum(values**2, axis=0, where=informative) / count))
 
 
 def _fit(
@@ -256,5 +258,5 @@ def _some_rows(
         np.concatenate([getattr(part, name) for part in problem])[::step]
         for name in ('columns', 'tau', 'target')
     )
-    told = np.concatenate([part.informative for part in problem])[::step]
-    return columns, tau, target, told
+    informative = np.concatenate([part.informative for part in problem])[::step]
+    return columns, tau, target, informative

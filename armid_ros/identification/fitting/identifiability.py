@@ -81,10 +81,10 @@ def unidentified(
                     'this motion shows it only together with others' if together else NOT_SHOWN,
                 )
             )
-    told = excludes_zero(estimate.values, estimate.std)
+    clear = excludes_zero(estimate.values, estimate.std)
     found += [
         Unidentified(name, 'not distinguishable from zero')
-        for name, sure in zip(estimate.parameters, told, strict=True)
+        for name, sure in zip(estimate.parameters, clear, strict=True)
         if not sure
     ]
     return tuple(found)

@@ -11,7 +11,7 @@ Joints are kept apart, as their weights are known only after all rows.
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 from armid_ros.identification.rows.regression import by_stretch, Regression
 from armid_ros.motion import FloatArray, read_only
@@ -166,12 +166,7 @@ class WeightedFit:
         return np.asarray(self.inverse @ self.inverse.T)
 
 
-def weighted_fit(
-    normal: NormalEquations,
-    *,
-    weighted: bool = True,
-    bounds: tuple[FloatArray, FloatArray] | None = None,
-) -> WeightedFit:
+def weighted_fit(normal: NormalEquations, *, weighted: bool = True) -> WeightedFit:
     """
     Fit parameters to normal equations.
 
@@ -181,8 +176,6 @@ def weighted_fit(
         Normal equations of the rows.
     weighted : bool
         Whether every joint is weighted by its own residual.
-    bounds : tuple of two ndarray, each of shape (r,), optional
-        Lower and upper bounds of physical values.
 
     """
     fit = scaled_fit(normal, np.ones(len(normal.counts)))
@@ -191,8 +184,6 @@ def weighted_fit(
         fit = scaled_fit(normal, positive(normal.joint_std(fit.values)))
         if np.allclose(fit.scale, before, rtol=1e-6):
             break
-    if bounds is not None:
-        return replace(fit, values=within(fit.values, fit.factor, bounds))
     return fit
 
 

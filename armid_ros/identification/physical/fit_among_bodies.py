@@ -27,7 +27,7 @@ from armid_ros.identification.physical.physical_certificate import (
 )
 from armid_ros.identification.physical.physical_program import Box, PhysicalProgram
 from armid_ros.identification.rows.regression import regressions, weighted_rows
-from armid_ros.identification.rows.signals import Conditioning
+from armid_ros.identification.rows.signals import Conditioning, TORQUE_RESOLUTION
 from armid_ros.model import BaseParameters
 from armid_ros.model.pseudo_inertia import Consistency, link_parameters, pseudo_inertia
 from armid_ros.motion import FloatArray
@@ -37,8 +37,6 @@ from armid_ros.robots.robot import PER_LINK
 import numpy as np
 import scipy.linalg
 
-#: Lower bound of the error of a fit, as a share of the torque: there is always some noise.
-FINEST_FIT = 1e-4
 #: Ratio of a mass to the described one above which a note is given.
 HEAVY = 3.0
 #: Blocks of the training data that are left out in turn to choose the weight of the prior.
@@ -159,7 +157,7 @@ def _bodies(
     blocks = np.array([own.T @ own for own in np.split(rows, ends * weights.shape[1])])
     whole = blocks.sum(axis=0)
     least = _misfit(whole, fit.solution.values)
-    least = max(least, FINEST_FIT * float(np.sqrt(whole[-1, -1])))
+    least = max(least, TORQUE_RESOLUTION * float(np.sqrt(whole[-1, -1])))
     counted = np.array_split(np.count_nonzero(weights, axis=1), BLOCKS)
     share = np.array([part.sum() for part in counted], dtype=float)
     counts = share / share.sum() * least**2  # so that the unconstrained fit's mean square is one
@@ -306,7 +304,7 @@ def _held_out_errors(
         for weight in WEIGHTS:
             theta = program.solve(others, count, weight)
             squares[weight] += _misfit(block, program.base.values(theta)) ** 2
-    floor = max(free, FINEST_FIT**2 * float(blocks[:, -1, -1].sum()))
+    floor = max(free, TORQUE_RESOLUTION**2 * float(blocks[:, -1, -1].sum()))
     return tuple((weight, float(np.sqrt(total / floor))) for weight, total in squares.items())
 
 

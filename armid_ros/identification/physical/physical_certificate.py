@@ -86,27 +86,27 @@ class PhysicalCertificate:
     @property
     def activity(self) -> tuple[str, ...]:
         """Return notes on active constraints and their cost; empty if none is active."""
-        said = []
+        notes = []
         if self.held_out_ratio > DEAR:
-            said.append(
+            notes.append(
                 f'constraints cost {100.0 * (self.held_out_ratio - 1.0):.1f} % of torque error on '
                 'blocks left out: a given mass or box is wrong, or the model lacks an effect'
             )
         if self.active:
-            said.append(
+            notes.append(
                 f'at the limit of what a body can be: {", ".join(self.active)}; '
                 'the model lacks an effect there, or the data are poor'
             )
         if self.at_wall:
-            said.append(f'at the limit of the box: {", ".join(self.at_wall)}')
+            notes.append(f'at the limit of the box: {", ".join(self.at_wall)}')
         if self.at_mass:
-            said.append(f'as light or heavy as they may be: {", ".join(self.at_mass)}')
+            notes.append(f'as light or heavy as they may be: {", ".join(self.at_mass)}')
         if self.total_mass is not None:
-            said.append(f'the masses add up to {self.total_mass:g} kg, as given')
+            notes.append(f'the masses add up to {self.total_mass:g} kg, as given')
         if self.at_bound:
             names = ', '.join(f'{p.name} of {p.joint}' for p in self.at_bound)
-            said.append(f'held by their bounds: {names}')
-        return tuple(said)
+            notes.append(f'held by their bounds: {names}')
+        return tuple(notes)
 
     def sentences(self) -> tuple[str, ...]:
         """Return the findings as sentences."""

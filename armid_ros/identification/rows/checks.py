@@ -10,7 +10,7 @@ from armid_ros.arm import ArmModel
 from armid_ros.errors import IdentificationError
 from armid_ros.identification.rows.feedback import laws_of_controllers, residual_of_fit
 from armid_ros.identification.rows.regression import Regression
-from armid_ros.identification.rows.signals import Conditioning, no_stretch, segments
+from armid_ros.identification.rows.signals import Conditioning
 from armid_ros.identification.rows.stamps import uneven_stamps
 from armid_ros.model import inverse_dynamics
 from armid_ros.motion import FloatArray, Motion
@@ -60,9 +60,7 @@ SLOW = 0.05
 SILENT = 'the torque of every joint is constant; fill in effort'
 
 
-def check_motion(
-    robot: Robot, recordings: Sequence[Recording], used: Conditioning | None = None
-) -> tuple[str, ...]:
+def check_motion(robot: Robot, recordings: Sequence[Recording]) -> tuple[str, ...]:
     """
     Raise an error for recordings without usable motion.
 
@@ -72,8 +70,6 @@ def check_motion(
         Robot of the recordings.
     recordings : sequence of Recording
         Recordings to check.
-    used : Conditioning, optional
-        Filters after which samples have to remain; without it, this is not checked.
 
     Returns
     -------
@@ -94,8 +90,6 @@ def check_motion(
                 'too short; record a movement of several seconds; for a table, check '
                 '--time-unit and --rate'
             )
-        if used is not None and not any(True for _ in segments(recording, used)):
-            raise no_stretch(recording, used)
     ranges = np.max([np.ptp(recording.q, axis=0) for recording in recordings], axis=0)
     return resting(robot, recordings[0].source, ranges)
 
@@ -247,14 +241,14 @@ def position_problem(robot: Robot, lowest: FloatArray, highest: FloatArray) -> s
     degrees = np.deg2rad(lowest) > robot.lower - slack
     degrees &= ~robot.prismatic & (np.deg2rad(highest) < robot.upper + slack) & (excess > allowed)
     hint = '' if robot.prismatic[worst] or degrees[worst] else ' (degrees?)'
-    said = f'{robot.joints[worst]} reaches {reach:.4g}{hint}, its'
+    text = f'{robot.joints[worst]} reaches {reach:.4g}{hint}, its'
     if degrees[worst]:
         names = ', '.join(np.array(robot.joints)[degrees])
-        said = (
-            f'{names} seem{"s" if degrees.sum() == 1 else ""} to be in degrees (--degrees): {said}'
+        text = (
+            f'{names} seem{"s" if degrees.sum() == 1 else ""} to be in degrees (--degrees): {text}'
         )
     return (
-        f'{said} limits are {robot.lower[worst]:.4g} to {robot.upper[worst]:.4g} '
+        f'{text} limits are {robot.lower[worst]:.4g} to {robot.upper[worst]:.4g} '
         f'{robot.position_units[worst]}; positions have to be in rad or m, with the zero of the '
         'description'
     )

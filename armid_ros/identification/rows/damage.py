@@ -7,9 +7,9 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import replace
 
-from armid_ros.identification.rows.signals import conditioning, SignalSettings
+from armid_ros.identification.rows.signals import Conditioning
 from armid_ros.identification.samples.spikes import FIRST, SpikeGate
-from armid_ros.identification.samples.straight_line import Excursion, StreamSample
+from armid_ros.identification.samples.straight_line import Excursion, missed_by, StreamSample
 from armid_ros.motion import FloatArray
 from armid_ros.recording import Recording
 import numpy as np
@@ -21,7 +21,7 @@ _NAMED = 3
 
 
 def without_damage(
-    recordings: Sequence[Recording], settings: SignalSettings
+    recordings: Sequence[Recording], used: Conditioning
 ) -> tuple[list[Recording], tuple[str, ...]]:
     """
     Interpolate across damaged samples.
@@ -37,8 +37,7 @@ def without_damage(
         Notes on the damage: recording, number of samples, and the first of them.
 
     """
-    used = conditioning(list(recordings), settings)
-    peak = float(np.max(used.taps()) / np.sum(used.taps()))
+    peak = float(np.max(used.taps) / np.sum(used.taps))
     repaired, found = [], []
     for recording in recordings:
         repaired.append(recording)
@@ -101,13 +100,17 @@ def impossible_excursions(
     lines = gate.line_errors(t, x, floor)
     found: list[Excursion] = []
     done = 0
-    for k in np.flatnonzero(np.any(lines.off > 1.0, axis=1)).tolist():
+    for k in np.flatnonzero(lines.suspect).tolist():
         if k < done:
             continue
-        start, known = int(lines.stretch[k]), []
+        start, known, bent = int(lines.stretch[k]), [], np.zeros(x.shape[1])
         if k - start >= FIRST or start < done:
-            start, known = k, [StreamSample(float(t[i]), x[i]) for i in (k - 2, k - 1)]
-        gate.begin(lines.usual, known, lines.bent[k - 1] if known else 0.0)
+            known = [StreamSample(float(t[i]), x[i]) for i in range(max(start, k - 3), k)]
+            if len(known) == 3:
+                error = missed_by(known[:2], known[2], lines.usual.period)
+                bent = error.error / error.bend
+            start = k
+        gate.begin(lines.usual, known[-2:], bent)
         passed, done = 0, start
         while done < len(t) and (passed < 2 or done <= k):
             good = gate.take(float(t[done]), x[done], floor)

@@ -12,13 +12,13 @@ without mass.
 
 from __future__ import annotations
 
-from dataclasses import replace
-
+from armid_ros.identification.rows.regression import REST_SPEED
 from armid_ros.model import inverse_dynamics, regressor
 from armid_ros.motion import FloatArray, Motion
 from armid_ros.robots import Robot
 import numpy as np
 import numpy.typing as npt
+from scipy.ndimage import maximum_filter1d
 
 #: Largest residual of a law, over the torque that the model needs in addition to the law: no model
 #: has an inertia that is ten times too large.
@@ -29,13 +29,10 @@ _FOLLOWS = 0.03
 #: Smallest torque of a driven joint as a share of the torque of the model. With less, the joint
 #: swings freely, or the model is wrong.
 _DRIVEN = 0.5
-#: Number of rows on either side of a reversal that filters smear, and speed below which a joint
-#: may reverse, as a share of its top speed.
-_BESIDE, _TURNING = 3, 0.02
 
 
 def laws_of_controllers(
-    robot: Robot, motion: Motion, told: npt.NDArray[np.bool_]
+    robot: Robot, motion: Motion, informative: npt.NDArray[np.bool_]
 ) -> tuple[str, ...]:
     """
     Return messages if the torque of every driven joint is a law of position and direction alone.
@@ -49,7 +46,7 @@ def laws_of_controllers(
         The arm.
     motion : Motion
         Filtered motion with the torque filtered alike, R samples of n joints.
-    told : ndarray of bool, shape (R, n)
+    informative : ndarray of bool, shape (R, n)
         False where a joint is at rest.
 
     Returns
@@ -59,19 +56,21 @@ def laws_of_controllers(
         if at least as many joints cannot be tested.
 
     """
+    # rows where a joint reverses, and three on either side, which filters smear
+    speed = np.abs(motion.dq)
+    slow = speed <= REST_SPEED * speed.max(axis=0, initial=0.0)
+    slow[1:] |= np.diff(np.sign(motion.dq), axis=0) != 0
+    smeared = maximum_filter1d(slow, 7, axis=0, mode='constant')
+    # 5000 rows are about sixty for every value of seven joints
+    some = slice(None, None, max(1, len(motion) // 5000))
+    informative = (informative & ~smeared)[some]
+    motion = motion.select(some)
     assert motion.tau is not None
-    still = np.zeros_like(motion.q)
-    weight = regressor(robot, replace(motion, dq=still, ddq=still))
-    needed = inverse_dynamics(robot, motion)
-    said: list[str] = []
+    weight, needed = regressor(robot, motion.at_rest()), inverse_dynamics(robot, motion)
+    laws: list[str] = []
     silent = 0
     for joint, (name, unit) in enumerate(zip(robot.joints, robot.torque_units, strict=True)):
-        # rows where a joint reverses, and neighbours that filters smear
-        dq = motion.dq[:, joint]
-        slow = np.abs(dq) <= _TURNING * np.abs(dq).max(initial=0.0)
-        slow[1:] |= np.diff(np.sign(dq)) != 0
-        beside = np.convolve(slow, np.ones(2 * _BESIDE + 1))
-        rows = told[:, joint] & ~(beside[_BESIDE : _BESIDE + len(slow)] > 0.0)
+        rows = informative[:, joint]
         tau = motion.tau[rows, joint]
         direction = np.sign(motion.dq[rows, joint])
         law = np.column_stack([weight[rows, joint], direction, np.ones_like(tau)])
@@ -84,14 +83,14 @@ def laws_of_controllers(
             continue
         if left > _FOLLOWS * size or left > _WITHOUT_INERTIA * lacking:
             return ()
-        said.append(
+        laws.append(
             f'the torque of {name} is a law of position and direction of motion alone, to '
             f'{100 * left / size:.1f} %. A controller that holds the weight or pushes along '
             f'makes such a torque. The {lacking:.2g} {unit} of the inertia are missing in it. '
             'Something else moves the arm, or body and friction cannot be distinguished: record '
             'the arm while it follows a trajectory'
         )
-    return tuple(said) if len(said) > silent else ()
+    return tuple(laws) if len(laws) > silent else ()
 
 
 def _left(law: FloatArray, torque: FloatArray) -> float | None:

@@ -24,7 +24,7 @@ from armid_ros.identification.rows.signals import (
     decimated_samples,
     segments,
 )
-from armid_ros.motion import FloatArray, Motion, read_only
+from armid_ros.motion import FloatArray, Motion, read_only, Samples
 from armid_ros.recording import Recording
 import numpy as np
 import numpy.typing as npt
@@ -33,6 +33,8 @@ import numpy.typing as npt
 REST_SPEED = 0.02
 #: ... for at least this long [s]; a reversal of direction is shorter.
 REST_TIME = 0.2
+
+_Columns = Callable[[Motion], FloatArray]
 
 
 @dataclass(frozen=True)
@@ -144,20 +146,15 @@ def regressions(
         One per unbroken stretch.
 
     """
-    total = sum(len(recording.t) for recording in recordings)
-    done = 0
-
-    def tick(samples: int) -> None:
-        nonlocal done
-        done += samples
-        if progress is not None:
-            progress(min(1.0, done / total))
-
     result = []
-    for recording in recordings:
+    for number, recording in enumerate(recordings, start=1):
         for motion in segments(recording, used):
-            stacked = filtered_columns(arm, columns, motion, used, tick)
-            result.append(Regression(recording.source, *_rows(arm, motion, used), stacked))
+            rest, unsure = held_samples(arm, motion)
+            stacked = filtered_columns(arm, columns, motion, used, unsure)
+            rows = _rows(motion, used, rest, unsure)
+            result.append(Regression(recording.source, *rows, stacked))
+        if progress is not None:
+            progress(number / len(recordings))
     return result
 
 
@@ -244,32 +241,23 @@ def predictions(arm: ArmModel, recordings: Sequence[Recording], used: Conditioni
     found = []
     for recording in recordings:
         for motion in segments(recording, used):
-            torque = filtered_torque(arm, motion, used)
-            found.append(Fit(recording.source, *_rows(arm, motion, used), torque))
+            rest, unsure = held_samples(arm, motion)
+            torque = decimate(bridged(arm.torque(motion), unsure), used)
+            found.append(Fit(recording.source, *_rows(motion, used, rest, unsure), torque))
     return found
 
 
-def filtered_torque(arm: ArmModel, motion: Motion, used: Conditioning) -> FloatArray:
-    """
-    Filter and decimate the torque of an arm along one unbroken stretch.
-
-    Returns
-    -------
-    ndarray, shape (M, n)
-
-    """
-    return decimate(bridged(arm.torque(motion), unsure_samples(arm, motion)), used)
-
-
 def _rows(
-    arm: ArmModel, motion: Motion, used: Conditioning
+    motion: Motion,
+    used: Conditioning,
+    rest: npt.NDArray[np.bool_],
+    unsure: npt.NDArray[np.bool_],
 ) -> tuple[Motion, npt.NDArray[np.bool_]]:
     """Return the decimated motion and torque of a stretch, and the mask of informative rows."""
     kept = np.array(decimated_samples(len(motion), used), dtype=np.intp)
     assert motion.tau is not None
-    tau = bridged(motion.tau, unsure_samples(arm, motion))
-    decimated = motion.select(kept).with_torque(decimate(tau, used))
-    return decimated, ~_at_rest(arm, motion)[kept]
+    tau = decimate(bridged(motion.tau, unsure), used)
+    return motion.select(kept).with_torque(tau), ~rest[kept]
 
 
 def filtered_columns(
@@ -277,7 +265,7 @@ def filtered_columns(
     columns: npt.NDArray[np.intp],
     motion: Motion,
     used: Conditioning,
-    tick: Callable[[int], None] = lambda samples: None,
+    unsure: npt.NDArray[np.bool_],
 ) -> FloatArray:
     """
     Filter and decimate some columns of an arm's regressor along one unbroken stretch.
@@ -292,8 +280,8 @@ def filtered_columns(
         The stretch at the full rate.
     used : Conditioning
         Filters.
-    tick : callable, optional
-        Called with the number of samples finished since the last call.
+    unsure : ndarray of bool, shape (N, n)
+        Samples of each joint that are interpolated; see `held_samples`.
 
     Returns
     -------
@@ -301,17 +289,20 @@ def filtered_columns(
 
     """
     result = np.empty((len(decimated_samples(len(motion), used)), motion.n_joints, len(columns)))
-    unsure = unsure_samples(arm, motion)
-    parts = [(arm.rigid_columns, len(arm.robot.rigid_parameters), True)]
+    parts: list[tuple[_Columns, int, bool]] = []
+    parts.append((arm.rigid_columns, len(arm.robot.rigid_parameters), True))
     parts += [
         (partial(arm.columns_of, effect), len(values), effect.instantaneous)
         for effect, values in zip(arm.effects, arm.values, strict=True)
     ]
     # functions of a part of the motion, with the indices of their columns there and in the result
-    local, first = [], 0
+    local: list[tuple[_Columns, Samples, npt.NDArray[np.intp]]] = []
+    first = 0
     for function, size, instantaneous in parts:
         outer = np.flatnonzero((columns >= first) & (columns < first + size))
-        inner = columns[outer] - first
+        own = columns[outer] - first
+        # a slice copies nothing
+        inner: Samples = slice(None) if np.array_equal(own, np.arange(size)) else own
         if len(outer) and instantaneous:
             local.append((function, inner, outer))
         elif len(outer):
@@ -322,35 +313,55 @@ def filtered_columns(
     stride = used.smooth_stride if margin == 0 else 1
     sure = ~np.pad(unsure, ((1, 1), (0, 0)))
     longest = max(int(np.diff(np.flatnonzero(column)).max()) - 1 for column in sure.T)
-    margin, overlap, row = max(margin, longest), len(used.taps()) - 1, 0
+    margin, overlap, row = max(margin, longest), len(used.taps) - 1, 0
     # samples whose regressor is in memory at once; 7 joints of 70 columns are 80 MB
     step = max(used.decimation, 20_000 // used.decimation * used.decimation)
     for start in range(0, max(1, len(motion) - overlap), step):
         stop, before = min(len(motion), start + step + overlap), max(0, start - margin)
         around, inside = slice(before, stop + margin), slice(start - before, stop - before)
         rows = slice(row, row + len(decimated_samples(stop - start, used)))
+        piece = motion.select(around)
         for function, inner, outer in local:
             if function == arm.rigid_columns and stride > 1:
                 # smooth columns need no interpolation and fewer samples
                 block = function(motion.select(slice(start, stop, stride)))[:, :, inner]
                 result[rows, :, outer] = decimate(block, used, stride)
             else:
-                block = function(motion.select(around))[:, :, inner]
+                block = function(piece)[:, :, inner]
                 result[rows, :, outer] = decimate(bridged(block, unsure[around])[inside], used)
         row = rows.stop
-        tick(stop - start)
     result.setflags(write=False)  # a read-only array is frozen without a copy
     return result
 
 
-def unsure_samples(arm: ArmModel, motion: Motion) -> npt.NDArray[np.bool_]:
-    """Return the samples next to a reversal of joints that have dry friction, shape (N, n)."""
-    held = _held(arm, motion)
-    turned = np.diff(np.sign(motion.dq[:, held]), axis=0) != 0
-    unsure = np.zeros(motion.q.shape, dtype=bool)
-    unsure[1:, held] = turned
-    unsure[:-1, held] |= turned
-    return unsure & ~_at_rest(arm, motion)
+def held_samples(
+    arm: ArmModel, motion: Motion
+) -> tuple[npt.NDArray[np.bool_], npt.NDArray[np.bool_]]:
+    """
+    Return the samples of joints with dry friction in which the friction is unknown.
+
+    Returns
+    -------
+    rest : ndarray of bool, shape (N, n)
+        Samples of a joint at rest, which friction may hold with any torque.
+    unsure : ndarray of bool, shape (N, n)
+        Samples next to a reversal of a moving joint.
+
+    """
+    rest, unsure = np.zeros((2, *motion.q.shape), dtype=bool)
+    shortest = REST_TIME / float(motion.t[1] - motion.t[0])
+    held = {joint for effect in arm.effects if effect.holds_at_rest for joint in effect.joints}
+    for joint in map(motion.joints.index, held):
+        velocity = motion.dq[:, joint]
+        direction, speed = np.sign(velocity), np.abs(velocity)
+        turned = direction[1:] != direction[:-1]
+        unsure[1:, joint] = turned
+        unsure[:-1, joint] |= turned
+        slow = np.concatenate([[False], speed < REST_SPEED * speed.max(), [False]])
+        edges = np.flatnonzero(slow[1:] != slow[:-1]).reshape(-1, 2)
+        for start, stop in edges[np.diff(edges, axis=1)[:, 0] >= shortest]:
+            rest[start:stop, joint] = True
+    return rest, unsure & ~rest
 
 
 def bridged(values: FloatArray, unsure: npt.NDArray[np.bool_]) -> FloatArray:
@@ -382,22 +393,3 @@ def bridged(values: FloatArray, unsure: npt.NDArray[np.bool_]) -> FloatArray:
         share = share.reshape(-1, *(1,) * (own.ndim - 1))
         result[gaps, joint] = own[left] + share * (own[right] - own[left])
     return result
-
-
-def _held(arm: ArmModel, motion: Motion) -> list[int]:
-    """Return the joints that dry friction may hold, as columns of the motion."""
-    held = {joint for effect in arm.effects if effect.holds_at_rest for joint in effect.joints}
-    return [motion.joints.index(name) for name in held]
-
-
-def _at_rest(arm: ArmModel, motion: Motion) -> npt.NDArray[np.bool_]:
-    """Return where joints with dry friction are at rest, shape (N, n)."""
-    rest = np.zeros(motion.q.shape, dtype=bool)
-    shortest = REST_TIME / float(motion.t[1] - motion.t[0])
-    for joint in _held(arm, motion):
-        speed = np.abs(motion.dq[:, joint])
-        slow = np.concatenate([[False], speed < REST_SPEED * speed.max(), [False]])
-        edges = np.flatnonzero(np.diff(slow.astype(int))).reshape(-1, 2)
-        for start, stop in edges[np.diff(edges, axis=1)[:, 0] >= shortest]:
-            rest[start:stop, joint] = True
-    return rest

@@ -26,7 +26,7 @@ from armid_ros.recording.recording import GAP_PERIODS
 from armid_ros.recording.series import NOTHING
 import numpy as np
 import numpy.typing as npt
-from scipy import signal
+from scipy import fft, signal
 from scipy.interpolate import CubicSpline
 from scipy.ndimage import correlate1d
 
@@ -114,12 +114,9 @@ class Conditioning:
         # the decimation filter ends at this share of the rate of the rows
         return 0.4 * self.rate_hz / self.decimation
 
-    def taps(self) -> FloatArray:
-        """Return the symmetric decimation filter; a single 1 where nothing is decimated."""
-        return self._taps
-
     @cached_property
-    def _taps(self) -> FloatArray:
+    def taps(self) -> FloatArray:
+        """Symmetric decimation filter; a single 1 where nothing is decimated."""
         if self.decimation == 1:
             return read_only(np.ones(1))
         count = 2 * _HALF_TAPS * self.decimation + 1
@@ -140,7 +137,7 @@ class Conditioning:
         return max(d for d in divisors if d <= max(1.0, widest))
 
 
-def conditioning(recordings: list[Recording], settings: SignalSettings) -> Conditioning:
+def conditioning(recordings: Sequence[Recording], settings: SignalSettings) -> Conditioning:
     """
     Choose the cut-off and the decimation for recordings of one kind.
 
@@ -151,11 +148,7 @@ def conditioning(recordings: list[Recording], settings: SignalSettings) -> Condi
     times this band, and are decimated to 2.5 samples per period of the upper end.
 
     """
-    for recording in recordings:
-        _require_rate(recording)
-        mixed = two_senders(recording)
-        if mixed:
-            raise IdentificationError(f'{recording.source or "recording"}: {mixed}')
+    check_recordings(recordings)
     rate = float(np.median([1.0 / recording.period for recording in recordings]))
     cutoff, decimation = settings.cutoff_hz, settings.decimation
     if cutoff is None or decimation is None:
@@ -207,22 +200,34 @@ def velocity_error(recording: Recording, used: Conditioning) -> FloatArray:
     return np.asarray(2.0 * np.pi * np.sqrt(noise + lacking * frequency[1]))
 
 
-def _require_rate(recording: Recording) -> None:
-    """Raise an IdentificationError if samples are too far apart, as with stamps not in seconds."""
-    rate = 1.0 / recording.period
-    if rate >= SLOWEST:
-        return
-    units = (('milliseconds', 1e3), ('microseconds', 1e6), ('nanoseconds', 1e9))
-    likely = [
-        f'; the stamps seem to be {unit} in place of seconds, {factor * rate:.4g} samples/s: '
-        'write them in seconds'
-        for unit, factor in units
-        if USUAL_RATES[0] <= factor * rate <= USUAL_RATES[1]
-    ]
-    raise IdentificationError(
-        f'{recording.source}: {len(recording)} samples in {recording.duration:.4g} s, one every '
-        f'{1.0 / rate:.4g} s: too slow for a motion' + (likely[0] if likely else '')
-    )
+def check_recordings(recordings: Sequence[Recording]) -> None:
+    """
+    Raise an error for recordings that no filter can process.
+
+    Raises
+    ------
+    IdentificationError
+        If samples are too far apart, as with stamps that are not in seconds, or if a topic has two
+        senders.
+
+    """
+    for recording in recordings:
+        rate = 1.0 / recording.period
+        if rate < SLOWEST:
+            units = (('milliseconds', 1e3), ('microseconds', 1e6), ('nanoseconds', 1e9))
+            likely = [
+                f'; the stamps seem to be {unit} in place of seconds, {factor * rate:.4g} '
+                'samples/s: write them in seconds'
+                for unit, factor in units
+                if USUAL_RATES[0] <= factor * rate <= USUAL_RATES[1]
+            ]
+            raise IdentificationError(
+                f'{recording.source}: {len(recording)} samples in {recording.duration:.4g} s, one '
+                f'every {1.0 / rate:.4g} s: too slow for a motion' + (likely[0] if likely else '')
+            )
+        mixed = two_senders(recording)
+        if mixed:
+            raise IdentificationError(f'{recording.source or "recording"}: {mixed}')
 
 
 def segments(recording: Recording, used: Conditioning) -> Iterator[Motion]:
@@ -248,7 +253,8 @@ def segments(recording: Recording, used: Conditioning) -> Iterator[Motion]:
     period = 1.0 / used.rate_hz
     for part in unbroken(recording, used.rate_hz):
         if len(part) >= _LEAST_SAMPLES and np.ptp(recording.t[part]) > _shortest(used):
-            t, q, tau = _even(recording.t[part], period, positions[part], measured[part])
+            own = slice(int(part[0]), int(part[-1]) + 1)  # a slice copies nothing
+            t, q, tau = _even(recording.t[own], period, positions[own], measured[own])
             yield _differentiated(recording, t, q, tau, used)
 
 
@@ -261,19 +267,15 @@ def unbroken(recording: Recording, rate: float) -> list[npt.NDArray[np.intp]]:
 
 def _shortest(used: Conditioning) -> float:
     """Return the shortest stretch that the filters can process [s]."""
-    return _decimated_edges(used) + _CUTOFF_PERIODS / used.cutoff_hz
-
-
-def _decimated_edges(used: Conditioning) -> float:
-    """Return the duration that the decimation filter removes at both ends together [s]."""
-    return 2 * _HALF_TAPS * used.decimation / used.rate_hz
+    edges = 2 * _HALF_TAPS * used.decimation / used.rate_hz  # of the decimation
+    return edges + _CUTOFF_PERIODS / used.cutoff_hz
 
 
 def no_stretch(recording: Recording, used: Conditioning) -> IdentificationError:
     """Return the error that no stretch is long enough for the filters, with the needed length."""
     spans = [recording.t[part[[0, -1]]] for part in unbroken(recording, used.rate_hz)]
     longest = max(float(last - first) for first, last in spans)
-    left = longest - _decimated_edges(used)
+    left = longest - _shortest(used) + _CUTOFF_PERIODS / used.cutoff_hz
     if 'cutoff' in used.given and left > 0.0:
         return IdentificationError(
             f'{recording.source}: --cutoff {used.cutoff_hz:g} Hz is too low for {longest:.2f} s '
@@ -306,14 +308,14 @@ def decimate(values: FloatArray, used: Conditioning, stride: int = 1) -> FloatAr
         Sample m belongs to input ``decimated_samples(N, used)[m]``.
 
     """
-    taps, factor = used.taps()[::stride], used.decimation // stride
+    taps, factor = used.taps[::stride], used.decimation // stride
     taps = taps / taps.sum()
     count = len(range(len(taps) // 2, len(values) - len(taps) // 2, factor))
     flat = values.reshape(len(values), -1)
     result = np.zeros((count, flat.shape[1]))
     # a link moves no joint after its own: half are zero
     active = np.flatnonzero(flat.any(axis=0))
-    flat = np.ascontiguousarray(flat[:, active])
+    flat = np.ascontiguousarray(flat[:, active] if len(active) < flat.shape[1] else flat)
     size = 16  # output samples of one matrix product; larger ones multiply more zeros of the band
     band = np.zeros((size, (size - 1) * factor + len(taps)))
     for row in range(size):
@@ -328,7 +330,7 @@ def decimate(values: FloatArray, used: Conditioning, stride: int = 1) -> FloatAr
 
 def decimated_samples(n_samples: int, used: Conditioning) -> range:
     """Return the indices of the full-rate samples at the times of the decimated ones."""
-    half = (len(used.taps()) - 1) // 2
+    half = (len(used.taps) - 1) // 2
     return range(half, max(half, n_samples - half), used.decimation)
 
 
@@ -357,13 +359,15 @@ def _differentiated(
     dq = _central_difference(smooth, t[1] - t[0])
     n = recording.n_joints
     ddq = _central_difference(dq[:, :n], t[1] - t[0])
+    for array in (smooth, dq, ddq):
+        array.setflags(write=False)  # a motion copies arrays that may change
     edge = int(np.ceil(EDGE_PERIODS * used.rate_hz / used.cutoff_hz))
     inner = slice(edge, len(t) - edge)
     # differences of two samples damp the cut-off by sinc(1 / 20), 0.4 %
     few = max(1, int(used.rate_hz / (20.0 * used.cutoff_hz)))
     bands = [(smooth[::few, :n], used.cutoff_hz)]
     band = _CURVATURE_BANDS * _motion_band(bands, used.rate_hz / few)
-    beside = None
+    points = None
     if recording.partner is not None:
         # motion of the ends of the ties on the other machine
         other, ties = recording.partner, recording.partner.ties
@@ -374,9 +378,9 @@ def _differentiated(
             smooth[inner, n:],
         )
         velocity = np.einsum('nsxj,nj->nsx', jacobian, dq[inner, n:])
-        beside = MovingPoints(tuple(tie.name for tie in ties), position, velocity)
+        points = MovingPoints(tuple(tie.name for tie in ties), position, velocity)
     parts = (part[inner] for part in (smooth[:, :n], dq[:, :n], ddq, tau))
-    return Motion(recording.joints, t[inner], *parts, band_hz=band, partner=beside)
+    return Motion(recording.joints, t[inner], *parts, band_hz=band, partner=points)
 
 
 def _central_difference(x: FloatArray, step: float) -> FloatArray:
@@ -397,17 +401,16 @@ def _motion_band(stretches: Sequence[tuple[FloatArray, npt.ArrayLike]], rate: fl
     # noise. Power above it does not count, as a joint that hardly moves has only noise where
     # another joint moves. All stretches count together, for the same reason.
     band = rate / max(len(q) for q, _ in stretches)
-    spectra = []
-    for q, end in stretches:  # the power of velocities
-        spectra.append((*signal.periodogram(np.diff(q, axis=0), rate, axis=0), end))
     for joint in range(stretches[0][0].shape[1]):
-        kept = [
-            (frequency[inside], power[inside, joint])
-            for frequency, power, end in spectra
-            for inside in [frequency <= np.broadcast_to(end, power.shape[1])[joint]]
-        ]
-        frequency, power = (np.concatenate(part) for part in zip(*kept, strict=True))
-        order = np.argsort(frequency)
+        spectra = []
+        for q, end in stretches:
+            velocity = np.diff(q[:, joint])
+            frequency = fft.rfftfreq(len(velocity), 1.0 / rate)
+            power = np.abs(fft.rfft(velocity - velocity.mean())) ** 2 / len(velocity)
+            inside = frequency <= np.broadcast_to(end, q.shape[1])[joint]
+            spectra.append((frequency[inside], power[inside]))
+        frequency, power = (np.concatenate(part) for part in zip(*spectra, strict=True))
+        order = np.argsort(frequency, kind='stable')
         share = np.cumsum(power[order])
         if share[-1] > 0.0:
             band = max(band, float(frequency[order[np.searchsorted(share, 0.99 * share[-1])]]))

@@ -104,24 +104,31 @@ def two_senders(recording: Recording) -> str:
     if len(t) < 2 * _FEWEST:
         return ''
     fewest = max(_FEWEST, _SHARE_OF_MESSAGES * len(t))
-    # steps from the message before and behind, and across; the same way from both is no motion
-    before, after, across = q[1:-1] - q[:-2], q[1:-1] - q[2:], q[2:] - q[:-2]
-    step = np.where(before * after > 0.0, np.minimum(np.abs(before), np.abs(after)), 0.0)
-    apart = step > np.maximum(_LEAST_STEP, _CLOSER * np.abs(across))
-    if np.count_nonzero(apart) < fewest:
+    # rows of each joint whose message is far from both neighbours in one direction, with the step
+    # and its sign; the arrays of one joint fit into the cache
+    found = []
+    for joint in range(recording.n_joints):
+        steps = np.diff(q[:, joint])
+        before, after, across = steps[:-1], -steps[1:], q[2:, joint] - q[:-2, joint]
+        step = np.minimum(np.abs(before), np.abs(after))
+        apart = step > np.maximum(_LEAST_STEP, _CLOSER * np.abs(across))
+        rows = np.flatnonzero(apart & (before * after > 0.0))
+        found.append((rows, step[rows], before[rows] > 0.0))
+    if sum(len(rows) for rows, *_ in found) < fewest:
         return ''
     # the speed that each joint seldom exceeds, from recorded velocities if there are any
-    time = (t[2:] - t[:-2])[:, np.newaxis]
-    usual = np.median(np.abs(across) / time, axis=0)
+    time = t[2:] - t[:-2]
+    usual = np.median(np.abs(q[2:] - q[:-2]) / time[:, np.newaxis], axis=0)
     if recording.dq is not None and np.any(recording.dq):
         usual = np.percentile(np.abs(recording.dq), 99, axis=0)
-    apart &= step > usual * time
-    if np.count_nonzero(apart.any(axis=1)) < fewest:
+    for joint, parts in enumerate(found):
+        fast = parts[1] > usual[joint] * time[parts[0]]
+        found[joint] = tuple(part[fast] for part in parts)
+    if len(np.unique(np.concatenate([rows for rows, *_ in found]))) < fewest:
         return ''
-    joint = int(np.argmax(apart.sum(axis=0)))
-    rows = np.flatnonzero(apart[:, joint])
-    jump = float(np.median(step[rows, joint]))
-    side = before[rows, joint] > 0.0
+    joint = int(np.argmax([len(rows) for rows, *_ in found]))
+    rows, step, side = found[joint]
+    jump = float(np.median(step))
     own = [np.abs(np.diff(q[rows[one] + 1, joint])) for one in (side, ~side) if one.sum() > 1]
     if not own or float(np.median(np.concatenate(own))) * _TRACK > jump:
         return ''

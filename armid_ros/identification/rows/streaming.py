@@ -19,9 +19,9 @@ from armid_ros.arm import ArmModel
 from armid_ros.identification.rows.damage import without_damage
 from armid_ros.identification.rows.regression import Regression, regressions
 from armid_ros.identification.rows.signals import (
+    check_recordings,
     Conditioning,
     EDGE_PERIODS,
-    SignalSettings,
 )
 from armid_ros.recording import ReadSettings, Recording
 from armid_ros.recording.reader import read_pieces
@@ -34,7 +34,7 @@ def _cuts(piece: Recording, used: Conditioning) -> tuple[int, int]:
     """Return the stamp of the first sample of the next piece, and that of its first row [ns]."""
     # after 16 periods, the start of a filter of order 4 has decayed to exp(-38)
     periods = (EDGE_PERIODS + 16.0) * used.rate_hz / used.cutoff_hz
-    margin = int(np.ceil(periods)) + len(used.taps())
+    margin = int(np.ceil(periods)) + len(used.taps)
     longest = GAP_PERIODS * max(1.0 / used.rate_hz, piece.period)
     gaps = np.flatnonzero(np.diff(piece.t) > longest)
     origin = int(gaps[-1]) + 1 if len(gaps) else 0
@@ -89,7 +89,8 @@ def streamed(
         if not chosen:
             chosen.append(choose(piece))
         used = chosen[0]
-        (repaired,), _ = without_damage([piece], SignalSettings(used.cutoff_hz, used.decimation))
+        check_recordings([piece])
+        (repaired,), _ = without_damage([piece], used)
         stop = np.inf if last else float(_cuts(piece, used)[1])
         owned = []
         for rows in regressions(arm, columns, [repaired], used):

@@ -202,7 +202,7 @@ class SpikeGate:
 
     def line_errors(self, t: FloatArray, x: FloatArray, floor: FloatArray) -> LineErrors:
         """Return the prediction errors of all samples of a recording; see `line_errors`."""
-        return line_errors(t, x, floor, self._turn, self._max_gap, self._quantile_of)
+        return line_errors(t, x, floor, self._max_gap, self._quantile_of)
 
     def possible(self, excursion: Excursion, lowest: FloatArray, highest: FloatArray) -> bool:
         """

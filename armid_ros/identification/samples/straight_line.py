@@ -287,8 +287,9 @@ class NoiseLevel:
         size = robust_scale(errors, _SHARE)
         self._remember(size, share_of_noise(errors, size))
         self.see_steps(moves)
-        usual = _loudest(period, self._sizes, self._shares)
-        self.usual = replace(usual, size=np.maximum(usual.size, self._least(period)))
+        loudest = np.argmax(self._sizes, axis=0), np.arange(len(size))
+        size = np.maximum(self._sizes[loudest], self._least(period))
+        self.usual = Usual(period, size, self._shares[loudest])
 
     def _remember(self, size: FloatArray, noisy: FloatArray) -> None:
         place = self._seen % _REMEMBERED
@@ -309,25 +310,22 @@ class NoiseLevel:
 
 class LineErrors(NamedTuple):
     """
-    Errors of samples against the straight line through the two samples before.
+    Prediction errors of the samples of a recording.
 
     Attributes
     ----------
     stretch : ndarray of int, shape (N,)
         First sample of the stretch that contains a sample; long gaps separate stretches.
-    off : ndarray, shape (N, m)
-        Error of each sample, if a smooth signal keeps its curvature, over the largest allowed
-        error; 0 for the first samples of a stretch.
-    bent : ndarray, shape (N, m)
-        Distance of each sample from the straight line, scaled to one period.
+    suspect : ndarray of bool, shape (N,)
+        Whether a signal is off the line of the two samples before by more than the largest allowed
+        error; False for the first two samples of a stretch.
     usual : Usual
         Usual error in the noisiest part of the recording.
 
     """
 
     stretch: npt.NDArray[np.intp]
-    off: FloatArray
-    bent: FloatArray
+    suspect: npt.NDArray[np.bool_]
     usual: Usual
 
 
@@ -335,12 +333,11 @@ def line_errors(
     t: FloatArray,
     x: FloatArray,
     floor: FloatArray,
-    turn: FloatArray,
     max_gap: int,
     quantile: Callable[[float], float],
 ) -> LineErrors:
     """
-    Return the errors of straight lines through two samples at the next one, for all samples.
+    Compare all samples of a recording with the straight lines through the two samples before.
 
     Parameters
     ----------
@@ -350,48 +347,42 @@ def line_errors(
         Signals.
     floor : ndarray, shape (m,)
         Negligible error of a sample.
-    turn : ndarray, shape (m,)
-        Full turn of a signal, whose jumps are ignored; 0 without.
     max_gap : int
         Longest gap within a stretch, in periods.
     quantile : callable
         Function of the period [s] that returns the largest allowed error in standard deviations.
 
     """
-    dt, moves = np.diff(t), np.diff(x, axis=0)
-    turns = np.flatnonzero(turn)
-    moves[:, turns] -= np.rint(moves[:, turns] / turn[turns]) * turn[turns]
+    dt = np.diff(t)
     period = float(np.median(dt))
     gap = dt > max_gap * period
     first = np.where(np.concatenate([[True], gap]), np.arange(len(t)), 0)
-    noise, bend = np.ones((2, len(t), 1))
-    noise[2:, 0], bend[2:, 0] = growth_over(dt[:-1], dt[1:], period)
-    error = np.zeros_like(x)
-    np.multiply((dt[1:] / dt[:-1])[:, np.newaxis], moves[:-1], out=error[2:])
-    np.subtract(moves[1:], error[2:], out=error[2:])
-    error[2:][gap[1:] | gap[:-1]] = 0.0
-    plain = error[2:] / np.maximum(noise, bend)[2:]
+    apart = gap[1:] | gap[:-1]
+    ratio, (noise, bend) = dt[1:] / dt[:-1], growth_over(dt[:-1], dt[1:], period)
+    growth = np.maximum(noise, bend)
+    suspect = np.zeros(len(t), dtype=bool)
+    sizes, shares = np.zeros((2, x.shape[1]))
     # windows of equal length are processed together; the last few samples are in none
-    count = max(1, len(plain) // _WINDOW)
-    size = len(plain) // count
-    windows = plain[: count * size].reshape(count, size, -1).swapaxes(0, 1)
-    sizes = robust_scale(windows, _SHARE)
-    usual = _loudest(period, sizes, share_of_noise(windows, sizes))
-    step = _smallest(np.abs(moves))[-1]
-    least = np.minimum(np.where(np.isfinite(step), step, 0.0), np.abs(error).max(axis=0))
-    usual = replace(usual, size=np.maximum(usual.size, least))
-    bent, off = error / bend, np.abs(error)
-    off[3:] = np.abs(error[3:] - usual.smoothness * bent[2:-1] * bend[3:])
-    floor = np.maximum(floor, np.finfo(float).tiny)
-    off /= np.maximum(usual.limits(quantile(period), noise, bend), floor)
-    return LineErrors(np.maximum.accumulate(first), off, bent, usual)
-
-
-def _loudest(period: float, sizes: FloatArray, shares: FloatArray) -> Usual:
-    """Return the usual error of the noisiest of K windows, given sizes and shares, (K, m)."""
-    loudest = np.argmax(sizes, axis=0)[np.newaxis]
-    size, noisy = (np.take_along_axis(one, loudest, 0)[0] for one in (sizes, shares))
-    return Usual(period, size, noisy)
+    count = max(1, len(ratio) // _WINDOW)
+    length = len(ratio) // count
+    for signal in range(x.shape[1]):  # the arrays of one signal fit into the cache
+        moves = np.diff(x[:, signal])
+        error = moves[1:] - ratio * moves[:-1]
+        error[apart] = 0.0
+        windows = (error / growth)[: count * length].reshape(count, length).T
+        scales = robust_scale(windows, _SHARE)
+        loudest = int(np.argmax(scales))
+        noisy = share_of_noise(windows[:, loudest], scales[loudest])
+        step = float(_smallest(np.abs(moves)[:, np.newaxis])[-1, 0])
+        least = min(step if np.isfinite(step) else 0.0, float(np.abs(error).max()))
+        size = max(scales[loudest], least)
+        usual = Usual(period, np.array([size]), np.array([noisy]))
+        limit = np.maximum(usual.limits(quantile(period), noise, bend), floor[signal])
+        # a smooth signal keeps its curvature
+        error[1:] -= usual.smoothness * (error[:-1] / bend[:-1]) * bend[1:]
+        suspect[2:] |= (np.abs(error) > limit) & ~apart
+        sizes[signal], shares[signal] = size, noisy
+    return LineErrors(np.maximum.accumulate(first), suspect, Usual(period, sizes, shares))
 
 
 def _smallest(steps: FloatArray) -> FloatArray:

@@ -6,13 +6,14 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from typing import Literal, NamedTuple
+from typing import Literal
 
 from armid_ros.effects.load import described_spread
 from armid_ros.errors import IdentificationError
 from armid_ros.estimate import ParameterName
 from armid_ros.identification.rows.signals import Conditioning, decimate, decimated_samples
 from armid_ros.model import (
+    BaseParameters,
     group_columns,
     inverse_dynamics,
     inverse_dynamics_derivatives,
@@ -142,30 +143,12 @@ class InteractionProblem:
         return np.asarray(np.sqrt(np.mean(angles, axis=0) + self.torque_noise**2))
 
 
-@dataclass(frozen=True)
-class MachineNoise:
-    """
-    Noise of the sensors.
-
-    Attributes
-    ----------
-    position : array_like, number or shape (n + m,)
-        Standard deviation of the angles of both machines [rad].
-    torque : array_like, number or shape (n,)
-        Smallest standard deviation of the torques [N m].
-
-    """
-
-    position: npt.ArrayLike = 0.0
-    torque: npt.ArrayLike = 0.0
-
-
 def interaction_problem(
     machines: TiedMachines,
     motion: Motion,
     other_motion: Motion,
     *,
-    noise: MachineNoise | None = None,
+    noise: tuple[npt.ArrayLike, npt.ArrayLike] = (0.0, 0.0),
     used: Conditioning | None = None,
     inertias: Inertias = 'known',
     separate: bool = False,
@@ -180,8 +163,9 @@ def interaction_problem(
         Both machines, with the positions of the springs.
     motion, other_motion : Motion
         Motions of both machines on one time base; ``motion`` with torques.
-    noise : MachineNoise, optional
-        Noise of the sensors; zero by default.
+    noise : tuple of two array_like
+        Standard deviation of the angles of both machines, a number or (n + m,) [rad], and the
+        smallest one of the torques, a number or (n,) [N m].
     used : Conditioning, optional
         Filters that were applied to the positions, and that decimate torques and columns. By
         default, every sample counts and the angles are not filtered.
@@ -209,75 +193,50 @@ def interaction_problem(
     slow, far = motion.select(kept), other_motion.select(kept)
     geometry = tie_geometry(robot, motion.q, other, other_motion.q, ties)
     springs = geometry.pulled(slack)
-    by_both = tie_columns_derivatives(robot, slow.q, other, far.q, ties, slack)
-    by_angles = np.concatenate(by_both, axis=3)
-    springs_by = np.concatenate([by_angles, np.zeros_like(by_angles), np.zeros_like(by_angles)], 3)
+    springs_by = _springs_by_motion(machines, slow, far, slack)
     if not separate:
         springs, springs_by = (x.sum(axis=2, keepdims=True) for x in (springs, springs_by))
     names = tuple(tie.name for tie in ties) if separate else ('all',)
     count = springs_by.shape[3] // 3
+    base = None
     if inertias == 'known':
-        body = _known_body(robot, motion, slow, count)
+        known = inverse_dynamics(robot, motion)
+        known_by = _placed(np.stack(inverse_dynamics_derivatives(robot, slow), axis=2), count)
+        columns, columns_by, spread = springs, springs_by, np.zeros((0, 1))
     else:
-        body = _free_body(
-            robot, motion, slow, springs, count, names if separate else ('the springs',)
-        )
-    columns = np.concatenate([springs, body.columns], axis=2)
-    columns_by = np.concatenate([springs_by, body.columns_by], axis=2)
-    tau, known = motion.tau, body.known
-    passed, left = np.diag([1.0, 0.0, 0.0])[np.newaxis], np.ones(1)
+        known, known_by = np.zeros_like(motion.q), np.zeros((*slow.q.shape, 3 * count))
+        body, base = _free_inertias(robot, motion, springs, names)
+        body_by = _placed(_regressor_by_motion(robot, slow, base.independent), count)
+        columns = np.concatenate([springs, body], axis=2)
+        columns_by = np.concatenate([springs_by, body_by], axis=2)
+        spread = base.grouping * described_spread(robot).ravel()
+    tau, alone = motion.tau, np.zeros(springs.shape[2])  # springs have no prior
+    passed, left = _passed(used)
     if used is not None:
         tau, known, columns = (decimate(values, used) for values in (tau, known, columns))
-        passed, left = _passed(used)
-    noise = noise or MachineNoise()
-    deviation = np.broadcast_to(np.asarray(noise.position, dtype=float), (count,))
+    deviation = np.broadcast_to(np.asarray(noise[0], dtype=float), (count,))
     return InteractionProblem(
         tau,
         known,
         columns,
-        body.known_by,
+        known_by,
         columns_by,
         np.asarray(np.kron(passed, np.diag(deviation**2))),
         left / left[0],
-        np.sqrt(left[0]) * np.broadcast_to(np.asarray(noise.torque, float), tau.shape[1:]),
+        np.sqrt(left[0]) * np.broadcast_to(np.asarray(noise[1], float), tau.shape[1:]),
         names,
         tuple(tie.joint for tie in ties) if separate else ('',),
-        body.parameters,
-        np.concatenate([np.zeros(springs.shape[2]), body.described]),
-        scipy.linalg.block_diag(np.zeros((springs.shape[2],) * 2), body.precision),
+        base.parameters if base else (),
+        np.concatenate([alone, base.values(robot.rigid_parameters)]) if base else alone,
+        scipy.linalg.block_diag(np.diag(alone), np.linalg.inv(spread @ spread.T)),
         float(np.sqrt(np.mean(np.sum(geometry.way**2, axis=2)))),
     )
 
 
-class _Body(NamedTuple):
-    """Rigid body in a problem: its known torque, or columns of free inertias with their prior."""
-
-    known: FloatArray
-    known_by: FloatArray
-    columns: FloatArray
-    columns_by: FloatArray
-    parameters: tuple[ParameterName, ...]
-    described: FloatArray
-    precision: FloatArray
-
-
-def _known_body(robot: Robot, motion: Motion, slow: Motion, count: int) -> _Body:
-    """Return the body as described, without columns."""
-    by_motion = _placed(np.stack(inverse_dynamics_derivatives(robot, slow), axis=2), count)
-    none, none_by = np.zeros((*motion.q.shape, 0)), np.zeros((*slow.q.shape, 0, 3 * count))
-    torque = inverse_dynamics(robot, motion)
-    return _Body(torque, by_motion, none, none_by, (), np.zeros(0), np.zeros((0, 0)))
-
-
-def _free_body(
-    robot: Robot,
-    motion: Motion,
-    slow: Motion,
-    springs: FloatArray,
-    count: int,
-    names: Sequence[str],
-) -> _Body:
-    """Return the inertial columns that are identifiable with the springs, and the prior."""
+def _free_inertias(
+    robot: Robot, motion: Motion, springs: FloatArray, names: Sequence[str]
+) -> tuple[FloatArray, BaseParameters]:
+    """Return the inertial columns that are identifiable with the springs, and their grouping."""
     body = regressor(robot, motion)
     every = rigid_parameter_names(robot)
     base = group_columns(body.reshape(-1, body.shape[2]), every, _RANK_TOLERANCE)
@@ -287,36 +246,41 @@ def _free_body(
     scaled = w / np.where(scale > 0.0, scale, 1.0)
     left = np.abs(np.diag(np.linalg.qr(scaled, mode='r')))[base.rank :]
     if len(left) and left.min() < _RANK_TOLERANCE:
+        which = names[int(np.argmin(left))] if len(names) > 1 else 'the springs'
         raise IdentificationError(
-            f'{names[int(np.argmin(left))]}: its stiffness cannot be distinguished from weight '
+            f'{which}: its stiffness cannot be distinguished from weight '
             'and inertia along this motion; keep the inertias known, or record more motion'
         )
-    spread = base.grouping * described_spread(robot).ravel()
-    return _Body(
-        np.zeros_like(motion.q),
-        np.zeros((*slow.q.shape, 3 * count)),
-        body[:, :, base.independent],
-        _placed(_regressor_by_motion(robot, slow, base.independent), count),
-        base.parameters,
-        base.values(robot.rigid_parameters),
-        np.asarray(np.linalg.inv(spread @ spread.T)),
+    return body[:, :, base.independent], base
+
+
+def _springs_by_motion(
+    machines: TiedMachines, motion: Motion, other: Motion, slack: float | FloatArray
+) -> FloatArray:
+    """Return the derivatives of spring columns by the motion of both machines, (N, n, S, 3 J)."""
+    by_both = tie_columns_derivatives(
+        machines.robot, motion.q, machines.other, other.q, machines.ties, slack
     )
+    by_angles = np.concatenate(by_both, axis=3)
+    return np.pad(by_angles, ((0, 0), (0, 0), (0, 0), (0, 2 * by_angles.shape[3])))
 
 
-def _passed(used: Conditioning) -> tuple[FloatArray, FloatArray]:
+def _passed(used: Conditioning | None) -> tuple[FloatArray, FloatArray]:
     """Return the covariances of filtered white noise of positions and of torques, over lags."""
     # covariances of position, velocity, acceleration of a row with itself and with later rows,
     # shape (1 + lags, 3, 3), and of torques, (1 + lags,). Columns change slowly compared with
     # the filter of the decimation, so they do not affect the noise that passes it
+    if used is None:
+        return np.diag([1.0, 0.0, 0.0])[np.newaxis], np.ones(1)
     w = np.linspace(0.0, np.pi, 8001)
     sections = signal.butter(4, used.cutoff_hz, fs=used.rate_hz, output='sos')
     gain = np.abs(signal.sosfreqz(sections, w)[1]) ** 4
-    gain = gain * np.abs(signal.freqz(used.taps(), worN=w)[1]) ** 2
+    gain = gain * np.abs(signal.freqz(used.taps, worN=w)[1]) ** 2
     result = np.empty((1 + _LAGS, 3, 3))
     for lag, i, j in np.ndindex(result.shape):
         turned = np.cos(w * lag * used.decimation + (i + j) * np.pi / 2.0)
         result[lag, i, j] = (-1) ** i * np.mean(gain * (used.rate_hz * w) ** (i + j) * turned)
-    taps = used.taps()
+    taps = used.taps
     ends = [len(taps) - lag * used.decimation for lag in range(1 + _LAGS)]
     return result, np.array([taps[:end] @ taps[-end:] if end > 0 else 0.0 for end in ends])
 

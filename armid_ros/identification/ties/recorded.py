@@ -23,7 +23,6 @@ from armid_ros.identification.ties.problem import (
     Inertias,
     interaction_problem,
     InteractionProblem,
-    MachineNoise,
     STACKED,
 )
 from armid_ros.model.spring_ties import TiedMachines
@@ -90,7 +89,7 @@ def together_interaction_problem(
     used: Conditioning,
     *,
     inertias: Inertias = 'known',
-    separate: bool = False,
+    separate: bool,
     slack: float | FloatArray = 0.0,
     rest: Callable[[Motion], FloatArray] | None = None,
 ) -> InteractionProblem:
@@ -117,12 +116,11 @@ def together_interaction_problem(
         If no stretch of the recording is long enough.
 
     """
-    beside, n = recording.partner, len(recording.joints)
-    assert beside is not None
+    partner, n = recording.partner, len(recording.joints)
+    assert partner is not None
     both = _one_machine(recording)
     assert both.tau is not None
-    machines = TiedMachines(robot, beside.robot, beside.ties)
-    noise = MachineNoise(_white(both.q), _white(both.tau[:, :n]))
+    machines = TiedMachines(robot, partner.robot, partner.ties)
     problems = []
     for stretch, own in zip(segments(both, used), segments(recording, used), strict=True):
         assert own.tau is not None
@@ -133,7 +131,7 @@ def together_interaction_problem(
                 machines,
                 own.with_torque(tau),
                 Motion(both.joints[n:], stretch.t, *far),
-                noise=noise,
+                noise=(_white(both.q), _white(both.tau[:, :n])),
                 used=used,
                 inertias=inertias,
                 separate=separate,

@@ -87,19 +87,15 @@ class Interaction:
         return self.estimate.interval(confidence)[: len(self.segments)]
 
 
-def identify_interaction(
-    problem: InteractionProblem, torque_noise: FloatArray | float | None = None
-) -> Interaction:
+def identify_interaction(problem: InteractionProblem) -> Interaction:
     """
     Estimate stiffnesses, and free inertias with them, without the bias of noisy angles.
 
     Parameters
     ----------
     problem : InteractionProblem
-        Torques, columns and their derivatives: see ``interaction_problem``.
-    torque_noise : float or ndarray, shape (n,), optional
-        Standard deviation of the torques [N m]; by default as measured in the recording. Larger
-        residuals widen the intervals.
+        Torques, columns and their derivatives: see ``interaction_problem``. Residuals larger than
+        its noise widen the intervals.
 
     Raises
     ------
@@ -114,7 +110,7 @@ def identify_interaction(
     columns = np.concatenate([together, problem.columns[:, :, count:]], axis=2)
     theta = _least_squares(problem, columns)
     theta = np.concatenate([np.full(count, theta[0]), theta[1:]])
-    noise = problem.torque_noise if torque_noise is None else np.asarray(torque_noise)
+    noise = problem.torque_noise
     least = _LEAST_SHARE * np.mean(problem.residual(theta) ** 2, axis=0) + 1e-18
     used = np.where(noise > 0.0, noise**2, least)
     theta = _most_likely(problem, theta, used)

@@ -67,7 +67,7 @@ def agrees(robot, names, seed=0):
     training = error(result.training)
     assert error(result.predict([recording])) == pytest.approx(training, rel=1e-3)
     np.testing.assert_allclose(
-        result.joint_std, NOISE * np.linalg.norm(result.used.taps()), rtol=0.3
+        result.joint_std, NOISE * np.linalg.norm(result.used.taps), rtol=0.3
     )
     other = recorded(truth, multisine(robot.joints, 6.0, 200.0, seed=7))
     assert error(result.predict([other])) < 1.0
@@ -103,7 +103,7 @@ def test_what_is_known_of_a_nonlinear_effect_is_where_the_fit_begins(robot):
     training = error(result.training)
     assert error(result.predict([recording])) == pytest.approx(training, rel=1e-3)
     np.testing.assert_allclose(
-        result.joint_std, NOISE * np.linalg.norm(result.used.taps()), rtol=0.3
+        result.joint_std, NOISE * np.linalg.norm(result.used.taps), rtol=0.3
     )
 
 
@@ -121,5 +121,5 @@ def test_what_the_described_torque_never_reaches_is_found_where_the_fitted_one_d
     levels = np.array(truth.effects[1].shape)
     assert np.any(np.abs(result.training[0].motion.tau).max(axis=0) > levels)
     np.testing.assert_allclose(
-        result.joint_std, NOISE * np.linalg.norm(result.used.taps()), rtol=0.3
+        result.joint_std, NOISE * np.linalg.norm(result.used.taps), rtol=0.3
     )

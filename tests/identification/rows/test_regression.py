@@ -5,7 +5,7 @@
 from armid_ros.arm import ArmModel
 from armid_ros.effects import make_effect
 from armid_ros.identification import identify
-from armid_ros.identification.rows.regression import bridged, filtered_columns, unsure_samples
+from armid_ros.identification.rows.regression import bridged, filtered_columns, held_samples
 from armid_ros.identification.rows.signals import Conditioning, decimate
 from armid_ros.motion import Motion
 from armid_ros.recording import Recording
@@ -55,9 +55,10 @@ def test_columns_made_in_parts_are_those_made_at_once(swing, long_motion, values
         arm = arm.with_effect(make_effect(name, swing), [value])
     used = Conditioning(1000.0, 50.0, 20)
     chosen = np.array([9 + len(values), 3, 9, 10])
-    parts = filtered_columns(arm, chosen, long_motion, used)
+    _, unsure = held_samples(arm, long_motion)
+    parts = filtered_columns(arm, chosen, long_motion, used, unsure)
     columns = arm.columns(long_motion)[:, :, chosen]
-    whole = decimate(bridged(columns, unsure_samples(arm, long_motion)), used)
+    whole = decimate(bridged(columns, unsure), used)
     np.testing.assert_allclose(parts, whole, atol=2e-5 * np.abs(whole).max())
 
 
@@ -67,7 +68,7 @@ def test_the_rigid_body_needs_no_more_samples_than_it_has_content(arm):
     assert used.smooth_stride == 10
     motion = multisine(arm.robot.joints, 30.0, rate, seed=3)
     rigid = np.arange(len(arm.robot.rigid_parameters))
-    strided = filtered_columns(arm, rigid, motion, used)
+    strided = filtered_columns(arm, rigid, motion, used, held_samples(arm, motion)[1])
     whole = decimate(arm.columns(motion)[:, :, rigid], used)
     scale = np.abs(whole).max(axis=(0, 1))
     np.testing.assert_array_less(np.abs(strided - whole).max(axis=(0, 1)), 3e-3 * scale + 1e-12)

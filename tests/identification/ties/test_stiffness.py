@@ -55,8 +55,9 @@ def test_exact_data_give_exact_stiffness(pair, poses, inertias, separate) -> Non
         poses.other,
         inertias=inertias,
         separate=separate,
+        noise=(0.0, 1e-3),
     )
-    found = identify_interaction(problem, 1e-3)
+    found = identify_interaction(problem)
     np.testing.assert_allclose(found.stiffness, STIFFNESS, rtol=1e-5)
 
 
