@@ -22,7 +22,7 @@ from dataclasses import dataclass, replace
 from functools import lru_cache
 from typing import Any, ClassVar, Self, TYPE_CHECKING, TypeAlias
 
-from armid_ros.effects.action import Action, Displacement
+from armid_ros.effects.action import Action
 from armid_ros.effects.quantities import joint_unit, Quantity, Shape
 from armid_ros.effects.traits import TRAITS, Traits
 from armid_ros.errors import meant, ModelError
