@@ -367,14 +367,13 @@ def feet_by_shares(cycle: GaitCycle, *, other: bool = False) -> FloatArray:
     hurry = np.gradient(speed, motion.t, axis=0)
     mass = np.array([body.mass for body in bodies])
     taken = mass[:, np.newaxis] * (hurry - robot.gravity)
-    plane = np.array([0, 2])
-    place, taken = place[..., plane], taken[..., plane]
+    place, taken = place[..., _PLANE], taken[..., _PLANE]
     trunk = floating(robot)[2]
     legs = [columns(robot, side) for side in SIDES]
     # shares of the trunk, (20) to (22): the leg whose thigh is nearer carries more
     far = np.linalg.norm(place[:, [leg[0] for leg in legs]] - place[:, [trunk]], axis=-1)
     shares = far[:, ::-1] / far.sum(axis=1, keepdims=True)
-    springs = cycle.torques.forces[..., plane] * (1.0 if not other else -1.0)
+    springs = cycle.torques.forces[..., _PLANE] * (1.0 if not other else -1.0)
     feet = np.empty((len(motion), 2, 2))
     for foot, own in enumerate(legs):
         pulled = [k for k, tie in enumerate(cycle.pair.ties) if tie.name.startswith(SIDES[foot])]
