@@ -92,7 +92,9 @@ def verdict(found: Sequence[Interaction], walked: SimulatedWalk | None) -> Verdi
     if walked is not None:
         each = ', '.join(f'{d.joint} {d.right.most:.2g}°' for d in walked.driven)
         sentences.append(f'Over a walking cycle, driven joints are off by at most: {each}.')
-    beware = [f'{", ".join(weak)}: too slightly drawn out to know within 10 %.'] if weak else []
+    beware = (
+        [f'{", ".join(weak)}: the extension is too small for an accuracy of 10 %.'] if weak else []
+    )
     if k - reach <= 0.0:
         return VerdictSection('no interaction', 'fair', ['No interaction is seen.'], beware)
     sure = reach < _NARROW * k
@@ -122,9 +124,9 @@ def _stiffness_section(found: Sequence[Interaction], truth: Mapping[str, float])
         ('Noise of the torques, as filtered', f'{_range(found[0].torque_noise)} N m'),
     ]
     text = (
-        'Springs are drawn out by millimetres, the small difference of measured angles. Noise in '
-        'the angles biases plain least squares, and more data do not help. '
-        'The noise was measured in the recording and its effect taken out.'
+        'Springs are extended by millimetres, the small difference of measured angles. Noise in '
+        'the angles biases plain least squares, and more data do not reduce this bias. The noise '
+        'is estimated from the recording, and the bias is corrected.'
     )
     table = DataTable([*heads, 'Simulated with'] if truth else heads, rows)
     return ContentSection('Stiffness', [table, FactList(noise), Paragraph(text, 'hint')])
@@ -160,10 +162,10 @@ def forces_section(
     return ContentSection(
         'Interaction',
         [
-            Paragraph('Force of each spring on the machine; the wearer feels the opposite.'),
+            Paragraph('Force of each spring on the machine; the force on the wearer is opposite.'),
             Chart(abscissa, series, name, 'force [N]', height=260),
             DataTable(['Segment', 'Mean [N]', 'Largest [N]'], rows),
-            Fold('What the springs make of the joint torques', [Panels(panels)]),
+            Fold('Joint torques with and without springs', [Panels(panels)]),
         ],
     )
 
@@ -180,6 +182,6 @@ def assumptions_section() -> ContentSection:
         else:
             text = f'{value:g}' if isinstance(value, float) else str(value)
         rows.append((name.replace('_', ' '), f'{text} {entry.unit}'.strip(), entry.reason))
-    said = 'What the literature leaves open and what was assumed instead.'
+    caption = 'Values that the source does not give, and their assumed values.'
     table = DataTable(['Quantity', 'Value', 'Reason'], rows, words=(0, 1, 2))
-    return ContentSection('Assumptions', [Paragraph(said), table])
+    return ContentSection('Assumptions', [Paragraph(caption), table])
