@@ -121,7 +121,7 @@ TRAITS = {
     ),
     'coulomb_friction': Traits(
         shown_by='slow constant velocity in both directions',
-        look_at='the brake, the seals and the bearings, and whether the joint moves freely by hand',
+        look_at='the brake, the seals and the bearings, by moving the joint by hand',
         usual=True,
         nuisance=((),),
         friction=True,
