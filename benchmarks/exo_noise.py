@@ -30,7 +30,7 @@ def find_springs(
     own, other = measured(motions, degrees, np.random.default_rng(seed))
     if len(own) < 1000:
         problem = interaction_problem(
-            pair.machines,
+            pair,
             own,
             other,
             noise=(np.radians(degrees), TORQUE_NOISE),
@@ -40,7 +40,7 @@ def find_springs(
         return identify_interaction(problem)
     return identify_interaction(
         recorded_interaction_problem(
-            pair.machines,
+            pair,
             recorded(own),
             recorded(other),
             inertias=inertias,

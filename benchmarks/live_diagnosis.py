@@ -22,7 +22,6 @@ from __future__ import annotations
 
 import argparse
 from collections.abc import Iterator
-from contextlib import contextmanager
 from dataclasses import dataclass
 import time
 
@@ -188,13 +187,6 @@ class Bench:
         return [[name, *joints] for name, joints in self.live.belief.named]
 
 
-@contextmanager
-def bench(along: Motion) -> Iterator[Bench]:
-    """Yield a bench with both nodes."""
-    with Stage() as stage:
-        yield Bench(stage, along)
-
-
 def draw(number: int, seed: int) -> Draw:
     """Run one draw: an effect appears in a running arm."""
     rng = np.random.default_rng(number + 1000 * seed)
@@ -202,7 +194,8 @@ def draw(number: int, seed: int) -> Draw:
     arm = known_arm()
     effect = drawn(arm, along, KINDS[number % len(KINDS)], rng)
     name, _, place = effect.partition(':')[0].partition('@')
-    with bench(along) as nodes:
+    with Stage() as stage:
+        nodes = Bench(stage, along)
         early = any(nodes.proposed for _ in nodes.run(BEFORE))
         nodes.set_effect(effect)
         delay = None
@@ -220,7 +213,8 @@ def quiet(minutes: float, seed: int) -> tuple[int, int, list[list[list[str]]]]:
     rng = np.random.default_rng([1000, seed])
     asked, said, proposed = 0, 0, []
     for _ in range(max(1, round(minutes / 5.0))):
-        with bench(working_motion(304.0, rng.uniform(1.0, 2.0), rng)) as nodes:
+        with Stage() as stage:
+            nodes = Bench(stage, working_motion(304.0, rng.uniform(1.0, 2.0), rng))
             for _ in nodes.run(min(300.0, 60.0 * minutes)):
                 latest = nodes.live.latest
                 said += bool(latest is not None and latest.named)

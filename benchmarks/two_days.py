@@ -17,7 +17,7 @@ from typing import Any
 from armid_ros.arm import ArmModel, Misfit
 from armid_ros.diagnosis import diagnose, diagnosis_document, DiagnosisSettings
 from armid_ros.diagnosis.verdict.finding import Gap
-from armid_ros.effects import CATALOGUE
+from armid_ros.effects import CATALOGUE, USUAL_EFFECTS
 from armid_ros.identification import Identification, identify
 from armid_ros.motion import FloatArray
 from armid_ros.recording import Recording
@@ -26,8 +26,6 @@ import numpy as np
 
 #: Verdicts of a gap that no known effect explains.
 UNEXPLAINED = ('unknown', 'partial')
-#: Effects in a model of day 1, the default of `armid identify`.
-EFFECTS = ('viscous_friction', 'coulomb_friction', 'torque_offset')
 
 
 @dataclass(frozen=True)
@@ -143,7 +141,7 @@ def known_arm(robot: Robot, known: Sequence[Any]) -> ArmModel:
 
 def identification_of(robot: Robot, recordings: Sequence[Recording]) -> Identification:
     """Identify an arm as `armid identify` does with its defaults."""
-    arm = ArmModel.of(robot, effects=EFFECTS)
+    arm = ArmModel.of(robot, effects=USUAL_EFFECTS)
     return identify(arm, list(recordings), rng=np.random.default_rng(0))
 
 

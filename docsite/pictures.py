@@ -333,7 +333,7 @@ def springs() -> Figure:
     plans = resonance_experiments(8, rms=EXCITATION_RMS, rng=rng)
     clean = [run_elastic(plant, loop, plan) for plan in plans]
     runs = [SENSORS.measure(run, rng) for run in clean]
-    found = identify_two_inertia(runs, shipped.parameters, loop=loop)
+    found = identify_two_inertia(runs, shipped.parameters, loop)
     figure = Figure(figsize=(WIDTH, 2.8), layout='constrained')
     panels = figure.subplots(1, 2, sharey=True)
     for k, (axes, joint, own) in enumerate(zip(panels, found.joints, found.measured, strict=True)):

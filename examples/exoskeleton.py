@@ -22,6 +22,6 @@ def measured(motion, tau=None):
     return ar.Recording(joints=motion.joints, t=t, q=q, tau=noisy, start_ns=10**9)
 
 
-problem = recorded_interaction_problem(pair.machines, measured(machine, tau), measured(wearer))
+problem = recorded_interaction_problem(pair, measured(machine, tau), measured(wearer))
 found = identify_interaction(problem)
 print(f'{found.stiffness[0]:.0f} ± {found.std[0]:.0f} N/m, true {pair.stiffness[0]:.0f} N/m')

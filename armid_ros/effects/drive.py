@@ -5,7 +5,6 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
 
 from armid_ros.effects.action import Action
 from armid_ros.effects.base import Arm, Effect, Unexplained
@@ -13,10 +12,8 @@ from armid_ros.effects.layout import joint_columns, scatter
 from armid_ros.effects.quantities import Quantity, Shape
 from armid_ros.effects.readings import TorqueReading
 from armid_ros.motion import FloatArray, Motion
+from armid_ros.robots import Robot
 import numpy as np
-
-if TYPE_CHECKING:
-    from armid_ros.robots import Robot
 
 
 @dataclass(frozen=True)
@@ -181,7 +178,7 @@ class ActuatorSaturation(TorqueReading):
     """
 
     name = 'actuator_saturation'
-    summary = 'torque beyond a level that the drive does not give, or does not report'
+    summary = 'torque beyond a level that the drive does not supply, or does not report'
     quantities = (
         Quantity('lost_share', '', lower=0.0, upper=1.0, typical=(0.05, 1.0)),
         Quantity('clipped_share', '', lower=0.0, upper=1.0, typical=(0.05, 1.0)),

@@ -82,7 +82,7 @@ class BaseTilt(_GravityEffect):
     """
 
     name = 'base_tilt'
-    summary = 'base mounted at an angle to gravity that the model does not have'
+    summary = 'tilt of the base relative to the model'
     quantities = tuple(
         Quantity(name, 'rad', lower=-np.pi, upper=np.pi, typical=(0.003, 0.1))
         for name in ('tilt_x', 'tilt_y')

@@ -20,15 +20,13 @@ from armid_ros.effects.action import Action
 from armid_ros.effects.base import Arm, Effect, Unexplained
 from armid_ros.effects.quantities import Quantity, Shape
 from armid_ros.model import LinkFrames
+from armid_ros.model.spring_ties import extension
 from armid_ros.motion import FloatArray, Motion
 from armid_ros.robots import Robot
 import numpy as np
 
 #: Positions and velocities of all k anchors [m, m/s] at times of shape (N,), each (N or 1, k, 3).
 Anchor = Callable[[FloatArray], tuple[FloatArray, FloatArray]]
-
-#: Distance below which a direction is undefined [m].
-_SHORTEST = 1e-12
 
 #: Anchors of straps to try: distances from the mean position of the attachment, over the spread of
 #: its positions, in all directions of a cube. Slacks are quantiles of the length.
@@ -52,7 +50,7 @@ class Attached(Effect):
             lever = model.inertias[model.getJointId(joint)].lever
             away = float(np.linalg.norm(lever))
             # the link of an arm without other joints has an assumed reach of 1 m
-            row[:3] = lever * min((reach or 1.0) / max(away, _SHORTEST), 1.0)
+            row[:3] = lever * min((reach or 1.0) / max(away, 1e-12), 1.0)
         return values
 
     def shape_starts(self, unexplained: Unexplained, arm: Arm) -> tuple[FloatArray, ...]:
@@ -189,7 +187,8 @@ class InterfaceSlack(Attached):
         for joint, shape in zip(self.joints, self.shape_values, strict=True):
             places = frames.places(joint, shape[:3])
             anchors, slacks = _proposals(places)
-            pulls = [_pulls(places - a, slack) for a, slack in zip(anchors, slacks, strict=True)]
+            pairs = zip(anchors, slacks, strict=True)
+            pulls = [extension(places - anchor, slack) for anchor, slack in pairs]
             straps = np.stack([frames.torques(joint, places, pull) for pull in pulls], axis=2)
             columns = rest(straps)
             own, aim = np.sum(columns**2, axis=0), columns.T @ target
@@ -214,15 +213,9 @@ class InterfaceSlack(Attached):
         straps = zip(self.joints, self._attachments, self.slacks, strict=True)
         for owner, (joint, attachment, slack) in enumerate(straps):
             places = frames.places(joint, attachment)
-            pulls = _pulls(places - anchors[:, owner], slack)
+            pulls = extension(places - anchors[:, owner], slack)
             columns[:, :, owner] = frames.torques(joint, places, pulls)
         return columns
-
-
-def _pulls(ways: FloatArray, slack: float) -> FloatArray:
-    """Return the force over stiffness of a strap along vectors, shape (N, 3) [m]."""
-    length = np.sqrt(np.einsum('nx,nx->n', ways, ways))[:, np.newaxis]
-    return np.asarray(ways * np.maximum(1.0 - slack / np.maximum(length, _SHORTEST), 0.0))
 
 
 def _proposals(places: FloatArray) -> tuple[FloatArray, FloatArray]:

@@ -4,7 +4,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
 from dataclasses import dataclass
 from itertools import chain, combinations, pairwise, permutations
 
@@ -53,12 +52,8 @@ class _Pairs(Effect):
 
     @classmethod
     def places(cls, robot: Robot) -> tuple[tuple[str, ...], ...]:
-        """Return the pairs of joints that may be coupled."""
-        return tuple(cls._likely_pairs(robot.joints))
-
-    @staticmethod
-    def _likely_pairs(joints: tuple[str, ...]) -> Iterable[tuple[str, str]]:
-        return pairwise(joints)
+        """Return the pairs of joints that may be coupled: neighbours."""
+        return tuple(pairwise(robot.joints))
 
     @property
     def owners(self) -> tuple[str, ...]:
@@ -162,9 +157,10 @@ class JointCoupling(_Pairs):
                 f'{self.name}: {twice[0]} is first in two pairs; put it second in one of them'
             )
 
-    @staticmethod
-    def _likely_pairs(joints: tuple[str, ...]) -> Iterable[tuple[str, str]]:
-        return combinations(joints, 2)
+    @classmethod
+    def places(cls, robot: Robot) -> tuple[tuple[str, ...], ...]:
+        """Return all pairs; their order has no influence."""
+        return tuple(combinations(robot.joints, 2))
 
     def columns(self, motion: Motion, arm: Arm) -> FloatArray:
         """Return the derivative of the torque by the coupling stiffness, (N, n, P) [rad]."""
@@ -193,12 +189,13 @@ class TorqueCrosstalk(_Pairs, TorqueReading):
 
     @classmethod
     def _default_joints(cls, robot: Robot) -> tuple[str, ...]:
-        super()._default_joints(robot)  # which needs two joints
-        return tuple(chain.from_iterable(cls._likely_pairs(robot.joints)))
+        super()._default_joints(robot)  # raises an error if there is only one joint
+        return tuple(chain.from_iterable(cls.places(robot)))
 
-    @staticmethod
-    def _likely_pairs(joints: tuple[str, ...]) -> Iterable[tuple[str, str]]:
-        return permutations(joints, 2)
+    @classmethod
+    def places(cls, robot: Robot) -> tuple[tuple[str, ...], ...]:
+        """Return all ordered pairs: reader and source."""
+        return tuple(permutations(robot.joints, 2))
 
     def parameters(self, robot: Robot) -> tuple[ParameterName, ...]:
         """Name the shares, each with the joint of the reading and the joint of the torque."""

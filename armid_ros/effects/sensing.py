@@ -134,7 +134,7 @@ class EncoderOffset(Displacing):
     """
 
     name = 'encoder_offset'
-    summary = 'zero of a position encoder that is off'
+    summary = 'wrong zero of a position encoder'
     quantities = (Quantity('encoder_offset', 'rad', typical=(0.001, 0.1)),)
     linear = False
 

@@ -119,7 +119,7 @@ def sines(robot: Robot, duration: float = 0.5, rate: float = 200.0) -> Motion:
     )
 
 
-def check_effect(kind: type[Effect], robot: Robot | None = None, *, seed: int = 3) -> None:
+def check_effect(kind: type[Effect], robot: Robot | None = None) -> None:
     """
     Check that a class of effects keeps its contract.
 
@@ -129,8 +129,6 @@ def check_effect(kind: type[Effect], robot: Robot | None = None, *, seed: int = 
         The class; it need not be registered.
     robot : Robot, optional
         An arm for which the effect is meant; a shipped arm by default.
-    seed : int
-        Seed of values and torque.
 
     Raises
     ------
@@ -147,7 +145,7 @@ def check_effect(kind: type[Effect], robot: Robot | None = None, *, seed: int = 
 
     """
     check_kind(kind)
-    trial = EffectCase.of(kind, robot, seed=seed)
+    trial = EffectCase.of(kind, robot)
     wrong = []
     for check in CHECKS:
         try:

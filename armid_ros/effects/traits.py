@@ -82,7 +82,7 @@ TRAITS = {
     ),
     'torque_crosstalk': Traits(
         shown_by='one joint loaded while the other one stands still',
-        look_at='how the torque sensors are mounted, and their cables',
+        look_at='the mounting of the torque sensors, and their cables',
     ),
     'torque_gain': Traits(
         shown_by='the same motion with and without a known payload',
@@ -95,7 +95,7 @@ TRAITS = {
     ),
     'time_delay': Traits(
         shown_by='the same motion at two speeds, and a sweep of frequency',
-        look_at='how the driver stamps positions and torques',
+        look_at='the timestamps of positions and torques in the driver',
     ),
     'torque_lag': Traits(
         shown_by='a sweep of frequency up to half of the bandwidth',
@@ -121,7 +121,7 @@ TRAITS = {
     ),
     'coulomb_friction': Traits(
         shown_by='slow constant velocity in both directions',
-        look_at='the brake, the seals and the bearings, and whether it moves freely by hand',
+        look_at='the brake, the seals and the bearings, by moving the joint by hand',
         usual=True,
         nuisance=((),),
         friction=True,
@@ -135,7 +135,7 @@ TRAITS = {
     ),
     'quadratic_friction': Traits(
         shown_by='constant velocities up to the limit',
-        look_at='what moves through air, oil or grease',
+        look_at='parts that move through air, oil or grease',
         friction=True,
     ),
     'stribeck_friction': Traits(
@@ -146,7 +146,7 @@ TRAITS = {
     ),
     'thermal_friction': Traits(
         shown_by='the same motion cold and after half an hour of work',
-        look_at='how warm the gear was, and how long the arm had worked before',
+        look_at='the temperature of the gear, and the time of work before the recording',
         friction=True,
     ),
     'gravity_magnitude': Traits(
@@ -155,7 +155,7 @@ TRAITS = {
     ),
     'base_tilt': Traits(
         shown_by='static holds with the first joint turned around',
-        look_at='how the base stands and is bolted down, with a spirit level',
+        look_at='the mounting of the base, with a spirit level',
     ),
     'load_dependent_friction': Traits(
         shown_by='the same motion with and without a known payload',
@@ -174,7 +174,7 @@ TRAITS = {
     ),
     'interface_slack': Traits(
         shown_by='the same motion at two tensions of the strap',
-        look_at='the strap, cable, table or fixture that may hold it, and how tight or near it is',
+        look_at='the strap, cable, table or fixture that may hold the arm, and its tightness',
         external=True,
     ),
     'payload': Traits(
@@ -184,7 +184,7 @@ TRAITS = {
     ),
     'link_inertia': Traits(
         shown_by='fast motion and static holds',
-        look_at='the link and what is bolted to it, as armid check ROBOT BAG compares it',
+        look_at='the link and the parts bolted to it; see armid check ROBOT BAG',
         corrects=True,
     ),
     'coupled_joint_friction': Traits(
@@ -207,7 +207,7 @@ TRAITS = {
     ),
     'soft_limit': Traits(
         shown_by='slow motion into and out of the end of the range',
-        look_at='the stops, and what the joint reaches there',
+        look_at='the stops, and parts that the joint touches near them',
         separate=((0,), (1,)),
     ),
 }

@@ -17,9 +17,6 @@ from distributed import Client, LocalCluster
 
 #: Timeout of the connection to a cluster [s].
 ANSWER = 30.0
-#: Period of the check whether all workers of this machine run.
-_LOOK_EVERY = '2s'
-
 #: Settings that reduce the work of Dask for its dashboard, which is not used here.
 _QUIET = {
     'distributed.worker.profile.enabled': False,
@@ -54,7 +51,7 @@ def connected(scheduler: str | None, workers: int | None = None) -> Iterator[Cli
     """
     logging.getLogger('distributed').setLevel(logging.CRITICAL)
     if scheduler is None:
-        with _embedded(workers) as client:
+        with _local(workers or len(os.sched_getaffinity(0))) as client:
             yield client
         return
     try:
@@ -73,8 +70,8 @@ def connected(scheduler: str | None, workers: int | None = None) -> Iterator[Cli
 
 
 @contextmanager
-def _embedded(workers: int | None) -> Iterator[Client]:
-    count = workers or len(os.sched_getaffinity(0))
+def _local(count: int) -> Iterator[Client]:
+    """Connect to processes of this machine."""
     before = os.environ.get('PYTHONSAFEPATH', '')
     os.environ['PYTHONSAFEPATH'] = '1'  # no worker runs a module of the current folder
     try:
@@ -93,7 +90,7 @@ def _embedded(workers: int | None) -> Iterator[Client]:
             ):
                 # Dask restarts a worker that ends, but not if it ends or is slow during its start.
                 # Without workers, tasks would wait for ever, so the number of workers is adapted.
-                cluster.adapt(minimum=count, maximum=count, interval=_LOOK_EVERY)
+                cluster.adapt(minimum=count, maximum=count, interval='2s')
                 yield client
     finally:
         os.environ['PYTHONSAFEPATH'] = before

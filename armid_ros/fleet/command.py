@@ -37,14 +37,14 @@ _scheduler = click.option(
 _workers = click.option(
     '--workers',
     type=click.IntRange(min=1),
-    help='Number of processes of this machine; one a core by default.',
+    help='Number of processes of this machine; one per core by default.',
 )
 _alpha = click.option(
     '--alpha',
     type=click.FloatRange(0.0, 1.0, min_open=True, max_open=True),
     default=0.05,
     show_default=True,
-    help='Share of healthy arms among those named, in the long run.',
+    help='False discovery rate: mean share of healthy arms among the named ones.',
 )
 
 
@@ -105,7 +105,7 @@ def _print_json(name: str, **document: Any) -> None:
 
 @fleet.command(
     epilog='Example: armid fleet identify "bags/*/*" --robot arm.urdf --out results; '
-    'what the first wildcard stands for is the arm.'
+    'the first wildcard matches the name of the arm.'
 )
 @click.argument('globs', nargs=-1, required=True, metavar='GLOB...')
 @click.option(
@@ -141,7 +141,7 @@ def _print_json(name: str, **document: Any) -> None:
 @options.gravity
 @options.joints
 @options.seed
-@click.option('--resume', is_flag=True, help='Leave out what earlier runs have done.')
+@click.option('--resume', is_flag=True, help='Skip bags that earlier runs have processed.')
 @options.reading
 @options.as_json
 def identify(
@@ -251,9 +251,9 @@ def watch(out: str, alpha: float, as_json: bool) -> None:
 @_scheduler
 @_workers
 @click.option(
-    '--arm', 'arms', multiple=True, help='Arm to diagnose; by default those that `watch` names.'
+    '--arm', 'arms', multiple=True, help='Arm to diagnose; by default every arm with a change.'
 )
-@click.option('--all', 'everyone', is_flag=True, help='All arms, whether they changed or not.')
+@click.option('--all', 'everyone', is_flag=True, help='Diagnose all arms, changed or not.')
 @_alpha
 @options.as_json
 def diagnose(
@@ -295,7 +295,7 @@ def diagnose(
     say(
         f'{len(rows)} diagnosed: {counts}'
         if rows
-        else 'No arm changed; --arm or --all name others.'
+        else 'No arm changed; use --arm or --all to diagnose others.'
     )
     lines = [f'{row["arm"]}: {row["verdict"].replace("_", " ")}: {row["summary"]}' for row in rows]
     _print_shown(list(map(pretty, lines)), f'{out}/reports')

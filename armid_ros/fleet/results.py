@@ -97,7 +97,7 @@ def write_summary(store: Store, summary: BagSummary, job: Job) -> None:
     bag, own = summary.bag, summary.own
     start = datetime.datetime.fromtimestamp(summary.start_ns * 1e-9, datetime.UTC)
     robot = job.arm.robot
-    rows = [] if own is None else _rows(own)
+    rows = [] if own is None else parameter_table(own.parameters, own.values, list(own.std))
     table = pa.Table.from_pylist(
         [{'bag': bag.url, 'start': start, **row} for row in rows], PARAMETERS
     )
@@ -182,7 +182,8 @@ def write_arm(
         'relative_error_percent': estimate.relative_error_percent,
         'condition_number': estimate.condition_number,
     }
-    table = pa.Table.from_pylist([{**common, **row} for row in _rows(estimate)], ARMS)
+    rows = parameter_table(estimate.parameters, estimate.values, list(estimate.std))
+    table = pa.Table.from_pylist([{**common, **row} for row in rows], ARMS)
     store.write_table(_estimate(arm), table)
 
 
@@ -216,15 +217,6 @@ def arm_is_done(store: Store, arm: str, bags: Sequence[BagFile], job: Job) -> li
 def _versions(versions: Sequence[tuple[str, str]]) -> str:
     """Return a hash of the versions of a set of bags."""
     return digest(*sorted('\t'.join(pair) for pair in versions))
-
-
-def _rows(estimate: FleetEstimate) -> list[dict[str, object]]:
-    rows: list[dict[str, object]] = parameter_table(
-        estimate.parameters, estimate.values, list(estimate.std)
-    )
-    return [
-        {name: row[name] for name in ('name', 'joint', 'unit', 'value', 'std')} for row in rows
-    ]
 
 
 def _same(row: dict[str, object], bag: BagFile, job: Job) -> bool:

@@ -4,7 +4,6 @@
 
 from armid_ros.model.base_parameters import (
     BaseParameters,
-    gravity_composites,
     group_columns,
     levelled,
     regroup,
@@ -24,7 +23,6 @@ __all__ = [
     'BaseParameters',
     'LINK_PARAMETERS',
     'LinkFrames',
-    'gravity_composites',
     'gravity_sensitivity',
     'group_columns',
     'inverse_dynamics',

@@ -15,13 +15,7 @@ from __future__ import annotations
 from dataclasses import dataclass, replace
 
 from armid_ros.estimate import ParameterName
-from armid_ros.model.rigid_body import (
-    LINK_PARAMETERS,
-    random_motion,
-    regressor,
-    rigid_parameter_names,
-)
-from armid_ros.motion import FloatArray, Motion, read_only
+from armid_ros.motion import FloatArray, read_only
 from armid_ros.robots import NO_MASS, Robot
 import numpy as np
 import numpy.typing as npt
@@ -218,23 +212,6 @@ def levelled(robot: Robot) -> Robot:
     own = turn.T @ robot.gravity
     across = np.abs(own) < 2e-3 * np.linalg.norm(own)
     return robot.with_gravity(turn @ np.where(across, 0.0, own)) if np.any(own[across]) else robot
-
-
-def gravity_composites(robot: Robot, rng: np.random.Generator) -> BaseParameters:
-    """
-    Find the combinations of masses and first moments that an arm at rest identifies.
-
-    An arm with revolute joints only has an even number of them. Multiplied by the magnitude of
-    gravity, they are the composite gravity parameters of Table 5 of the humanoid-arm paper.
-
-    """
-    robot = levelled(robot)
-    motion = random_motion(robot, rng)
-    rest = Motion(motion.joints, motion.t, motion.q, 0.0 * motion.dq, 0.0 * motion.ddq)
-    names = rigid_parameter_names(robot)
-    static = [j for j in range(len(names)) if j % len(LINK_PARAMETERS) < 4]
-    w = regressor(robot, rest)[:, :, static].reshape(-1, len(static))
-    return group_columns(w, tuple(names[j] for j in static))
 
 
 def _symbol_of(parameter: ParameterName) -> str:

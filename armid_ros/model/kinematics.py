@@ -94,8 +94,13 @@ class LinkFrames:
         joints : sequence of str, optional
             The joints; all by default.
 
+        Raises
+        ------
+        RobotError
+            If the robot has no such joint.
+
         """
-        ends = [robot.joints.index(joint) for joint in joints or robot.joints]
+        ends = [robot.index(joint) for joint in joints or robot.joints]
         frames: dict[int, _Frame] = {}
         lines, turns = np.zeros((2, robot.n_joints, 3, len(q)))
         for link in sorted({above for end in ends for above in robot.geometry[end].movers}):

@@ -104,10 +104,15 @@ class TieGeometry(NamedTuple):
 
     def pulled(self, slack: float | FloatArray) -> FloatArray:
         """Return the columns of springs that pull only beyond a slack [m], (N, n, S)."""
-        # the direction of a vector shorter than this [m] is undefined
-        length = np.maximum(np.linalg.norm(self.way, axis=2), 1e-12)
-        share = np.maximum(1.0 - slack / length, 0.0)
-        return np.asarray(self.columns * share[:, np.newaxis])
+        way = extension(self.way, slack)
+        return np.asarray(np.einsum('nsxj,nsx->njs', self.jacobian, way))
+
+
+def extension(way: FloatArray, slack: float | FloatArray) -> FloatArray:
+    """Return the parts of vectors, shape (..., 3), beyond a slack, shape (...) [m]."""
+    # the direction of a vector shorter than this [m] is undefined
+    length = np.maximum(np.linalg.norm(way, axis=-1), 1e-12)
+    return np.asarray(np.maximum(1.0 - slack / length, 0.0)[..., np.newaxis] * way)
 
 
 def centroid_ties(robot: Robot, other: Robot, joints: Sequence[tuple[str, str]]) -> list[Tie]:
@@ -153,13 +158,13 @@ def tie_geometry(
     """
     position, jacobian = points_motion(
         robot,
-        [_known(robot, tie.joint) for tie in ties],
+        [tie.joint for tie in ties],
         np.array([tie.point for tie in ties]).reshape(-1, 3),
         q,
     )
     other_position, other_jacobian = points_motion(
         other,
-        [_known(other, tie.other_joint) for tie in ties],
+        [tie.other_joint for tie in ties],
         np.array([tie.other_point for tie in ties]).reshape(-1, 3),
         other_q,
     )
@@ -212,11 +217,6 @@ def tie_columns_derivatives(
         return by_q, by_other
     here = tie_geometry(robot, q, other, other_q, ties)
     return by_q, -np.einsum('nsxi,nsxj->nisj', here.jacobian, here.other_jacobian)
-
-
-def _known(robot: Robot, joint: str) -> str:
-    robot.index(joint)
-    return joint
 
 
 def leg_ties(exo: Robot, human: Robot, segments: Sequence[str] = SEGMENTS) -> tuple[Tie, ...]:

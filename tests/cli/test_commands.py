@@ -48,13 +48,6 @@ def test_options_of_a_project_are_taken_and_printed_where_none_is_typed(
     assert '--package mine=.\n' in armid('inspect', bags[0]).stderr
 
 
-def test_a_command_of_a_group_takes_options_of_a_project(tmp_path, monkeypatch):
-    monkeypatch.chdir(tmp_path)
-    (tmp_path / 'armid.toml').write_text('alpha = 0.1\n[fleet.watch]\nout = "results"\n')
-    said = armid('fleet', 'watch', code=2).stderr
-    assert '--alpha 0.1' in said and '--out results' in said
-
-
 #: What takes long to import, and the packages of armid_ros that import it.
 HEAVY = (
     *('numpy', 'scipy', 'pinocchio', 'coal', 'matplotlib', 'rich', 'rosbags', 'rclpy', 'dask'),
@@ -77,7 +70,7 @@ def build(group, context):
         if isinstance(command, click.Group):
             build(command, below)
 
-for arguments in (['--version'], ['--help'], ['fleet', 'watch', '--help']):
+for arguments in (['--version'], ['--help'], ['identify', '--help']):
     main(arguments, standalone_mode=False)
 build(main, click.Context(main, info_name='armid'))
 sys.exit(', '.join(sys.modules.keys() & set({HEAVY!r})) or 0)
@@ -214,7 +207,6 @@ def test_an_empty_out_does_not_fill_the_current_folder(command, bags, tmp_path, 
         ('simulate', '--robot', ROBOT, '--out', 'o', '--torque-noise'),
         ('identify', 'bag', '--robot', ROBOT, '--out', 'o', '--memory-limit'),
         (*PHYSICAL, '--total-mass'),
-        ('fleet', 'identify', 'bags', '--out', 'o', '--cutoff'),
     ],
 )
 def test_a_number_that_is_not_finite_is_refused_with_its_option(arguments, number):

@@ -72,3 +72,15 @@ def test_a_table_of_robots_is_checked_by_line(bags, tmp_path, text, said):
     out = tmp_path / 'out'
     result = armid('fleet', 'identify', f'{bags}/*/*', '--robots', table, '--out', out, code=2)
     assert said in result.output
+
+
+def test_watch_takes_options_of_a_project(tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    (tmp_path / 'armid.toml').write_text('alpha = 0.1\n[fleet.watch]\nout = "results"\n')
+    said = armid('fleet', 'watch', code=2).stderr
+    assert '--alpha 0.1' in said and '--out results' in said
+
+
+def test_a_cutoff_that_is_not_finite_is_refused():
+    said = armid('fleet', 'identify', 'bags', '--out', 'o', '--cutoff', 'nan', code=2).output
+    assert "'--cutoff'" in said and 'nan' in said

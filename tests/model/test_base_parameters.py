@@ -2,7 +2,6 @@
 # SPDX-License-Identifier: Apache-2.0
 from armid_ros.arm import ArmModel
 from armid_ros.model import (
-    gravity_composites,
     group_columns,
     random_motion,
     regressor,
@@ -37,12 +36,16 @@ def rng():
     return np.random.default_rng(3)
 
 
+def gravity_composites(robot, rng):
+    """Return the combinations that an arm at rest identifies."""
+    return ArmModel(robot, quasi_static=True).base_parameters(rng)
+
+
 @pytest.mark.parametrize(('name', 'column'), [('humanoid_arm', 1), ('humanoid_arm_loaded', 2)])
 def test_gravity_composites_are_the_papers(name, column, rng):
     robot = load_robot(name, gravity='moon')
     base = gravity_composites(robot, rng)
-    static = robot.rigid_parameters.reshape(-1, 10)[:, :4].ravel()
-    values = 1e3 * 1.62 * base.values(static)
+    values = 1e3 * 1.62 * base.values(robot.rigid_parameters)
     assert [p.name for p in base.parameters] == [row[0] for row in COMPOSITES]
     expected = np.array([row[column] for row in COMPOSITES])
     np.testing.assert_allclose(values, expected, rtol=1e-12)

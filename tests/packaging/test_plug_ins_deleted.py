@@ -46,10 +46,11 @@ for module in walk_packages(armid_ros.__path__, 'armid_ros.'):
 """
 #: A few tests of the core: of a regression, and of commands.
 FEW = ('cli/test_completion.py', 'identification/fitting/test_normal_equations.py')
-#: Tests of the tree and of commands of plug-ins, and tests of the core that only read tables.
+#: Tests of the tree, and tests of the core that only read tables.
 OTHERS = (
     *('packaging', 'docsite', 'examples', 'golden'),
-    *('cli/test_convert.py', 'cli/test_convert_real.py', 'recording/test_turns.py'),
+    *('cli/test_convert.py', 'cli/test_convert_real.py', 'fuzz/test_tables.py'),
+    'recording/test_turns.py',
 )
 #: Other tests of the core that read a table.
 OF_TABLES = (
@@ -65,16 +66,18 @@ def code_of(folder):
 
 
 def copied(root, folder):
-    """Copy the tree without plug-ins and what imports them; what is not code is linked."""
+    """Copy the tree without plug-ins, their tests and what imports them; link other files."""
     ignored = shutil.ignore_patterns('__pycache__')
     for name in CODE:
         shutil.copytree(root / name, folder / name, ignore=ignored)
     for path in root.iterdir():
         if path.name not in CODE and not path.name.startswith('.'):
             (folder / path.name).symlink_to(path)
+    gone = []
     for plug_in in PLUG_INS:
         shutil.rmtree(folder / 'armid_ros' / plug_in)
-    gone = ['armid_ros.' + plug_in.replace('/', '.') for plug_in in PLUG_INS]
+        shutil.rmtree(folder / 'tests' / plug_in, ignore_errors=True)
+        gone += [f'{place}.{plug_in.replace("/", ".")}' for place in ('armid_ros', 'tests')]
     texts = {path: path.read_text() for path in code_of(folder)}
     while gone:
         named = re.compile(rf'\b({"|".join(map(re.escape, gone))})\b')

@@ -19,11 +19,14 @@ import click
     multiple=True,
     type=click.Path(path_type=Path),
     metavar='BAG',
-    help='Step responses to tune the parameters to.',
+    help='Step responses, for the tuning of the parameters.',
 )
-@click.option('--demo', is_flag=True, help='Simulate the shipped arm first, and identify that.')
+@click.option('--demo', is_flag=True, help='Simulate the shipped arm, and identify it.')
 @click.option(
-    '--experiments', default=48, show_default=True, help='Number that --demo simulates, 4 s each.'
+    '--experiments',
+    default=48,
+    show_default=True,
+    help='Number of experiments of 4 s that --demo simulates.',
 )
 @parameters.robot_described(
     default='two_link_elastic', show_default=True, help='Robot: shipped name or path.'
@@ -31,17 +34,21 @@ import click
 @click.option(
     '--start',
     type=click.Choice(['found', 'before', 'after']),
-    help='What the tuning begins with: what was found by then, or a printed set. By default '
-    "the former, with --demo the set 'before', as in the source.",
+    help='Start values of the tuning: the result of the earlier steps, or a published set of '
+    'parameters. Default: found; with --demo: before, as in the source.',
 )
 @click.option('--accelerometers', metavar='R1,R2', help='Distances from the joints [m].')
-@click.option('--gear', metavar='N1,N2', help='Turns of the motors per turn of the joints.')
+@click.option(
+    '--gear', metavar='N1,N2', help='Gear ratios: turns of the motor per turn of the joint.'
+)
 @click.option(
     '--kp', metavar='K1,K2', help='Gains of the velocity loops, at the joints [N m s/rad].'
 )
-@click.option('--ki', metavar='K1,K2', help='Integral gains of the same [N m/rad].')
+@click.option('--ki', metavar='K1,K2', help='Integral gains of the velocity loops [N m/rad].')
 @click.option(
-    '--model', type=click.Path(path_type=Path), help='model.yaml with inertias, for other arms.'
+    '--model',
+    type=click.Path(path_type=Path),
+    help='model.yaml with the inertias of an arm that is no planar pair of links.',
 )
 @parameters.folder
 @parameters.reading
@@ -65,9 +72,9 @@ def elastic(
     """
     Identify elastic joints.
 
-    A pair of links that move in a horizontal plane is identified in three steps, resonances and
-    all. Other arms need encoders on both sides of their joints, and known inertias: their springs
-    are found joint by joint.
+    A pair of links that move in a horizontal plane is identified in three steps, with its
+    resonances. The springs of any other arm are identified joint by joint, from encoders on both
+    sides of each joint and known inertias.
 
     """
     from armid_ros.cli import options
@@ -87,27 +94,27 @@ def elastic(
     if not planar_pair(robot):
         if demo or steps:
             raise RobotError(
-                f'{robot.name} is no pair of links that move in a horizontal plane, as --demo and '
-                '--steps need. Without them its springs are found joint by joint'
+                f'--demo and --steps need a pair of links that move in a horizontal plane, which '
+                f'{robot.name} is not; without them its springs are identified joint by joint'
             )
         identify_springs(bags, robot, robot_source, model, out, seed, as_json)
         return
     if model is not None:
-        raise RobotError('--model has no place in the three steps, which find the inertias')
+        raise RobotError('--model is not available here: the three steps identify the inertias')
     radius, drives, loop = work.machine(**given)
     staged = options.stage(out, report.SCHEMA, robot_source)
     with progress('reading') as tick:
         if demo:
             bags, steps = work.simulate(robot, radius, staged, experiments, seed, tick)
         elif not bags:
-            raise RecordingError('no bag is named; give one, or --demo to simulate one')
+            raise RecordingError('no bag is given; give one, or --demo to simulate one')
         how = options.read_settings(), options.tell_damage
         runs, responses = (
             [run for path in paths for run in read_runs(path, robot, radius, *how)]
             for paths in (bags, steps)
         )
         result = identify_two_inertia(
-            runs, drives, steps=responses, loop=loop, start=printed, progress=tick
+            runs, drives, loop, steps=responses, start=printed, progress=tick
         )
         tick(1.0, 'writing')
         shipped, known, table = two_link_set('after').parameters, printed, ''
@@ -123,8 +130,9 @@ def elastic(
         story = report.tuning_story(result.tuning, printed or result.untuned, shipped)
         document['story'] = story
         told = (
-            f'Against the true arm tuning made the error {story["factor"]:.0f} times smaller; '
-            f'main parameters are within {story["main_parameters_percent_after"]:.2g} %.'
+            f'The tuning reduced the error against the true arm by a factor of '
+            f'{story["factor"]:.0f}. The main parameters are within '
+            f'{story["main_parameters_percent_after"]:.2g} % of the true ones.'
         )
         verdict = replace(verdict, sentences=[*verdict.sentences, told])
     shown = work.values_table if every else work.resonances_table

@@ -113,8 +113,8 @@ def run_elastic(plant: Plant, loop: VelocityLoop, experiment: Experiment) -> Ela
     return ElasticRun(motor, Motion(joints, t, *trace.links), experiment.velocity)
 
 
-#: For the shipped two-link arm: torque of the multisine [N m] rms, the share of the loop's gains
-#: it runs under, and steps of velocity [rad/s] in poses [rad] that tell all parameters apart.
+#: For the shipped two-link arm: rms torque of the multisine [N m], factor on the gains of the loop
+#: during the multisine, and steps of velocity [rad/s] in poses [rad] that identify all parameters.
 EXCITATION_RMS, WEAK = (60.0, 45.0), 0.15
 STEP_POSES = ((0.0, 0.0), (0.0, np.pi / 2), (0.0, np.pi / 4), (0.0, 3 * np.pi / 4))
 STEPS = ((1.0, 0.0), (0.0, 1.0), (1.0, -1.0), (1.0, 1.0))
@@ -131,16 +131,16 @@ def resonance_experiments(
     """
     Return experiments that excite all joints through their resonances, in many poses.
 
-    Motors follow a slow sine of velocity under a loop of low gain, so that friction has one sign
-    most of the time, and get a multisine of torque on top. Poses are random, around the stretched
-    arm, in which interaction is largest.
+    The motors follow a slow sine of velocity under a loop of low gain, so that friction rarely
+    changes its sign. A multisine of torque is added. Poses are random, around the stretched arm,
+    in which the interaction of the joints is largest.
 
     Parameters
     ----------
     count : int
         Number of experiments.
     rms : array_like, shape (n,)
-        Of the torque of the multisine [N m].
+        Rms torque of the multisine [N m].
     rng : numpy.random.Generator
         Source of phases and poses.
 

@@ -179,8 +179,9 @@ def rigid_section(fit: RigidFit) -> ContentSection:
         )
     ]
     text = (
-        f'Step 1, least squares below {CUTOFF:g} Hz: motor and link of joint 1, and friction of '
-        f'motors and links, are one. {fit.relative_error:.2f} % of the torque is left.'
+        f'Step 1, least squares below {CUTOFF:g} Hz. The inertias of motor and link of joint 1, '
+        f'and the friction of motors and links, are known as sums. The relative torque error is '
+        f'{fit.relative_error:.2f} %.'
     )
     heads = ('Parameter', 'Joint', 'Estimate', '± 95 %', 'Unit')
     return ContentSection('Rigid arm', [Paragraph(text), DataTable(heads, rows, words=(0, 1, 4))])
@@ -195,10 +196,10 @@ _SIZE = 'magnitude [dB re rad/(N m s)]'
 def responses_section(result: TwoInertiaIdentification) -> ContentSection:
     """Return a section with responses from motor torque to motor velocity of both joints."""
     text = (
-        'Motor velocity per motor torque at each frequency. The dip is the link swinging on its '
-        'spring (antiresonance), the peak motor and link against each other (resonance). Without '
-        'the torque of the other joint (decoupled), a joint is a motor and a link on a spring. '
-        'Drag across a plot, or pinch it, to zoom; double-click or double-tap to see it all.'
+        'Motor velocity per motor torque at each frequency. At the dip (antiresonance), the link '
+        'swings on its spring; at the peak (resonance), motor and link swing against each other. '
+        'Without the torque of the other joint (decoupled), a joint is a motor and a link on a '
+        'spring. Drag across a plot, or pinch it, to zoom; double-click or double-tap to reset.'
     )
     hint = (
         'The response of the whole arm is the mean over the poses of joint 2 in the recording, '
@@ -305,8 +306,8 @@ def steps_section(tuning: Tuning) -> ContentSection:
     """Return a section with link velocities after reference steps, before and after tuning."""
     before, after = tuning.rms
     text = (
-        'Velocities of the links after steps of the reference. Before tuning '
-        f'{digits(before, 3)} rad/s rms is left unexplained, after it {digits(after, 3)} rad/s, '
+        'Velocities of the links after steps of the reference. The rms residual is '
+        f'{digits(before, 3)} rad/s before the tuning and {digits(after, 3)} rad/s after it, '
         'noise included.'
     )
     t = np.asarray(1e3 * tuning.steps.dt * np.arange(len(tuning.measured)), dtype=np.float64)

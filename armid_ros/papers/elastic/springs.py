@@ -56,9 +56,9 @@ def _springs(found: Sequence[SpringEstimate]) -> ContentSection:
         ]
         motors.append((one.joint, f'{one.inertia:.3g}', *own, *both))
     text = (
-        'A motor twists against its link by the torque of the rigid body over the stiffness. '
-        'Backlash adds a step where the load changes sides; with a correlation near ±1 they are '
-        'not distinguishable. R² is the explained share of the twist.'
+        'The twist between motor and link is the torque of the rigid body over the stiffness. '
+        'Backlash adds a step where the load changes its sign; with a correlation near ±1 '
+        'stiffness and backlash are not distinguishable. R² is the explained share of the twist.'
     )
     hint = (
         'Frequencies are those of each joint alone, the others held, at its mean inertia in the '
@@ -72,37 +72,37 @@ def _springs(found: Sequence[SpringEstimate]) -> ContentSection:
 
 
 def verdict(found: Sequence[SpringEstimate]) -> VerdictSection:
-    """Say how many springs were found, and which is the softest."""
-    told = [one for one in found if one.informative]
+    """Return the verdict: number of identified springs, and the softest one."""
+    known = [one for one in found if one.informative]
     lost = [one.joint for one in found if not one.informative]
     beware = [
         'Inertias are those of the description or model: a stiffness is as accurate as they are.'
     ]
     step = f'Record {", ".join(lost)} again under more load, or with finer encoders.'
     if lost:
-        beware.append(f'{", ".join(lost)}: the twist does not follow the load.')
-    if not told:
+        beware.append(f'{", ".join(lost)}: the twist does not depend on the load.')
+    if not known:
         shown = ['No joint shows a spring.']
         return VerdictSection('not identifiable', 'bad', shown, beware, step=step)
-    softest = min(told, key=lambda one: one.transmission.stiffness[0])
+    softest = min(known, key=lambda one: one.transmission.stiffness[0])
     value, low, high = softest.transmission.stiffness
     sentences = [
-        f'Stiffness of {len(told)} of {counted(len(found), "joint")} found; the softest is '
+        f'Stiffness of {len(known)} of {counted(len(found), "joint")} found; the softest is '
         f'{softest.joint} with {value:.4g} N m/rad ({low:.4g} to {high:.4g}, 95 %).'
     ]
-    loose = [one.joint for one in told if one.transmission.backlash_seen]
+    loose = [one.joint for one in known if one.transmission.backlash_seen]
     if loose:
         sentences.append(f'Free play is seen at {", ".join(loose)}.')
     if not lost:
         spring = f'joint_elasticity@{softest.joint}:compliance={1.0 / value:.3g}'
-        step = f'Simulate with the springs: armid simulate --effect {spring}, and so for each.'
+        step = f'Simulate the springs: armid simulate --effect {spring}, one --effect per joint.'
     grade, tone = ('partial', 'fair') if lost else ('found', 'good')
     return VerdictSection(grade, tone, sentences, beware, step=step)
 
 
 WITHOUT = (
-    'with encoders at the motors alone, `armid diagnose`, or `armid identify --effects '
-    '...,joint_elasticity`, looks for springs'
+    'without encoders at the links, use `armid diagnose` or `armid identify --effects '
+    '...,joint_elasticity`'
 )
 
 
@@ -114,7 +114,7 @@ def identify_springs(
     staged = options.stage(out, SPRINGS_SCHEMA, source)
     body = robot if model is None else options.model_of(model, robot).body
     if not bags:
-        raise RecordingError('no bag is named; give one with encoders on both sides of the joints')
+        raise RecordingError('no bag is given; give one with encoders on both sides of the joints')
     with progress('reading') as tick:
         try:
             sides = [read_sides(path, robot, options.read_settings()) for path in bags]
@@ -152,7 +152,7 @@ def _row(found: SpringEstimate) -> tuple[str, ...]:
 
 
 def springs_document(found: Sequence[SpringEstimate], robot: str) -> dict[str, Any]:
-    """Return springs that were found joint by joint as the document that elastic.json holds."""
+    """Return the springs of all joints as the document of elastic.json."""
 
     def number(value: float) -> float | None:
         return float(value) if np.isfinite(value) else None

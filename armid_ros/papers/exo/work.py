@@ -83,7 +83,7 @@ def identify_ties(
     for share, separate in ((0.1, False), (0.35, True)):
         tick(share, 'identifying')
         problem = recorded_interaction_problem(
-            pair.machines,
+            pair,
             machine,
             wearer,
             inertias=inertias,

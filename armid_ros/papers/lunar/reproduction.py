@@ -30,7 +30,7 @@ from armid_ros.excitation import (
 )
 from armid_ros.identification.identify import Identification, identify
 from armid_ros.identification.rows.regression import Fit
-from armid_ros.model import gravity_composites, inverse_dynamics
+from armid_ros.model import inverse_dynamics
 from armid_ros.motion import FloatArray, Motion
 from armid_ros.recording import Recording
 from armid_ros.robots import collision_model, load_robot, Robot
@@ -353,12 +353,11 @@ def _compared(
 ) -> tuple[tuple[Composite, ...], float, float]:
     """Return the composites of two runs, and the load with its standard deviation."""
     robots = [load_robot(r.table.robot, gravity='moon') for r in (bare, loaded)]
-    theory = gravity_composites(robots[0], rng)
+    theory = ArmModel(robots[0], quasi_static=True).base_parameters(rng)
     gravity = 1e3 * float(np.linalg.norm(robots[0].gravity))
-    static = [j for j in range(len(robots[0].rigid_parameters)) if j % 10 < 4]
     found = [r.methods[0].result for r in (bare, loaded)]
-    truth = [gravity * theory.values(robot.rigid_parameters[static]) for robot in robots]
-    values = [gravity * theory.values(one.arm.robot.rigid_parameters[static]) for one in found]
+    truth = [gravity * theory.values(robot.rigid_parameters) for robot in robots]
+    values = [gravity * theory.values(one.arm.robot.rigid_parameters) for one in found]
     places = [
         [
             next(
@@ -385,8 +384,8 @@ def _compared(
         )
     )
     change = (values[1] - values[0]) / gravity
-    last = [j for j, name in enumerate(theory.standard) if name.joint == robots[0].joints[-1]]
-    columns = theory.grouping[:, last]  # m, mx, my, mz of the hand
+    hand = [j for j, name in enumerate(theory.standard) if name.joint == robots[0].joints[-1]]
+    columns = theory.grouping[:, hand[:4]]  # m, mx, my, mz
     covariance = sum(
         one.estimate.covariance[np.ix_(rows, rows)]
         for one, rows in zip(found, places, strict=True)

@@ -24,9 +24,6 @@ from tests.hidden.lived.sizing import gap, misfit, rows_of, sized
 from tests.hidden.lived.specification import LivedSpec, specify
 from tests.hidden.lived.wear import Wear
 
-#: How many recordings each day has.
-RUNS = 3
-
 
 @dataclass(frozen=True)
 class LivedRecording:

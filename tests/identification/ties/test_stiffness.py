@@ -12,6 +12,7 @@ from armid_ros.identification.ties.problem import (
 )
 from armid_ros.identification.ties.recorded import recorded_interaction_problem
 from armid_ros.identification.ties.stiffness import identify_interaction, Interaction
+from armid_ros.model.spring_ties import TiedMachines
 from armid_ros.papers.exo.plant.gait import read_gait
 from armid_ros.papers.exo.plant.leg_pair import leg_pair, PairMotion, stepping, TiedPair
 from armid_ros.recording import Recording
@@ -50,7 +51,7 @@ def percent(found: Interaction) -> np.ndarray:
 @pytest.mark.parametrize('separate', [False, True])
 def test_exact_data_give_exact_stiffness(pair, poses, inertias, separate) -> None:
     problem = interaction_problem(
-        pair.machines,
+        pair,
         poses.own,
         poses.other,
         inertias=inertias,
@@ -92,7 +93,7 @@ def test_recordings_need_not_begin_together(pair, seconds) -> None:
     own, other = measured(seconds, 0.05, np.random.default_rng(0))
     late = other.select(slice(700, None))
     late = recorded(replace(late, t=late.t - late.t[0]), start_ns=700 * 10**6)
-    found = identify_interaction(recorded_interaction_problem(pair.machines, recorded(own), late))
+    found = identify_interaction(recorded_interaction_problem(pair, recorded(own), late))
     assert abs(percent(found)[0]) < 0.5
 
 
@@ -112,15 +113,15 @@ def test_without_springs_none_are_found(pair) -> None:
 
 def test_data_that_cannot_tell_are_refused(pair, poses) -> None:
     same = replace(poses.own, q=poses.other.q)
-    one = replace(pair.machines, ties=pair.ties[:1])
+    one = TiedMachines(pair.robot, pair.other, pair.ties[:1])
     problem = interaction_problem(one, same, poses.other)
     with pytest.raises(IdentificationError, match='nothing shows'):
         identify_interaction(problem)
     with pytest.raises(IdentificationError, match='no torques'):
-        interaction_problem(pair.machines, poses.own.with_torque(None), poses.other)
+        interaction_problem(pair, poses.own.with_torque(None), poses.other)
     with pytest.raises(IdentificationError, match='time base'):
         shifted = replace(poses.other, t=poses.other.t + 0.1)
-        interaction_problem(pair.machines, poses.own, shifted)
+        interaction_problem(pair, poses.own, shifted)
 
 
 def two_sides(pair: TiedPair, seed: int) -> tuple[Recording, Recording]:
@@ -155,9 +156,7 @@ def test_inertias_of_links_that_hardly_turn_stay_near_their_description(pair) ->
     """The trunk's inertia is a column of noise: without a belief its best value is infinite."""
     real = leg_pair(3e3, ('stance_thigh',))
     own, other = two_sides(real, 9)
-    problem = recorded_interaction_problem(
-        pair.machines, own, other, inertias='free', separate=True
-    )
+    problem = recorded_interaction_problem(pair, own, other, inertias='free', separate=True)
     found = identify_interaction(problem)
     away = found.estimate.values - problem.described
     spread = np.sqrt(np.diag(np.linalg.inv(problem.precision[4:, 4:])))

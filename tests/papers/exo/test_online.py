@@ -18,7 +18,7 @@ def identified(slack: float = 0.0, seconds: float = 4.2) -> OnlineInteraction:
     pair = leg_pair(1e4).with_slack(slack)
     rng = np.random.default_rng(0)
     walking = SimulatedPair(pair, read_gait(), rate=500.0, rng=rng, **NOISE)
-    online = OnlineInteraction(pair.machines, **SETTINGS)
+    online = OnlineInteraction(pair, **SETTINGS)
     for _ in range(round(500.0 * seconds)):
         sample = walking.advance()
         online.take_other(sample.t, sample.other_q)
@@ -47,7 +47,7 @@ def test_slack_is_seen_and_measured():
 
 def test_one_machine_alone_is_not_enough():
     pair = leg_pair()
-    online = OnlineInteraction(pair.machines, **SETTINGS)
+    online = OnlineInteraction(pair, **SETTINGS)
     online.take(0.0, np.zeros(6), np.zeros(6))
     with pytest.raises(IdentificationError, match='joint states'):
         online.take(5.0, np.zeros(6), np.zeros(6))
@@ -65,4 +65,4 @@ def test_what_comes_after_an_interruption_is_not_mixed_with_what_was_before():
 
 def test_settings_that_do_not_fit_are_refused():
     with pytest.raises(IdentificationError, match='memory'):
-        OnlineInteraction(leg_pair().machines, memory=1.0)
+        OnlineInteraction(leg_pair(), memory=1.0)

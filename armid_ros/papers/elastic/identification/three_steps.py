@@ -274,9 +274,9 @@ class TwoInertiaIdentification:
 def identify_two_inertia(
     runs: Sequence[ElasticRun],
     drives: TwoLinkParameters,
+    loop: VelocityLoop,
     *,
     steps: Sequence[ElasticRun] = (),
-    loop: VelocityLoop | None = None,
     start: TwoLinkParameters | None = None,
     progress: Callable[[float, str], None] = lambda share, what: None,
 ) -> TwoInertiaIdentification:
@@ -289,10 +289,10 @@ def identify_two_inertia(
         Experiments through the resonances, with some slow motion.
     drives : TwoLinkParameters
         Gears and torque constants; other parameters are not used.
+    loop : VelocityLoop
+        Gains of the velocity loop of the step responses.
     steps : sequence of ElasticRun
-        Step responses under a velocity loop for the tuning; without them there is no tuning.
-    loop : VelocityLoop, optional
-        The loop's gains.
+        Step responses for the tuning; without them there is no tuning.
     start : TwoLinkParameters, optional
         Initial values of the tuning instead of those of step 3a; Coulomb friction is always that
         of step 1.
@@ -305,8 +305,6 @@ def identify_two_inertia(
         If the data do not determine the parameters; the message names the step and the remedy.
 
     """
-    if steps and loop is None:
-        raise IdentificationError('tuning to step responses needs the gains of their loop')
     progress(0.0, 'step 1: rigid arm')
     rigid = fit_rigid(runs)
     first, beta, gamma, rotor = rigid.estimate.values[:4].tolist()
@@ -337,7 +335,7 @@ def identify_two_inertia(
     progress(0.45, 'step 3: physical parameters')
     untuned, gain = fit_joints(systems, joints, known)
     tuning = None
-    if steps and loop is not None:
+    if steps:
         progress(0.5, 'step 3: tuning to step responses')
         begin = untuned if start is None else replace(start, coulomb=untuned.coulomb)
         tuning = tune(steps, begin, loop)

@@ -76,7 +76,7 @@ class InteractionIdentifierNode(ArmidNode):
         pair = leg_pair()
         names = ('memory', 'period', 'slack_period', 'inertias')
         settings = {name: self.value(name) for name in names}
-        self.identifier = OnlineInteraction(pair.machines, **settings)
+        self.identifier = OnlineInteraction(pair, **settings)
         self.received = 0
         self._estimates = self.create_publisher(ParameterEstimate, '~/estimate', LATCHED)
         self._joints = pair.robot.joints, pair.other.joints

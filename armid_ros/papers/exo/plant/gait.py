@@ -14,6 +14,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass
+from functools import lru_cache
 from importlib import resources
 from pathlib import Path
 from typing import Any
@@ -49,6 +50,7 @@ class Assumption:
     reason: str
 
 
+@lru_cache
 def read_assumptions() -> Mapping[str, Assumption]:
     """Read the assumptions of the human-exoskeleton leg pair."""
     text = leg_pair_file('exoskeleton_legs/assumptions.yaml').read_text(encoding='utf-8')

@@ -34,7 +34,7 @@ from armid_ros.papers.exo.plant.walkers import (
     columns,
     contacts,
     floating,
-    Ground,
+    ground_force,
     leg_length,
     SIDES,
     walkable,
@@ -67,8 +67,6 @@ class GaitCycle:
         Force on right heel and toe and left heel and toe, forward and up [N].
     torques : PairTorques
         Torques of all joints; those of the floating joints are the remaining external forces.
-    soil : Ground
-        The ground.
 
     """
 
@@ -78,7 +76,6 @@ class GaitCycle:
     ground: FloatArray
     other_ground: FloatArray
     torques: PairTorques
-    soil: Ground
 
     def feet(self, *, other: bool = False) -> FloatArray:
         """Return the force on the right and on the left foot, shape (N, 2, 2) [N]."""
@@ -127,7 +124,6 @@ def gait_cycle(pair: TiedPair, gait: Gait) -> GaitCycle:
 
     """
     known = read_assumptions()
-    ground = Ground(creep=known['ground_creep'].value)
     cycle, late = known['cycle_time'].value, known['exoskeleton_delay'].value
     worn = walkable(gait, leg_length(pair.other), cycle)
     phase = np.arange(100) / 100.0
@@ -153,14 +149,14 @@ def gait_cycle(pair: TiedPair, gait: Gait) -> GaitCycle:
         speeds.append(np.gradient(path, axis=0)[2] * count / cycle)
         places.append(path[0] - speeds[-1] * lag)
     start = np.concatenate([*places, *speeds])
-    states, rates = _walk(pair, courses, ground, start, cycle)
+    states, rates = _walk(pair, courses, start, cycle)
     rows = np.append(np.arange(0, 2 * _STEPS, 2), 0)
     motions = PairMotion(
         _placed(pair.robot, moves[0], rows, states[:, :2], states[:, 4:6], rates[:, 4:6], cycle),
         _placed(pair.other, moves[1], rows, states[:, 2:4], states[:, 6:], rates[:, 6:], cycle),
     )
     forces = [
-        ground_forces(robot, motion, ground)
+        ground_forces(robot, motion)
         for robot, motion in zip((pair.robot, pair.other), motions, strict=True)
     ]
     return GaitCycle(
@@ -170,15 +166,14 @@ def gait_cycle(pair: TiedPair, gait: Gait) -> GaitCycle:
         read_only(forces[0]),
         read_only(forces[1]),
         walking_torques(pair, motions, forces[0], forces[1]),
-        ground,
     )
 
 
-def ground_forces(robot: Robot, motion: Motion, ground: Ground) -> FloatArray:
+def ground_forces(robot: Robot, motion: Motion) -> FloatArray:
     """Return the ground forces on heels and toes along a motion, shape (N, 4, 2) [N]."""
     place, jacobian = points_motion(robot, *contacts(robot), motion.q)
     speed = np.einsum('ncxj,nj->ncx', jacobian, motion.dq)
-    return ground.force(place[..., 2], speed[..., 2], speed[..., 0])
+    return ground_force(place[..., 2], speed[..., 2], speed[..., 0])
 
 
 def walking_torques(
@@ -241,11 +236,7 @@ def _course(pair: TiedPair, motion: Motion, other: bool) -> _Course:
 
 
 def _walk(
-    pair: TiedPair,
-    courses: tuple[_Course, _Course],
-    ground: Ground,
-    start: FloatArray,
-    cycle: float,
+    pair: TiedPair, courses: tuple[_Course, _Course], start: FloatArray, cycle: float
 ) -> tuple[FloatArray, FloatArray]:
     """Integrate both hips (Runge-Kutta 4); returns states and their rates of the last cycle."""
     own, far = courses
@@ -257,7 +248,7 @@ def _walk(
         for course, place, speed in ((own, x[:2], x[4:6]), (far, x[2:4], x[6:])):
             points = course.contact[k] + place
             moving = course.contact_speed[k] + speed
-            touch = ground.force(points[:, 1], moving[:, 1], moving[:, 0])
+            touch = ground_force(points[:, 1], moving[:, 1], moving[:, 0])
             pulls.append(course.pull[k] + touch.sum(axis=0))
         way = own.tied[k] - far.tied[k] + (x[:2] - x[2:4])
         spring = pair.forces(way).sum(axis=0)
@@ -323,7 +314,7 @@ def check_cycle(
     pair, motions = cycle.pair, cycle.motions
     torque = driving_torque(cycle, joint, rate, believed, ground_forces)
     hips = [pair.robot.joints[place] for place in floating(pair.robot)[:2]]
-    moved = drive_by_torque(pair, *motions, [*hips, joint], torque, cycle.soil)
+    moved = drive_by_torque(pair, *motions, [*hips, joint], torque, on_ground=True)
     return GaitCheck(joint, motions.own.q[::2, pair.robot.index(joint)], moved)
 
 
@@ -367,14 +358,13 @@ def feet_by_shares(cycle: GaitCycle, *, other: bool = False) -> FloatArray:
     hurry = np.gradient(speed, motion.t, axis=0)
     mass = np.array([body.mass for body in bodies])
     taken = mass[:, np.newaxis] * (hurry - robot.gravity)
-    plane = np.array([0, 2])
-    place, taken = place[..., plane], taken[..., plane]
+    place, taken = place[..., _PLANE], taken[..., _PLANE]
     trunk = floating(robot)[2]
     legs = [columns(robot, side) for side in SIDES]
     # shares of the trunk, (20) to (22): the leg whose thigh is nearer carries more
     far = np.linalg.norm(place[:, [leg[0] for leg in legs]] - place[:, [trunk]], axis=-1)
     shares = far[:, ::-1] / far.sum(axis=1, keepdims=True)
-    springs = cycle.torques.forces[..., plane] * (1.0 if not other else -1.0)
+    springs = cycle.torques.forces[..., _PLANE] * (1.0 if not other else -1.0)
     feet = np.empty((len(motion), 2, 2))
     for foot, own in enumerate(legs):
         pulled = [k for k, tie in enumerate(cycle.pair.ties) if tie.name.startswith(SIDES[foot])]

@@ -21,9 +21,9 @@ from typing import NamedTuple
 from armid_ros.errors import ModelError
 from armid_ros.model import inverse_dynamics
 from armid_ros.model.spring_ties import (
+    extension,
     leg_ties,
     SEGMENTS,
-    Tie,
     tie_geometry,
     TiedMachines,
     TieGeometry,
@@ -35,22 +35,18 @@ from armid_ros.papers.exo.plant.gait import (
     read_gait,
     stance_motion,
 )
-from armid_ros.robots import load_robot, Robot
+from armid_ros.robots import load_robot
 import numpy as np
 import numpy.typing as npt
 
 
 @dataclass(frozen=True)
-class TiedPair:
+class TiedPair(TiedMachines):
     """
-    Two machines and the springs between them.
+    Two machines, such as an exoskeleton and its wearer, and the S springs between them.
 
     Attributes
     ----------
-    robot, other : Robot
-        The exoskeleton and its wearer, or any other two.
-    ties : tuple of Tie
-        Attachment points of the S springs.
     stiffness : ndarray, shape (S,)
         k [N/m].
     slack : ndarray, shape (S,)
@@ -58,9 +54,6 @@ class TiedPair:
 
     """
 
-    robot: Robot
-    other: Robot
-    ties: tuple[Tie, ...]
     stiffness: FloatArray
     slack: FloatArray | None = None
 
@@ -79,11 +72,6 @@ class TiedPair:
             if np.any(spread < 0.0) or not np.all(np.isfinite(spread)):
                 raise ModelError(f'{name}: {spread} has to be finite and not negative')
             object.__setattr__(self, name, read_only(np.array(spread, dtype=float)))
-
-    @property
-    def machines(self) -> TiedMachines:
-        """Both machines and the attachment points, without stiffnesses."""
-        return TiedMachines(self.robot, self.other, self.ties)
 
     @property
     def segments(self) -> tuple[str, ...]:
@@ -120,9 +108,7 @@ class TiedPair:
 
         """
         assert self.slack is not None
-        length = np.linalg.norm(way, axis=-1)
-        pulling = np.maximum(1.0 - self.slack / np.maximum(length, 1e-12), 0.0)
-        return np.asarray(-(self.stiffness * pulling)[..., np.newaxis] * way)
+        return np.asarray(-self.stiffness[:, np.newaxis] * extension(way, self.slack))
 
 
 class PairMotion(NamedTuple):
@@ -285,46 +271,16 @@ def following(
     return PairMotion(own, moving(pair.other.joints, t))
 
 
-@dataclass(frozen=True)
-class Exercise:
-    """
-    An exercise.
-
-    Attributes
-    ----------
-    what : str
-        Description of the motion of the person.
-    middle, reach : tuple of float, length 4
-        Mean and amplitude of stance hip and knee, swing hip and knee [deg].
-    period : float
-        [s].
-
-    """
-
-    what: str
-    middle: tuple[float, float, float, float]
-    reach: tuple[float, float, float, float]
-    period: float
-
-
-#: Exercises by name; steps follow the gait, forward and back.
+#: Exercises by name: mean and amplitude of stance hip and knee, swing hip and knee [deg], and the
+#: period [s]. Steps follow the gait, forward and back.
 EXERCISES = {
-    'step': Exercise('step forward and back', (0.0,) * 4, (0.0,) * 4, 1.8),
-    'quick_step': Exercise('the same, twice as quickly', (0.0,) * 4, (0.0,) * 4, 0.9),
-    'swing': Exercise('swing the free leg', (2.0, 5.0, 10.0, 25.0), (0.0, 0.0, 30.0, 20.0), 1.2),
-    'lift': Exercise('lift the free knee', (2.0, 5.0, 40.0, 50.0), (0.0, 0.0, 35.0, 45.0), 1.2),
-    'squat': Exercise(
-        'bend the knees, the second foot on a force plate',
-        (20.0, 35.0, 20.0, 35.0),
-        (18.0, 30.0, 18.0, 30.0),
-        1.6,
-    ),
-    'rock': Exercise(
-        'rock to and fro over the standing ankle',
-        (0.0, 8.0, 5.0, 15.0),
-        (12.0, 6.0, 12.0, 6.0),
-        0.9,
-    ),
+    'step': ((0.0,) * 4, (0.0,) * 4, 1.8),
+    'quick_step': ((0.0,) * 4, (0.0,) * 4, 0.9),
+    'swing': ((2.0, 5.0, 10.0, 25.0), (0.0, 0.0, 30.0, 20.0), 1.2),
+    'lift': ((2.0, 5.0, 40.0, 50.0), (0.0, 0.0, 35.0, 45.0), 1.2),
+    # with the second foot on a force plate
+    'squat': ((20.0, 35.0, 20.0, 35.0), (18.0, 30.0, 18.0, 30.0), 1.6),
+    'rock': ((0.0, 8.0, 5.0, 15.0), (12.0, 6.0, 12.0, 6.0), 0.9),
 }
 
 
@@ -344,10 +300,10 @@ def exercise(pair: TiedPair, name: str, t: FloatArray, gait: Gait | None = None)
         Gait for stepping; the shipped one by default.
 
     """
-    plan = EXERCISES[name]
+    *angles, period = EXERCISES[name]
     if name.endswith('step'):
-        return stepping(pair, gait or read_gait(), t, plan.period)
-    w, middle, reach = 2.0 * np.pi / plan.period, np.radians(plan.middle), np.radians(plan.reach)
+        return stepping(pair, gait or read_gait(), t, period)
+    (middle, reach), w = np.radians(angles), 2.0 * np.pi / period
 
     def moving(joints: tuple[str, ...], time: FloatArray) -> Motion:
         """Return sines of hips and knees with a flat foot and an upright trunk."""

@@ -18,7 +18,7 @@ from armid_ros.errors import TrajectoryError
 from armid_ros.motion import FloatArray, Motion
 from armid_ros.papers.exo.plant.gait import Gait, read_assumptions
 from armid_ros.papers.exo.plant.leg_pair import pair_torques, PairMotion, stepping, TiedPair
-from armid_ros.papers.exo.plant.walkers import contacts, Ground
+from armid_ros.papers.exo.plant.walkers import contacts, ground_force
 import numpy as np
 import pinocchio as pin
 from scipy.interpolate import CubicHermiteSpline, CubicSpline
@@ -83,7 +83,8 @@ def drive_by_torque(
     other_motion: Motion,
     driven: Sequence[str],
     torque: DrivingTorque,
-    ground: Ground | None = None,
+    *,
+    on_ground: bool = False,
 ) -> Motion:
     """
     Integrate the driven joints of the machine; everything else moves as prescribed.
@@ -99,8 +100,8 @@ def drive_by_torque(
         Joints of the machine that follow torques.
     torque : callable
         Their torques.
-    ground : Ground, optional
-        Ground under the feet of a pair that is free to walk.
+    on_ground : bool
+        Whether the pair is free to walk, with ground under its feet.
 
     Returns
     -------
@@ -118,7 +119,7 @@ def drive_by_torque(
             f'{len(motion)} samples; integration steps of two samples need an odd number'
         )
     columns = [pair.robot.index(joint) for joint in driven]
-    rate = _forward_dynamics(pair, PairMotion(motion, other_motion), columns, torque, ground)
+    rate = _forward_dynamics(pair, PairMotion(motion, other_motion), columns, torque, on_ground)
     x = np.concatenate([motion.q[0, columns], motion.dq[0, columns]])
     rows = []
     for k in range(0, len(motion) - 2, 2):
@@ -139,12 +140,12 @@ def _forward_dynamics(
     motions: PairMotion,
     free: list[int],
     torque: DrivingTorque,
-    ground: Ground | None,
+    on_ground: bool,
 ) -> Rate:
     """Return a function for velocities and accelerations of the driven joints, shape (2 d,)."""
     robot, own, tied = pair.robot, motions.own, len(pair.ties)
     ends = [(tie.joint, np.array(tie.point)) for tie in pair.ties]
-    if ground is not None:
+    if on_ground:
         ends += zip(*contacts(robot), strict=True)
     model, operational = pin.Model(robot.model), pin.FrameType.OP_FRAME
     frames = [
@@ -170,9 +171,9 @@ def _forward_dynamics(
         )
         force = np.zeros_like(place)
         force[:tied] = pair.forces(place[:tied] - far[k])
-        if ground is not None:
+        if on_ground:
             feet, moving = place[tied:], jacobian[tied:] @ dq
-            force[tied:, ::2] = ground.force(feet[:, 2], moving[:, 2], moving[:, 0])
+            force[tied:, ::2] = ground_force(feet[:, 2], moving[:, 2], moving[:, 0])
         push = torque(float(own.t[k])) - load[free]
         push += np.einsum('cxj,cx->j', jacobian, force)[free]
         return np.concatenate([x[count:], np.linalg.solve(inertia[np.ix_(free, free)], push)])

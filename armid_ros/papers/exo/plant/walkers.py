@@ -219,53 +219,28 @@ def _inside(phase: FloatArray, ends: tuple[float, float]) -> np.typing.NDArray[n
     return np.asarray((phase >= ends[0]) & (phase <= ends[1]))
 
 
-@dataclass(frozen=True)
-class Ground:
+def ground_force(height: FloatArray, rising: FloatArray, sliding: FloatArray) -> FloatArray:
     """
-    Contact parameters of the ground.
+    Return the force of the ground on points.
 
-    Attributes
+    Parameters
     ----------
-    stiffness : float
-        k [N/m^e].
-    exponent : float
-        e [-].
-    damping : float
-        c [N s/m].
-    friction : float
-        mu [-].
-    creep : float
-        Sliding speed at three quarters of the largest friction [m/s]; the source does not describe
-        the transition from rest to sliding.
+    height, rising, sliding : ndarray, shape (...)
+        Height of the points above the ground [m], and their velocity up and forward [m/s].
+
+    Returns
+    -------
+    ndarray, shape (..., 2)
+        Forward and up [N].
 
     """
-
-    stiffness: float = 100.0 * 1e3**1.5
-    exponent: float = 1.5
-    damping: float = 1000.0
-    friction: float = 0.3
-    creep: float = 0.01
-
-    def force(self, height: FloatArray, rising: FloatArray, sliding: FloatArray) -> FloatArray:
-        """
-        Return the force on points.
-
-        Parameters
-        ----------
-        height, rising, sliding : ndarray, shape (...)
-            Height of the points above the ground [m], and their velocity up and forward [m/s].
-
-        Returns
-        -------
-        ndarray, shape (..., 2)
-            Forward and up [N].
-
-        """
-        depth = np.maximum(-height, 0.0)
-        pressed = self.stiffness * depth**self.exponent - self.damping * rising
-        up = np.where(height < 0.0, np.maximum(pressed, 0.0), 0.0)
-        ahead = -self.friction * up * np.tanh(sliding / self.creep)
-        return np.stack([ahead, up], axis=-1)
+    depth = np.maximum(-height, 0.0)
+    pressed = 100.0 * 1e3**1.5 * depth**1.5 - 1000.0 * rising
+    up = np.where(height < 0.0, np.maximum(pressed, 0.0), 0.0)
+    # sliding speed at three quarters of the largest friction; the source does not describe the
+    # transition from rest to sliding
+    creep = read_assumptions()['ground_creep'].value
+    return np.stack([-0.3 * up * np.tanh(sliding / creep), up], axis=-1)
 
 
 SIDES = ('right', 'left')

@@ -168,9 +168,9 @@ class Walk(Section):
 def feet_section(cycle: GaitCycle) -> ContentSection:
     """Return a section with forces on the feet, simulated and by the source's rule."""
     text = (
-        "What the ground does to the feet, by the contact of the source's Table 3 "
-        '(100 N/mm^1.5, 1 N s/mm, friction 0.3). Vertical lines: from one foot on the ground to '
-        'two and back. In double support the source splits the trunk between the legs by the '
+        "Forces of the ground on the feet, by the contact law of the source's Table 3 "
+        '(100 N/mm^1.5, 1 N s/mm, friction 0.3). Vertical lines: changes between one and two feet '
+        'on the ground. In double support the source splits the trunk between the legs by the '
         'distances of the thighs, equations (20) to (22).'
     )
     off = 'source off by [N rms]'
