@@ -14,8 +14,12 @@ from armid_ros.excitation.schedule import Excitation
 from armid_ros.excitation.supervision import Path
 from armid_ros.excitation.transfer import Transfer, TransferPlanner
 from armid_ros.motion import FloatArray, Motion
+from armid_ros.robots.reference import Reference
 import numpy as np
 import numpy.typing as npt
+
+#: Largest distance of the curve through the waypoints from the path that was checked [rad or m].
+_OFF_PATH = 0.001
 
 
 @dataclass(frozen=True)
@@ -96,6 +100,25 @@ class Run:
         t = np.arange(round(self.duration * self.rate) + 1) / self.rate
         return replace(self.at(t), t=t)
 
+    def require_waypoints(self) -> None:
+        """
+        Raise a TrajectoryError if a controller leaves the path between the samples of `motion`.
+
+        A controller interpolates between its waypoints with quintic polynomials. Only the path
+        itself is checked for limits and collisions.
+
+        """
+        motion = self.motion()
+        # the distance is largest in the middle, except that a harmonic of the rate is zero there
+        between = motion.t[:-1] + 0.4 / self.rate
+        away = np.abs(Reference.of(motion).sample(between).q - self.at(between).q).max(axis=0)
+        j = int(np.argmax(away))
+        if away[j] > _OFF_PATH:
+            raise TrajectoryError(
+                f"joint '{self.joints[j]}' would be {away[j]:.2g} rad or m off its path between "
+                f'{self.rate:g} waypoints per second: send more (rate), or take fewer harmonics'
+            )
+
 
 def plan_run(
     excitation: Excitation,
@@ -130,14 +153,17 @@ def plan_run(
     Raises
     ------
     TrajectoryError
-        If no way was found; the message names the obstruction.
+        If no way was found, or the waypoints are too few for the path; the message names the
+        obstruction or the joint.
 
     """
     excitation = _unwound(excitation, planner.arm, planner.limits, start)
     first, last = excitation.at([0.0, excitation.duration]).q
     there = planner(start, first, shortest, seed)
     home = planner(start, last, shortest, seed).reversed() if back else None
-    return Run(there, excitation, home, rate)
+    run = Run(there, excitation, home, rate)
+    run.require_waypoints()
+    return run
 
 
 def _unwound(

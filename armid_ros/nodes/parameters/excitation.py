@@ -4,8 +4,6 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
-
 from armid_ros.arm import ArmModel, load_model
 from armid_ros.effects import make_effect, USUAL_EFFECTS
 from armid_ros.errors import TrajectoryError
@@ -291,6 +289,8 @@ def checked(excitation: Excitation, planner: TransferPlanner, source: str) -> Ex
     """
     Check an excitation, and return it with the joints in the order of the arm.
 
+    A joint without an acceleration limit gets the one that designs assume; see `Limits.of`.
+
     Parameters
     ----------
     excitation : Excitation
@@ -310,9 +310,10 @@ def checked(excitation: Excitation, planner: TransferPlanner, source: str) -> Ex
     with reading(source, TrajectoryError):
         excitation = excitation.for_joints(robot.joints)
     limits = Limits.of(robot, speed=1.0, reserve=False)
-    limits = replace(limits, acceleration=robot.acceleration_limit)
     faults = trajectory_faults(planner.arm, limits, excitation.trajectory, planner.clearance)
     faults = faults or excitation_faults(planner.arm, limits, excitation)
     if faults:
-        raise TrajectoryError(f'{source}: {faults}')
+        assumed = np.isinf(robot.acceleration_limit).any() and 'acceleration' in str(faults)
+        remedy = '; the parameter joint_limits declares other acceleration limits' * assumed
+        raise TrajectoryError(f'{source}: {faults}{remedy}')
     return excitation
