@@ -24,29 +24,21 @@ import numpy.typing as npt
 import pinocchio as pin
 from scipy.linalg import eigh, LinAlgError
 
-NO_BODY = (
-    'the inertia matrix is not positive definite: identify with --physical, or correct the '
-    'description'
-)
-
 
 class NoBodyError(ModelError):
     """An arm cannot be simulated because some links are not physically possible bodies."""
 
 
 def require_masses(robot: Robot) -> None:
-    """
-    Raise a ModelError if links of a robot have a negative mass.
-
-    Raises
-    ------
-    ModelError
-        If a mass is negative; the message names the links.
-
-    """
-    negative = _of_negative_mass(robot)
-    if negative:
-        raise ModelError(f'{robot.name}: {negative}; correct the description')
+    """Raise a ModelError that names the links of negative mass, if a robot has any."""
+    masses = robot.rigid_parameters[::PER_LINK]
+    named = [
+        f"link '{name}' has a mass of {mass:g} kg"
+        for name, mass in zip(robot.links, masses, strict=True)
+        if mass < 0.0
+    ]
+    if named:
+        raise ModelError(f'{robot.name}: {", ".join(named)}; correct the description')
 
 
 def require_any_mass(robot: Robot) -> None:
@@ -69,26 +61,18 @@ def require_any_mass(robot: Robot) -> None:
 
 def no_body(robot: Robot) -> str:
     """Return the message on an inertia matrix that is not positive definite."""
-    links = zip(robot.links, robot.rigid_parameters.reshape(-1, PER_LINK), strict=True)
-    negative = _of_negative_mass(robot)
     odd = [
-        name
-        for name, values in links
+        f"'{name}' ({values[0]:g} kg)"
+        for name, values in zip(
+            robot.links, robot.rigid_parameters.reshape(-1, PER_LINK), strict=True
+        )
         if np.any(values) and np.linalg.eigvalsh(pseudo_inertia(values))[0] < 0.0
     ]
-    if negative or not odd:
-        return f'{negative}; {NO_BODY}' if negative else NO_BODY
-    return f'inertias of {", ".join(odd)} are not those of a body; {NO_BODY}'
-
-
-def _of_negative_mass(robot: Robot) -> str:
-    masses = robot.rigid_parameters[::PER_LINK]
-    named = [
-        f"link '{name}' has a mass of {mass:g} kg"
-        for name, mass in zip(robot.links, masses, strict=True)
-        if mass < 0.0
-    ]
-    return ', '.join(named)
+    links = f'links {", ".join(odd)} are not possible bodies; ' if odd else ''
+    return (
+        f'{links}the inertia matrix is not positive definite: identify with --physical, or '
+        'correct the description'
+    )
 
 
 class Rotors(NamedTuple):
@@ -183,13 +167,6 @@ class Plant:
         Actions of the effects on the arm and on its sensors.
     springs : ElasticJoints, or None
         Springs between motors and links; None if all joints are rigid.
-    spans : tuple of ndarray, each of shape ()
-        The step and half the step [s], as arrays because numpy multiplies them twice as fast as
-        floats.
-    torque_range : tuple of ndarray, each of shape (n,)
-        Torque limits of the drives, backwards and forwards [N m].
-    stops : list of (float, float)
-        Lower and upper position limit of every joint [rad or m].
     data : pinocchio.Data
         Scratch memory of the rigid-body algorithms; two threads therefore need two plants.
 
@@ -209,12 +186,6 @@ class Plant:
     constant: FloatArray | None = field(init=False, repr=False)
     model: pin.Model = field(init=False, repr=False)
     coupling: FloatArray | None = field(init=False, repr=False)
-    spans: tuple[FloatArray, FloatArray] = field(init=False, repr=False)
-    torque_range: tuple[FloatArray, FloatArray] = field(init=False, repr=False)
-    stops: list[tuple[float, float]] = field(init=False, repr=False)
-    _at_stops: dict[tuple[bytes, bytes], Contacts] = field(
-        init=False, repr=False, default_factory=dict
-    )
 
     def __post_init__(self) -> None:
         """Collect the actions of the effects."""
@@ -249,9 +220,6 @@ class Plant:
         values = {
             'robot': robot,
             'contacts': Contacts.of(friction),
-            'spans': (np.array(self.dt), np.array(self.dt / 2)),
-            'torque_range': (-robot.torque_limit, robot.torque_limit),
-            'stops': list(zip(robot.lower.tolist(), robot.upper.tolist(), strict=True)),
             'data': data,
             'torque': torque,
             'action': action,
@@ -349,20 +317,17 @@ class Plant:
         = 0 at the upper limit.
 
         """
-        key = (at_lower.tobytes(), at_upper.tobytes())
-        if key not in self._at_stops:
-            friction, hit = self.contacts, np.flatnonzero(at_lower | at_upper)
-            loaded = friction.friction
-            elements = DryFriction(
+        friction, hit = self.contacts, np.flatnonzero(at_lower | at_upper)
+        loaded, none = friction.friction, np.zeros(len(hit))
+        share = None if loaded is None else loaded.load_share
+        return Contacts.of(
+            DryFriction(
                 np.vstack([friction.directions, np.eye(self.robot.n_joints)[hit]]),
-                np.append(friction.law.lower, np.where(at_lower[hit], -np.inf, 0.0)),
-                np.append(friction.law.upper, np.where(at_upper[hit], np.inf, 0.0)),
-                None
-                if loaded is None or loaded.load_share is None
-                else np.append(loaded.load_share, np.zeros(len(hit))),
+                np.append(friction.lower, np.where(at_lower[hit], -np.inf, 0.0)),
+                np.append(friction.upper, np.where(at_upper[hit], np.inf, 0.0)),
+                None if share is None else np.append(share, none),
             )
-            self._at_stops[key] = Contacts.of(elements)
-        return self._at_stops[key]
+        )
 
 
 def _damping_weight(robot: Robot, inertia: FloatArray, damping: FloatArray, dt: float) -> float:

@@ -193,7 +193,7 @@ def _required(robot: Robot, action: Action) -> Transmission:
     rotor = np.zeros(len(soft)) if action.inertia is None else np.diag(action.inertia)
     for joint in np.flatnonzero(soft & (rotor <= 0.0))[:1]:
         raise ModelError(
-            f"{robot.name}: joint '{robot.joints[joint]}' is elastic, but its motor has no  "
+            f"{robot.name}: joint '{robot.joints[joint]}' is elastic, but its motor has no "
             'inertia; add rotor_inertia'
         )
     if np.any(springs.gap[~soft] > 0.0):
