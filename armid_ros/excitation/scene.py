@@ -238,16 +238,14 @@ class Fitness:
                 f'({self.nearest.first} and {self.nearest.second})'
             )
         if self.lowest.link:
-            parts.append(self.height())
+            height, what = self.lowest.height, 'base'
+            if self.floor.height is not None:
+                height, what = height - self.floor.height, 'floor'
+            side = 'above' if height >= 0.0 else 'below'
+            parts.append(
+                f'lowest point {abs(height):.3f} m {side} the {what} ({self.lowest.link})'
+            )
         return parts
-
-    def height(self) -> str:
-        """Return a phrase on the lowest point of the motion."""
-        height, what = self.lowest.height, 'base'
-        if self.floor.height is not None:
-            height, what = height - self.floor.height, 'floor'
-        side = 'above' if height >= 0.0 else 'below'
-        return f'lowest point {abs(height):.3f} m {side} the {what} ({self.lowest.link})'
 
 
 def fitness(motion: Motion, limits: Limits, scene: CollisionScene) -> Fitness:

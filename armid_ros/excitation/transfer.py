@@ -4,7 +4,6 @@
 
 from __future__ import annotations
 
-from collections import Counter
 from dataclasses import dataclass, replace
 
 from armid_ros.arm import ArmModel
@@ -160,21 +159,8 @@ class TransferPlanner:
                     return self._simplified(q, zero)
         raise TrajectoryError(
             f'the zero of {self.arm.robot.name} is not free, nor is a pose about it: {reason}; '
-            f'give a pose to start from, --start{self._always_near(about)}'
+            'give a pose to start from, --start'
         )
-
-    def _always_near(self, poses: FloatArray) -> str:
-        """Return a phrase on the bodies that are most often too close, and a clearance."""
-        near = [clear_line(self.clearance, q, q) for q in poses]
-        pairs = Counter((one.first, one.second) for one in near if one is not None)
-        if not pairs:
-            return ''
-        (first, second), count = pairs.most_common(1)[0]
-        best = max(
-            one.distance for one in near if one and (one.first, one.second) == (first, second)
-        )
-        then = f', at most {best:.4f} m: --clearance {0.8 * best:.1g}' if best > 0.0 else ''
-        return f'; {first} and {second} are too close in {count} of {len(near)} poses{then}'
 
     def _simplified(self, q: FloatArray, zero: FloatArray) -> FloatArray:
         """Set joints to zero if the pose stays free, and round the other joints."""

@@ -29,10 +29,11 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 from armid_ros.changes.statistic import quadratic_form
+from armid_ros.estimate import Estimate
 from armid_ros.identification.online.background import Background, Pieces
-from armid_ros.identification.online.change import ChangeCandidate
+from armid_ros.identification.online.change import Change, ChangeCandidate
 from armid_ros.identification.online.null_calibration import NullCalibration
-from armid_ros.identification.online.recursive import Learned, WeightedSample
+from armid_ros.identification.online.recursive import RecursiveLeastSquares, WeightedSample
 from armid_ros.motion import FloatArray
 import numpy as np
 import numpy.typing as npt
@@ -81,10 +82,8 @@ class Block:
         Information before the stretch, A = R^T R.
     known_along : ndarray, shape (P, Q)
         A D, with the same D.
-    before : Learned
-        State of the estimator with nuisance parameters at the begin.
-    narrow : Learned
-        State of the estimator without nuisance parameters at the begin.
+    before, narrow : RecursiveLeastSquares
+        Estimators with and without nuisance parameters at the begin.
     samples : tuple of WeightedSample
         Samples of the stretch, kept to be learned again.
 
@@ -97,8 +96,8 @@ class Block:
     moved: FloatArray
     known: FloatArray
     known_along: FloatArray
-    before: Learned
-    narrow: Learned
+    before: RecursiveLeastSquares
+    narrow: RecursiveLeastSquares
     samples: tuple[WeightedSample, ...]
 
 
@@ -195,34 +194,21 @@ class FoundChange:
 
     Attributes
     ----------
-    blocks : tuple of Block
-        The last blocks of rows.
-    first : int
-        Index of the block that contains the onset.
-    best : ChangeCandidate
-        Candidate that explains the torques best.
-    rivals : tuple of ChangeCandidate
-        Candidates that explain the torques nearly as well.
+    change : Change
+        The change, with its covariance in the usual noise.
+    before : Block
+        The last block before the change.
+    after : sequence of Block
+        The blocks wholly after the change.
     likelihood : float
         Logarithm of the likelihood ratio.
 
     """
 
-    blocks: tuple[Block, ...]
-    first: int
-    best: ChangeCandidate
-    rivals: tuple[ChangeCandidate, ...]
+    change: Change
+    before: Block
+    after: Sequence[Block]
     likelihood: float
-
-    @property
-    def before(self) -> int:
-        """Return the index of the last block before the change."""
-        return max(self.first - 1, 0)
-
-    @property
-    def after(self) -> int:
-        """Return the index of the first block wholly after the change."""
-        return min(self.first + 1, len(self.blocks) - 1)
 
 
 class ChangeSearch:
@@ -321,16 +307,19 @@ class ChangeSearch:
         return None
 
     def size(
-        self, found: FoundChange, residual_scale: float
-    ) -> Pieces[tuple[FloatArray, FloatArray]]:
-        """Return the size of a change and its covariance."""
-        before, after = found.blocks[found.before], found.blocks[found.after :]
+        self,
+        candidate: ChangeCandidate,
+        before: Block,
+        after: Sequence[Block],
+        residual_scale: float,
+    ) -> Pieces[Estimate]:
+        """Return the size of a change between a block and later blocks."""
         window = yield from weighing(after, before, self.directions, residual_scale)
         yield
-        number = self._candidates.index(found.best)
+        number = self._candidates.index(candidate)
         values, covariance = window.size(self._slices[number])
         usual = np.fmax.reduce([u.factors[number] for u in self._usual.values()], initial=1.0)
-        return values, covariance * usual
+        return Estimate(candidate.parameters, values, covariance * usual)
 
     def _window(self, first: int, residual_scale: float) -> Pieces[ScoreStatistics]:
         """Compute the statistics of the window from block `first` to the last one."""
@@ -377,4 +366,8 @@ class ChangeSearch:
         rivals = tuple(c for c in alike if not (c.includes(named) or named.includes(c)))
         if rivals and seen < _LATEST:
             return None
-        return FoundChange(tuple(self._blocks), first, named, rivals, float(at[best]))
+        blocks = list(self._blocks)
+        last, since = blocks[max(first - 1, 0)], blocks[min(first + 1, len(blocks) - 1) :]
+        size = yield from self.size(named, last, since, residual_scale)
+        change = Change(named, rivals, blocks[first].begin, size)
+        return FoundChange(change, last, since, float(at[best]))

@@ -23,16 +23,11 @@ from typing import NamedTuple, TypeVar
 
 from armid_ros.arm import ArmModel
 from armid_ros.effects import CATALOGUE
-from armid_ros.estimate import Estimate
 from armid_ros.identification.online.background import at_once, Background, Job, Pieces
 from armid_ros.identification.online.change import Change, ChangeCandidate
 from armid_ros.identification.online.change_search import Block, ChangeSearch, FoundChange
 from armid_ros.identification.online.null_calibration import BLOCKS, ResidualScale
-from armid_ros.identification.online.recursive import (
-    Learned,
-    RecursiveLeastSquares,
-    WeightedSample,
-)
+from armid_ros.identification.online.recursive import RecursiveLeastSquares, WeightedSample
 from armid_ros.identification.rows.causal import CausalMotion, TripleLag
 from armid_ros.motion import FloatArray, Motion
 import numpy as np
@@ -141,7 +136,7 @@ class _Stretch:
     """Rows that are not searched yet; `end` is None before an interruption."""
 
     begin: float
-    narrow: Learned
+    narrow: RecursiveLeastSquares
     end: float | None = None
     rows: list[Row] = field(default_factory=list)
 
@@ -223,7 +218,7 @@ class ChangeWatch:
     def interrupt(self) -> None:
         """Begin a new stretch of rows after an interruption."""
         if self._late is None:
-            self._open = self._open or _Stretch(0.0, self._estimator.learned())
+            self._open = self._open or _Stretch(0.0, self._estimator.copied())
             self._hand_over(None)
 
     def update(self, row: Row) -> None:
@@ -234,7 +229,7 @@ class ChangeWatch:
             self._late.append(row)
         else:
             if self._open is None:
-                self._open = _Stretch(row.t, self._estimator.learned())
+                self._open = _Stretch(row.t, self._estimator.copied())
             self._open.rows.append(row)
         self._estimator.update(*row.sample)
 
@@ -259,7 +254,7 @@ class ChangeWatch:
             while self._unseen:
                 stretch = self._unseen.popleft()
                 samples = yield from self._widened(stretch.rows)
-                before = self._wider.learned()
+                before = self._wider.copied()
                 yield from self._learn(self._wider, samples)
                 if stretch.end is None:
                     self._search.interrupt()
@@ -293,7 +288,11 @@ class ChangeWatch:
         return samples
 
     def _summed(
-        self, stretch: _Stretch, end: float, samples: Sequence[WeightedSample], before: Learned
+        self,
+        stretch: _Stretch,
+        end: float,
+        samples: Sequence[WeightedSample],
+        before: RecursiveLeastSquares,
     ) -> Pieces[Block]:
         """Sum up the rows of a block, projected on the candidate changes."""
         residual_scale, residuals, squares = self._residual_scale.value, [], 0.0
@@ -336,15 +335,12 @@ class ChangeWatch:
 
     def _name(self, found: FoundChange) -> Job:
         """Report a change, and restart without information on the changed parameters."""
-        values, covariance = yield from self._search.size(found, self._residual_scale_of_all)
-        yield
-        size = Estimate(found.best.parameters, values, covariance)
-        change = Change(found.best, found.rivals, found.blocks[found.first].begin, size)
-        yield from self._learn_again(found, change.reopened)
+        change, size = found.change, found.change.size
+        yield from self._learn_again(found)
         # A change shakes the arm, and the parameters were not learned from such motion: the
         # covariance grows by the ratio of squared residuals to the usual ones.
         squares = count = 0.0
-        for block in found.blocks[found.after :]:
+        for block in found.after:
             rows, tau, weights = (np.stack(part) for part in zip(*block.samples, strict=True))
             residual = self._estimator.scale(weights) * (tau - rows @ self._wider.values)
             squares += float(np.sum((residual / self._residual_scale.value) ** 2))
@@ -357,10 +353,10 @@ class ChangeWatch:
             replace(change, size=replace(size, covariance=louder * size.covariance))
         )
 
-    def _learn_again(self, found: FoundChange, reopened: FloatArray) -> Job:
+    def _learn_again(self, found: FoundChange) -> Job:
         """Restart from the state before a change, without information on changed parameters."""
-        last = found.blocks[found.before]
-        since = [sample for block in found.blocks[found.after :] for sample in block.samples]
+        last, reopened = found.before, found.change.reopened
+        since = [sample for block in found.after for sample in block.samples]
         stretches = (*self._unseen, *([self._open] if self._open else ()))
         self._unseen.clear()
         self._open, self._late = None, []
@@ -379,7 +375,7 @@ class ChangeWatch:
             yield from self._learn_both(again, (yield from self._widened(late)))
         at_once(self._learn_both(again, at_once(self._widened(self._late))))
         self._late = None
-        self._estimator.restore(again.learned())
+        self._estimator.restore(again)
 
     def _learn_both(self, again: RecursiveLeastSquares, samples: Sequence[WeightedSample]) -> Job:
         yield from self._learn(self._wider, samples)

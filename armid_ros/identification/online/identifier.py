@@ -270,7 +270,7 @@ class OnlineIdentifier:
         """Return base parameters and covariance, with autocorrelated errors included."""
         self._settle()
         estimate = self._estimator.estimate
-        covariance = self._scores.covariance(self._estimator.learned().root)
+        covariance = self._scores.covariance(self._estimator.root)
         return estimate if covariance is None else replace(estimate, covariance=covariance)
 
     def model(self) -> ArmModel:

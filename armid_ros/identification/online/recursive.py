@@ -19,12 +19,11 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from copy import copy
-from dataclasses import dataclass
 from typing import NamedTuple
 
 from armid_ros.errors import IdentificationError
 from armid_ros.estimate import Estimate, ParameterName
-from armid_ros.motion import FloatArray, read_only
+from armid_ros.motion import FloatArray
 import numpy as np
 import numpy.typing as npt
 from scipy.linalg import lapack
@@ -41,31 +40,6 @@ _LOSS_RATIO = 2.0
 #: Largest share of the old information that one sample may remove in any direction [-].
 _LARGEST_LOSS = 0.5
 _BLOCK = 8  # columns of a Householder block; the fastest for 60 to 120 parameters
-
-
-@dataclass(frozen=True, eq=False)
-class Learned:
-    """
-    Saved state of an estimator.
-
-    Attributes
-    ----------
-    root : ndarray, shape (P, P)
-        Upper triangle R; the information is R^T R.
-    values : ndarray, shape (P,)
-        Estimated parameters.
-    squares, freedom : float
-        Weighted squares of the residuals, and observations beyond the parameters.
-    samples : int
-        Samples used.
-
-    """
-
-    root: FloatArray
-    values: FloatArray
-    squares: float
-    freedom: float
-    samples: int
 
 
 class WeightedSample(NamedTuple):
@@ -241,17 +215,17 @@ class RecursiveLeastSquares:
         """Return the factors that whiten rows of given weights, shape (m,) [1/(N m)]."""
         return np.asarray(np.sqrt(weights) / self._noise)
 
-    def learned(self) -> Learned:
-        """Return the present state."""
-        return Learned(
-            read_only(self._root), self._values, self._squares, self._freedom, self.samples
-        )
+    def copied(self) -> RecursiveLeastSquares:
+        """Return a copy, which later updates do not change."""
+        other = copy(self)
+        other._root, other._right = self._root.copy('F'), self._right.copy('F')
+        return other
 
-    def restore(self, learned: Learned) -> None:
-        """Restore a saved state."""
-        self._take(np.array(learned.root, order='F'), learned.values)
-        self._squares, self._freedom = learned.squares, learned.freedom
-        self.samples = learned.samples
+    def restore(self, other: RecursiveLeastSquares) -> None:
+        """Continue from the state of another estimator of the same parameters."""
+        self._take(other._root.copy('F'), other._values)
+        self._squares, self._freedom = other._squares, other._freedom
+        self.samples = other.samples
 
     def reopen(self, directions: FloatArray) -> None:
         """
@@ -276,6 +250,11 @@ class RecursiveLeastSquares:
         check_forgetting(factor)
         self._forgetting = factor
         self._take(self._root, self._values)  # R theta is not kept up while samples are forgotten
+
+    @property
+    def root(self) -> FloatArray:
+        """Upper triangle R of the information R^T R, shape (P, P); updates overwrite it."""
+        return self._root
 
     @property
     def values(self) -> FloatArray:

@@ -10,7 +10,6 @@ from armid_ros.identification.online.change import Change, change_candidates, Ch
 from armid_ros.identification.online.change_search import (
     Block,
     ChangeSearch,
-    FoundChange,
     ScoreStatistics,
     weighing,
 )
@@ -60,7 +59,7 @@ def learned_and_block(
         estimator.update(row[np.newaxis], np.atleast_1d(row @ TRUTH + rng.normal()))
     w = rng.normal(size=(60, 5))
     tau = w @ (TRUTH + delta * CHANGED[:, 0]) + rng.normal(size=60)
-    learned = estimator.learned()
+    learned = estimator.copied()
     products, right = w.T @ w / noise**2, w.T @ tau / noise**2
     known = learned.root.T @ learned.root
     along = products @ directions, known, known @ directions
@@ -92,10 +91,10 @@ def test_a_change_without_calibrated_statistics_has_the_deviation_of_its_data():
     _, block, _, _ = learned_and_block(np.random.default_rng(0), 0.7, seen=5)
     candidate = ChangeCandidate('payload', 'hand', NAMES[:1], CHANGED, CHANGED)
     search = ChangeSearch([candidate], CHANGED, 1e-6, Foreground())
-    found, covariance = at_once(search.size(FoundChange((block,), 0, candidate, (), 9.0), 1.0))
+    found = at_once(search.size(candidate, block, [block], 1.0))
     expected, certain = score_statistics(block, CHANGED).size(slice(0, 1))
-    np.testing.assert_allclose(found, expected)
-    np.testing.assert_allclose(covariance, certain)
+    np.testing.assert_allclose(found.values, expected)
+    np.testing.assert_allclose(found.covariance, certain)
 
 
 def test_without_a_change_the_ratio_is_chi_square():
@@ -116,11 +115,11 @@ def test_what_was_never_known_cannot_be_seen_to_change():
 def test_reopening_forgets_one_direction_and_nothing_else():
     rng = np.random.default_rng(3)
     estimator, _, _, _ = learned_and_block(rng, 0.0, seen=5)
-    before, root = estimator.values, estimator.learned().root
+    before, root = estimator.values, estimator.root.copy()
     information = root.T @ root
     estimator.reopen(CHANGED)
     np.testing.assert_allclose(estimator.values, before, rtol=1e-6)
-    after = estimator.learned().root.T @ estimator.learned().root
+    after = estimator.root.T @ estimator.root
     unit = CHANGED / np.linalg.norm(CHANGED)
     assert (unit.T @ after @ unit).item() < 1e-6
     lost = information @ unit
