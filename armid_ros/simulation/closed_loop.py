@@ -13,7 +13,6 @@ from __future__ import annotations
 
 from collections.abc import Callable
 import ctypes
-from dataclasses import dataclass
 from functools import cache
 from importlib.util import find_spec
 from typing import Any, NamedTuple
@@ -44,7 +43,17 @@ _TORQUE_LAW = ctypes.CFUNCTYPE(ctypes.c_int)
 _ADDRESS, _REAL, _COUNT = ctypes.c_void_p, ctypes.c_double, ctypes.c_int64
 
 
-class _Arm(ctypes.Structure):
+class _Structure(ctypes.Structure):
+    """A structure of the kernel, which keeps the arrays to which it points."""
+
+    arrays: tuple[npt.NDArray[Any], ...]
+
+    @property
+    def address(self) -> int:
+        return ctypes.addressof(self)
+
+
+class _Arm(_Structure):
     _fields_ = (
         ('n', _COUNT),
         ('gravity', _REAL * 3),
@@ -53,7 +62,7 @@ class _Arm(ctypes.Structure):
     )
 
 
-class _Controller(ctypes.Structure):
+class _Controller(_Structure):
     _fields_ = (
         ('arm', _Arm),
         ('bandwidth', _REAL),
@@ -63,7 +72,7 @@ class _Controller(ctypes.Structure):
     )
 
 
-class _Plant(ctypes.Structure):
+class _Plant(_Structure):
     _fields_ = (
         ('arm', _Arm),
         ('dt', _REAL),
@@ -97,23 +106,7 @@ def kernel() -> ctypes.CDLL | None:
     return library
 
 
-def _array(values: npt.ArrayLike, kind: npt.DTypeLike = float) -> npt.NDArray[Any]:
-    return np.ascontiguousarray(values, dtype=kind)
-
-
-@dataclass(frozen=True, eq=False)
-class _Structure:
-    """A C structure of the kernel, and the arrays to which it points."""
-
-    values: Any
-    arrays: tuple[npt.NDArray[Any], ...]
-
-    @property
-    def address(self) -> int:
-        return ctypes.addressof(self.values)
-
-
-def rigid_body(robot: Robot, added_inertia: FloatArray, weighs: bool = True) -> _Structure:
+def rigid_body(robot: Robot, added_inertia: FloatArray, weighs: bool = True) -> _Arm:
     """
     Return a rigid-body model in the format of the kernel.
 
@@ -135,11 +128,11 @@ def rigid_body(robot: Robot, added_inertia: FloatArray, weighs: bool = True) -> 
         )
         for joint, body in zip(robot.geometry, robot.model.inertias[1:], strict=True)
     ]
-    joints = np.array(rows, _JOINT)
-    added = _array(added_inertia)
+    joints, added = np.array(rows, _JOINT), np.ascontiguousarray(added_inertia)
     gravity = (_REAL * 3)(*(weighs * robot.gravity))
-    values = _Arm(len(joints), gravity, joints.ctypes.data, added.ctypes.data)
-    return _Structure(values, (joints, added))
+    arm = _Arm(len(joints), gravity, joints.ctypes.data, added.ctypes.data)
+    arm.arrays = joints, added
+    return arm
 
 
 class CompiledLoop:
@@ -156,47 +149,44 @@ class CompiledLoop:
     """
 
     def __init__(self, plant: Plant, feedback: LinearFeedback) -> None:
-        n, dry = plant.robot.n_joints, plant.contacts
+        robot, dry, n = plant.robot, plant.contacts, plant.robot.n_joints
         added = np.diag(plant.model.armature)
-        added = added if plant.coupling is None else added + plant.coupling
-        body = rigid_body(plant.robot, added)
+        body = rigid_body(robot, added if plant.coupling is None else added + plant.coupling)
+        nominal = rigid_body(feedback.robot, feedback.added_inertia, feedback.weighs)
         far = np.full(n, np.inf)
-        lower, upper = (plant.robot.lower, plant.robot.upper) if plant.hard_stops else (-far, far)
+        lower, upper = (robot.lower, robot.upper) if plant.hard_stops else (-far, far)
         self._law_input, self._law_torque = np.empty(1 + 2 * n), np.empty(n)
         self._torque, self.failure = plant.torque, list[BaseException]()
         arrays = (
-            _array(plant.damping),
-            np.zeros(n) if plant.constant is None else _array(plant.constant),
-            *map(_array, (lower, upper, -plant.robot.torque_limit, plant.robot.torque_limit)),
-            _array(dry.axes, np.int64),
-            *map(_array, (dry.lower, dry.upper)),
+            plant.damping,
+            np.zeros(n) if plant.constant is None else plant.constant,
+            *(lower, upper, -robot.torque_limit, robot.torque_limit),
+            np.array(dry.axes, dtype=np.int64),
+            *(dry.lower, dry.upper),
         )
+        arrays = tuple(map(np.ascontiguousarray, arrays))
         addresses = [array.ctypes.data for array in arrays]
-        self._plant = _Structure(
-            _Plant(
-                body.values,
-                plant.dt,
-                SPEED_TOLERANCE,
-                *addresses[:6],
-                len(dry.axes),
-                *addresses[6:],
-                self._law_input.ctypes.data,
-                self._law_torque.ctypes.data,
-                _TORQUE_LAW() if plant.torque is None else _TORQUE_LAW(self._smooth_effects),
-            ),
-            (*body.arrays, *arrays),
+        self._plant = _Plant(
+            body,
+            plant.dt,
+            SPEED_TOLERANCE,
+            *addresses[:6],
+            len(dry.axes),
+            *addresses[6:],
+            self._law_input.ctypes.data,
+            self._law_torque.ctypes.data,
+            _TORQUE_LAW() if plant.torque is None else _TORQUE_LAW(self._smooth_effects),
         )
-        nominal = rigid_body(feedback.robot, feedback.added_inertia, feedback.weighs)
         gains = [np.array(np.broadcast_to(x, n)) for x in (feedback.stiffness, feedback.damping)]
-        self._controller = _Structure(
-            _Controller(
-                nominal.values,
-                feedback.bandwidth,
-                feedback.follows,
-                *(gain.ctypes.data for gain in gains),
-            ),
-            (*nominal.arrays, *gains),
+        self._controller = _Controller(
+            nominal,
+            feedback.bandwidth,
+            feedback.follows,
+            *(gain.ctypes.data for gain in gains),
         )
+        # a structure holds a copy of its rigid body
+        self._plant.arrays = *body.arrays, *arrays
+        self._controller.arrays = *nominal.arrays, *gains
         self.addresses = self._plant.address, self._controller.address
 
     @classmethod

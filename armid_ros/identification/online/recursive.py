@@ -33,10 +33,6 @@ SMALLEST_FORGETTING = 0.9
 #: Standard deviation of every parameter before the first sample, in its SI unit. Robots have
 #: parameters of 1e-4 to 1e3; a parameter that the data do not identify keeps this deviation.
 PRIOR_STD = 1e6
-#: Loss of information over that of exponential forgetting, as samples with little information lose
-#: less. A step of the Coulomb friction of a moving 7-joint arm is followed as with exponential
-#: forgetting: 63 % in 8 s and 90 % in 28 s with a memory of 10 s.
-_LOSS_RATIO = 2.0
 #: Largest share of the old information that one sample may remove in any direction [-].
 _LARGEST_LOSS = 0.5
 _BLOCK = 8  # columns of a Householder block; the fastest for 60 to 120 parameters
@@ -315,7 +311,10 @@ def replaced(root: FloatArray, rows: FloatArray, forgetting: float) -> FloatArra
     """
     whitened, _ = lapack.dtrtrs(root, rows.T, trans=1)
     gains, directions = np.linalg.eigh(whitened.T @ whitened)
-    budget = _LOSS_RATIO * (1.0 - forgetting) * len(root)
+    # Twice the loss of exponential forgetting, as samples with little information lose less. Steps
+    # of the Coulomb friction of a moving 7-joint arm are then followed as with exponential
+    # forgetting: 63 % in 8 s and 90 % in 28 s with a memory of 10 s.
+    budget = 2.0 * (1.0 - forgetting) * len(root)
     # the level at which the gains, ascending and limited to it, add up to the budget
     some = np.maximum(gains, 0.0)
     levels = (budget - np.append(0.0, np.cumsum(some[:-1]))) / np.arange(len(some), 0, -1)
