@@ -16,7 +16,7 @@ from armid_ros.api.arguments import (
     RobotLike,
     spelled,
 )
-from armid_ros.api.excitation import ExcitationResult, planner_of, WAYPOINT_RATE
+from armid_ros.api.excitation import ExcitationResult, WAYPOINT_RATE
 from armid_ros.arm import ArmModel
 from armid_ros.errors import TrajectoryError
 from armid_ros.excitation import (
@@ -25,6 +25,7 @@ from armid_ros.excitation import (
     DesignProblem,
     DesignProgress,
     DesignSettings,
+    TransferPlanner,
     whole_period,
     with_joint_limits,
 )
@@ -183,7 +184,7 @@ def _searched(
     progress: Callable[[DesignProgress], None] | None,
 ) -> ExcitationResult:
     """Check that a start pose is free, then search for the trajectory."""
-    planner = planner_of(model, asked, scene)
+    planner = TransferPlanner.of(model, scene, asked.speed)
     if start is None:
         planner.free_start()  # raises before the search if no pose is free
     elif fault := planner.fault(start):

@@ -82,7 +82,7 @@ class Design:
 
     def limits_used(self, arm: ArmModel) -> dict[str, FloatArray]:
         """
-        Return the used share of every limit; the ways to and from the excitation are not included.
+        Return the used share of every limit; the transfers are not included.
 
         Parameters
         ----------

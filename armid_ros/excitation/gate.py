@@ -244,7 +244,7 @@ class Ending:
             return None
         return self.gate.stop(phase, duration, monitor.pose.q, monitor.velocity())
 
-    def looked(
+    def updated(
         self,
         monitor: PoseMonitor,
         now: float,

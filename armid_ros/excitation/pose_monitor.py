@@ -51,10 +51,10 @@ class PoseMonitor:
     """
     Recursive filter of the joint states of one arm.
 
-    A position is believed if it is finite, within the position limits, newer than the last
-    believed one, and reachable from it at the velocity limit. Positions that contradict the last
-    believed one are believed when `AGREEING` of them agree with each other and no other position
-    was believed meanwhile.
+    A position is accepted if it is finite, within the position limits, newer than the last
+    accepted one, and reachable from it at the velocity limit. Positions that contradict the last
+    accepted one are accepted when `AGREEING` of them agree with each other and no other position
+    was accepted meanwhile.
 
     Parameters
     ----------
@@ -66,7 +66,7 @@ class PoseMonitor:
     Attributes
     ----------
     pose : MeasuredPose
-        Last believed positions.
+        Last accepted positions.
     rejected : int
         Number of rejected joint states.
 

@@ -1,6 +1,6 @@
 # Copyright 2026 The armid_ros developers
 # SPDX-License-Identifier: Apache-2.0
-"""A complete run: the way to the excitation, the excitation, and the way back."""
+"""A complete run: a transfer to the excitation, the excitation, and a transfer back."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ _OFF_PATH = 0.001
 @dataclass(frozen=True)
 class Run:
     """
-    The way to an excitation, the excitation, and the way back to the start pose.
+    A transfer to an excitation, the excitation, and a transfer back to the start pose.
 
     Attributes
     ----------
@@ -46,7 +46,7 @@ class Run:
     rate: float
 
     def __post_init__(self) -> None:
-        """Round the ways to whole numbers of samples, and check that they meet the excitation."""
+        """Round the transfers to whole numbers of samples; check that they meet the excitation."""
         ends = self.excitation.at([0.0, self.excitation.duration]).q
         for way, own, end in ((self.approach, -1, 0), (self.back, 0, 1)):
             # [rad or m]; rounding
@@ -138,22 +138,22 @@ def plan_run(
     excitation : Excitation
         The excitation; its joints may be shifted by whole turns.
     planner : TransferPlanner
-        Planner of the ways.
+        Planner of the transfers.
     start : ndarray, shape (n,)
         Present pose of the arm [rad or m].
     rate : float
         Samples per second [Hz].
     shortest : float
-        Shortest duration of a way [s].
+        Shortest duration of a transfer [s].
     back : bool
         Whether the arm returns to its start pose.
     seed : int
-        Seed of the search for a way.
+        Seed of the search for a path.
 
     Raises
     ------
     TrajectoryError
-        If no way was found, or the waypoints are too few for the path; the message names the
+        If no path was found, or the waypoints are too few for the path; the message names the
         obstruction or the joint.
 
     """
@@ -170,8 +170,8 @@ def _unwound(
     excitation: Excitation, arm: ArmModel, limits: Limits, start: FloatArray
 ) -> Excitation:
     """Return the excitation shifted by whole turns, as close to a start pose as limits allow."""
-    # a joint with a range of two turns reaches most poses at two positions; above a floor, the way
-    # to one of them is often blocked, as the shoulder would have to swing through the floor
+    # A joint with a range of two turns reaches most poses at two positions. Above a floor, a path
+    # to one of them is often blocked, as the shoulder would have to swing through the floor.
     trajectory = excitation.trajectory
     samples = 400
     q = trajectory.one_period(samples).q

@@ -3,7 +3,8 @@
 """A rehearsal remembers the worst, in memory that does not grow."""
 
 from armid_ros.arm import ArmModel
-from armid_ros.excitation import Excitation, FourierTrajectory, Rehearsal
+from armid_ros.excitation import Excitation, FourierTrajectory
+from armid_ros.excitation.supervision import Rehearsal
 from armid_ros.robots import load_robot
 import numpy as np
 import pytest

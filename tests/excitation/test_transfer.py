@@ -15,12 +15,12 @@ from armid_ros.excitation import (
     Obstacle,
     plan_run,
     random_feasible,
-    Transfer,
     transfer_limits,
     TransferPlanner,
     with_obstacles,
 )
 from armid_ros.excitation.run import _unwound
+from armid_ros.excitation.transfer import Transfer
 from armid_ros.robots import collision_model, robot_from_urdf
 import numpy as np
 import pinocchio as pin

@@ -8,21 +8,19 @@ from armid_ros.arm import ArmModel, load_model
 from armid_ros.effects import make_effect, USUAL_EFFECTS
 from armid_ros.errors import TrajectoryError
 from armid_ros.excitation import (
-    ClearanceModel,
     CollisionScene,
     design,
     DesignSettings,
     Excitation,
-    excitation_faults,
     Limits,
     load_excitation,
     SPEED_CLASSES,
     trajectory_faults,
-    transfer_limits,
     TransferPlanner,
     whole_period,
     with_joint_limits,
 )
+from armid_ros.excitation.feasibility import excitation_faults
 from armid_ros.files import reading
 from armid_ros.nodes.parameters.table import NodeParameter, Values
 from armid_ros.robots import load_arms, load_robot
@@ -235,9 +233,7 @@ def make_planner(value: Values) -> tuple[TransferPlanner, tuple[str, ...]]:
     robot = with_joint_limits(robot, value('joint_limits'), value('velocity'))
     arm = load_model(value('model'), robot) if value('model') else ArmModel(robot)
     scene = CollisionScene.of(robot, value('clearance'), value('floor'), value('environment'))
-    limits = transfer_limits(arm.robot, value('speed'))
-    clearance = ClearanceModel.of(scene.bodies, scene.clearance)
-    planner = TransferPlanner(arm, limits, clearance)
+    planner = TransferPlanner.of(arm, scene, value('speed'))
     unchecked = scene.unchecked
     if others:
         unchecked += (f'{", ".join(others)} (not driven, as they belong to no arm)',)
