@@ -1,11 +1,11 @@
 # Copyright 2026 The armid_ros developers
 # SPDX-License-Identifier: Apache-2.0
 """
-Elements that can hold a joint at rest, dry friction and joint stops, and their exact solution.
+Dry friction and joint stops as complementarity conditions, and their exact solution.
 
-Over one step, the velocities of m elements are w = w_free - G f, with G symmetric and positive
-semidefinite (the Delassus matrix times the step) and f the friction torques of the elements. Every
-element obeys its law:
+An element is a source of dry friction, or a joint stop. It can hold a joint at rest. Over one
+step, the velocities of m elements are w = w_free - G f. G is symmetric and positive semidefinite:
+the Delassus matrix times the step. The torques f of the elements obey
 
     w_i > 0 and f_i = upper_i,   or   w_i < 0 and f_i = lower_i,   or   w_i = 0 and f_i between.
 
