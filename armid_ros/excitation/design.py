@@ -217,7 +217,7 @@ def placed(problem: DesignProblem, trajectory: FourierTrajectory) -> Excitation:
                 return run
             last = f'in {run_in:.3g} s, {faults}'
         run_in *= 1.5
-    raise TrajectoryError(f'no way into the trajectory and out of it; {last}')
+    raise TrajectoryError(f'no run-in of the trajectory keeps the limits; {last}')
 
 
 def evaluate(

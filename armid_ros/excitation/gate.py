@@ -145,9 +145,10 @@ class MotionGate:
         """
         step = np.abs(measured - set_point)
         if not step.max() <= largest:
-            joint = self.limits.joints[int(np.argmax(step))]
+            j = int(np.argmax(step))
             raise TrajectoryError(
-                f"joint '{joint}' stands {step.max():.3g} from its set point, over {largest:g}"
+                f"joint '{self.limits.joints[j]}' is {step[j]:.3g} "
+                f'{self.limits.unit("position", j)} from its set point, more than {largest:g}'
             )
         inside = np.clip(measured, self.limits.lower, self.limits.upper)
         near = clear_line(self.clearance, set_point, inside)
@@ -176,9 +177,9 @@ class MotionGate:
         if not (factor > 0.0 and self.effort[j] > 0.0 and beyond[j] > 0.0):
             return ''
         return (
-            f"joint '{self.limits.joints[j]}' takes {abs(effort[j]):.3g} "
-            f'{self.limits.unit("torque", j)}, and at most {self.effort[j]:.3g} were foreseen: '
-            f'more than effort_factor {factor:g} allows'
+            f"the effort of joint '{self.limits.joints[j]}' is {abs(effort[j]):.3g} "
+            f'{self.limits.unit("torque", j)}, more than effort_factor {factor:g} times the '
+            f'predicted {self.effort[j]:.3g}'
         )
 
     def _time_of(self, step: FloatArray, speed: FloatArray) -> float:

@@ -36,13 +36,10 @@ class _State(NamedTuple):
 
 @dataclass
 class _Source:
-    """Messages with the same list of names: the arm's joints, their limits, recent states."""
+    """Messages with the same list of names: the arm's joints in them, and recent states."""
 
     columns: npt.NDArray[np.int_]
     joints: npt.NDArray[np.int_]
-    lower: FloatArray
-    upper: FloatArray
-    velocity: FloatArray
     states: deque[_State] = field(default_factory=deque)
     rivals: list[_State] = field(default_factory=list)
 
@@ -115,9 +112,7 @@ class PoseMonitor:
         joints = self.pose.joints
         if names not in self._sources:
             own = [(k, joints.index(name)) for k, name in enumerate(names) if name in joints]
-            columns, indices = np.array(own, dtype=int).reshape(-1, 2).T
-            limits = (limit[indices] for limit in (self._lower, self._upper, self._velocity))
-            self._sources[names] = _Source(columns, indices, *limits)
+            self._sources[names] = _Source(*np.array(own, dtype=int).reshape(-1, 2).T)
         source = self._sources[names]
         if not len(source.joints):
             return
@@ -218,7 +213,7 @@ class PoseMonitor:
 
     def _outside(self, source: _Source, q: FloatArray) -> str:
         """Return a message if a position is not finite or is outside the limits."""
-        inside = (q >= source.lower) & (q <= source.upper)
+        inside = (q >= self._lower[source.joints]) & (q <= self._upper[source.joints])
         if inside.all():
             return ''
         k = int(np.argmin(inside))
@@ -244,7 +239,7 @@ class PoseMonitor:
             passed = max(passed, min(between, passed + 0.1))
         step = np.abs(state.q - last.q)
         # encoder noise, added to the change of position that the velocity limit allows [rad or m]
-        beyond = step - 0.02 - source.velocity * max(passed, 0.0)
+        beyond = step - 0.02 - self._velocity[source.joints] * max(passed, 0.0)
         k = int(np.argmax(beyond))
         if not beyond[k] > 0.0:  # NaN if no position was known
             return ''

@@ -51,7 +51,7 @@ class Run:
         for way, own, end in ((self.approach, -1, 0), (self.back, 0, 1)):
             # [rad or m]; rounding
             if way is not None and np.abs(way.q[own] - ends[end]).max() > 1e-9:
-                raise TrajectoryError('run: the way and the excitation do not meet')
+                raise TrajectoryError('run: a transfer and the excitation do not meet')
         for name in ('approach', 'back'):
             way = getattr(self, name)
             if way is not None:

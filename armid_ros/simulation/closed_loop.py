@@ -150,21 +150,20 @@ class CompiledLoop:
 
     def __init__(self, plant: Plant, feedback: LinearFeedback) -> None:
         robot, dry, n = plant.robot, plant.contacts, plant.robot.n_joints
-        added = np.diag(plant.model.armature)
-        body = rigid_body(robot, added if plant.coupling is None else added + plant.coupling)
+        body = rigid_body(robot, plant.added_inertia)
         nominal = rigid_body(feedback.robot, feedback.added_inertia, feedback.weighs)
         far = np.full(n, np.inf)
         lower, upper = (robot.lower, robot.upper) if plant.hard_stops else (-far, far)
         self._law_input, self._law_torque = np.empty(1 + 2 * n), np.empty(n)
         self._torque, self.failure = plant.torque, list[BaseException]()
-        arrays = (
+        arrays: list[npt.NDArray[Any]] = [
             plant.damping,
             np.zeros(n) if plant.constant is None else plant.constant,
             *(lower, upper, -robot.torque_limit, robot.torque_limit),
             np.array(dry.axes, dtype=np.int64),
             *(dry.lower, dry.upper),
-        )
-        arrays = tuple(map(np.ascontiguousarray, arrays))
+        ]
+        arrays = [np.ascontiguousarray(array) for array in arrays]
         addresses = [array.ctypes.data for array in arrays]
         self._plant = _Plant(
             body,

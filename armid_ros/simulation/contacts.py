@@ -69,38 +69,38 @@ def solve_box_complementarity(
         Mode of each element.
 
     """
-    low, high, modes = lower.tolist(), upper.tolist(), list(modes)
+    low, high, found = lower.tolist(), upper.tolist(), list(modes)
     f = np.zeros(len(modes))
     for rounds in range(500):
         # the bounds of slipping elements, and the solution of w = 0 for stuck elements
         f = np.array(
-            [(0.0, *bounds)[mode] for mode, *bounds in zip(modes, high, low, strict=True)]
+            [(0.0, *bounds)[mode] for mode, *bounds in zip(found, high, low, strict=True)]
         )
-        stuck = [k for k, mode in enumerate(modes) if mode == 0]
+        stuck = [k for k, mode in enumerate(found) if mode == 0]
         if stuck:
             system = np.eye(len(modes))
             for k in stuck:
                 system[k], f[k] = g[k], w_free[k]
                 system[k, k] *= 1.0 + shift
             f = np.asarray(dgesv(system, f, 1, 1)[2])
-        # elements that break their law, each with the mode to try next
+        # elements that violate their condition, each with the mode to try next
         broken = []
         speeds = (w_free - g.dot(f)).tolist()
         for k, (speed, torque) in enumerate(zip(speeds, f.tolist(), strict=True)):
-            if modes[k] and speed * modes[k] < -SPEED_TOLERANCE:
+            if found[k] and speed * found[k] < -SPEED_TOLERANCE:
                 broken.append((k, 0))
-            elif modes[k] == 0 and torque > high[k] + TORQUE_TOLERANCE * abs(high[k]):
+            elif found[k] == 0 and torque > high[k] + TORQUE_TOLERANCE * abs(high[k]):
                 broken.append((k, 1))
-            elif modes[k] == 0 and torque < low[k] - TORQUE_TOLERANCE * abs(low[k]):
+            elif found[k] == 0 and torque < low[k] - TORQUE_TOLERANCE * abs(low[k]):
                 broken.append((k, -1))
         if not broken:
             break
-        # A typical step needs one round, in which all elements that break their law change at
+        # A typical step needs one round, in which all violating elements change at
         # once. Some problems cycle; after 12 rounds only the first such element changes, which
         # always terminates.
         for k, mode in broken if rounds < 12 else broken[:1]:
-            modes[k] = mode
-    return f, tuple(modes)
+            found[k] = mode
+    return f, tuple(found)
 
 
 @dataclass(frozen=True, eq=False)

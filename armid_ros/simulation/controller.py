@@ -237,10 +237,6 @@ class VelocityLoop:
         """Freeze the gains."""
         freeze(self, 'proportional', 'integral')
 
-    def torque(self, error: FloatArray, integral: FloatArray) -> FloatArray:
-        """Return the torque for errors of velocity [rad/s] and their integral [rad], (n,)."""
-        return np.asarray(self.proportional * error + self.integral * integral)
-
 
 @dataclass(eq=False)
 class MotorControl(Controller):
@@ -330,4 +326,5 @@ class MotorControl(Controller):
         """Update the integrals and return the torque, shape (n,)."""
         error = desired[1] - dq
         self.integral = self.integral + self.dt * error
-        return self.loop.torque(error, self.integral) + feedforward
+        torque = self.loop.proportional * error + self.loop.integral * self.integral
+        return torque + feedforward

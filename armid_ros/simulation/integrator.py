@@ -67,10 +67,7 @@ def step(plant: Plant, state: State, torque: FloatArray) -> State:
     if contacts.friction is not None:
         load = pin.rnea(model, data, q_middle, dq_middle, state.ddq)
         contacts = contacts.under(load)
-    inertia = pin.crba(plant.model, data, q_middle)
-    if plant.coupling is not None:
-        inertia = inertia + plant.coupling
-
+    inertia = pin.crba(model, data, q_middle) + plant.added_inertia
     dq_next, ddq, modes = _end_velocity(plant, contacts, inertia, force, dq, state.modes)
     q_next = q_middle + half * dq_next
     robot = plant.robot

@@ -4,12 +4,12 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from functools import cached_property
 
 from armid_ros.effects import Action
 from armid_ros.errors import ModelError, RobotError
-from armid_ros.motion import FloatArray, Motion, read_only
+from armid_ros.motion import FloatArray, Motion
 from armid_ros.robots import Robot
 from armid_ros.simulation.closed_loop import Trace
 from armid_ros.simulation.plant import Plant, State
@@ -216,44 +216,40 @@ class RecentPast:
         return q[-1], dq[-1], tau[late]
 
 
-@dataclass(frozen=True, eq=False)
 class LinkAccelerometers:
     """
     Accelerometers with three axes, one on every link, aligned with the frame of its joint.
 
-    Attributes
+    Parameters
     ----------
     robot : Robot
         The arm.
-    places : ndarray, shape (n, 3)
+    places : array_like, shape (n, 3), optional
         Positions of the accelerometers in the frames of the joints [m]; by default the centroids
         of the links.
 
+    Raises
+    ------
+    RobotError
+        If the places have another shape.
+
     """
 
-    robot: Robot
-    places: npt.ArrayLike | None = None
-    _data: pin.Data = field(init=False, repr=False)
-    _placements: tuple[pin.SE3, ...] = field(init=False, repr=False)
-
-    def __post_init__(self) -> None:
-        """Check the places, or choose the default places."""
-        model, places = self.robot.model, self.places
+    def __init__(self, robot: Robot, places: npt.ArrayLike | None = None) -> None:
         if places is None:
-            places = [inertia.lever for inertia in list(model.inertias)[1:]]
-        array = read_only(places)
-        if array.shape != (self.robot.n_joints, 3):
+            places = [inertia.lever for inertia in list(robot.model.inertias)[1:]]
+        array = np.asarray(places, dtype=float)
+        if array.shape != (robot.n_joints, 3):
             raise RobotError(
-                f'{self.robot.name}: accelerometers need three coordinates for each of '
-                f'{self.robot.n_joints} links, got an array of shape {array.shape}'
+                f'{robot.name}: accelerometers need three coordinates for each of '
+                f'{robot.n_joints} links, got an array of shape {array.shape}'
             )
-        object.__setattr__(self, '_data', model.createData())
-        placements = tuple(pin.SE3(np.eye(3), place) for place in array)
-        object.__setattr__(self, '_placements', placements)
+        self._model, self._data = robot.model, robot.model.createData()
+        self._placements = [pin.SE3(np.eye(3), place) for place in array]
 
     def read(self, q: FloatArray, dq: FloatArray, ddq: FloatArray) -> FloatArray:
         """Return the readings in one state, shape (n, 3) [m/s^2]; at rest gravity, upwards."""
-        model, data = self.robot.model, self._data
+        model, data = self._model, self._data
         pin.forwardKinematics(model, data, q, dq, ddq)
         up = -model.gravity.linear
         readings = np.empty((len(self._placements), 3))

@@ -223,7 +223,7 @@ class SimulatedArm:
                 f'{arm.robot.name}: an arm with the joints {", ".join(self.joints)} cannot become '
                 f'one with {", ".join(arm.robot.joints)}'
             )
-        return replace(self.plant, arm=arm)
+        return Plant(arm, self.plant.dt, self.plant.hard_stops)
 
     def set_trajectory(self, reference: Reference) -> None:
         """

@@ -255,7 +255,8 @@ class ChangeWatch:
                     self._search.interrupt()
                     continue
                 block = yield from self._summed(stretch, stretch.end, samples, before)
-                found = yield from self._search.take(block, self._residual_scale_of_all)
+                mean = float(np.exp(np.mean(np.log(self._residual_scale.value))))
+                found = yield from self._search.take(block, mean)
                 if found is not None:
                     yield from self._name(found)
         finally:
@@ -331,47 +332,38 @@ class ChangeWatch:
             samples=tuple(samples),
         )
 
-    @property
-    def _residual_scale_of_all(self) -> float:
-        return float(np.exp(np.mean(np.log(self._residual_scale.value))))
-
     def _name(self, found: FoundChange) -> Job:
-        """Report a change, and restart without information on the changed parameters."""
-        change, size = found.change, found.change.size
-        yield from self._learn_again(found)
-        # A change shakes the arm, and the parameters were not learned from such motion: the
-        # covariance grows by the ratio of squared residuals to the usual ones.
-        squares = count = 0.0
-        for block in found.after:
-            rows, tau, weights = (np.stack(part) for part in zip(*block.samples, strict=True))
-            residual = self._estimator.scale(weights) * (tau - rows @ self._wider.values)
-            squares += float(np.sum((residual / self._residual_scale.value) ** 2))
-            count += float(np.sum(weights))
-            yield
-        factor, free = 1.0, change.reopened.shape[1]
-        if self._fit_ratios and count > free:
-            factor = max(1.0, squares / (count - free) / float(np.median(self._fit_ratios)))
-        self.changes.append(
-            replace(change, size=replace(size, covariance=factor * size.covariance))
-        )
-
-    def _learn_again(self, found: FoundChange) -> Job:
-        """Restart from the state before a change, without information on changed parameters."""
-        last, reopened = found.before, found.change.reopened
-        since = [sample for block in found.after for sample in block.samples]
+        """Restart from before a change, without the changed parameters, and report the change."""
+        change, size, reopened = found.change, found.change.size, found.change.reopened
         again = copy(self._estimator)
         for estimator, known, directions in (
-            (self._wider, last.before, self._among_all(reopened)),
-            (again, last.narrow, reopened),
+            (self._wider, found.before.before, self._among_all(reopened)),
+            (again, found.before.narrow, reopened),
         ):
             estimator.restore(known)
             estimator.reopen(directions)
             yield
+        since = [sample for block in found.after for sample in block.samples]
         yield from self._learn_both(again, since)
         while len(rows := self._unsearched()) > self._at_a_time:
             yield from self._learn_both(again, (yield from self._widened(rows)))
         at_once(self._learn_both(again, at_once(self._widened(rows))))
         self._estimator.restore(again)
+        # A change shakes the arm, and the parameters were not learned from such motion: the
+        # covariance grows by the ratio of squared residuals to the usual ones.
+        squares = count = 0.0
+        for block in found.after:
+            columns, tau, weights = (np.stack(part) for part in zip(*block.samples, strict=True))
+            residual = self._estimator.scale(weights) * (tau - columns @ self._wider.values)
+            squares += float(np.sum((residual / self._residual_scale.value) ** 2))
+            count += float(np.sum(weights))
+            yield
+        factor, free = 1.0, reopened.shape[1]
+        if self._fit_ratios and count > free:
+            factor = max(1.0, squares / (count - free) / float(np.median(self._fit_ratios)))
+        self.changes.append(
+            replace(change, size=replace(size, covariance=factor * size.covariance))
+        )
 
     def _learn_both(self, again: RecursiveLeastSquares, samples: Sequence[WeightedSample]) -> Job:
         yield from self._learn(self._wider, samples)

@@ -15,7 +15,7 @@ from __future__ import annotations
 from collections.abc import Iterator, Sequence
 
 from armid_ros.changes.statistic import limits, MEDIAN_SQUARE
-from armid_ros.identification.online.background import Job, Pieces
+from armid_ros.identification.online.background import Job
 from armid_ros.motion import FloatArray
 import numpy as np
 from scipy import stats
@@ -166,26 +166,16 @@ class NullCalibration:
         factors = np.full(len(self._sizes), np.nan)
         factors[judged] = np.exp(value + drawn * (middle - value)).clip(1.0)
         yield
-        tail = yield from self._tail_of(later[:, judged], (factors * self._rare)[judged])
+        # 99 % quantile of the statistics, each over its quantile in white noise; zeros are no data
+        relative = (later[:, judged] / (factors * self._rare)[judged]).ravel()
+        count = np.count_nonzero(relative)
+        place = len(relative) - count + (1.0 - _RARE) * (count - 1)
+        largest = np.sort(np.partition(relative, int(place))[int(place) :])
+        tail = float(np.interp(place % 1.0, np.arange(len(largest)), largest))
         self.factors, self._tail = factors, max(1.0, tail)
         self._freedom = np.zeros(len(self._sizes))
         self._freedom[judged] = 2.0 / left  # a mean square of k degrees varies by 2 / k
         self._limits = None
-
-    @staticmethod
-    def _tail_of(seen: FloatArray, rare: FloatArray) -> Pieces[float]:
-        """Return the 99 % quantile of the statistics, each over its quantile in white noise."""
-        count = int(np.sum(seen > 0.0))
-        most = count - int((1.0 - _RARE) * (count - 1))  # the quantile is among so many largest
-        largest = np.empty(0)
-        for columns in _in_pieces(seen):
-            relative = (seen[:, columns] / rare[columns]).reshape(-1)
-            largest = np.concatenate([largest, relative])
-            if len(largest) > most:
-                largest = np.partition(largest, len(largest) - most)[-most:]
-            yield
-        place = (1.0 - _RARE) * (count - 1) - (count - len(largest))
-        return float(np.interp(place, np.arange(len(largest)), np.sort(largest)))
 
     def excess(self, ratios: FloatArray, strength: FloatArray, chance: float) -> FloatArray:
         """
