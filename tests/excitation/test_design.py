@@ -70,8 +70,7 @@ def test_predicted_deviations_are_the_scatter_of_repeats(humanoid_design):
     run, lead = result.excitation, int(np.ceil(20.0 * result.excitation.run_in))
     periods = slice(lead, lead + run.n_periods * round(20.0 * run.trajectory.period))
     w = problem.columns(run.motion(20.0).select(periods))[:, problem.base.independent]
-    inverse = np.linalg.pinv(w)
-    scatter = (inverse @ rng.normal(size=(len(w), 400))).std(axis=1)
+    scatter = (np.linalg.pinv(w) @ rng.normal(size=(len(w), 400))).std(axis=1)
     np.testing.assert_allclose(predicted, scatter, rtol=0.2)
 
 

@@ -91,10 +91,9 @@ def test_a_run_is_sent_with_enough_waypoints_for_its_path(gate, two_link, rate, 
 
 def test_a_run_is_held_to_assumed_acceleration_limits(gate, two_link):
     planner = TransferPlanner(ArmModel(two_link), transfer_limits(two_link), None)
-    path = gate.run.excitation.trajectory
-    fast = replace(gate.run.excitation, trajectory=path.scaled(0.05).stretched(path.period / 16))
+    path = gate.run.excitation.trajectory.scaled(0.05).stretched(0.125)
+    fast = replace(gate.run.excitation, trajectory=path)
     run = plan_run(fast, planner, fast.at([0.0]).q[0], 400.0)
-    assert np.all(np.abs(run.motion().dq) < two_link.velocity_limit)
     with pytest.raises(TrajectoryError, match='acceleration'):
         MotionGate.of(run, planner)
 

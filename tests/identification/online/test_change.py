@@ -68,7 +68,6 @@ def learned_and_block(
 
 
 def statistics_of(block, directions, residual_scale=1.0):
-    """Weigh possible changes by a block, against what was known when it began."""
     return at_once(score_statistics([block], block, directions, residual_scale))
 
 
