@@ -9,7 +9,7 @@ from dataclasses import replace
 from pathlib import Path
 
 from armid_ros.api.arguments import drivable, RecordingLike, recordings_of, Rng, RobotLike
-from armid_ros.api.excitation import ExcitationResult, planner_of, WAYPOINT_RATE
+from armid_ros.api.excitation import ExcitationResult, WAYPOINT_RATE
 from armid_ros.arm import ArmModel
 from armid_ros.errors import TrajectoryError
 from armid_ros.excitation import (
@@ -18,6 +18,7 @@ from armid_ros.excitation import (
     DesignProblem,
     DesignProgress,
     DesignSettings,
+    TransferPlanner,
     whole_period,
     with_joint_limits,
 )
@@ -177,7 +178,7 @@ def _searched(
     progress: Callable[[DesignProgress], None] | None,
 ) -> ExcitationResult:
     """Check that a start pose is free, then search for the trajectory."""
-    planner = planner_of(model, settings, scene)
+    planner = TransferPlanner.of(model, scene, settings.speed)
     if start is None:
         planner.free_start()  # raises before the search if no pose is free
     elif fault := planner.fault(start):

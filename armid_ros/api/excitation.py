@@ -16,17 +16,14 @@ from armid_ros.arm import ArmModel
 from armid_ros.diagnosis.next_run.isolability import Isolability, isolability
 from armid_ros.errors import TrajectoryError
 from armid_ros.excitation import (
-    ClearanceModel,
     CollisionScene,
     Design,
-    DesignSettings,
     Excitation,
     Fitness,
     fitness,
     plan_run,
     Run,
     save_excitation,
-    transfer_limits,
     TransferPlanner,
 )
 from armid_ros.excitation.problem import torque_noise
@@ -128,7 +125,7 @@ class ExcitationResult(Shown):
     @cached_property
     def planner(self) -> TransferPlanner:
         """Return the planner of approach and return motions."""
-        return planner_of(self.arm, self.core.settings, self.scene)
+        return TransferPlanner.of(self.arm, self.scene, self.core.settings.speed)
 
     @cached_property
     def start(self) -> FloatArray:
@@ -151,7 +148,7 @@ class ExcitationResult(Shown):
     @cached_property
     def fitness(self) -> Fitness:
         """Return the results of the checks of the run."""
-        return fitness(self.run.motion(), self.core.limits, self.scene)
+        return fitness(self.run.motion(), self.scene)
 
     def document(self, origin: ResultOrigin = DEFAULT_ORIGIN) -> dict[str, Any]:
         """Return the content of excitation.json."""
@@ -271,12 +268,3 @@ class ExcitationResult(Shown):
         lines += [f'the zero of the description is not free: {fault}'] if fault else []
         early = f'stopped early ({self.core.stopped}): not what the seed would give'
         return fit.word, [*lines, early] if self.core.stopped else lines, fit.remedy
-
-
-def planner_of(arm: ArmModel, settings: DesignSettings, scene: CollisionScene) -> TransferPlanner:
-    """Return a planner of approach and return motions."""
-    return TransferPlanner(
-        arm,
-        transfer_limits(arm.robot, settings.speed),
-        ClearanceModel.of(scene.bodies, settings.clearance),
-    )

@@ -331,7 +331,7 @@ def write_course(
     """Write a trajectory that makes elastic joints identifiable, as a bag."""
     from armid_ros.api.excitation import BAG, ExcitationResult
     from armid_ros.cli import options
-    from armid_ros.excitation import ClearanceModel, Limits
+    from armid_ros.excitation import ClearanceModel
     from armid_ros.recording import write_joint_trajectory
     from armid_ros.simulation.elastic import multisine_course, step_course
     import numpy as np
@@ -356,5 +356,5 @@ def write_course(
         for joint, q, unit in zip(robot.joints, course.q[0], robot.position_units, strict=True)
     )
     say(f'starts at rest in the middle of the ranges, {first}: bring the arm there first')
-    for missing in space.not_checked(Limits.of(robot)):
+    for missing in space.unchecked:
         say(f'not checked: {missing}', 'yellow')

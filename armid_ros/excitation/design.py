@@ -82,7 +82,7 @@ class Design:
 
     def limits_used(self, arm: ArmModel) -> dict[str, FloatArray]:
         """
-        Return the used share of every limit; the ways to and from the excitation are not included.
+        Return the used share of every limit; the transfers are not included.
 
         Parameters
         ----------
@@ -217,7 +217,7 @@ def placed(problem: DesignProblem, trajectory: FourierTrajectory) -> Excitation:
                 return run
             last = f'in {run_in:.3g} s, {faults}'
         run_in *= 1.5
-    raise TrajectoryError(f'no way into the trajectory and out of it; {last}')
+    raise TrajectoryError(f'no run-in of the trajectory keeps the limits; {last}')
 
 
 def evaluate(

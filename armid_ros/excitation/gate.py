@@ -15,14 +15,11 @@ from armid_ros.excitation.run import Run
 from armid_ros.excitation.supervision import HANDOVER, slowed
 from armid_ros.excitation.transfer import TransferPlanner
 from armid_ros.motion import FloatArray, Motion
-from armid_ros.robots.reference import Reference
 import numpy as np
 
 #: Factor on the duration of a stop that exceeds an acceleration limit, and the largest duration as
 #: a multiple of the desired one, or of that of a stop at the acceleration limit if it is longer.
 _LONGER, _LONGEST = 1.25, 4.8
-#: Largest distance of the curve through the waypoints from the path that was checked [rad or m].
-_OFF_PATH = 0.001
 
 
 @dataclass(frozen=True)
@@ -35,8 +32,7 @@ class MotionGate:
     run : Run
         Run that was planned.
     limits : Limits
-        Limits of the robot. Without acceleration limits in the description, the acceleration limit
-        is at least the largest acceleration of the run.
+        Limits of the robot, without a reserve.
     clearance : ClearanceModel or None
         Bodies to keep apart, the floor among them.
     effort : ndarray, shape (n,)
@@ -68,39 +64,23 @@ class MotionGate:
             close; the message names the joint or the bodies.
 
         """
-        motion, arm = run.motion(), planner.arm
-        torque = arm.joint_torque(motion)
-        peak = np.abs(motion.ddq).max(axis=0)
-        robot = arm.robot
+        motion, robot = run.motion(), planner.arm.robot
+        torque = planner.arm.joint_torque(motion)
         limits = Limits.of(robot, speed=1.0, reserve=False)
-        usual = np.maximum(limits.acceleration, 1.001 * peak)
-        fixed = np.isfinite(robot.acceleration_limit)
-        limits = replace(limits, acceleration=np.where(fixed, limits.acceleration, usual))
-        # a joint may need a tenth of its limit for its dry friction
-        room = np.where(np.isfinite(robot.torque_limit), 0.1 * robot.torque_limit, 0.0)
-        effort = np.maximum(np.abs(torque).max(axis=0), room)
-        gate = cls(run, limits, planner.clearance, effort)
         violations = check_limits(limits, motion, torque)
         if violations:
             raise TrajectoryError(f'the run is not sent: {violations[0]}')
-        # a controller interpolates between the samples; there the difference of a quintic is
-        # largest in the middle, where a harmonic of the rate is zero
-        between = motion.t[:-1] + 0.4 / run.rate
-        away = np.abs(Reference.of(motion).sample(between).q - run.at(between).q).max(axis=0)
-        j = int(np.argmax(away))
-        if away[j] > _OFF_PATH:
-            raise TrajectoryError(
-                f"the run is not sent: joint '{robot.joints[j]}' would be {away[j]:.2g} "
-                f'{robot.position_units[j]} off its path between {run.rate:g} waypoints per '
-                'second; send more (rate)'
-            )
-        # intervals of 0.1 s at the beginning of the proof
-        times = np.linspace(0.0, run.duration, int(np.ceil(run.duration / 0.1)) + 1)
+        run.require_waypoints()
         if planner.clearance is not None:
+            # intervals of 0.1 s at the beginning of the proof
+            times = np.linspace(0.0, run.duration, int(np.ceil(run.duration / 0.1)) + 1)
+            peak = np.abs(motion.ddq).max(axis=0)
             near = planner.clearance.first_fault(run.at, 1.5 * peak, times)
             if near is not None:
                 raise TrajectoryError(f'the run is not sent: {near}')
-        return gate
+        # a joint may need a tenth of its limit for its dry friction
+        room = np.where(np.isfinite(robot.torque_limit), 0.1 * robot.torque_limit, 0.0)
+        return cls(run, limits, planner.clearance, np.maximum(np.abs(torque).max(axis=0), room))
 
     def stop(
         self, phase: float, duration: float, measured: FloatArray, velocity: FloatArray
@@ -165,9 +145,10 @@ class MotionGate:
         """
         step = np.abs(measured - set_point)
         if not step.max() <= largest:
-            joint = self.limits.joints[int(np.argmax(step))]
+            j = int(np.argmax(step))
             raise TrajectoryError(
-                f"joint '{joint}' stands {step.max():.3g} from its set point, over {largest:g}"
+                f"joint '{self.limits.joints[j]}' is {step[j]:.3g} "
+                f'{self.limits.unit("position", j)} from its set point, more than {largest:g}'
             )
         inside = np.clip(measured, self.limits.lower, self.limits.upper)
         near = clear_line(self.clearance, set_point, inside)
@@ -196,9 +177,9 @@ class MotionGate:
         if not (factor > 0.0 and self.effort[j] > 0.0 and beyond[j] > 0.0):
             return ''
         return (
-            f"joint '{self.limits.joints[j]}' takes {abs(effort[j]):.3g} "
-            f'{self.limits.unit("torque", j)}, and at most {self.effort[j]:.3g} were foreseen: '
-            f'more than effort_factor {factor:g} allows'
+            f"the effort of joint '{self.limits.joints[j]}' is {abs(effort[j]):.3g} "
+            f'{self.limits.unit("torque", j)}, more than effort_factor {factor:g} times the '
+            f'predicted {self.effort[j]:.3g}'
         )
 
     def _time_of(self, step: FloatArray, speed: FloatArray) -> float:
@@ -264,7 +245,7 @@ class Ending:
             return None
         return self.gate.stop(phase, duration, monitor.pose.q, monitor.velocity())
 
-    def looked(
+    def updated(
         self,
         monitor: PoseMonitor,
         now: float,

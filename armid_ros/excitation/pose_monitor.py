@@ -36,13 +36,10 @@ class _State(NamedTuple):
 
 @dataclass
 class _Source:
-    """Messages with the same list of names: the arm's joints, their limits, recent states."""
+    """Messages with the same list of names: the arm's joints in them, and recent states."""
 
     columns: npt.NDArray[np.int_]
     joints: npt.NDArray[np.int_]
-    lower: FloatArray
-    upper: FloatArray
-    velocity: FloatArray
     states: deque[_State] = field(default_factory=deque)
     rivals: list[_State] = field(default_factory=list)
 
@@ -51,10 +48,10 @@ class PoseMonitor:
     """
     Recursive filter of the joint states of one arm.
 
-    A position is believed if it is finite, within the position limits, newer than the last
-    believed one, and reachable from it at the velocity limit. Positions that contradict the last
-    believed one are believed when `AGREEING` of them agree with each other and no other position
-    was believed meanwhile.
+    A position is accepted if it is finite, within the position limits, newer than the last
+    accepted one, and reachable from it at the velocity limit. Positions that contradict the last
+    accepted one are accepted when `AGREEING` of them agree with each other and no other position
+    was accepted meanwhile.
 
     Parameters
     ----------
@@ -66,7 +63,7 @@ class PoseMonitor:
     Attributes
     ----------
     pose : MeasuredPose
-        Last believed positions.
+        Last accepted positions.
     rejected : int
         Number of rejected joint states.
 
@@ -115,9 +112,7 @@ class PoseMonitor:
         joints = self.pose.joints
         if names not in self._sources:
             own = [(k, joints.index(name)) for k, name in enumerate(names) if name in joints]
-            columns, indices = np.array(own, dtype=int).reshape(-1, 2).T
-            limits = (limit[indices] for limit in (self._lower, self._upper, self._velocity))
-            self._sources[names] = _Source(columns, indices, *limits)
+            self._sources[names] = _Source(*np.array(own, dtype=int).reshape(-1, 2).T)
         source = self._sources[names]
         if not len(source.joints):
             return
@@ -218,7 +213,7 @@ class PoseMonitor:
 
     def _outside(self, source: _Source, q: FloatArray) -> str:
         """Return a message if a position is not finite or is outside the limits."""
-        inside = (q >= source.lower) & (q <= source.upper)
+        inside = (q >= self._lower[source.joints]) & (q <= self._upper[source.joints])
         if inside.all():
             return ''
         k = int(np.argmin(inside))
@@ -244,7 +239,7 @@ class PoseMonitor:
             passed = max(passed, min(between, passed + 0.1))
         step = np.abs(state.q - last.q)
         # encoder noise, added to the change of position that the velocity limit allows [rad or m]
-        beyond = step - 0.02 - source.velocity * max(passed, 0.0)
+        beyond = step - 0.02 - self._velocity[source.joints] * max(passed, 0.0)
         k = int(np.argmax(beyond))
         if not beyond[k] > 0.0:  # NaN if no position was known
             return ''

@@ -242,7 +242,13 @@ class DesignProblem:
             lacking = np.arange(len(whole.parameters)) >= len(rival.parameters)
             wanted, values = lacking[base.independent], base.values(lacking * whole.theta)
         elif settings.focus:
-            wanted = _in_focus(whole, settings.focus)[base.independent]
+            names = [effect.name for effect in whole.effects]
+            for name in set(settings.focus) - set(names):
+                raise TrajectoryError(
+                    f"focus: the arm has no effect '{name}'; it has {', '.join(names) or 'none'}"
+                )
+            focused = marked(whole, lambda effect: effect.name in settings.focus)
+            wanted = focused[base.independent]
         criterion = Criterion(settings.criterion, scale, wanted, values, settings.balance)
         problem = cls(whole, settings, limits, base, read_only(noise), read_only(scale), criterion)
         problem._require_visible(columns.T @ columns)
@@ -339,17 +345,6 @@ def _joined(arm: ArmModel, rival: ArmModel) -> ArmModel:
         if (effect.name, effect.joints) not in known:
             joined = joined.with_effect(effect, values)
     return joined
-
-
-def _in_focus(arm: ArmModel, focus: tuple[str, ...]) -> npt.NDArray[np.bool_]:
-    """Mark the parameters of the effects in focus."""
-    names = [effect.name for effect in arm.effects]
-    unknown = [name for name in focus if name not in names]
-    if unknown:
-        raise TrajectoryError(
-            f"focus: the arm has no effect '{unknown[0]}'; it has {', '.join(names) or 'none'}"
-        )
-    return marked(arm, lambda effect: effect.name in focus)
 
 
 def marked(arm: ArmModel, which: Callable[[Effect], bool]) -> npt.NDArray[np.bool_]:

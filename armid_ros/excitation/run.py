@@ -1,6 +1,6 @@
 # Copyright 2026 The armid_ros developers
 # SPDX-License-Identifier: Apache-2.0
-"""A complete run: the way to the excitation, the excitation, and the way back."""
+"""A complete run: a transfer to the excitation, the excitation, and a transfer back."""
 
 from __future__ import annotations
 
@@ -14,14 +14,18 @@ from armid_ros.excitation.schedule import Excitation
 from armid_ros.excitation.supervision import Path
 from armid_ros.excitation.transfer import Transfer, TransferPlanner
 from armid_ros.motion import FloatArray, Motion
+from armid_ros.robots.reference import Reference
 import numpy as np
 import numpy.typing as npt
+
+#: Largest distance of the curve through the waypoints from the path that was checked [rad or m].
+_OFF_PATH = 0.001
 
 
 @dataclass(frozen=True)
 class Run:
     """
-    The way to an excitation, the excitation, and the way back to the start pose.
+    A transfer to an excitation, the excitation, and a transfer back to the start pose.
 
     Attributes
     ----------
@@ -42,12 +46,12 @@ class Run:
     rate: float
 
     def __post_init__(self) -> None:
-        """Round the ways to whole numbers of samples, and check that they meet the excitation."""
+        """Round the transfers to whole numbers of samples; check that they meet the excitation."""
         ends = self.excitation.at([0.0, self.excitation.duration]).q
         for way, own, end in ((self.approach, -1, 0), (self.back, 0, 1)):
             # [rad or m]; rounding
             if way is not None and np.abs(way.q[own] - ends[end]).max() > 1e-9:
-                raise TrajectoryError('run: the way and the excitation do not meet')
+                raise TrajectoryError('run: a transfer and the excitation do not meet')
         for name in ('approach', 'back'):
             way = getattr(self, name)
             if way is not None:
@@ -96,6 +100,26 @@ class Run:
         t = np.arange(round(self.duration * self.rate) + 1) / self.rate
         return replace(self.at(t), t=t)
 
+    def require_waypoints(self) -> None:
+        """
+        Raise a TrajectoryError if a controller leaves the path between the samples of `motion`.
+
+        A controller interpolates between its waypoints with quintic polynomials. Only the path
+        itself is checked for limits and collisions. A polynomial through samples of a sine exceeds
+        its velocity and acceleration by less than 0.2 %, so only positions are compared.
+
+        """
+        motion = self.motion()
+        # the distance is largest in the middle, except that a harmonic of the rate is zero there
+        between = motion.t[:-1] + 0.4 / self.rate
+        away = np.abs(Reference.of(motion).sample(between).q - self.at(between).q).max(axis=0)
+        j = int(np.argmax(away))
+        if away[j] > _OFF_PATH:
+            raise TrajectoryError(
+                f"joint '{self.joints[j]}' would be {away[j]:.2g} rad or m off its path between "
+                f'{self.rate:g} waypoints per second: send more (rate), or take fewer harmonics'
+            )
+
 
 def plan_run(
     excitation: Excitation,
@@ -115,37 +139,40 @@ def plan_run(
     excitation : Excitation
         The excitation; its joints may be shifted by whole turns.
     planner : TransferPlanner
-        Planner of the ways.
+        Planner of the transfers.
     start : ndarray, shape (n,)
         Present pose of the arm [rad or m].
     rate : float
         Samples per second [Hz].
     shortest : float
-        Shortest duration of a way [s].
+        Shortest duration of a transfer [s].
     back : bool
         Whether the arm returns to its start pose.
     seed : int
-        Seed of the search for a way.
+        Seed of the search for a path.
 
     Raises
     ------
     TrajectoryError
-        If no way was found; the message names the obstruction.
+        If no path was found, or the waypoints are too few for the path; the message names the
+        obstruction or the joint.
 
     """
     excitation = _unwound(excitation, planner.arm, planner.limits, start)
     first, last = excitation.at([0.0, excitation.duration]).q
     there = planner(start, first, shortest, seed)
     home = planner(start, last, shortest, seed).reversed() if back else None
-    return Run(there, excitation, home, rate)
+    run = Run(there, excitation, home, rate)
+    run.require_waypoints()
+    return run
 
 
 def _unwound(
     excitation: Excitation, arm: ArmModel, limits: Limits, start: FloatArray
 ) -> Excitation:
     """Return the excitation shifted by whole turns, as close to a start pose as limits allow."""
-    # a joint with a range of two turns reaches most poses at two positions; above a floor, the way
-    # to one of them is often blocked, as the shoulder would have to swing through the floor
+    # A joint with a range of two turns reaches most poses at two positions. Above a floor, a path
+    # to one of them is often blocked, as the shoulder would have to swing through the floor.
     trajectory = excitation.trajectory
     samples = 400
     q = trajectory.one_period(samples).q

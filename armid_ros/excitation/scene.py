@@ -17,12 +17,7 @@ from armid_ros.excitation.geometry.floor import (
     lowest_point,
     LowestPoint,
 )
-from armid_ros.excitation.limits import (
-    has_velocity_limit,
-    Limits,
-    require_radians,
-    SLOW_VELOCITY,
-)
+from armid_ros.excitation.limits import has_velocity_limit, require_radians, SLOW_VELOCITY
 from armid_ros.motion import Motion
 from armid_ros.robots import collision_model, CollisionModel, Robot
 import numpy as np
@@ -98,10 +93,6 @@ class CollisionScene:
     @property
     def unchecked(self) -> tuple[str, ...]:
         """Return the items that cannot be checked for any motion."""
-        return self.not_checked(Limits.of(self.collision.robot, speed=1.0))
-
-    def not_checked(self, limits: Limits) -> tuple[str, ...]:
-        """Return the items that cannot be checked for a run within limits."""
         robot = self.collision.robot
         found: list[str] = []
         if self.floor.height is None and not any(o.kind == 'plane' for o in self.obstacles):
@@ -111,15 +102,14 @@ class CollisionScene:
                 found.append('the floor (the environment has no plane)')
         found += self._bodies_not_checked()
         by_name = robot.description.by_name
-        endless = np.array([by_name[joint].kind == 'continuous' for joint in limits.joints])
+        endless = np.array([by_name[joint].kind == 'continuous' for joint in robot.joints])
         slow = f'no limit is given; {SLOW_VELOCITY:g} rad/s or m/s is taken'
         for name, reason, where in (
-            ('position', 'no limit', np.isinf(limits.upper - limits.lower) & ~endless),
-            ('velocity', 'no limit', np.isinf(limits.velocity)),
-            ('torque', 'no limit', np.isinf(limits.torque)),
+            ('position', 'no limit', np.isinf(robot.upper - robot.lower) & ~endless),
+            ('torque', 'no limit', np.isinf(robot.torque_limit)),
             ('velocity', slow, ~has_velocity_limit(robot)),
         ):
-            joints = [joint for joint, one in zip(limits.joints, where, strict=True) if one]
+            joints = [joint for joint, one in zip(robot.joints, where, strict=True) if one]
             if joints:
                 found.append(f'the {name} of {_listed(joints)} ({reason})')
         mass = robot.rigid_parameters.reshape(robot.n_joints, -1)[:, 0]
@@ -238,19 +228,17 @@ class Fitness:
                 f'({self.nearest.first} and {self.nearest.second})'
             )
         if self.lowest.link:
-            parts.append(self.height())
+            height, what = self.lowest.height, 'base'
+            if self.floor.height is not None:
+                height, what = height - self.floor.height, 'floor'
+            side = 'above' if height >= 0.0 else 'below'
+            parts.append(
+                f'lowest point {abs(height):.3f} m {side} the {what} ({self.lowest.link})'
+            )
         return parts
 
-    def height(self) -> str:
-        """Return a phrase on the lowest point of the motion."""
-        height, what = self.lowest.height, 'base'
-        if self.floor.height is not None:
-            height, what = height - self.floor.height, 'floor'
-        side = 'above' if height >= 0.0 else 'below'
-        return f'lowest point {abs(height):.3f} m {side} the {what} ({self.lowest.link})'
 
-
-def fitness(motion: Motion, limits: Limits, scene: CollisionScene) -> Fitness:
+def fitness(motion: Motion, scene: CollisionScene) -> Fitness:
     """
     Return the results for a run that keeps its limits and its clearance.
 
@@ -258,8 +246,6 @@ def fitness(motion: Motion, limits: Limits, scene: CollisionScene) -> Fitness:
     ----------
     motion : Motion
         The whole run.
-    limits : Limits
-        Limits in force.
     scene : CollisionScene
         Bodies, floor and obstacles of the clearance check.
 
@@ -269,5 +255,5 @@ def fitness(motion: Motion, limits: Limits, scene: CollisionScene) -> Fitness:
         lowest_point(scene.collision, scene.floor.up, motion, exempt),
         scene.floor,
         ClearanceModel.of(scene.bodies).closest(motion),
-        scene.not_checked(limits),
+        scene.unchecked,
     )

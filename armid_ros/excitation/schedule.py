@@ -91,8 +91,9 @@ class Excitation:
         phase = time - self.run_in
         # 1 - before is the share of the run-in done, x; the phase rate is _step(x), and the phase
         # that is still to come before the first period is run_in * integral of _step from x to 1.
-        lead = self.run_in * (_STEP_AREA - _step_integral(1.0 - before))
-        lag = self.run_in * (_STEP_AREA - _step_integral(1.0 - after))
+        # The integral of _step from 0 to 1 is a half.
+        lead = self.run_in * (0.5 - _step_integral(1.0 - before))
+        lag = self.run_in * (0.5 - _step_integral(1.0 - after))
         end = self.n_periods * self.trajectory.period
         phase = np.where(before > 0.0, -lead, np.where(after > 0.0, end + lag, phase))
         speed = _step(1.0 - before) * _step(1.0 - after)
@@ -177,13 +178,6 @@ class Excitation:
         samples = 2 * self._run_in_samples(rate) + self.n_periods * self._period_samples(rate)
         return samples / rate
 
-    def period_slices(self, rate: float) -> tuple[slice, ...]:
-        """Return the slice of the samples of ``motion(rate)`` for each period."""
-        lead, length = self._run_in_samples(rate), self._period_samples(rate)
-        return tuple(
-            slice(lead + k * length, lead + (k + 1) * length) for k in range(self.n_periods)
-        )
-
     def _run_in_samples(self, rate: float) -> int:
         return int(np.ceil(self.run_in * rate - _WHOLE_SAMPLES))
 
@@ -196,10 +190,6 @@ class Excitation:
                 f'it has to be a whole number: take {whole / self.trajectory.period:.9g} Hz'
             )
         return whole
-
-
-#: Integral of _step from 0 to 1.
-_STEP_AREA = 0.5
 
 
 def _step(x: FloatArray) -> FloatArray:

@@ -109,7 +109,7 @@ def tracking_fault(
     if abs(error[worst]) <= tolerance:
         return ''
     return (
-        f"joint '{joints[worst]}' is {error[worst]:.3g} {units[worst]} from where it should be, "
+        f"joint '{joints[worst]}' is {error[worst]:.3g} {units[worst]} from its planned position, "
         f'more than {tolerance:g} {units[worst]}'
     )
 
@@ -234,7 +234,7 @@ class Rehearsal:
         self.torque = np.fmax(self.torque, np.abs(tau))
         self._count, self._until = self._count + 1, max(self._until, phase)
 
-    def foreseen(self) -> FloatArray:
+    def predicted(self) -> FloatArray:
         """Return the largest predicted torque so far, shape (n,)."""
         wanted = self._path.at(np.linspace(0.0, self._until, 4000))
         return np.asarray(np.abs(self._arm.joint_torque(wanted)).max(axis=0))
@@ -242,24 +242,26 @@ class Rehearsal:
     def report(self) -> tuple[str, tuple[str, ...]]:
         """Return a summary so far, and a sentence on each joint with an unexpected torque."""
         if not self._count:
-            said = 'no joint state was received during the rehearsal'
-            return said, (said,)
-        robot, foreseen = self._arm.robot, self.foreseen()
+            fault = 'no joint state was received during the rehearsal'
+            return fault, (fault,)
+        robot, predicted = self._arm.robot, self.predicted()
         surprises: list[str] = []
         for j, joint in enumerate(robot.joints):
             limit = robot.torque_limit[j]
-            room = max(foreseen[j], 0.05 * limit if np.isfinite(limit) else 0.0)
+            room = max(predicted[j], 0.05 * limit if np.isfinite(limit) else 0.0)
             # largest accepted ratio of a measured torque to the largest predicted torque. The
             # ratio is large because a description has no friction, and friction dominates the
             # torque of a slow arm.
             if self.torque[j] > 3.0 * room > 0.0:
-                took = f'{joint} took {self.torque[j]:.3g}'
-                surprises.append(f'{took}, and {foreseen[j]:.3g} N m were foreseen')
+                surprises.append(
+                    f'the torque of {joint} was {self.torque[j]:.3g} {robot.torque_units[j]}, '
+                    f'{predicted[j]:.3g} predicted'
+                )
         worst = int(np.argmax(self.tracking))
-        text = f'followed within {self.tracking[worst]:.3g} ({robot.joints[worst]})'
+        text = f'tracking error at most {self.tracking[worst]:.3g} ({robot.joints[worst]})'
         if np.isfinite(self.torque).any():
             limits = np.where(robot.torque_limit > 0.0, robot.torque_limit, np.inf)
             most = int(np.nanargmax(self.torque / limits))
-            text += f'; most torque {self.torque[most]:.3g} N m ({robot.joints[most]}), '
-            text += f'{foreseen[most]:.3g} foreseen'
+            text += f'; largest torque {self.torque[most]:.3g} {robot.torque_units[most]} '
+            text += f'({robot.joints[most]}), {predicted[most]:.3g} predicted'
         return '; '.join((text, *surprises)), tuple(surprises)

@@ -4,7 +4,6 @@
 
 from __future__ import annotations
 
-from collections import Counter
 from dataclasses import dataclass, replace
 
 from armid_ros.arm import ArmModel
@@ -12,6 +11,7 @@ from armid_ros.errors import TrajectoryError
 from armid_ros.excitation.geometry.clearance import ClearanceModel
 from armid_ros.excitation.geometry.paths import clear_line, find_path
 from armid_ros.excitation.limits import check_limits, Limits, SLOW_VELOCITY, SPEED_CLASSES
+from armid_ros.excitation.scene import CollisionScene
 from armid_ros.motion import FloatArray, Motion
 from armid_ros.robots import Robot
 from armid_ros.robots.reference import Reference
@@ -30,22 +30,22 @@ class Transfer(Reference):
         super().__post_init__()
 
     def at(self, t: npt.ArrayLike) -> Motion:
-        """Evaluate the way at times of shape (N,) [s]; at rest before its start and after it."""
+        """Evaluate the transfer at times (N,) [s]; at rest before its start and after its end."""
         return self.sample(np.clip(np.asarray(t, dtype=float), 0.0, self.duration))
 
     def lasting(self, duration: float) -> Transfer:
-        """Return the same way with another duration [s]."""
+        """Return the same path with another duration [s]."""
         return replace(self, t=self.t * (duration / self.duration))
 
     def reversed(self) -> Transfer:
-        """Return the way back."""
+        """Return the reversed transfer."""
         return replace(self, t=self.duration - self.t[::-1], q=self.q[::-1])
 
 
 @dataclass(frozen=True)
 class TransferPlanner:
     """
-    Planner of ways between poses, within limits and clearance.
+    Planner of transfers between poses, within limits and clearance.
 
     Attributes
     ----------
@@ -62,11 +62,17 @@ class TransferPlanner:
     limits: Limits
     clearance: ClearanceModel | None
 
+    @classmethod
+    def of(cls, arm: ArmModel, scene: CollisionScene, speed: str | float) -> TransferPlanner:
+        """Return the planner for an arm and its surroundings, with a speed as in `Limits.of`."""
+        clearance = ClearanceModel.of(scene.bodies, scene.clearance)
+        return cls(arm, transfer_limits(arm.robot, speed), clearance)
+
     def __call__(
         self, start: FloatArray, goal: FloatArray, shortest: float = 0.0, seed: int = 0
     ) -> Transfer:
         """
-        Plan a way.
+        Plan a transfer.
 
         Parameters
         ----------
@@ -75,12 +81,12 @@ class TransferPlanner:
         shortest : float
             Shortest duration [s].
         seed : int
-            Seed of the search for a way around obstacles.
+            Seed of the search for a path around obstacles.
 
         Raises
         ------
         TrajectoryError
-            If the start or the goal is not allowed, or no way was found. The message names the
+            If the start or the goal is not allowed, or no path was found. The message names the
             limit or the bodies.
 
         """
@@ -108,18 +114,18 @@ class TransferPlanner:
             (1.875 * way / velocity).max(axis=1),
             np.sqrt((10.0 / np.sqrt(3.0)) * way / limits.acceleration).max(axis=1),
         )
-        # a way on which no joint moves takes a time as well
+        # a transfer without motion has a positive duration as well
         t = np.append(0.0, np.cumsum(np.maximum(needed, 1e-6)))
         transfer = Transfer(limits.joints, t, poses)
         transfer = transfer.lasting(max(transfer.duration, shortest))
         for _ in range(20):  # durations, each longer than the last
-            # samples of a way at which its torque is checked
+            # the torque is checked at 200 samples
             motion = transfer.at(np.linspace(0.0, transfer.duration, 200))
             violations = check_limits(limits, motion, self.arm.joint_torque(motion))
             if not violations:
                 return transfer
             transfer = transfer.lasting(1.3 * transfer.duration)
-        raise TrajectoryError(f'no way to the trajectory keeps the limits: {violations[0]}')
+        raise TrajectoryError(f'no transfer to the trajectory keeps the limits: {violations[0]}')
 
     def fault(self, q: FloatArray) -> str:
         """Return why an arm may not stand in a pose, shape (n,); empty if it may."""
@@ -160,21 +166,8 @@ class TransferPlanner:
                     return self._simplified(q, zero)
         raise TrajectoryError(
             f'the zero of {self.arm.robot.name} is not free, nor is a pose about it: {reason}; '
-            f'give a pose to start from, --start{self._always_near(about)}'
+            'give a pose to start from, --start'
         )
-
-    def _always_near(self, poses: FloatArray) -> str:
-        """Return a phrase on the bodies that are most often too close, and a clearance."""
-        near = [clear_line(self.clearance, q, q) for q in poses]
-        pairs = Counter((one.first, one.second) for one in near if one is not None)
-        if not pairs:
-            return ''
-        (first, second), count = pairs.most_common(1)[0]
-        best = max(
-            one.distance for one in near if one and (one.first, one.second) == (first, second)
-        )
-        then = f', at most {best:.4f} m: --clearance {0.8 * best:.1g}' if best > 0.0 else ''
-        return f'; {first} and {second} are too close in {count} of {len(near)} poses{then}'
 
     def _simplified(self, q: FloatArray, zero: FloatArray) -> FloatArray:
         """Set joints to zero if the pose stays free, and round the other joints."""
@@ -204,7 +197,7 @@ class TransferPlanner:
 
 def transfer_limits(robot: Robot, speed: str | float = 'slow') -> Limits:
     """
-    Return the limits of a way, which is slow because it identifies no parameters.
+    Return the limits of a transfer, which is slow because it identifies no parameters.
 
     Parameters
     ----------
@@ -212,7 +205,7 @@ def transfer_limits(robot: Robot, speed: str | float = 'slow') -> Limits:
         Robot with the limits; the whole range of motion is used, because the arm may stand at its
         end.
     speed : str or float
-        Speed of the run; a way is never faster.
+        Speed of the run; a transfer is never faster.
 
     """
     run = Limits.of(robot, speed=speed, reserve=False)

@@ -8,8 +8,7 @@ from collections.abc import Callable, Iterable
 import math
 from typing import Any
 
-from armid_ros.excitation import PoseMonitor
-from armid_ros.excitation.pose_monitor import AGREEING
+from armid_ros.excitation.pose_monitor import AGREEING, PoseMonitor
 from armid_ros.motion import FloatArray
 from armid_ros.nodes.base import ArmidNode
 from armid_ros.nodes.messages.timeliness import StampDifference

@@ -11,7 +11,7 @@ import time
 from typing import Any
 
 from armid_ros.errors import ArmidError, RecordingError
-from armid_ros.excitation import jump_fault, MeasuredPose
+from armid_ros.excitation.supervision import jump_fault, MeasuredPose
 from armid_ros.nodes.base import ArmidNode
 from armid_ros.nodes.messages.classes import message_class
 from armid_ros.nodes.parameters.table import NodeParameter

@@ -12,17 +12,10 @@ import time
 from typing import Any
 
 from armid_ros.errors import ArmidError, TrajectoryError
-from armid_ros.excitation import (
-    Ending,
-    Excitation,
-    MotionGate,
-    plan_run,
-    Rehearsal,
-    tracking_fault,
-    TransferPlanner,
-)
+from armid_ros.excitation import Excitation, plan_run, TransferPlanner
+from armid_ros.excitation.gate import Ending, MotionGate
 from armid_ros.excitation.schedule import load_excitation, read_excitation
-from armid_ros.excitation.supervision import HANDOVER
+from armid_ros.excitation.supervision import HANDOVER, Rehearsal, tracking_fault
 from armid_ros.files import reading
 from armid_ros.nodes.arm_watch import ArmWatch
 from armid_ros.nodes.base import ArmidNode
@@ -388,7 +381,7 @@ class ExcitationPublisherNode(ArmidNode):
     def _watch_ending(self, ending: Ending) -> None:
         """Check that the arm comes to rest; hold a blocked arm at its position."""
         limits = map(self.value, ('state_timeout', 'tracking_tolerance', 'stopping'))
-        self._ending, motion, report = ending.looked(self._arm.monitor, self._arm.now(), *limits)
+        self._ending, motion, report = ending.updated(self._arm.monitor, self._arm.now(), *limits)
         if motion is not None:
             self._controller.insist(write_trajectory(motion, float(motion.t[0])))
         if report:

@@ -261,7 +261,7 @@ class OnlineIdentifierNode(ListeningNode):
         differ = '' if self.complaints.fresh else self.stamps.of_results(self.joint_states.topic)
         if not identifier.samples:
             return differ
-        learned = self._progress.look(self._last_sample, identifier.estimate())
+        learned = self._progress.unidentified(self._last_sample, identifier.estimate())
         return '; '.join(filter(None, (too_little_motion(learned), differ)))
 
     def take_description(self, urdf: str) -> None:

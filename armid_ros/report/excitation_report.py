@@ -17,12 +17,12 @@ from armid_ros.excitation import (
     Fitness,
     Limits,
     Obstacle,
-    obstacles_alone,
     Run,
     SPEED_CLASSES,
     TARGETS,
     with_obstacles,
 )
+from armid_ros.excitation.geometry.environment import obstacles_alone
 from armid_ros.excitation.scene import FIT, UNFIT
 from armid_ros.motion import FloatArray, Motion
 from armid_ros.report.arm_drawing import draw_poses, OBSTACLE

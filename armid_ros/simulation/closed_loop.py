@@ -13,15 +13,14 @@ from __future__ import annotations
 
 from collections.abc import Callable
 import ctypes
-from dataclasses import dataclass
 from functools import cache
 from importlib.util import find_spec
 from typing import Any, NamedTuple
 
-from armid_ros.motion import FloatArray, read_only
+from armid_ros.motion import FloatArray, Motion
 from armid_ros.robots import Robot
 from armid_ros.simulation.contacts import SPEED_TOLERANCE
-from armid_ros.simulation.controller import Controller, LinearFeedback, Target, Targets
+from armid_ros.simulation.controller import Controller, LinearFeedback
 from armid_ros.simulation.integrator import step
 from armid_ros.simulation.plant import Plant, State
 import numpy as np
@@ -44,7 +43,17 @@ _TORQUE_LAW = ctypes.CFUNCTYPE(ctypes.c_int)
 _ADDRESS, _REAL, _COUNT = ctypes.c_void_p, ctypes.c_double, ctypes.c_int64
 
 
-class _Arm(ctypes.Structure):
+class _Structure(ctypes.Structure):
+    """A structure of the kernel, which keeps the arrays to which it points."""
+
+    arrays: tuple[npt.NDArray[Any], ...]
+
+    @property
+    def address(self) -> int:
+        return ctypes.addressof(self)
+
+
+class _Arm(_Structure):
     _fields_ = (
         ('n', _COUNT),
         ('gravity', _REAL * 3),
@@ -53,7 +62,7 @@ class _Arm(ctypes.Structure):
     )
 
 
-class _Controller(ctypes.Structure):
+class _Controller(_Structure):
     _fields_ = (
         ('arm', _Arm),
         ('bandwidth', _REAL),
@@ -63,7 +72,7 @@ class _Controller(ctypes.Structure):
     )
 
 
-class _Plant(ctypes.Structure):
+class _Plant(_Structure):
     _fields_ = (
         ('arm', _Arm),
         ('dt', _REAL),
@@ -97,23 +106,7 @@ def kernel() -> ctypes.CDLL | None:
     return library
 
 
-def _array(values: npt.ArrayLike, kind: npt.DTypeLike = float) -> npt.NDArray[Any]:
-    return np.ascontiguousarray(values, dtype=kind)
-
-
-@dataclass(frozen=True, eq=False)
-class _Structure:
-    """A C structure of the kernel, and the arrays to which it points."""
-
-    values: Any
-    arrays: tuple[npt.NDArray[Any], ...]
-
-    @property
-    def address(self) -> int:
-        return ctypes.addressof(self.values)
-
-
-def rigid_body(robot: Robot, added_inertia: FloatArray, weighs: bool = True) -> _Structure:
+def rigid_body(robot: Robot, added_inertia: FloatArray, weighs: bool = True) -> _Arm:
     """
     Return a rigid-body model in the format of the kernel.
 
@@ -127,17 +120,19 @@ def rigid_body(robot: Robot, added_inertia: FloatArray, weighs: bool = True) -> 
         Whether gravity acts on the robot.
 
     """
-    joints = np.zeros(robot.n_joints, _JOINT)
-    for row, geometry, body in zip(joints, robot.geometry, robot.model.inertias[1:], strict=True):
-        for name in ('parent', 'slide', 'turn', 'origin', 'sliding'):
-            row[name] = getattr(geometry, name)
-        row['turning'] = geometry.turning.reshape(9, 3)
-        row['mass'], row['first_moment'] = body.mass, body.mass * body.lever
-        row['inertia'] = body.matrix()[3:, 3:].ravel()
-    added = _array(added_inertia)
+    rows = [
+        (
+            *(joint.parent, joint.slide, joint.turn, joint.origin, joint.sliding),
+            joint.turning.reshape(9, 3),
+            *(body.mass, body.mass * body.lever, body.matrix()[3:, 3:].ravel()),
+        )
+        for joint, body in zip(robot.geometry, robot.model.inertias[1:], strict=True)
+    ]
+    joints, added = np.array(rows, _JOINT), np.ascontiguousarray(added_inertia)
     gravity = (_REAL * 3)(*(weighs * robot.gravity))
-    values = _Arm(len(joints), gravity, joints.ctypes.data, added.ctypes.data)
-    return _Structure(values, (joints, added))
+    arm = _Arm(len(joints), gravity, joints.ctypes.data, added.ctypes.data)
+    arm.arrays = joints, added
+    return arm
 
 
 class CompiledLoop:
@@ -154,47 +149,43 @@ class CompiledLoop:
     """
 
     def __init__(self, plant: Plant, feedback: LinearFeedback) -> None:
-        n, dry = plant.robot.n_joints, plant.contacts
-        added = np.diag(plant.model.armature)
-        added = added if plant.coupling is None else added + plant.coupling
-        body = rigid_body(plant.robot, added)
+        robot, dry, n = plant.robot, plant.contacts, plant.robot.n_joints
+        body = rigid_body(robot, plant.added_inertia)
+        nominal = rigid_body(feedback.robot, feedback.added_inertia, feedback.weighs)
         far = np.full(n, np.inf)
-        lower, upper = (plant.robot.lower, plant.robot.upper) if plant.hard_stops else (-far, far)
+        lower, upper = (robot.lower, robot.upper) if plant.hard_stops else (-far, far)
         self._law_input, self._law_torque = np.empty(1 + 2 * n), np.empty(n)
         self._torque, self.failure = plant.torque, list[BaseException]()
-        arrays = (
-            _array(plant.damping),
-            np.zeros(n) if plant.constant is None else _array(plant.constant),
-            *map(_array, (lower, upper, *plant.torque_range)),
-            _array(dry.axes, np.int64),
-            *map(_array, (dry.law.lower, dry.law.upper)),
-        )
+        arrays: list[npt.NDArray[Any]] = [
+            plant.damping,
+            np.zeros(n) if plant.constant is None else plant.constant,
+            *(lower, upper, -robot.torque_limit, robot.torque_limit),
+            np.array(dry.axes, dtype=np.int64),
+            *(dry.lower, dry.upper),
+        ]
+        arrays = [np.ascontiguousarray(array) for array in arrays]
         addresses = [array.ctypes.data for array in arrays]
-        self._plant = _Structure(
-            _Plant(
-                body.values,
-                plant.dt,
-                SPEED_TOLERANCE,
-                *addresses[:6],
-                len(dry.axes),
-                *addresses[6:],
-                self._law_input.ctypes.data,
-                self._law_torque.ctypes.data,
-                _TORQUE_LAW() if plant.torque is None else _TORQUE_LAW(self._smooth_effects),
-            ),
-            (*body.arrays, *arrays),
+        self._plant = _Plant(
+            body,
+            plant.dt,
+            SPEED_TOLERANCE,
+            *addresses[:6],
+            len(dry.axes),
+            *addresses[6:],
+            self._law_input.ctypes.data,
+            self._law_torque.ctypes.data,
+            _TORQUE_LAW() if plant.torque is None else _TORQUE_LAW(self._smooth_effects),
         )
-        nominal = rigid_body(feedback.robot, feedback.added_inertia, feedback.weighs)
         gains = [np.array(np.broadcast_to(x, n)) for x in (feedback.stiffness, feedback.damping)]
-        self._controller = _Structure(
-            _Controller(
-                nominal.values,
-                feedback.bandwidth,
-                feedback.follows,
-                *(gain.ctypes.data for gain in gains),
-            ),
-            (*nominal.arrays, *gains),
+        self._controller = _Controller(
+            nominal,
+            feedback.bandwidth,
+            feedback.follows,
+            *(gain.ctypes.data for gain in gains),
         )
+        # a structure holds a copy of its rigid body
+        self._plant.arrays = *body.arrays, *arrays
+        self._controller.arrays = *nominal.arrays, *gains
         self.addresses = self._plant.address, self._controller.address
 
     @classmethod
@@ -202,8 +193,7 @@ class CompiledLoop:
         """Return the loop; None if the kernel does not support the plant or is not compiled."""
         action, dry = plant.action, plant.contacts
         usual = plant.springs is None and action.drive is None and action.hysteresis is None
-        of_joints = dry.friction is None and -1 not in dry.axes
-        of_joints = of_joints and len(set(dry.axes)) == len(dry.axes)
+        of_joints = dry.friction is None and dry.of_single_joints
         feedback, library = controller.feedback, kernel()
         if not (usual and of_joints) or feedback is None or library is None:
             return None
@@ -211,15 +201,17 @@ class CompiledLoop:
         return cls(plant, feedback) if plant.robot.n_joints <= most else None
 
     def over(
-        self, targets: Targets, moved: FloatArray, tau: FloatArray
+        self, targets: Motion, rows: range, moved: FloatArray, tau: FloatArray
     ) -> Callable[[State, int], int]:
         """
         Return a function that computes steps until a mode changes or a stop is reached.
 
         Parameters
         ----------
-        targets : Targets
-            The targets at the end of each of N steps.
+        targets : Motion
+            Desired motion and feedforward torque.
+        rows : range
+            Rows of the targets at the end of each of N steps.
         moved : ndarray, shape (3, N + 1, n)
             Position, velocity and acceleration at the steps; written by the function.
         tau : ndarray, shape (N + 1, n)
@@ -231,13 +223,13 @@ class CompiledLoop:
             From a state and its row to the next row.
 
         """
-        library, last = kernel(), len(targets)
-        assert library is not None
-        asked = map(_array, (targets.q, targets.dq, targets.ddq, targets.feedforward))
-        rows = (*moved, tau, *asked)
-        addresses = [row.ctypes.data for row in rows]
+        library, last = kernel(), len(rows)
+        assert library is not None and targets.tau is not None
+        asked = (targets.q, targets.dq, targets.ddq, targets.tau)
+        arrays = (*moved, tau, *(values[rows.start : rows.stop] for values in asked))
+        addresses = [array.ctypes.data for array in arrays]
 
-        def advance(state: State, row: int, rows: object = rows) -> int:  # keeps the rows alive
+        def advance(state: State, row: int, arrays: object = arrays) -> int:  # keeps them alive
             modes = np.array(state.modes, dtype=np.int64)
             reached: int = library.advance(
                 *self.addresses, modes.ctypes.data, state.t, row, last, *addresses
@@ -284,11 +276,16 @@ class Trace(NamedTuple):
     state: State
 
 
-def command(plant: Plant, controller: Controller, state: State, target: Target) -> FloatArray:
-    """Return the torque for a target, within the limits of the drives, shape (n,) [N m]."""
+def command(
+    plant: Plant, controller: Controller, state: State, targets: Motion, row: int
+) -> FloatArray:
+    """Return the torque for a row of targets, within the limits of the drives, (n,) [N m]."""
+    assert targets.tau is not None
+    desired = targets.q[row], targets.dq[row], targets.ddq[row]
     q, dq = (state.q, state.dq) if state.rotors is None else plant.motors(state)[:2]
-    lowest, highest = plant.torque_range
-    return np.minimum(np.maximum(controller.torque(q, dq, *target), lowest), highest)
+    limit = plant.robot.torque_limit
+    torque = controller.torque(q, dq, desired, targets.tau[row])
+    return np.minimum(np.maximum(torque, -limit), limit)
 
 
 def run(
@@ -296,7 +293,8 @@ def run(
     controller: Controller,
     state: State,
     torque: FloatArray,
-    targets: Targets,
+    targets: Motion,
+    rows: range,
     compiled: CompiledLoop | None = None,
 ) -> Trace:
     """
@@ -312,18 +310,20 @@ def run(
         The initial state.
     torque : ndarray, shape (n,)
         Torque of the first step, from `command`.
-    targets : Targets
-        The targets at the end of each step.
+    targets : Motion
+        Desired motion and feedforward torque, from the controller.
+    rows : range
+        Rows of the targets at the end of each step.
     compiled : CompiledLoop, optional
         The same plant and controller in compiled form, used for the steps that it supports.
 
     """
-    drive, last = plant.action.drive, len(targets)
+    drive, last = plant.action.drive, len(rows)
     tau = np.empty((last + 1, len(torque)))
     links = np.empty((3, *tau.shape))
     motors = links if plant.springs is None else np.empty_like(links)
     q, dq, ddq = links
-    fast = None if compiled is None else compiled.over(targets, links, tau)
+    fast = None if compiled is None else compiled.over(targets, rows, links, tau)
     k = 0
     while k < last:
         q[k], dq[k], ddq[k], tau[k] = state.q, state.dq, state.ddq, torque
@@ -332,13 +332,13 @@ def run(
         reached = k if fast is None else fast(state, k)
         if reached > k:
             steps = state.steps + reached - k
-            at, speed, pull = map(read_only, links[:, reached])
+            at, speed, pull = links[:, reached].copy()
             modes, memory = state.modes, state.memory
             state = State(steps, steps * plant.dt, at, speed, pull, modes, memory)
             k, torque = reached, tau[reached]
             continue
         state = step(plant, state, torque if drive is None else drive(torque))
-        torque = command(plant, controller, state, targets.at(k))
+        torque = command(plant, controller, state, targets, rows[k])
         k += 1
     q[last], dq[last], ddq[last], tau[last] = state.q, state.dq, state.ddq, torque
     if motors is not links:

@@ -1,11 +1,11 @@
 # Copyright 2026 The armid_ros developers
 # SPDX-License-Identifier: Apache-2.0
 """
-Elements that can hold a joint at rest, dry friction and joint stops, and their exact solution.
+Dry friction and joint stops as complementarity conditions, and their exact solution.
 
-Over one step, the velocities of m elements are w = w_free - G f, with G symmetric and positive
-semidefinite (the Delassus matrix times the step) and f the friction torques of the elements. Every
-element obeys its law:
+An element is a source of dry friction, or a joint stop. It can hold a joint at rest. Over one
+step, the velocities of m elements are w = w_free - G f. G is symmetric and positive semidefinite:
+the Delassus matrix times the step. The torques f of the elements obey
 
     w_i > 0 and f_i = upper_i,   or   w_i < 0 and f_i = lower_i,   or   w_i = 0 and f_i between.
 
@@ -15,7 +15,7 @@ Source: block principal pivoting with Murty's rule as its safeguard, Judice and 
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, replace
 
 from armid_ros.effects import DryFriction, NO_FRICTION
 from armid_ros.errors import ModelError
@@ -36,100 +36,30 @@ TORQUE_TOLERANCE = 1e-12
 SPEED_TOLERANCE = 1e-13
 
 
-@dataclass(frozen=True, eq=False)
-class BoxLaw:
-    """
-    The bounds of m friction elements.
-
-    Attributes
-    ----------
-    lower, upper : ndarray, shape (m,)
-        Torque while the element moves backwards, and forwards; lower < upper, infinite for an
-        element that never slips.
-    shift : float
-        Share of its diagonal that is added to G; 0 if G is regular.
-
-    """
-
-    lower: FloatArray
-    upper: FloatArray
-    shift: float = REGULARISATION
-    _limits: list[tuple[float, float]] = field(init=False, repr=False)
-    _patterns: dict[Modes, _Pattern] = field(init=False, repr=False, default_factory=dict)
-
-    def __post_init__(self) -> None:
-        """Add the tolerance to the bounds."""
-        lower = self.lower - TORQUE_TOLERANCE * np.abs(self.lower)
-        upper = self.upper + TORQUE_TOLERANCE * np.abs(self.upper)
-        object.__setattr__(self, '_limits', list(zip(lower.tolist(), upper.tolist(), strict=True)))
-
-    def torques(self, g: FloatArray, w_free: FloatArray, modes: Modes) -> FloatArray:
-        """
-        Return the torques: the bounds of slipping elements, the solution of w = 0 for stuck ones.
-
-        The same patterns of modes recur in many steps; the constants of each pattern are cached.
-
-        """
-        pattern = self._patterns.get(modes)
-        if pattern is None:
-            array = np.array(modes)
-            stuck = array == 0
-            pattern = self._patterns[modes] = _Pattern(
-                np.where(stuck, 0.0, np.where(array > 0, self.upper, self.lower)),
-                stuck * 1.0 if stuck.any() else None,
-                stuck[:, np.newaxis] * (1.0 + self.shift * np.eye(len(modes))),
-                np.diag(1.0 - stuck),
-            )
-        if pattern.stuck is None:
-            return pattern.bound
-        system = g * pattern.rows
-        system += pattern.ones
-        right = w_free * pattern.stuck
-        right += pattern.bound
-        return np.asarray(dgesv(system, right, 1, 1)[2])
-
-    def violations(self, w: FloatArray, f: FloatArray, modes: Modes) -> list[tuple[int, int]]:
-        """Return the elements that break their law, each with the mode to try next."""
-        broken = []
-        for element, (speed, torque, (lower, upper), mode) in enumerate(
-            zip(w.tolist(), f.tolist(), self._limits, modes, strict=True)
-        ):
-            if mode:
-                if speed * mode < -SPEED_TOLERANCE:
-                    broken.append((element, 0))
-            elif torque > upper:
-                broken.append((element, 1))
-            elif torque < lower:
-                broken.append((element, -1))
-        return broken
-
-
-@dataclass(frozen=True, eq=False)
-class _Pattern:
-    """Constants of one pattern of modes: masks (m,), (m, m), and bounds of slipping elements."""
-
-    bound: FloatArray
-    stuck: FloatArray | None
-    rows: FloatArray
-    ones: FloatArray
-
-
 def solve_box_complementarity(
-    law: BoxLaw, g: FloatArray, w_free: FloatArray, modes: Modes
+    lower: FloatArray,
+    upper: FloatArray,
+    g: FloatArray,
+    w_free: FloatArray,
+    modes: Modes,
+    shift: float = REGULARISATION,
 ) -> tuple[FloatArray, Modes]:
     """
     Solve for the torques of the friction elements.
 
     Parameters
     ----------
-    law : BoxLaw
-        Bounds of the m elements.
+    lower, upper : ndarray, shape (m,)
+        Torque while an element moves backwards, and forwards; lower < upper, infinite for an
+        element that never slips [N m].
     g : ndarray, shape (m, m)
         Change of velocity per torque.
     w_free : ndarray, shape (m,)
         Velocities at the end of the step without friction.
     modes : tuple of int, length m
         First guess, such as the modes of the last step, which are nearly always right.
+    shift : float
+        Share of its diagonal that is added to G; 0 if G is regular.
 
     Returns
     -------
@@ -139,20 +69,38 @@ def solve_box_complementarity(
         Mode of each element.
 
     """
-    f = law.torques(g, w_free, modes)
+    low, high, found = lower.tolist(), upper.tolist(), list(modes)
+    f = np.zeros(len(modes))
     for rounds in range(500):
-        broken = law.violations(w_free - g.dot(f), f, modes)
+        # the bounds of slipping elements, and the solution of w = 0 for stuck elements
+        f = np.array(
+            [(0.0, *bounds)[mode] for mode, *bounds in zip(found, high, low, strict=True)]
+        )
+        stuck = [k for k, mode in enumerate(found) if mode == 0]
+        if stuck:
+            system = np.eye(len(modes))
+            for k in stuck:
+                system[k], f[k] = g[k], w_free[k]
+                system[k, k] *= 1.0 + shift
+            f = np.asarray(dgesv(system, f, 1, 1)[2])
+        # elements that violate their condition, each with the mode to try next
+        broken = []
+        speeds = (w_free - g.dot(f)).tolist()
+        for k, (speed, torque) in enumerate(zip(speeds, f.tolist(), strict=True)):
+            if found[k] and speed * found[k] < -SPEED_TOLERANCE:
+                broken.append((k, 0))
+            elif found[k] == 0 and torque > high[k] + TORQUE_TOLERANCE * abs(high[k]):
+                broken.append((k, 1))
+            elif found[k] == 0 and torque < low[k] - TORQUE_TOLERANCE * abs(low[k]):
+                broken.append((k, -1))
         if not broken:
             break
-        changed = list(modes)
-        # A typical step needs one round, in which all elements that break their law change at
+        # A typical step needs one round, in which all violating elements change at
         # once. Some problems cycle; after 12 rounds only the first such element changes, which
         # always terminates.
-        for element, mode in broken if rounds < 12 else broken[:1]:
-            changed[element] = mode
-        modes = tuple(changed)
-        f = law.torques(g, w_free, modes)
-    return f, modes
+        for k, mode in broken if rounds < 12 else broken[:1]:
+            found[k] = mode
+    return f, tuple(found)
 
 
 @dataclass(frozen=True, eq=False)
@@ -164,8 +112,8 @@ class Contacts:
     ----------
     directions : ndarray, shape (m, n)
         Velocity of each element as a combination of the joint velocities.
-    law : BoxLaw
-        Bounds of the torques of the elements.
+    lower, upper : ndarray, shape (m,)
+        Bounds of the torques of the elements [N m].
     axes : tuple of int, length m
         The joint that an element acts on alone; -1 if it acts on several.
     friction : DryFriction
@@ -174,27 +122,36 @@ class Contacts:
     """
 
     directions: FloatArray
-    law: BoxLaw
+    lower: FloatArray
+    upper: FloatArray
     axes: tuple[int, ...]
     friction: DryFriction | None = None
 
     @classmethod
     def of(cls, friction: DryFriction) -> Contacts:
         """Return the contacts of friction elements."""
-        directions = friction.directions
-        joints = [np.flatnonzero(direction).tolist() for direction in directions]
+        joints = [np.flatnonzero(direction).tolist() for direction in friction.directions]
         axes = tuple(some[0] if len(some) == 1 else -1 for some in joints)
-        independent = -1 not in axes and len(set(axes)) == len(axes)
-        law = BoxLaw(friction.lower, friction.upper, 0.0 if independent else REGULARISATION)
         loaded = None if friction.load_share is None else friction
-        return cls(directions, law, axes, loaded)
+        return cls(friction.directions, friction.lower, friction.upper, axes, loaded)
+
+    @property
+    def of_single_joints(self) -> bool:
+        """Whether every element acts on one joint, and no two elements on the same joint."""
+        return -1 not in self.axes and len(set(self.axes)) == len(self.axes)
 
     def under(self, load: FloatArray) -> Contacts:
         """Return the contacts under a torque of the rigid body, shape (n,) [N m]."""
         if self.friction is None:
             return self
         more = self.friction.widening(load)
-        return replace(self, law=BoxLaw(self.friction.lower - more, self.friction.upper + more))
+        return replace(self, lower=self.friction.lower - more, upper=self.friction.upper + more)
+
+    def torques(self, g: FloatArray, w_free: FloatArray, modes: Modes) -> tuple[FloatArray, Modes]:
+        """Solve for torques and modes of the elements; see `solve_box_complementarity`."""
+        regular = self.friction is None and self.of_single_joints
+        shift = 0.0 if regular else REGULARISATION
+        return solve_box_complementarity(self.lower, self.upper, g, w_free, modes, shift)
 
 
 def split_constant(friction: DryFriction | None, n_joints: int) -> tuple[DryFriction, FloatArray]:

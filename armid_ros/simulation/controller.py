@@ -21,41 +21,8 @@ import pinocchio as pin
 BANDWIDTH = 50.0
 
 
-#: Desired position, velocity and acceleration, without and with the feedforward torque; each (n,).
+#: Desired position, velocity and acceleration, each of shape (n,).
 Desired = tuple[FloatArray, FloatArray, FloatArray]
-Target = tuple[Desired, FloatArray]
-
-
-@dataclass(frozen=True, eq=False)
-class Targets:
-    """
-    Targets of a controller at N successive steps.
-
-    Attributes
-    ----------
-    q, dq, ddq : ndarray, shape (N, n)
-        Desired position, velocity and acceleration of the motors [rad or m, s].
-    feedforward : ndarray, shape (N, n)
-        Torque that depends on the reference only [N m].
-
-    """
-
-    q: FloatArray
-    dq: FloatArray
-    ddq: FloatArray
-    feedforward: FloatArray
-
-    def at(self, row: int) -> Target:
-        """Return the targets of one step."""
-        return (self.q[row], self.dq[row], self.ddq[row]), self.feedforward[row]
-
-    def __getitem__(self, rows: slice) -> Targets:
-        """Return the targets of some of the steps."""
-        return Targets(self.q[rows], self.dq[rows], self.ddq[rows], self.feedforward[rows])
-
-    def __len__(self) -> int:
-        """Return the number of steps N."""
-        return len(self.q)
 
 
 @dataclass(frozen=True, eq=False)
@@ -148,15 +115,15 @@ class Controller:
         """Return a controller in its initial state; without a state, itself."""
         return self
 
-    def targets(self, desired: Motion, asked: FloatArray | None = None) -> Targets:
+    def targets(self, desired: Motion, asked: FloatArray | None = None) -> Motion:
         """
-        Return the targets for a reference that has one row per step.
+        Return the desired motion of the motors, with the feedforward torque.
 
-        `asked` is the position, shape (n,), that a controller commanded before for the first row,
-        if any.
+        The reference has one row per step. `asked` is the position, shape (n,), that a controller
+        commanded before for the first row, if any.
 
         """
-        return Targets(desired.q, desired.dq, desired.ddq, self.feedforward(desired))
+        return desired.with_torque(self.feedforward(desired))
 
     def feedforward(self, desired: Motion) -> FloatArray:
         """Return the torques that depend on the reference only, shape (N, n) [N m]."""
@@ -270,10 +237,6 @@ class VelocityLoop:
         """Freeze the gains."""
         freeze(self, 'proportional', 'integral')
 
-    def torque(self, error: FloatArray, integral: FloatArray) -> FloatArray:
-        """Return the torque for errors of velocity [rad/s] and their integral [rad], (n,)."""
-        return np.asarray(self.proportional * error + self.integral * integral)
-
 
 @dataclass(eq=False)
 class MotorControl(Controller):
@@ -338,9 +301,9 @@ class MotorControl(Controller):
         """Return the same loops with zero integrals."""
         return replace(self)
 
-    def targets(self, desired: Motion, asked: FloatArray | None = None) -> Targets:
+    def targets(self, desired: Motion, asked: FloatArray | None = None) -> Motion:
         """
-        Return the targets of the motors for a motion of the links.
+        Return the desired motion of the motors for a motion of the links.
 
         The torque of the reference, if any, is added to the torque of the loops.
 
@@ -354,7 +317,8 @@ class MotorControl(Controller):
         before = np.concatenate([q[:1] - self.dt * desired.dq[:1], q[:-1]])
         if asked is not None:
             before[1:2] = asked
-        return Targets(q, (q - before) / self.dt, np.zeros_like(q), tau)
+        dq = (q - before) / self.dt
+        return Motion(desired.joints, desired.t, q, dq, np.zeros_like(q), tau)
 
     def torque(
         self, q: FloatArray, dq: FloatArray, desired: Desired, feedforward: FloatArray
@@ -362,4 +326,5 @@ class MotorControl(Controller):
         """Update the integrals and return the torque, shape (n,)."""
         error = desired[1] - dq
         self.integral = self.integral + self.dt * error
-        return self.loop.torque(error, self.integral) + feedforward
+        torque = self.loop.proportional * error + self.loop.integral * self.integral
+        return torque + feedforward

@@ -1,6 +1,6 @@
 # Copyright 2026 The armid_ros developers
 # SPDX-License-Identifier: Apache-2.0
-"""Simulated arms with elastic joints, the shipped two-link arm, and courses for springs."""
+"""Simulated arms with elastic joints, and trajectories that make springs identifiable."""
 
 from __future__ import annotations
 

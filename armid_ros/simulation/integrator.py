@@ -20,7 +20,7 @@ middle of the substep.
 from __future__ import annotations
 
 from armid_ros.motion import FloatArray
-from armid_ros.simulation.contacts import Contacts, Modes, solve_box_complementarity
+from armid_ros.simulation.contacts import Contacts, Modes
 from armid_ros.simulation.plant import no_body, NoBodyError, Plant, Rotors, State
 from armid_ros.simulation.springs import ElasticJoints
 import numpy as np
@@ -53,7 +53,7 @@ def step(plant: Plant, state: State, torque: FloatArray) -> State:
             assert state.rotors is not None
             state = spring_substep(plant, plant.springs, state.rotors, state, torque)
         return State(steps, steps * plant.dt, *state[2:])
-    half = plant.spans[1]
+    half = 0.5 * plant.dt
     model, data, dq = plant.robot.model, plant.data, state.dq
     q_middle = state.q + half * dq
     dq_middle = dq + half * state.ddq
@@ -67,13 +67,11 @@ def step(plant: Plant, state: State, torque: FloatArray) -> State:
     if contacts.friction is not None:
         load = pin.rnea(model, data, q_middle, dq_middle, state.ddq)
         contacts = contacts.under(load)
-    inertia = pin.crba(plant.model, data, q_middle)
-    if plant.coupling is not None:
-        inertia = inertia + plant.coupling
-
+    inertia = pin.crba(model, data, q_middle) + plant.added_inertia
     dq_next, ddq, modes = _end_velocity(plant, contacts, inertia, force, dq, state.modes)
     q_next = q_middle + half * dq_next
-    if plant.hard_stops and not _inside(plant.stops, q_next):
+    robot = plant.robot
+    if plant.hard_stops and np.any((q_next < robot.lower) | (q_next > robot.upper)):
         q_next, dq_next, ddq, modes = _stop(plant, inertia, force, state, q_next, load)
     if slipping is not None:
         memory = slipping.advance(memory, q_next - state.q)
@@ -90,8 +88,7 @@ def _end_velocity(
     modes: Modes,
 ) -> tuple[FloatArray, FloatArray, Modes]:
     """Return end velocity, acceleration, and torques and modes of friction elements and stops."""
-    dt = plant.spans[0]
-    directions = contacts.directions
+    dt, directions = plant.dt, contacts.directions
     right = np.empty((1 + len(directions), len(force)))
     right[0], right[1:] = force, directions
     _, solution, failed = dposv(inertia, right.T, 0, 0, 1)
@@ -99,9 +96,7 @@ def _end_velocity(
         raise NoBodyError(no_body(plant.robot))
     solution = dt * solution
     dq_free, response = dq + solution[:, 0], solution[:, 1:]
-    taken, modes = solve_box_complementarity(
-        contacts.law, directions.dot(response), directions.dot(dq_free), modes
-    )
+    taken, modes = contacts.torques(directions.dot(response), directions.dot(dq_free), modes)
     dq_next = dq_free - response.dot(taken)
     if 0 in modes:
         # set the velocity of joints that stick to exactly zero, without rounding errors
@@ -121,13 +116,6 @@ def _end_velocity(
                     dq_next[pivot] = -direction.dot(dq_next) / direction[pivot]
                     fixed.append(pivot)
     return dq_next, (dq_next - dq) / dt, modes
-
-
-def _inside(stops: list[tuple[float, float]], q: FloatArray) -> bool:
-    for position, (lower, upper) in zip(q.tolist(), stops, strict=True):
-        if not lower <= position <= upper:
-            return False
-    return True
 
 
 def _stop(
@@ -182,7 +170,7 @@ def spring_substep(
             load = pin.rnea(plant.robot.model, plant.data, q, v[e:], state.ddq)
             contacts = contacts.under(load)
         w, g = springs.friction @ x_next[e:], springs.friction @ response[e:]
-        rub, modes = solve_box_complementarity(contacts.law, g, w, modes)
+        rub, modes = contacts.torques(g, w, modes)
         x_next = x_next - response @ rub
     size = len(x)
     constant = rates[:, size] - rates[:, size + 1 :] @ rub

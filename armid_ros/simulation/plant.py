@@ -4,7 +4,6 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
 import math
 from typing import NamedTuple
 
@@ -24,29 +23,21 @@ import numpy.typing as npt
 import pinocchio as pin
 from scipy.linalg import eigh, LinAlgError
 
-NO_BODY = (
-    'the inertia matrix is not positive definite: identify with --physical, or correct the '
-    'description'
-)
-
 
 class NoBodyError(ModelError):
     """An arm cannot be simulated because some links are not physically possible bodies."""
 
 
 def require_masses(robot: Robot) -> None:
-    """
-    Raise a ModelError if links of a robot have a negative mass.
-
-    Raises
-    ------
-    ModelError
-        If a mass is negative; the message names the links.
-
-    """
-    negative = _of_negative_mass(robot)
-    if negative:
-        raise ModelError(f'{robot.name}: {negative}; correct the description')
+    """Raise a ModelError that names the links of negative mass, if a robot has any."""
+    masses = robot.rigid_parameters[::PER_LINK]
+    named = [
+        f"link '{name}' has a mass of {mass:g} kg"
+        for name, mass in zip(robot.links, masses, strict=True)
+        if mass < 0.0
+    ]
+    if named:
+        raise ModelError(f'{robot.name}: {", ".join(named)}; correct the description')
 
 
 def require_any_mass(robot: Robot) -> None:
@@ -69,26 +60,18 @@ def require_any_mass(robot: Robot) -> None:
 
 def no_body(robot: Robot) -> str:
     """Return the message on an inertia matrix that is not positive definite."""
-    links = zip(robot.links, robot.rigid_parameters.reshape(-1, PER_LINK), strict=True)
-    negative = _of_negative_mass(robot)
     odd = [
-        name
-        for name, values in links
+        f"'{name}' ({values[0]:g} kg)"
+        for name, values in zip(
+            robot.links, robot.rigid_parameters.reshape(-1, PER_LINK), strict=True
+        )
         if np.any(values) and np.linalg.eigvalsh(pseudo_inertia(values))[0] < 0.0
     ]
-    if negative or not odd:
-        return f'{negative}; {NO_BODY}' if negative else NO_BODY
-    return f'inertias of {", ".join(odd)} are not those of a body; {NO_BODY}'
-
-
-def _of_negative_mass(robot: Robot) -> str:
-    masses = robot.rigid_parameters[::PER_LINK]
-    named = [
-        f"link '{name}' has a mass of {mass:g} kg"
-        for name, mass in zip(robot.links, masses, strict=True)
-        if mass < 0.0
-    ]
-    return ', '.join(named)
+    links = f'links {", ".join(odd)} are not possible bodies; ' if odd else ''
+    return (
+        f'{links}the inertia matrix is not positive definite: identify with --physical, or '
+        'correct the description'
+    )
 
 
 class Rotors(NamedTuple):
@@ -142,7 +125,6 @@ class State(NamedTuple):
     rotors: Rotors | None = None
 
 
-@dataclass(frozen=True, eq=False)
 class Plant:
     """
     An arm model prepared for integration.
@@ -151,7 +133,7 @@ class Plant:
     and link of joints with joint_elasticity and rotor_inertia have different velocities. Otherwise
     they have the same velocity, and the springs only change the position readings.
 
-    Attributes
+    Parameters
     ----------
     arm : ArmModel
         Rigid body and effects.
@@ -162,19 +144,25 @@ class Plant:
         bouncing. The stop of a link on a spring is a damped spring, which yields by some
         milliradians. Its frequency is 32 Hz with the inertia in the middle of the ranges and the
         default step.
-    elasticity : Elasticity, or None
-        How elastic joints are simulated; None: all joints are rigid.
+    elasticity : Elasticity, optional
+        How elastic joints are simulated; by default all joints are rigid.
+
+    Raises
+    ------
+    ModelError
+        If the step is not positive, or the arm cannot move as a body.
+
+    Attributes
+    ----------
     robot : Robot
         The rigid body with the changes of the effects, such as a payload.
     contacts : Contacts
         Friction elements that can stick, m of them.
     damping : ndarray, shape (n, n)
         Viscous matrix [N m s/rad].
-    model : pinocchio.Model
-        The rigid body, with the inertia added to every joint: rotors, and the implicit part of the
-        damping [kg m^2].
-    coupling : ndarray, shape (n, n), or None
-        Added inertia between different joints [kg m^2].
+    added_inertia : ndarray, shape (n, n)
+        Inertia added to that of the rigid body: rotors, and the implicit part of the damping
+        [kg m^2].
     constant : ndarray, shape (n,), or None
         Constant torque that the actuators have to supply [N m].
     torque : callable (t, q, dq) -> ndarray (n,), or None
@@ -183,52 +171,32 @@ class Plant:
         Actions of the effects on the arm and on its sensors.
     springs : ElasticJoints, or None
         Springs between motors and links; None if all joints are rigid.
-    spans : tuple of ndarray, each of shape ()
-        The step and half the step [s], as arrays because numpy multiplies them twice as fast as
-        floats.
-    torque_range : tuple of ndarray, each of shape (n,)
-        Torque limits of the drives, backwards and forwards [N m].
-    stops : list of (float, float)
-        Lower and upper position limit of every joint [rad or m].
     data : pinocchio.Data
         Scratch memory of the rigid-body algorithms; two threads therefore need two plants.
 
     """
 
-    arm: ArmModel
-    dt: float = 1e-3
-    hard_stops: bool = True
-    elasticity: Elasticity | None = None
-    robot: Robot = field(init=False)
-    contacts: Contacts = field(init=False, repr=False)
-    torque: TorqueLaw | None = field(init=False, repr=False)
-    action: Action = field(init=False, repr=False)
-    springs: ElasticJoints | None = field(init=False, repr=False)
-    data: pin.Data = field(init=False, repr=False)
-    damping: FloatArray = field(init=False, repr=False)
-    constant: FloatArray | None = field(init=False, repr=False)
-    model: pin.Model = field(init=False, repr=False)
-    coupling: FloatArray | None = field(init=False, repr=False)
-    spans: tuple[FloatArray, FloatArray] = field(init=False, repr=False)
-    torque_range: tuple[FloatArray, FloatArray] = field(init=False, repr=False)
-    stops: list[tuple[float, float]] = field(init=False, repr=False)
-    _at_stops: dict[tuple[bytes, bytes], Contacts] = field(
-        init=False, repr=False, default_factory=dict
-    )
-
-    def __post_init__(self) -> None:
-        """Collect the actions of the effects."""
-        if not (math.isfinite(self.dt) and self.dt > 0.0):
-            raise ModelError(f'the step has to be a positive time, not {self.dt} s')
-        action = self.arm.action()
-        robot = action.robot or self.arm.robot
-        n = robot.n_joints
+    def __init__(
+        self,
+        arm: ArmModel,
+        dt: float = 1e-3,
+        hard_stops: bool = True,
+        elasticity: Elasticity | None = None,
+    ) -> None:
+        if not (math.isfinite(dt) and dt > 0.0):
+            raise ModelError(f'the step has to be a positive time, not {dt} s')
+        self.arm, self.dt, self.hard_stops, self.elasticity = arm, dt, hard_stops, elasticity
+        self.action: Action = arm.action()
+        self.robot: Robot = self.action.robot or arm.robot
+        robot, n = self.robot, self.robot.n_joints
         zero = np.zeros((n, n))
-        damping = zero if action.damping is None else action.damping
-        inertia = zero if action.inertia is None else action.inertia
-        friction, constant = split_constant(action.dry_friction, n)
-        data = robot.model.createData()
-        mass = np.array(pin.crba(robot.model, data, robot.middle_pose))
+        self.damping: FloatArray = zero if self.action.damping is None else self.action.damping
+        inertia = zero if self.action.inertia is None else self.action.inertia
+        friction, constant = split_constant(self.action.dry_friction, n)
+        self.contacts = Contacts.of(friction)
+        self.constant: FloatArray | None = constant if constant.any() else None
+        self.data = robot.model.createData()
+        mass = np.array(pin.crba(robot.model, self.data, robot.middle_pose))
         moved = np.abs(np.diag(mass + inertia))
         still = int(np.argmin(moved))
         if moved[still] < 1e-15:
@@ -236,33 +204,15 @@ class Plant:
                 f"{robot.name}: joint '{robot.joints[still]}' moves no mass and no inertia, so "
                 f"its acceleration is infinite; give link '{robot.links[still]}' an <inertial>"
             )
-        weight = _damping_weight(robot, mass + inertia, damping, self.dt)
-        added = inertia + weight * self.dt * damping
-        coupling = added - np.diag(np.diag(added))
-        model = pin.Model(robot.model)
-        model.armature = np.diag(added).copy()
-        springs = None
-        torque = sum_laws([law for law in (action.torque, action.link_torque) if law is not None])
-        if self.elasticity is not None:
-            directions, torque = friction.directions, action.torque
-            springs = ElasticJoints.of(self.arm, self.elasticity, directions, mass, self.dt)
-        values = {
-            'robot': robot,
-            'contacts': Contacts.of(friction),
-            'spans': (np.array(self.dt), np.array(self.dt / 2)),
-            'torque_range': (-robot.torque_limit, robot.torque_limit),
-            'stops': list(zip(robot.lower.tolist(), robot.upper.tolist(), strict=True)),
-            'data': data,
-            'torque': torque,
-            'action': action,
-            'springs': springs,
-            'damping': damping,
-            'constant': constant if constant.any() else None,
-            'model': model,
-            'coupling': coupling if coupling.any() else None,
-        }
-        for name, value in values.items():
-            object.__setattr__(self, name, value)
+        weight = _damping_weight(robot, mass + inertia, self.damping, dt)
+        self.added_inertia: FloatArray = inertia + weight * dt * self.damping
+        laws = [self.action.torque]
+        self.springs: ElasticJoints | None = None
+        if elasticity is None:
+            laws.append(self.action.link_torque)
+        else:
+            self.springs = ElasticJoints.of(arm, elasticity, friction.directions, mass, dt)
+        self.torque: TorqueLaw | None = sum_laws([law for law in laws if law is not None])
 
     def state(
         self,
@@ -349,20 +299,17 @@ class Plant:
         = 0 at the upper limit.
 
         """
-        key = (at_lower.tobytes(), at_upper.tobytes())
-        if key not in self._at_stops:
-            friction, hit = self.contacts, np.flatnonzero(at_lower | at_upper)
-            loaded = friction.friction
-            elements = DryFriction(
+        friction, hit = self.contacts, np.flatnonzero(at_lower | at_upper)
+        loaded, none = friction.friction, np.zeros(len(hit))
+        share = None if loaded is None else loaded.load_share
+        return Contacts.of(
+            DryFriction(
                 np.vstack([friction.directions, np.eye(self.robot.n_joints)[hit]]),
-                np.append(friction.law.lower, np.where(at_lower[hit], -np.inf, 0.0)),
-                np.append(friction.law.upper, np.where(at_upper[hit], np.inf, 0.0)),
-                None
-                if loaded is None or loaded.load_share is None
-                else np.append(loaded.load_share, np.zeros(len(hit))),
+                np.append(friction.lower, np.where(at_lower[hit], -np.inf, 0.0)),
+                np.append(friction.upper, np.where(at_upper[hit], np.inf, 0.0)),
+                None if share is None else np.append(share, none),
             )
-            self._at_stops[key] = Contacts.of(elements)
-        return self._at_stops[key]
+        )
 
 
 def _damping_weight(robot: Robot, inertia: FloatArray, damping: FloatArray, dt: float) -> float:

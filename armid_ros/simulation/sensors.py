@@ -4,11 +4,12 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass
+from functools import cached_property
 
 from armid_ros.effects import Action
 from armid_ros.errors import ModelError, RobotError
-from armid_ros.motion import FloatArray, Motion, read_only
+from armid_ros.motion import FloatArray, Motion
 from armid_ros.robots import Robot
 from armid_ros.simulation.closed_loop import Trace
 from armid_ros.simulation.plant import Plant, State
@@ -49,12 +50,9 @@ class Sensors:
     velocity_from_encoder: bool = False
     torque_delay: int = 0
     acceleration_noise: float = 0.0
-    _noisy: bool = field(init=False, repr=False)
-    _counted: npt.NDArray[np.bool_] | None = field(init=False, repr=False)
-    _size: FloatArray = field(init=False, repr=False)
 
     def __post_init__(self) -> None:
-        """Raise a ModelError if a value is negative; prepare the noise and the quantisation."""
+        """Raise a ModelError if a value is negative."""
         noises = ('torque_noise', 'position_noise', 'velocity_noise', 'acceleration_noise')
         for name in (*noises, 'resolution'):
             value = np.asarray(getattr(self, name), dtype=float)
@@ -65,12 +63,16 @@ class Sensors:
                 f'sensors: torque_delay is a whole number of steps, not {self.torque_delay}'
             )
 
+    @cached_property
+    def _noisy(self) -> bool:
+        noises = (self.torque_noise, self.position_noise, self.velocity_noise)
+        return any(np.any(noise) for noise in noises)
+
+    @cached_property
+    def _step(self) -> FloatArray | None:
+        """Step of the encoders, 1 where there is no quantisation; None without quantisation."""
         resolution = np.asarray(self.resolution, dtype=float)
-        object.__setattr__(
-            self, '_noisy', any(np.any(np.asarray(getattr(self, name))) for name in noises[:3])
-        )
-        object.__setattr__(self, '_counted', resolution > 0.0 if resolution.any() else None)
-        object.__setattr__(self, '_size', np.where(resolution > 0.0, resolution, 1.0))
+        return np.where(resolution > 0.0, resolution, 1.0) if resolution.any() else None
 
     def measure(
         self,
@@ -116,9 +118,9 @@ class Sensors:
         return position, dq, tau
 
     def _quantise(self, q: FloatArray) -> FloatArray:
-        if self._counted is None:
+        if self._step is None:
             return q
-        return np.where(self._counted, np.rint(q / self._size) * self._size, q)
+        return np.where(self.resolution, np.rint(q / self._step) * self._step, q)
 
 
 def readings(
@@ -214,63 +216,45 @@ class RecentPast:
         return q[-1], dq[-1], tau[late]
 
 
-@dataclass(frozen=True, eq=False)
 class LinkAccelerometers:
     """
     Accelerometers with three axes, one on every link, aligned with the frame of its joint.
 
-    Attributes
+    Parameters
     ----------
     robot : Robot
         The arm.
-    places : ndarray, shape (n, 3)
+    places : array_like, shape (n, 3), optional
         Positions of the accelerometers in the frames of the joints [m]; by default the centroids
         of the links.
 
+    Raises
+    ------
+    RobotError
+        If the places have another shape.
+
     """
 
-    robot: Robot
-    places: npt.ArrayLike | None = None
-    _model: pin.Model = field(init=False, repr=False)
-    _data: pin.Data = field(init=False, repr=False)
-    _frames: tuple[int, ...] = field(init=False, repr=False)
-
-    def __post_init__(self) -> None:
-        """Check the places, or choose the default places."""
-        model = self.robot.model
-        places = self.places
+    def __init__(self, robot: Robot, places: npt.ArrayLike | None = None) -> None:
         if places is None:
-            places = [inertia.lever for inertia in list(model.inertias)[1:]]
-        array = read_only(places)
-        if array.shape != (self.robot.n_joints, 3):
+            places = [inertia.lever for inertia in list(robot.model.inertias)[1:]]
+        array = np.asarray(places, dtype=float)
+        if array.shape != (robot.n_joints, 3):
             raise RobotError(
-                f'{self.robot.name}: accelerometers need three coordinates for each of '
-                f'{self.robot.n_joints} links, got an array of shape {array.shape}'
+                f'{robot.name}: accelerometers need three coordinates for each of '
+                f'{robot.n_joints} links, got an array of shape {array.shape}'
             )
-        model = pin.Model(model)
-        frames = [
-            model.addFrame(
-                pin.Frame(
-                    f'{link}_accelerometer',
-                    joint,
-                    pin.SE3(np.eye(3), place),
-                    pin.FrameType.SENSOR,
-                )
-            )
-            for joint, (link, place) in enumerate(zip(self.robot.links, array, strict=True), 1)
-        ]
-        object.__setattr__(self, '_model', model)
-        object.__setattr__(self, '_data', model.createData())
-        object.__setattr__(self, '_frames', tuple(frames))
+        self._model, self._data = robot.model, robot.model.createData()
+        self._placements = [pin.SE3(np.eye(3), place) for place in array]
 
     def read(self, q: FloatArray, dq: FloatArray, ddq: FloatArray) -> FloatArray:
         """Return the readings in one state, shape (n, 3) [m/s^2]; at rest gravity, upwards."""
         model, data = self._model, self._data
         pin.forwardKinematics(model, data, q, dq, ddq)
         up = -model.gravity.linear
-        readings = np.empty((len(self._frames), 3))
-        for joint, frame in enumerate(self._frames, 1):
-            felt = pin.getFrameClassicalAcceleration(model, data, frame, pin.LOCAL).linear
+        readings = np.empty((len(self._placements), 3))
+        for joint, place in enumerate(self._placements, 1):
+            felt = pin.getFrameClassicalAcceleration(model, data, joint, place, pin.LOCAL).linear
             readings[joint - 1] = felt + up.dot(data.oMi[joint].rotation)
         return readings
 

@@ -12,7 +12,7 @@ from armid_ros.errors import ModelError, TrajectoryError
 from armid_ros.motion import FloatArray, Motion
 from armid_ros.robots.reference import Reference
 from armid_ros.simulation.closed_loop import command, CompiledLoop, run, Trace
-from armid_ros.simulation.controller import ComputedTorque, Controller, MotorControl, Targets
+from armid_ros.simulation.controller import ComputedTorque, Controller, MotorControl
 from armid_ros.simulation.plant import Plant, State
 from armid_ros.simulation.sensors import LinkAccelerometers, RecentPast, Sensors
 import numpy as np
@@ -121,7 +121,8 @@ class SimulatedArm:
             controller = ComputedTorque(self.plant.arm) if rigid else MotorControl.of(self.plant)
         self.controller = controller
         self.sensors = sensors or Sensors()
-        self.accelerometers = accelerometers or LinkAccelerometers(self.plant.robot)
+        if self.plant.springs is not None:
+            self.accelerometers = accelerometers or LinkAccelerometers(self.plant.robot)
         self.rng = rng
         start = self.plant.robot.middle_pose if start is None else start
         self._compiled = CompiledLoop.of(self.plant, self.controller)
@@ -129,7 +130,7 @@ class SimulatedArm:
         self._state: State
         self._reference: Reference
         self._acting: Controller
-        self._targets: Targets
+        self._targets: Motion
         self._torque: FloatArray
         self._previous: FloatArray | None
         self._previous_link: FloatArray | None
@@ -222,7 +223,7 @@ class SimulatedArm:
                 f'{arm.robot.name}: an arm with the joints {", ".join(self.joints)} cannot become '
                 f'one with {", ".join(arm.robot.joints)}'
             )
-        return replace(self.plant, arm=arm)
+        return Plant(arm, self.plant.dt, self.plant.hard_stops)
 
     def set_trajectory(self, reference: Reference) -> None:
         """
@@ -281,10 +282,8 @@ class SimulatedArm:
                 self._look_ahead(self._targets.q[-1])
                 row = 1
             taken = min(steps, len(self._targets) - row)
-            targets = self._targets[row : row + taken]
-            trace = run(
-                self.plant, self._acting, self._state, self._torque, targets, self._compiled
-            )
+            rows, arm = range(row, row + taken), (self.plant, self._acting)
+            trace = run(*arm, self._state, self._torque, self._targets, rows, self._compiled)
             self._state, self._torque = trace.state, trace.tau[-1]
             self._past.extend(trace)
             steps -= taken
@@ -327,7 +326,7 @@ class SimulatedArm:
 
     def _act(self) -> None:
         """Return the torque of the controller for the present targets."""
-        self._torque = command(self.plant, self._acting, self._state, self._targets.at(0))
+        self._torque = command(self.plant, self._acting, self._state, self._targets, 0)
 
     def _look_ahead(self, asked: FloatArray | None = None, steps: int = 1000) -> None:
         """Evaluate the reference for the next steps, given the last commanded motor position."""

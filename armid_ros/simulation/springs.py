@@ -12,7 +12,8 @@ not depend on the pose (Spong 1987).
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass
+from functools import cached_property
 
 from armid_ros.arm import ArmModel
 from armid_ros.effects import Action, Transmission
@@ -68,10 +69,6 @@ class ElasticJoints:
         Stiffness and damping of the stops [N m/rad], [N m s/rad].
     sensing : Action
         Action of the effects on the readings of the motors, which the springs do not change.
-    pull : ndarray, shape (e + n, e + e + n)
-        Torques of engaged springs and of friction, per twist and velocity.
-    loose : bool
-        Whether any joint has free play.
 
     """
 
@@ -86,15 +83,16 @@ class ElasticJoints:
     friction: FloatArray
     stops: tuple[FloatArray, FloatArray]
     sensing: Action
-    pull: FloatArray = field(init=False, repr=False)
-    loose: bool = field(init=False)
 
-    def __post_init__(self) -> None:
-        """Compute the matrix of the engaged springs."""
-        springs = self.transmission
-        object.__setattr__(self, 'loose', bool(np.any(springs.gap)))
-        pull = self._pull_of(springs.stiffness, springs.damping)
-        object.__setattr__(self, 'pull', read_only(pull))
+    @cached_property
+    def pull(self) -> FloatArray:
+        """Torques of engaged springs and friction per twist and velocity, (e + n, e + e + n)."""
+        return self._pull_of(self.transmission.stiffness, self.transmission.damping)
+
+    @cached_property
+    def loose(self) -> bool:
+        """Whether any joint has free play."""
+        return bool(np.any(self.transmission.gap))
 
     @classmethod
     def of(
@@ -193,7 +191,7 @@ def _required(robot: Robot, action: Action) -> Transmission:
     rotor = np.zeros(len(soft)) if action.inertia is None else np.diag(action.inertia)
     for joint in np.flatnonzero(soft & (rotor <= 0.0))[:1]:
         raise ModelError(
-            f"{robot.name}: joint '{robot.joints[joint]}' is elastic, but its motor has no  "
+            f"{robot.name}: joint '{robot.joints[joint]}' is elastic, but its motor has no "
             'inertia; add rotor_inertia'
         )
     if np.any(springs.gap[~soft] > 0.0):

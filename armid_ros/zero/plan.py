@@ -13,7 +13,7 @@ from __future__ import annotations
 
 from dataclasses import replace
 
-from armid_ros.api.excitation import ExcitationResult, planner_of
+from armid_ros.api.excitation import ExcitationResult
 from armid_ros.arm import ArmModel
 from armid_ros.errors import TrajectoryError
 from armid_ros.excitation import (
@@ -55,7 +55,7 @@ def plan_zero(
     arm, model, rng = ArmModel(robot), arm_at_rest(robot), np.random.default_rng(seed)
     settings = DesignSettings(clearance=scene.clearance, n_periods=1, target='effects')
     limits = Limits.of(robot, speed=1.0)
-    planner = planner_of(arm, settings, scene)
+    planner = TransferPlanner.of(arm, scene, settings.speed)
     assert planner.limits is not None and planner.clearance is not None
     inside = replace(planner.limits, lower=limits.lower, upper=limits.upper)
     # half as much again, as the smoothing cuts corners

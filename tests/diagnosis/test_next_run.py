@@ -15,13 +15,12 @@ from armid_ros.effects import CATALOGUE
 from armid_ros.errors import TrajectoryError
 from armid_ros.excitation import (
     ClearanceModel,
-    excitation_faults,
     FourierTrajectory,
     Limits,
     random_feasible,
     trajectory_faults,
 )
-from armid_ros.excitation.feasibility import CLEARANCE, templates
+from armid_ros.excitation.feasibility import CLEARANCE, excitation_faults, templates
 from armid_ros.model import inverse_dynamics
 from armid_ros.recording import Recording
 from armid_ros.robots import collision_model, robot_from_urdf

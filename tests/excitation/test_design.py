@@ -67,12 +67,10 @@ def test_predicted_deviations_are_the_scatter_of_repeats(humanoid_design):
     settings = replace(result.settings, rate=20.0)
     problem = DesignProblem.of(arm, settings, rng)
     predicted = evaluate(problem, result.excitation).information.std
-    run = result.excitation.motion(20.0)
-    slices = result.excitation.period_slices(20.0)
-    motion = run.select(slice(slices[0].start, slices[-1].stop))
-    w = problem.columns(motion)[:, problem.base.independent]
-    inverse = np.linalg.pinv(w)
-    scatter = (inverse @ rng.normal(size=(len(w), 400))).std(axis=1)
+    run, lead = result.excitation, int(np.ceil(20.0 * result.excitation.run_in))
+    periods = slice(lead, lead + run.n_periods * round(20.0 * run.trajectory.period))
+    w = problem.columns(run.motion(20.0).select(periods))[:, problem.base.independent]
+    scatter = (np.linalg.pinv(w) @ rng.normal(size=(len(w), 400))).std(axis=1)
     np.testing.assert_allclose(predicted, scatter, rtol=0.2)
 
 

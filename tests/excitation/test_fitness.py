@@ -5,7 +5,7 @@
 from dataclasses import replace
 import re
 
-from armid_ros.excitation import CollisionScene, fitness, Floor, Limits, Obstacle
+from armid_ros.excitation import CollisionScene, fitness, Floor, Obstacle
 from armid_ros.excitation.scene import FIT, PARTLY, UNFIT
 from armid_ros.motion import Motion
 from armid_ros.robots import collision_model, robot_from_urdf
@@ -23,9 +23,8 @@ PLANE = (Obstacle('floor', 'plane'),)
 
 
 def unchecked(text=None, floor=GROUND, obstacles=PLANE, **limits):
-    robot = robot_from_urdf(text or urdf(*JOINTS))
-    bound = replace(Limits.of(robot), **limits)
-    return CollisionScene(collision_model(robot), floor, obstacles, 0.01).not_checked(bound)
+    robot = replace(robot_from_urdf(text or urdf(*JOINTS)), **limits)
+    return CollisionScene(collision_model(robot), floor, obstacles, 0.01).unchecked
 
 
 def without(tag):
@@ -67,10 +66,10 @@ CASES = {
         'position of shoulder',
     ),
     'velocity': (
-        {'velocity': np.array([np.inf, 1.0])},
+        {'velocity_limit': np.array([np.inf, 1.0])},
         'velocity of shoulder',
     ),
-    'torque': ({'torque': np.array([1.0, np.inf])}, 'torque of elbow'),
+    'torque': ({'torque_limit': np.array([1.0, np.inf])}, 'torque of elbow'),
 }
 
 
@@ -96,13 +95,12 @@ def test_what_is_missing_is_named_and_is_in_the_verdict(case):
 
 def judged(options):
     """Judge an arm that holds still."""
-    robot = robot_from_urdf(options.pop('text'))
-    scene = CollisionScene(
-        collision_model(robot), options.pop('floor'), options.pop('obstacles'), 0.01
-    )
+    text, floor, obstacles = (options.pop(name) for name in ('text', 'floor', 'obstacles'))
+    robot = replace(robot_from_urdf(text), **options)
+    scene = CollisionScene(collision_model(robot), floor, obstacles, 0.01)
     rest = np.zeros((2, 2))
     motion = Motion(robot.joints, np.arange(2.0), rest, rest, rest)
-    return fitness(motion, replace(Limits.of(robot), **options), scene)
+    return fitness(motion, scene)
 
 
 def swung(angle):
@@ -111,7 +109,7 @@ def swung(angle):
     q = np.column_stack([np.linspace(0.0, angle, 50), np.zeros(50)])
     motion = Motion(robot.joints, np.linspace(0.0, 1.0, 50), q, 0.0 * q, 0.0 * q)
     scene = CollisionScene(collision_model(robot), GROUND, PLANE, 0.01)
-    return fitness(motion, Limits.of(robot), scene)
+    return fitness(motion, scene)
 
 
 def test_a_verdict_without_reserve_has_the_lowest_point_above_the_floor():

@@ -78,15 +78,24 @@ def test_a_run_is_sent_with_enough_waypoints_for_its_path(gate, two_link, rate, 
     a, b = np.zeros((2, 2, harmonics))
     a[:, -1] = 0.02 * np.pi * harmonics  # 0.04 rad to and fro, at most twice the rate
     excitation = replace(excitation, trajectory=replace(excitation.trajectory, a=a, b=b))
-    planner = TransferPlanner(ArmModel(two_link), transfer_limits(two_link), None)
+    robot = replace(two_link, acceleration_limit=np.full(2, 100.0))
+    planner = TransferPlanner(ArmModel(robot), transfer_limits(robot), None)
     start = excitation.at([0.0]).q[0]
-    for enough in (False, True):
-        run = plan_run(excitation, planner, start, 20.0 * rate if enough else rate)
-        if enough:
-            MotionGate.of(run, planner)
-        else:
-            with pytest.raises(TrajectoryError, match='waypoints'):
-                MotionGate.of(run, planner)
+    with pytest.raises(TrajectoryError, match='waypoints'):
+        plan_run(excitation, planner, start, rate)
+    run = plan_run(excitation, planner, start, 20.0 * rate)
+    MotionGate.of(run, planner)
+    with pytest.raises(TrajectoryError, match='waypoints'):
+        MotionGate.of(replace(run, rate=rate), planner)
+
+
+def test_a_run_is_held_to_assumed_acceleration_limits(gate, two_link):
+    planner = TransferPlanner(ArmModel(two_link), transfer_limits(two_link), None)
+    path = gate.run.excitation.trajectory.scaled(0.05).stretched(0.125)
+    fast = replace(gate.run.excitation, trajectory=path)
+    run = plan_run(fast, planner, fast.at([0.0]).q[0], 400.0)
+    with pytest.raises(TrajectoryError, match='acceleration'):
+        MotionGate.of(run, planner)
 
 
 def test_a_set_point_that_moves_is_held_within_the_acceleration_limits(gate):

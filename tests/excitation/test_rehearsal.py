@@ -3,7 +3,8 @@
 """A rehearsal remembers the worst, in memory that does not grow."""
 
 from armid_ros.arm import ArmModel
-from armid_ros.excitation import Excitation, FourierTrajectory, Rehearsal
+from armid_ros.excitation import Excitation, FourierTrajectory
+from armid_ros.excitation.supervision import Rehearsal
 from armid_ros.robots import load_robot
 import numpy as np
 import pytest
@@ -33,7 +34,7 @@ def rehearsed(arm, run, off=0.0, factor=1.0, count=500):
 def test_an_arm_as_described_surprises_nobody(arm, run):
     rehearsal = rehearsed(arm, run)
     assert rehearsal.report()[1] == ()
-    np.testing.assert_allclose(rehearsal.torque, rehearsal.foreseen(), rtol=2e-5)
+    np.testing.assert_allclose(rehearsal.torque, rehearsal.predicted(), rtol=2e-5)
     np.testing.assert_allclose(rehearsal.tracking, 0.0, atol=1e-12)
 
 

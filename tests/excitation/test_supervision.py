@@ -2,7 +2,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """Where an arm is known to be, whether it follows, and how its set point comes to rest."""
 
-from armid_ros.excitation import jump_fault, MeasuredPose, tracking_fault
+from armid_ros.excitation.supervision import jump_fault, MeasuredPose, tracking_fault
 import numpy as np
 import pytest
 

@@ -14,10 +14,10 @@ from armid_ros.excitation import (
     DesignSettings,
     evaluate,
     Floor,
-    floor_obstacles,
     Obstacle,
     with_obstacles,
 )
+from armid_ros.excitation.geometry.floor import floor_obstacles
 from armid_ros.excitation.scene import PARTLY
 from armid_ros.report.arm_drawing import draw_poses, OBSTACLE
 from armid_ros.robots import collision_model, load_robot

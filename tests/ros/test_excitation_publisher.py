@@ -8,7 +8,8 @@ import json
 
 from armid_ros.cli.excite import excite
 from armid_ros.errors import ArmidError, TrajectoryError
-from armid_ros.excitation import Excitation, load_excitation, plan_run, save_excitation, slowed
+from armid_ros.excitation import Excitation, load_excitation, plan_run, save_excitation
+from armid_ros.excitation.supervision import slowed
 from armid_ros.nodes import arm_watch, excitation_publisher
 from armid_ros.nodes.excitation_publisher import ExcitationPublisherNode
 from armid_ros.nodes.qos import STREAM

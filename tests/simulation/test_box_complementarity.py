@@ -4,7 +4,7 @@
 
 from itertools import product
 
-from armid_ros.simulation.contacts import BoxLaw, solve_box_complementarity
+from armid_ros.simulation.contacts import solve_box_complementarity
 import numpy as np
 import pytest
 
@@ -33,7 +33,7 @@ def test_it_finds_the_one_solution_from_any_guess(size: int) -> None:
         w_free = rng.normal(size=size) * 3.0
         lower, upper = -rng.uniform(0.1, 2.0, size), rng.uniform(0.1, 2.0, size)
         guess = tuple(rng.integers(-1, 2, size).tolist())
-        f, _ = solve_box_complementarity(BoxLaw(lower, upper), g, w_free, guess)
+        f, _ = solve_box_complementarity(lower, upper, g, w_free, guess)
         np.testing.assert_allclose(
             f, by_trying_everything(g, w_free, lower, upper), rtol=1e-6, atol=1e-8
         )
@@ -48,7 +48,7 @@ def test_large_and_singular_problems_obey_the_law() -> None:
         w_free = directions @ rng.normal(size=7) * 5.0
         bound = rng.uniform(0.01, 1.0, 14)
         guess = tuple(rng.integers(-1, 2, 14).tolist())
-        f, modes = solve_box_complementarity(BoxLaw(-bound, bound), g, w_free, guess)
+        f, modes = solve_box_complementarity(-bound, bound, g, w_free, guess)
         w = w_free - g @ f
         assert np.all(np.abs(f) <= bound * (1.0 + 1e-9))
         for speed, torque, limit, mode in zip(w, f, bound, modes, strict=True):

@@ -78,19 +78,20 @@ def find_path(
     # number of poses drawn before a TrajectoryError is raised
     for number in range(800):
         reached = near.grow(rng.uniform(lower, upper))
-        if reached is not None and far.connect(near.poses[reached]):
-            path = [*near.branch(reached)[::-1], *far.branch(len(far.poses) - 1)[1:]]
+        joined = None if reached is None else far.connect(near.poses[reached])
+        if reached is not None and joined is not None:
+            path = [*near.branch(reached)[::-1], *far.branch(joined)[1:]]
             path = path if number % 2 == 0 else path[::-1]
             return np.array(_shortened(path, free, rng))
         near, far = far, near
     blocked = clear_line(clearance, start, goal)
-    reason = 'some pose on the straight one is too heavy to hold'
+    reason = 'the arm cannot hold some pose on the straight line'
     if blocked is not None:
         reason = (
-            f'on the straight one {blocked.first} and {blocked.second} come within '
+            f'on the straight line {blocked.first} and {blocked.second} come within '
             f'{blocked.distance:.4f} m'
         )
-    raise TrajectoryError(f'no way to the trajectory was found: {reason}')
+    raise TrajectoryError(f'no free path to the trajectory was found: {reason}')
 
 
 def clear_line(
@@ -133,17 +134,12 @@ class _Tree:
         self.parents.append(nearest)
         return len(self.poses) - 1
 
-    def connect(self, target: FloatArray) -> bool:
-        """Step towards a pose while possible; return whether the pose is reached."""
-        while True:
-            reached = self.grow(target)
-            if reached is None:
-                return False
+    def connect(self, target: FloatArray) -> int | None:
+        """Step towards a pose while possible; return its number in the tree if it is reached."""
+        while (reached := self.grow(target)) is not None:
             if np.array_equal(self.poses[reached], target):
-                if reached != len(self.poses) - 1:
-                    self.poses.append(target)
-                    self.parents.append(reached)
-                return True
+                return reached
+        return None
 
     def branch(self, number: int) -> list[FloatArray]:
         """Return the poses from one pose back to the root."""

@@ -14,9 +14,6 @@ from armid_ros.model import BaseParameters
 from armid_ros.motion import FloatArray, read_only
 import numpy as np
 
-#: Number of reported parameters of a body that an arm picks up: its mass and first moments. The
-#: torque of its inertia about its own centre is small compared with theirs.
-_REPORTED = 4
 #: Relative singular value below which directions count as linearly dependent [-].
 _INDEPENDENT = 1e-6
 
@@ -158,7 +155,9 @@ def _candidate(
     unit = columns / np.where(lengths > 0.0, lengths, 1.0)
     ranks = [np.linalg.matrix_rank(unit[:, :k], _INDEPENDENT) for k in range(len(lengths) + 1)]
     independent = np.flatnonzero(np.diff(ranks)).tolist()
-    kept = [k for k in independent if not names or k < _REPORTED]
+    # Of a body that an arm picks up, mass and first moments are reported. Its inertia about its
+    # own centre has a torque that is small compared with theirs.
+    kept = [k for k in independent if not names or k < 4]
     parameters = names or [base.standard[k] for k in added_to]
     return ChangeCandidate(
         name,

@@ -29,10 +29,11 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 from armid_ros.changes.statistic import quadratic_form
+from armid_ros.estimate import Estimate
 from armid_ros.identification.online.background import Background, Pieces
-from armid_ros.identification.online.change import ChangeCandidate
+from armid_ros.identification.online.change import Change, ChangeCandidate
 from armid_ros.identification.online.null_calibration import NullCalibration
-from armid_ros.identification.online.recursive import Learned, WeightedSample
+from armid_ros.identification.online.recursive import RecursiveLeastSquares, WeightedSample
 from armid_ros.motion import FloatArray
 import numpy as np
 import numpy.typing as npt
@@ -40,24 +41,10 @@ from scipy.linalg import lapack
 
 #: Lengths of the tested windows, in blocks.
 _LENGTHS = (2, 4, 8)
-#: Number of blocks kept: the longest window, and the block before it.
-_KEPT = 9
-#: Number of blocks since a change that contain its torque. With fewer than the first, no change is
-#: named; with the second, it is named despite rivals. Blocks at rest have no friction torque, so
-#: an arm that stops, with the largest errors in its last slow motion, raises no alarm.
-_EARLIEST = 4
+#: Number of blocks with the torque of a change after which it is named despite rivals.
 _LATEST = 6
-#: A block contains a change if its squared torque exceeds this share of the largest block's [-].
-_SHOWS = 0.05
 #: Difference of log-likelihoods above which one explanation is clearly better than another.
 _CLEAR = 5.0
-#: If the log-likelihoods of two onsets differ by less, the later one is taken: soon after a change
-#: there are too few data to distinguish onsets, and every onset before the change fits.
-_ALIKE = 4.0
-#: Time after a change during which its size is still being learned [s]. Another change in it needs
-#: more than this share of the log-likelihood of the first; otherwise it corrects the size.
-_LEARNING = 10.0
-_CORRECTION = 0.3
 #: Eigenvalues of an information matrix below this share of the largest count as zero [-].
 _NOTHING = 1e-9
 
@@ -81,10 +68,8 @@ class Block:
         Information before the stretch, A = R^T R.
     known_along : ndarray, shape (P, Q)
         A D, with the same D.
-    before : Learned
-        State of the estimator with nuisance parameters at the begin.
-    narrow : Learned
-        State of the estimator without nuisance parameters at the begin.
+    before, narrow : RecursiveLeastSquares
+        Estimators with and without nuisance parameters at the begin.
     samples : tuple of WeightedSample
         Samples of the stretch, kept to be learned again.
 
@@ -97,8 +82,8 @@ class Block:
     moved: FloatArray
     known: FloatArray
     known_along: FloatArray
-    before: Learned
-    narrow: Learned
+    before: RecursiveLeastSquares
+    narrow: RecursiveLeastSquares
     samples: tuple[WeightedSample, ...]
 
 
@@ -144,7 +129,7 @@ class ScoreStatistics:
         return values, np.asarray(covariance)
 
 
-def weighing(
+def score_statistics(
     window: Sequence[Block],
     before: Block,
     directions: FloatArray,
@@ -195,34 +180,21 @@ class FoundChange:
 
     Attributes
     ----------
-    blocks : tuple of Block
-        The last blocks of rows.
-    first : int
-        Index of the block that contains the onset.
-    best : ChangeCandidate
-        Candidate that explains the torques best.
-    rivals : tuple of ChangeCandidate
-        Candidates that explain the torques nearly as well.
+    change : Change
+        The change, with its covariance in the usual noise.
+    before : Block
+        The last block before the change.
+    after : sequence of Block
+        The blocks wholly after the change.
     likelihood : float
         Logarithm of the likelihood ratio.
 
     """
 
-    blocks: tuple[Block, ...]
-    first: int
-    best: ChangeCandidate
-    rivals: tuple[ChangeCandidate, ...]
+    change: Change
+    before: Block
+    after: Sequence[Block]
     likelihood: float
-
-    @property
-    def before(self) -> int:
-        """Return the index of the last block before the change."""
-        return max(self.first - 1, 0)
-
-    @property
-    def after(self) -> int:
-        """Return the index of the first block wholly after the change."""
-        return min(self.first + 1, len(self.blocks) - 1)
 
 
 class ChangeSearch:
@@ -266,23 +238,25 @@ class ChangeSearch:
             for size in sorted(set(sizes))
             for some in [np.flatnonzero(self._sizes == size)]
         ]
-        self.believe(chance)
+        self.set_chance(chance)
         self.reset()
 
-    def believe(self, chance: float) -> None:
+    def set_chance(self, chance: float) -> None:
         """Set the false alarm probability; 0 disables detection."""
         self._chance = chance / (len(self._sizes) * len(_LENGTHS))
 
     def reset(self) -> None:
         """Clear the calibration and all blocks."""
         places = {c.joint for c in self._candidates}
-        self._usual = {m: NullCalibration(self._sizes.tolist(), m, len(places)) for m in _LENGTHS}
-        self._fresh = -np.inf, 0.0
+        self._calibrations = {
+            m: NullCalibration(self._sizes.tolist(), m, len(places)) for m in _LENGTHS
+        }
+        self._latest_change = -np.inf, 0.0
         self.interrupt()
 
     def interrupt(self) -> None:
         """Begin a new stretch after an interruption."""
-        self._blocks: deque[Block] = deque(maxlen=_KEPT)
+        self._blocks: deque[Block] = deque(maxlen=_LENGTHS[-1] + 1)
         self._waiting: deque[dict[int, tuple[FloatArray, FloatArray]]] = deque()
 
     def take(self, block: Block, residual_scale: float) -> Pieces[FoundChange | None]:
@@ -299,43 +273,48 @@ class ChangeSearch:
         """
         self._blocks.append(block)
         lengths = [m for m in _LENGTHS if m <= len(self._blocks)]
-        weighed, positive = {}, False
+        statistics, positive = {}, False
         for m in lengths:
             window = yield from self._window(len(self._blocks) - m, residual_scale)
             yield
-            weighed[m] = self._ratios(window), window.strength
+            statistics[m] = self._ratios(window), window.strength
             if self._chance > 0.0:
-                excess = self._usual[m].excess(*weighed[m], self._chance)
+                excess = self._calibrations[m].excess(*statistics[m], self._chance)
                 positive = positive or bool(np.any(excess > 1.0))
             yield
         if positive:
             found = yield from self._judge(residual_scale)
             if found is not None:
-                self._fresh = block.end, found.likelihood
+                self._latest_change = block.end, found.likelihood
                 self.interrupt()
                 return found
-        self._waiting.append(weighed)
+        self._waiting.append(statistics)
         if len(self._waiting) > _LENGTHS[-1]:  # a change in it would have been named by now
             for m, values in self._waiting.popleft().items():
-                self._work.begin(self._usual[m].learning(*values))
+                self._work.begin(self._calibrations[m].update(*values))
         return None
 
     def size(
-        self, found: FoundChange, residual_scale: float
-    ) -> Pieces[tuple[FloatArray, FloatArray]]:
-        """Return the size of a change and its covariance."""
-        before, after = found.blocks[found.before], found.blocks[found.after :]
-        window = yield from weighing(after, before, self.directions, residual_scale)
+        self,
+        candidate: ChangeCandidate,
+        before: Block,
+        after: Sequence[Block],
+        residual_scale: float,
+    ) -> Pieces[Estimate]:
+        """Return the size of a change between a block and later blocks."""
+        window = yield from score_statistics(after, before, self.directions, residual_scale)
         yield
-        number = self._candidates.index(found.best)
+        number = self._candidates.index(candidate)
         values, covariance = window.size(self._slices[number])
-        usual = np.fmax.reduce([u.factors[number] for u in self._usual.values()], initial=1.0)
-        return values, covariance * usual
+        usual = np.fmax.reduce(
+            [u.factors[number] for u in self._calibrations.values()], initial=1.0
+        )
+        return Estimate(candidate.parameters, values, covariance * usual)
 
     def _window(self, first: int, residual_scale: float) -> Pieces[ScoreStatistics]:
         """Compute the statistics of the window from block `first` to the last one."""
         blocks = list(self._blocks)[first:]
-        return weighing(blocks, blocks[0], self.directions, residual_scale)
+        return score_statistics(blocks, blocks[0], self.directions, residual_scale)
 
     def _ratios(self, window: ScoreStatistics) -> FloatArray:
         ratios = np.empty(len(self._candidates))
@@ -352,24 +331,28 @@ class ChangeSearch:
             rows.append(self._ratios(window))
             yield
         # log-likelihoods, with a penalty for each free parameter
-        usual = np.nanmedian(np.concatenate([u.factors for u in self._usual.values()]))
+        usual = np.nanmedian(np.concatenate([u.factors for u in self._calibrations.values()]))
         observations = sum(len(block.samples) for block in self._blocks)
         likelihood = np.array(rows) / (2.0 * usual) - 0.5 * self._sizes * np.log(observations)
         at = likelihood.max(axis=0)
         best = int(np.argmax(at))
-        first = int(np.flatnonzero(likelihood[:, best] > at[best] - _ALIKE)[-1])
-        # number of blocks since the onset that contain the torque of the candidate
+        # Soon after a change there are too few data to distinguish onsets, and every onset before
+        # the change fits. The last onset is taken whose log-likelihood is lower by less than 4.
+        first = int(np.flatnonzero(likelihood[:, best] > at[best] - 4.0)[-1])
+        # Number of blocks since the onset that contain the torque of the candidate: at least 5 %
+        # of the squared torque of the largest block. Blocks at rest have no friction torque, so an
+        # arm that stops, with the largest errors in its last slow motion, raises no alarm.
         some = self._slices[best]
         directions = self.directions[:, some]
         moved = [one.moved[:, some] for one in self._blocks]
         strength = np.array([np.einsum('pq,pq->q', directions, one) for one in moved])
-        shows = np.any(strength > _SHOWS * strength.max(axis=0), axis=1)
+        shows = np.any(strength > 0.05 * strength.max(axis=0), axis=1)
         seen = int(np.count_nonzero(shows[first:]))
-        # soon after a change, a correction of its size is not another change
-        t, before = self._fresh
-        soon = self._blocks[-1].end - t < _LEARNING
-        least = max(_CLEAR, _CORRECTION * before) if soon else _CLEAR
-        if not (at[best] > least and seen >= _EARLIEST):
+        # The size of a change is learned for 10 s. In this time another change needs 0.3 times the
+        # log-likelihood of the first one; otherwise it is a correction of the size.
+        t, before = self._latest_change
+        least = max(_CLEAR, 0.3 * before) if self._blocks[-1].end - t < 10.0 else _CLEAR
+        if not (at[best] > least and seen >= 4):
             return None
         alike = [self._candidates[k] for k in np.flatnonzero(at > max(at[best] - _CLEAR, 0.0))]
         # a load is preferred among equally likely candidates: arms often pick things up
@@ -377,4 +360,8 @@ class ChangeSearch:
         rivals = tuple(c for c in alike if not (c.includes(named) or named.includes(c)))
         if rivals and seen < _LATEST:
             return None
-        return FoundChange(tuple(self._blocks), first, named, rivals, float(at[best]))
+        blocks = list(self._blocks)
+        last, since = blocks[max(first - 1, 0)], blocks[min(first + 1, len(blocks) - 1) :]
+        size = yield from self.size(named, last, since, residual_scale)
+        change = Change(named, rivals, blocks[first].begin, size)
+        return FoundChange(change, last, since, float(at[best]))

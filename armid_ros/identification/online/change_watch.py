@@ -23,16 +23,11 @@ from typing import NamedTuple, TypeVar
 
 from armid_ros.arm import ArmModel
 from armid_ros.effects import CATALOGUE
-from armid_ros.estimate import Estimate
 from armid_ros.identification.online.background import at_once, Background, Job, Pieces
 from armid_ros.identification.online.change import Change, ChangeCandidate
 from armid_ros.identification.online.change_search import Block, ChangeSearch, FoundChange
 from armid_ros.identification.online.null_calibration import BLOCKS, ResidualScale
-from armid_ros.identification.online.recursive import (
-    Learned,
-    RecursiveLeastSquares,
-    WeightedSample,
-)
+from armid_ros.identification.online.recursive import RecursiveLeastSquares, WeightedSample
 from armid_ros.identification.rows.causal import CausalMotion, TripleLag
 from armid_ros.motion import FloatArray, Motion
 import numpy as np
@@ -141,7 +136,7 @@ class _Stretch:
     """Rows that are not searched yet; `end` is None before an interruption."""
 
     begin: float
-    narrow: Learned
+    narrow: RecursiveLeastSquares
     end: float | None = None
     rows: list[Row] = field(default_factory=list)
 
@@ -181,7 +176,7 @@ class ChangeWatch:
         self._estimator = estimator
         self._nuisance = nuisance
         self._wider = estimator.with_more(nuisance.parameters)
-        self._own = len(estimator.parameters)
+        self._count = len(estimator.parameters)
         self._work = work
         self._search = ChangeSearch(
             candidates,
@@ -199,10 +194,9 @@ class ChangeWatch:
         self._residual_scale = ResidualScale(
             _LEAST_NOISE if self._estimator.noise_is_relative else 1.0
         )
-        self._left: deque[float] = deque(maxlen=BLOCKS)
+        self._fit_ratios: deque[float] = deque(maxlen=BLOCKS)
         self._open: _Stretch | None = None
-        self._unseen: deque[_Stretch] = deque()
-        self._late: list[Row] | None = None
+        self._queued: deque[_Stretch] = deque()
         self._searching = False
 
     def use(self, false_alarm_time: float | None, forgetting: float) -> None:
@@ -217,59 +211,63 @@ class ChangeWatch:
             Forgetting factor of the estimator.
 
         """
-        self._search.believe(0.0 if false_alarm_time is None else BLOCK / false_alarm_time)
+        self._search.set_chance(0.0 if false_alarm_time is None else BLOCK / false_alarm_time)
         self._wider.forgetting = forgetting
 
     def interrupt(self) -> None:
         """Begin a new stretch of rows after an interruption."""
-        if self._late is None:
-            self._open = self._open or _Stretch(0.0, self._estimator.learned())
-            self._hand_over(None)
+        self._open = self._open or _Stretch(0.0, self._estimator.copied())
+        self._queue(None)
 
     def update(self, row: Row) -> None:
         """Update the estimator with one row; see ``RecursiveLeastSquares.update``."""
         if self._open is not None and row.t - self._open.begin >= BLOCK:
-            self._hand_over(row.t)
-        if self._late is not None:  # a change was named, and the rows since then are learned again
-            self._late.append(row)
-        else:
-            if self._open is None:
-                self._open = _Stretch(row.t, self._estimator.learned())
-            self._open.rows.append(row)
+            self._queue(row.t)
+        if self._open is None:
+            self._open = _Stretch(row.t, self._estimator.copied())
+        self._open.rows.append(row)
         self._estimator.update(*row.sample)
 
     def _among_all(self, directions: FloatArray) -> FloatArray:
         """Extend directions by zeros for the nuisance parameters."""
-        more = len(self._wider.parameters) - self._own
+        more = len(self._wider.parameters) - self._count
         return np.vstack([directions, np.zeros((more, directions.shape[1]))])
 
-    def _hand_over(self, end: float | None) -> None:
+    def _queue(self, end: float | None) -> None:
         """Queue the open stretch for the search."""
         assert self._open is not None
         self._open.end = end
-        self._unseen.append(self._open)
+        self._queued.append(self._open)
         self._open = None
         if not self._searching:
             self._searching = True
-            self._work.begin(self._see(), urgent=True)
+            self._work.begin(self._search_queue(), urgent=True)
 
-    def _see(self) -> Job:
+    def _search_queue(self) -> Job:
         """Search the queued stretches."""
         try:
-            while self._unseen:
-                stretch = self._unseen.popleft()
+            while self._queued:
+                stretch = self._queued.popleft()
                 samples = yield from self._widened(stretch.rows)
-                before = self._wider.learned()
+                before = self._wider.copied()
                 yield from self._learn(self._wider, samples)
                 if stretch.end is None:
                     self._search.interrupt()
                     continue
                 block = yield from self._summed(stretch, stretch.end, samples, before)
-                found = yield from self._search.take(block, self._residual_scale_of_all)
+                mean = float(np.exp(np.mean(np.log(self._residual_scale.value))))
+                found = yield from self._search.take(block, mean)
                 if found is not None:
                     yield from self._name(found)
         finally:
             self._searching = False
+
+    def _unsearched(self) -> list[Row]:
+        """Take all rows that are not searched yet."""
+        stretches = (*self._queued, *([self._open] if self._open else ()))
+        self._queued.clear()
+        self._open = None
+        return [row for part in stretches for row in part.rows]
 
     def _learn(self, estimator: RecursiveLeastSquares, samples: Sequence[WeightedSample]) -> Job:
         for part in _parts(samples, self._at_a_time):
@@ -293,7 +291,11 @@ class ChangeWatch:
         return samples
 
     def _summed(
-        self, stretch: _Stretch, end: float, samples: Sequence[WeightedSample], before: Learned
+        self,
+        stretch: _Stretch,
+        end: float,
+        samples: Sequence[WeightedSample],
+        before: RecursiveLeastSquares,
     ) -> Pieces[Block]:
         """Sum up the rows of a block, projected on the candidate changes."""
         residual_scale, residuals, squares = self._residual_scale.value, [], 0.0
@@ -311,7 +313,7 @@ class ChangeWatch:
         weights = np.stack([sample.weights for sample in samples])
         self._residual_scale.learn(np.concatenate(residuals), weights)
         if weights.any():
-            self._left.append(squares / float(np.sum(weights)))
+            self._fit_ratios.append(squares / float(np.sum(weights)))
         yield
         moved = information @ self._search.directions
         yield
@@ -330,60 +332,42 @@ class ChangeWatch:
             samples=tuple(samples),
         )
 
-    @property
-    def _residual_scale_of_all(self) -> float:
-        return float(np.exp(np.mean(np.log(self._residual_scale.value))))
-
     def _name(self, found: FoundChange) -> Job:
-        """Report a change, and restart without information on the changed parameters."""
-        values, covariance = yield from self._search.size(found, self._residual_scale_of_all)
-        yield
-        size = Estimate(found.best.parameters, values, covariance)
-        change = Change(found.best, found.rivals, found.blocks[found.first].begin, size)
-        yield from self._learn_again(found, change.reopened)
-        # A change shakes the arm, and the parameters were not learned from such motion: the
-        # covariance grows by the ratio of squared residuals to the usual ones.
-        squares = count = 0.0
-        for block in found.blocks[found.after :]:
-            rows, tau, weights = (np.stack(part) for part in zip(*block.samples, strict=True))
-            residual = self._estimator.scale(weights) * (tau - rows @ self._wider.values)
-            squares += float(np.sum((residual / self._residual_scale.value) ** 2))
-            count += float(np.sum(weights))
-            yield
-        louder, free = 1.0, change.reopened.shape[1]
-        if self._left and count > free:
-            louder = max(1.0, squares / (count - free) / float(np.median(self._left)))
-        self.changes.append(
-            replace(change, size=replace(size, covariance=louder * size.covariance))
-        )
-
-    def _learn_again(self, found: FoundChange, reopened: FloatArray) -> Job:
-        """Restart from the state before a change, without information on changed parameters."""
-        last = found.blocks[found.before]
-        since = [sample for block in found.blocks[found.after :] for sample in block.samples]
-        stretches = (*self._unseen, *([self._open] if self._open else ()))
-        self._unseen.clear()
-        self._open, self._late = None, []
-        since += yield from self._widened([row for part in stretches for row in part.rows])
+        """Restart from before a change, without the changed parameters, and report the change."""
+        change, size, reopened = found.change, found.change.size, found.change.reopened
         again = copy(self._estimator)
         for estimator, known, directions in (
-            (self._wider, last.before, self._among_all(reopened)),
-            (again, last.narrow, reopened),
+            (self._wider, found.before.before, self._among_all(reopened)),
+            (again, found.before.narrow, reopened),
         ):
             estimator.restore(known)
             estimator.reopen(directions)
             yield
+        since = [sample for block in found.after for sample in block.samples]
         yield from self._learn_both(again, since)
-        while len(self._late) > self._at_a_time:
-            late, self._late = self._late, []
-            yield from self._learn_both(again, (yield from self._widened(late)))
-        at_once(self._learn_both(again, at_once(self._widened(self._late))))
-        self._late = None
-        self._estimator.restore(again.learned())
+        while len(rows := self._unsearched()) > self._at_a_time:
+            yield from self._learn_both(again, (yield from self._widened(rows)))
+        at_once(self._learn_both(again, at_once(self._widened(rows))))
+        self._estimator.restore(again)
+        # A change shakes the arm, and the parameters were not learned from such motion: the
+        # covariance grows by the ratio of squared residuals to the usual ones.
+        squares = count = 0.0
+        for block in found.after:
+            columns, tau, weights = (np.stack(part) for part in zip(*block.samples, strict=True))
+            residual = self._estimator.scale(weights) * (tau - columns @ self._wider.values)
+            squares += float(np.sum((residual / self._residual_scale.value) ** 2))
+            count += float(np.sum(weights))
+            yield
+        factor, free = 1.0, reopened.shape[1]
+        if self._fit_ratios and count > free:
+            factor = max(1.0, squares / (count - free) / float(np.median(self._fit_ratios)))
+        self.changes.append(
+            replace(change, size=replace(size, covariance=factor * size.covariance))
+        )
 
     def _learn_both(self, again: RecursiveLeastSquares, samples: Sequence[WeightedSample]) -> Job:
         yield from self._learn(self._wider, samples)
-        own = [sample._replace(rows=sample.rows[:, : self._own]) for sample in samples]
+        own = [sample._replace(rows=sample.rows[:, : self._count]) for sample in samples]
         yield from self._learn(again, own)
 
 

@@ -10,11 +10,6 @@ from armid_ros.motion import FloatArray
 from armid_ros.robots import Robot
 import numpy as np
 
-#: A longer silence is a stopped stream without missing samples [s].
-_SILENCE = 10.0
-#: A timestamp that is further back belongs to a restarted clock [s].
-_BEHIND = 1.0
-
 
 class StreamChecks:
     """
@@ -95,11 +90,13 @@ class MissingSamples:
     def take(self, t: float, period: float | None) -> None:
         """Add a timestamp [s], with the sampling period if known."""
         last = self._last
-        if last is not None and last - _BEHIND < t <= last:
+        # a timestamp that is more than 1 s back belongs to a restarted clock
+        if last is not None and last - 1.0 < t <= last:
             self._came_late()
             return
         self._last = t
-        if last is None or period is None or not 0.0 < t - last < _SILENCE:
+        # a silence of 10 s is a stopped stream without missing samples
+        if last is None or period is None or not 0.0 < t - last < 10.0:
             self._doubtful = 0
             return
         steps = (t - last) / period

@@ -140,7 +140,7 @@ class OnlineIdentifier:
         self._row_filter = TripleLag(settings.cutoff)
         self._row_period = 1.0 / settings.rows_per_second()
         self._work = Background()
-        self._crowded = False
+        self._had_row = False
         self._estimator = RecursiveLeastSquares(
             self.base.parameters,
             sensor_noise(robot, settings.torque_noise),
@@ -156,7 +156,7 @@ class OnlineIdentifier:
             self._watch = ChangeWatch(
                 self._estimator, *watched, settings.false_alarm_time, self._work
             )
-        self._forget()
+        self._clear_estimate()
         self._data = robot.model.createData()
         held = {joint for e in arm.effects if e.holds_at_rest for joint in e.joints}
         self._held = np.array([joint in held for joint in robot.joints])
@@ -169,15 +169,15 @@ class OnlineIdentifier:
     def reset(self) -> None:
         """Clear the estimate and all counters."""
         self._work.clear()
-        self._forget()
+        self._clear_estimate()
         self._filter.reset()
         self._checks.reset()
         self._missing.reset()
         self._gate.reset()
 
-    def _forget(self) -> None:
+    def _clear_estimate(self) -> None:
         """Clear the estimate; no background job may be pending."""
-        self._waiting: tuple[Row, FloatArray] | None = None  # with its innovation
+        self._pending: tuple[Row, FloatArray] | None = None  # with its innovation
         self._reopened = 0
         self.latest: tuple[OnlineSample, ...] = ()
         # of residuals: weighted squares, their weights, and the standard deviation
@@ -208,34 +208,34 @@ class OnlineIdentifier:
             None between rows, while the filters settle, and for a sample that is left out.
 
         """
-        learned = self._settle()
+        added = self._add_pending_row()
         signal = self._filter.signal(t, q, dq, tau)
         self.latest = ()
         if signal is not None:
             self._missing.take(t, self._filter.period)
-            good = self._gate.take(t, signal, self._without_consequence)
-            found = [self._take(sample) for sample in good]
+            good = self._gate.take(t, signal, self._negligible_error)
+            found = [self._process(sample) for sample in good]
             self.latest = tuple(one for one in found if one is not None)
         # background work runs with samples that bring no other work, if there are any
         period = self._filter.period or 0.0
         if self.latest:
-            busy = not self._crowded
+            busy = not self._had_row
         else:
-            busy = learned and _SPARE * period <= self._row_period
+            busy = added and _SPARE * period <= self._row_period
         if not busy:
-            self._settle()
+            self._add_pending_row()
             # pieces per second, at least
             self._work.advance(max(1, round(400.0 * period)))
-        self._crowded = bool(self.latest)
+        self._had_row = bool(self.latest)
         return self.latest[-1] if self.latest else None
 
     def __getstate__(self) -> dict[str, Any]:
         """Finish pending jobs, as generators cannot be copied."""
-        self._settle()
+        self._add_pending_row()
         self._work.finish()
         return self.__dict__
 
-    def _take(self, sample: StreamSample) -> OnlineSample | None:
+    def _process(self, sample: StreamSample) -> OnlineSample | None:
         """Filter a good sample, which may begin a stretch; return the new row or None."""
         if sample.begins:
             self._filter.restart('position_step')
@@ -246,7 +246,7 @@ class OnlineIdentifier:
         if self._filter.generation != self._generation:
             # the row filter starts anew, together with the motion filter
             self._row_filter.reset()
-            self._settle()
+            self._add_pending_row()
             self._scores.interrupt()
             if self._watch is not None:
                 self._watch.interrupt()
@@ -264,18 +264,18 @@ class OnlineIdentifier:
         self._last_row = motion.t
         used = motion.t - self._last_useless > _FORGOTTEN / self._row_filter.pole
         usable = not (self._checks.silent or self._checks.error)
-        return self._learn(motion, step, used & usable, begins)
+        return self._new_row(motion, step, used & usable, begins)
 
     def estimate(self) -> Estimate:
         """Return base parameters and covariance, with autocorrelated errors included."""
-        self._settle()
+        self._add_pending_row()
         estimate = self._estimator.estimate
-        covariance = self._scores.covariance(self._estimator.learned().root)
+        covariance = self._scores.covariance(self._estimator.root)
         return estimate if covariance is None else replace(estimate, covariance=covariance)
 
     def model(self) -> ArmModel:
         """Return the arm with the estimate; unidentified directions stay unchanged."""
-        self._settle()
+        self._add_pending_row()
         return self.arm.with_theta(self.base.lift(self._estimator.values, self.arm.theta))
 
     def check(self, settings: OnlineSettings) -> None:
@@ -317,7 +317,7 @@ class OnlineIdentifier:
         self.check(settings)
         self.settings = settings
         self._filter.max_gap = settings.max_gap
-        self._settle()
+        self._add_pending_row()
         self._estimator.forgetting = self._scores.forgetting = settings.forgetting
         if self._watch is not None:
             self._watch.use(settings.false_alarm_time, settings.forgetting)
@@ -330,13 +330,13 @@ class OnlineIdentifier:
     @property
     def condition_number(self) -> float:
         """Condition number of the weighted regressor so far; takes a millisecond."""
-        self._settle()
+        self._add_pending_row()
         return self._estimator.condition_number
 
     @property
     def samples(self) -> int:
         """Return the number of samples in the estimate."""
-        self._settle()
+        self._add_pending_row()
         return self._estimator.samples
 
     @property
@@ -373,7 +373,7 @@ class OnlineIdentifier:
         pole = self._filter.pole
         return None if pole is None else 3.0 / pole + self._row_filter.delay
 
-    def _learn(
+    def _new_row(
         self, motion: CausalMotion, step: float, used: npt.NDArray[np.bool_], begins: bool
     ) -> OnlineSample:
         state = (motion.q[None], motion.dq[None], motion.ddq[None])
@@ -392,16 +392,16 @@ class OnlineIdentifier:
         stamp = motion.t - (self.delay or 0.0)
         weights = np.asarray(used * independent)
         sample = WeightedSample(rows / gain, measured / gain, weights)
-        self._settle()
+        self._add_pending_row()
         innovation = sample.tau - sample.rows @ self._estimator.values
-        self._waiting = Row(stamp, sample, motion, step, gain, begins), innovation
+        self._pending = Row(stamp, sample, motion, step, gain, begins), innovation
         return OnlineSample(stamp, measured, measured - innovation * gain, used)
 
-    def _settle(self) -> bool:
+    def _add_pending_row(self) -> bool:
         """Update the estimate with the pending row; return whether there was one."""
-        if self._waiting is None:
+        if self._pending is None:
             return False
-        (row, innovation), self._waiting = self._waiting, None
+        (row, innovation), self._pending = self._pending, None
         sample, estimator = row.sample, self._estimator
         if self._watch is None:
             estimator.update(*sample)
@@ -420,7 +420,7 @@ class OnlineIdentifier:
         return True
 
     @property
-    def _without_consequence(self) -> FloatArray:
+    def _negligible_error(self) -> FloatArray:
         """Return the largest negligible error of one sample; 0 for all but torques."""
         n = self.arm.robot.n_joints
         floor = np.zeros((3 if self.settings.measured_velocity else 2) * n)

@@ -14,15 +14,8 @@ from armid_ros.model import BaseParameters, inverse_dynamics, random_motion
 from armid_ros.motion import FloatArray
 import numpy as np
 
-#: A parameter is identified if it makes a torque uncertain by less than this share of the usual.
-_KNOWN = 0.1
-#: Progress: a standard deviation falls within this time [s] below this share of its value.
+#: Time in which a standard deviation has to fall [s].
 _WAIT = 10.0
-_LEARNED = 0.9
-#: Uncertainty of a torque, over the usual torque, above which nothing is identified yet. There,
-#: standard deviations depend on the noise alone and have to fall below this share.
-_NOTHING = 100.0
-_BEGUN = 0.5
 #: Largest number of joints in the message.
 _NAMED = 3
 #: Unit of a kind of rigid parameter, its name, and the motion that identifies it.
@@ -95,7 +88,7 @@ class LearningProgress:
         """Clear all estimates."""
         self._past.clear()
 
-    def look(self, t: float, estimate: Estimate) -> tuple[Unlearned, ...]:
+    def unidentified(self, t: float, estimate: Estimate) -> tuple[Unlearned, ...]:
         """
         Return the unidentified quantities of each joint that made no progress for ten seconds.
 
@@ -115,15 +108,18 @@ class LearningProgress:
         if self._past[0][0] > t - _WAIT:
             return ()
         # the usual torque of a joint: that of the described links, and that of the effects (mainly
-        # friction) as far as their estimates exceed their uncertainty
-        # what is certain to two standard deviations
+        # friction) as far as their estimates exceed two standard deviations
         known = np.maximum(np.abs(estimate.values) - 2.0 * estimate.std, 0.0)
         effects = self._size * np.where(self._of_effects, known, 0.0)
         usual = np.sqrt(self._rigid**2 + np.sum(effects**2, axis=1))
         share = self._size / np.maximum(usual, 1e-3 * usual.max())[:, np.newaxis]
         unknown = share.max(axis=0) * estimate.std
-        learned = np.where(unknown > _NOTHING, _BEGUN, _LEARNED)
-        stuck = (unknown > _KNOWN) & (estimate.std > learned * self._past[0][1])
+        # A parameter is identified if a torque is uncertain by less than a tenth of the usual one.
+        # It makes progress if its standard deviation falls to 0.9 of its value. With a torque
+        # uncertain by 100 times the usual one, the deviation depends on the noise alone and has to
+        # fall to 0.5.
+        progress = np.where(unknown > 100.0, 0.5, 0.9)
+        stuck = (unknown > 0.1) & (estimate.std > progress * self._past[0][1])
         by_joint: dict[str, list[int]] = {}
         for k in sorted(np.flatnonzero(stuck).tolist(), key=lambda k: -float(unknown[k])):
             by_joint.setdefault(estimate.parameters[k].joint, []).append(k)

@@ -15,30 +15,19 @@ from __future__ import annotations
 from collections.abc import Iterator, Sequence
 
 from armid_ros.changes.statistic import limits, MEDIAN_SQUARE
-from armid_ros.identification.online.background import Job, Pieces
+from armid_ros.identification.online.background import Job
 from armid_ros.motion import FloatArray
 import numpy as np
 from scipy import stats
 
 #: Number of windows kept: ten minutes at four windows per second.
 _MEMORY = 2400
-#: New windows after which the factors are computed again, and the same as a share of all windows.
-_EVERY = 8
-_SHARE = 0.05
 #: Tail probability of the quantile to which larger statistics are limited in the mean.
 _TAIL = 0.05
 #: Tail probability of the quantile that shows whether large statistics are too frequent.
 _RARE = 0.01
-#: Smallest standard deviation between the logarithms of the factors.
-_LEAST_SPREAD = 0.1
-#: Allowance for a next motion with more model discrepancy than the motions before [-].
-_MARGIN = 1.3
-#: Smallest number of independent windows for a test.
-_FEWEST = 12.0
 #: Number of blocks kept: one minute at four blocks per second.
 BLOCKS = 240
-#: Number of blocks after which the measured noise replaces the assumed one.
-_FEWEST_BLOCKS = 16
 
 
 class History:
@@ -121,7 +110,7 @@ class NullCalibration:
         self.factors = np.full(len(sizes), np.nan)
         self._freedom = np.zeros(len(sizes))
 
-    def learning(self, ratios: FloatArray, strength: FloatArray) -> Job:
+    def update(self, ratios: FloatArray, strength: FloatArray) -> Job:
         """
         Update the factors with a window without a change; yield between pieces of the work.
 
@@ -138,7 +127,7 @@ class NullCalibration:
         self._ratios.append(ratios)
         self._strengths.append(strength)
         self._fresh += 1
-        if self._fresh < max(_EVERY, _SHARE * len(self._ratios)):
+        if self._fresh < max(8, 0.05 * len(self._ratios)):  # often enough
             return
         self._fresh = 0
         yield
@@ -147,13 +136,13 @@ class NullCalibration:
             some = strengths[:, columns]
             self._strength[columns] = np.quantile(some, 0.9, axis=0)
             yield
-        yield from self._look(self._ratios.values[len(self._ratios) // 4 :])
+        yield from self._fit_factors(self._ratios.values[len(self._ratios) // 4 :])
 
-    def _look(self, later: FloatArray) -> Job:
+    def _fit_factors(self, later: FloatArray) -> Job:
         """Compute the factors from statistics of later windows, where 0 means no data."""
         counts = np.sum(later > 0.0, axis=0)
         independent = counts / self._overlap
-        judged = independent >= _FEWEST
+        judged = independent >= 12.0  # fewer independent windows permit no test
         if not judged.any():
             return
         single = np.full(len(self._sizes), np.nan)
@@ -170,33 +159,23 @@ class NullCalibration:
         value, variance = single[judged], self._variance[judged] / independent[judged]
         middle = float(np.average(value, weights=1.0 / variance))
         apart = float(np.average((value - middle) ** 2 - variance, weights=1.0 / variance))
-        spread = max(apart, _LEAST_SPREAD**2)
+        spread = max(apart, 0.1**2)  # smallest variance between the logarithms of the factors
         middle = float(np.average(value, weights=1.0 / (variance + spread)))
         drawn = variance / (variance + spread)
         left = drawn * spread + drawn**2 * np.mean(variance + spread) / self._sources
         factors = np.full(len(self._sizes), np.nan)
         factors[judged] = np.exp(value + drawn * (middle - value)).clip(1.0)
         yield
-        tail = yield from self._tail_of(later[:, judged], (factors * self._rare)[judged])
+        # 99 % quantile of the statistics, each over its quantile in white noise; zeros are no data
+        relative = (later[:, judged] / (factors * self._rare)[judged]).ravel()
+        count = np.count_nonzero(relative)
+        place = len(relative) - count + (1.0 - _RARE) * (count - 1)
+        largest = np.sort(np.partition(relative, int(place))[int(place) :])
+        tail = float(np.interp(place % 1.0, np.arange(len(largest)), largest))
         self.factors, self._tail = factors, max(1.0, tail)
         self._freedom = np.zeros(len(self._sizes))
         self._freedom[judged] = 2.0 / left  # a mean square of k degrees varies by 2 / k
         self._limits = None
-
-    @staticmethod
-    def _tail_of(seen: FloatArray, rare: FloatArray) -> Pieces[float]:
-        """Return the 99 % quantile of the statistics, each over its quantile in white noise."""
-        count = int(np.sum(seen > 0.0))
-        most = count - int((1.0 - _RARE) * (count - 1))  # the quantile is among so many largest
-        largest = np.empty(0)
-        for columns in _in_pieces(seen):
-            relative = (seen[:, columns] / rare[columns]).reshape(-1)
-            largest = np.concatenate([largest, relative])
-            if len(largest) > most:
-                largest = np.partition(largest, len(largest) - most)[-most:]
-            yield
-        place = (1.0 - _RARE) * (count - 1) - (count - len(largest))
-        return float(np.interp(place, np.arange(len(largest)), np.sort(largest)))
 
     def excess(self, ratios: FloatArray, strength: FloatArray, chance: float) -> FloatArray:
         """
@@ -208,7 +187,7 @@ class NullCalibration:
         Parameters
         ----------
         ratios, strength : ndarray
-            Statistics of one window, as in `learning`.
+            Statistics of one window, as in `update`.
         chance : float
             Probability of a false alarm of each statistic.
 
@@ -219,7 +198,8 @@ class NullCalibration:
         result = np.zeros(len(self._sizes))
         relative = strength / self._strength.clip(1e-100)
         stronger = np.maximum.reduceat(relative, self._first).clip(1.0)
-        usual = 1.0 + (_MARGIN * self._tail * self.factors[judged] - 1.0) * stronger[judged]
+        # the next motion may have 1.3 times the model discrepancy of the motions before
+        usual = 1.0 + (1.3 * self._tail * self.factors[judged] - 1.0) * stronger[judged]
         result[judged] = ratios[judged] / (usual * self._limits[1])
         return result
 
@@ -264,7 +244,7 @@ class ResidualScale:
         if self._seen is None:
             self._seen = History(len(squares), BLOCKS)
         self._seen.append(np.where(used > 0, squares / np.maximum(used, 1), np.nan))
-        if len(self._seen) < _FEWEST_BLOCKS:
+        if len(self._seen) < 16:  # with fewer blocks, the assumed noise is better
             return
         later = self._seen.values[len(self._seen) // 2 :]
         known = np.any(later > 0.0, axis=0)

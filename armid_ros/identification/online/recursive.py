@@ -19,12 +19,11 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from copy import copy
-from dataclasses import dataclass
 from typing import NamedTuple
 
 from armid_ros.errors import IdentificationError
 from armid_ros.estimate import Estimate, ParameterName
-from armid_ros.motion import FloatArray, read_only
+from armid_ros.motion import FloatArray
 import numpy as np
 import numpy.typing as npt
 from scipy.linalg import lapack
@@ -34,38 +33,9 @@ SMALLEST_FORGETTING = 0.9
 #: Standard deviation of every parameter before the first sample, in its SI unit. Robots have
 #: parameters of 1e-4 to 1e3; a parameter that the data do not identify keeps this deviation.
 PRIOR_STD = 1e6
-#: Loss of information over that of exponential forgetting, as samples with little information lose
-#: less. A step of the Coulomb friction of a moving 7-joint arm is followed as with exponential
-#: forgetting: 63 % in 8 s and 90 % in 28 s with a memory of 10 s.
-_LOSS_RATIO = 2.0
 #: Largest share of the old information that one sample may remove in any direction [-].
 _LARGEST_LOSS = 0.5
 _BLOCK = 8  # columns of a Householder block; the fastest for 60 to 120 parameters
-
-
-@dataclass(frozen=True, eq=False)
-class Learned:
-    """
-    Saved state of an estimator.
-
-    Attributes
-    ----------
-    root : ndarray, shape (P, P)
-        Upper triangle R; the information is R^T R.
-    values : ndarray, shape (P,)
-        Estimated parameters.
-    squares, freedom : float
-        Weighted squares of the residuals, and observations beyond the parameters.
-    samples : int
-        Samples used.
-
-    """
-
-    root: FloatArray
-    values: FloatArray
-    squares: float
-    freedom: float
-    samples: int
 
 
 class WeightedSample(NamedTuple):
@@ -241,17 +211,17 @@ class RecursiveLeastSquares:
         """Return the factors that whiten rows of given weights, shape (m,) [1/(N m)]."""
         return np.asarray(np.sqrt(weights) / self._noise)
 
-    def learned(self) -> Learned:
-        """Return the present state."""
-        return Learned(
-            read_only(self._root), self._values, self._squares, self._freedom, self.samples
-        )
+    def copied(self) -> RecursiveLeastSquares:
+        """Return a copy, which later updates do not change."""
+        other = copy(self)
+        other._root, other._right = self._root.copy('F'), self._right.copy('F')
+        return other
 
-    def restore(self, learned: Learned) -> None:
-        """Restore a saved state."""
-        self._take(np.array(learned.root, order='F'), learned.values)
-        self._squares, self._freedom = learned.squares, learned.freedom
-        self.samples = learned.samples
+    def restore(self, other: RecursiveLeastSquares) -> None:
+        """Continue from the state of another estimator of the same parameters."""
+        self._take(other._root.copy('F'), other._values)
+        self._squares, self._freedom = other._squares, other._freedom
+        self.samples = other.samples
 
     def reopen(self, directions: FloatArray) -> None:
         """
@@ -276,6 +246,11 @@ class RecursiveLeastSquares:
         check_forgetting(factor)
         self._forgetting = factor
         self._take(self._root, self._values)  # R theta is not kept up while samples are forgotten
+
+    @property
+    def root(self) -> FloatArray:
+        """Upper triangle R of the information R^T R, shape (P, P); updates overwrite it."""
+        return self._root
 
     @property
     def values(self) -> FloatArray:
@@ -336,7 +311,10 @@ def replaced(root: FloatArray, rows: FloatArray, forgetting: float) -> FloatArra
     """
     whitened, _ = lapack.dtrtrs(root, rows.T, trans=1)
     gains, directions = np.linalg.eigh(whitened.T @ whitened)
-    budget = _LOSS_RATIO * (1.0 - forgetting) * len(root)
+    # Twice the loss of exponential forgetting, as samples with little information lose less. Steps
+    # of the Coulomb friction of a moving 7-joint arm are then followed as with exponential
+    # forgetting: 63 % in 8 s and 90 % in 28 s with a memory of 10 s.
+    budget = 2.0 * (1.0 - forgetting) * len(root)
     # the level at which the gains, ascending and limited to it, add up to the budget
     some = np.maximum(gains, 0.0)
     levels = (budget - np.append(0.0, np.cumsum(some[:-1]))) / np.arange(len(some), 0, -1)

@@ -4,27 +4,23 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
-
 from armid_ros.arm import ArmModel, load_model
 from armid_ros.effects import make_effect, USUAL_EFFECTS
 from armid_ros.errors import TrajectoryError
 from armid_ros.excitation import (
-    ClearanceModel,
     CollisionScene,
     design,
     DesignSettings,
     Excitation,
-    excitation_faults,
     Limits,
     load_excitation,
     SPEED_CLASSES,
     trajectory_faults,
-    transfer_limits,
     TransferPlanner,
     whole_period,
     with_joint_limits,
 )
+from armid_ros.excitation.feasibility import excitation_faults
 from armid_ros.files import reading
 from armid_ros.nodes.parameters.table import NodeParameter, Values
 from armid_ros.robots import load_arms, load_robot
@@ -237,9 +233,7 @@ def make_planner(value: Values) -> tuple[TransferPlanner, tuple[str, ...]]:
     robot = with_joint_limits(robot, value('joint_limits'), value('velocity'))
     arm = load_model(value('model'), robot) if value('model') else ArmModel(robot)
     scene = CollisionScene.of(robot, value('clearance'), value('floor'), value('environment'))
-    limits = transfer_limits(arm.robot, value('speed'))
-    clearance = ClearanceModel.of(scene.bodies, scene.clearance)
-    planner = TransferPlanner(arm, limits, clearance)
+    planner = TransferPlanner.of(arm, scene, value('speed'))
     unchecked = scene.unchecked
     if others:
         unchecked += (f'{", ".join(others)} (not driven, as they belong to no arm)',)
@@ -291,6 +285,8 @@ def checked(excitation: Excitation, planner: TransferPlanner, source: str) -> Ex
     """
     Check an excitation, and return it with the joints in the order of the arm.
 
+    A joint without an acceleration limit gets the one that designs assume; see `Limits.of`.
+
     Parameters
     ----------
     excitation : Excitation
@@ -310,9 +306,10 @@ def checked(excitation: Excitation, planner: TransferPlanner, source: str) -> Ex
     with reading(source, TrajectoryError):
         excitation = excitation.for_joints(robot.joints)
     limits = Limits.of(robot, speed=1.0, reserve=False)
-    limits = replace(limits, acceleration=robot.acceleration_limit)
     faults = trajectory_faults(planner.arm, limits, excitation.trajectory, planner.clearance)
     faults = faults or excitation_faults(planner.arm, limits, excitation)
     if faults:
-        raise TrajectoryError(f'{source}: {faults}')
+        assumed = np.isinf(robot.acceleration_limit).any() and 'acceleration' in str(faults)
+        remedy = '; the parameter joint_limits declares other acceleration limits' * assumed
+        raise TrajectoryError(f'{source}: {faults}{remedy}')
     return excitation

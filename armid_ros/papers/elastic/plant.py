@@ -11,7 +11,7 @@ from armid_ros.errors import TrajectoryError
 from armid_ros.motion import ElasticRun, FloatArray, Motion
 from armid_ros.robots.reference import limit_slack
 from armid_ros.simulation.closed_loop import command, run
-from armid_ros.simulation.controller import MotorControl, Targets, VelocityLoop
+from armid_ros.simulation.controller import MotorControl, VelocityLoop
 from armid_ros.simulation.elastic import multisine
 from armid_ros.simulation.plant import Plant
 import numpy as np
@@ -95,10 +95,11 @@ def run_elastic(plant: Plant, loop: VelocityLoop, experiment: Experiment) -> Ela
     """
     control, still = MotorControl(loop, plant.dt), np.zeros_like(experiment.velocity)
     extra = still if experiment.torque is None else experiment.torque
-    targets = Targets(still, experiment.velocity, still, extra)
+    joints, t = plant.robot.joints, plant.times(0, len(still))
+    targets = Motion(joints, t, still, experiment.velocity, still, extra)
     state = plant.state(experiment.q)
-    torque = command(plant, control, state, targets.at(0))
-    trace = run(plant, control, state, torque, targets[1:])
+    torque = command(plant, control, state, targets, 0)
+    trace = run(plant, control, state, torque, targets, range(1, len(targets)))
     robot, slack, end = plant.robot, limit_slack(plant.robot), trace.state
     beyond = (end.q < robot.lower - slack) | (end.q > robot.upper + slack)
     for joint in np.flatnonzero(beyond)[:1]:
@@ -107,7 +108,6 @@ def run_elastic(plant: Plant, loop: VelocityLoop, experiment: Experiment) -> Ela
             f'{end.t:.3f} s, beyond its limits of {robot.lower[joint]:.4g} and '
             f'{robot.upper[joint]:.4g}'
         )
-    joints, t = robot.joints, plant.times(0, len(targets))
     q, dq, _ = trace.motors
     motor = Motion(joints, t, q, dq, still, trace.tau)
     return ElasticRun(motor, Motion(joints, t, *trace.links), experiment.velocity)

@@ -5,15 +5,13 @@
 import re
 
 from armid_ros.errors import TrajectoryError
-from armid_ros.excitation import (
-    ClearanceModel,
+from armid_ros.excitation import ClearanceModel, Floor, Obstacle, with_obstacles
+from armid_ros.excitation.geometry.floor import (
     find_floor,
-    Floor,
     floor_obstacles,
-    Obstacle,
-    with_obstacles,
+    link_heights,
+    lowest_point,
 )
-from armid_ros.excitation.geometry.floor import link_heights, lowest_point
 from armid_ros.motion import Motion
 from armid_ros.robots import collision_model, load_robot, robot_from_urdf, shipped_robots
 import numpy as np

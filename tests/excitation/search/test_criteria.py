@@ -4,8 +4,8 @@
 
 from armid_ros.errors import TrajectoryError
 from armid_ros.estimate import ParameterName
-from armid_ros.excitation import DesignProblem, DesignSettings, Information
-from armid_ros.excitation.search.criteria import Criterion
+from armid_ros.excitation import DesignProblem, DesignSettings
+from armid_ros.excitation.search.criteria import Criterion, Information
 from armid_ros.model import random_motion
 import numpy as np
 import pytest

@@ -10,9 +10,8 @@ from armid_ros.identification.online.change import Change, change_candidates, Ch
 from armid_ros.identification.online.change_search import (
     Block,
     ChangeSearch,
-    FoundChange,
+    score_statistics,
     ScoreStatistics,
-    weighing,
 )
 from armid_ros.identification.online.change_watch import ChangeWatch, Row
 from armid_ros.identification.online.null_calibration import NullCalibration
@@ -60,7 +59,7 @@ def learned_and_block(
         estimator.update(row[np.newaxis], np.atleast_1d(row @ TRUTH + rng.normal()))
     w = rng.normal(size=(60, 5))
     tau = w @ (TRUTH + delta * CHANGED[:, 0]) + rng.normal(size=60)
-    learned = estimator.learned()
+    learned = estimator.copied()
     products, right = w.T @ w / noise**2, w.T @ tau / noise**2
     known = learned.root.T @ learned.root
     along = products @ directions, known, known @ directions
@@ -68,9 +67,8 @@ def learned_and_block(
     return estimator, block, w, tau
 
 
-def score_statistics(block, directions, residual_scale=1.0):
-    """Weigh possible changes by a block, against what was known when it began."""
-    return at_once(weighing([block], block, directions, residual_scale))
+def statistics_of(block, directions, residual_scale=1.0):
+    return at_once(score_statistics([block], block, directions, residual_scale))
 
 
 @pytest.mark.parametrize('noise', [1.0, 3.0])
@@ -78,7 +76,7 @@ def test_the_size_of_a_change_is_that_of_least_squares_over_all_rows(noise):
     """Before and after in one problem, with a column for the change, in any unit of noise."""
     rng = np.random.default_rng(0)
     _, block, w, tau = learned_and_block(rng, 0.7, seen=5, noise=noise)
-    found, covariance = score_statistics(block, CHANGED, noise).size(slice(0, 1))
+    found, covariance = statistics_of(block, CHANGED, noise).size(slice(0, 1))
     top = np.hstack([block.before.root, np.zeros((5, 1))])
     both = np.vstack([top, np.hstack([w, w @ CHANGED])])
     aim = np.concatenate([block.before.root @ block.before.values, tau])
@@ -92,10 +90,10 @@ def test_a_change_without_calibrated_statistics_has_the_deviation_of_its_data():
     _, block, _, _ = learned_and_block(np.random.default_rng(0), 0.7, seen=5)
     candidate = ChangeCandidate('payload', 'hand', NAMES[:1], CHANGED, CHANGED)
     search = ChangeSearch([candidate], CHANGED, 1e-6, Foreground())
-    found, covariance = at_once(search.size(FoundChange((block,), 0, candidate, (), 9.0), 1.0))
-    expected, certain = score_statistics(block, CHANGED).size(slice(0, 1))
-    np.testing.assert_allclose(found, expected)
-    np.testing.assert_allclose(covariance, certain)
+    found = at_once(search.size(candidate, block, [block], 1.0))
+    expected, certain = statistics_of(block, CHANGED).size(slice(0, 1))
+    np.testing.assert_allclose(found.values, expected)
+    np.testing.assert_allclose(found.covariance, certain)
 
 
 def test_without_a_change_the_ratio_is_chi_square():
@@ -103,24 +101,24 @@ def test_without_a_change_the_ratio_is_chi_square():
     ratios = []
     for _ in range(60):
         _, block, _, _ = learned_and_block(rng, 0.0, seen=5)
-        ratios.append(score_statistics(block, CHANGED).ratios(np.array([[0]]))[0])
+        ratios.append(statistics_of(block, CHANGED).ratios(np.array([[0]]))[0])
     assert stats.kstest(ratios, stats.chi2(1).cdf).pvalue > 1e-3
 
 
 def test_what_was_never_known_cannot_be_seen_to_change():
     unknown = np.eye(5)[:, [4]]
     _, block, _, _ = learned_and_block(np.random.default_rng(2), 5.0, directions=unknown)
-    assert score_statistics(block, unknown).ratios(np.array([[0]]))[0] < 1e-3
+    assert statistics_of(block, unknown).ratios(np.array([[0]]))[0] < 1e-3
 
 
 def test_reopening_forgets_one_direction_and_nothing_else():
     rng = np.random.default_rng(3)
     estimator, _, _, _ = learned_and_block(rng, 0.0, seen=5)
-    before, root = estimator.values, estimator.learned().root
+    before, root = estimator.values, estimator.root.copy()
     information = root.T @ root
     estimator.reopen(CHANGED)
     np.testing.assert_allclose(estimator.values, before, rtol=1e-6)
-    after = estimator.learned().root.T @ estimator.learned().root
+    after = estimator.root.T @ estimator.root
     unit = CHANGED / np.linalg.norm(CHANGED)
     assert (unit.T @ after @ unit).item() < 1e-6
     lost = information @ unit
@@ -134,7 +132,7 @@ def test_a_statistic_that_is_usually_large_is_not_surprising():
     usual, strength = NullCalibration([1, 3], 1, 2), np.ones(4)
     for _ in range(400):
         ratios = 100.0 * np.array([rng.chisquare(1), rng.chisquare(3)])
-        at_once(usual.learning(ratios, strength))
+        at_once(usual.update(ratios, strength))
     np.testing.assert_allclose(usual.factors, 100.0, rtol=0.3)
     assert np.all(usual.excess(np.array([2000.0, 2500.0]), strength, 1e-8) < 1.0)
     large = np.array([8000.0, 9000.0])

@@ -30,7 +30,7 @@ def learn(arm, motion, look_every=1.0):
     for t, q, torque in zip(motion.t, motion.q, tau, strict=True):
         online.update(t, q, None, torque)
         if t > due and online.samples:
-            said, due = progress.look(t, online.estimate()), due + look_every
+            said, due = progress.unidentified(t, online.estimate()), due + look_every
     return said
 
 
@@ -59,8 +59,8 @@ def test_while_the_estimate_gets_better_nothing_is_asked_for(arm):
     start = online.estimate()
     for second in range(30):
         better = Estimate(start.parameters, start.values, start.covariance * 0.8**second)
-        assert not progress.look(float(second), better)
-    worse = [progress.look(30.0 + second, better) for second in range(30)]
+        assert not progress.unidentified(float(second), better)
+    worse = [progress.unidentified(30.0 + second, better) for second in range(30)]
     assert worse[-1]
 
 
@@ -75,5 +75,7 @@ def test_what_a_joint_takes_includes_its_friction(arm, friction, named):
     values[wrist], std[wrist] = friction, 0.005
     said = ()
     for second in range(12):
-        said = progress.look(float(second), Estimate(start.parameters, values, np.diag(std**2)))
+        said = progress.unidentified(
+            float(second), Estimate(start.parameters, values, np.diag(std**2))
+        )
     assert [part.joint for part in said] == (['wrist_pitch'] if named else [])
