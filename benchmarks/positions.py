@@ -15,7 +15,7 @@ import sys
 import time
 
 from armid_ros.positions.fit import fit_positions, start_values
-from armid_ros.positions.loop import Commands, LoopModel
+from armid_ros.positions.loop import CommandedMotion, LoopModel
 import mujoco
 from mujoco import rollout
 import numpy as np
@@ -50,18 +50,19 @@ def case(seed):
 def own_way(robot, recording, commanded, start, size, gains):
     """Fit a model of MuJoCo by rollouts; return the values and their standard errors."""
     n = robot.n_joints
-    commands = Commands.of(commanded, recording)
+    commands = CommandedMotion.of(commanded, recording)
     edges = STEP * np.arange(round(recording.t[-1] / STEP) + 2)
     rows = np.rint(recording.t / STEP).astype(int)
     free = np.ones(len(start), dtype=bool)
     free[1 : 2 * n + 1] = gains is None
+    free[-1] = False  # the width of the tool is known here
 
     def apart(z):
         x = start.copy()
         x[free] = z * size[free]
-        kp, kd, rotor, viscous, coulomb = x[1:-4].reshape(5, n)
+        kp, kd, rotor, viscous, coulomb = x[1:-5].reshape(5, n)
         noise = {'noise': 0.0, 'resolution': 0.0, 'velocities': bool(np.any(commands.dq))}
-        secret = Secret(kp, kd, x[0], rotor, viscous, coulomb, x[-4], x[-3:], **noise)
+        secret = Secret(kp, kd, x[0], rotor, viscous, coulomb, x[-5], x[-4:-1], **noise)
         model, places = compiled(robot, secret, STEP)
         data = mujoco.MjData(model)
         data.qpos[places] = recording.q[0]
@@ -72,7 +73,7 @@ def own_way(robot, recording, commanded, start, size, gains):
         return (states[0, rows - 1][1:, 1 + places] - recording.q[1:]).ravel() / 1e-3
 
     lower, upper = np.zeros(len(start)), np.full(len(start), np.inf)
-    lower[-3:], upper[-3:] = -1.0, 1.0
+    lower[-4:-1], upper[-4:] = -1.0, 1.0
     lower[1 : n + 1] = 1e-3
     bounds = (lower / size)[free], (upper / size)[free]
     found = least_squares(
@@ -116,17 +117,16 @@ def main(number=10, first=0):
     for seed in range(first, first + number):
         name, robot, secret, (recording, commanded), gains, settings = case(seed)
         model, truth = LoopModel(robot), secret.truth(robot)
-        run = recording, Commands.of(commanded, recording)
+        run = recording, CommandedMotion.of(commanded, recording)
         begun = time.perf_counter()
         fit = fit_positions(model, [run], gains)
         lasted = time.perf_counter() - begun
-        values, std = (np.array([getattr(v, k) for v in fit.values]) for k in ('value', 'std'))
-        rows = [('armid', values, std, lasted)]
+        rows = [('armid', fit.values, fit.std, lasted)]
         begun = time.perf_counter()
         found = own_way(robot, recording, commanded, *start_values(model, [run], gains), gains)
         rows.append(('mujoco', *found, time.perf_counter() - begun))
         kind = settings['kind'].__name__ if settings else 'waves'
-        label = f'{seed} {name}, {kind}, {"gains given" if gains else "gains fitted"}'
+        label = f'{seed} {name}, {kind}, {"gains fitted" if gains is None else "gains given"}'
         print(f'{label}, delay {1e3 * secret.delay:.1f} ms, noise {secret.noise:.1g}, {settings}')
         for way, values, std, lasted in rows:
             delay, viscous, dry, rotor, held, of, unseen = shown(model, values, std, truth)

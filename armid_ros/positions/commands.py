@@ -6,10 +6,11 @@ from __future__ import annotations
 
 from dataclasses import replace
 from pathlib import Path
+from typing import Any
 
 from armid_ros.errors import RecordingError
 from armid_ros.files import reading
-from armid_ros.positions.loop import Commands
+from armid_ros.positions.loop import CommandedMotion
 from armid_ros.recording import ReadSettings, Recording
 from armid_ros.recording.anything import is_table, read_anything
 from armid_ros.recording.bag import Bag
@@ -31,9 +32,9 @@ def read_commands(
     name: str | None = None,
     columns: ColumnSettings | None = None,
     settings: ReadSettings = DEFAULT,
-) -> Commands:
+) -> CommandedMotion:
     """
-    Read the commands beside the positions of a recording.
+    Read the commands of a recording.
 
     Parameters
     ----------
@@ -67,7 +68,7 @@ def read_commands(
     else:
         topic = _topic(path, recording, name, settings)
         if topic.type_name.endswith(_STATE):
-            return Commands.of(_controller_state(path, robot, topic, settings), recording)
+            return CommandedMotion.of(_controller_state(path, robot, topic, settings), recording)
         name = topic.name
     commanded = read_anything(
         path,
@@ -77,7 +78,7 @@ def read_commands(
         columns=columns,
         settings=settings,
     )
-    return Commands.of(commanded, recording)
+    return CommandedMotion.of(commanded, recording)
 
 
 def _topic(path: Path, recording: Recording, name: str | None, settings: ReadSettings) -> Topic:
@@ -109,7 +110,7 @@ def _controller_state(path: Path, robot: Robot, topic: Topic, settings: ReadSett
     with Bag(path, settings) as bag, reading(where, RecordingError):
         for block in bag.blocks(topic.name):
             for k in range(len(block)):
-                state = store.deserialize_cdr(block.message(k), topic.type_name)
+                state: Any = store.deserialize_cdr(block.message(k), topic.type_name)
                 point = state.reference if hasattr(state, 'reference') else state.desired
                 stamp, names = state.header.stamp, list(state.joint_names)
                 missing = set(robot.joints) - set(names)

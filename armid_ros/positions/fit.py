@@ -22,7 +22,7 @@ from armid_ros.errors import IdentificationError
 from armid_ros.estimate import ParameterName
 from armid_ros.model import inverse_dynamics
 from armid_ros.motion import FloatArray
-from armid_ros.positions.loop import Commands, LoopModel, Window, windows_of
+from armid_ros.positions.loop import CommandedMotion, LoopModel, Window, windows_of
 from armid_ros.recording import Recording
 import numpy as np
 import numpy.typing as npt
@@ -36,8 +36,8 @@ _DELAYS, _DELAY_RANGE = np.arange(0.0, 0.1, 0.002), (-0.05, 0.3)
 _PRIOR, _SEEN = 3.0, 0.3
 #: Step of a difference over that size.
 _DIFFERENCE = 1e-3
-#: Sizes of the delay [s] and of the centre of a tool [m].
-_OF_DELAY, _OF_CENTER = 0.03, 0.1
+#: Sizes of the delay [s], of the centre of a tool and of its radius of gyration [m].
+_OF_DELAY, _OF_CENTER, _OF_RADIUS = 0.03, 0.1, 0.02
 #: Duration of the blocks within which residuals are correlated [s].
 _BLOCK = 0.5
 #: Smallest torque of a joint at the start over that of the strongest joint.
@@ -48,7 +48,7 @@ _THINNED = 2000
 _ROUNDS = 3
 
 #: A recording and its commands.
-Run = tuple[Recording, Commands]
+Run = tuple[Recording, CommandedMotion]
 
 
 @dataclass(frozen=True)
@@ -103,7 +103,7 @@ def fit_positions(
     ----------
     model : LoopModel
         The described robot and its kind of control.
-    runs : sequence of (Recording, Commands)
+    runs : sequence of (Recording, CommandedMotion)
         Recordings with their commands.
     gains : ndarray, shape (2, n), optional
         Known kp and kd [N m/rad, N m s/rad]; fitted by default.
@@ -177,10 +177,11 @@ def start_values(
         values, effort = more * values, more * effort
     mass = float(robot.rigid_parameters[::10].sum())
     sizes = np.array([effort / error, effort / speed, effort / rate, effort / speed, effort])
-    size = np.concatenate([[_OF_DELAY], sizes.ravel(), [mass / _PRIOR], 3 * [_OF_CENTER]])
+    size = np.concatenate([[_OF_DELAY], sizes.ravel(), [mass / _PRIOR]])
+    size = np.concatenate([size, 3 * [_OF_CENTER], [_OF_RADIUS]])
     # a value that starts at its limit hardly leaves it
     values[free] = np.maximum(values, 0.02 * sizes)[free]
-    return np.concatenate([[best], values.ravel(), [0.01 * mass, 0.0, 0.0, 0.0]]), size
+    return np.concatenate([[best], values.ravel(), [0.01 * mass, 0.0, 0.0, 0.0, _OF_RADIUS]]), size
 
 
 @dataclass(eq=False)
@@ -209,7 +210,7 @@ class _Problem:
         x, places = self.start.copy(), np.flatnonzero(free)
         lower, upper = np.zeros(len(x)), np.full(len(x), np.inf)
         lower[0], upper[0] = _DELAY_RANGE
-        lower[-3:], upper[-3:] = -1.0, 1.0  # centre of the tool [m]
+        lower[-4:-1], upper[-4:] = -1.0, 1.0  # of the tool [m]
         size, prior = self.size[places], np.eye(len(places)) / _PRIOR
 
         def whole(z: FloatArray) -> FloatArray:
@@ -272,7 +273,7 @@ def _judged(problem: _Problem, x: FloatArray, free: npt.NDArray[np.bool_]) -> Po
     std, reasons = np.zeros(count), [''] * count
     std[fitted] = own * problem.size[fitted]
     for k, place in enumerate(fitted):
-        if own[k] < _SEEN * _PRIOR:
+        if own[k] < _SEEN * _PRIOR or place == count - 1:  # the prior of the radius is real
             continue
         std[place] = np.inf
         correlation = np.abs(covariance[k]) / np.sqrt(np.diag(covariance))

@@ -44,7 +44,7 @@ _HELD = 0.5
 
 
 @dataclass(frozen=True, eq=False)
-class Commands:
+class CommandedMotion:
     """
     Commanded motion of a recording; the drive holds each command until the next one.
 
@@ -62,7 +62,7 @@ class Commands:
     dq: FloatArray
 
     @classmethod
-    def of(cls, commanded: Recording, recording: Recording) -> Commands:
+    def of(cls, commanded: Recording, recording: Recording) -> CommandedMotion:
         """Return commands that were recorded with a recording."""
         t = commanded.t + 1e-9 * (commanded.start_ns - recording.start_ns)
         dq = np.zeros_like(commanded.q) if commanded.dq is None else commanded.dq
@@ -87,7 +87,7 @@ class Window:
 
     Attributes
     ----------
-    commands : Commands
+    commands : CommandedMotion
         The commanded motion.
     start : float
         Time at which the simulation starts [s].
@@ -100,14 +100,14 @@ class Window:
 
     """
 
-    commands: Commands
+    commands: CommandedMotion
     start: float
     state: FloatArray
     t: FloatArray
     q: FloatArray
 
 
-def windows_of(recording: Recording, commands: Commands) -> Iterator[Window]:
+def windows_of(recording: Recording, commands: CommandedMotion) -> Iterator[Window]:
     """Yield the windows of the stretches of a recording without gaps, while commands last."""
     t = recording.t
     known = (t >= commands.t[0]) & (t <= commands.t[-1] + _HELD)
@@ -161,7 +161,7 @@ class LoopModel:
 
     @property
     def parameters(self) -> tuple[ParameterName, ...]:
-        """Return the parameters: delay, gains of the joints, effects, centre of the payload."""
+        """Return the parameters: delay, gains of the joints, effects, place of the payload."""
         robot = self.robot
         units = list(zip(robot.torque_units, robot.position_units, strict=True))
         gains = [
@@ -175,13 +175,15 @@ class LoopModel:
             *gains,
             *own[: 3 * robot.n_joints + 1],
             *(ParameterName(f'payload_center_{axis}', own[-1].joint, 'm') for axis in 'xyz'),
+            ParameterName('payload_gyration_radius', own[-1].joint, 'm'),
         )
 
     def arm(self, x: FloatArray) -> ArmModel:
-        """Return the arm with the effects of parameters, shape (P,); the tool is a point mass."""
-        tool = pin.Inertia(x[-4], x[-3:], np.zeros((3, 3))).toDynamicParameters()
-        n = self.robot.n_joints
-        return replace(self.bare, values=(*np.split(x[2 * n + 1 : -4], 3), tool))
+        """Return the arm with the effects of parameters, shape (P,); the tool is a ball."""
+        n, (mass, *center, radius) = self.robot.n_joints, x[-5:]
+        tool = pin.Inertia(mass, np.array(center), mass * radius**2 * np.eye(3))
+        values = (*np.split(x[2 * n + 1 : -5], 3), tool.toDynamicParameters())
+        return replace(self.bare, values=values)
 
     def simulated(self, x: FloatArray, windows: Sequence[Window]) -> list[FloatArray]:
         """

@@ -78,6 +78,7 @@ class Secret:
         found |= {
             (f'payload_center_{a}', last): c for a, c in zip('xyz', self.center, strict=True)
         }
+        found['payload_gyration_radius', last] = CUBE / np.sqrt(6.0)
         return found | {('payload_m', last): self.mass}
 
 

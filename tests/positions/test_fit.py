@@ -6,7 +6,7 @@ from dataclasses import replace
 
 from armid_ros.errors import IdentificationError
 from armid_ros.positions.fit import fit_positions
-from armid_ros.positions.loop import Commands, LoopModel, windows_of
+from armid_ros.positions.loop import CommandedMotion, LoopModel, windows_of
 import numpy as np
 import pytest
 
@@ -31,7 +31,7 @@ def secret(robot):
 def run(robot, secret):
     """Return positions and commands with velocities."""
     measured, commanded = play(robot, secret, np.random.default_rng(5), duration=SECONDS)
-    return measured, Commands.of(commanded, measured)
+    return measured, CommandedMotion.of(commanded, measured)
 
 
 @pytest.fixture(scope='module')
@@ -45,7 +45,7 @@ def silent(robot, secret):
     """Return positions and commands without velocities."""
     quiet = replace(secret, velocities=False)
     measured, commanded = play(robot, quiet, np.random.default_rng(6), duration=SECONDS)
-    return measured, Commands.of(commanded, measured)
+    return measured, CommandedMotion.of(commanded, measured)
 
 
 def true_values(model, secret):
@@ -54,7 +54,7 @@ def true_values(model, secret):
 
 
 def test_held_commands_are_averaged_over_each_step():
-    commands = Commands(np.array([0.0, 1.0]), np.array([[1.0], [3.0]]), np.zeros((2, 1)))
+    commands = CommandedMotion(np.array([0.0, 1.0]), np.array([[1.0], [3.0]]), np.zeros((2, 1)))
     q, dq = commands.mean(np.array([-0.5, 0.5, 0.75, 1.25, 5.0]))
     np.testing.assert_allclose(q[:, 0], [1.0, 1.0, 2.0, 3.0])
     assert not dq.any()
@@ -63,7 +63,7 @@ def test_held_commands_are_averaged_over_each_step():
 def test_the_loop_moves_as_in_an_independent_engine(robot, secret):
     exact = replace(secret, noise=0.0, resolution=1e-9)
     measured, commanded = play(robot, exact, np.random.default_rng(5), duration=6.0)
-    commands, model = Commands.of(commanded, measured), LoopModel(robot)
+    commands, model = CommandedMotion.of(commanded, measured), LoopModel(robot)
     windows = list(windows_of(measured, commands))
     simulated = model.simulated(true_values(model, exact), windows)
     for window, q in zip(windows, simulated, strict=True):
@@ -107,18 +107,15 @@ def test_given_gains_separate_viscous_friction_and_wrong_ones_are_named(robot, s
     assert np.all(wrong.gain_ratio[:2] < 0.95)
 
 
-def test_nothing_is_known_of_a_joint_that_does_not_move(robot, secret):
-    measured, commanded = play(robot, secret, np.random.default_rng(5), duration=6.0)
-    still = commanded.q.copy()
-    still[:, 0], dq = 0.3, commanded.dq.copy()
-    dq[:, 0] = 0.0
-    # the first joint is held: its axis is vertical
-    q = measured.q.copy()
-    q[:, 0] = 0.3 + 5e-5 * np.random.default_rng(1).normal(size=len(q))
-    run = replace(measured, q=q), replace(commanded, q=still, dq=dq)
-    found = fit_positions(LoopModel(robot), [(run[0], Commands.of(run[1], run[0]))])
-    assert np.isinf(found.of('viscous_coefficient', robot.joints[0])[1])
-    assert np.isinf(found.of('rotor_inertia', robot.joints[0])[1])
+def test_nothing_but_its_friction_is_seen_of_a_joint_that_sticks(robot, secret):
+    jammed = replace(secret, coulomb=np.append(500.0, secret.coulomb[1:]))
+    measured, commanded = play(robot, jammed, np.random.default_rng(5), duration=6.0)
+    assert np.ptp(measured.q[:, 0]) < 1e-3 < np.ptp(commanded.q[:, 0])
+    run = measured, CommandedMotion.of(commanded, measured)
+    found = fit_positions(LoopModel(robot), [run], np.array([secret.kp, secret.kd]))
+    for name in ('viscous_coefficient', 'rotor_inertia'):
+        assert np.isinf(found.of(name, robot.joints[0])[1])
+        assert np.isfinite(found.of(name, robot.joints[1])[1])
 
 
 def test_a_recording_without_its_commands_is_refused(robot, run):
