@@ -4,8 +4,8 @@
 Ten arms in MuJoCo under position control: how well positions alone determine their drives.
 
 The first three arms have commands that were chosen for the fit: sums of waves, 200 Hz. Seven have
-random commands, rates and descriptions. Beside it, MuJoCo's own way: scipy's least squares over
-rollouts of the same model with finite differences, from the same start.
+random commands and rates. The second row of an arm is MuJoCo's own way: scipy's least squares over
+rollouts of its model with finite differences, from the same start.
 
 python -m benchmarks.positions [NUMBER [FIRST]]
 
@@ -27,8 +27,6 @@ from tests.positions.machine import chirps, compiled, moves, play, random_chain,
 ARMS = ('humanoid_earth', 'panda', 'ur10', 'chain', 'kinova', 'xarm7', 'chain', 'panda', 'ur10')
 #: Step of MuJoCo in its own way [s].
 STEP = 1e-3
-#: Smallest friction that is compared, as a share of the torque of the joint.
-_SMALLEST = 0.0
 
 
 def case(seed):
@@ -125,9 +123,9 @@ def main(number=10, first=0):
         begun = time.perf_counter()
         found = own_way(robot, recording, commanded, *start_values(model, [run], gains), gains)
         rows.append(('mujoco', *found, time.perf_counter() - begun))
-        kind = settings['kind'].__name__ if settings else 'waves'
-        label = f'{seed} {name}, {kind}, {"gains fitted" if gains is None else "gains given"}'
-        print(f'{label}, delay {1e3 * secret.delay:.1f} ms, noise {secret.noise:.1g}, {settings}')
+        kind = settings.get('kind', waves).__name__
+        known = 'fitted' if gains is None else 'given'
+        print(f'{seed} {name}: {kind}, gains {known}, delay {1e3 * secret.delay:.1f} ms')
         for way, values, std, lasted in rows:
             delay, viscous, dry, rotor, held, of, unseen = shown(model, values, std, truth)
             total[way][0] += held
@@ -137,17 +135,6 @@ def main(number=10, first=0):
                 f'{held:3}/{of:3} {unseen:5} {lasted:8.1f}',
                 flush=True,
             )
-            bad = [
-                (p.name, p.joint, v, truth[p.name, p.joint], s)
-                for p, v, s in zip(model.parameters, values, std, strict=True)
-                if s and np.isfinite(s) and abs(v - truth[p.name, p.joint]) > 1.96 * s
-            ]
-            if way == 'armid':
-                print(
-                    '   ',
-                    [(a, b, f'{v:.4g} {w:.4g} {s:.2g}') for a, b, v, w, s in bad],
-                    fit.residual / secret.noise,
-                )
     for way, (held, of) in total.items():
         print(f'{way}: intervals hold the truth in {held} of {of}: {100.0 * held / of:.1f} %')
 

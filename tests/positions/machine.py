@@ -61,7 +61,8 @@ class Secret:
         Return the true values by name and joint.
 
         MuJoCo integrates damping implicitly with a step dt. To first order, this adds half a step
-        times the damping to the inertia.
+        times the damping to the inertia. A command acts from the first step after its arrival,
+        half a step before the position that the step begins with.
 
         """
         of_joints = {
@@ -71,7 +72,7 @@ class Secret:
             'viscous_coefficient': self.viscous,
             'coulomb_torque': self.coulomb,
         }
-        found = {('command_delay', ''): self.delay}
+        found = {('command_delay', ''): (np.ceil(self.delay / dt) - 0.5) * dt}
         for name, values in of_joints.items():
             found |= {(name, j): float(v) for j, v in zip(robot.joints, values, strict=True)}
         last = robot.joints[-1]
