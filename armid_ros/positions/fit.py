@@ -234,7 +234,7 @@ class _Problem:
                 jacobian,
                 bounds,
                 x_scale='jac',
-                ftol=1e-4,
+                ftol=1e-5,
                 xtol=1e-5,
                 max_nfev=25,
             )
