@@ -114,9 +114,9 @@ def compiled(robot, secret, dt, hard=True):
     return model, np.array([model.joint(joint).qposadr[0] for joint in robot.joints])
 
 
-def random_chain(rng):
-    """Return a serial arm of 3 to 6 links with random axes, masses and centres."""
-    n = int(rng.integers(3, 7))
+def random_chain(rng, links=None):
+    """Return a serial arm of some links, 3 to 6 by default, with random axes, masses, centres."""
+    n = int(rng.integers(3, 7)) if links is None else links
     length = rng.uniform(0.08, 0.35, n)
     mass = 3.0 * rng.uniform(0.5, 1.5) * rng.uniform(0.6, 0.9, n).cumprod()
     parts = ['<robot name="chain"><link name="base"/>']

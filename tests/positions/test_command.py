@@ -38,7 +38,7 @@ def run(*arguments):
 
 @pytest.fixture(scope='module')
 def robot():
-    return random_chain(np.random.default_rng(8))
+    return random_chain(np.random.default_rng(8), links=3)
 
 
 @pytest.fixture(scope='module')
