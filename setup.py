@@ -10,7 +10,7 @@ from setuptools import Extension, find_packages, setup
 HERE = Path(__file__).resolve().parent  # `colcon build --symlink-install` runs a link to this file
 NAME = 'armid_ros'
 PLUG_INS = (
-    *(Path(NAME, room) for room in ('controllers', 'fleet', 'view', 'zero')),
+    *(Path(NAME, room) for room in ('controllers', 'fleet', 'positions', 'view', 'zero')),
     *sorted(Path(NAME, 'papers').glob('*/')),
 )
 #: Commands that are not called like the folder of their plug-in.

@@ -22,6 +22,8 @@ LEFT = {
     # the effects that a room makes, or fits to an arm at rest
     'residual/learn.py': 1,
     'zero/fit.py': 25,
+    'positions/loop.py': 4,
+    'positions/text.py': 1,
     # a key of diagnosis.json that is called as an effect is
     'diagnosis/next_run/plan.py': 1,
 }

@@ -12,7 +12,7 @@ import tomllib
 import pytest
 
 LAYERS = (
-    ('controllers', 'fleet', 'papers', 'view', 'zero'),
+    ('controllers', 'fleet', 'papers', 'positions', 'view', 'zero'),
     ('cli',),
     ('nodes',),
     ('live',),

@@ -17,6 +17,7 @@ WITH_COMMAND = {
     'papers/elastic': 'elastic',
     'papers/exo': 'exo',
     'papers/lunar': 'lunar',
+    'positions': 'positions',
     'view': 'view',
     'zero': 'zero',
 }

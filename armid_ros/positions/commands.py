@@ -1,0 +1,137 @@
+# Copyright 2026 The armid_ros developers
+# SPDX-License-Identifier: Apache-2.0
+"""Read the commands of a position-controlled arm, recorded with its positions."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+from armid_ros.errors import RecordingError
+from armid_ros.files import reading
+from armid_ros.positions.loop import CommandedMotion
+from armid_ros.recording import ReadSettings, Recording
+from armid_ros.recording.anything import is_table, read_anything
+from armid_ros.recording.bag import Bag
+from armid_ros.recording.columns import ColumnSettings
+from armid_ros.recording.message_types import JOINT_STATE, store_for
+from armid_ros.recording.source import DEFAULT, listed, Topic
+from armid_ros.robots import Robot
+import numpy as np
+
+#: Ending of the types of messages of a joint_trajectory_controller: fields joint_names, and
+#: reference (desired before Jazzy), a JointTrajectoryPoint.
+_STATE = 'JointTrajectoryControllerState'
+
+
+def read_commands(
+    path: Path,
+    robot: Robot,
+    recording: Recording,
+    name: str | None = None,
+    columns: ColumnSettings | None = None,
+    settings: ReadSettings = DEFAULT,
+) -> CommandedMotion:
+    """
+    Read the commands of a recording.
+
+    Parameters
+    ----------
+    path : Path
+        A bag or a table.
+    robot : Robot
+        The robot.
+    recording : Recording
+        Positions that were read from the same path.
+    name : str, optional
+        Topic of the commands: sensor_msgs/JointState, or the state of a
+        joint_trajectory_controller. By default the only such topic, which for JointState has
+        'command' in its name. For a table the columns, as in `ColumnSettings`.
+    columns : ColumnSettings, optional
+        Columns and units of the positions.
+    settings : ReadSettings
+        How bags are read.
+
+    Raises
+    ------
+    RecordingError
+        If there are no commands, or several topics of them.
+
+    """
+    columns = columns or ColumnSettings()
+    if is_table(path):
+        if name is None:
+            raise RecordingError(f'{path}: name the columns of the commands with --commands')
+        columns = replace(columns, position=name, velocity='none', effort='none')
+        topic = None
+    else:
+        topic = _topic(path, recording, name, settings)
+        if topic.type_name.endswith(_STATE):
+            return CommandedMotion.of(_controller_state(path, robot, topic, settings), recording)
+        name = topic.name
+    commanded = read_anything(
+        path,
+        joints=robot.joints,
+        slides=list(robot.prismatic),
+        topic=None if topic is None else name,
+        columns=columns,
+        settings=settings,
+    )
+    return CommandedMotion.of(commanded, recording)
+
+
+def _topic(path: Path, recording: Recording, name: str | None, settings: ReadSettings) -> Topic:
+    with Bag(path, settings) as bag:
+        topics = bag.topics()
+    if name is None:
+        found = [
+            one
+            for one in topics
+            if one.type_name.endswith(_STATE)
+            or (
+                one.type_name == JOINT_STATE and 'command' in one.name.replace(recording.topic, '')
+            )
+        ]
+    else:
+        found = [one for one in topics if one.name.strip('/') == name.strip('/')]
+    if len(found) != 1:
+        raise RecordingError(
+            f'{path}: {"several topics" if found else "no topic"} of commands; name a topic of '
+            f'{JOINT_STATE} or {_STATE} with --commands: {listed(topics)}'
+        )
+    return found[0]
+
+
+def _controller_state(path: Path, robot: Robot, topic: Topic, settings: ReadSettings) -> Recording:
+    """Return the references in the states of a controller."""
+    where, rows = f'{path}: {topic.name}', []
+    store = store_for(topic.message_type)
+    with Bag(path, settings) as bag, reading(where, RecordingError):
+        for block in bag.blocks(topic.name):
+            for k in range(len(block)):
+                state: Any = store.deserialize_cdr(block.message(k), topic.type_name)
+                point = state.reference if hasattr(state, 'reference') else state.desired
+                stamp, names = state.header.stamp, list(state.joint_names)
+                missing = set(robot.joints) - set(names)
+                if missing:
+                    raise RecordingError(f'no joint {", ".join(sorted(missing))}')
+                order = [names.index(joint) for joint in robot.joints]
+                q, dq = (np.array(x) for x in (point.positions, point.velocities))
+                if len(q) == len(names):
+                    speed = dq[order] if len(dq) == len(q) else np.zeros(len(order))
+                    rows.append((stamp.sec * 10**9 + stamp.nanosec, q[order], speed))
+    if not rows:
+        raise RecordingError(f'{where} has no messages with positions')
+    stamps, index = np.unique([row[0] for row in rows], return_index=True)
+    sampled = 1e-9 * (stamps - stamps[0])
+    t = np.arange(0.0, sampled[-1], 1e-3)  # the controller interpolates faster than it reports
+    q, dq = (
+        np.column_stack(
+            [np.interp(t, sampled, x) for x in np.array([rows[k][part] for k in index]).T]
+        )
+        for part in (1, 2)
+    )
+    return Recording(
+        joints=robot.joints, t=t, q=q, dq=dq, start_ns=int(stamps[0]), source=str(path)
+    )

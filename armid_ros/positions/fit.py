@@ -1,0 +1,307 @@
+# Copyright 2026 The armid_ros developers
+# SPDX-License-Identifier: Apache-2.0
+"""
+Drives, friction, delay and tool from commanded and measured positions: output error.
+
+The simulated loop of `LoopModel` is fitted to the measured positions by Gauss-Newton iterations
+with a trust region. The described links are taken as exact. Sensitivities are differences of
+simulations. Weak priors about the start keep parameters finite that the data do not determine.
+The standard error of such a parameter is infinite, and other values fit as well. Standard errors
+hold for residuals that are correlated within blocks of time.
+
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+from armid_ros.api.arguments import motion_of
+from armid_ros.arm import ArmModel
+from armid_ros.errors import IdentificationError
+from armid_ros.estimate import ParameterName
+from armid_ros.model import inverse_dynamics
+from armid_ros.motion import FloatArray
+from armid_ros.positions.loop import CommandedMotion, LoopModel, Window, windows_of
+from armid_ros.recording import Recording
+import numpy as np
+import numpy.typing as npt
+from scipy.optimize import least_squares, nnls
+
+#: Delays from which the best start is taken [s], and limits of the fitted delay [s]; it is
+#: negative if the clocks of commands and positions differ.
+_DELAYS, _DELAY_RANGE = np.arange(0.0, 0.1, 0.002), (-0.05, 0.3)
+#: Standard deviation of the prior over the size of a parameter that alone explains the torque,
+#: and share of it above which the standard error of a parameter is infinite.
+_PRIOR, _SEEN = 3.0, 0.3
+#: Step of a difference over that size.
+_DIFFERENCE = 1e-3
+#: Sizes of the delay [s], of the centre of a tool and of its radius of gyration [m].
+_OF_DELAY, _OF_CENTER, _OF_RADIUS = 0.03, 0.1, 0.02
+#: Duration of the blocks within which residuals are correlated [s].
+_BLOCK = 0.5
+#: Smallest torque of a joint at the start over that of the strongest joint.
+_LIGHTEST = 0.03
+#: Most samples of a recording from which the start is found.
+_THINNED = 2000
+#: Rounds of the fit with newly estimated noise of the joints.
+_ROUNDS = 3
+
+#: A recording and its commands.
+Run = tuple[Recording, CommandedMotion]
+
+
+@dataclass(frozen=True)
+class PositionFit:
+    """
+    Fit of a position-controlled arm.
+
+    Attributes
+    ----------
+    arm : ArmModel
+        The described links with the fitted effects.
+    parameters : tuple of ParameterName
+        The parameters of `LoopModel`, P of them.
+    values, std : ndarray, shape (P,)
+        Values and standard errors: 0 for a given value, infinite if the data do not determine it.
+    reasons : tuple of str
+        Why a value is not determined; empty if it is.
+    gain_ratio, gain_ratio_std : ndarray, shape (n,)
+        kp that the data demand over the given kp, with its standard error; 1 and 0 if fitted.
+    tracking, residual : ndarray, shape (n,)
+        Rms of command minus position, and of simulated minus measured position [rad or m].
+    duration : float
+        Compared time [s].
+
+    """
+
+    arm: ArmModel
+    parameters: tuple[ParameterName, ...]
+    values: FloatArray
+    std: FloatArray
+    reasons: tuple[str, ...]
+    gain_ratio: FloatArray
+    gain_ratio_std: FloatArray
+    tracking: FloatArray
+    residual: FloatArray
+    duration: float
+
+    def of(self, name: str, joint: str = '') -> tuple[float, float]:
+        """Return value and standard error of a parameter."""
+        names = [(one.name, one.joint) for one in self.parameters]
+        place = names.index((name, joint))
+        return float(self.values[place]), float(self.std[place])
+
+
+def fit_positions(
+    model: LoopModel, runs: Sequence[Run], gains: FloatArray | None = None
+) -> PositionFit:
+    """
+    Fit a loop to recordings.
+
+    Parameters
+    ----------
+    model : LoopModel
+        The described robot and its kind of control.
+    runs : sequence of (Recording, CommandedMotion)
+        Recordings with their commands.
+    gains : ndarray, shape (2, n), optional
+        Known kp and kd [N m/rad, N m s/rad]; fitted by default.
+
+    Raises
+    ------
+    IdentificationError
+        If no recording is long enough, or a recording has too few samples.
+
+    """
+    windows = [window for run in runs for window in windows_of(*run)]
+    if not windows:
+        raise IdentificationError(
+            f'{runs[0][0].source}: no stretch of 4 s has positions and commands without a gap; '
+            'check that both were recorded together, and record longer'
+        )
+    start, size = start_values(model, runs, gains)
+    free = np.ones(len(start), dtype=bool)
+    free[1 : 2 * model.robot.n_joints + 1] = gains is None
+    problem = _Problem(model, windows, start, size)
+    return _judged(problem, problem.solved(free), free)
+
+
+def start_values(
+    model: LoopModel, runs: Sequence[Run], gains: FloatArray | None
+) -> tuple[FloatArray, FloatArray]:
+    """
+    Return values to start from, and the size of each that alone explains the torque, (P,) each.
+
+    The torque balance of each joint is linear in gains, rotor inertia and friction. It is solved
+    with values that are not negative for several delays, and the delay with the smallest residual
+    is taken.
+
+    """
+    robot, n = model.robot, model.robot.n_joints
+    motions = [motion_of(recording) for recording, _ in runs]
+    motions = [one.select(slice(None, None, len(one) // _THINNED + 1)) for one in motions]
+    load = np.concatenate([inverse_dynamics(robot, motion) for motion in motions])
+    if model.compensated:
+        load = load - np.concatenate([inverse_dynamics(robot, m.at_rest()) for m in motions])
+    q, dq, ddq = (np.concatenate([getattr(m, x) for m in motions]) for x in ('q', 'dq', 'ddq'))
+    side = np.sign(dq) * (np.abs(dq) > 0.05 * np.abs(dq).max(axis=0))
+    free = np.array([gains is None, gains is None, True, True, True])
+    if gains is None and not any(np.any(commands.dq) for _, commands in runs):
+        free[3] = False  # velocity gain and viscous friction act alike
+    least, level = np.inf, np.sum(load**2, axis=0) + 1e-12
+    for delay in _DELAYS:
+        means = []
+        for motion, (_, commands) in zip(motions, runs, strict=True):
+            half = 0.5 * (motion.t[1] - motion.t[0])
+            edges = np.append(motion.t - half, motion.t[-1] + half) - delay
+            means.append(commands.mean(edges))
+        u, du = (np.concatenate(x) for x in zip(*means, strict=True))
+        columns = np.array([u - q, du - dq, -ddq, -dq, -side])
+        found = np.zeros((5, n))
+        if gains is not None:
+            found[:2] = gains
+        rest = load - np.einsum('kmj,kj->mj', columns, found)
+        misfit = 0.0
+        for j in range(n):
+            found[free, j], norm = nnls(columns[free, :, j].T, rest[:, j])
+            misfit += norm**2 / level[j]
+        if misfit < least:
+            least, best, values, behind, slower = misfit, delay, found, u - q, du - dq
+    effort = values[0] * behind + values[1] * slower
+    speed, rate, effort, error = (
+        np.sqrt(np.mean(x**2, axis=0)) + 1e-6 for x in (dq, ddq, effort, behind)
+    )
+    if gains is None:  # the described load of a light last link determines no scale
+        more = np.maximum(_LIGHTEST * effort.max() / effort, 1.0)
+        values, effort = more * values, more * effort
+    mass = float(robot.rigid_parameters[::10].sum())
+    sizes = np.array([effort / error, effort / speed, effort / rate, effort / speed, effort])
+    size = np.concatenate([[_OF_DELAY], sizes.ravel(), [mass / _PRIOR]])
+    size = np.concatenate([size, 3 * [_OF_CENTER], [_OF_RADIUS]])
+    # a value that starts at its limit hardly leaves it
+    values[free] = np.maximum(values, 0.02 * sizes)[free]
+    return np.concatenate([[best], values.ravel(), [0.01 * mass, 0.0, 0.0, 0.0, _OF_RADIUS]]), size
+
+
+@dataclass(eq=False)
+class _Problem:
+    """Least squares of a model over windows, about a start with priors of given sizes."""
+
+    model: LoopModel
+    windows: list[Window]
+    start: FloatArray
+    size: FloatArray
+
+    def apart(self, x: FloatArray) -> FloatArray:
+        """Return simulated minus measured positions, shape (M, n)."""
+        simulated = self.model.simulated(x, self.windows)
+        measured = [window.q for window in self.windows]
+        return np.concatenate(simulated) - np.concatenate(measured)
+
+    def slopes(self, x: FloatArray, places: npt.NDArray[np.intp]) -> FloatArray:
+        """Differentiate the positions by some parameters over their size, (M, n, places)."""
+        now, steps = self.apart(x), _DIFFERENCE * np.diag(self.size)[places]
+        columns = [(self.apart(x + step) - now) / _DIFFERENCE for step in steps]
+        return np.stack(columns, axis=-1)
+
+    def solved(self, free: npt.NDArray[np.bool_]) -> FloatArray:
+        """Fit the free parameters, with noise of the joints that is estimated in rounds."""
+        x, places = self.start.copy(), np.flatnonzero(free)
+        lower, upper = np.zeros(len(x)), np.full(len(x), np.inf)
+        lower[0], upper[0] = _DELAY_RANGE
+        lower[-4:-1], upper[-4:] = -1.0, 1.0  # of the tool [m]
+        size, prior = self.size[places], np.eye(len(places)) / _PRIOR
+
+        def whole(z: FloatArray) -> FloatArray:
+            found = self.start.copy()
+            found[places] = size * z
+            return found
+
+        def residual(z: FloatArray) -> FloatArray:
+            return np.append(self.apart(whole(z)) / sigma, (z - begin) / _PRIOR)
+
+        def jacobian(z: FloatArray) -> FloatArray:
+            slopes = self.slopes(whole(z), places) / sigma[:, np.newaxis]
+            return np.concatenate([slopes.reshape(-1, len(places)), prior])
+
+        begin, bounds = self.start[places] / size, (lower[places] / size, upper[places] / size)
+        sigma = np.sqrt(np.mean(self.apart(x) ** 2, axis=0)) + 1e-9
+        for _ in range(_ROUNDS):
+            found = least_squares(
+                residual,
+                x[places] / size,
+                jacobian,
+                bounds,
+                x_scale='jac',
+                ftol=1e-5,
+                xtol=1e-5,
+                max_nfev=25,
+            )
+            x, before = whole(found.x), sigma
+            sigma = np.sqrt(np.mean(self.apart(x) ** 2, axis=0)) + 1e-9
+            if np.all(np.abs(before / sigma - 1.0) < 0.1):
+                break
+        return x
+
+
+def _judged(problem: _Problem, x: FloatArray, free: npt.NDArray[np.bool_]) -> PositionFit:
+    """Return the fit at the solution, with standard errors."""
+    model, n, count = problem.model, problem.model.robot.n_joints, len(x)
+    rest = problem.apart(x)
+    sigma = np.sqrt(np.mean(rest**2, axis=0)) + 1e-9
+    weighted = problem.slopes(x, np.arange(count)) / sigma[:, np.newaxis]
+    pulls = np.einsum('mjp,mj->mp', weighted, rest / sigma)
+    t = np.concatenate([k * 1e6 + window.t for k, window in enumerate(problem.windows)])
+    _, block = np.unique(np.floor(t / _BLOCK), return_inverse=True)
+    scores = np.zeros((block.max() + 1, count))
+    np.add.at(scores, block, pulls)
+    information = np.einsum('mjp,mjr->pr', weighted, weighted)
+
+    def errors(some: npt.NDArray[np.intp]) -> tuple[FloatArray, FloatArray]:
+        """Return covariance and standard errors of some parameters over their sizes."""
+        inside = information[np.ix_(some, some)] + np.eye(len(some)) / _PRIOR**2
+        covariance = np.linalg.inv(inside)
+        blocks = len(scores)
+        lost = blocks / max(blocks - len(some), 0.2 * blocks)
+        middle = lost * scores[:, some].T @ scores[:, some]
+        robust = np.diag(covariance @ middle @ covariance)
+        return covariance, np.sqrt(np.maximum(np.diag(covariance), robust))
+
+    fitted = np.flatnonzero(free)
+    covariance, own = errors(fitted)
+    std, reasons = np.zeros(count), [''] * count
+    std[fitted] = own * problem.size[fitted]
+    for k, place in enumerate(fitted):
+        if own[k] < _SEEN * _PRIOR or place == count - 1:  # the prior of the radius is real
+            continue
+        std[place] = np.inf
+        correlation = np.abs(covariance[k]) / np.sqrt(np.diag(covariance))
+        correlation[k] = 0.0
+        other = model.parameters[fitted[np.argmax(correlation)]]
+        alone = information[place, place] ** -0.5 if information[place, place] else np.inf
+        mixed = f'not separable from the {other.words} of {other.joint or "the arm"}'
+        if 'velocity_gain' in (other.name, model.parameters[place].name):
+            mixed += '; give --gains, or record commanded velocities'
+        reasons[place] = mixed if alone < _SEEN * _PRIOR else 'the motion does not depend on it'
+    ratio, ratio_std = np.ones(n), np.zeros(n)
+    if not free[1]:  # one Gauss-Newton step with kp free as well
+        more = np.flatnonzero(free | (np.arange(count) <= n))
+        covariance, spread = errors(more)
+        step = -covariance @ pulls.sum(axis=0)[more]
+        kp = slice(1, n + 1)
+        ratio = 1.0 + step[kp] * problem.size[kp] / x[kp]
+        ratio_std = spread[kp] * problem.size[kp] / x[kp]
+    behind = [w.commands.mean(np.append(w.t, w.t[-1] + 1e-3))[0] - w.q for w in problem.windows]
+    return PositionFit(
+        model.arm(x),
+        model.parameters,
+        x,
+        std,
+        tuple(reasons),
+        ratio,
+        ratio_std,
+        np.sqrt(np.mean(np.concatenate(behind) ** 2, axis=0)),
+        np.sqrt(np.mean(rest**2, axis=0)),
+        sum(float(w.t[-1] - w.t[0]) for w in problem.windows),
+    )

@@ -1,0 +1,235 @@
+# Copyright 2026 The armid_ros developers
+# SPDX-License-Identifier: Apache-2.0
+"""
+An arm in a closed loop of position control, simulated in windows of a recording.
+
+tau = kp (u(t - delay) - q) + kd (du(t - delay) - dq), where u is the commanded position and du the
+commanded velocity, zero if none is commanded. The loop is evaluated at the middle of each step of
+the plant, with kd in the implicit damping. It is thus of second order in the step at any gain.
+
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass, replace
+from itertools import pairwise
+
+from armid_ros.arm import ArmModel
+from armid_ros.errors import ModelError
+from armid_ros.estimate import ParameterName
+from armid_ros.motion import FloatArray
+from armid_ros.recording import Recording
+from armid_ros.recording.recording import GAP_PERIODS
+from armid_ros.robots import Robot
+from armid_ros.simulation.closed_loop import CompiledLoop, run
+from armid_ros.simulation.controller import Controller, LinearFeedback, Targets
+from armid_ros.simulation.plant import Plant
+import numpy as np
+import pinocchio as pin
+
+#: Step of the plant [s].
+STEP = 1e-3
+#: Duration of a window, and of the simulation before it, in which errors of the initial state
+#: decay [s].
+WINDOW, LEAD = 5.0, 0.5
+#: Half of the time in which a parabola through the positions determines an initial state [s].
+_AROUND = 0.03
+#: Most samples per second that are compared [Hz]; faster ones repeat the same dynamics.
+_RATE = 250.0
+#: Largest position error of a simulation that is used [rad or m]; it bounds unstable loops.
+_FAR = 3.0
+#: Time for which the last command is held [s].
+_HELD = 0.5
+
+
+@dataclass(frozen=True, eq=False)
+class CommandedMotion:
+    """
+    Commanded motion of a recording; the drive holds each command until the next one.
+
+    Attributes
+    ----------
+    t : ndarray, shape (K,)
+        Times on the time base of the recording [s].
+    q, dq : ndarray, shape (K, n)
+        Commanded positions [rad or m] and velocities; velocities are zero if none are commanded.
+
+    """
+
+    t: FloatArray
+    q: FloatArray
+    dq: FloatArray
+
+    @classmethod
+    def of(cls, commanded: Recording, recording: Recording) -> CommandedMotion:
+        """Return commands that were recorded with a recording."""
+        t = commanded.t + 1e-9 * (commanded.start_ns - recording.start_ns)
+        dq = np.zeros_like(commanded.q) if commanded.dq is None else commanded.dq
+        return cls(t, commanded.q, dq)
+
+    def mean(self, edges: FloatArray) -> tuple[FloatArray, FloatArray]:
+        """Return mean position and velocity between successive times, each (len - 1, n)."""
+        ends = min(self.t[0], edges[0]) - 1.0, max(self.t[-1], edges[-1]) + 1.0
+        t = np.concatenate([ends[:1], self.t, ends[1:]])
+        values = np.hstack([self.q, self.dq])
+        areas = np.vstack([values[:1], values]) * np.diff(t)[:, np.newaxis]
+        integral = np.vstack([0.0 * areas[:1], np.cumsum(areas, axis=0)])
+        there = np.column_stack([np.interp(edges, t, column) for column in integral.T])
+        q, dq = np.hsplit(np.diff(there, axis=0) / np.diff(edges)[:, np.newaxis], 2)
+        return q, dq
+
+
+@dataclass(frozen=True, eq=False)
+class Window:
+    """
+    A part of a recording, simulated from a measured state.
+
+    Attributes
+    ----------
+    commands : CommandedMotion
+        The commanded motion.
+    start : float
+        Time at which the simulation starts [s].
+    state : ndarray, shape (3, n)
+        Position, velocity and acceleration at that time.
+    t : ndarray, shape (M,)
+        Times of the samples that are compared [s].
+    q : ndarray, shape (M, n)
+        Their measured positions [rad or m].
+
+    """
+
+    commands: CommandedMotion
+    start: float
+    state: FloatArray
+    t: FloatArray
+    q: FloatArray
+
+
+def windows_of(recording: Recording, commands: CommandedMotion) -> Iterator[Window]:
+    """Yield the windows of the stretches of a recording without gaps, while commands last."""
+    t = recording.t
+    known = (t >= commands.t[0]) & (t <= commands.t[-1] + _HELD)
+    breaks = np.diff(t) > GAP_PERIODS * recording.period
+    breaks |= known[1:] != known[:-1]
+    every = max(round(1.0 / (_RATE * max(recording.period, 1e-6))), 1)
+    for stretch in np.split(np.arange(len(t)), np.flatnonzero(breaks) + 1):
+        first = t[stretch[0]] + _AROUND
+        count = round((t[stretch[-1]] - first - LEAD) / WINDOW + 0.3)
+        if not known[stretch[0]] or count < 1:
+            continue
+        edges = np.linspace(first + LEAD, t[stretch[-1]], count + 1)
+        for begin, end in pairwise(edges):
+            start = begin - LEAD
+            near = stretch[np.abs(t[stretch] - start) <= max(_AROUND, 2.5 * recording.period)]
+            parabola = np.polynomial.polynomial.polyfit(t[near] - start, recording.q[near], 2)
+            inside = stretch[(t[stretch] > begin) & (t[stretch] <= end)][::every]
+            state = parabola * np.array([[1.0], [1.0], [2.0]])
+            yield Window(commands, start, state, t[inside], recording.q[inside])
+
+
+@dataclass(frozen=True, eq=False)
+class _PositionControl(Controller):
+    """A controller that is its feedback law."""
+
+    feedback: LinearFeedback
+
+
+@dataclass(frozen=True, eq=False)
+class LoopModel:
+    """
+    A robot with a position controller, drives and a tool, as a function of P parameters.
+
+    Attributes
+    ----------
+    robot : Robot
+        The described robot, of n joints.
+    compensated : bool
+        Whether the controller adds the gravity torque of the described robot.
+
+    """
+
+    robot: Robot
+    compensated: bool = False
+
+    @property
+    def bare(self) -> ArmModel:
+        """Return the described arm with the effects of the fit, all zero."""
+        names = 'rotor_inertia', 'viscous_friction', 'coulomb_friction', 'payload'
+        return ArmModel.of(self.robot, effects=names)
+
+    @property
+    def parameters(self) -> tuple[ParameterName, ...]:
+        """Return the parameters: delay, gains of the joints, effects, place of the payload."""
+        robot = self.robot
+        units = list(zip(robot.torque_units, robot.position_units, strict=True))
+        gains = [
+            ParameterName(name, joint, f'{force}{time}/{position}')
+            for name, time in (('position_gain', ''), ('velocity_gain', ' s'))
+            for joint, (force, position) in zip(robot.joints, units, strict=True)
+        ]
+        own = self.bare.parameters[len(robot.rigid_parameters) :]
+        return (
+            ParameterName('command_delay', '', 's'),
+            *gains,
+            *own[: 3 * robot.n_joints + 1],
+            *(ParameterName(f'payload_center_{axis}', own[-1].joint, 'm') for axis in 'xyz'),
+            ParameterName('payload_gyration_radius', own[-1].joint, 'm'),
+        )
+
+    def arm(self, x: FloatArray) -> ArmModel:
+        """Return the arm with the effects of parameters, shape (P,); the tool is a ball."""
+        n, (mass, *center, radius) = self.robot.n_joints, x[-5:]
+        tool = pin.Inertia(mass, np.array(center), mass * radius**2 * np.eye(3))
+        values = (*np.split(x[2 * n + 1 : -5], 3), tool.toDynamicParameters())
+        return replace(self.bare, values=values)
+
+    def simulated(self, x: FloatArray, windows: Sequence[Window]) -> list[FloatArray]:
+        """
+        Simulate windows with values of the parameters, shape (P,).
+
+        Returns
+        -------
+        list of ndarray, each (M, n)
+            Positions at the times of the samples of each window [rad or m].
+
+        """
+        effects, n = self.arm(x), self.robot.n_joints
+        kp, kd = x[1 : n + 1], x[n + 1 : 2 * n + 1]
+        rotor, viscous, *others = effects.values
+        endless = replace(self.robot, torque_limit=np.full(n, np.inf))
+        damped = replace(effects, robot=endless, values=(rotor, viscous + kd, *others))
+        plant = Plant(damped, STEP, hard_stops=False)
+        # positions half a step ahead: kp (u - q - dq STEP / 2)
+        feedback = LinearFeedback(
+            self.robot,
+            np.zeros((n, n)),
+            weighs=self.compensated,
+            stiffness=kp,
+            damping=0.5 * STEP * kp,
+        )
+        control = _PositionControl(feedback)
+        compiled = CompiledLoop.of(plant, control)
+        found = []
+        for window in windows:
+            steps = int(np.ceil((window.t[-1] - window.start) / STEP)) + 1
+            edges = window.start - x[0] + STEP * np.arange(steps + 2)
+            u, du = window.commands.mean(edges)
+            targets = Targets(u, np.zeros_like(u), np.zeros_like(u), kd * du)
+            state = plant.state(*window.state)
+            torque = control.torque(state.q, state.dq, *targets.at(0))
+            try:
+                trace = run(plant, control, state, torque, targets[slice(1, None)], compiled)
+            except (ModelError, FloatingPointError):  # an unstable loop
+                found.append(np.full_like(window.q, _FAR))
+                continue
+            q, dq, _ = trace.links
+            place = (window.t - window.start) / STEP
+            k = np.minimum(place.astype(int), steps - 1)
+            s = (place - k)[:, np.newaxis]
+            here = q[k] + (q[k + 1] - q[k]) * s**2 * (3.0 - 2.0 * s)  # Hermite's spline
+            here += STEP * s * (1.0 - s) * (dq[k] * (1.0 - s) - dq[k + 1] * s)
+            apart = np.nan_to_num(here - window.q, nan=_FAR, posinf=_FAR, neginf=-_FAR)
+            found.append(window.q + np.clip(apart, -_FAR, _FAR))
+        return found

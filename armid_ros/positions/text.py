@@ -1,0 +1,106 @@
+# Copyright 2026 The armid_ros developers
+# SPDX-License-Identifier: Apache-2.0
+"""Summary and document of ``armid positions``."""
+
+from __future__ import annotations
+
+from typing import Any
+
+from armid_ros.api.table import Summary
+from armid_ros.positions.fit import PositionFit
+from armid_ros.report.notation import measured
+import numpy as np
+
+SCHEMA = 'armid/positions/1'
+#: Residual over the tracking error of a joint, above which a fit does not explain the positions.
+_POOR = 0.3
+#: Given gains differ from the data beyond this number of standard errors, and this share.
+_DIFFERS, _SHARE = 3.0, 0.02
+#: Quantities of the joints in the table, and their headings.
+_COLUMNS = {
+    'position_gain': 'kp',
+    'velocity_gain': 'kd',
+    'rotor_inertia': 'rotor',
+    'viscous_coefficient': 'viscous',
+    'coulomb_torque': 'Coulomb',
+}
+
+
+def fit_document(found: PositionFit) -> dict[str, Any]:
+    """Return the content of positions.json."""
+    poor = bool(np.any(found.residual > _POOR * found.tracking))
+    std = [float(one) if np.isfinite(one) else None for one in found.std]
+    values = zip(found.parameters, found.values.tolist(), std, found.reasons, strict=True)
+    columns = 'tracking', 'residual', 'gain_ratio', 'gain_ratio_std'
+    rows = zip(*(getattr(found, name).tolist() for name in columns), strict=True)
+    return {
+        'schema': SCHEMA,
+        'robot': found.arm.robot.name,
+        'verdict': 'not explained' if poor else 'in part' if any(found.reasons) else 'determined',
+        'duration': found.duration,
+        'quantities': [
+            {
+                'name': one.name,
+                'joint': one.joint,
+                'unit': one.unit,
+                'value': value,
+                'std': error,
+                'reason': reason,
+            }
+            for one, value, error, reason in values
+        ],
+        'joints': [
+            {'joint': joint, **dict(zip(columns, row, strict=True))}
+            for joint, row in zip(found.arm.robot.joints, rows, strict=True)
+        ],
+    }
+
+
+def fit_summary(found: PositionFit, verdict: str, step: str) -> Summary:
+    """Return the summary of a fit; `step` is the next step after a good fit."""
+    joints = found.arm.robot.joints
+
+    def cell(name: str, joint: str = '', factor: float = 1.0) -> str:
+        """Write a value with its 95 % interval."""
+        value, std = found.of(name, joint)
+        if not np.isfinite(std):
+            return 'not det.'
+        text, half = measured(factor * value, factor * 1.96 * std)
+        return f'{text} ± {half}' if std else f'{text} (given)'
+
+    rows = [
+        (
+            joint,
+            *(cell(name, joint) for name in _COLUMNS),
+            f'{1e3 * rest:.2g} of {1e3 * behind:.2g}',
+        )
+        for joint, rest, behind in zip(joints, found.residual, found.tracking, strict=True)
+    ]
+    center = [cell(f'payload_center_{a}', joints[-1]).split(' ± ')[0] for a in 'xyz']
+    tool = f'{cell("payload_m", joints[-1])} kg at {", ".join(center)} m'
+    title = f'command delay {cell("command_delay", factor=1e3)} ms, tool {tool}'
+    lines = [f'{found.duration:.0f} s compared; links are taken as described']
+    ratio, error = found.gain_ratio, found.gain_ratio_std
+    if error.any():
+        differs = np.abs(ratio - 1.0) > np.maximum(_DIFFERS * error, _SHARE)
+        text = f'agree with the data within {100.0 * 1.96 * error.max():.2g} %'
+        if differs.any():
+            places = np.flatnonzero(differs)
+            text = 'differ from the data: ' + ', '.join(
+                f'{ratio[k]:.3g} ± {1.96 * error[k]:.1g} times at {joints[k]}' for k in places
+            )
+        lines.append(f'given position gains {text}')
+    reasons: dict[str, list[str]] = {}
+    for one, reason in zip(found.parameters, found.reasons, strict=True):
+        if reason:
+            reasons.setdefault(reason, []).append(f'{one.words} {one.joint}'.strip())
+    for reason, names in reasons.items():
+        text = ', '.join(names) if len(names) < 9 else f'{len(names)} values'
+        lines.append(f'not determined: {text}: {reason}')
+    if verdict == 'not explained':
+        step = (
+            'check --robot, --gravity, --gains, --commands, contacts, and whether the controller '
+            'compensates gravity (--gravity-compensation)'
+        )
+    heads = 'joint', *_COLUMNS.values(), 'residual [mrad or mm]'
+    return Summary(title, verdict, heads, rows, lines, [step])

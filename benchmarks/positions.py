@@ -1,0 +1,143 @@
+# Copyright 2026 The armid_ros developers
+# SPDX-License-Identifier: Apache-2.0
+"""
+Ten arms in MuJoCo under position control: how well positions alone determine their drives.
+
+The first three arms have commands that were chosen for the fit: sums of waves, 200 Hz. Seven have
+random commands and rates. The second row of an arm is MuJoCo's own way: scipy's least squares over
+rollouts of its model with finite differences, from the same start.
+
+python -m benchmarks.positions [NUMBER [FIRST]]
+
+"""
+
+import sys
+import time
+
+from armid_ros.positions.fit import fit_positions, start_values
+from armid_ros.positions.loop import CommandedMotion, LoopModel
+import mujoco
+from mujoco import rollout
+import numpy as np
+from scipy.optimize import least_squares
+
+from tests.hidden.machines import load_machine
+from tests.positions.machine import chirps, compiled, moves, play, random_chain, Secret, waves
+
+ARMS = ('humanoid_earth', 'panda', 'ur10', 'chain', 'kinova', 'xarm7', 'chain', 'panda', 'ur10')
+#: Step of MuJoCo in its own way [s].
+STEP = 1e-3
+
+
+def case(seed):
+    """Return name, robot, secret, recordings and known gains of an arm."""
+    rng = np.random.default_rng(1000 + seed)
+    name = 'chain' if seed == 9 else ARMS[seed]
+    robot = random_chain(rng) if name == 'chain' else load_machine(name)
+    secret, settings = Secret.draw(robot, rng), {}
+    if seed > 2:
+        settings = {
+            'rate': int(rng.choice([100, 200, 250, 500])),
+            'command_rate': int(rng.choice([50, 100, 250])),
+            'kind': (waves, chirps, moves)[int(rng.integers(3))],
+        }
+    gains = None if secret.velocities else np.array([secret.kp, secret.kd])
+    return name, robot, secret, play(robot, secret, rng, **settings), gains, settings
+
+
+def own_way(robot, recording, commanded, start, size, gains):
+    """Fit a model of MuJoCo by rollouts; return the values and their standard errors."""
+    n = robot.n_joints
+    commands = CommandedMotion.of(commanded, recording)
+    edges = STEP * np.arange(round(recording.t[-1] / STEP) + 2)
+    rows = np.rint(recording.t / STEP).astype(int)
+    free = np.ones(len(start), dtype=bool)
+    free[1 : 2 * n + 1] = gains is None
+    free[-1] = False  # the width of the tool is known here
+
+    def apart(z):
+        x = start.copy()
+        x[free] = z * size[free]
+        kp, kd, rotor, viscous, coulomb = x[1:-5].reshape(5, n)
+        noise = {'noise': 0.0, 'resolution': 0.0, 'velocities': bool(np.any(commands.dq))}
+        secret = Secret(kp, kd, x[0], rotor, viscous, coulomb, x[-5], x[-4:-1], **noise)
+        model, places = compiled(robot, secret, STEP)
+        data = mujoco.MjData(model)
+        data.qpos[places] = recording.q[0]
+        state = np.empty((1, mujoco.mj_stateSize(model, mujoco.mjtState.mjSTATE_FULLPHYSICS)))
+        mujoco.mj_getState(model, data, state[0], mujoco.mjtState.mjSTATE_FULLPHYSICS)
+        u, du = commands.mean(edges - x[0])
+        states, _ = rollout.rollout(model, data, state, (u + kd / kp * du)[np.newaxis])
+        return (states[0, rows - 1][1:, 1 + places] - recording.q[1:]).ravel() / 1e-3
+
+    lower, upper = np.zeros(len(start)), np.full(len(start), np.inf)
+    lower[-4:-1], upper[-4:] = -1.0, 1.0
+    lower[1 : n + 1] = 1e-3
+    bounds = (lower / size)[free], (upper / size)[free]
+    found = least_squares(
+        apart, (start / size)[free], bounds=bounds, x_scale='jac', diff_step=1e-3,
+        ftol=1e-4, xtol=1e-5, max_nfev=25,
+    )  # fmt: skip
+    x, std = start.copy(), np.zeros(len(start))
+    x[free] = found.x * size[free]
+    variance = 2.0 * found.cost / (len(found.fun) - free.sum())
+    std[free] = np.sqrt(np.diag(np.linalg.pinv(found.jac.T @ found.jac)) * variance) * size[free]
+    return x, std
+
+
+def shown(model, values, std, truth):
+    """Return errors of delay [ms] and, in per cent, of friction, and intervals that hold."""
+    names = [one.name for one in model.parameters]
+    wanted = np.array([truth[one.name, one.joint] for one in model.parameters])
+    of = {name: np.array([one == name for one in names]) for name in set(names)}
+    relative = 100.0 * np.abs(values / wanted - 1.0)
+    known = (std > 0.0) & np.isfinite(std)
+    held = np.abs(values - wanted) <= 1.96 * std
+    worst = [
+        relative[of[name] & known].max(initial=0.0)
+        for name in ('viscous_coefficient', 'coulomb_torque', 'rotor_inertia')
+    ]
+    unseen = int(np.sum(np.isinf(std)))
+    return (
+        1e3 * abs(values[0] - wanted[0]),
+        *worst,
+        int(held[known].sum()),
+        int(known.sum()),
+        unseen,
+    )
+
+
+def main(number=10, first=0):
+    """Print a row for each arm and way."""
+    print('arm             way     delay  viscous  dry   rotor  held   unseen  time')
+    print('                         [ms]    [%]     [%]   [%]                  [s]')
+    total = {'armid': [0, 0], 'mujoco': [0, 0]}
+    for seed in range(first, first + number):
+        name, robot, secret, (recording, commanded), gains, settings = case(seed)
+        model, truth = LoopModel(robot), secret.truth(robot)
+        run = recording, CommandedMotion.of(commanded, recording)
+        begun = time.perf_counter()
+        fit = fit_positions(model, [run], gains)
+        lasted = time.perf_counter() - begun
+        rows = [('armid', fit.values, fit.std, lasted)]
+        begun = time.perf_counter()
+        found = own_way(robot, recording, commanded, *start_values(model, [run], gains), gains)
+        rows.append(('mujoco', *found, time.perf_counter() - begun))
+        kind = settings.get('kind', waves).__name__
+        known = 'fitted' if gains is None else 'given'
+        print(f'{seed} {name}: {kind}, gains {known}, delay {1e3 * secret.delay:.1f} ms')
+        for way, values, std, lasted in rows:
+            delay, viscous, dry, rotor, held, of, unseen = shown(model, values, std, truth)
+            total[way][0] += held
+            total[way][1] += of
+            print(
+                f'{"":15} {way:6} {delay:6.2f} {viscous:8.2f} {dry:6.2f} {rotor:6.2f} '
+                f'{held:3}/{of:3} {unseen:5} {lasted:8.1f}',
+                flush=True,
+            )
+    for way, (held, of) in total.items():
+        print(f'{way}: intervals hold the truth in {held} of {of}: {100.0 * held / of:.1f} %')
+
+
+if __name__ == '__main__':
+    main(*map(int, sys.argv[1:]))
