@@ -15,7 +15,7 @@ from armid_ros.errors import RecordingError
 from armid_ros.files import reading
 from armid_ros.recording.bag import Bag
 from armid_ros.recording.columns import renamed
-from armid_ros.recording.joint_state.conversion import is_plain
+from armid_ros.recording.joint_state.conversion import require_standard
 from armid_ros.recording.mcap.source import McapSource
 from armid_ros.recording.message_types import JOINT_STATE
 from armid_ros.recording.source import DEFAULT, ReadSettings, Source, Topic, UNREADABLE
@@ -67,7 +67,7 @@ class Copied:
         )
 
 
-def recover(file: str | Path, out: str | Path, settings: ReadSettings = DEFAULT) -> Copied:
+def recover(file: str | Path, out: str | Path) -> Copied:
     """
     Copy the readable part of an MCAP file into a complete bag, with index and metadata.yaml.
 
@@ -80,8 +80,6 @@ def recover(file: str | Path, out: str | Path, settings: ReadSettings = DEFAULT)
         The file, which is not changed. A directory with a single .mcap file may be given instead.
     out : str or Path
         Bag directory to create; it must not exist.
-    settings : ReadSettings
-        Whether checksums are compared, and the memory limit.
 
     Raises
     ------
@@ -101,7 +99,7 @@ def recover(file: str | Path, out: str | Path, settings: ReadSettings = DEFAULT)
         path = files[0]
     if not os.path.lexists(path):
         raise RecordingError(f'{path}: there is no such file')
-    with reading(path, RecordingError), closing(McapSource(path, settings)) as source:
+    with reading(path, RecordingError), closing(McapSource(path)) as source:
         if next(source.messages(), None) is None:
             raise RecordingError(
                 f'{path}: there is no message to recover; {source.damage or "the file is whole"}'
@@ -158,11 +156,8 @@ def copy_bag(
                 f'{"; ".join(left_out) or "the bag is empty"}'
             )
         for topic in topics:
-            if rename and topic.type_name == JOINT_STATE and not is_plain(topic):
-                raise RecordingError(
-                    f'{path}: {topic.name} is no {JOINT_STATE} of ROS 2, whose names can be '
-                    'changed; give --rename to the command that reads the bag'
-                )
+            if rename and topic.type_name == JOINT_STATE:
+                require_standard(bag, topic)
         copied = _copied(path, bag, out, change)
     changed = tuple((old, new) for old, new in names.items() if old != new)
     return replace(copied, left_out=tuple(left_out), renamed=changed)
