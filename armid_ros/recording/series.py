@@ -310,7 +310,9 @@ def unwrapped(q: FloatArray) -> tuple[FloatArray, list[int]]:
     turns = (2.0 * np.pi, 360.0)  # a turn in each unit of positions [rad, degrees]
     off_a_turn = 0.15  # largest deviation of a jump from a whole turn, as a share of the turn
     found: list[int] = []
-    for joint in np.flatnonzero(np.ptp(q, axis=0) > (1.0 - off_a_turn) * turns[0]).tolist():
+    for joint in range(q.shape[1]):
+        if np.ptp(q[:, joint]) < (1.0 - off_a_turn) * turns[0]:
+            continue
         step = np.diff(q[:, joint])
         for turn in turns:
             far = np.abs(step) > 0.5 * turn

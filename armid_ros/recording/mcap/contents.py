@@ -143,10 +143,9 @@ def heads(data: bytes | mmap.mmap, offsets: IntArray) -> npt.NDArray[np.void]:
     return records_at(data, offsets, MESSAGE.itemsize).view(MESSAGE)
 
 
-def message_block(
-    data: bytes | mmap.mmap, offsets: IntArray, rows: npt.NDArray[np.void]
-) -> MessageBlock:
-    """Return the messages at given record positions, with their heads."""
+def message_block(data: bytes | mmap.mmap, offsets: IntArray) -> MessageBlock:
+    """Return the messages at given record positions."""
+    rows = heads(data, offsets)
     return MessageBlock(
         data,
         offsets + MESSAGE.itemsize,

@@ -100,9 +100,9 @@ class McapSource(Source):
             or any(channel in chunk.indexes for channel in wanted)
         ]
         count = 0
-        for _, data, offsets, rows in self._pieces(chunks, wanted):
+        for _, data, offsets in self._pieces(chunks, wanted):
             count += len(offsets)
-            yield message_block(data, offsets, rows)
+            yield message_block(data, offsets)
         self._compare_count(topic, wanted, count)
 
     def messages(self) -> Iterator[RawMessage]:
@@ -112,11 +112,11 @@ class McapSource(Source):
         pending: list[RawMessage] = []
         count = 0
         in_order = sorted(self._found.chunks, key=lambda chunk: chunk.start_time)
-        for start_time, data, offsets, rows in self._pieces(in_order, sorted(names)):
+        for start_time, data, offsets in self._pieces(in_order, sorted(names)):
             ready = bisect_left(pending, start_time, key=attrgetter('log_time_ns'))
             yield from pending[:ready]
             del pending[:ready]
-            block = message_block(data, offsets, rows)
+            block, rows = message_block(data, offsets), heads(data, offsets)
             count += len(block)
             pending += [
                 RawMessage(names[channel], log_time, publish_time, block.message(at))
@@ -133,17 +133,17 @@ class McapSource(Source):
 
     def _pieces(
         self, chunks: Sequence[Chunk], channels: Sequence[int]
-    ) -> Iterator[tuple[int, bytes | mmap.mmap, IntArray, _Rows]]:
-        """Yield first log time, buffer, begin and heads of the messages of some channels."""
+    ) -> Iterator[tuple[int, bytes | mmap.mmap, IntArray]]:
+        """Yield first log time, buffer, and begin of the messages of some channels."""
         data, loose = self._found.data, np.array(self._found.loose, np.int64)
         for contents in read_chunks(self._found, chunks, self._settings):
-            offsets, rows = self._possible(*messages_in(self._found, contents), channels)
+            offsets = self._possible(*messages_in(self._found, contents), channels)
             if len(offsets):
-                yield contents.parts[0][0].start_time, contents.data, offsets, rows
-        offsets, rows = self._possible(loose, heads(data, loose), channels)
-        for at in range(0, len(offsets), BLOCK_MESSAGES):
-            some = rows[at : at + BLOCK_MESSAGES]
-            yield int(rows['log_time'][at:].min()), data, offsets[at : at + BLOCK_MESSAGES], some
+                yield contents.parts[0][0].start_time, contents.data, offsets
+        loose = self._possible(loose, heads(data, loose), channels)
+        for at in range(0, len(loose), BLOCK_MESSAGES):
+            first = int(heads(data, loose[at:])['log_time'].min())
+            yield first, data, loose[at : at + BLOCK_MESSAGES]
 
     def _survey(self) -> dict[int, int]:
         """Find all channels, and return the number of messages of each."""
@@ -165,9 +165,7 @@ class McapSource(Source):
         self._counts = dict(counts)
         return self._counts
 
-    def _possible(
-        self, offsets: IntArray, rows: _Rows, wanted: Sequence[int]
-    ) -> tuple[IntArray, _Rows]:
+    def _possible(self, offsets: IntArray, rows: _Rows, wanted: Sequence[int]) -> IntArray:
         """Return the messages that are of some channels and have a valid time."""
         channels = rows['channel']
         chosen = np.isin(channels, wanted) if len(wanted) != 1 else channels == wanted[0]
@@ -178,7 +176,7 @@ class McapSource(Source):
                 'year 2262'
             )
             chosen &= ~late
-        return (offsets, rows) if chosen.all() else (offsets[chosen], rows[chosen])
+        return offsets if chosen.all() else offsets[chosen]
 
     def _compare_count(self, what: str, channels: Collection[int], count: int) -> None:
         """Compare the number of messages with the count of the writer."""
