@@ -13,7 +13,6 @@ from __future__ import annotations
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 import csv
-import json
 import math
 from pathlib import Path
 import struct
@@ -165,19 +164,6 @@ def yaml_line(text: str, place: Sequence[str | int]) -> int:
         key, node = pairs[part]
         mark = key.start_mark
     return int(mark.line) + 1
-
-
-def load_json(text: str) -> Any:
-    """
-    Parse JSON to plain types.
-
-    Raises
-    ------
-    ValueError or RecursionError
-        If the text is not JSON, or is nested too deep.
-
-    """
-    return json.loads(text)
 
 
 def _line(event: yaml.Event) -> int:

@@ -27,7 +27,7 @@ import re
 from typing import Any
 
 from armid_ros.errors import OutputError
-from armid_ros.files.documents import load_json, load_yaml, reading
+from armid_ros.files.documents import load_yaml, reading
 from armid_ros.files.regular import open_regular, read_text
 
 #: Model file that may be in a folder without document, and schemas of results that replace it.
@@ -221,7 +221,7 @@ def _refuse_other_results(path: Path, schema: str, robot: str) -> None:
     if not there and schema in _WITH_MODEL and os.path.lexists(path / _MODEL):
         there = [_MODEL]
     for name in there:
-        load = load_yaml if name == _MODEL else load_json
+        load = load_yaml if name == _MODEL else json.loads
         try:
             with reading(path / name, OutputError):
                 found = load(read_text(path / name, OutputError))
