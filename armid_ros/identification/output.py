@@ -215,9 +215,8 @@ def _found(model: Path) -> dict[Path, dict[str, Any] | None]:
     beside = model.with_name('identification.json')
     if not is_file(beside):
         return {}
-    text = read_text(beside, ModelError)
     with reading(beside, ModelError):
-        document = json.loads(text)
+        document = json.loads(read_text(beside, ModelError))
         known = {
             str(row['bag']): {'size': int(row['size']), 'digest': str(row['digest'])}
             for row in document.get('recordings', [])

@@ -257,9 +257,8 @@ def _beside(path: Path, model: Mapping[str, Any]) -> ParameterFile | None:
     file = path.with_name('identification.json')
     if not is_file(file):
         return None
-    text = read_text(file, ModelError)
     with reading(file, ModelError):
-        document = json.loads(text)
+        document = json.loads(read_text(file, ModelError))
         if not isinstance(document, dict) or document.get('schema') != SCHEMA:
             return None
         found = parameters_of(str(file), document)
