@@ -82,7 +82,7 @@ _WRITES = {
 }
 #: Documents whose schema identifies the results in a folder; a command writes its document last.
 DOCUMENTS = tuple(
-    dict.fromkeys(names[0] for names in _WRITES.values() if names[0].endswith('.json'))
+    dict.fromkeys(first for first, *_ in _WRITES.values() if first.endswith('.json'))
 )
 #: Folder in which a run writes until its result is complete.
 STAGING = '.armid-part'

@@ -67,7 +67,7 @@ class Copied:
         )
 
 
-def recover(file: str | Path, out: str | Path) -> Copied:
+def recover(file: str | Path, out: str | Path, settings: ReadSettings = DEFAULT) -> Copied:
     """
     Copy the readable part of an MCAP file into a complete bag, with index and metadata.yaml.
 
@@ -80,6 +80,8 @@ def recover(file: str | Path, out: str | Path) -> Copied:
         The file, which is not changed. A directory with a single .mcap file may be given instead.
     out : str or Path
         Bag directory to create; it must not exist.
+    settings : ReadSettings
+        Whether checksums are compared, and the memory limit.
 
     Raises
     ------
@@ -99,7 +101,7 @@ def recover(file: str | Path, out: str | Path) -> Copied:
         path = files[0]
     if not os.path.lexists(path):
         raise RecordingError(f'{path}: there is no such file')
-    with reading(path, RecordingError), closing(McapSource(path)) as source:
+    with reading(path, RecordingError), closing(McapSource(path, settings)) as source:
         if next(source.messages(), None) is None:
             raise RecordingError(
                 f'{path}: there is no message to recover; {source.damage or "the file is whole"}'

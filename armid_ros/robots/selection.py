@@ -11,8 +11,6 @@ from armid_ros.errors import meant, RobotError
 from armid_ros.robots.description import Description, Joint
 from armid_ros.robots.robot import Robot
 
-#: Pinocchio keeps tensors of the joints cubed, 1 GB for 250; a humanoid with both hands has 70.
-MAX_DRIVEN = 150
 GRIPPER_WORDS = ('finger', 'gripper', 'jaw')
 
 
@@ -81,9 +79,11 @@ def driven_joints(description: Description, names: Sequence[str] | None) -> tupl
             )
     if not chosen:
         raise RobotError('no joint can be driven; a robot needs at least one')
-    if len(chosen) > MAX_DRIVEN:
+    # Pinocchio keeps tensors of the joints cubed, 1 GB for 250; a humanoid with both hands has 70
+    most = 150
+    if len(chosen) > most:
         raise RobotError(
-            f'{len(chosen)} joints are driven; {MAX_DRIVEN} are the most that can be '
+            f'{len(chosen)} joints are driven; {most} are the most that can be '
             'identified together: name those of one arm with --joints'
         )
     return chosen

@@ -21,14 +21,6 @@ from mcap.opcode import Opcode
 import numpy as np
 import numpy.typing as npt
 
-#: Threads that decompress chunks ahead of the reader. Decompression and checksums release the GIL.
-_THREADS = 2
-#: Limit of decompressed data ahead of the reader [bytes]. A larger group is decompressed alone.
-_AHEAD = 16 << 20
-#: Content of the chunks that are read at once [bytes]. Small groups are slow in array code.
-#: Decompressed contents are copied into one buffer, which should fit into the processor cache.
-_GROUP, _GROUP_OF_COMPRESSED = 4 << 20, 1 << 20
-
 
 class Contents(NamedTuple):
     """Contents of some chunks in one buffer: each chunk, with the range of its content."""
@@ -56,9 +48,12 @@ def read_chunks(
     settings = replace(settings, check_crc=check)
     chunks = list(chunks)
     packed = any(chunk.compression for chunk in chunks)
+    # Small groups are slow in array code. Decompressed contents are copied into one buffer, which
+    # should fit into the processor cache. [bytes]
+    most = 1 << 20 if packed else 4 << 20
     groups: list[list[Chunk]] = [[]]
     for chunk in chunks:
-        if sum(one.size for one in groups[-1]) >= (_GROUP_OF_COMPRESSED if packed else _GROUP):
+        if sum(one.size for one in groups[-1]) >= most:
             groups.append([])
         groups[-1].append(chunk)
     if packed:
@@ -77,10 +72,13 @@ def _read_ahead(
 ) -> Iterator[tuple[Contents, list[str]]]:
     """Yield contents and damage of groups that threads read ahead of the reader."""
     begun: deque[tuple[int, Future[tuple[Contents, list[str]]]]] = deque()
-    with ThreadPoolExecutor(min(_THREADS, os.cpu_count() or 1)) as threads:
+    # Decompression and checksums release the GIL.
+    count = min(2, os.cpu_count() or 1)
+    most = 16 << 20  # limit of decompressed data ahead [bytes]; a larger group is read alone
+    with ThreadPoolExecutor(count) as threads:
         for group in groups:
             size = sum(chunk.size for chunk in group)
-            while begun and (sum(s for s, _ in begun) + size > _AHEAD or len(begun) > _THREADS):
+            while begun and (sum(s for s, _ in begun) + size > most or len(begun) > count):
                 yield begun.popleft()[1].result()
             begun.append((size, threads.submit(_read_group, found, group, settings)))
         while begun:
