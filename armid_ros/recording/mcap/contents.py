@@ -52,10 +52,13 @@ def read_chunks(
     # should fit into the processor cache. [bytes]
     most = 1 << 20 if packed else 4 << 20
     groups: list[list[Chunk]] = [[]]
+    size = 0
     for chunk in chunks:
-        if sum(one.size for one in groups[-1]) >= most:
+        if size >= most:
             groups.append([])
+            size = 0
         groups[-1].append(chunk)
+        size += chunk.size
     if packed:
         results = _read_ahead(found, groups, settings)
     else:  # checksums alone are faster without threads
