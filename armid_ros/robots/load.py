@@ -214,7 +214,7 @@ def robot_from_urdf(
             *description.inertia_doubts(),
             *description.notes,
             *locked,
-            *several_arms(description, driven),
+            *several_arms(description, [joint.name for joint in driven]),
         ),
         path=path,
     )
