@@ -240,8 +240,8 @@ def _reason(error: Exception, request: dict[str, Any], missing: dict[str, str]) 
         written = ' '.join(f'{one}:={value}' for one, value in values.items())
         rest = _unknown(xacro, request) or f"grep '<xacro:arg' {path} lists the others"
         return (
-            f"{'the file' if place == path else place} uses the argument '{name}', which is not "
-            f"given above; write --robot '{path} {written}'; {rest}"
+            f"{'the file' if place == path else place} uses the argument '{name}', which has no "
+            f"value there; write --robot '{path} {written}'; {rest}"
         )
     if missing:
         lines = '; '.join(f"package '{name}' ({file})" for name, file in missing.items())
