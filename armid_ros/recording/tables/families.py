@@ -42,23 +42,17 @@ TIMES = dict.fromkeys(('time', 't', 'timestamp', 'timestamps'), 3.0) | dict.from
 )
 #: Words for the time of measurement, preferred to the time of reception.
 TIMES |= {'stamp': 3.5}
-#: Words for measured quantities.
-MEASURED = dict.fromkeys(
-    ('meas', 'measured', 'act', 'actual', 'fb', 'feedback', 'observation'), 1.0
+#: Words beside that of a quantity, and the weights that they add to its score.
+_QUALIFIERS = (
+    ('meas measured act actual fb feedback observation', 1.0),
+    ('filt filtered est estimated se disc mot motor', -0.3),  # processed
+    ('cmd command commanded des desired target ref reference con goal set setpoint', -2.0),
+    ('ctrl control action ff feedforward traj leader', -2.0),  # not measured either
+    ('err error ext external fric friction pert model pred predicted residual limit', -2.0),
+    ('min max std temp temperature tcp ee cart cartesian acc ddq imu rel', -2.0),
+    ('init gravity kin dyn', -2.0),
 )
-_COMMANDED = (
-    'cmd command commanded des desired target ref reference con goal set setpoint ctrl control '
-    'action ff feedforward traj leader'
-)
-_OF_OTHER_THINGS = (
-    'err error ext external fric friction pert model pred predicted residual limit min max std '
-    'temp temperature tcp ee cart cartesian acc ddq imu rel init gravity kin dyn'
-)
-#: Words for quantities that were not measured or are not of joints; with less weight, words for
-#: processed quantities.
-OTHERWISE = dict.fromkeys((_COMMANDED + ' ' + _OF_OTHER_THINGS).split(), -2.0) | dict.fromkeys(
-    ('filt', 'filtered', 'est', 'estimated', 'se', 'disc', 'mot', 'motor'), -0.3
-)
+QUALIFIERS = {word: weight for words, weight in _QUALIFIERS for word in words.split()}
 
 _RANGE = re.compile(r'([\[{])(\d+)\.\.(\d+)[\]}]')
 
@@ -232,7 +226,7 @@ def guess_time(table: Table) -> TableColumn | None:
         for column in table.columns:
             words = words_of(column.bare_name)
             score = max((TIMES.get(word, 0.0) for word in words), default=0.0)
-            score += sum(OTHERWISE.get(word, 0.0) for word in words) - 0.1 * len(words)
+            score += sum(QUALIFIERS.get(word, 0.0) for word in words) - 0.1 * len(words)
             steps = way * np.diff(column.finite)
             if score > 0.5 and len(steps) and np.mean(steps >= 0.0) > 0.9:
                 scores[column] = score
@@ -349,8 +343,7 @@ def _score(pattern: str, quantity: QuantityName) -> float:
     own = scores[quantity]
     if own <= 0.0 or own < max(scores.values()):
         return 0.0
-    said = sum(MEASURED.get(word, 0.0) + OTHERWISE.get(word, 0.0) for word in words)
-    return own + said - 0.01 * len(words)
+    return own + sum(QUALIFIERS.get(word, 0.0) for word in words) - 0.01 * len(words)
 
 
 def words_of(name: str) -> list[str]:
