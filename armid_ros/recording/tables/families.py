@@ -42,7 +42,7 @@ TIMES = dict.fromkeys(('time', 't', 'timestamp', 'timestamps'), 3.0) | dict.from
 )
 #: Words for the time of measurement, preferred to the time of reception.
 TIMES |= {'stamp': 3.5}
-#: Words beside that of a quantity, and the weights that they add to its score.
+#: Words that qualify a quantity, and the weights that they add to its score.
 _QUALIFIERS = (
     ('meas measured act actual fb feedback observation', 1.0),
     ('filt filtered est estimated se disc mot motor', -0.3),  # processed
