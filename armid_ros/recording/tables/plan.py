@@ -4,7 +4,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 import textwrap
 
@@ -182,13 +182,13 @@ def plan(
             sources.append(found)
     time, unit, rate = _time(table, settings)
     effort = next((one for one in sources if one.quantity == 'effort'), None)
-    notes: tuple[str, ...] = ()
+    notes = list(_far(position, settings, sliding))
     if effort is not None and not settings.effort_scale:
         name = effort.pattern
         if effort.unit in ('A', 'mA') or 'load' in name.lower():
-            notes = (f"efforts '{name}' seem to be currents; --current-gain makes them N m",)
+            notes.append(f"efforts '{name}' seem to be currents; --current-gain makes them N m")
     scaled = tuple(_scaled(source, settings, names, sliding) for source in sources)
-    return TablePlan(table, names, time, unit, rate, scaled, settings, notes, missing)
+    return TablePlan(table, names, time, unit, rate, scaled, settings, tuple(notes), missing)
 
 
 def _source(
@@ -250,6 +250,24 @@ def _scaled(
 
 def _short(values: FloatArray) -> str:
     return ', '.join(dict.fromkeys(f'{value:.6g}' for value in values))
+
+
+def _far(
+    position: QuantityColumns, settings: ColumnSettings, slides: npt.NDArray[np.bool_]
+) -> Iterator[str]:
+    """Return notes on positions that are too large for rad or m."""
+    if position.unit != 'rad' or settings.gear or settings.position_scale:
+        return
+    reach = np.fmax.reduce(np.abs(position.values()))
+    far = reach > 4.5 * np.pi  # probably not in rad or m
+    turned, slid = far & ~slides, far & slides
+    if turned.any() and not settings.degrees:
+        yield f'positions reach {reach[turned].max():.4g}: --degrees, or motor angles (--gear)?'
+    if slid.any():
+        others = 'pi/180' if settings.degrees else '1'
+        scale = ','.join('0.001' if one else others for one in slides)
+        most = f'{reach[slid].max():.4g}'
+        yield f'positions that slide reach {most} m: --position-scale {scale} if in mm?'
 
 
 def _time(table: Table, settings: ColumnSettings) -> tuple[TableColumn | None, str, float | None]:

@@ -199,3 +199,12 @@ def test_rows_with_times_that_are_rubbish_are_left_out_and_counted(value, recwar
     found = measured(plan(recorded, ColumnSettings(), JOINTS))
     assert (len(found), found.report.unstamped, found.report.restarted) == (48, 2, 0)
     assert not recwarn.list
+
+
+def test_large_ways_of_a_joint_that_slides_are_doubted_apart():
+    columns = table(q1=np.linspace(0, 1, 50), q2=np.linspace(0, 180, 50))
+    assert any('--degrees' in note for note in plan(columns, ColumnSettings(), JOINTS).notes)
+    (note,) = plan(columns, ColumnSettings(), JOINTS, [False, True]).notes
+    assert '180 m' in note and '--position-scale 1,0.001' in note
+    scaled = ColumnSettings(position_scale=(1.0, 0.001))
+    assert not plan(columns, scaled, JOINTS, [False, True]).notes
