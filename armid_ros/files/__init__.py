@@ -3,14 +3,14 @@
 """
 Files as untrusted input, and as output that is whole or absent.
 
-Readers of text use `read_text` (no FIFO, no device, a bounded size), `load_yaml` or `load_json`
-(bounded depth and expansion) and `reading`, which converts errors of a parser into an error of the
+Readers of text use `read_text` (no FIFO, no device, a bounded size), `load_yaml` (bounded
+depth and expansion) and `reading`, which converts errors of a parser into an error of the
 package with the path. Writers of results use `write_file`, inside the `result_folder` of the
 command. A result of several files is written into a `staged` folder until it is complete.
 
 """
 
-from armid_ros.files.documents import finite, load_json, load_yaml, parsed_yaml, reading, yaml_line
+from armid_ros.files.documents import finite, load_yaml, parsed_yaml, reading, yaml_line
 from armid_ros.files.output import json_text, result_folder, settled, write_file
 from armid_ros.files.regular import (
     default_memory_limit,
@@ -28,7 +28,6 @@ __all__ = [
     'load_yaml',
     'parsed_yaml',
     'yaml_line',
-    'load_json',
     'reading',
     'finite',
     'write_file',

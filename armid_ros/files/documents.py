@@ -13,7 +13,6 @@ from __future__ import annotations
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 import csv
-import json
 import math
 from pathlib import Path
 import struct
@@ -22,12 +21,8 @@ from typing import Any
 from armid_ros.errors import ArmidError
 import yaml
 
-#: Largest nesting of a document; documents of this package have six levels at most.
-MAX_DEPTH = 64
 #: Largest number of a document. No quantity is as large, and products of three stay finite.
 LARGEST = 1e100
-#: Largest number of nodes with aliases expanded; a model of 1,000 joints has 200,000.
-MAX_NODES = 2_000_000
 
 # The parser in C, where there is one, is ten times as fast.
 _Loader: Any = type('_Loader', (getattr(yaml, 'CSafeLoader', yaml.SafeLoader),), {})
@@ -112,7 +107,8 @@ def load_yaml(text: str) -> Any:
         If the text is not YAML, is nested too deep, or has too many nodes with aliases expanded.
 
     """
-    # depth and number of nodes, from the events alone
+    most_levels = 64  # documents of this package have six at most
+    most_nodes = 2_000_000  # with aliases expanded; a model of 1,000 joints has 200,000
     open_nodes: list[tuple[str | None, int]] = []
     sizes: dict[str | None, int] = {}  # of nodes with an anchor
     total = 0
@@ -124,17 +120,19 @@ def load_yaml(text: str) -> Any:
         elif isinstance(event, (yaml.SequenceStartEvent, yaml.MappingStartEvent)):
             total += 1
             open_nodes.append((event.anchor, total))
-            if len(open_nodes) > MAX_DEPTH:
-                raise ValueError(f'line {_line(event)}: nested more than {MAX_DEPTH} levels deep')
+            if len(open_nodes) > most_levels:
+                raise ValueError(
+                    f'line {_line(event)}: nested more than {most_levels} levels deep'
+                )
         elif isinstance(event, (yaml.SequenceEndEvent, yaml.MappingEndEvent)):
             anchor, begin = open_nodes.pop()
             sizes[anchor] = total - begin + 1
         elif isinstance(event, yaml.ScalarEvent):
             total += 1
             sizes[event.anchor] = 1
-        if total > MAX_NODES:
+        if total > most_nodes:
             raise ValueError(
-                f'line {_line(event)}: more than {MAX_NODES} nodes with aliases expanded'
+                f'line {_line(event)}: more than {most_nodes} nodes with aliases expanded'
             )
     return yaml.load(text, Loader=_Loader)
 
@@ -165,19 +163,6 @@ def yaml_line(text: str, place: Sequence[str | int]) -> int:
         key, node = pairs[part]
         mark = key.start_mark
     return int(mark.line) + 1
-
-
-def load_json(text: str) -> Any:
-    """
-    Parse JSON to plain types.
-
-    Raises
-    ------
-    ValueError or RecursionError
-        If the text is not JSON, or is nested too deep.
-
-    """
-    return json.loads(text)
 
 
 def _line(event: yaml.Event) -> int:

@@ -27,28 +27,17 @@ import re
 from typing import Any
 
 from armid_ros.errors import OutputError
-from armid_ros.files.documents import load_json, load_yaml, reading
+from armid_ros.files.documents import load_yaml, reading
 from armid_ros.files.regular import open_regular, read_text
 
-#: Documents whose schema identifies the results in a folder; a command writes its document last.
-DOCUMENTS = (
-    'identification.json',
-    'diagnosis.json',
-    'excitation.json',
-    'elastic.json',
-    'exo.json',
-    'comparison.json',
-    'lunar.json',
-    'fleet.json',
-)
 #: Model file that may be in a folder without document, and schemas of results that replace it.
 _MODEL = 'model.yaml'
 _WITH_MODEL = ('armid/identification/1', 'armid/diagnosis/1')
-#: Files and folders of each kind of result, by schema.
+#: Files and folders of each kind of result, by schema; a document in JSON is first.
 _WRITES = {
     'armid/identification/1': (
-        'model.yaml',
         'identification.json',
+        'model.yaml',
         'report.html',
         'identified.urdf',
         'identified.mjcf.xml',
@@ -63,15 +52,15 @@ _WRITES = {
         'experiment.yaml',
     ),
     'armid/excitation/1': (
+        'excitation.json',
         'excitation.yaml',
         'excitation.csv',
-        'excitation.json',
         'report.html',
         'trajectory',
     ),
     'armid/comparison/1': ('comparison.json', 'report.html'),
     'armid/inspection/1': ('inspection.html', 'inspection.json'),
-    'armid/check/1': ('check.json', 'report.html'),
+    'armid/check/1': ('report.html', 'check.json'),
     'armid/elastic/1': ('elastic.json', 'report.html', 'resonances', 'steps'),
     'armid/springs/1': ('elastic.json', 'report.html'),
     'armid/exo/1': ('exo.json', 'report.html', 'recording'),
@@ -91,6 +80,10 @@ _WRITES = {
         'watch',
     ),
 }
+#: Documents whose schema identifies the results in a folder; a command writes its document last.
+DOCUMENTS = tuple(
+    dict.fromkeys(first for first, *_ in _WRITES.values() if first.endswith('.json'))
+)
 #: Folder in which a run writes until its result is complete.
 STAGING = '.armid-part'
 #: Element in the head of each page of this package.
@@ -228,7 +221,7 @@ def _refuse_other_results(path: Path, schema: str, robot: str) -> None:
     if not there and schema in _WITH_MODEL and os.path.lexists(path / _MODEL):
         there = [_MODEL]
     for name in there:
-        load = load_yaml if name == _MODEL else load_json
+        load = load_yaml if name == _MODEL else json.loads
         try:
             with reading(path / name, OutputError):
                 found = load(read_text(path / name, OutputError))

@@ -68,7 +68,7 @@ def open_regular(path: str | Path, error: type[ArmidError]) -> BinaryIO:
     return os.fdopen(descriptor, 'rb')
 
 
-def read_text(path: str | Path, error: type[ArmidError], limit: int = TEXT_LIMIT) -> str:
+def read_text(path: str | Path, error: type[ArmidError]) -> str:
     """
     Return the content of a text file.
 
@@ -78,8 +78,6 @@ def read_text(path: str | Path, error: type[ArmidError], limit: int = TEXT_LIMIT
         The file, in UTF-8.
     error : type of ArmidError
         Class of the raised error.
-    limit : int
-        Largest permitted size [bytes].
 
     Raises
     ------
@@ -89,11 +87,11 @@ def read_text(path: str | Path, error: type[ArmidError], limit: int = TEXT_LIMIT
     """
     with open_regular(path, error) as stream:
         try:
-            content = stream.read(limit + 1)
+            content = stream.read(TEXT_LIMIT + 1)
         except OSError as problem:
             raise error(f'{path}: cannot be read: {problem_text(problem)}') from problem
-    if len(content) > limit:
-        raise error(f'{path}: larger than {limit >> 20} MiB, the limit of a text file')
+    if len(content) > TEXT_LIMIT:
+        raise error(f'{path}: larger than {TEXT_LIMIT >> 20} MiB, the limit of a text file')
     try:
         return content.decode('utf-8-sig')
     except UnicodeDecodeError as problem:

@@ -24,9 +24,6 @@ import shutil
 from armid_ros.errors import OutputError
 from armid_ros.files.output import DOCUMENTS, locked, STAGING
 
-#: Constants of the system call renameat2(2).
-_AT_FDCWD, _RENAME_EXCHANGE = -100, 2
-
 
 @dataclass(frozen=True)
 class Staged:
@@ -172,10 +169,11 @@ def staged(
 
 def _exchange(first: Path, second: Path) -> None:
     """Exchange two folders in one step; OSError if kernel or file system cannot do so."""
+    at_fdcwd, rename_exchange = -100, 2  # constants of the system call renameat2(2)
     rename = getattr(ctypes.CDLL(None, use_errno=True), 'renameat2', None)
     if rename is None:
         raise OSError(errno.ENOSYS, os.strerror(errno.ENOSYS))
-    if rename(_AT_FDCWD, os.fsencode(first), _AT_FDCWD, os.fsencode(second), _RENAME_EXCHANGE):
+    if rename(at_fdcwd, os.fsencode(first), at_fdcwd, os.fsencode(second), rename_exchange):
         code = ctypes.get_errno()
         raise OSError(code, os.strerror(code), str(second))
 

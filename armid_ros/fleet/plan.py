@@ -22,7 +22,7 @@ import uuid
 
 from armid_ros.arm import ArmModel
 from armid_ros.errors import ArmidError, FleetError
-from armid_ros.files import json_text, load_json, reading
+from armid_ros.files import json_text, reading
 from armid_ros.files.cells import listed
 from armid_ros.fleet.bags import BagFile, digest
 from armid_ros.fleet.store import fetched, opened, Store, StoreError
@@ -307,7 +307,7 @@ def document(store: Store) -> dict[str, Any]:
     if data is None:
         return {}
     with reading(f'{store.url}/fleet.json', FleetError):
-        found: Mapping[str, Any] = load_json(data.decode())
+        found: Mapping[str, Any] = json.loads(data.decode())
         if found['schema'] != SCHEMA:
             raise FleetError(f'holds {found["schema"]}, not {SCHEMA}; name another folder')
     return dict(found)

@@ -12,13 +12,14 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 import hashlib
+import json
 from pathlib import Path
 import re
 from typing import Any
 
 from armid_ros.arm import parameter_table
 from armid_ros.errors import ModelError
-from armid_ros.files import is_file, json_text, load_json, read_text, reading, write_file
+from armid_ros.files import is_file, json_text, read_text, reading, write_file
 from armid_ros.identification.assess.consistency import NoiseCheck
 from armid_ros.identification.assess.grade import Grade
 from armid_ros.identification.assess.verification import Verification
@@ -214,9 +215,8 @@ def _found(model: Path) -> dict[Path, dict[str, Any] | None]:
     file = model.with_name('identification.json')
     if not is_file(file):
         return {}
-    text = read_text(file, ModelError)
     with reading(file, ModelError):
-        document = load_json(text)
+        document = json.loads(read_text(file, ModelError))
         known = {
             str(row['bag']): {'size': int(row['size']), 'digest': str(row['digest'])}
             for row in document.get('recordings', [])

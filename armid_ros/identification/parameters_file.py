@@ -6,6 +6,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
+import json
 from pathlib import Path
 from typing import Any
 
@@ -15,7 +16,7 @@ from armid_ros.arm.model_file import checked_model, read_model
 from armid_ros.arm.model_file import SCHEMA as MODEL
 from armid_ros.errors import ArmidError, ModelError
 from armid_ros.estimate import ParameterName
-from armid_ros.files import finite, is_file, load_json, load_yaml, read_text, reading
+from armid_ros.files import finite, is_file, load_yaml, read_text, reading
 from armid_ros.identification.assess.grade_limits import by_error
 from armid_ros.identification.fitting.identifiability import NOT_SHOWN
 from armid_ros.identification.fitting.normal_equations import scaled_inverse
@@ -226,7 +227,7 @@ def read_parameters(path: str | Path) -> ParameterFile:
     text = read_text(path, ModelError)
     with reading(path, ModelError):
         try:
-            document = load_json(text) if path.suffix == '.json' else load_yaml(text)
+            document = json.loads(text) if path.suffix == '.json' else load_yaml(text)
         except (ValueError, yaml.YAMLError) as error:
             reason = ' '.join(str(error).split())
             raise ModelError(f'neither JSON nor YAML: {reason}') from error
@@ -255,9 +256,8 @@ def _identification_of(path: Path, model: Mapping[str, Any]) -> ParameterFile | 
     file = path.with_name('identification.json')
     if not is_file(file):
         return None
-    text = read_text(file, ModelError)
     with reading(file, ModelError):
-        document = load_json(text)
+        document = json.loads(read_text(file, ModelError))
         if not isinstance(document, dict) or document.get('schema') != SCHEMA:
             return None
         found = parameters_of(str(file), document)

@@ -27,16 +27,12 @@ from armid_ros.robots.geometry import all_in_one, collision_geometry
 from armid_ros.robots.robot import PER_LINK
 import numpy as np
 
-#: Least and largest plausible density of a link within its shape [kg/m^3]: foam and steel.
-_DENSITIES = 30.0, 8000.0
 #: A shape above this [m] has probably another unit.
 _LONGEST = 10.0
 #: A fitted model whose torque error is smaller by less than this shows no wrong link [%].
 _MATERIAL = 1.0
 #: Share of the residual that a further link has to explain; chi-squared per row that may remain.
 _FURTHER, _REMAINS = 0.5, 10.0
-#: A mass is determined if its standard deviation is below this share of the prior's.
-_DETERMINED = 0.1
 
 
 @dataclass(frozen=True, eq=False)
@@ -160,9 +156,10 @@ def _of_shapes(robot: Robot) -> Iterator[Remark]:
             continue
         mass = 0.0 if inertial is None else inertial.mass
         density = f"link '{link}': {mass:g} kg, {mass / volume[link]:.3g} kg/m^3"
-        if mass > _DENSITIES[1] * volume[link]:
+        # plausible densities are those of foam to steel
+        if mass > 8000.0 * volume[link]:
             yield Remark('bad', f'{density}; steel has 7850')
-        elif mass < _DENSITIES[0] * volume[link] and link != robot.base:
+        elif mass < 30.0 * volume[link] and link != robot.base:
             yield Remark('doubt', f'{density}; foam has 30')
     yield from (Remark('note', text) for text in all_in_one([*missing.values()]))
 
@@ -218,7 +215,8 @@ def check_links(found: Identification, described: ArmModel, grade: str, fault: s
     measured, std = np.full((2, robot.n_joints, 4), np.nan)
     for position, k in enumerate(wrong):
         own = slice(size * position, size * position + 4)
-        if covariance[own, own][0, 0] > (_DETERMINED * spread[size * k]) ** 2:
+        # a determined mass has a standard deviation below a tenth of the prior's
+        if covariance[own, own][0, 0] > (0.1 * spread[size * k]) ** 2:
             continue
         mass, *moments = body[k] + changes[own]
         measured[k] = mass, *(np.array(moments) / mass)

@@ -133,7 +133,7 @@ def inspect(
         *_of_time(recording, sampling),
         *_of_units(recording, joints, robot),
         *_of_motion(recording, joints, sampling),
-        *_of_efforts(joints, robot, trial),
+        *_of_efforts(joints, trial),
     ]
     mixed = two_senders(recording)
     if trial is None and mixed:
@@ -288,9 +288,7 @@ def _of_motion(
         )
 
 
-def _of_efforts(
-    joints: tuple[JointFacts, ...], robot: Robot | None, trial: TrialFit | None
-) -> Iterator[Remark]:
+def _of_efforts(joints: tuple[JointFacts, ...], trial: TrialFit | None) -> Iterator[Remark]:
     if joints[0].effort_rms is None:
         yield Remark('bad', 'no efforts: nothing can be identified; is JointState.effort filled?')
         return
@@ -298,20 +296,6 @@ def _of_efforts(
     if silent and not (trial is not None and SILENT in trial.refused):
         weight: Weight = 'bad' if len(silent) == len(joints) else 'doubt'
         yield Remark(weight, f'efforts of {", ".join(silent)} never change')
-    if robot is not None:
-        beyond = [
-            f'{joint.name} {joint.effort_largest:.4g} of {limit:.4g} {unit}'
-            for joint, limit, unit in zip(
-                joints, robot.torque_limit, robot.torque_units, strict=True
-            )
-            if joint.effort_largest is not None and joint.effort_largest > 3.0 * limit
-        ]
-        if beyond:
-            yield Remark(
-                'doubt',
-                f'efforts beyond three times the limit of the description: {", ".join(beyond)}; '
-                'are they in mN m, or are the limits of the description too low?',
-            )
     if trial is None or trial.scale is None or trial.faults:
         return
     known = np.flatnonzero(np.isfinite(trial.scale))

@@ -27,16 +27,7 @@ CORRUPT = (zstandard.ZstdError, RuntimeError, MemoryError, OverflowError, ValueE
 ZSTD = b'\x28\xb5\x2f\xfd'
 
 
-def stated_size(stored: _Buffer, compression: str) -> int | None:
-    """Return the content size that a compressed frame states; None if it states none."""
-    if compression == 'zstd':
-        size = int(zstandard.frame_content_size(stored))
-        return size if size >= 0 else None
-    size = int(lz4.frame.get_frame_info(stored)['content_size'])
-    return size or None
-
-
-def decompressed(stored: _Buffer, compression: str, size: int) -> bytes:
+def decompressed(stored: _Buffer, compression: str, size: int, settings: ReadSettings) -> bytes:
     """
     Return the content of a frame.
 
@@ -48,30 +39,35 @@ def decompressed(stored: _Buffer, compression: str, size: int) -> bytes:
         Its kind.
     size : int
         Size that the content must have [bytes].
+    settings : ReadSettings
+        The memory limit.
 
     Raises
     ------
-    RecordingError
+    one of CORRUPT
         The frame is damaged, or its content has another size.
+    RecordingError
+        The content exceeds the memory limit.
 
     """
-    try:
-        said = stated_size(stored, compression)
-        if said is not None and said != size:
-            raise RecordingError(f'holds {said} bytes, but {size} are stated')
-        if not size:
-            return b''
-        if compression == 'zstd':
-            content = _ZSTD.decompressor.decompress(stored, max_output_size=size)
-        else:
-            decompressor = lz4.frame.LZ4FrameDecompressor()
-            content = bytes(decompressor.decompress(stored, max_length=size))
-            if not decompressor.eof and decompressor.decompress(b'', max_length=1):
-                raise RecordingError(f'holds more than the {size} bytes stated')
-    except CORRUPT as error:
-        raise RecordingError(str(error) or 'it cannot be decompressed') from error
+    if compression == 'zstd':
+        stated = int(zstandard.frame_content_size(stored))
+    else:
+        stated = int(lz4.frame.get_frame_info(stored)['content_size']) or -1
+    if stated not in (-1, size):  # -1: the frame states no size
+        raise ValueError(f'holds {stated} bytes, but {size} are stated')
+    settings.require(size, 'a chunk')
+    if not size:
+        return b''
+    if compression == 'zstd':
+        content = _ZSTD.decompressor.decompress(stored, max_output_size=size)
+    else:
+        decompressor = lz4.frame.LZ4FrameDecompressor()
+        content = bytes(decompressor.decompress(stored, max_length=size))
+        if not decompressor.eof and decompressor.decompress(b'', max_length=1):
+            raise ValueError(f'holds more than the {size} bytes stated')
     if len(content) != size:
-        raise RecordingError(f'holds {len(content)} bytes, but {size} are stated')
+        raise ValueError(f'holds {len(content)} bytes, but {size} are stated')
     return content
 
 

@@ -15,7 +15,7 @@ from armid_ros.errors import RecordingError
 from armid_ros.files import reading
 from armid_ros.recording.bag import Bag
 from armid_ros.recording.columns import renamed
-from armid_ros.recording.joint_state.conversion import is_plain
+from armid_ros.recording.joint_state.conversion import require_standard
 from armid_ros.recording.mcap.source import McapSource
 from armid_ros.recording.message_types import JOINT_STATE
 from armid_ros.recording.source import DEFAULT, ReadSettings, Source, Topic, UNREADABLE
@@ -158,11 +158,8 @@ def copy_bag(
                 f'{"; ".join(left_out) or "the bag is empty"}'
             )
         for topic in topics:
-            if rename and topic.type_name == JOINT_STATE and not is_plain(topic):
-                raise RecordingError(
-                    f'{path}: {topic.name} is no {JOINT_STATE} of ROS 2, whose names can be '
-                    'changed; give --rename to the command that reads the bag'
-                )
+            if rename and topic.type_name == JOINT_STATE:
+                require_standard(bag, topic)
         copied = _copied(path, bag, out, change)
     changed = tuple((old, new) for old, new in names.items() if old != new)
     return replace(copied, left_out=tuple(left_out), renamed=changed)

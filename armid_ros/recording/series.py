@@ -267,13 +267,15 @@ def _finite(
     if quantities[0] is None:
         raise RecordingError(f'{where} has no {absent[0]}')
     bad, culprits = np.zeros(len(series), np.bool_), []
+    most = 1e15  # uninitialised memory can hold any number
     for name, values in zip(QUANTITIES, quantities, strict=True):
-        # uninitialised memory can hold any number
-        wrong = None if values is None else ~(np.abs(values) < 1e15)
-        if wrong is not None and wrong.any():
-            bad |= wrong.any(axis=1)
-            numbers = zip(joints, wrong.sum(axis=0).tolist(), strict=True)
-            culprits += [f'{name} of {joint} in {number}' for joint, number in numbers if number]
+        # the extremes of an array are NaN if one of its values is
+        if values is None or (values.min(initial=0.0) > -most and values.max(initial=0.0) < most):
+            continue
+        wrong = ~(np.abs(values) < most)
+        bad |= wrong.any(axis=1)
+        numbers = zip(joints, wrong.sum(axis=0).tolist(), strict=True)
+        culprits += [f'{name} of {joint} in {number}' for joint, number in numbers if number]
     dropped = int(bad.sum())
     if dropped > MAX_NOT_FINITE * len(series):
         raise RecordingError(
@@ -307,11 +309,11 @@ def unwrapped(q: FloatArray) -> tuple[FloatArray, list[int]]:
     """
     turns = (2.0 * np.pi, 360.0)  # a turn in each unit of positions [rad, degrees]
     off_a_turn = 0.15  # largest deviation of a jump from a whole turn, as a share of the turn
-    steps = np.diff(q, axis=0)
     found: list[int] = []
-    largest = np.max(np.abs(steps), axis=0, initial=0.0)
-    for joint in np.flatnonzero(largest > (1.0 - off_a_turn) * turns[0]).tolist():
-        step = steps[:, joint]
+    for joint in range(q.shape[1]):
+        if np.ptp(q[:, joint]) < (1.0 - off_a_turn) * turns[0]:
+            continue
+        step = np.diff(q[:, joint])
         for turn in turns:
             far = np.abs(step) > 0.5 * turn
             off = np.abs(np.abs(step[far]) - turn)

@@ -19,10 +19,6 @@ import numpy as np
 MOVABLE = ('revolute', 'continuous', 'prismatic')
 KNOWN = (*MOVABLE, 'fixed', 'floating', 'planar')
 
-ROUNDING = 1e-6  # relative; descriptions print six digits
-NEGLIGIBLE = 1e-12  # kg m^2
-MAX_CHAIN = 500  # joints one behind the other; Pinocchio's reader descends by recursion
-
 Vector = tuple[float, float, float]
 #: Components of an inertia, in the order of a URDF.
 INERTIA = ('ixx', 'ixy', 'ixz', 'iyy', 'iyz', 'izz')
@@ -42,7 +38,8 @@ class Inertial:
         ixx, ixy, ixz, iyy, iyz, izz = self.inertia
         tensor = np.array([[ixx, ixy, ixz], [ixy, iyy, iyz], [ixz, iyz, izz]])
         moments = np.linalg.eigvalsh(tensor)
-        tolerance = max(ROUNDING * float(np.abs(moments).max()), NEGLIGIBLE)
+        # descriptions print six digits; moments below 1e-12 kg m^2 are negligible
+        tolerance = max(1e-6 * float(np.abs(moments).max()), 1e-12)
         said = ', '.join(f'{moment:.3g}' for moment in moments)
         if self.mass < 0.0 or moments[0] < -tolerance:
             return f'negative mass or inertia (m = {self.mass:g} kg, moments {said} kg m^2)'
@@ -223,9 +220,10 @@ def _check_tree(links: Iterable[str], joints: Iterable[Joint]) -> None:
         for below, name in enumerate(reversed(path), start=depth[link] + 1):
             depth[name] = below
     deepest = max(depth, key=depth.__getitem__)
-    if depth[deepest] > MAX_CHAIN:
+    most = 500  # Pinocchio's reader descends by recursion
+    if depth[deepest] > most:
         raise RobotError(
-            f"link '{deepest}' is {depth[deepest]} joints from the base; {MAX_CHAIN} are the most"
+            f"link '{deepest}' is {depth[deepest]} joints from the base; {most} are the most"
         )
 
 

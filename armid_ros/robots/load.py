@@ -89,7 +89,6 @@ def load_robot(
     *,
     gravity: str | Sequence[float] | FloatArray = 'earth',
     joints: Sequence[str] | None = None,
-    xacro_arguments: Mapping[str, str] | None = None,
 ) -> Robot:
     """
     Load a robot.
@@ -111,8 +110,6 @@ def load_robot(
         all revolute, continuous and prismatic joints except those of a gripper (mimic joints,
         joints they follow, names with finger, gripper or jaw). Other joints are locked at 0, or at
         their limit nearest to it, and their links become part of the body that carries them.
-    xacro_arguments : mapping of str to str, optional
-        Values of ``<xacro:arg>``.
 
     Returns
     -------
@@ -134,8 +131,7 @@ def load_robot(
     """
     if isinstance(source, str) and source.lstrip().startswith('<'):
         return robot_from_urdf(source, gravity=gravity, joints=joints)
-    source, given, packages = _written_out(source)
-    xacro_arguments = {**given, **(xacro_arguments or {})}
+    source, arguments, packages = _written_out(source)
     shipped = isinstance(source, str) and source in shipped_robots()
     path = shipped_path(str(source)) if shipped else Path(source).expanduser()
     if not os.path.lexists(path):
@@ -151,11 +147,11 @@ def load_robot(
         )
     text = read_text(path, RobotError)
     notes: tuple[str, ...] = ()
-    if is_mjcf(text) and not xacro_arguments:
+    if is_mjcf(text) and not arguments:
         text, notes = urdf_of_mjcf(path)
     elif path.suffix == '.xacro' or '<xacro:' in text:
-        text = expand_xacro(path, xacro_arguments, packages)
-    elif xacro_arguments:
+        text = expand_xacro(path, arguments, packages)
+    elif arguments:
         raise RobotError(f'{path}: not a xacro file, so it takes no arguments')
     for name, folder in packages.items():
         text = text.replace(f'package://{name}/', f'file://{escape(folder)}/')
@@ -218,7 +214,7 @@ def robot_from_urdf(
             *description.inertia_doubts(),
             *description.notes,
             *locked,
-            *several_arms(description, driven),
+            *several_arms(description, [joint.name for joint in driven]),
         ),
         path=path,
     )

@@ -22,9 +22,6 @@ import numpy as np
 #: Tolerance beyond a position limit, as a share of the range between the limits.
 LIMIT_TOLERANCE = 1e-6
 
-#: Samples per block when a reference is compared with the limits.
-_BLOCK = 20_000
-
 
 @dataclass(frozen=True, eq=False)
 class Reference:
@@ -231,7 +228,8 @@ class Reference:
         slack = limit_slack(robot)
         fastest = robot.velocity_limit * (1.0 + LIMIT_TOLERANCE)
         t = np.minimum(dt * np.arange(int(np.ceil(self.duration / dt)) + 1), self.duration)
-        blocks = [self.t, *np.split(t, np.arange(_BLOCK, len(t), _BLOCK))]
+        size = 20_000  # samples of a block
+        blocks = [self.t, *np.split(t, np.arange(size, len(t), size))]
         for motion in map(self.sample, blocks):
             for beyond, values, kind, unit in (
                 (motion.q < robot.lower - slack, motion.q, 'lower', ''),

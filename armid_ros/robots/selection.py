@@ -4,15 +4,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass
 
 from armid_ros.errors import meant, RobotError
 from armid_ros.robots.description import Description, Joint
 from armid_ros.robots.robot import Robot
 
-#: Pinocchio keeps tensors of the joints cubed, 1 GB for 250; a humanoid with both hands has 70.
-MAX_DRIVEN = 150
 GRIPPER_WORDS = ('finger', 'gripper', 'jaw')
 
 
@@ -66,7 +64,7 @@ def driven_joints(description: Description, names: Sequence[str] | None) -> tupl
             for joint in free
             if joint.name in led or any(word in joint.name.lower() for word in GRIPPER_WORDS)
         }
-        carriers = _carriers(description, [joint for joint in free if joint.name not in gripper])
+        carriers = _carriers(description, [j.name for j in free if j.name not in gripper])
         chosen = tuple(j for j in free if j.name not in gripper or j.name in carriers)
         chosen = chosen or tuple(joint for joint in free if joint.name not in led)
     else:
@@ -81,17 +79,19 @@ def driven_joints(description: Description, names: Sequence[str] | None) -> tupl
             )
     if not chosen:
         raise RobotError('no joint can be driven; a robot needs at least one')
-    if len(chosen) > MAX_DRIVEN:
+    # Pinocchio keeps tensors of the joints cubed, 1 GB for 250; a humanoid with both hands has 70
+    most = 150
+    if len(chosen) > most:
         raise RobotError(
-            f'{len(chosen)} joints are driven; {MAX_DRIVEN} are the most that can be '
+            f'{len(chosen)} joints are driven; {most} are the most that can be '
             'identified together: name those of one arm with --joints'
         )
     return chosen
 
 
-def several_arms(description: Description, driven: Sequence[Joint]) -> tuple[str, ...]:
+def several_arms(description: Description, driven: Sequence[str]) -> tuple[str, ...]:
     """Return a note if the driven joints belong to several arms; otherwise no note."""
-    arms = _arms(description, [joint.name for joint in driven])
+    arms = _arms(description, driven)
     if len(arms) < 2:
         return ()
     begins = ', '.join(f"'{arm[0]}' ({len(arm)} joints)" for arm in arms)
@@ -100,7 +100,7 @@ def several_arms(description: Description, driven: Sequence[Joint]) -> tuple[str
 
 def _arms(description: Description, joints: Sequence[str]) -> list[list[str]]:
     """Return the arms among the driven joints: long enough chains from the last fork to a tip."""
-    carriers = {name: _carriers(description, [description.by_name[name]]) for name in joints}
+    carriers = {name: _carriers(description, [name]) for name in joints}
     kept = list(joints)
     while kept:
         beyond = {j: {k for k in kept if j in carriers[k]} for j in kept}
@@ -117,12 +117,11 @@ def _arms(description: Description, joints: Sequence[str]) -> list[list[str]]:
 
 def driven_in_words(robot: Robot) -> tuple[str, ...]:
     """Return notes on joints that are not driven, and on driven joints of several arms."""
-    description = robot.description
     locked = [
         f'{joint.name} (follows {joint.follows})' if joint.follows else joint.name
         for joint in held_joints(robot)
     ]
-    arms = several_arms(description, [description.by_name[name] for name in robot.joints])
+    arms = several_arms(robot.description, robot.joints)
     if not locked:
         return arms
     most = 8  # are named
@@ -156,7 +155,7 @@ def load_arms(
 def held_joints(robot: Robot) -> tuple[HeldJoint, ...]:
     """Return the movable joints of the description that are not driven."""
     description = robot.description
-    carriers = {name: _carriers(description, [description.by_name[name]]) for name in robot.joints}
+    carriers = {name: _carriers(description, [name]) for name in robot.joints}
     return tuple(
         HeldJoint(
             joint.name,
@@ -210,12 +209,12 @@ def _by_name(description: Description, names: Sequence[str]) -> tuple[Joint, ...
     return tuple(joint for joint in description.joints if joint.name in named)
 
 
-def _carriers(description: Description, joints: Sequence[Joint]) -> set[str]:
+def _carriers(description: Description, joints: Iterable[str]) -> set[str]:
     """Return the joints that carry one of the given joints."""
     by_child = {joint.child: joint for joint in description.joints}
     found: set[str] = set()
     for joint in joints:
-        carrier = by_child.get(joint.parent)
+        carrier = by_child.get(description.by_name[joint].parent)
         while carrier is not None and carrier.name not in found:
             found.add(carrier.name)
             carrier = by_child.get(carrier.parent)

@@ -232,30 +232,22 @@ def _reason(error: Exception, request: dict[str, Any], missing: dict[str, str]) 
 
     text = ' '.join(str(error).split()) or type(error).__name__
     cause = error.exc if isinstance(error, xacro.XacroException) else None
+    place, path = _place(xacro), str(request['path'])
     if isinstance(cause, xacro.substitution_args.ArgException):
-        name, path = str(cause), str(request['path'])
-        declared = _declared(xacro, path)
-        given = {_near(one, declared) or one: value for one, value in request['arguments'].items()}
-        default = declared.get(name)
-        without = [one for one, value in declared.items() if value is None]
-        needed = dict.fromkeys([*without, name], 'VALUE')
-        why = 'which is not given'
-        if default is not None:  # <xacro:arg> is below
-            why = f"above the line with its default, '{default}'"
-            needed[name] = default if re.fullmatch(r'[\w./-]+', default) else 'VALUE'
-        written = ' '.join(f'{one}:={value}' for one, value in (needed | given).items())
+        name, declared = str(cause), _declared(xacro, path)
+        needed = [one for one, default in declared.items() if default is None]
+        values = dict.fromkeys([*needed, name], 'VALUE') | request['arguments']
+        written = ' '.join(f'{one}:={value}' for one, value in values.items())
         rest = _unknown(xacro, request) or f"grep '<xacro:arg' {path} lists the others"
-        place = _place(xacro)
         return (
-            f"{'the file' if place == path else place} uses the argument '{name}', {why}; "
-            f"write --robot '{path} {written}'; {rest}"
+            f"{'the file' if place == path else place} uses the argument '{name}', which has no "
+            f"value there; write --robot '{path} {written}'; {rest}"
         )
     if missing:
         lines = '; '.join(f"package '{name}' ({file})" for name, file in missing.items())
         first = next(iter(missing))
         return f'not found: {lines}; clone or install it, or add --package {first}=FOLDER ({text})'
-    place = _place(xacro)
-    return text if place == request['path'] else f'{place}: {text}'
+    return text if place == path else f'{place}: {text}'
 
 
 def _unknown(xacro: Any, request: dict[str, Any]) -> str:
@@ -267,16 +259,11 @@ def _unknown(xacro: Any, request: dict[str, Any]) -> str:
     for name in request['arguments']:
         used = re.compile(rf'\$\(arg\s+{re.escape(name)}\s*\)')
         if name not in declared and not any(used.search(text) for text in texts):
-            near = _near(name, declared)
-            unknown.append(f"'{name}'" + (f" (did you mean '{near}'?)" if near else ''))
+            near = difflib.get_close_matches(name, declared, 1, 0.75)
+            unknown.append(f"'{name}'" + (f" (did you mean '{near[0]}'?)" if near else ''))
     if not unknown:
         return ''
     return f"the file has no argument {', '.join(unknown)}; grep '<xacro:arg' {path} lists them"
-
-
-def _near(name: str, declared: dict[str, str | None]) -> str:
-    """Return the declared argument with the most similar name; '' if none is similar."""
-    return next(iter(difflib.get_close_matches(name, declared, 1, 0.75)), '')
 
 
 def _place(xacro: Any) -> str:

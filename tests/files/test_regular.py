@@ -7,7 +7,7 @@ import os
 from armid_ros.arm import load_model
 from armid_ros.errors import ArmidError, RobotError
 from armid_ros.excitation import load_environment, load_excitation
-from armid_ros.files import read_text
+from armid_ros.files import read_text, regular
 from armid_ros.identification.parameters_file import read_parameters
 from armid_ros.papers.exo.plant.gait import read_gait
 from armid_ros.recording import read_recording, recover
@@ -61,7 +61,8 @@ def test_rubbish_in_any_file_is_refused_with_its_name(tmp_path, name, content):
         READERS[name](tmp_path / name)
 
 
-def test_a_text_has_a_largest_size(tmp_path):
+def test_a_text_has_a_largest_size(tmp_path, monkeypatch):
+    monkeypatch.setattr(regular, 'TEXT_LIMIT', 100)
     (tmp_path / 'large.urdf').write_text('x' * 101)
     with pytest.raises(RobotError, match=r'large\.urdf: '):
-        read_text(tmp_path / 'large.urdf', RobotError, 100)
+        read_text(tmp_path / 'large.urdf', RobotError)

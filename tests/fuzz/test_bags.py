@@ -10,6 +10,7 @@ from armid_ros.recording import read_recording, ReadSettings, write_recording
 from armid_ros.recording.compression import decompressed
 from armid_ros.recording.mcap.records import map_file
 from armid_ros.recording.message_types import JOINT_STATE
+from armid_ros.recording.source import DEFAULT
 from hypothesis import given
 from hypothesis import strategies as st
 import lz4.frame
@@ -129,7 +130,9 @@ def test_mcap_chunks_with_right_checksums(folder, compression, fields):
     chunk = map_file(content, path).chunks[1]
     stored = content[chunk.begin : chunk.end]
     plain = bytearray(
-        decompressed(stored, chunk.compression, chunk.size) if chunk.compression else stored
+        decompressed(stored, chunk.compression, chunk.size, DEFAULT)
+        if chunk.compression
+        else stored
     )
     for message, place, value, width in fields:
         at = min(int(message * len(plain)) + int(place * 40), len(plain) - width)

@@ -9,8 +9,9 @@ import struct
 from armid_ros.errors import RecordingError
 from armid_ros.recording import read_recording, ReadSettings, write_recording
 from armid_ros.recording.bag import Bag
-from armid_ros.recording.compression import decompressed, unpacked
+from armid_ros.recording.compression import CORRUPT, decompressed, unpacked
 from armid_ros.recording.mcap.records import MAGIC
+from armid_ros.recording.source import DEFAULT
 import lz4.frame
 import pytest
 import zstandard
@@ -100,11 +101,11 @@ def test_a_frame_holds_what_it_states(compression):
     content = bytes(range(256)) * 100
     pack = zstandard.ZstdCompressor().compress if compression == 'zstd' else lz4.frame.compress
     stored = pack(content)
-    assert decompressed(stored, compression, len(content)) == content
-    assert decompressed(pack(b''), compression, 0) == b''
+    assert decompressed(stored, compression, len(content), DEFAULT) == content
+    assert decompressed(pack(b''), compression, 0, DEFAULT) == b''
     for size in (len(content) - 1, len(content) + 1, 0, 2**63):
-        with pytest.raises(RecordingError):
-            decompressed(stored, compression, size)
+        with pytest.raises(CORRUPT):
+            decompressed(stored, compression, size, DEFAULT)
     for cut in (1, len(stored) // 2, len(stored) - 5):
-        with pytest.raises(RecordingError):
-            decompressed(stored[:cut], compression, len(content))
+        with pytest.raises(CORRUPT):
+            decompressed(stored[:cut], compression, len(content), DEFAULT)

@@ -1,19 +1,17 @@
 # Copyright 2026 The armid_ros developers
 # SPDX-License-Identifier: Apache-2.0
-"""Convert messages that contain a JointState to CDR of sensor_msgs/JointState."""
+"""Yield JointState messages of a topic, also those inside messages of another type."""
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from functools import cache
 import re
-from typing import Any
 
 from armid_ros.errors import RecordingError
 from armid_ros.recording.bag import Bag
-from armid_ros.recording.message_types import JOINT_STATE, MessageType, QUANTITIES, store_for
+from armid_ros.recording.message_types import JOINT_STATE, MessageType, store_for
 from armid_ros.recording.source import MessageBlock, Topic
-import numpy as np
 from rosbags.typesys import get_typestore, Stores
 
 _INSIDE = re.compile(r'^\s*sensor_msgs/(?:msg/)?JointState\s+(\w+)', re.MULTILINE)
@@ -24,12 +22,6 @@ def holds_joint_state(topic: Topic) -> bool:
     return topic.type_name == JOINT_STATE or bool(_inside(topic.message_type))
 
 
-def is_plain(topic: Topic) -> bool:
-    """Return whether the messages of a topic are JointState of ROS 2 in CDR."""
-    described = topic.message_type
-    return topic.encoding == 'cdr' and described.name == JOINT_STATE and _standard(described)
-
-
 def joint_state_blocks(bag: Bag, topic: Topic) -> Iterator[MessageBlock]:
     """
     Yield the messages of a topic as JointState in CDR, in the order of storage.
@@ -37,54 +29,40 @@ def joint_state_blocks(bag: Bag, topic: Topic) -> Iterator[MessageBlock]:
     Raises
     ------
     RecordingError
-        If the schema in the bag lacks header, names or positions, or messages are not in CDR.
+        If messages are not in CDR, or the bag defines JointState in another way than ROS 2.
 
     """
-    convert = _converter(f'{bag.path}: {topic.name}', topic)
-    if convert is None:
+    require_standard(bag, topic)
+    if topic.type_name == JOINT_STATE:
         yield from bag.blocks(topic.name)
         return
-    store = get_typestore(Stores.ROS2_JAZZY)
-    types = store.types
+    described, inside = topic.message_type, _inside(topic.message_type)
+    store = store_for(described)
     for block in bag.blocks(topic.name):
         messages = []
         for at in range(len(block)):
             try:
-                found = convert(block.message(at))
-                stamp = found.header.stamp
-                header = types['std_msgs/msg/Header'](
-                    types['builtin_interfaces/msg/Time'](stamp.sec, stamp.nanosec), ''
-                )
-                values = [np.array(getattr(found, name, []), np.float64) for name in QUANTITIES]
-                state = types[JOINT_STATE](header, list(found.name), *values)
+                message = store.deserialize_cdr(block.message(at), described.name)
+                state = getattr(message, inside)
                 messages.append(bytes(store.serialize_cdr(state, JOINT_STATE)))
             except Exception:  # the decoder counts it as malformed
                 messages.append(bytes(4))
         yield MessageBlock.joined(messages, block.log_time, block.publish_time)
 
 
-def _converter(where: str, topic: Topic) -> Callable[[bytes], Any] | None:
-    """Return a function that decodes a JointState; None if no conversion is needed."""
-    described = topic.message_type
+def require_standard(bag: Bag, topic: Topic) -> None:
+    """Raise a RecordingError unless the JointState of a topic is that of ROS 2 in CDR."""
+    where = f'{bag.path}: {topic.name}'
     if topic.encoding != 'cdr':
         raise RecordingError(
             f"{where} is serialised as '{topic.encoding}'; CDR of ROS 2 can be read: record it "
             'with ros2 bag record'
         )
-    if is_plain(topic):
-        return None
-    store = store_for(described)
-    fields = {name for name, _ in store.fielddefs[JOINT_STATE][1]}
-    lacking = {'header', 'name', 'position'} - fields
-    if lacking:
+    if not _standard(topic.message_type):
         raise RecordingError(
-            f'{where}: its schema of {JOINT_STATE} has {", ".join(sorted(fields))}, and no '
-            f'{", ".join(sorted(lacking))}; record the type of sensor_msgs'
+            f'{where}: the bag defines {JOINT_STATE} in another way than ROS 2; record the type '
+            'of sensor_msgs'
         )
-    if described.name == JOINT_STATE:
-        return lambda data: store.deserialize_cdr(data, JOINT_STATE)
-    inside = _inside(described)
-    return lambda data: getattr(store.deserialize_cdr(data, described.name), inside)
 
 
 def _inside(described: MessageType) -> str:

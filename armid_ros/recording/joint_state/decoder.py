@@ -6,6 +6,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
+import math
 from typing import NamedTuple
 
 from armid_ros.motion import FloatArray, Samples
@@ -100,7 +101,8 @@ class JointStateDecoder:
 
         """
         self._wanted = tuple(joints)
-        self._room = _Room(expected)
+        self._expected = expected
+        self._free: dict[tuple[str, int], FloatArray] = {}
         self._plans: dict[int, list[_Plan]] = {}
         self._names: dict[str, None] = {}
         self.others: dict[str, tuple[float, float]] = {}
@@ -151,10 +153,38 @@ class JointStateDecoder:
         self, plan: _Plan, rows: npt.NDArray[np.void], numbers: IntArray, receive: IntArray
     ) -> Iterator[JointSamples]:
         """Yield the values of requested joints, and update the ranges of other joints."""
-        for joint, lowest, highest in plan.ranges_of_others(rows):
-            known = self.others.get(joint, (lowest, highest))
-            self.others[joint] = (min(known[0], lowest), max(known[1], highest))
-        yield from plan.read(rows, numbers, receive, self._room)
+        if plan.others and plan.layout.counts[0] and len(rows):
+            positions = rows[QUANTITIES[0]][:, list(plan.others.values())]
+            lowest, highest = np.fmin.reduce(positions), np.fmax.reduce(positions)
+            for joint, low, high in zip(
+                plan.others, lowest.tolist(), highest.tolist(), strict=True
+            ):
+                if math.isfinite(low) and math.isfinite(high):
+                    known = self.others.get(joint, (low, high))
+                    self.others[joint] = (min(known[0], low), max(known[1], high))
+        if not plan.joints:
+            return
+        stamps = rows['sec'].astype(np.int64)
+        stamps *= 10**9
+        stamps += rows['nanosec']
+        values: list[FloatArray | None] = []
+        for name, count in zip(QUANTITIES, plan.layout.counts, strict=True):
+            place = self._place(name, len(rows), len(plan.joints)) if count else None
+            if place is not None:
+                place[:] = rows[name][:, plan.columns]
+            values.append(place)
+        yield JointSamples(plan.joints, stamps, tuple(values), receive, numbers)
+
+    def _place(self, name: str, count: int, joints: int) -> FloatArray:
+        """Return an array of shape (count, joints), adjacent to the previous one if possible."""
+        free = self._free.get((name, joints))
+        if free is None:
+            # counts in damaged files are unreliable: at most 1 GiB is reserved for a quantity
+            free = np.empty((min(self._expected, (1 << 30) // (8 * joints)), joints))
+        if count > len(free):
+            return np.empty((count, joints))
+        self._free[name, joints] = free[count:]
+        return free[:count]
 
     def _plan_for(self, first: npt.NDArray[np.void]) -> _Plan | None:
         """Return the plan for a message; None if it is malformed."""
@@ -175,37 +205,15 @@ class JointStateDecoder:
         return plan
 
 
-class _Room:
-    """Memory for values, so that values of one quantity are contiguous."""
-
-    def __init__(self, expected: int) -> None:
-        self._expected = expected
-        self._free: dict[tuple[str, int], FloatArray] = {}
-
-    def take(self, name: str, count: int, joints: int) -> FloatArray:
-        """Return an array of shape (count, joints), adjacent to the previous one if possible."""
-        # largest memory reserved at once for a quantity; counts in damaged files are unreliable
-        # [bytes]
-        expected = min(self._expected, (1 << 30) // (8 * joints))
-        free = self._free.get((name, joints))
-        if free is None:
-            free = np.empty((expected, joints))
-        if count > len(free):
-            return np.empty((count, joints))
-        self._free[name, joints] = free[count:]
-        return free[:count]
-
-
 @dataclass(frozen=True)
 class _Plan:
-    """Plan to read requested joints from messages of one layout."""
+    """Columns of requested joints, and of others by name, in messages of one layout."""
 
     layout: JointStateLayout
     dtype: np.dtype[np.void]
     joints: tuple[str, ...]
     columns: slice | list[int]
-    others: tuple[str, ...]
-    columns_of_others: list[int]
+    others: dict[str, int]
 
     @classmethod
     def make(cls, layout: JointStateLayout, length: int, wanted: Sequence[str]) -> _Plan:
@@ -219,7 +227,6 @@ class _Plan:
                 )
         joints = tuple(name for name in wanted if name in layout.names)
         columns = [layout.names.index(name) for name in joints]
-        others = [k for k, name in enumerate(layout.names) if name not in joints]
         first = columns[0] if columns else 0
         contiguous = columns == list(range(first, first + len(columns)))
         return cls(
@@ -227,35 +234,8 @@ class _Plan:
             layout.dtype(length),
             joints,
             slice(first, first + len(columns)) if contiguous else columns,
-            tuple(layout.names[k] for k in others),
-            others,
+            {name: k for k, name in enumerate(layout.names) if name not in joints},
         )
-
-    def ranges_of_others(self, rows: npt.NDArray[np.void]) -> Iterator[tuple[str, float, float]]:
-        """Yield name, lowest and highest position of other joints."""
-        if not (self.others and self.layout.counts[0] and len(rows)):
-            return
-        positions = rows[QUANTITIES[0]][:, self.columns_of_others]
-        lowest, highest = np.fmin.reduce(positions), np.fmax.reduce(positions)
-        for k in np.flatnonzero(np.isfinite(lowest) & np.isfinite(highest)).tolist():
-            yield self.others[k], float(lowest[k]), float(highest[k])
-
-    def read(
-        self, rows: npt.NDArray[np.void], numbers: IntArray, receive: IntArray, room: _Room
-    ) -> Iterator[JointSamples]:
-        """Yield the values of messages of this layout, if they have a requested joint."""
-        if not self.joints:
-            return
-        header = rows['sec'].astype(np.int64)
-        header *= 10**9
-        header += rows['nanosec']
-        values: list[FloatArray | None] = []
-        for name, count in zip(QUANTITIES, self.layout.counts, strict=True):
-            place = room.take(name, len(rows), len(self.joints)) if count else None
-            if place is not None:
-                place[:] = rows[name][:, self.columns]
-            values.append(place)
-        yield JointSamples(self.joints, header, tuple(values), receive, numbers)
 
 
 class JointStateValues(NamedTuple):

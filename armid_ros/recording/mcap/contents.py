@@ -7,44 +7,31 @@ from __future__ import annotations
 from collections import deque
 from collections.abc import Iterable, Iterator, Sequence
 from concurrent.futures import Future, ThreadPoolExecutor
+from dataclasses import replace
 import mmap
 import os
 import struct
 from typing import NamedTuple
 import zlib
 
-from armid_ros.errors import RecordingError
-from armid_ros.recording.compression import CORRUPT, decompressed, partly_decompressed, stated_size
+from armid_ros.recording.compression import CORRUPT, decompressed, partly_decompressed
 from armid_ros.recording.mcap.records import Chunk, FileMap, MESSAGE, MESSAGE_HEADER, RECORD_HEADER
-from armid_ros.recording.source import (
-    BLOCK_MESSAGES,
-    IntArray,
-    MessageBlock,
-    ReadSettings,
-    records_at,
-)
+from armid_ros.recording.source import IntArray, MessageBlock, ReadSettings, records_at
 from mcap.opcode import Opcode
 import numpy as np
 import numpy.typing as npt
 
-_COMPRESSIONS = ('', 'zstd', 'lz4')
-#: Threads that decompress chunks ahead of the reader. Decompression and checksums release the GIL.
-_THREADS = 2
-#: Limit of decompressed data ahead of the reader [bytes]. A larger chunk is decompressed alone.
-_AHEAD = 16 << 20
 
-
-class Content(NamedTuple):
-    """Content of a chunk: a buffer, and the range in it."""
+class Contents(NamedTuple):
+    """Contents of some chunks in one buffer: each chunk, with the range of its content."""
 
     data: bytes | mmap.mmap
-    begin: int
-    end: int
+    parts: list[tuple[Chunk, int, int]]
 
 
-def contents(
+def read_chunks(
     found: FileMap, chunks: Iterable[Chunk], settings: ReadSettings
-) -> Iterator[tuple[Chunk, Content]]:
+) -> Iterator[Contents]:
     """
     Yield the contents of some chunks of a file in their order, without damaged chunks.
 
@@ -56,118 +43,100 @@ def contents(
         A chunk takes more memory than the settings allow.
 
     """
-    chunks = list(chunks)
-    # Either all chunks of a writer have checksums, or none.
+    # either all chunks of a writer have checksums, or none
     check = settings.check_crc and any(chunk.crc for chunk in found.chunks)
-    if any(chunk.compression for chunk in chunks):
-        pieces = _unpacked_ahead(found, chunks, settings, check)
-    else:  # checksums of small chunks are faster without threads
-        pieces = ((chunk, _checked(found, chunk, settings, check)) for chunk in chunks)
-    for chunk, content in pieces:
-        if isinstance(content, Content):
-            yield chunk, content
-        else:
-            found.damage.add(f'{content}: messages {found.span(chunk)} are left out')
-
-
-def _unpacked_ahead(
-    found: FileMap, chunks: Sequence[Chunk], settings: ReadSettings, check: bool
-) -> Iterator[tuple[Chunk, Content | str]]:
-    """Yield contents that threads decompress ahead of the reader."""
-
-    def unpack(part: Sequence[Chunk]) -> list[tuple[Chunk, Content | str]]:
-        return [(chunk, _checked(found, chunk, settings, check)) for chunk in part]
-
-    parts: list[list[Chunk]] = [[]]
+    settings = replace(settings, check_crc=check)
+    chunks = list(chunks)
+    packed = any(chunk.compression for chunk in chunks)
+    # Small groups are slow in array code. Decompressed contents are copied into one buffer, which
+    # should fit into the processor cache. [bytes]
+    most = 1 << 20 if packed else 4 << 20
+    groups: list[list[Chunk]] = [[]]
+    size = 0
     for chunk in chunks:
-        if sum(one.size for one in parts[-1]) >= 2 << 20:  # bytes at a time
-            parts.append([])
-        parts[-1].append(chunk)
-    begun: deque[tuple[int, Future[list[tuple[Chunk, Content | str]]]]] = deque()
-    with ThreadPoolExecutor(min(_THREADS, os.cpu_count() or 1)) as threads:
-        for part in parts:
-            size = sum(chunk.size for chunk in part)
-            while begun and (sum(s for s, _ in begun) + size > _AHEAD or len(begun) > _THREADS):
-                yield from begun.popleft()[1].result()
-            begun.append((size, threads.submit(unpack, part)))
+        if size >= most:
+            groups.append([])
+            size = 0
+        groups[-1].append(chunk)
+        size += chunk.size
+    if packed:
+        results = _read_ahead(found, groups, settings)
+    else:  # checksums alone are faster without threads
+        results = (_read_group(found, group, settings) for group in groups)
+    for contents, damage in results:
+        for problem in damage:
+            found.damage.add(problem)
+        if contents.parts:
+            yield contents
+
+
+def _read_ahead(
+    found: FileMap, groups: Sequence[Sequence[Chunk]], settings: ReadSettings
+) -> Iterator[tuple[Contents, list[str]]]:
+    """Yield contents and damage of groups that threads read ahead of the reader."""
+    begun: deque[tuple[int, Future[tuple[Contents, list[str]]]]] = deque()
+    # Decompression and checksums release the GIL.
+    count = min(2, os.cpu_count() or 1)
+    most = 16 << 20  # limit of decompressed data ahead [bytes]; a larger group is read alone
+    with ThreadPoolExecutor(count) as threads:
+        for group in groups:
+            size = sum(chunk.size for chunk in group)
+            while begun and (sum(s for s, _ in begun) + size > most or len(begun) > count):
+                yield begun.popleft()[1].result()
+            begun.append((size, threads.submit(_read_group, found, group, settings)))
         while begun:
-            yield from begun.popleft()[1].result()
+            yield begun.popleft()[1].result()
 
 
-def _checked(found: FileMap, chunk: Chunk, settings: ReadSettings, check: bool) -> Content | str:
-    """Return the content of a chunk, or its error as a text."""
-    where = f'{chunk.compression} chunk' if chunk.compression else 'chunk'
-    where = f'the {where} at byte {chunk.begin}'
-    if chunk.compression not in _COMPRESSIONS:
-        return f"{where} is compressed with '{chunk.compression}'; zstd and lz4 can be read"
-    stored = memoryview(found.data)[chunk.begin : chunk.end]
-    if not chunk.whole:
-        if chunk.compression:
-            most = min(chunk.size, settings.memory_limit)
-            part = partly_decompressed(stored, chunk.compression, most)
-            content = Content(part, 0, len(part))
-        else:
-            end = min(chunk.end, chunk.begin + chunk.size)
-            content = Content(found.data, chunk.begin, end)
-        read = content.end - content.begin
-        share = 100 * read // max(chunk.size, 1)
-        found.damage.add(
-            f'of the chunk that begins there {read} of {chunk.size} bytes ({share} %) are read'
-        )
-        return content
-    if not chunk.compression:
-        if len(stored) != chunk.size:
-            return f'{where} is damaged'
-        content = Content(found.data, chunk.begin, chunk.end)
-    else:
+def _read_group(
+    found: FileMap, group: Sequence[Chunk], settings: ReadSettings
+) -> tuple[Contents, list[str]]:
+    """Return the contents of chunks without damage, and the damage of the others."""
+    packed = any(chunk.compression for chunk in group)
+    contents: list[bytes | memoryview] = []
+    parts: list[tuple[Chunk, int, int]] = []
+    damage: list[str] = []
+    end = 0
+    for chunk in group:
         try:
-            stated = stated_size(stored, chunk.compression)
-            if stated is None or stated == chunk.size:
-                settings.require(chunk.size, where)
+            content = _content(found, chunk, settings)
         except CORRUPT as error:
-            return f'{where} is damaged: {error}'
-        try:
-            whole = decompressed(stored, chunk.compression, chunk.size)
-        except RecordingError as error:
-            return f'{where} is damaged: {error}'
-        content = Content(whole, 0, len(whole))
-    data = memoryview(content.data)[content.begin : content.end]
-    if check and zlib.crc32(data) != chunk.crc:
-        return f'the checksum of the chunk at byte {chunk.begin} is wrong'
+            damage.append(
+                f'the chunk at byte {chunk.begin} is damaged ({error}): messages '
+                f'{found.span(chunk)} are left out'
+            )
+            continue
+        if not chunk.whole:
+            share = 100 * len(content) // max(chunk.size, 1)
+            damage.append(
+                f'of the last chunk {len(content)} of {chunk.size} bytes ({share} %) are read'
+            )
+        begin = end if packed else chunk.begin
+        end = begin + len(content)
+        contents.append(content)
+        parts.append((chunk, begin, end))
+    return Contents(b''.join(contents) if packed else found.data, parts), damage
+
+
+def _content(found: FileMap, chunk: Chunk, settings: ReadSettings) -> bytes | memoryview:
+    """Return the content of a chunk; raise one of CORRUPT if the chunk is damaged."""
+    stored = memoryview(found.data)[chunk.begin : chunk.end]
+    if chunk.compression not in ('', 'zstd', 'lz4'):
+        raise ValueError(f"compressed with '{chunk.compression}'; zstd and lz4 can be read")
+    if not chunk.whole:
+        most = min(chunk.size, settings.memory_limit)
+        if chunk.compression:
+            return partly_decompressed(stored, chunk.compression, most)
+        return stored[:most]
+    if chunk.compression:
+        content: bytes | memoryview = decompressed(stored, chunk.compression, chunk.size, settings)
+    elif len(stored) != chunk.size:
+        raise ValueError(f'holds {len(stored)} bytes, but {chunk.size} are stated')
+    else:
+        content = stored
+    if settings.check_crc and zlib.crc32(content) != chunk.crc:
+        raise ValueError('its checksum is wrong')
     return content
-
-
-class Gathered:
-    """Collects messages of chunks for a block."""
-
-    def __init__(self, data: bytes | mmap.mmap) -> None:
-        self._file = data
-        self._parts: list[bytes] = []
-        self._offsets: list[IntArray] = []
-        self._size = self._count = 0
-
-    def add(self, content: bytes | mmap.mmap, offsets: IntArray) -> Iterator[MessageBlock]:
-        """Add messages of a decompressed content, or of the file itself."""
-        own = isinstance(content, bytes) and content is not self._file
-        if own != bool(self._parts):
-            yield from self.flush()
-        if own:
-            self._parts.append(bytes(content))
-            self._offsets.append(offsets + self._size)
-            self._size += len(content)
-        else:
-            self._offsets.append(offsets)
-        self._count += len(offsets)
-        # small blocks are slow in array code, and large blocks exceed the processor cache
-        if self._size > (1 << 20) or (not own and self._count > BLOCK_MESSAGES):
-            yield from self.flush()
-
-    def flush(self) -> Iterator[MessageBlock]:
-        """Yield the added messages, if any."""
-        data = self._parts[0] if len(self._parts) == 1 else b''.join(self._parts)
-        if self._count:
-            yield message_block(data if self._parts else self._file, np.concatenate(self._offsets))
-        self._parts, self._offsets, self._size, self._count = [], [], 0, 0
 
 
 def heads(data: bytes | mmap.mmap, offsets: IntArray) -> npt.NDArray[np.void]:
@@ -187,49 +156,84 @@ def message_block(data: bytes | mmap.mmap, offsets: IntArray) -> MessageBlock:
     )
 
 
+def messages_in(found: FileMap, contents: Contents) -> tuple[IntArray, npt.NDArray[np.void]]:
+    """Return begin and heads of the messages of some chunks, by the index if it is correct."""
+    data, parts = contents
+    ranges = np.array([(begin, end) for _, begin, end in parts], np.int64)
+    if all(chunk.indexes and chunk.whole for chunk, _, _ in parts):
+        # offsets beyond a chunk are set to its end, where none of its messages can begin
+        listed = [
+            np.minimum(np.frombuffer(found.data, '<u8', 2 * count, at)[1::2], chunk.size).astype(
+                np.int64
+            )
+            + begin
+            for chunk, begin, _ in parts
+            for at, count in chunk.indexes.values()
+        ]
+        offsets = np.concatenate(listed)
+        if not (np.diff(offsets) > 0).all():
+            offsets.sort(kind='stable')
+        rows = tiled(data, offsets, ranges)
+        if rows is not None:
+            return offsets, rows
+    walked = []
+    for chunk, begin, end in parts:
+        some, _, position = walk(data, begin, end)
+        walked.append(some)
+        if chunk.whole and position != end:
+            found.damage.add(
+                f'the chunk at byte {chunk.begin} is damaged: '
+                f'some messages {found.span(chunk)} are lost'
+            )
+    offsets = np.concatenate(walked)
+    return offsets, heads(data, offsets)
+
+
 def tiled(
-    data: bytes | mmap.mmap, offsets: IntArray, begin: int, end: int
+    data: bytes | mmap.mmap, offsets: IntArray, ranges: IntArray
 ) -> npt.NDArray[np.void] | None:
     """
-    Return the heads of messages if the index of the chunk is complete and correct.
+    Return the heads of messages if the indexes of their chunks are complete and correct.
 
-    The index is correct if messages and definitions fill the chunk without gaps: each record
+    The indexes are correct if messages and definitions fill the chunks without gaps: each record
     begins at the end of the previous one.
 
     Parameters
     ----------
     data : bytes or mmap
-        Buffer with the content.
+        Buffer with the contents.
     offsets : ndarray, shape (N,)
-        Begin of each message by the index, in ascending order.
-    begin, end : int
-        Range of the content in the buffer.
+        Begin of each message by the indexes, in ascending order.
+    ranges : ndarray, shape (K, 2)
+        Begin and end of the content of each chunk in the buffer, in ascending order.
 
     Returns
     -------
     ndarray of `MESSAGE`, shape (N,), or None
-        None if the index is wrong.
+        None if an index is wrong.
 
     """
-    if not len(offsets) or offsets[0] < begin or offsets[-1] + MESSAGE.itemsize > end:
+    begins, ends = ranges.T
+    if not len(offsets) or offsets[0] < begins[0] or offsets[-1] + MESSAGE.itemsize > ends[-1]:
         return None
     rows = heads(data, offsets)
     lengths = rows['length'].astype(np.uint64)
     if (rows['opcode'] != Opcode.MESSAGE).any():
         return None
-    if lengths.min() < MESSAGE_HEADER or lengths.max() > end - begin:
+    if lengths.min() < MESSAGE_HEADER or lengths.max() > len(data):
         return None
-    ends = offsets + RECORD_HEADER + lengths.astype(np.int64)
-    gaps = np.flatnonzero(ends[:-1] != offsets[1:])
-    around = [(begin, int(offsets[0])), (int(ends[-1]), end)]
-    between = zip(ends[gaps].tolist(), offsets[gaps + 1].tolist(), strict=True)
-    for start, stop in (*around, *between):
-        if start > stop:
+    behind = offsets + RECORD_HEADER + lengths.astype(np.int64)
+    gaps = np.flatnonzero(behind[:-1] != offsets[1:])
+    # where a chunk begins or a message ends, a message begins, the chunk ends, or definitions lie
+    starts = np.sort(np.concatenate([begins, behind[gaps], behind[-1:]]))
+    stops = np.sort(np.concatenate([offsets[:1], offsets[gaps + 1], ends]))
+    if (starts > stops).any():
+        return None
+    between = starts < stops
+    for start, stop in zip(starts[between].tolist(), stops[between].tolist(), strict=True):
+        messages, _, position = walk(data, start, stop)
+        if position != stop or len(messages):
             return None
-        if start < stop:  # only schemas and channels may lie between messages
-            messages, _, position = walk(data, start, stop)
-            if position != stop or len(messages):
-                return None
     return rows
 
 

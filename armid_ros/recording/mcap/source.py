@@ -10,20 +10,20 @@ completely, since its undamaged messages cannot be recognised.
 
 from __future__ import annotations
 
+from bisect import bisect_left
+from collections import Counter
 from collections.abc import Collection, Iterator, Sequence
-import heapq
 import mmap
+from operator import attrgetter
 from pathlib import Path
 
 from armid_ros.errors import RecordingError
 from armid_ros.files import open_regular
 from armid_ros.recording.mcap.contents import (
-    Content,
-    contents,
-    Gathered,
     heads,
     message_block,
-    tiled,
+    messages_in,
+    read_chunks,
     walk,
 )
 from armid_ros.recording.mcap.records import add_definition, Chunk, FileMap, map_file
@@ -91,66 +91,59 @@ class McapSource(Source):
         self._survey()
         found = self._found
         wanted = sorted(c.id for c in found.channels.values() if c.topic == topic)
-        gathered, count = Gathered(found.data), 0
         # The message count reveals a damaged index; unfinished files have no count.
         counted = found.finished and found.statistics
-        read = [
+        chunks = [
             chunk
             for chunk in found.chunks
             if not (counted and chunk.whole and chunk.indexes)
             or any(channel in chunk.indexes for channel in wanted)
         ]
-        for _, content, offsets in self._pieces(read, wanted):
+        count = 0
+        for _, data, offsets in self._pieces(chunks, wanted):
             count += len(offsets)
-            yield from gathered.add(content, offsets)
-        yield from gathered.flush()
+            yield message_block(data, offsets)
         self._compare_count(topic, wanted, count)
 
     def messages(self) -> Iterator[RawMessage]:
         self._survey()
         names = {channel.id: channel.topic for channel in self._found.channels.values()}
-        pending: list[tuple[int, int, RawMessage]] = []
-        number = size = 0
+        # Messages of chunks that overlap in time are kept in memory until they are sorted.
+        pending: list[RawMessage] = []
+        count = 0
         in_order = sorted(self._found.chunks, key=lambda chunk: chunk.start_time)
-        overhead = 400  # bytes of a message object
-        for start_time, content, offsets in self._pieces(in_order, sorted(names), by_time=True):
-            while pending and pending[0][0] < start_time:
-                raw = heapq.heappop(pending)[2]
-                size -= len(raw.cdr) + overhead
-                yield raw
-            block, channels = message_block(content, offsets), heads(content, offsets)['channel']
-            times = zip(
-                channels.tolist(),
-                block.log_time.tolist(),
-                block.publish_time.tolist(),
-                strict=True,
-            )
-            for at, (channel, log_time, publish_time) in enumerate(times):
-                raw = RawMessage(names[channel], log_time, publish_time, block.message(at))
-                heapq.heappush(pending, (log_time, number, raw))
-                number += 1
-                size += len(raw.cdr) + overhead
-            # Chunks that overlap in time are kept in memory until their messages are sorted.
+        for start_time, data, offsets in self._pieces(in_order, sorted(names)):
+            ready = bisect_left(pending, start_time, key=attrgetter('log_time_ns'))
+            yield from pending[:ready]
+            del pending[:ready]
+            block, rows = message_block(data, offsets), heads(data, offsets)
+            count += len(block)
+            pending += [
+                RawMessage(names[channel], log_time, publish_time, block.message(at))
+                for at, (channel, log_time, publish_time) in enumerate(
+                    rows[['channel', 'log_time', 'publish_time']].tolist()
+                )
+            ]
+            pending.sort(key=attrgetter('log_time_ns'))
+            overhead = 400  # bytes of a message object
+            size = sum(len(one.cdr) + overhead for one in pending)
             self._settings.require(size, 'the messages to sort by time')
-        while pending:
-            yield heapq.heappop(pending)[2]
-        self._compare_count('all topics', list(names), number)
+        yield from pending
+        self._compare_count('all topics', list(names), count)
 
     def _pieces(
-        self, chunks: Sequence[Chunk], channels: Sequence[int], *, by_time: bool = False
+        self, chunks: Sequence[Chunk], channels: Sequence[int]
     ) -> Iterator[tuple[int, bytes | mmap.mmap, IntArray]]:
-        """Yield first log time, content, and begin of the messages of some channels."""
-        data = self._found.data
-        for chunk, unpacked in contents(self._found, chunks, self._settings):
-            content, offsets, rows = self._messages_in(chunk, unpacked)
-            yield chunk.start_time, content, self._possible(offsets, rows, channels)
-        loose = np.array(self._found.loose, np.int64)
+        """Yield first log time, buffer, and begin of the messages of some channels."""
+        data, loose = self._found.data, np.array(self._found.loose, np.int64)
+        for contents in read_chunks(self._found, chunks, self._settings):
+            offsets = self._possible(*messages_in(self._found, contents), channels)
+            if len(offsets):
+                yield contents.parts[0][0].start_time, contents.data, offsets
         loose = self._possible(loose, heads(data, loose), channels)
-        if by_time:
-            loose = loose[np.argsort(heads(data, loose)['log_time'], kind='stable')]
         for at in range(0, len(loose), BLOCK_MESSAGES):
-            some = loose[at : at + BLOCK_MESSAGES]
-            yield int(heads(data, some)['log_time'][0]), data, some
+            first = int(heads(data, loose[at:])['log_time'].min())
+            yield first, data, loose[at : at + BLOCK_MESSAGES]
 
     def _survey(self) -> dict[int, int]:
         """Find all channels, and return the number of messages of each."""
@@ -160,46 +153,17 @@ class McapSource(Source):
         if found.finished and summary and summary.channel_count == len(found.channels):
             self._counts = dict(summary.channel_message_counts)
             return self._counts
-        counts: dict[int, int] = {}
-        channels = [heads(found.data, np.array(found.loose, np.int64))['channel']]
-        for _, (content, begin, end) in contents(found, found.chunks, self._settings):
-            offsets, definitions, _ = walk(content, begin, end)
-            for opcode, start, stop in definitions:
-                add_definition(found, opcode, content[start:stop])
-            channels.append(heads(content, offsets)['channel'].copy())
-        for rows in channels:
-            for channel, count in zip(*np.unique(rows, return_counts=True), strict=True):
-                counts[int(channel)] = counts.get(int(channel), 0) + int(count)
-        self._counts = counts
+        counts: Counter[int] = Counter(
+            heads(found.data, np.array(found.loose, np.int64))['channel'].tolist()
+        )
+        for data, parts in read_chunks(found, found.chunks, self._settings):
+            for _, begin, end in parts:
+                offsets, definitions, _ = walk(data, begin, end)
+                for opcode, start, stop in definitions:
+                    add_definition(found, opcode, data[start:stop])
+                counts.update(heads(data, offsets)['channel'].tolist())
+        self._counts = dict(counts)
         return self._counts
-
-    def _messages_in(
-        self, chunk: Chunk, unpacked: Content
-    ) -> tuple[bytes | mmap.mmap, IntArray, _Rows]:
-        """Return the content of a chunk, and begin and heads of its messages."""
-        content, begin, end = unpacked
-        if chunk.indexes and chunk.whole and end > begin:
-            # Offsets beyond the content are set to its end, where no message can begin.
-            parts = [
-                np.minimum(
-                    np.frombuffer(self._found.data, '<u8', 2 * count, at)[1::2], chunk.size
-                ).astype(np.int64)
-                for at, count in chunk.indexes.values()
-            ]
-            offsets = parts[0] if len(parts) == 1 else np.concatenate(parts)
-            if len(parts) > 1 or not (np.diff(offsets) > 0).all():
-                offsets = np.sort(offsets, kind='stable')
-            offsets += begin
-            rows = tiled(content, offsets, begin, end)
-            if rows is not None:
-                return content, offsets, rows
-        offsets, _, position = walk(content, begin, end)
-        if chunk.whole and position != end:
-            self._found.damage.add(
-                f'the chunk at byte {chunk.begin} is damaged: '
-                f'some messages {self._found.span(chunk)} are lost'
-            )
-        return content, offsets, heads(content, offsets)
 
     def _possible(self, offsets: IntArray, rows: _Rows, wanted: Sequence[int]) -> IntArray:
         """Return the messages that are of some channels and have a valid time."""

@@ -31,6 +31,7 @@ from mcap.data_stream import RecordBuilder
 from mcap.opcode import Opcode
 from mcap.records import (
     Channel,
+    Chunk,
     ChunkIndex,
     DataEnd,
     Footer,
@@ -158,24 +159,18 @@ class McapWriter:
         times = rows['log_time'].astype(np.int64)
         start, end = (int(times.min()), int(times.max())) if len(times) else (0, 0)
         stored = self._compress(content)
-        name = self._compression.encode()
-        chunk = struct.pack(
-            f'<BQQQQII{len(name)}sQ',
-            Opcode.CHUNK,
-            8 + 8 + 8 + 4 + 4 + len(name) + 8 + len(stored),
-            start,
-            end,
-            len(content),
-            zlib.crc32(content),
-            len(name),
-            name,
-            len(stored),
+        chunk = Chunk(
+            compression=self._compression,
+            data=stored,
+            message_start_time=start,
+            message_end_time=end,
+            uncompressed_crc=zlib.crc32(content),
+            uncompressed_size=len(content),
         )
-        position = self.committed.position
-        indexes_begin = position + len(chunk) + len(stored)
+        parts = [_record(chunk)]
+        done, chunk_length = self.committed, len(parts[0])
         counts: Counter[int] = Counter()
         index_offsets: dict[int, int] = {}
-        parts = [chunk, stored]
         size = 0
         for channel in np.unique(rows['channel']).tolist():
             of_channel = rows['channel'] == channel
@@ -183,22 +178,21 @@ class McapWriter:
             head = struct.pack(
                 '<BQHI', Opcode.MESSAGE_INDEX, 6 + entries.nbytes, channel, entries.nbytes
             )
-            index_offsets[channel] = indexes_begin + size
+            index_offsets[channel] = done.position + chunk_length + size
             parts += [head, entries.tobytes()]
             size += len(head) + entries.nbytes
             counts[channel] = len(entries)
         index = ChunkIndex(
             message_start_time=start,
             message_end_time=end,
-            chunk_start_offset=position,
-            chunk_length=len(chunk) + len(stored),
+            chunk_start_offset=done.position,
+            chunk_length=chunk_length,
             message_index_offsets=index_offsets,
             message_index_length=size,
             compression=self._compression,
             compressed_size=len(stored),
             uncompressed_size=len(content),
         )
-        done = self.committed
         index_size = self._note(_record(index))
         end_position = self._append(b''.join(parts))
         first, last = done.time_range if done.counts else (start, end)

@@ -6,13 +6,14 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
 import io
+import json
 import math
 from pathlib import Path
 from typing import Any
 import zipfile
 
 from armid_ros.errors import RecordingError
-from armid_ros.files import finite, load_json, read_text, reading
+from armid_ros.files import finite, read_text, reading
 from armid_ros.recording.source import DEFAULT
 from armid_ros.recording.tables.table import (
     imported,
@@ -122,7 +123,7 @@ def read_lerobot(path: Path, episode: int | None = None) -> Table:
 
     """
     with reading(path / INFO, RecordingError):
-        info = load_json(read_text(path / INFO, RecordingError))
+        info = json.loads(read_text(path / INFO, RecordingError))
         features: Mapping[str, Any] = info['features']
         names: dict[str, list[str]] = {}
         for key, feature in features.items():

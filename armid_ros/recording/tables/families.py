@@ -10,7 +10,7 @@ Columns whose names differ only in the name or number of a joint form a family.
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 import re
 from typing import Literal
 
@@ -42,34 +42,30 @@ TIMES = dict.fromkeys(('time', 't', 'timestamp', 'timestamps'), 3.0) | dict.from
 )
 #: Words for the time of measurement, preferred to the time of reception.
 TIMES |= {'stamp': 3.5}
-#: Words for measured quantities.
-MEASURED = dict.fromkeys(
-    ('meas', 'measured', 'act', 'actual', 'fb', 'feedback', 'observation'), 1.0
+#: Words that qualify a quantity, and the weights that they add to its score.
+_QUALIFIERS = (
+    ('meas measured act actual fb feedback observation', 1.0),
+    ('filt filtered est estimated se disc mot motor', -0.3),  # processed
+    ('cmd command commanded des desired target ref reference con goal set setpoint', -2.0),
+    ('ctrl control action ff feedforward traj leader', -2.0),  # not measured either
+    ('err error ext external fric friction pert model pred predicted residual limit', -2.0),
+    ('min max std temp temperature tcp ee cart cartesian acc ddq imu rel', -2.0),
+    ('init gravity kin dyn', -2.0),
 )
-_COMMANDED = (
-    'cmd command commanded des desired target ref reference con goal set setpoint ctrl control '
-    'action ff feedforward traj leader'
-)
-_OF_OTHER_THINGS = (
-    'err error ext external fric friction pert model pred predicted residual limit min max std '
-    'temp temperature tcp ee cart cartesian acc ddq imu rel init gravity kin dyn'
-)
-#: Words for quantities that were not measured or are not of joints; with less weight, words for
-#: processed quantities.
-OTHERWISE = dict.fromkeys((_COMMANDED + ' ' + _OF_OTHER_THINGS).split(), -2.0) | dict.fromkeys(
-    ('filt', 'filtered', 'est', 'estimated', 'se', 'disc', 'mot', 'motor'), -0.3
-)
+QUALIFIERS = {word: weight for words, weight in _QUALIFIERS for word in words.split()}
 
 _RANGE = re.compile(r'([\[{])(\d+)\.\.(\d+)[\]}]')
 
 
 @dataclass(frozen=True, eq=False)
-class Family:
+class QuantityColumns:
     """
-    Columns of one quantity.
+    Columns and unit of one quantity.
 
     Attributes
     ----------
+    quantity : str
+        'position', 'velocity' or 'effort'.
     pattern : str
         Pattern that selects the columns.
     columns : tuple of TableColumn
@@ -79,13 +75,23 @@ class Family:
         name.
     rest : mapping of str to TableColumn
         Columns of other joints with the same pattern, by their label.
+    guessed : bool
+        Whether the columns were guessed.
+    unit : str
+        Unit in the file; empty before the plan is made.
+    factor : ndarray, shape (n,)
+        To SI.
 
     """
 
+    quantity: QuantityName
     pattern: str
     columns: tuple[TableColumn, ...]
     labels: tuple[str, ...]
     rest: Mapping[str, TableColumn] = field(default_factory=dict)
+    guessed: bool = False
+    unit: str = ''
+    factor: FloatArray = field(default_factory=lambda: np.ones(1))
 
     def joints(self, rename: Rules = ()) -> tuple[str, ...]:
         """Return the joint names in the column names; otherwise joint_1 and so on."""
@@ -93,44 +99,18 @@ class Family:
             return tuple(f'joint_{k + 1}' for k in range(len(self.labels)))
         return tuple(renamed(label, rename) for label in self.labels)
 
-
-@dataclass(frozen=True)
-class QuantitySource:
-    """
-    Columns and unit of one quantity.
-
-    Attributes
-    ----------
-    quantity : str
-        'position', 'velocity' or 'effort'.
-    chosen : Family
-        Columns.
-    unit : str
-        Unit in the file.
-    factor : ndarray, shape (n,)
-        To SI.
-    guessed : bool
-        Whether the columns were guessed.
-    rivals : tuple of str
-        Patterns of other columns that also fit.
-
-    """
-
-    quantity: QuantityName
-    chosen: Family
-    unit: str
-    factor: FloatArray
-    guessed: bool
-    rivals: tuple[str, ...] = ()
-
     def values(self) -> FloatArray:
         """Return the quantity in SI, shape (N, n)."""
-        return np.column_stack([c.values for c in self.chosen.columns]) * self.factor
+        return np.column_stack([c.values for c in self.columns]) * self.factor
 
 
 def choose(
-    table: Table, pattern: str, joints: Sequence[str] | None, what: str, rename: Rules = ()
-) -> Family:
+    table: Table,
+    quantity: QuantityName,
+    pattern: str,
+    joints: Sequence[str] | None,
+    rename: Rules = (),
+) -> QuantityColumns:
     """
     Return the columns that a pattern selects.
 
@@ -138,12 +118,12 @@ def choose(
     ----------
     table : Table
         Table with the columns.
+    quantity : {'position', 'velocity', 'effort'}
+        Quantity of the columns.
     pattern : str
         See ColumnSettings.
     joints : sequence of str or None
         Joints, if known; columns are matched to them by name, else by number.
-    what : str
-        Name of the quantity, for error messages.
     rename : sequence of (str, str)
         From names in the file to names of the joints.
 
@@ -156,22 +136,22 @@ def choose(
     found = _matching(table, pattern)
     if not found:
         raise RecordingError(
-            f"{table.source}: no column is '{pattern}', given for {what}; its columns are "
+            f"{table.source}: no column is '{pattern}', given for {quantity}; its columns are "
             f'{table.listed()}'
         )
     labels = [label for label, _ in found]
     twice = [column.name for label, column in found if labels.count(label) > 1]
     if twice:
         raise RecordingError(
-            f"{table.source}: for {what}, '{pattern}' fits {' and '.join(twice)} for one joint; "
-            'name the columns with commas, or give each a name of its own'
+            f"{table.source}: for {quantity}, '{pattern}' fits {' and '.join(twice)} for one "
+            'joint; name the columns with commas, or give each a name of its own'
         )
     members = dict(found)
     names = [renamed(label, rename) for label in labels]
     by_name = joints is None or set(joints) <= set(names)
     if not by_name and len(labels) == len(joints or ()) and (',' in pattern or len(labels) == 1):
-        return Family(pattern, tuple(members.values()), tuple(labels))
-    family = _family(pattern, members, joints, rename)
+        return QuantityColumns(quantity, pattern, tuple(members.values()), tuple(labels))
+    family = _family(quantity, pattern, members, joints, rename)
     if family is not None:
         return family
     assert joints is not None
@@ -187,14 +167,14 @@ def choose(
             f'{fit} fit, and no column is that of {lacking}; columns are matched by joint name '
             'or number: see --rename and --joints'
         )
-    raise RecordingError(f"{table.source}: for {what}, '{pattern}': {problem}")
+    raise RecordingError(f"{table.source}: for {quantity}, '{pattern}': {problem}")
 
 
 def guess(
     table: Table, quantity: QuantityName, joints: Sequence[str] | None, rename: Rules = ()
-) -> tuple[list[Family], tuple[str, tuple[str, ...]]]:
+) -> tuple[QuantityColumns | None, tuple[str, tuple[str, ...]]]:
     """
-    Return the families that may hold a quantity, and the nearest of those that lack joints.
+    Return the most likely columns of a quantity, and the nearest columns that lack joints.
 
     Parameters
     ----------
@@ -209,8 +189,8 @@ def guess(
 
     Returns
     -------
-    families : list of Family
-        The most likely first.
+    columns : QuantityColumns or None
+        None if no columns fit.
     incomplete : (str, tuple of str)
         Pattern of the columns of the most joints, and the joints without a column of numbers; the
         pattern is empty if no column is that of a joint.
@@ -220,26 +200,23 @@ def guess(
     for column in table.columns:
         for pattern, label in _readings(column, joints, rename):
             groups.setdefault(pattern, {})[label] = column
-    scored: list[tuple[float, Family]] = []
+    best: tuple[tuple[float, int], QuantityColumns] | None = None
     incomplete = '', tuple(joints or ())
     for pattern, members in groups.items():
         score = _score(pattern, quantity)
-        family = _family(pattern, members, joints, rename)
+        family = _family(quantity, pattern, members, joints, rename)
         if family is not None:
             # constant columns hold no measurements
             score -= any(not np.any(np.diff(column.finite)) for column in family.columns)
         if score <= 0.0:
             continue
-        if family is not None:
-            scored.append((score, family))
+        if family is not None and (best is None or (score, len(family.columns)) > best[0]):
+            best = (score, len(family.columns)), replace(family, guessed=True)
         names = [renamed(label, rename) for label in members]
         lacking = tuple(joint for joint in joints or () if joint not in names)
         if len(lacking) < len(incomplete[1]):
             incomplete = pattern, lacking
-    best: dict[tuple[TableColumn, ...], Family] = {}
-    for _, one in sorted(scored, key=lambda one: (-one[0], -len(one[1].columns))):
-        best.setdefault(one.columns, one)
-    return list(best.values()), incomplete
+    return best and best[1], incomplete
 
 
 def guess_time(table: Table) -> TableColumn | None:
@@ -249,7 +226,7 @@ def guess_time(table: Table) -> TableColumn | None:
         for column in table.columns:
             words = words_of(column.bare_name)
             score = max((TIMES.get(word, 0.0) for word in words), default=0.0)
-            score += sum(OTHERWISE.get(word, 0.0) for word in words) - 0.1 * len(words)
+            score += sum(QUALIFIERS.get(word, 0.0) for word in words) - 0.1 * len(words)
             steps = way * np.diff(column.finite)
             if score > 0.5 and len(steps) and np.mean(steps >= 0.0) > 0.9:
                 scores[column] = score
@@ -259,9 +236,13 @@ def guess_time(table: Table) -> TableColumn | None:
 
 
 def _family(
-    pattern: str, members: Mapping[str, TableColumn], joints: Sequence[str] | None, rename: Rules
-) -> Family | None:
-    """Return a family in the order of the joints: by name, else by number; None if none fits."""
+    quantity: QuantityName,
+    pattern: str,
+    members: Mapping[str, TableColumn],
+    joints: Sequence[str] | None,
+    rename: Rules,
+) -> QuantityColumns | None:
+    """Return columns in the order of the joints: by name, else by number; None if none fit."""
     labels = list(members)
     numbered = all(label.isdigit() for label in labels)
     if numbered:
@@ -273,7 +254,8 @@ def _family(
         elif not numbered or len(labels) != len(joints):
             return None
     rest = {label: column for label, column in members.items() if label not in labels}
-    return Family(pattern, tuple(members[label] for label in labels), tuple(labels), rest)
+    columns = tuple(members[label] for label in labels)
+    return QuantityColumns(quantity, pattern, columns, tuple(labels), rest)
 
 
 def _by_number(label: str) -> tuple[int, str]:
@@ -361,8 +343,7 @@ def _score(pattern: str, quantity: QuantityName) -> float:
     own = scores[quantity]
     if own <= 0.0 or own < max(scores.values()):
         return 0.0
-    said = sum(MEASURED.get(word, 0.0) + OTHERWISE.get(word, 0.0) for word in words)
-    return own + said - 0.01 * len(words)
+    return own + sum(QUALIFIERS.get(word, 0.0) for word in words) - 0.01 * len(words)
 
 
 def words_of(name: str) -> list[str]:

@@ -19,8 +19,8 @@ from armid_ros.recording.tables.families import (
     CURRENTS,
     guess,
     guess_time,
+    QuantityColumns,
     QuantityName,
-    QuantitySource,
     words_of,
 )
 from armid_ros.recording.tables.table import Table, TableColumn
@@ -52,7 +52,7 @@ class TablePlan:
         Unit of the column of time.
     rate_hz : float or None
         Samples per second, if there is no column of time.
-    sources : tuple of QuantitySource
+    sources : tuple of QuantityColumns
         Position first.
     settings : ColumnSettings
         Settings of the user.
@@ -68,7 +68,7 @@ class TablePlan:
     time: TableColumn | None
     time_unit: str
     rate_hz: float | None
-    sources: tuple[QuantitySource, ...]
+    sources: tuple[QuantityColumns, ...]
     settings: ColumnSettings
     notes: tuple[str, ...]
     missing: dict[QuantityName, tuple[str, tuple[str, ...]]]
@@ -94,7 +94,7 @@ class TablePlan:
     @property
     def unread(self) -> str:
         """Return the names of the columns that are not read, as a text."""
-        taken = [self.time, *(one for source in self.sources for one in source.chosen.columns)]
+        taken = [self.time, *(one for source in self.sources for one in source.columns)]
         rest = tuple(one for one in self.table.columns if one not in taken)
         return replace(self.table, columns=rest).listed() if rest else ''
 
@@ -108,12 +108,10 @@ class TablePlan:
             guessed = ' (guessed)' if self.time_guessed else ''
             lines.append(f'  time      {self.time.name}, in {self.time_unit}{guessed}')
         for source in self.sources:
-            names = [column.name for column in source.chosen.columns]
+            names = [column.name for column in source.columns]
             shown = ', '.join(names) if len(names) <= 3 else f'{names[0]}, .., {names[-1]}'
             guessed = ' (guessed)' if source.guessed else ''
             lines.append(f'  {source.quantity:9s} {shown}, in {source.unit}{guessed}')
-            if source.rivals:
-                lines.append(f'            also fits: {", ".join(source.rivals)}')
         for quantity, (pattern, lacking) in self.missing.items():
             why = f": '{pattern}' has no column of numbers for {', '.join(lacking)}"
             lines.append(f'  {quantity:9s} none{why if pattern else ""}')
@@ -167,7 +165,7 @@ def plan(
             f'{table.source}: no columns seem to be positions{of_joints}; name them, as in '
             f"--position 'q{{}}' or --position a,b,c. Its columns are {table.listed()}"
         )
-    names = tuple(joints) if joints else position.chosen.joints(settings.rename)
+    names = tuple(joints) if joints else position.joints(settings.rename)
     sliding = np.zeros(len(names), np.bool_) if slides is None else np.asarray(slides, np.bool_)
     sources = [position]
     missing: dict[QuantityName, tuple[str, tuple[str, ...]]] = {}
@@ -175,7 +173,7 @@ def plan(
         found = _source(table, quantity, settings, names)
         if isinstance(found, tuple) and joints is None:
             # match the joints by number, as the names differ or are missing
-            numbers = [str(k) for k in range(len(position.chosen.columns))]
+            numbers = [str(k) for k in range(len(position.columns))]
             by_number = _source(table, quantity, settings, numbers)
             found = found if isinstance(by_number, tuple) else by_number
         if isinstance(found, tuple):
@@ -186,7 +184,7 @@ def plan(
     effort = next((one for one in sources if one.quantity == 'effort'), None)
     notes = list(_far(position, settings, sliding))
     if effort is not None and not settings.effort_scale:
-        name = effort.chosen.pattern
+        name = effort.pattern
         if effort.unit in ('A', 'mA') or 'load' in name.lower():
             notes.append(f"efforts '{name}' seem to be currents; --current-gain makes them N m")
     scaled = tuple(_scaled(source, settings, names, sliding) for source in sources)
@@ -198,42 +196,34 @@ def _source(
     quantity: QuantityName,
     settings: ColumnSettings,
     joints: Sequence[str] | None,
-) -> QuantitySource | tuple[str, tuple[str, ...]]:
+) -> QuantityColumns | tuple[str, tuple[str, ...]]:
     """Return the source of a quantity, given or guessed; without one, the lacking joints."""
     asked = getattr(settings, quantity)
     if asked is not None and asked.lower() == 'none':
         return '', ()
-    rivals: tuple[str, ...] = ()
+    incomplete: tuple[str, tuple[str, ...]] = '', ()
+    chosen: QuantityColumns | None
     if asked is not None:
-        chosen = choose(table, asked, joints, quantity, settings.rename)
+        chosen = choose(table, quantity, asked, joints, settings.rename)
     else:
-        guesses, incomplete = guess(table, quantity, joints, settings.rename)
-        if not guesses:
-            return incomplete
-        chosen, *others = guesses
-        for column in chosen.columns:
-            table.column(column.bare_name)  # which has to be one
-        rivals = tuple(
-            dict.fromkeys(
-                one.pattern
-                for one in others
-                if set(chosen.columns).isdisjoint(one.columns)
-                and len(one.columns) == len(chosen.columns)
-            )
-        )[:4]
+        chosen, incomplete = guess(table, quantity, joints, settings.rename)
+    if chosen is None:
+        return incomplete
+    for column in chosen.columns if chosen.guessed else ():
+        table.column(column.bare_name)  # raises an error if columns of this name differ
     unit = next((column.unit for column in chosen.columns if column.unit), '')
     if not unit and set(words_of(chosen.pattern)) & set(CURRENTS):
         unit = 'A'
     factor = np.full(len(chosen.columns), _FACTORS.get(unit, 1.0))
-    return QuantitySource(quantity, chosen, unit or _SI[quantity], factor, asked is None, rivals)
+    return replace(chosen, unit=unit or _SI[quantity], factor=factor)
 
 
 def _scaled(
-    source: QuantitySource,
+    source: QuantityColumns,
     settings: ColumnSettings,
     joints: Sequence[str],
     slides: npt.NDArray[np.bool_],
-) -> QuantitySource:
+) -> QuantityColumns:
     """Apply unit settings of the user; degrees apply to revolute joints only."""
     if source.quantity == 'effort':
         if not settings.effort_scale:
@@ -263,7 +253,7 @@ def _short(values: FloatArray) -> str:
 
 
 def _far(
-    position: QuantitySource, settings: ColumnSettings, slides: npt.NDArray[np.bool_]
+    position: QuantityColumns, settings: ColumnSettings, slides: npt.NDArray[np.bool_]
 ) -> Iterator[str]:
     """Return notes on positions that are too large for rad or m."""
     if position.unit != 'rad' or settings.gear or settings.position_scale:
@@ -294,7 +284,7 @@ def _time(table: Table, settings: ColumnSettings) -> tuple[TableColumn | None, s
     elif settings.rate_hz is None and asked is None:
         column = guess_time(table)
     if column is not None:
-        table.column(column.name)  # which has to be one
+        table.column(column.name)  # raises an error if columns of this name differ
         return column, _time_unit(table, column, settings.time_unit), None
     rate = settings.rate_hz or table.rate_hz
     if rate is None:
@@ -346,7 +336,7 @@ def measured(plan: TablePlan) -> Recording:
     t, start = _times(plan)
     stamped = np.isfinite(t)
     for source in plan.sources:
-        for column in source.chosen.columns:
+        for column in source.columns:
             empty = np.flatnonzero(~np.isfinite(column.values))
             if len(empty) > MAX_NOT_FINITE * len(table):
                 raise RecordingError(
@@ -372,7 +362,7 @@ def measured(plan: TablePlan) -> Recording:
     position, settings = plan.sources[0], plan.settings
     # of joints that were not requested, if their unit is known
     if not (settings.gear or settings.zero) and len(set(position.factor)) == 1:
-        for label, column in position.chosen.rest.items():
+        for label, column in position.rest.items():
             values = column.finite * position.factor[0]
             if len(values):
                 joint = renamed(label, settings.rename)

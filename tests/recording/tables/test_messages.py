@@ -153,5 +153,5 @@ def test_abbreviations_of_efforts_are_known(tmp_path, word):
     (tmp_path / 'run.csv').write_text(text)
     found = plan(open_table(tmp_path / 'run.csv'), ColumnSettings())
     (effort,) = [one for one in found.sources if one.quantity == 'effort']
-    assert effort.chosen.pattern == f'{word}_J{{}}'
+    assert effort.pattern == f'{word}_J{{}}'
     assert any('currents' in note for note in found.notes) == (word in ('cur', 'i', 'load'))
