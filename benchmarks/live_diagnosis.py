@@ -28,9 +28,9 @@ import time
 
 from armid_ros.arm import ArmModel
 from armid_ros.effects import CATALOGUE, parse_effect
-from armid_ros.live import InProcess, LiveDiagnosis, LiveSettings
-from armid_ros.live.assistant import Job, Result
 from armid_ros.motion import Motion
+from armid_ros.nodes.live import InProcess, LiveDiagnosis, LiveSettings
+from armid_ros.nodes.live.assistant import Job, Result
 from armid_ros.nodes.live_diagnosis import LiveDiagnosisNode
 from armid_ros.nodes.lockstep import EPOCH_NS, Stage
 from armid_ros.nodes.simulated_arm import SimulatedArmNode

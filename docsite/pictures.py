@@ -19,8 +19,8 @@ from tempfile import TemporaryDirectory
 import textwrap
 
 import armid_ros as ar
-from armid_ros.live.belief import LiveDiagnosis, LiveSettings
-from armid_ros.live.request import answer
+from armid_ros.nodes.live.belief import LiveDiagnosis, LiveSettings
+from armid_ros.nodes.live.request import answer
 from armid_ros.papers.elastic.identification.interaction import ideal_response
 from armid_ros.papers.elastic.identification.three_steps import identify_two_inertia
 from armid_ros.papers.elastic.plant import EXCITATION_RMS, resonance_experiments, run_elastic, WEAK

@@ -15,10 +15,10 @@ from armid_ros.diagnosis import Finding
 from armid_ros.errors import IdentificationError
 from armid_ros.estimate import name_in_words
 from armid_ros.files.output import refuse_replacing
-from armid_ros.live import Answer, Assistant, LiveDiagnosis, StreamWatch
-from armid_ros.live.assistant import Helper, Plan, Save
 from armid_ros.nodes.base import key_values
 from armid_ros.nodes.listening import ListeningNode
+from armid_ros.nodes.live import Answer, Assistant, LiveDiagnosis, StreamWatch
+from armid_ros.nodes.live.assistant import Helper, Plan, Save
 from armid_ros.nodes.messages.joint_states import disturbance, JointSample
 from armid_ros.nodes.parameters.live import (
     LIVE_PARAMETERS,

@@ -6,7 +6,7 @@ from __future__ import annotations
 
 from armid_ros.arm import ArmModel
 from armid_ros.effects import parse_effect
-from armid_ros.live import DiagnosisRequest, InProcess
+from armid_ros.nodes.live import DiagnosisRequest, InProcess
 from armid_ros.recording import Recording
 from armid_ros.simulation import Reference, Sensors, SimulatedArm
 import numpy as np

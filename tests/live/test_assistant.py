@@ -11,8 +11,8 @@ import time
 
 from armid_ros.errors import IdentificationError
 from armid_ros.excitation.schedule import read_excitation
-from armid_ros.live import Answer, Assistant, DiagnosisRequest, InProcess
-from armid_ros.live.assistant import Plan, Save
+from armid_ros.nodes.live import Answer, Assistant, DiagnosisRequest, InProcess
+from armid_ros.nodes.live.assistant import Plan, Save
 import pytest
 
 #: Only reached when something is broken.

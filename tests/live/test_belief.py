@@ -7,8 +7,8 @@ from __future__ import annotations
 from types import SimpleNamespace
 
 from armid_ros.errors import IdentificationError
-from armid_ros.live import Answer, LiveDiagnosis, LiveSettings
-from armid_ros.live.request import WAITING
+from armid_ros.nodes.live import Answer, LiveDiagnosis, LiveSettings
+from armid_ros.nodes.live.request import WAITING
 import numpy as np
 import pytest
 

@@ -7,9 +7,9 @@ from __future__ import annotations
 from dataclasses import replace
 
 from armid_ros.identification.rows.signals import Conditioning
-from armid_ros.live import DiagnosisRequest
-from armid_ros.live.request import answer, Healthy, WAITING
 from armid_ros.motion import Motion
+from armid_ros.nodes.live import DiagnosisRequest
+from armid_ros.nodes.live.request import answer, Healthy, WAITING
 import numpy as np
 import pytest
 

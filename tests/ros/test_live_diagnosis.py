@@ -10,9 +10,9 @@ from armid_msgs.msg import Diagnosis
 from armid_ros.arm import ArmModel
 from armid_ros.arm.model_file import model_text, read_model
 from armid_ros.effects import parse_effect
-from armid_ros.live import InProcess, LiveDiagnosis, LiveSettings
-from armid_ros.live.assistant import Done, Plan, Save
 from armid_ros.motion import Motion
+from armid_ros.nodes.live import InProcess, LiveDiagnosis, LiveSettings
+from armid_ros.nodes.live.assistant import Done, Plan, Save
 from armid_ros.nodes.live_diagnosis import LiveDiagnosisNode
 from armid_ros.nodes.qos import LATCHED
 from armid_ros.nodes.trajectory_controller import write_trajectory

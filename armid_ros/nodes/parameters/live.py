@@ -11,7 +11,7 @@ from armid_ros.api.arguments import read_recording
 from armid_ros.arm import ArmModel, load_misfit, load_model
 from armid_ros.effects import parse_effect
 from armid_ros.errors import ModelError
-from armid_ros.live import LiveDiagnosis, LiveSettings
+from armid_ros.nodes.live import LiveDiagnosis, LiveSettings
 from armid_ros.nodes.parameters.identifier import robot_of, ROBOT_PARAMETERS
 from armid_ros.nodes.parameters.table import NodeParameter, Values
 

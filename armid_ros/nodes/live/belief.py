@@ -14,8 +14,8 @@ from dataclasses import dataclass, replace
 
 from armid_ros.arm import ArmModel, Misfit
 from armid_ros.errors import IdentificationError
-from armid_ros.live.request import Answer, DiagnosisRequest, Healthy, WAITING
-from armid_ros.live.window import SampleWindow
+from armid_ros.nodes.live.request import Answer, DiagnosisRequest, Healthy, WAITING
+from armid_ros.nodes.live.window import SampleWindow
 from armid_ros.recording import Recording
 import numpy as np
 import numpy.typing as npt

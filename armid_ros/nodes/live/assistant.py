@@ -25,7 +25,7 @@ from armid_ros.api.diagnosis import DiagnosisResult
 from armid_ros.diagnosis import Diagnosis, next_run
 from armid_ros.errors import ArmidError, IdentificationError
 from armid_ros.excitation.schedule import excitation_text
-from armid_ros.live.request import Answer, answer, DiagnosisRequest
+from armid_ros.nodes.live.request import Answer, answer, DiagnosisRequest
 import numpy as np
 
 #: One thread of linear algebra: the matrices are small, and other processes need the cores.

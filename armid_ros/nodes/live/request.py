@@ -12,8 +12,8 @@ from armid_ros.arm import ArmModel, Misfit
 from armid_ros.diagnosis import diagnose, Diagnosis, DiagnosisSettings, Finding, known_misfit
 from armid_ros.diagnosis.prepare import choose_filters
 from armid_ros.errors import ArmidError
+from armid_ros.identification.online.onset import onset
 from armid_ros.identification.rows.signals import Conditioning
-from armid_ros.live.onset import onset
 from armid_ros.recording import Recording
 import numpy as np
 

@@ -2,11 +2,11 @@
 # SPDX-License-Identifier: Apache-2.0
 """Diagnosis of an arm while it moves, without ROS."""
 
-from armid_ros.live.assistant import Assistant, InProcess
-from armid_ros.live.belief import Belief, LiveDiagnosis, LiveSettings
-from armid_ros.live.request import Answer, DiagnosisRequest
-from armid_ros.live.stream_watch import StreamWatch
-from armid_ros.live.window import SampleWindow
+from armid_ros.nodes.live.assistant import Assistant, InProcess
+from armid_ros.nodes.live.belief import Belief, LiveDiagnosis, LiveSettings
+from armid_ros.nodes.live.request import Answer, DiagnosisRequest
+from armid_ros.nodes.live.stream_watch import StreamWatch
+from armid_ros.nodes.live.window import SampleWindow
 
 __all__ = [
     'Answer',
