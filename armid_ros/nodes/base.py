@@ -12,7 +12,7 @@ from typing import Any, ClassVar
 
 from armid_ros.errors import ArmidError, OutputError
 from armid_ros.nodes.complaints import Complaints, FATAL
-from armid_ros.nodes.parameters.table import as_declared, declare, is_as, NodeParameter, unknown
+from armid_ros.nodes.parameters.table import declare, is_as, NodeParameter, unknown
 from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus, KeyValue
 from rcl_interfaces.msg import SetParametersResult
 from rclpy.clock import Clock, ClockType
@@ -73,7 +73,7 @@ class ArmidNode(Node):
         super().__init__(name, **kwargs)
         self.complaints = Complaints(self.get_logger())
         self._clock_missed = self._trouble_said = False
-        declare(self, self.parameters())
+        self._entries = declare(self, self.parameters())
         self.add_on_set_parameters_callback(self._validate)
         self.add_post_set_parameters_callback(self._apply)
         self._diagnostics = self.create_publisher(DiagnosticArray, '/diagnostics', 10)
@@ -285,7 +285,15 @@ class ArmidNode(Node):
         again. An integer is accepted for a float.
 
         """
-        given = [as_declared(self, parameter) for parameter in parameter_list]
+        known = self._entries
+        try:
+            given = [
+                Parameter(p.name, value=known[p.name].converted(p.value)) if p.name in known else p
+                for p in parameter_list
+            ]
+        except ArmidError as error:
+            self.complaints.say('parameter', str(error))
+            return SetParametersResult(successful=False, reason=str(error))
         changed = [p for p in given if not is_as(self, p)]
         if not changed:
             return SetParametersResult(successful=True)
