@@ -185,7 +185,7 @@ class Bench:
     @property
     def proposed(self) -> list[list[str]]:
         """Effects that the node proposes, with their joints."""
-        return [[name, *joints] for name, joints in self.live.belief.named]
+        return [[name, *joints] for name, joints in self.live.named]
 
 
 @contextmanager

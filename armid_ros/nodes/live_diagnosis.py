@@ -75,7 +75,6 @@ class LiveDiagnosisNode(ListeningNode):
         super().__init__('live_diagnosis', **kwargs)
         self.live: LiveDiagnosis | None = None
         self._said: object = ()
-        self._waiting: list[Save | Plan] = []
         self._helper = helper or Assistant()
         self._diagnoses = self.create_publisher(Diagnosis, '~/diagnosis', LATCHED)
         self._models = self.create_publisher(String, '~/model', LATCHED)
@@ -120,13 +119,13 @@ class LiveDiagnosisNode(ListeningNode):
         self._require_diagnosis()
         folder = self.folder('save_to')
         refuse_replacing(folder, Save.FILES)
-        self._begin(Save(folder))
+        self._helper.ask(Save(folder))
         return f'writing {", ".join(Save.FILES)} to {folder}'
 
     def next_run(self) -> str:
         """Start to plan the motion that separates the candidates, for ~/experiment."""
         self._require_diagnosis()
-        self._begin(Plan(self.value('seed')))
+        self._helper.ask(Plan(self.value('seed')))
         return f'planning; the motion goes out on {self._runs.topic_name}'
 
     def look(self) -> None:
@@ -158,8 +157,6 @@ class LiveDiagnosisNode(ListeningNode):
             self.tell(result.text)
             if result.excitation:
                 self._runs.publish(String(data=result.excitation))
-        if self._waiting and not self._helper.busy:
-            self._helper.ask(self._waiting.pop(0))
         return True
 
     def condition(self) -> tuple[str, Mapping[str, object]]:
@@ -174,7 +171,7 @@ class LiveDiagnosisNode(ListeningNode):
             'motion [s]': live.window.moved,
             'diagnoses': live.asked,
             'busy': int(self.busy),
-            'proposed': int(live.belief.proposed is not None),
+            'proposed': int(live.proposed is not None),
         }
         for reason in sorted(self._watch.news()):
             self.complaints.say(reason, disturbance(reason, self.joint_states.several))
@@ -202,11 +199,11 @@ class LiveDiagnosisNode(ListeningNode):
         status.level = _LEVELS.get(answer.verdict, DiagnosticStatus.WARN)
         status.message = f'{answer.verdict.replace("_", " ")}: {answer.summary}'
         numbers = {'processor seconds': answer.seconds, 'window': answer.window.duration}
-        for row in answer.gap:
+        for joint, before, after, floor in _gaps(answer):
             numbers |= {
-                f'gap before {row.joint} [N m]': row.before,
-                f'gap after {row.joint} [N m]': row.after,
-                f'floor {row.joint} [N m]': row.floor,
+                f'gap before {joint} [N m]': before,
+                f'gap after {joint} [N m]': after,
+                f'floor {joint} [N m]': floor,
             }
         for finding in answer.findings:
             for parameter, value, std in _rows(finding):
@@ -251,11 +248,12 @@ class LiveDiagnosisNode(ListeningNode):
             effect_joints=[','.join(finding.joints) for finding in answer.findings],
             share=[float(finding.share) for finding in answer.findings],
             rivals=[','.join(finding.ambiguous_with) for finding in answer.findings],
-            gap_joint=[row.joint for row in answer.gap],
-            gap_before=[row.before for row in answer.gap],
-            gap_after=[row.after for row in answer.gap],
-            gap_floor=[row.floor for row in answer.gap],
         )
+        for joint, before, after, floor in _gaps(answer):
+            message.gap_joint.append(joint)
+            message.gap_before.append(before)
+            message.gap_after.append(after)
+            message.gap_floor.append(floor)
         for number, finding in enumerate(answer.findings):
             for parameter, value, std in _rows(finding):
                 message.name.append(parameter.name)
@@ -275,18 +273,12 @@ class LiveDiagnosisNode(ListeningNode):
         if self._require().latest is None:
             raise IdentificationError('nothing has been diagnosed so far')
 
-    def _begin(self, job: Save | Plan) -> None:
-        if self._helper.busy:
-            self._waiting.append(job)
-        else:
-            self._helper.ask(job)
-
     def _publish_model(self) -> None:
-        model = self._require().belief.model
+        model = self._require().model
         self._models.publish(String(data=model_text(model, source_of(model.robot))))
 
     def _adopt(self, live: LiveDiagnosis) -> None:
-        robot = live.belief.accepted.robot
+        robot = live.accepted.robot
         self.adopt(robot)
         self.live = live
         self._watch = StreamWatch(robot.n_joints)
@@ -302,10 +294,19 @@ def _rows(finding: Finding) -> list[tuple[object, float, float]]:
     return list(zip(finding.parameters, finding.values, finding.std, strict=True))
 
 
+def _gaps(answer: Answer) -> list[tuple[str, float, float, float]]:
+    """Return the joints with their residuals before and after the patch, and floors [N m]."""
+    gap = answer.gap
+    if gap is None:
+        return []
+    columns = (column.tolist() for column in (gap.before, gap.after, gap.floor))
+    return list(zip(answer.arm.robot.joints, *columns, strict=True))
+
+
 def _in_words(live: LiveDiagnosis) -> str:
     return '; '.join(
         ' of '.join(filter(None, (name_in_words(name), ', '.join(joints))))
-        for name, joints in live.belief.named
+        for name, joints in live.named
     )
 
 

@@ -72,7 +72,9 @@ def test_without_a_parameter_file_nodes_get_parameters_they_have(bench, tmp_path
     for executable, node in nodes.items():
         values = read_back(bench, node, tmp_path)
         given = {key for p in node.parameters if isinstance(p, dict) for key in p}
-        given |= yaml.safe_load(Path(node.parameters[0]).read_text())['/**']['ros__parameters'].keys()
+        given |= yaml.safe_load(Path(node.parameters[0]).read_text())['/**'][
+            'ros__parameters'
+        ].keys()
         assert given <= {*TABLES[executable], 'use_sim_time'}
         assert values['use_sim_time'] is (executable == 'online_identifier' and name == 'replay')
     assert all(one.description for one in declared(name))

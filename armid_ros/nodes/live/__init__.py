@@ -3,15 +3,14 @@
 """Diagnosis of an arm while it moves, without ROS."""
 
 from armid_ros.nodes.live.assistant import Assistant, InProcess
-from armid_ros.nodes.live.belief import Belief, LiveDiagnosis, LiveSettings
-from armid_ros.nodes.live.request import Answer, DiagnosisRequest
+from armid_ros.nodes.live.request import Answer, DiagnosisRequest, LiveSettings
+from armid_ros.nodes.live.schedule import LiveDiagnosis
 from armid_ros.nodes.live.stream_watch import StreamWatch
 from armid_ros.nodes.live.window import SampleWindow
 
 __all__ = [
     'Answer',
     'Assistant',
-    'Belief',
     'InProcess',
     'LiveDiagnosis',
     'LiveSettings',

@@ -86,27 +86,26 @@ class InProcess:
 
     def __init__(self) -> None:
         self._last: tuple[DiagnosisRequest, Diagnosis] | None = None
-        self._result: Result | None = None
+        self._results: list[Result] = []
 
     @property
     def busy(self) -> bool:
         """Return whether a result is available."""
-        return self._result is not None
+        return bool(self._results)
 
     def ask(self, job: Job) -> None:
         """Run a job."""
         try:
-            self._result = self._done(job)
+            self._results.append(self._done(job))
         except ArmidError as error:
-            self._result = Done(str(error), success=False)
+            self._results.append(Done(str(error), success=False))
         except OSError as error:
             text = f'{error.filename}: cannot be written: {error.strerror}'
-            self._result = Done(text, success=False)
+            self._results.append(Done(text, success=False))
 
     def poll(self) -> Result | None:
-        """Return the result, and clear it."""
-        result, self._result = self._result, None
-        return result
+        """Return and remove the first result; None without one."""
+        return self._results.pop(0) if self._results else None
 
     def close(self) -> None:
         """Do nothing: there is no process."""
@@ -141,40 +140,47 @@ class Assistant:
     """
 
     def __init__(self) -> None:
-        self.busy = False
+        self._pending = 0
         self._start()
+
+    @property
+    def busy(self) -> bool:
+        """Return whether a job is under way."""
+        return self._pending > 0
 
     def ask(self, job: Job) -> None:
         """
-        Begin a job; a new process is started if the last one has ended.
+        Send a job, which runs after the pending ones; a process that has ended is replaced.
+
+        A request of a diagnosis is larger than the buffer of the pipe. It would wait for the
+        pending jobs; send it when none is pending.
 
         Raises
         ------
         IdentificationError
-            If another job is under way, or the process has just ended.
+            If the process has just ended.
         OSError
             If a new process cannot be started.
 
         """
-        if self.busy:
-            raise IdentificationError('a diagnosis is under way; ask again in some seconds')
-        if self._process.poll() is not None:
+        if not self.busy and self._process.poll() is not None:
             self.close()
             self._start()
         try:
             self._pipe.send(job)
         except OSError as error:
             raise IdentificationError(f'the process that diagnoses has ended: {error}') from error
-        self.busy = True
+        self._pending += 1
 
     def poll(self) -> Result | None:
         """Return the result if one has arrived; None otherwise."""
         if self._pipe.closed or not self._pipe.poll():
             return None
-        self.busy = False
+        self._pending -= 1
         try:
             result: Result = self._pipe.recv()
         except (EOFError, OSError):  # the process ended, maybe during the transfer
+            self._pending = 0
             self._pipe.close()
             code = self._process.wait()
             return Done(f'the process that diagnoses has ended with {code}', success=False)

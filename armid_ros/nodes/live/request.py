@@ -1,54 +1,67 @@
 # Copyright 2026 The armid_ros developers
 # SPDX-License-Identifier: Apache-2.0
-"""Request and answer of the diagnosis of a window of samples."""
+"""Settings, request and answer of the diagnosis of a window of samples."""
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from dataclasses import dataclass, replace
 import time
 
 from armid_ros.arm import ArmModel, Misfit
 from armid_ros.diagnosis import diagnose, Diagnosis, DiagnosisSettings, Finding, known_misfit
 from armid_ros.diagnosis.prepare import choose_filters
-from armid_ros.errors import ArmidError
+from armid_ros.diagnosis.verdict.finding import Gap
+from armid_ros.errors import ArmidError, IdentificationError
 from armid_ros.identification.online.onset import onset
-from armid_ros.identification.rows.signals import Conditioning
 from armid_ros.recording import Recording
 import numpy as np
 
+#: Name and joints of an effect.
+Named = tuple[str, tuple[str, ...]]
 #: Verdict if the motion since the last change of the arm is too short.
 WAITING = 'waiting'
 
 
 @dataclass(frozen=True)
-class Healthy:
+class LiveSettings:
     """
-    Motion of the healthy arm, and its model at that time.
+    Settings of the live diagnosis.
 
     Attributes
     ----------
-    arm : ArmModel
-        The model.
-    recording : Recording
-        The motion.
+    window : float
+        Longest motion that is diagnosed [s].
+    shortest : float
+        Shortest motion that is diagnosed [s].
+    every : float
+        Motion between two requests [s].
+    rate : float
+        Rate of the kept samples [Hz].
+    confirmations : int
+        Diagnoses in a row that must agree on an effect.
+    learning : float
+        Motion at the beginning in which the arm is healthy [s]. The misfit of the model is
+        computed from it if neither a baseline nor a misfit is given. 0: no misfit is used.
+    material : float
+        Share of a joint's torque below which a cause does not matter.
 
     """
 
-    arm: ArmModel
-    recording: Recording
+    window: float = 20.0
+    shortest: float = 8.0
+    every: float = 4.0
+    rate: float = 200.0
+    confirmations: int = 2
+    learning: float = 20.0
+    material: float = 0.01
 
-    def misfit(self, filters: Conditioning) -> Misfit:
-        """
-        Compute the misfit of the model in the band of the filters.
-
-        Raises
-        ------
-        IdentificationError
-            If the motion is too short for the filters.
-
-        """
-        return known_misfit(self.arm, [], filters, [self.recording])
+    def __post_init__(self) -> None:
+        """Raise an IdentificationError if the window is shorter than the shortest motion."""
+        if not 0.0 < self.shortest <= self.window:
+            raise IdentificationError(
+                f'a window of {self.window:g} s is shorter than the shortest motion that is '
+                f'diagnosed, {self.shortest:g} s'
+            )
 
 
 @dataclass(frozen=True)
@@ -66,16 +79,15 @@ class DiagnosisRequest:
         Recordings of the healthy arm.
     misfit : Misfit or None
         Residual of the model when it was identified, used without a baseline.
-    shortest : float
-        Shortest window that is diagnosed [s].
-    material : float
-        Share of a joint's torque below which a cause does not matter.
+    settings : LiveSettings
+        Settings of the diagnosis.
     seed : int
         Random seed of the diagnosis.
     end : float
         Time of the last sample of the window, on the time base of the node [s].
-    healthy : Healthy or None
-        Motion of the healthy arm, from which the misfit is computed if no baseline is given.
+    healthy : tuple of ArmModel and Recording, or None
+        Motion of the healthy arm and its model then, from which the misfit is computed if no
+        baseline is given.
     of_one_arm : bool
         Whether the whole window lies after the last change of the arm. The residual of a wrong
         model varies with the motion and hides further changes, so that none is searched for.
@@ -86,22 +98,11 @@ class DiagnosisRequest:
     window: Recording
     baseline: tuple[Recording, ...] = ()
     misfit: Misfit | None = None
-    shortest: float = 8.0
-    material: float = 0.01
+    settings: LiveSettings = LiveSettings()
     seed: int = 0
     end: float = 0.0
-    healthy: Healthy | None = None
+    healthy: tuple[ArmModel, Recording] | None = None
     of_one_arm: bool = False
-
-
-@dataclass(frozen=True)
-class GapOfJoint:
-    """Root mean square residual of a joint before and after the patch, and noise floor [N m]."""
-
-    joint: str
-    before: float
-    after: float
-    floor: float
 
 
 @dataclass(frozen=True)
@@ -116,10 +117,6 @@ class Answer:
         'bad_data' if the window cannot be diagnosed.
     summary : str
         Verdict in one or two sentences.
-    findings : tuple of Finding
-        Named effects.
-    gap : tuple of GapOfJoint
-        Residuals of the joints.
     arm : ArmModel
         Patched model; the model of the request if no effect was named.
     window : Recording
@@ -130,21 +127,25 @@ class Answer:
         Processor time of the diagnosis [s].
     changed : bool
         Whether the arm changed in the window.
+    findings : tuple of Finding
+        Named effects.
+    gap : Gap or None
+        Residuals of the joints, without curves; None if the window was not diagnosed.
 
     """
 
     verdict: str
     summary: str
-    findings: tuple[Finding, ...]
-    gap: tuple[GapOfJoint, ...]
     arm: ArmModel
     window: Recording
     end: float
     seconds: float
     changed: bool = False
+    findings: tuple[Finding, ...] = ()
+    gap: Gap | None = None
 
     @property
-    def named(self) -> tuple[tuple[str, tuple[str, ...]], ...]:
+    def named(self) -> tuple[Named, ...]:
         """Return names and joints of the named effects, the largest first."""
         return tuple((finding.name, finding.joints) for finding in self.findings)
 
@@ -157,43 +158,46 @@ def answer(request: DiagnosisRequest) -> tuple[Answer, Diagnosis | None]:
 
     """
     begun, arm, window = time.process_time(), request.arm, request.window
-
-    def answered(
-        verdict: str, summary: str, findings: Sequence[Finding] = (), patched: ArmModel = arm
-    ) -> Answer:
-        spent = time.process_time() - begun
-        gap = None if found is None else found.gap
-        more: tuple[GapOfJoint, ...] = ()
-        if gap is not None:
-            rows = zip(arm.robot.joints, gap.before, gap.after, gap.floor, strict=True)
-            more = tuple(GapOfJoint(joint, *map(float, numbers)) for joint, *numbers in rows)
-        cut = window is not request.window
-        return Answer(
-            verdict, summary, tuple(findings), more, patched, window, request.end, spent, cut
-        )
-
+    settings = DiagnosisSettings(material=request.settings.material)
     found: Diagnosis | None = None
-    settings = DiagnosisSettings(material=request.material)
     try:
         changed = None if request.of_one_arm else onset(arm, window)
         if changed is not None:
             window = window.select(window.t >= changed)
             window = replace(window, t=window.t - (window.t[0] if len(window) else 0.0))
-        if window.duration < request.shortest:
-            text = f'the arm changed {window.duration:.0f} s ago: the diagnosis needs more motion'
-            return answered(WAITING, text), None
-        rng, misfit = np.random.default_rng(request.seed), request.misfit
-        if request.healthy is not None and not request.baseline:
-            # misfit of the healthy arm, in the band of the window
-            misfit = request.healthy.misfit(choose_filters(arm, [window], (), settings, rng))
-        found = diagnose(
-            arm,
-            [window],
-            baseline=request.baseline,
-            misfit=misfit,
-            settings=settings,
-            rng=np.random.default_rng(request.seed),
-        )
+        if window.duration < request.settings.shortest:
+            verdict = WAITING
+            summary = (
+                f'the arm changed {window.duration:.0f} s ago: the diagnosis needs more motion'
+            )
+        else:
+            misfit = request.misfit
+            if request.healthy is not None and not request.baseline:
+                # misfit of the healthy arm, in the band of the window
+                rng = np.random.default_rng(request.seed)
+                filters = choose_filters(arm, [window], (), settings, rng)
+                misfit = known_misfit(request.healthy[0], [], filters, [request.healthy[1]])
+            found = diagnose(
+                arm,
+                [window],
+                baseline=request.baseline,
+                misfit=misfit,
+                settings=settings,
+                rng=np.random.default_rng(request.seed),
+            )
+            verdict, summary = found.verdict, found.summary
     except ArmidError as error:
-        return answered('bad_data', str(error)), None
-    return answered(found.verdict, found.summary, found.findings, found.arm), found
+        verdict, summary = 'bad_data', str(error)
+    result = Answer(
+        verdict,
+        summary,
+        arm if found is None else found.arm,
+        window,
+        request.end,
+        time.process_time() - begun,
+        changed=window is not request.window,
+    )
+    if found is not None:
+        gap = None if found.gap is None else replace(found.gap, overlays=())
+        result = replace(result, findings=tuple(found.findings), gap=gap)
+    return result, found
