@@ -47,7 +47,7 @@ class _JumpGuard:
         )
 
     @property
-    def hears(self) -> bool:
+    def has_state(self) -> bool:
         """Return whether a joint state was received."""
         return bool(self._latest)
 
@@ -310,7 +310,7 @@ class BagPlayerNode(ArmidNode):
     def _ready(self) -> bool:
         everyone = all(p.get_subscription_count() for p in self._topics.values())
         if self._guard is not None and not self._has_states:
-            everyone = everyone and self._guard.hears
+            everyone = everyone and self._guard.has_state
         return everyone or time.monotonic() > self._made + self.value('subscriber_timeout')
 
     def _publish(self, message: RawMessage) -> None:

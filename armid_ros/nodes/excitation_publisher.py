@@ -107,7 +107,7 @@ class ExcitationPublisherNode(ArmidNode):
         )
         for service in (self.start, self.rehearse, self.stop):
             self.offer(f'~/{service.__name__}', service)
-        self.look_every(0.05, self.look)
+        self._timer = self.look_every(0.05, self.look)
 
     def parameters(self) -> Sequence[NodeParameter]:
         """Return the parameters; for a simulation some defaults differ."""
@@ -219,8 +219,7 @@ class ExcitationPublisherNode(ArmidNode):
         late = self._arm.stamps.late if not (self.value('zero_stamp') or self._simulated) else 0.0
         self._begun_ns, self._begun = now.nanoseconds, self._arm.now() + late
         self._gate, self._ending, self._rehearsal = gate, None, None
-        self._overloads = 0
-        self._trouble, self._rehearsed = '', ''
+        self._overloads, self._trouble, self._rehearsed = 0, '', ''
         self._runs, self._outcome = self._runs + 1, 'complete'  # unless it is stopped
         return self.tell(
             f'a run of {planned.duration:g} s, {planned.approach.duration:.1f} s of it to get '
@@ -298,7 +297,8 @@ class ExcitationPublisherNode(ArmidNode):
 
     def close(self) -> None:
         """Stop the arm unless it is at rest, and wait until the message has arrived."""
-        sent = self._gate is not None or (self._ending is not None and self._ending.last)
+        ending = self._let_go()
+        sent = self._gate is not None or (ending is not None and ending.last is not None)
         if sent and self.context.ok():
             self.stop()
             self._controller.settle(1.0)

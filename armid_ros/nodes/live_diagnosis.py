@@ -19,7 +19,7 @@ from armid_ros.nodes.base import key_values
 from armid_ros.nodes.listening import ListeningNode
 from armid_ros.nodes.live import Answer, Assistant, LiveDiagnosis, StreamWatch
 from armid_ros.nodes.live.assistant import Helper, Plan, Save
-from armid_ros.nodes.messages.joint_states import disturbance, JointSample
+from armid_ros.nodes.messages.joint_states import JointSample
 from armid_ros.nodes.parameters.live import (
     LIVE_PARAMETERS,
     LIVE_SETTINGS,
@@ -74,7 +74,7 @@ class LiveDiagnosisNode(ListeningNode):
         """
         super().__init__('live_diagnosis', **kwargs)
         self.live: LiveDiagnosis | None = None
-        self._said: object = ()
+        self._logged: object = ()
         self._helper = helper or Assistant()
         self._diagnoses = self.create_publisher(Diagnosis, '~/diagnosis', LATCHED)
         self._models = self.create_publisher(String, '~/model', LATCHED)
@@ -174,14 +174,10 @@ class LiveDiagnosisNode(ListeningNode):
             'proposed': int(live.proposed is not None),
         }
         for reason in sorted(self._watch.news()):
-            self.complaints.say(reason, disturbance(reason, self.joint_states.several))
-        if self.awaited:
-            return self.awaited, values
-        if not (self.freshness.stopped or self.complaints.fresh) and live.learning:
-            return 'learning the misfit of the model: the arm must be healthy', values
-        trouble = self.freshness.trouble()
-        if not (trouble or self.complaints.fresh):
-            trouble = self.stamps.of_results(self.joint_states.topic)
+            self.report(reason)
+        trouble = self.stream_trouble()
+        if live.learning and not (trouble or self.complaints.fresh):
+            trouble = 'learning the misfit of the model: the arm must be healthy'
         return trouble, values
 
     def further_statuses(self) -> Sequence[DiagnosticStatus]:
@@ -264,10 +260,10 @@ class LiveDiagnosisNode(ListeningNode):
                 message.of_effect.append(number)
         message.header.stamp = self.reader.stamp(answer.end).to_msg()
         self._diagnoses.publish(message)
-        said = f'{answer.verdict.replace("_", " ")}: {answer.summary}'
-        if answer.named != self._said:
-            self._said = answer.named
-            self.get_logger().warning(said) if answer.named else self.get_logger().info(said)
+        text = f'{answer.verdict.replace("_", " ")}: {answer.summary}'
+        if answer.named != self._logged:
+            self._logged = answer.named
+            self.get_logger().warning(text) if answer.named else self.get_logger().info(text)
 
     def _require_diagnosis(self) -> None:
         if self._require().latest is None:

@@ -144,8 +144,11 @@ class SimulatedArmNode(ArmidNode):
 
         """
         super().__init__('simulated_arm', **kwargs)
-        self._arm = arm or make_arm(self.value, self.get_logger().warn)
-        self._bare = described_arm(self.value)[0] if arm is None else None
+        self._bare: ArmModel | None = None
+        if arm is None:
+            self._bare, drives = described_arm(self.value)
+            arm = make_arm(self.value, self._bare, drives, self.get_logger().warn)
+        self._arm = arm
         self._dt_ns = round(self._arm.plant.dt * 1e9)
         self._stride = self._steps_at(self.value('rate'))
         self._follows = bool(self.value('use_sim_time'))

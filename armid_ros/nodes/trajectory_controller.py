@@ -108,8 +108,8 @@ class TrajectoryController:
         """
         self._publisher = node.create_publisher(JointTrajectory, 'joint_trajectory', STREAM)
         self.topic = str(self._publisher.topic_name)
-        beside = f'{self.topic.rpartition("/")[0]}/follow_joint_trajectory'
-        self.action = node.resolve_topic_name(node.value('action') or beside)
+        default = f'{self.topic.rpartition("/")[0]}/follow_joint_trajectory'
+        self.action = node.resolve_topic_name(node.value('action') or default)
         self.client: ActionClient | None = None
         self._node, self._on_end = node, on_end
         self._kind = node.value('interface')
@@ -289,7 +289,7 @@ class TrajectoryController:
         future = self.client.send_goal_async(
             message,
             goal_uuid=UUID(uuid=list(identifier)),
-            feedback_callback=self._guarded(lambda said: self._on_feedback(goal, said)),
+            feedback_callback=self._guarded(lambda message: self._on_feedback(goal, message)),
         )
         self._ask(future, lambda handle: self._on_answer(goal, handle))
         if before is not None:
@@ -348,8 +348,8 @@ class TrajectoryController:
             clients = node.get_client_names_and_types_by_node(name, space)
             if any(client == service for client, _ in clients):
                 found.append(f'{space.rstrip("/")}/{name}')
-        who = ', '.join(sorted(found)) or 'another client'
-        return f'the goal of {self.action} was cancelled or replaced by {who}'
+        names = ', '.join(sorted(found)) or 'another client'
+        return f'the goal of {self.action} was cancelled or replaced by {names}'
 
     def _end(self, goal: _Goal, reason: str) -> None:
         if goal is self._goal:

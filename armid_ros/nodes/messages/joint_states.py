@@ -36,7 +36,7 @@ DISTURBANCES = {
     'still reads the encoders',
 }
 #: Reasons that two publishers of the same joints can cause.
-_OF_TWO = frozenset({'out_of_order', 'stamp', 'erratic', 'jump_back', 'position_step', 'spike'})
+OF_TWO = frozenset({'out_of_order', 'stamp', 'erratic', 'jump_back', 'position_step', 'spike'})
 
 
 class JointSample(NamedTuple):
@@ -182,21 +182,3 @@ class JointStateReader:
             joint = self._joints[bad if self._merger is None else self._some[bad]]
             raise RecordingError(f"joint states where the {name} of '{joint}' is not a number")
         return values
-
-
-def disturbance(reason: str, several: str, text: str = '') -> str:
-    """
-    Return a text on faulty joint states.
-
-    Parameters
-    ----------
-    reason : str
-        A key of `DISTURBANCES`, or 'spike'.
-    several : str
-        Text that names several publishers; empty for one.
-    text : str
-        Text for a reason that is not a key.
-
-    """
-    said = text or DISTURBANCES[reason]
-    return f'{said}; {several}' if several and reason in _OF_TWO else said

@@ -9,7 +9,6 @@ from dataclasses import replace
 
 from armid_ros.arm import ArmModel
 from armid_ros.arm.model_file import load_model
-from armid_ros.effects import parse_effect
 from armid_ros.errors import RobotError
 from armid_ros.files import reading
 from armid_ros.nodes.parameters.table import NodeParameter, Values
@@ -96,7 +95,9 @@ _PER_JOINT = ('torque_noise', 'position_noise', 'velocity_noise', 'resolution')
 SENSOR_PARAMETERS = {*_PER_JOINT, 'velocity_from_encoder', 'acceleration_noise'}
 
 
-def make_arm(value: Values, warn: Callable[[str], object]) -> SimulatedArm:
+def make_arm(
+    value: Values, arm: ArmModel, drives: TwoLinkSet | None, warn: Callable[[str], object]
+) -> SimulatedArm:
     """
     Make the simulated arm that parameters describe, with elastic joints if it has any.
 
@@ -104,6 +105,8 @@ def make_arm(value: Values, warn: Callable[[str], object]) -> SimulatedArm:
     ----------
     value : callable
         Returns the value of a parameter of `ARM_PARAMETERS`.
+    arm, drives : ArmModel, and TwoLinkSet or None
+        Result of `described_arm`.
     warn : callable
         Called with texts on parts of the model that cannot be simulated.
 
@@ -113,7 +116,6 @@ def make_arm(value: Values, warn: Callable[[str], object]) -> SimulatedArm:
         If robot, model, effects or sensors are not valid or do not fit each other.
 
     """
-    arm, drives = described_arm(value)
     arm = with_effects(arm, value('effects'))
     n, dt = arm.robot.n_joints, value('time_step')
     rng = np.random.default_rng(value('seed'))
@@ -178,9 +180,8 @@ def with_effects(arm: ArmModel, texts: Iterable[str]) -> ArmModel:
         If an effect or joint does not exist.
 
     """
-    for text in filter(None, texts):
-        arm = arm.with_effect(*parse_effect(text, arm.robot))
-    return arm
+    more = ArmModel.of(arm.robot, effects=tuple(filter(None, texts)))
+    return replace(arm, effects=arm.effects + more.effects, values=arm.values + more.values)
 
 
 def described_arm(value: Values) -> tuple[ArmModel, TwoLinkSet | None]:

@@ -6,8 +6,8 @@ from __future__ import annotations
 
 from dataclasses import replace
 
+from armid_ros.api.arguments import USUAL
 from armid_ros.arm import ArmModel, load_model
-from armid_ros.effects import make_effect, USUAL_EFFECTS
 from armid_ros.errors import TrajectoryError
 from armid_ros.excitation import (
     ClearanceModel,
@@ -26,6 +26,7 @@ from armid_ros.excitation import (
     with_joint_limits,
 )
 from armid_ros.files import reading
+from armid_ros.nodes.parameters.arm import with_effects
 from armid_ros.nodes.parameters.table import NodeParameter, Values
 from armid_ros.robots import load_arms, load_robot
 import numpy as np
@@ -71,7 +72,7 @@ PUBLISHER_PARAMETERS = (
     ),
     NodeParameter(
         'effects',
-        list(USUAL_EFFECTS),
+        USUAL.split(','),
         'Effects to excite, with the rigid body.',
     ),
     NodeParameter('clearance', 0.01, 'Distance kept between bodies.', 'm', limits=(0.0, 1.0)),
@@ -269,9 +270,7 @@ def make_excitation(value: Values, rate: float, planner: TransferPlanner) -> Exc
         return checked(load_excitation(value('file')), planner, value('file'))
     arm = planner.arm
     own = {effect.name for effect in arm.effects}
-    for name in value('effects'):
-        if name not in own:
-            arm = arm.with_effect(make_effect(name, arm.robot))
+    arm = with_effects(arm, [name for name in value('effects') if name not in own])
     periods, run_in = value('n_periods'), value('run_in')
     settings = DesignSettings(
         period=whole_period(value('duration'), periods, run_in, rate),

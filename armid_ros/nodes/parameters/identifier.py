@@ -4,8 +4,8 @@
 
 from __future__ import annotations
 
+from armid_ros.api.arguments import USUAL
 from armid_ros.arm import ArmModel
-from armid_ros.effects import make_effect, USUAL_EFFECTS
 from armid_ros.identification.online.identifier import OnlineIdentifier, OnlineSettings
 from armid_ros.nodes.parameters.table import NodeParameter, Values
 from armid_ros.robots import load_robot, parse_gravity, Robot, robot_from_urdf
@@ -28,7 +28,7 @@ IDENTIFIER_PARAMETERS = (
     *ROBOT_PARAMETERS,
     NodeParameter(
         'effects',
-        list(USUAL_EFFECTS),
+        USUAL.split(','),
         'Effects to estimate with the rigid body, each as NAME[@joint+joint].',
     ),
     NodeParameter(
@@ -104,10 +104,7 @@ def make_identifier(value: Values, description: str | None = None) -> OnlineIden
         If robot, effects or settings are not valid or do not fit each other.
 
     """
-    robot = robot_of(value, description)
-    arm = ArmModel(robot)
-    for text in value('effects'):
-        arm = arm.with_effect(make_effect(text, robot))
+    arm = ArmModel.of(robot_of(value, description), effects=value('effects'))
     return OnlineIdentifier(arm, settings_of(value, arm), rng=np.random.default_rng(0))
 
 

@@ -9,7 +9,6 @@ from pathlib import Path
 
 from armid_ros.api.arguments import read_recording
 from armid_ros.arm import ArmModel, load_misfit, load_model
-from armid_ros.effects import parse_effect
 from armid_ros.errors import ModelError
 from armid_ros.nodes.live import LiveDiagnosis, LiveSettings
 from armid_ros.nodes.parameters.identifier import robot_of, ROBOT_PARAMETERS
@@ -137,8 +136,8 @@ def make_diagnosis(value: Values, description: str | None = None) -> LiveDiagnos
     else:
         assert robot is not None  # the node then waits for robot_description
         arm = ArmModel(robot)
-    for text in value('effects'):
-        effect, values = parse_effect(text, arm.robot)
+    given = ArmModel.of(arm.robot, effects=value('effects'))
+    for effect, values in zip(given.effects, given.values, strict=True):
         if effect in arm.effects:
             known = list(arm.values)
             known[arm.effects.index(effect)] = values
