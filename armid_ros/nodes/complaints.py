@@ -57,7 +57,7 @@ class Complaints:
     def defect(self, kind: str, error: Exception) -> None:
         """Count and log an input that caused an unexpected exception."""
         self.defects += 1
-        self.say(kind, f'{kind}: left out, as it cannot be used ({type(error).__name__}: {error})')
+        self.say(kind, f'{kind}: skipped, as it cannot be used ({type(error).__name__}: {error})')
         self._logger.debug(''.join(traceback.format_exception(error)))
 
     def settle(self) -> None:

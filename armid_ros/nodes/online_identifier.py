@@ -124,7 +124,7 @@ class OnlineIdentifierNode(ListeningNode):
         """Write the estimate, an arm model with it, and the robot of the model to files."""
         identifier = self._require()
         if not identifier.samples:
-            raise IdentificationError('nothing has been learned so far, so nothing is written')
+            raise IdentificationError('no sample was used so far, so that nothing is written')
         folder = Path(self.value('save_to') or _FOLDER).expanduser()
         refuse_replacing(folder, FILES)
         robot, estimate = identifier.arm.robot, identifier.estimate()
@@ -191,7 +191,9 @@ class OnlineIdentifierNode(ListeningNode):
         for reason in news.keys() & DISTURBANCES.keys():
             self.report(reason)
         for joint, signal in identifier.spikes if news['spike'] else ():
-            self.report('spike', f"the {signal} of '{joint}' jumps for single samples: left out")
+            self.report(
+                'spike', f"the {signal} of '{joint}' jumps for single samples, which are skipped"
+            )
         self._disturbed = counted
         self._begin_statistics()
         trouble = self.stream_trouble()
@@ -211,12 +213,12 @@ class OnlineIdentifierNode(ListeningNode):
             return ()
         common = {'level': DiagnosticStatus.OK, 'hardware_id': self.hardware}
         learned = DiagnosticStatus(name=f'{prefix}: parameters', **common)
-        learned.message = 'nothing learned so far'
+        learned.message = 'no sample was used so far'
         if identifier.samples:
             learned.message = 'value, lower and upper end of the 95 % interval'
             learned.values = key_values(estimate_values(identifier.estimate()))
         changed = DiagnosticStatus(name=f'{prefix}: changes', **common)
-        changed.message = 'no change seen'
+        changed.message = 'no change was detected'
         values: dict[str, object] = {'changes': len(identifier.changes)}
         if identifier.changes:
             latest = identifier.changes[-1]
