@@ -137,8 +137,8 @@ class BagPlayerNode(ArmidNode):
         NodeParameter(
             'subscriber_timeout',
             2.0,
-            'How long to wait for every topic to have a subscriber, and to hear of the arm that '
-            'is to follow a trajectory.',
+            'How long to wait for a subscriber of every topic, and for joint states of the arm '
+            'that follows a trajectory.',
             's',
             limits=(0.0, 3600.0),
             read_only=False,

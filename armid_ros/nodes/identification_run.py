@@ -22,7 +22,6 @@ from armid_ros.nodes.base import ArmidNode
 from armid_ros.nodes.parameters.table import NodeParameter
 from armid_ros.nodes.running.process import run
 from diagnostic_msgs.msg import DiagnosticArray
-from rclpy.client import Client
 from rclpy.task import Future
 from std_srvs.srv import Trigger
 
@@ -119,9 +118,12 @@ class IdentificationRunNode(ArmidNode):
         self._failure = self._refused = ''
         self._results: list[str] = []
         self._state: dict[str, str] = {}
-        self._trigger_clients: dict[str, Client] = {}
-        self._full = {
-            name: self.resolve_topic_name(self.value(name)) for name in ('publisher', 'recorder')
+        services = {'publisher': ('start', 'rehearse', 'stop'), 'recorder': ('start', 'stop')}
+        self._full = {node: self.resolve_topic_name(self.value(node)) for node in services}
+        self._callers = {
+            (node, service): self.create_client(Trigger, f'{self._full[node]}/{service}')
+            for node, names in services.items()
+            for service in names
         }
         self.create_subscription(DiagnosticArray, '/diagnostics', self._on_diagnostics, 100)
         self._script = self._steps()
@@ -178,7 +180,7 @@ class IdentificationRunNode(ArmidNode):
     def _stop_all(self) -> None:
         """Stop the run and the recording that this node began, the arm first."""
         for node in sorted(self._begun):
-            if self._client(node, 'stop').service_is_ready():
+            if self._callers[node, 'stop'].service_is_ready():
                 self._stops.append(self._call(node, 'stop'))
         self._begun = []
 
@@ -283,17 +285,11 @@ class IdentificationRunNode(ArmidNode):
         return [
             name
             for node, name in self._full.items()
-            if not self._client(node, 'start').service_is_ready()
+            if not self._callers[node, 'start'].service_is_ready()
         ]
 
-    def _client(self, node: str, service: str) -> Client:
-        name = f'{self._full[node]}/{service}'
-        if name not in self._trigger_clients:
-            self._trigger_clients[name] = self.create_client(Trigger, name)
-        return self._trigger_clients[name]
-
-    def _call(self, node: str, service: str) -> Any:
-        return self._client(node, service).call_async(Trigger.Request())
+    def _call(self, node: str, service: str) -> Future:
+        return self._callers[node, service].call_async(Trigger.Request())
 
     def _on_diagnostics(self, message: DiagnosticArray) -> None:
         wanted = f'{self._full["publisher"][1:]}: state'

@@ -74,8 +74,8 @@ class JointStateMergerNode(ArmidNode):
         NodeParameter(
             'gains',
             [1.0],
-            'Torque per unit of what comes, N m/A for currents: one for all joints, or one a '
-            'joint; negative where the sign is the opposite.',
+            'Torque per unit of the received values, N m/A for currents: one for all joints, or '
+            'one per joint; negative for an opposite sign.',
         ),
     )
 

@@ -18,7 +18,7 @@ from armid_ros.files.output import refuse_replacing
 from armid_ros.nodes.base import key_values
 from armid_ros.nodes.listening import ListeningNode
 from armid_ros.nodes.live import Answer, Assistant, LiveDiagnosis, StreamWatch
-from armid_ros.nodes.live.assistant import Helper, Plan, Save
+from armid_ros.nodes.live.assistant import Plan, Save
 from armid_ros.nodes.messages.joint_states import JointSample
 from armid_ros.nodes.parameters.live import (
     LIVE_PARAMETERS,
@@ -57,7 +57,7 @@ class LiveDiagnosisNode(ListeningNode):
     table = LIVE_PARAMETERS
 
     def __init__(
-        self, live: LiveDiagnosis | None = None, helper: Helper | None = None, **kwargs: Any
+        self, live: LiveDiagnosis | None = None, helper: Assistant | None = None, **kwargs: Any
     ) -> None:
         """
         Make the node.
@@ -66,7 +66,7 @@ class LiveDiagnosisNode(ListeningNode):
         ----------
         live : LiveDiagnosis, optional
             Schedules the diagnoses; by default made from the parameters, once the robot is known.
-        helper : Helper, optional
+        helper : Assistant, optional
             Computes the diagnoses; by default in a separate process.
         **kwargs
             Keyword arguments of rclpy's Node.

@@ -85,8 +85,6 @@ class OnlineIdentifierNode(ListeningNode):
         super().__init__('online_identifier', **kwargs)
         self.identifier: OnlineIdentifier | None = None
         self.update_times: deque[float] = deque(maxlen=2000)
-        self._published = -1
-        self._disturbed: Counter[str] = Counter()
         if self.value('save_to'):  # check before the identification, not at its end
             refuse_replacing(Path(self.value('save_to')).expanduser(), FILES)
         if identifier is None and self.value('robot'):
@@ -112,12 +110,9 @@ class OnlineIdentifierNode(ListeningNode):
 
     def reset(self) -> str:
         """Delete the estimate, and start again."""
-        self._require().reset()
-        self._progress.reset()
-        self._disturbed.clear()
-        self._published = -1
-        self._told = 0
-        self._begin_statistics()
+        identifier = self._require()
+        identifier.reset()
+        self._adopt(identifier)
         return 'the estimate begins anew'
 
     def save(self) -> str:
@@ -317,8 +312,8 @@ class OnlineIdentifierNode(ListeningNode):
         self.adopt(robot)
         self.identifier = identifier
         self._names = list(robot.joints)
-        self._last_sample = 0.0
-        self._told = len(identifier.changes)
+        self._last_sample, self._published, self._told = 0.0, -1, len(identifier.changes)
+        self._disturbed: Counter[str] = Counter()
         self._progress = LearningProgress(
             identifier.arm, identifier.base, np.random.default_rng(0)
         )

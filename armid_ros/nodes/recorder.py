@@ -44,8 +44,8 @@ class RecorderNode(ArmidNode):
         NodeParameter(
             'bag',
             '',
-            'Directory to write; empty: armid_<date>_<time> in the current directory. Set while '
-            'a bag is open, it is of the next one.',
+            'Directory to write; empty: armid_<date>_<time> in the current directory. A '
+            'name set while a bag is open applies to the next bag.',
             read_only=False,
         ),
         NodeParameter(

@@ -10,7 +10,7 @@ import select
 import time
 
 from armid_ros.excitation.schedule import read_excitation
-from armid_ros.nodes.live import Answer, Assistant, DiagnosisRequest, InProcess
+from armid_ros.nodes.live import Answer, Assistant, DiagnosisRequest, Worker
 from armid_ros.nodes.live.assistant import Plan, Save
 
 #: Only reached when something is broken.
@@ -51,10 +51,8 @@ def test_a_process_of_its_own_answers_as_this_one_does(asked, answered, tmp_path
 
 
 def test_nothing_can_be_written_or_planned_before_a_diagnosis(tmp_path):
-    here = InProcess()
     for job in (Save(tmp_path), Plan()):
-        here.ask(job)
-        done = here.poll()
+        done = Worker().run(job)
         assert not done.success and done.text
 
 
@@ -75,10 +73,9 @@ def test_the_process_survives_a_job_that_fails_is_replaced_and_ends_with_its_own
 
 
 def test_a_plan_is_a_motion_that_can_be_read(answered):
-    here, answer = answered
+    worker, answer = answered
     if not any(f.rivals for f in answer.findings):
-        here.ask(Plan())
-        done = here.poll()
+        done = worker.run(Plan())
         assert done.excitation or 'ambiguous' in done.text
         if done.excitation:
             assert read_excitation(done.excitation, 'plan').duration > 0.0

@@ -11,7 +11,7 @@ from armid_ros.arm import ArmModel
 from armid_ros.arm.model_file import model_text, read_model
 from armid_ros.effects import parse_effect
 from armid_ros.motion import Motion
-from armid_ros.nodes.live import InProcess, LiveDiagnosis, LiveSettings
+from armid_ros.nodes.live import LiveDiagnosis, LiveSettings
 from armid_ros.nodes.live.assistant import Plan, Save
 from armid_ros.nodes.live_diagnosis import LiveDiagnosisNode
 from armid_ros.nodes.qos import LATCHED
@@ -25,7 +25,7 @@ from sensor_msgs.msg import JointState
 from std_msgs.msg import String
 from trajectory_msgs.msg import JointTrajectory
 
-from tests.live.conftest import KNOWN, MORE_FRICTION, moving
+from tests.live.conftest import InProcess, KNOWN, MORE_FRICTION, moving
 from tests.ros.controller import joint_state
 from tests.ros.test_simulated_arm import still_arm
 

@@ -52,8 +52,9 @@ def test_a_wrong_override_is_refused_with_what_to_write(bench, name, value, advi
     assert '\n' not in str(error.value)
 
 
-def test_an_integer_is_taken_for_a_float(bench):
-    node = bench.add(Declared, rate=50, gains=[2])
+def test_an_integer_is_taken_for_a_float_and_one_value_for_a_list(bench):
+    node = bench.add(Declared, rate=50, gains=2, names='a')
+    assert node.value('names') == ('a',)
     assert (node.value('rate'), list(node.value('gains'))) == (50.0, [2.0])
     assert node.set_parameters([Parameter('rate', value=60)])[0].successful
     assert node.value('rate') == 60.0

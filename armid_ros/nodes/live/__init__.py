@@ -2,7 +2,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """Diagnosis of an arm while it moves, without ROS."""
 
-from armid_ros.nodes.live.assistant import Assistant, InProcess
+from armid_ros.nodes.live.assistant import Assistant, Worker
 from armid_ros.nodes.live.request import Answer, DiagnosisRequest, LiveSettings
 from armid_ros.nodes.live.schedule import LiveDiagnosis
 from armid_ros.nodes.live.stream_watch import StreamWatch
@@ -11,10 +11,10 @@ from armid_ros.nodes.live.window import SampleWindow
 __all__ = [
     'Answer',
     'Assistant',
-    'InProcess',
     'LiveDiagnosis',
     'LiveSettings',
     'DiagnosisRequest',
     'SampleWindow',
     'StreamWatch',
+    'Worker',
 ]

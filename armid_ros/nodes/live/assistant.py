@@ -81,51 +81,35 @@ Job = DiagnosisRequest | Save | Plan
 Result = Answer | Done
 
 
-class InProcess:
-    """Computes diagnoses at once, in the calling process."""
+class Worker:
+    """Runs jobs, and keeps the last diagnosis for later jobs."""
 
     def __init__(self) -> None:
         self._last: tuple[DiagnosisRequest, Diagnosis] | None = None
-        self._results: list[Result] = []
 
-    @property
-    def busy(self) -> bool:
-        """Return whether a result is available."""
-        return bool(self._results)
-
-    def ask(self, job: Job) -> None:
-        """Run a job."""
+    def run(self, job: Job) -> Result:
+        """Run a job; an error of the data or the disk is a result without success."""
         try:
-            self._results.append(self._done(job))
+            if isinstance(job, DiagnosisRequest):
+                found, diagnosis = answer(job)
+                if diagnosis is not None:
+                    self._last = job, diagnosis
+                return found
+            if self._last is None:
+                raise IdentificationError('nothing has been diagnosed so far')
+            request, diagnosis = self._last
+            if isinstance(job, Save):
+                result = DiagnosisResult(diagnosis, request.arm, (request.window,), ())
+                return Done(f'wrote {", ".join(Save.FILES)} to {result.save(job.folder)}')
+            run = next_run(diagnosis, np.random.default_rng(job.seed))
+            if run is None:
+                return Done('no candidates are ambiguous: no motion is needed', success=False)
+            return Done(run.sentence, excitation=excitation_text(run.excitation))
         except ArmidError as error:
-            self._results.append(Done(str(error), success=False))
+            return Done(str(error), success=False)
         except OSError as error:
             text = f'{error.filename}: cannot be written: {error.strerror}'
-            self._results.append(Done(text, success=False))
-
-    def poll(self) -> Result | None:
-        """Return and remove the first result; None without one."""
-        return self._results.pop(0) if self._results else None
-
-    def close(self) -> None:
-        """Do nothing: there is no process."""
-
-    def _done(self, job: Job) -> Result:
-        if isinstance(job, DiagnosisRequest):
-            found, diagnosis = answer(job)
-            if diagnosis is not None:
-                self._last = job, diagnosis
-            return found
-        if self._last is None:
-            raise IdentificationError('nothing has been diagnosed so far')
-        request, diagnosis = self._last
-        if isinstance(job, Save):
-            result = DiagnosisResult(diagnosis, request.arm, (request.window,), ())
-            return Done(f'wrote {", ".join(Save.FILES)} to {result.save(job.folder)}')
-        run = next_run(diagnosis, np.random.default_rng(job.seed))
-        if run is None:
-            return Done('no candidates are ambiguous: no motion is needed', success=False)
-        return Done(run.sentence, excitation=excitation_text(run.excitation))
+            return Done(text, success=False)
 
 
 class Assistant:
@@ -210,20 +194,15 @@ class Assistant:
             )
 
 
-#: Runs jobs one at a time.
-Helper = Assistant | InProcess
-
-
 def main(fd: int) -> None:
     """Run jobs from a socket until its other end is closed."""
     os.nice(10)  # lower priority than the nodes
-    helper = InProcess()
+    worker = Worker()
     with suppress(EOFError, OSError), Connection(fd) as pipe:
         while True:
             job = pipe.recv()
             try:
-                helper.ask(job)
-                result = helper.poll()
+                result = worker.run(job)
             except (
                 Exception
             ) as error:  # an unexpected error of one window must not end the process

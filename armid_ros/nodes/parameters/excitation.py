@@ -53,8 +53,8 @@ PUBLISHER_PARAMETERS = (
     NodeParameter(
         'file',
         '',
-        'Excitation to use (.yaml); empty: design one. Set on the running node it is what '
-        '~/start runs next.',
+        'Excitation to use (.yaml); empty: design one. A file set at run time is run by '
+        'the next ~/start.',
         read_only=False,
     ),
     NodeParameter(
@@ -79,14 +79,14 @@ PUBLISHER_PARAMETERS = (
     NodeParameter(
         'floor',
         '',
-        'Height of the floor above the origin of the base [m], or none; empty: what is shipped '
+        'Height of the floor above the origin of the base [m], or none; empty: the height shipped '
         'with the robot, or the base plane of an arm that stands.',
     ),
     NodeParameter(
         'environment',
         '',
-        'YAML with what stands around the arm, or a planning scene of MoveIt, as ros2 topic '
-        'echo prints it; empty: nothing.',
+        'YAML of the obstacles around the arm, or a planning scene of MoveIt, as ros2 topic '
+        'echo prints it; empty: none.',
     ),
     NodeParameter(
         'design_time', 20.0, 'Limit of processor time of the search.', 's', limits=(1.0, 86400.0)
@@ -101,8 +101,8 @@ PUBLISHER_PARAMETERS = (
         'interface',
         'auto',
         'How trajectories are sent. action: as goals, which needs the package control_msgs. '
-        'topic: no controller answers. auto: by the action where there is one when the run '
-        'begins.',
+        'topic: as messages, which no controller answers. auto: by the action if a controller '
+        'offers it when the run begins.',
         choices=('auto', 'topic', 'action'),
     ),
     NodeParameter(
@@ -114,8 +114,8 @@ PUBLISHER_PARAMETERS = (
     NodeParameter(
         'goal_tolerance',
         0.0,
-        'How far a joint may be from the end for the goal to be reached; 0: what the controller '
-        'has. On the way the controller gets tracking_tolerance.',
+        'Largest distance of a joint from the end of a goal that is reached; 0: default of the '
+        'controller. Its path tolerance is tracking_tolerance.',
         'rad or m',
         limits=(0.0, 10.0),
         read_only=False,
@@ -155,8 +155,8 @@ PUBLISHER_PARAMETERS = (
     NodeParameter(
         'zero_stamp',
         False,
-        'Stamp the run with zero, which a controller takes for now: where the clocks of this '
-        'computer and of the robot differ. Stops are always stamped with zero.',
+        'Stamp the run with zero, so that the controller begins at once: for clocks of this '
+        'computer and of the robot that differ. Stops are always stamped with zero.',
     ),
     NodeParameter(
         'stopping',

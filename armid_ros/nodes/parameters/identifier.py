@@ -71,7 +71,7 @@ IDENTIFIER_PARAMETERS = (
     NodeParameter(
         'false_alarm_time',
         360000.0,
-        'Mean time between false reports of a change; 0: changes are not looked for.',
+        'Mean time between false reports of a change; 0: no search for changes.',
         's',
         limits=(0.0, 1e9),
         read_only=False,

@@ -80,9 +80,9 @@ LIVE_PARAMETERS = (
     NodeParameter(
         'learning',
         20.0,
-        'Motion at the beginning in which nothing is wrong. It gives the misfit of the model '
-        'where neither a baseline nor the model file does. 0: find all that the model lacks, not '
-        'changes alone.',
+        'Motion of the healthy arm at the beginning. The misfit of the model is computed from it '
+        'if neither a baseline nor the model file gives it. 0: diagnose all deviations from the '
+        'model, not only changes.',
         's',
         limits=(0.0, 600.0),
     ),

@@ -82,7 +82,9 @@ class NodeParameter:
 
     def converted(self, value: Any) -> Value:
         """
-        Return a value with the type of the parameter: an integer as a float, [] as no names.
+        Return a value with the type of the parameter.
+
+        An integer is accepted for a float, one value for a list of one, and [] for no names.
 
         Raises
         ------
@@ -92,11 +94,12 @@ class NodeParameter:
         """
         default, several = self.default, isinstance(self.default, list)
         kind = type(default[0] if isinstance(default, list) else default)
-        if several and kind is str and (value is None or len(value) == 0):
+        one = not several or isinstance(value, str | float | int)
+        items = [value] if one else list(value or ())
+        if kind is str and not items:
             return ['']
-        items = list(value or ()) if several and not isinstance(value, str | float) else [value]
-        items = [float(one) if kind is float and type(one) is int else one for one in items]
-        if items and all(type(one) is kind for one in items):
+        items = [float(item) if kind is float and type(item) is int else item for item in items]
+        if items and all(type(item) is kind for item in items):
             typed: Value = items if several else items[0]
             return typed
         instead = f'use a value such as {str(default).lower() if kind is bool else default}'
