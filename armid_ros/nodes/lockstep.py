@@ -125,9 +125,9 @@ def run_lockstep(
 
     """
     with Stage() as stage:
-        learner = None if identifier is None else stage.add(OnlineIdentifierNode, identifier)
+        learners = [] if identifier is None else [stage.add(OnlineIdentifierNode, identifier)]
         topics = ['joint_states', 'robot_description', 'joint_trajectory']
-        topics += [] if learner is None else ['online_identifier/estimate']
+        topics += ['online_identifier/estimate'] * len(learners)
         recorder = stage.add(RecorderNode, bag=str(bag), topics=topics)
         plant = stage.add(
             SimulatedArmNode, arm, EPOCH_NS, rate=rate, real_time_factor=0.0, use_sim_time=False
@@ -137,7 +137,7 @@ def run_lockstep(
         publisher = stage.add(
             ExcitationPublisherNode, excitation, planner, start=False, approach=approach
         )
-        listeners = [recorder, publisher, *([] if learner is None else [learner])]
+        listeners = [recorder, publisher, *learners]
         topic = plant.resolve_topic_name('joint_states')
 
         def connected() -> bool:
@@ -145,7 +145,7 @@ def run_lockstep(
             plant.publish_clock()
             return (
                 not recorder.missing
-                and (learner is None or _matched(learner))
+                and all(map(_matched, learners))
                 and plant.readers >= len(listeners)
                 and publisher.readers >= 1
                 and all(node.get_clock().now().nanoseconds for node in listeners)
@@ -153,13 +153,12 @@ def run_lockstep(
 
         def step() -> int:
             stamp = plant.step()
-            stage.spin_until(
-                lambda: (
-                    recorder.last_stamps.get(topic) == stamp
-                    and (learner is None or learner.last_stamp_ns == stamp)
-                ),
-                topic,
-            )
+
+            def arrived() -> bool:
+                learned = all(learner.last_stamp_ns == stamp for learner in learners)
+                return learned and recorder.last_stamps.get(topic) == stamp
+
+            stage.spin_until(arrived, topic)
             if plant.complaints.counts:
                 raise ArmidError(plant.complaints.latest)
             return stamp

@@ -150,6 +150,7 @@ class SimulatedArmNode(ArmidNode):
             arm = make_arm(self.value, self._bare, drives, self.get_logger().warn)
         self._arm = arm
         self._dt_ns = round(self._arm.plant.dt * 1e9)
+        self._stride = self._steps_at(self.value('rate'))  # refused before publishers are made
         self._follows = bool(self.value('use_sim_time'))
         self._origin_ns = start_ns
         if start_ns is None and not self._follows:
@@ -303,7 +304,7 @@ class SimulatedArmNode(ArmidNode):
             self.real_time.given_up = 0.0
             self._keep_pace()
         described = sensors_of(self.value, self._arm.joints)
-        known = {name: getattr(described, name) for name in names & SENSOR_PARAMETERS}
+        known = {name: getattr(described, name) for name in names & set(SENSOR_PARAMETERS)}
         self._arm.sensors = replace(self._arm.sensors, **known)
 
     def _with_effects(self, texts: Sequence[str]) -> ArmModel:

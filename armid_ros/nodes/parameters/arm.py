@@ -15,7 +15,7 @@ from armid_ros.nodes.parameters.table import NodeParameter, Values
 from armid_ros.recording.columns import numbers, per_joint
 from armid_ros.robots import load_robot, parse_gravity
 from armid_ros.robots.two_link import TwoLinkSet
-from armid_ros.simulation import ComputedTorque, GravityPD, Plant, Sensors, SimulatedArm
+from armid_ros.simulation import Plant, Sensors, SimulatedArm
 from armid_ros.simulation.elastic import (
     elastic_joints,
     make_elastic_arm,
@@ -45,12 +45,6 @@ ARM_PARAMETERS = (
         '',
         'Initial position, as q1,q2,...; empty: middle of the position limits [rad or m].',
     ),
-    NodeParameter(
-        'controller',
-        'computed_torque',
-        'Controller of an arm with rigid joints.',
-        choices=('computed_torque', 'gravity_pd'),
-    ),
     *(
         NodeParameter(
             name, [0.0], f'{what}, one or one per joint; 0: none.', unit, read_only=False
@@ -63,21 +57,7 @@ ARM_PARAMETERS = (
         )
     ),
     NodeParameter(
-        'velocity_from_encoder',
-        False,
-        'Compute the velocity by differentiating positions.',
-        read_only=False,
-    ),
-    NodeParameter(
         'torque_delay', 0, 'Delay of the torque measurement in time steps.', limits=(0, 100000)
-    ),
-    NodeParameter(
-        'acceleration_noise',
-        0.0,
-        'Standard deviation; of links on springs.',
-        'm/s^2',
-        limits=(0.0, 1000.0),
-        read_only=False,
     ),
     NodeParameter(
         'loop_gain',
@@ -90,9 +70,8 @@ ARM_PARAMETERS = (
 )
 
 
-_PER_JOINT = ('torque_noise', 'position_noise', 'velocity_noise', 'resolution')
-#: Parameters of the sensors that can be set while the arm moves.
-SENSOR_PARAMETERS = {*_PER_JOINT, 'velocity_from_encoder', 'acceleration_noise'}
+#: Parameters of the sensors that can be set while the arm moves, one number or one per joint.
+SENSOR_PARAMETERS = ('torque_noise', 'position_noise', 'velocity_noise', 'resolution')
 
 
 def make_arm(
@@ -137,12 +116,7 @@ def make_arm(
             sensors=sensors,
             start=start or None,
         )
-    plant = Plant(arm, dt=dt)
-    controllers = {'computed_torque': ComputedTorque, 'gravity_pd': GravityPD}
-    controller = controllers[value('controller')](plant.arm)
-    return SimulatedArm(
-        plant, rng=rng, controller=controller, sensors=sensors, start=start or None
-    )
+    return SimulatedArm(Plant(arm, dt=dt), rng=rng, sensors=sensors, start=start or None)
 
 
 def sensors_of(value: Values, joints: Sequence[str]) -> Sensors:
@@ -156,10 +130,11 @@ def sensors_of(value: Values, joints: Sequence[str]) -> Sensors:
 
     """
     return Sensors(
-        **{name: per_joint(value(name), joints, f"parameter '{name}'") for name in _PER_JOINT},
-        velocity_from_encoder=value('velocity_from_encoder'),
+        **{
+            name: per_joint(value(name), joints, f"parameter '{name}'")
+            for name in SENSOR_PARAMETERS
+        },
         torque_delay=value('torque_delay'),
-        acceleration_noise=value('acceleration_noise'),
     )
 
 

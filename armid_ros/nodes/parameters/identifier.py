@@ -39,13 +39,6 @@ IDENTIFIER_PARAMETERS = (
         limits=(0.01, 1000.0),
     ),
     NodeParameter(
-        'row_rate',
-        0.0,
-        'Samples used per second; 0 for 40 times the cut-off.',
-        'Hz',
-        limits=(0.0, 10000.0),
-    ),
-    NodeParameter(
         'forgetting',
         1.0,
         'Forgetting factor per used sample; 1: no forgetting.',
@@ -115,7 +108,6 @@ def settings_of(value: Values, arm: ArmModel) -> OnlineSettings:
         noise = noise * arm.robot.n_joints
     return OnlineSettings(
         cutoff=value('cutoff'),
-        row_rate=value('row_rate') or None,
         forgetting=value('forgetting'),
         torque_noise=noise if any(noise) else None,
         max_gap=value('max_gap'),
