@@ -10,11 +10,9 @@ from setuptools import Extension, find_packages, setup
 HERE = Path(__file__).resolve().parent  # `colcon build --symlink-install` runs a link to this file
 NAME = 'armid_ros'
 PLUG_INS = (
-    *(Path(NAME, room) for room in ('controllers', 'fleet', 'positions', 'view', 'zero')),
+    *(Path(NAME, room) for room in ('fleet', 'positions', 'view', 'zero')),
     *sorted(Path(NAME, 'papers').glob('*/')),
 )
-#: Commands that are not called like the folder of their plug-in.
-COMMANDS = {'controllers': 'export'}
 NODES = sorted(path.name for path in (HERE / 'scripts').iterdir() if path.name != 'armid')
 
 
@@ -36,8 +34,7 @@ def package_data():
 def commands():
     """List the command of every plug-in that is there, in its command.py."""
     found = [path for path in PLUG_INS if (path / 'command.py').is_file()]
-    names = {path: COMMANDS.get(path.name, path.name) for path in found}
-    return [f'{name} = {".".join(path.parts)}.command:{name}' for path, name in names.items()]
+    return [f'{path.name} = {".".join(path.parts)}.command:{path.name}' for path in found]
 
 
 def nodes():

@@ -27,9 +27,9 @@ import time
 
 from armid_ros.arm import ArmModel
 from armid_ros.effects import CATALOGUE, parse_effect
-from armid_ros.live import InProcess, LiveDiagnosis, LiveSettings
-from armid_ros.live.assistant import Job, Result
 from armid_ros.motion import Motion
+from armid_ros.nodes.live import LiveDiagnosis, LiveSettings, Worker
+from armid_ros.nodes.live.assistant import Job, Result
 from armid_ros.nodes.live_diagnosis import LiveDiagnosisNode
 from armid_ros.nodes.lockstep import EPOCH_NS, Stage
 from armid_ros.nodes.simulated_arm import SimulatedArmNode
@@ -81,7 +81,7 @@ class Draw:
     right: bool
 
 
-class Unhurried(InProcess):
+class Unhurried:
     """
     Diagnoses in this process, whose answers are delayed by their processor time.
 
@@ -93,18 +93,29 @@ class Unhurried(InProcess):
     """
 
     def __init__(self) -> None:
-        super().__init__()
+        self._worker, self._result = Worker(), None
         self._due = self.now = 0.0
+
+    @property
+    def busy(self) -> bool:
+        """Return whether an answer was not taken so far."""
+        return self._result is not None
 
     def ask(self, job: Job) -> None:
         """Run a diagnosis, and set the time of its answer."""
         begun = time.process_time()
-        super().ask(job)
+        self._result = self._worker.run(job)
         self._due = self.now + time.process_time() - begun
 
     def poll(self) -> Result | None:
         """Return the answer once its time has come; None before."""
-        return super().poll() if self.now >= self._due else None
+        if self.now < self._due:
+            return None
+        result, self._result = self._result, None
+        return result
+
+    def close(self) -> None:
+        """Do nothing: there is no process."""
 
 
 def known_arm() -> ArmModel:
@@ -184,7 +195,7 @@ class Bench:
     @property
     def proposed(self) -> list[list[str]]:
         """Effects that the node proposes, with their joints."""
-        return [[name, *joints] for name, joints in self.live.belief.named]
+        return [[name, *joints] for name, joints in self.live.named]
 
 
 def draw(number: int, seed: int) -> Draw:

@@ -19,8 +19,8 @@ from tempfile import TemporaryDirectory
 import textwrap
 
 import armid_ros as ar
-from armid_ros.live.belief import LiveDiagnosis, LiveSettings
-from armid_ros.live.request import answer
+from armid_ros.nodes.live import LiveDiagnosis, LiveSettings
+from armid_ros.nodes.live.request import answer
 from armid_ros.papers.elastic.identification.interaction import ideal_response
 from armid_ros.papers.elastic.identification.three_steps import identify_two_inertia
 from armid_ros.papers.elastic.plant import EXCITATION_RMS, resonance_experiments, run_elastic, WEAK
@@ -389,16 +389,18 @@ def live() -> Figure:
                 stream.take(answers[-1])
     answers = [one for one in answers if one.gap]
     ends = [one.end for one in answers]
-    rows = [next(row for row in one.gap if row.joint == 'elbow') for one in answers]
+    elbow = arm.robot.index('elbow')
+    before = [one.gap.before[elbow] for one in answers]
+    after = [one.gap.after[elbow] for one in answers]
     figure = Figure(figsize=(WIDTH, 2.6), layout='constrained')
     axes = figure.subplots()
-    axes.plot(ends, [row.before for row in rows], 'o-', color=ORANGE, label='model as given')
-    axes.plot(ends, [row.after for row in rows], 'o-', color=BLUE, label='with what is named')
+    axes.plot(ends, before, 'o-', color=ORANGE, label='model as given')
+    axes.plot(ends, after, 'o-', color=BLUE, label='with what is named')
     axes.axvline(came, color=GREY, lw=1)
     axes.annotate('spring added', (came, axes.get_ylim()[1]), (4, -8), **TEXT)
-    for one, row in zip(answers, rows, strict=True):
+    for one, height in zip(answers, before, strict=True):
         name = one.named[0][0].replace('_', ' ') if one.named else one.verdict
-        axes.annotate(name, (one.end, row.before), (0, 9), ha='center', **TEXT)
+        axes.annotate(name, (one.end, height), (0, 9), ha='center', **TEXT)
     axes.set(xlabel='end of the window [s]', ylabel='error of elbow [N m]')
     axes.margins(0.08, 0.2)
     axes.legend(frameon=False, loc='center right')

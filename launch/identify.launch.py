@@ -10,14 +10,7 @@ controller and joint states are there. `simulate:=true` tries it on a simulated 
 
 from pathlib import Path
 
-from armid_ros.nodes.running.launching import (
-    Argument,
-    described,
-    full_name,
-    node,
-    parameters_named,
-    SIMULATED_DRIVES,
-)
+from armid_ros.nodes.running.launching import Argument, described, node, SIMULATED_DRIVES
 from launch.actions import Shutdown
 
 ARGUMENTS = (
@@ -63,10 +56,9 @@ def start(given):
 
     simulate = given.get('simulate', False)
     shipped = '' if simulate else str(Path(__file__).parents[1] / 'config' / 'real_robot.yaml')
-    if not simulate and 'robot' not in given:
-        publisher = full_name(given, 'excitation_publisher')
-        if 'robot' not in parameters_named(given.get('params_file', shipped), publisher):
-            raise RuntimeError('robot is missing: give robot:=URDF, or a params_file with robot')
+    if not simulate and not {'robot', 'params_file'} & given.keys():
+        raise RuntimeError('robot is missing: give robot:=URDF, or a params_file with robot')
+    unnamed = {} if simulate else {'robot': ''}  # no robot, rather than the default one
     topics = some('joint_states', 'robot_description')
     own, simulation = dict(topics), {'simulation': True} if simulate else {}
     if 'effort_topic' in given:
@@ -84,10 +76,10 @@ def start(given):
     excitation = arm | effects | design | simulation
     chosen = arm | effects | steps | (run if saved else {})
     nodes = [
-        one('excitation_publisher', excitation, {'start': False}, topics),
+        one('excitation_publisher', excitation, {'start': False} | unnamed, topics),
         one('online_identifier', arm | effects | (live if saved else {}), live, topics),
         one('recorder', bag if saved else {}, bag | recorded),
-        one('identification_run', chosen, run, on_exit=Shutdown()),
+        one('identification_run', chosen, run | unnamed, on_exit=Shutdown()),
     ]
     if 'effort_topic' in given:
         nodes.append(one('joint_state_merger', some('effort_topic', 'joints'), {}, own))

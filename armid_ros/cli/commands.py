@@ -40,6 +40,7 @@ COMMANDS = {
     'layout': 'layout',
     'robots': 'catalogues',
     'effects': 'catalogues',
+    'export': 'export.command',
 }
 
 

@@ -292,7 +292,12 @@ class Ending:
                 # tolerance
                 motion = self.gate.hold(set_point, speed, measured, 3.0 * tolerance)
             except TrajectoryError as error:
-                return ending, None, f'{self.reason}; the set point stays where it is: {error}'
+                return (
+                    ending,
+                    None,
+                    f'{self.reason}; the set point stays where it is: {error}; if the arm is '
+                    'pushed, use the emergency stop',
+                )
             return replace(ending, last=motion, sent=now), motion, ''
         lasts = 0.0 if self.last is None else float(self.last.t[-1])
         moving = monitor.unsteady(_REST, 2)

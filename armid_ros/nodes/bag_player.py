@@ -47,7 +47,7 @@ class _JumpGuard:
         )
 
     @property
-    def hears(self) -> bool:
+    def has_state(self) -> bool:
         """Return whether a joint state was received."""
         return bool(self._latest)
 
@@ -124,9 +124,6 @@ class BagPlayerNode(ArmidNode):
             'loop', False, 'Play again from the beginning at the end of the bag.', read_only=False
         ),
         NodeParameter(
-            'start_offset', 0.0, 'Bag time to skip at the beginning.', 's', limits=(0.0, 1e9)
-        ),
-        NodeParameter(
             'clock_rate',
             0.0,
             'Rate at which bag time is published on /clock; 0: never.',
@@ -137,8 +134,8 @@ class BagPlayerNode(ArmidNode):
         NodeParameter(
             'subscriber_timeout',
             2.0,
-            'How long to wait for every topic to have a subscriber, and to hear of the arm that '
-            'is to follow a trajectory.',
+            'How long to wait for a subscriber of every topic, and for joint states of the arm '
+            'that follows a trajectory.',
             's',
             limits=(0.0, 3600.0),
             read_only=False,
@@ -185,12 +182,10 @@ class BagPlayerNode(ArmidNode):
         self._next: RawMessage | None = None
         self._take()
         self._first = self._next.log_time_ns if self._next else 0
-        self._begin = self._first + int(self.value('start_offset') * 1e9)
-        self._position = self._begin
+        self._position = self._clock_due = self._first
         self._anchor: int | None = None
         self._made = time.monotonic()
         self.published: Counter[str] = Counter()
-        self._clock_due = self._begin
         self._clock_publisher: Publisher | None = None
         self._keep_clock()
         pace = self.get_clock() if self._lock_step else Clock(clock_type=ClockType.STEADY_TIME)
@@ -237,7 +232,7 @@ class BagPlayerNode(ArmidNode):
             if self._next is None and self.value('loop'):
                 self._messages = self._from_start()
                 self._next = next(self._messages, None)
-                self._position = self._clock_due = self._begin
+                self._position = self._clock_due = self._first
         if self._clock_publisher is not None and self._clock_period:
             if self._position >= self._clock_due:
                 stamp = Time(nanoseconds=self._position).to_msg()
@@ -310,15 +305,13 @@ class BagPlayerNode(ArmidNode):
     def _ready(self) -> bool:
         everyone = all(p.get_subscription_count() for p in self._topics.values())
         if self._guard is not None and not self._has_states:
-            everyone = everyone and self._guard.hears
+            everyone = everyone and self._guard.has_state
         return everyone or time.monotonic() > self._made + self.value('subscriber_timeout')
 
     def _publish(self, message: RawMessage) -> None:
         guard = self._guard
         if guard is not None and message.topic in self._descriptions:
             guard.describe(message.cdr)
-        if message.log_time_ns < self._begin:
-            return
         if guard is not None and message.topic in self._trajectories:
             if not self._has_states:
                 self._refused = guard.objection(message.cdr) or self._refused

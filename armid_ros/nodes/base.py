@@ -12,7 +12,7 @@ from typing import Any, ClassVar
 
 from armid_ros.errors import ArmidError, OutputError
 from armid_ros.nodes.complaints import Complaints, FATAL
-from armid_ros.nodes.parameters.table import as_declared, declare, is_as, NodeParameter, unknown
+from armid_ros.nodes.parameters.table import declare, is_as, NodeParameter, unknown
 from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus, KeyValue
 from rcl_interfaces.msg import SetParametersResult
 from rclpy.clock import Clock, ClockType
@@ -72,8 +72,8 @@ class ArmidNode(Node):
         """Make the node with keyword arguments of rclpy's Node, such as context or namespace."""
         super().__init__(name, **kwargs)
         self.complaints = Complaints(self.get_logger())
-        self._clock_missed = self._trouble_said = False
-        declare(self, self.parameters())
+        self._clock_missed = self._trouble_logged = False
+        self._entries = declare(self, self.parameters())
         self.add_on_set_parameters_callback(self._validate)
         self.add_post_set_parameters_callback(self._apply)
         self._diagnostics = self.create_publisher(DiagnosticArray, '/diagnostics', 10)
@@ -146,15 +146,15 @@ class ArmidNode(Node):
             self.get_logger().warning(f'{missing}; until then the node waits')
         self._clock_missed = bool(missing)
         trouble = '' if missing else self.condition()[0]
-        if trouble and not self._trouble_said and not self.complaints.has_logged(trouble):
+        if trouble and not self._trouble_logged and not self.complaints.has_logged(trouble):
             self.get_logger().info(trouble)
-        self._trouble_said = bool(trouble)
+        self._trouble_logged = bool(trouble)
 
     def warn_of_unknown(self) -> None:
         """Log start parameters that the node does not have."""
-        said = unknown(self)
-        if said:
-            self.complaints.say('parameter', said)
+        text = unknown(self)
+        if text:
+            self.complaints.say('parameter', text)
 
     @property
     def finished(self) -> bool:
@@ -241,8 +241,8 @@ class ArmidNode(Node):
         try:
             folder.mkdir(parents=True, exist_ok=True)
         except OSError as error:
-            said = f'{parameter}: {folder}: cannot be made: {error.strerror}'
-            raise OutputError(said) from error
+            text = f'{parameter}: {folder}: cannot be made: {error.strerror}'
+            raise OutputError(text) from error
         return folder
 
     def offer(self, service: str, action: Callable[[], str]) -> None:
@@ -285,7 +285,15 @@ class ArmidNode(Node):
         again. An integer is accepted for a float.
 
         """
-        given = [as_declared(self, parameter) for parameter in parameter_list]
+        known = self._entries
+        try:
+            given = [
+                Parameter(p.name, value=known[p.name].converted(p.value)) if p.name in known else p
+                for p in parameter_list
+            ]
+        except ArmidError as error:
+            self.complaints.say('parameter', str(error))
+            return SetParametersResult(successful=False, reason=str(error))
         changed = [p for p in given if not is_as(self, p)]
         if not changed:
             return SetParametersResult(successful=True)

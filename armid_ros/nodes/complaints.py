@@ -35,7 +35,7 @@ class Complaints:
         """Log complaints with the logger of a node."""
         self._logger = logger
         self.counts: Counter[str] = Counter()
-        self._said: dict[str, set[str]] = {}
+        self._logged: dict[str, set[str]] = {}
         self.latest = ''
         self.fresh = False
         self.defects = 0
@@ -45,19 +45,19 @@ class Complaints:
         self.counts[kind] += 1
         self.latest = text
         self.fresh = True
-        said = self._said.setdefault(kind, set())
-        if text not in said and len(said) < 10:  # so that the log does not overflow
-            said.add(text)
+        logged = self._logged.setdefault(kind, set())
+        if text not in logged and len(logged) < 10:  # so that the log does not overflow
+            logged.add(text)
             self._logger.warning(text)
 
     def has_logged(self, text: str) -> bool:
         """Return whether a text was logged."""
-        return any(text in said for said in self._said.values())
+        return any(text in logged for logged in self._logged.values())
 
     def defect(self, kind: str, error: Exception) -> None:
         """Count and log an input that caused an unexpected exception."""
         self.defects += 1
-        self.say(kind, f'{kind}: left out, as it cannot be used ({type(error).__name__}: {error})')
+        self.say(kind, f'{kind}: skipped, as it cannot be used ({type(error).__name__}: {error})')
         self._logger.debug(''.join(traceback.format_exception(error)))
 
     def settle(self) -> None:

@@ -82,16 +82,13 @@ class ExcitationPublisherNode(ArmidNode):
             if excitation is None:
                 self.get_logger().info('making the excitation')
                 excitation = make_excitation(self.value, self._rate, planner)
-        if excitation is None:
-            raise TrajectoryError('a planner is given without an excitation')
         self._planner = planner
         self._excitation = excitation.for_joints(planner.arm.robot.joints)
         self._gate: MotionGate | None = None
         self._ending: Ending | None = None
         self._begun_ns, self._begun, self._tracked = 0, -math.inf, -math.inf
-        self._overloads = 0
         self._trouble = self._rehearsed = ''
-        self._runs, self._outcome = 0, 'ready'
+        self._overloads, self._runs, self._outcome = 0, 0, 'ready'
         self._rehearsal: Rehearsal | None = None
         self._waiting = bool(self.value('start'))
         self._deadline = time.monotonic() + self.value('subscriber_timeout')
@@ -101,9 +98,8 @@ class ExcitationPublisherNode(ArmidNode):
         self._experiments = self.create_subscription(
             String, 'experiment', self._on_experiment, LATCHED
         )
-        self.offer('~/start', self.start)
-        self.offer('~/rehearse', self.rehearse)
-        self.offer('~/stop', self.stop)
+        for service in (self.start, self.rehearse, self.stop):
+            self.offer(f'~/{service.__name__}', service)
         self._timer = self.look_every(0.05, self.look)
 
     def parameters(self) -> Sequence[NodeParameter]:
@@ -163,8 +159,7 @@ class ExcitationPublisherNode(ArmidNode):
             return
         if self._gate is not None:
             self._end_complete(self._gate)
-        if self._ending is not None:
-            self._watch_ending(self._ending)
+        self._watch_ending()
         if self._rehearsal is not None:
             self._end_rehearsal(self._rehearsal)
         elif self._waiting:
@@ -201,7 +196,7 @@ class ExcitationPublisherNode(ArmidNode):
         motion = planned.motion()
         # the set point differs from the measured position
         first = max(math.ceil(HANDOVER * self._rate), 1)
-        message = write_trajectory(motion.select(slice(first, None)), first / self._rate)
+        message = write_trajectory(motion.select(slice(first, None)))
         self._controller.discover()  # no time passes between the stamp and the sending
         self._arm.catch_up()
         pose, units = self._arm.monitor.pose, self._planner.arm.robot.position_units
@@ -217,8 +212,7 @@ class ExcitationPublisherNode(ArmidNode):
         late = self._arm.stamps.late if not (self.value('zero_stamp') or self._simulated) else 0.0
         self._begun_ns, self._begun = now.nanoseconds, self._arm.now() + late
         self._gate, self._ending, self._rehearsal = gate, None, None
-        self._overloads = 0
-        self._trouble, self._rehearsed = '', ''
+        self._overloads, self._trouble, self._rehearsed = 0, '', ''
         self._runs, self._outcome = self._runs + 1, 'complete'  # unless it is stopped
         return self.tell(
             f'a run of {planned.duration:g} s, {planned.approach.duration:.1f} s of it to get '
@@ -239,7 +233,7 @@ class ExcitationPublisherNode(ArmidNode):
             elapsed = self._arm.now() - self._begun
             self._end_run('stopped by ~/stop')
             return self.tell(f'stopped {elapsed:.2f} s after the start')
-        ending = self._ending
+        ending = self._let_go()
         if ending is None:
             raise TrajectoryError('nothing is under way')
         if ending.last is None:
@@ -249,7 +243,7 @@ class ExcitationPublisherNode(ArmidNode):
         if motion is None:
             return self.tell('the stop was sent before')
         self._ending = replace(ending, last=motion, sent=now)
-        self._controller.insist(write_trajectory(motion, float(motion.t[0])))
+        self._controller.insist(write_trajectory(motion))
         return self.tell('the arm was still on its path, and was stopped again')
 
     @property
@@ -296,7 +290,8 @@ class ExcitationPublisherNode(ArmidNode):
 
     def close(self) -> None:
         """Stop the arm unless it is at rest, and wait until the message has arrived."""
-        sent = self._gate is not None or (self._ending is not None and self._ending.last)
+        ending = self._let_go()
+        sent = self._gate is not None or (ending is not None and ending.last is not None)
         if sent and self.context.ok():
             self.stop()
             self._controller.settle(1.0)
@@ -328,8 +323,7 @@ class ExcitationPublisherNode(ArmidNode):
         if 0.0 <= now - self._tracked < 0.005:  # often enough
             return
         self._tracked = now
-        if self._ending is not None:
-            self._watch_ending(self._ending)
+        self._watch_ending()
         elapsed = self.elapsed
         if elapsed is None or self._gate is None:
             return
@@ -376,14 +370,24 @@ class ExcitationPublisherNode(ArmidNode):
         measured = self._arm.monitor.pose.q, self._arm.monitor.velocity()
         motion = gate.stop(now - self._begun, self.value('stopping'), *measured)
         self._ending = replace(self._ending, last=motion)
-        self._controller.bring_to_rest(write_trajectory(motion, float(motion.t[0])))
+        self._controller.bring_to_rest(write_trajectory(motion))
 
-    def _watch_ending(self, ending: Ending) -> None:
+    def _let_go(self) -> Ending | None:
+        """Return the ended run, without a motion to send if another client moves the arm."""
+        ending = self._ending
+        if ending is not None and self._controller.taken:
+            self._ending = replace(ending, last=None) if ending.reason else None
+        return self._ending
+
+    def _watch_ending(self) -> None:
         """Check that the arm comes to rest; hold a blocked arm at its position."""
+        ending = self._let_go()
+        if ending is None:
+            return
         limits = map(self.value, ('state_timeout', 'tracking_tolerance', 'stopping'))
         self._ending, motion, report = ending.updated(self._arm.monitor, self._arm.now(), *limits)
         if motion is not None:
-            self._controller.insist(write_trajectory(motion, float(motion.t[0])))
+            self._controller.insist(write_trajectory(motion))
         if report:
             self._say_trouble(report)
 
@@ -394,7 +398,7 @@ class ExcitationPublisherNode(ArmidNode):
 
     def _on_goal_ended(self, reason: str) -> None:
         """Handle the result of the controller: empty at the end of the run, else the reason."""
-        gate, now = self._gate, self._arm.now()
+        gate, elapsed = self._gate, self._arm.now() - self._begun
         if gate is None:  # the run was stopped before
             ending = self._ending
             if reason and ending is not None and ending.last is not None and not ending.warned:
@@ -402,22 +406,23 @@ class ExcitationPublisherNode(ArmidNode):
                     f'the stop failed: {reason}; if the arm still moves, use the emergency stop'
                 )
             return
-        if not reason:
+        if reason:
+            self._gate, self._rehearsal, self._outcome = None, None, 'stopped'
+            self._ending = Ending(gate, self._begun, None, self._arm.now(), reason)
+            self._say_trouble(f'stopped {elapsed:.2f} s after the start: {reason}')
+        elif elapsed < gate.run.duration - self.value('state_timeout'):
+            self._give_up(f'the controller reported the end of a run of {gate.run.duration:.1f} s')
+        else:
             self._end_complete(gate)
-            return
-        self._gate, self._rehearsal, self._outcome = None, None, 'stopped'
-        self._ending = Ending(gate, self._begun, None, now, reason)
-        self._say_trouble(f'stopped {now - self._begun:.2f} s after the start: {reason}')
 
     def _end_rehearsal(self, rehearsal: Rehearsal) -> None:
         """Report the result of the rehearsal and the next step."""
         self._rehearsal = None
         report, surprises = rehearsal.report()
-        speed = 100.0 * self.value('speed_scaling')
-        advice = f'~/start runs it at {speed:.0f} % of its speed'
         if surprises:
             self._say_trouble(f'rehearsed: {report}; look into it before ~/start')
         else:
+            advice = f'~/start runs it at {100.0 * self.value("speed_scaling"):.0f} % of its speed'
             self._rehearsed = self.tell(f'rehearsed: {report}; {advice}')
 
     def _on_experiment(self, message: String) -> None:

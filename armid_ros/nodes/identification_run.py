@@ -22,12 +22,11 @@ from armid_ros.nodes.base import ArmidNode
 from armid_ros.nodes.parameters.table import NodeParameter
 from armid_ros.nodes.running.process import run
 from diagnostic_msgs.msg import DiagnosticArray
-from rclpy.client import Client
 from rclpy.task import Future
 from std_srvs.srv import Trigger
 
 #: Result document of each command, and the keys that are reported.
-_SAID = {
+_REPORTED = {
     'identify': ('identification.json', ('grade',)),
     'diagnose': ('diagnosis.json', ('verdict', 'summary')),
 }
@@ -113,15 +112,18 @@ class IdentificationRunNode(ArmidNode):
                 refuse_foreign(folder / subfolder, schema)
         self._start = start
         self._begun: list[str] = []
-        self._farewells: list[Future] = []
+        self._stops: list[Future] = []
         self._program: Any = None
         self._done, self._step = False, 'begins'
         self._failure = self._refused = ''
         self._results: list[str] = []
         self._state: dict[str, str] = {}
-        self._trigger_clients: dict[str, Client] = {}
-        self._full = {
-            name: self.resolve_topic_name(self.value(name)) for name in ('publisher', 'recorder')
+        services = {'publisher': ('start', 'rehearse', 'stop'), 'recorder': ('start', 'stop')}
+        self._full = {node: self.resolve_topic_name(self.value(node)) for node in services}
+        self._callers = {
+            (node, service): self.create_client(Trigger, f'{self._full[node]}/{service}')
+            for node, names in services.items()
+            for service in names
         }
         self.create_subscription(DiagnosticArray, '/diagnostics', self._on_diagnostics, 100)
         self._script = self._steps()
@@ -165,7 +167,7 @@ class IdentificationRunNode(ArmidNode):
     def close(self) -> None:
         """Stop the run, the recording and the program that this node began."""
         self._stop_all()
-        for future in self._farewells:
+        for future in self._stops:
             if self.executor is not None:  # the node that is stopped may have ended already
                 self.executor.spin_until_future_complete(future, timeout_sec=1.0)
         if self._program is not None and self._program.poll() is None:
@@ -178,8 +180,8 @@ class IdentificationRunNode(ArmidNode):
     def _stop_all(self) -> None:
         """Stop the run and the recording that this node began, the arm first."""
         for node in sorted(self._begun):
-            if self._client(node, 'stop').service_is_ready():
-                self._farewells.append(self._call(node, 'stop'))
+            if self._callers[node, 'stop'].service_is_ready():
+                self._stops.append(self._call(node, 'stop'))
         self._begun = []
 
     def _steps(self) -> Iterator[Wait]:
@@ -195,11 +197,11 @@ class IdentificationRunNode(ArmidNode):
             yield from self._excited('rehearse')
         bags = []
         for number in range(self.value('runs')):
-            said = yield from self._asked('recorder', 'start')
+            answer = yield from self._called('recorder', 'start')
             self._begun.append('recorder')
-            bags.append(said.removeprefix('recording into '))
+            bags.append(answer.removeprefix('recording into '))
             yield from self._excited('start', f'run {number + 1} of {self.value("runs")}')
-            yield from self._asked('recorder', 'stop')
+            yield from self._called('recorder', 'stop')
             self._begun.remove('recorder')
         folder = Path(self.value('save_to')).expanduser()
         yield from self._ended('identify', folder / 'identification', bags)
@@ -238,12 +240,12 @@ class IdentificationRunNode(ArmidNode):
         if self._state['run'] != 'complete':
             raise TrajectoryError(f'{what}: {self._state["message"]}')
         if service == 'rehearse':
-            said = self._state['message']
-            self.get_logger().info(said)
-            if 'look into it' in said:
-                raise TrajectoryError(said)
+            report = self._state['message']
+            self.get_logger().info(report)
+            if 'look into it' in report:
+                raise TrajectoryError(report)
 
-    def _asked(self, node: str, service: str) -> Any:
+    def _called(self, node: str, service: str) -> Any:
         """Call a service, and return its answer."""
         future = self._call(node, service)
         yield self._step, future.done
@@ -264,7 +266,7 @@ class IdentificationRunNode(ArmidNode):
         program = (command, *fitted, *validate, *given, *more, '--out', str(folder))
         self._program = self._start(program)
         yield f'armid {command} is under way', lambda: self._program.poll() is not None
-        name, keys = _SAID[command]
+        name, keys = _REPORTED[command]
         document = {}
         if (folder / name).is_file():
             document = json.loads((folder / name).read_text(encoding='utf-8'))
@@ -275,25 +277,19 @@ class IdentificationRunNode(ArmidNode):
                 f'armid {command} ended with code {self._program.returncode}; the recordings are '
                 f'{", ".join(bags)}{known}'
             )
-        told = ': '.join(str(document[key]).replace('_', ' ') for key in keys if key in document)
-        self._results.append(f'{command}: {told or "done"} ({folder / "report.html"})')
+        result = ': '.join(str(document[key]).replace('_', ' ') for key in keys if key in document)
+        self._results.append(f'{command}: {result or "done"} ({folder / "report.html"})')
 
     def _missing(self) -> list[str]:
         """Return the names of the nodes that are not available."""
         return [
             name
             for node, name in self._full.items()
-            if not self._client(node, 'start').service_is_ready()
+            if not self._callers[node, 'start'].service_is_ready()
         ]
 
-    def _client(self, node: str, service: str) -> Client:
-        name = f'{self._full[node]}/{service}'
-        if name not in self._trigger_clients:
-            self._trigger_clients[name] = self.create_client(Trigger, name)
-        return self._trigger_clients[name]
-
-    def _call(self, node: str, service: str) -> Any:
-        return self._client(node, service).call_async(Trigger.Request())
+    def _call(self, node: str, service: str) -> Future:
+        return self._callers[node, service].call_async(Trigger.Request())
 
     def _on_diagnostics(self, message: DiagnosticArray) -> None:
         wanted = f'{self._full["publisher"][1:]}: state'

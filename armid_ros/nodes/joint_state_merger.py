@@ -74,8 +74,8 @@ class JointStateMergerNode(ArmidNode):
         NodeParameter(
             'gains',
             [1.0],
-            'Torque per unit of what comes, N m/A for currents: one for all joints, or one a '
-            'joint; negative where the sign is the opposite.',
+            'Torque per unit of the received values, N m/A for currents: one for all joints, or '
+            'one per joint; negative for an opposite sign.',
         ),
     )
 
@@ -136,12 +136,12 @@ class JointStateMergerNode(ArmidNode):
         missing = self._merger.missing
         positions = [self.joints[k] for k in missing if k < n]
         torques = [self.joints[k - n] for k in missing if k >= n]
-        told = [
+        lacking = [
             f'no {kind} of {", ".join(joints)} so far'
             for kind, joints in (('position', positions), ('torque', torques))
             if joints
         ]
-        return '; '.join(told) or 'the senders do not share their time', values
+        return '; '.join(lacking) or 'the senders do not share their time', values
 
     def _adopt(self, joints: Sequence[str]) -> None:
         if tuple(joints) == self.joints:

@@ -8,7 +8,12 @@ from abc import abstractmethod
 from typing import Any
 
 from armid_ros.nodes.base import ArmidNode, LOOK_PERIOD
-from armid_ros.nodes.messages.joint_states import JointSample, JointStateReader
+from armid_ros.nodes.messages.joint_states import (
+    DISTURBANCES,
+    JointSample,
+    JointStateReader,
+    OF_TWO,
+)
 from armid_ros.nodes.messages.timeliness import Freshness, StampDifference
 from armid_ros.nodes.qos import LATCHED, MatchedSubscription
 from armid_ros.recording.message_types import header_stamp
@@ -91,6 +96,31 @@ class ListeningNode(ArmidNode):
     def level(self, troubled: bool) -> bytes:
         """Return STALE if joint states have stopped."""
         return DiagnosticStatus.STALE if self.freshness.stopped else super().level(troubled)
+
+    def stream_trouble(self) -> str:
+        """Return why joint states are missing or their results have wrong stamps, or empty."""
+        fresh = self.complaints.latest if self.complaints.fresh else ''
+        if self.awaited:
+            return self.awaited
+        if self.freshness.stopped:
+            return '; '.join(filter(None, (self.freshness.trouble(), fresh)))
+        return '' if fresh else self.stamps.of_results(self.joint_states.topic)
+
+    def report(self, reason: str, text: str = '') -> None:
+        """
+        Complain of faulty joint states, with their publishers if two of them can cause the fault.
+
+        Parameters
+        ----------
+        reason : str
+            A key of `DISTURBANCES`, or 'spike'.
+        text : str
+            Text for a reason that is not a key.
+
+        """
+        several = self.joint_states.several if reason in OF_TWO else ''
+        parts = text or DISTURBANCES[reason], several
+        self.complaints.say(reason, '; '.join(filter(None, parts)))
 
     def look(self) -> None:
         """Check the publishers, and publish diagnostics if joint states stop or resume."""

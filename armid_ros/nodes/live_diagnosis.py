@@ -15,11 +15,11 @@ from armid_ros.diagnosis import Finding
 from armid_ros.errors import IdentificationError
 from armid_ros.estimate import name_in_words
 from armid_ros.files.output import refuse_replacing
-from armid_ros.live import Answer, Assistant, LiveDiagnosis, StreamWatch
-from armid_ros.live.assistant import Helper, Plan, Save
 from armid_ros.nodes.base import key_values
 from armid_ros.nodes.listening import ListeningNode
-from armid_ros.nodes.messages.joint_states import disturbance, JointSample
+from armid_ros.nodes.live import Answer, Assistant, LiveDiagnosis, StreamWatch
+from armid_ros.nodes.live.assistant import Plan, Save
+from armid_ros.nodes.messages.joint_states import JointSample
 from armid_ros.nodes.parameters.live import (
     LIVE_PARAMETERS,
     LIVE_SETTINGS,
@@ -57,7 +57,7 @@ class LiveDiagnosisNode(ListeningNode):
     table = LIVE_PARAMETERS
 
     def __init__(
-        self, live: LiveDiagnosis | None = None, helper: Helper | None = None, **kwargs: Any
+        self, live: LiveDiagnosis | None = None, helper: Assistant | None = None, **kwargs: Any
     ) -> None:
         """
         Make the node.
@@ -66,7 +66,7 @@ class LiveDiagnosisNode(ListeningNode):
         ----------
         live : LiveDiagnosis, optional
             Schedules the diagnoses; by default made from the parameters, once the robot is known.
-        helper : Helper, optional
+        helper : Assistant, optional
             Computes the diagnoses; by default in a separate process.
         **kwargs
             Keyword arguments of rclpy's Node.
@@ -74,8 +74,7 @@ class LiveDiagnosisNode(ListeningNode):
         """
         super().__init__('live_diagnosis', **kwargs)
         self.live: LiveDiagnosis | None = None
-        self._said: object = ()
-        self._waiting: list[Save | Plan] = []
+        self._logged: object = ()
         self._helper = helper or Assistant()
         self._diagnoses = self.create_publisher(Diagnosis, '~/diagnosis', LATCHED)
         self._models = self.create_publisher(String, '~/model', LATCHED)
@@ -120,13 +119,13 @@ class LiveDiagnosisNode(ListeningNode):
         self._require_diagnosis()
         folder = self.folder('save_to')
         refuse_replacing(folder, Save.FILES)
-        self._begin(Save(folder))
+        self._helper.ask(Save(folder))
         return f'writing {", ".join(Save.FILES)} to {folder}'
 
     def next_run(self) -> str:
         """Start to plan the motion that separates the candidates, for ~/experiment."""
         self._require_diagnosis()
-        self._begin(Plan(self.value('seed')))
+        self._helper.ask(Plan(self.value('seed')))
         return f'planning; the motion goes out on {self._runs.topic_name}'
 
     def look(self) -> None:
@@ -158,8 +157,6 @@ class LiveDiagnosisNode(ListeningNode):
             self.tell(result.text)
             if result.excitation:
                 self._runs.publish(String(data=result.excitation))
-        if self._waiting and not self._helper.busy:
-            self._helper.ask(self._waiting.pop(0))
         return True
 
     def condition(self) -> tuple[str, Mapping[str, object]]:
@@ -174,17 +171,13 @@ class LiveDiagnosisNode(ListeningNode):
             'motion [s]': live.window.moved,
             'diagnoses': live.asked,
             'busy': int(self.busy),
-            'proposed': int(live.belief.proposed is not None),
+            'proposed': int(live.proposed is not None),
         }
         for reason in sorted(self._watch.news()):
-            self.complaints.say(reason, disturbance(reason, self.joint_states.several))
-        if self.awaited:
-            return self.awaited, values
-        if not (self.freshness.stopped or self.complaints.fresh) and live.learning:
-            return 'learning the misfit of the model: the arm must be healthy', values
-        trouble = self.freshness.trouble()
-        if not (trouble or self.complaints.fresh):
-            trouble = self.stamps.of_results(self.joint_states.topic)
+            self.report(reason)
+        trouble = self.stream_trouble()
+        if live.learning and not (trouble or self.complaints.fresh):
+            trouble = 'learning the misfit of the model: the arm must be healthy'
         return trouble, values
 
     def further_statuses(self) -> Sequence[DiagnosticStatus]:
@@ -202,11 +195,11 @@ class LiveDiagnosisNode(ListeningNode):
         status.level = _LEVELS.get(answer.verdict, DiagnosticStatus.WARN)
         status.message = f'{answer.verdict.replace("_", " ")}: {answer.summary}'
         numbers = {'processor seconds': answer.seconds, 'window': answer.window.duration}
-        for row in answer.gap:
+        for joint, before, after, floor in _gaps(answer):
             numbers |= {
-                f'gap before {row.joint} [N m]': row.before,
-                f'gap after {row.joint} [N m]': row.after,
-                f'floor {row.joint} [N m]': row.floor,
+                f'gap before {joint} [N m]': before,
+                f'gap after {joint} [N m]': after,
+                f'floor {joint} [N m]': floor,
             }
         for finding in answer.findings:
             for parameter, value, std in _rows(finding):
@@ -251,11 +244,12 @@ class LiveDiagnosisNode(ListeningNode):
             effect_joints=[','.join(finding.joints) for finding in answer.findings],
             share=[float(finding.share) for finding in answer.findings],
             rivals=[','.join(finding.ambiguous_with) for finding in answer.findings],
-            gap_joint=[row.joint for row in answer.gap],
-            gap_before=[row.before for row in answer.gap],
-            gap_after=[row.after for row in answer.gap],
-            gap_floor=[row.floor for row in answer.gap],
         )
+        for joint, before, after, floor in _gaps(answer):
+            message.gap_joint.append(joint)
+            message.gap_before.append(before)
+            message.gap_after.append(after)
+            message.gap_floor.append(floor)
         for number, finding in enumerate(answer.findings):
             for parameter, value, std in _rows(finding):
                 message.name.append(parameter.name)
@@ -266,27 +260,21 @@ class LiveDiagnosisNode(ListeningNode):
                 message.of_effect.append(number)
         message.header.stamp = self.reader.stamp(answer.end).to_msg()
         self._diagnoses.publish(message)
-        said = f'{answer.verdict.replace("_", " ")}: {answer.summary}'
-        if answer.named != self._said:
-            self._said = answer.named
-            self.get_logger().warning(said) if answer.named else self.get_logger().info(said)
+        text = f'{answer.verdict.replace("_", " ")}: {answer.summary}'
+        if answer.named != self._logged:
+            self._logged = answer.named
+            self.get_logger().warning(text) if answer.named else self.get_logger().info(text)
 
     def _require_diagnosis(self) -> None:
         if self._require().latest is None:
             raise IdentificationError('nothing has been diagnosed so far')
 
-    def _begin(self, job: Save | Plan) -> None:
-        if self._helper.busy:
-            self._waiting.append(job)
-        else:
-            self._helper.ask(job)
-
     def _publish_model(self) -> None:
-        model = self._require().belief.model
+        model = self._require().model
         self._models.publish(String(data=model_text(model, source_of(model.robot))))
 
     def _adopt(self, live: LiveDiagnosis) -> None:
-        robot = live.belief.accepted.robot
+        robot = live.accepted.robot
         self.adopt(robot)
         self.live = live
         self._watch = StreamWatch(robot.n_joints)
@@ -302,10 +290,19 @@ def _rows(finding: Finding) -> list[tuple[object, float, float]]:
     return list(zip(finding.parameters, finding.values, finding.std, strict=True))
 
 
+def _gaps(answer: Answer) -> list[tuple[str, float, float, float]]:
+    """Return the joints with their residuals before and after the patch, and floors [N m]."""
+    gap = answer.gap
+    if gap is None:
+        return []
+    columns = (column.tolist() for column in (gap.before, gap.after, gap.floor))
+    return list(zip(answer.arm.robot.joints, *columns, strict=True))
+
+
 def _in_words(live: LiveDiagnosis) -> str:
     return '; '.join(
         ' of '.join(filter(None, (name_in_words(name), ', '.join(joints))))
-        for name, joints in live.belief.named
+        for name, joints in live.named
     )
 
 

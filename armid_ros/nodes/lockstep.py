@@ -47,11 +47,6 @@ PATIENCE = 20.0
 EPOCH_NS = 1_000 * 10**9
 #: Time for which the arm rests before the run, as the publisher requires [s].
 _SEEN = 0.26
-#: Recorded topics, and further topics with an online identifier.
-_TOPICS = ('joint_states', 'robot_description', 'joint_trajectory')
-_LEARNED = ('online_identifier/estimate',)
-#: Step of the clock of a replay [ns].
-_TICK_NS = 2_000_000
 
 
 class Progress:
@@ -67,8 +62,8 @@ class Progress:
 
     """
 
-    def __init__(self, duration: float, tell: OnProgress | None) -> None:
-        self._tell, self._due = tell, 1.0
+    def __init__(self, duration: float, on_progress: OnProgress | None) -> None:
+        self._on_progress, self._due = on_progress, 1.0
         self._begun = time.monotonic()
         self.duration, self.t, self.real_time_factor = duration, 0.0, 0.0
 
@@ -78,8 +73,8 @@ class Progress:
         self.real_time_factor = self.t / max(time.monotonic() - self._begun, 1e-9)
         if self.t >= self._due:
             self._due += 1.0
-            if self._tell is not None:
-                self._tell(self)
+            if self._on_progress is not None:
+                self._on_progress(self)
 
 
 OnProgress = Callable[[Progress], None]
@@ -130,8 +125,9 @@ def run_lockstep(
 
     """
     with Stage() as stage:
-        learner = None if identifier is None else stage.add(OnlineIdentifierNode, identifier)
-        topics = list(_TOPICS if learner is None else _TOPICS + _LEARNED)
+        learners = [] if identifier is None else [stage.add(OnlineIdentifierNode, identifier)]
+        topics = ['joint_states', 'robot_description', 'joint_trajectory']
+        topics += ['online_identifier/estimate'] * len(learners)
         recorder = stage.add(RecorderNode, bag=str(bag), topics=topics)
         plant = stage.add(
             SimulatedArmNode, arm, EPOCH_NS, rate=rate, real_time_factor=0.0, use_sim_time=False
@@ -141,7 +137,7 @@ def run_lockstep(
         publisher = stage.add(
             ExcitationPublisherNode, excitation, planner, start=False, approach=approach
         )
-        listeners = [recorder, publisher, *([] if learner is None else [learner])]
+        listeners = [recorder, publisher, *learners]
         topic = plant.resolve_topic_name('joint_states')
 
         def connected() -> bool:
@@ -149,7 +145,7 @@ def run_lockstep(
             plant.publish_clock()
             return (
                 not recorder.missing
-                and (learner is None or _matched(learner))
+                and all(map(_matched, learners))
                 and plant.readers >= len(listeners)
                 and publisher.readers >= 1
                 and all(node.get_clock().now().nanoseconds for node in listeners)
@@ -157,13 +153,12 @@ def run_lockstep(
 
         def step() -> int:
             stamp = plant.step()
-            stage.spin_until(
-                lambda: (
-                    recorder.last_stamps.get(topic) == stamp
-                    and (learner is None or learner.last_stamp_ns == stamp)
-                ),
-                topic,
-            )
+
+            def arrived() -> bool:
+                learned = all(learner.last_stamp_ns == stamp for learner in learners)
+                return learned and recorder.last_stamps.get(topic) == stamp
+
+            stage.spin_until(arrived, topic)
             if plant.complaints.counts:
                 raise ArmidError(plant.complaints.latest)
             return stamp
@@ -221,11 +216,11 @@ def replay_lockstep(
         stage.spin_until(
             lambda: clock.get_subscription_count() >= 2 and _matched(learner), full_topic
         )
-        played, now = Progress(duration, on_progress), EPOCH_NS
+        played, now, step = Progress(duration, on_progress), EPOCH_NS, 2_000_000
         while played.t < duration and not player.finished:
-            now += _TICK_NS
+            now += step
             clock.publish(Clock(clock=Time(nanoseconds=now).to_msg()))
-            due = (now - EPOCH_NS - _TICK_NS - 1) * 1e-9
+            due = (now - EPOCH_NS - step - 1) * 1e-9
             stage.spin_until(
                 lambda due=due: not player.waiting and player.position >= due, '/clock'
             )
@@ -270,8 +265,6 @@ class Stage:
         return node
 
     def spin_until(self, done: Callable[[], object], what: str) -> None:
-        if done():
-            return
         deadline = time.monotonic() + PATIENCE
         while not done():
             if time.monotonic() > deadline:  # after the timeout, done() is checked once more

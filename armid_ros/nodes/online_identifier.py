@@ -15,7 +15,6 @@ from typing import Any
 
 from armid_msgs.msg import ParameterEstimate
 from armid_ros.arm.model_file import parameter_table, read_model, save_model
-from armid_ros.effects import Effect
 from armid_ros.errors import ArmidError, IdentificationError, ModelError
 from armid_ros.estimate import Estimate
 from armid_ros.files import write_file
@@ -26,7 +25,7 @@ from armid_ros.motion import FloatArray
 from armid_ros.nodes.base import key_values
 from armid_ros.nodes.listening import ListeningNode
 from armid_ros.nodes.messages.estimates import estimate_message, estimate_values
-from armid_ros.nodes.messages.joint_states import disturbance, DISTURBANCES, JointSample
+from armid_ros.nodes.messages.joint_states import DISTURBANCES, JointSample
 from armid_ros.nodes.parameters.identifier import (
     IDENTIFIER_PARAMETERS,
     make_identifier,
@@ -86,8 +85,6 @@ class OnlineIdentifierNode(ListeningNode):
         super().__init__('online_identifier', **kwargs)
         self.identifier: OnlineIdentifier | None = None
         self.update_times: deque[float] = deque(maxlen=2000)
-        self._published = -1
-        self._disturbed: Counter[str] = Counter()
         if self.value('save_to'):  # check before the identification, not at its end
             refuse_replacing(Path(self.value('save_to')).expanduser(), FILES)
         if identifier is None and self.value('robot'):
@@ -113,19 +110,16 @@ class OnlineIdentifierNode(ListeningNode):
 
     def reset(self) -> str:
         """Delete the estimate, and start again."""
-        self._require().reset()
-        self._progress.reset()
-        self._disturbed.clear()
-        self._published = -1
-        self._told = 0
-        self._begin_statistics()
+        identifier = self._require()
+        identifier.reset()
+        self._adopt(identifier)
         return 'the estimate begins anew'
 
     def save(self) -> str:
         """Write the estimate, an arm model with it, and the robot of the model to files."""
         identifier = self._require()
         if not identifier.samples:
-            raise IdentificationError('nothing has been learned so far, so nothing is written')
+            raise IdentificationError('no sample was used so far, so that nothing is written')
         folder = Path(self.value('save_to') or _FOLDER).expanduser()
         refuse_replacing(folder, FILES)
         robot, estimate = identifier.arm.robot, identifier.estimate()
@@ -153,10 +147,10 @@ class OnlineIdentifierNode(ListeningNode):
         """Save the estimate if the parameter save_to is set."""
         if self.value('save_to') and self.identifier is not None and self.identifier.samples:
             try:
-                said = self.save()
+                text = self.save()
             except ArmidError as error:
-                said = f'what was learned is lost: {error}'
-            print(said, file=sys.stderr)  # the log is closed when a signal ends the node
+                text = f'the estimate is lost: {error}'
+            print(text, file=sys.stderr)  # the log is closed when a signal ends the node
 
     def publish_estimate(self) -> None:
         """Publish the estimate if it has changed."""
@@ -189,15 +183,23 @@ class OnlineIdentifierNode(ListeningNode):
         counted = Counter(identifier.rejected) + Counter(identifier.restarts)
         counted['missing'] = identifier.missing
         news = counted - self._disturbed
-        several = self.joint_states.several if news else ''
         for reason in news.keys() & DISTURBANCES.keys():
-            self.complaints.say(reason, disturbance(reason, several))
+            self.report(reason)
         for joint, signal in identifier.spikes if news['spike'] else ():
-            text = f"the {signal} of '{joint}' jumps for single samples: left out"
-            self.complaints.say('spike', disturbance('spike', several, text))
+            self.report(
+                'spike', f"the {signal} of '{joint}' jumps for single samples, which are skipped"
+            )
         self._disturbed = counted
         self._begin_statistics()
-        return self._trouble(identifier), values
+        trouble = self.stream_trouble()
+        if self.awaited or self.freshness.stopped:
+            return trouble, values
+        if identifier.error:
+            return identifier.error, values
+        if identifier.samples:
+            progress = self._progress.unidentified(self._last_sample, identifier.estimate())
+            trouble = '; '.join(filter(None, (too_little_motion(progress), trouble)))
+        return trouble, values
 
     def further_statuses(self) -> Sequence[DiagnosticStatus]:
         """Return the estimate with intervals, and the detected changes."""
@@ -206,12 +208,12 @@ class OnlineIdentifierNode(ListeningNode):
             return ()
         common = {'level': DiagnosticStatus.OK, 'hardware_id': self.hardware}
         learned = DiagnosticStatus(name=f'{prefix}: parameters', **common)
-        learned.message = 'nothing learned so far'
+        learned.message = 'no sample was used so far'
         if identifier.samples:
             learned.message = 'value, lower and upper end of the 95 % interval'
             learned.values = key_values(estimate_values(identifier.estimate()))
         changed = DiagnosticStatus(name=f'{prefix}: changes', **common)
-        changed.message = 'no change seen'
+        changed.message = 'no change was detected'
         values: dict[str, object] = {'changes': len(identifier.changes)}
         if identifier.changes:
             latest = identifier.changes[-1]
@@ -249,21 +251,6 @@ class OnlineIdentifierNode(ListeningNode):
         stopped = self.freshness.stopped
         return DiagnosticStatus.ERROR if failed and not stopped else super().level(troubled)
 
-    def _trouble(self, identifier: OnlineIdentifier) -> str:
-        if self.awaited:
-            return self.awaited
-        stopped = self.freshness.trouble()
-        if stopped:
-            fresh = self.complaints.latest if self.complaints.fresh else ''
-            return '; '.join(filter(None, (stopped, fresh)))
-        if identifier.error:
-            return identifier.error
-        differ = '' if self.complaints.fresh else self.stamps.of_results(self.joint_states.topic)
-        if not identifier.samples:
-            return differ
-        learned = self._progress.unidentified(self._last_sample, identifier.estimate())
-        return '; '.join(filter(None, (too_little_motion(learned), differ)))
-
     def take_description(self, urdf: str) -> None:
         """Identify the robot of robot_description."""
         self._begin(make_identifier(self.value, urdf))
@@ -273,8 +260,13 @@ class OnlineIdentifierNode(ListeningNode):
         # Effects from the parameters are kept, even if the model lacks them.
         before = self._require()
         arm = read_model(message.data, before.arm.robot, 'model')
-        kept = [e for e in self._own_effects if not any(_covers(m, e) for m in arm.effects)]
-        more = [e for e in arm.effects if not any(_covers(k, e) for k in kept)]
+
+        def covered(effect: Any, others: Sequence[Any]) -> bool:
+            same = [other for other in others if other.name == effect.name]
+            return any(set(other.joints) >= set(effect.joints) for other in same)
+
+        kept = [effect for effect in self._own_effects if not covered(effect, arm.effects)]
+        more = [effect for effect in arm.effects if not covered(effect, kept)]
         values = [before.arm.values_of(e) for e in kept] + [arm.values_of(e) for e in more]
         arm = replace(arm, effects=(*kept, *more), values=tuple(values))
         if arm.effects != before.arm.effects:
@@ -320,8 +312,8 @@ class OnlineIdentifierNode(ListeningNode):
         self.adopt(robot)
         self.identifier = identifier
         self._names = list(robot.joints)
-        self._last_sample = 0.0
-        self._told = len(identifier.changes)
+        self._last_sample, self._published, self._told = 0.0, -1, len(identifier.changes)
+        self._disturbed: Counter[str] = Counter()
         self._progress = LearningProgress(
             identifier.arm, identifier.base, np.random.default_rng(0)
         )
@@ -339,10 +331,6 @@ class OnlineIdentifierNode(ListeningNode):
         if self.identifier is None:
             raise IdentificationError('no robot is known: robot_description was not received')
         return self.identifier
-
-
-def _covers(one: Effect, other: Effect) -> bool:
-    return one.name == other.name and set(one.joints) >= set(other.joints)
 
 
 main = partial(run, OnlineIdentifierNode)

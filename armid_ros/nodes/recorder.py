@@ -44,8 +44,8 @@ class RecorderNode(ArmidNode):
         NodeParameter(
             'bag',
             '',
-            'Directory to write; empty: armid_<date>_<time> in the current directory. Set while '
-            'a bag is open, it is of the next one.',
+            'Directory to write; empty: armid_<date>_<time> in the current directory. A '
+            'name set while a bag is open applies to the next bag.',
             read_only=False,
         ),
         NodeParameter(
@@ -140,12 +140,13 @@ class RecorderNode(ArmidNode):
         for subscription in self._subscriptions_by_topic.values():
             subscription.close()
         self._subscriptions_by_topic.clear()
-        self._write_held(self._writer, 0)
-        writer, self._writer = self._writer, None
+        writer = self._writer
+        self._write_held(writer, 0)
         try:
             writer.close()
         except ArmidError as error:
-            raise self._given_up(writer, str(error)) from error
+            self._give_up(str(error))
+        self._writer = None
         return self.tell(f'{writer.path}: {self.message_count} messages')
 
     def look(self) -> None:
@@ -288,13 +289,9 @@ class RecorderNode(ArmidNode):
                 self._give_up(str(error))
 
     def _give_up(self, reason: str) -> NoReturn:
-        """End the recording with an error."""
+        """Complete the bag, and raise an error with the reason and the kept messages."""
         writer, self._writer = self._writer, None
         assert writer is not None
-        raise self._given_up(writer, reason)
-
-    def _given_up(self, writer: BagWriter, reason: str) -> RecordingEnded:
-        """Complete the bag, and return the error with the reason and the kept messages."""
         lacking = ''
         try:
             writer.close()
@@ -306,7 +303,7 @@ class RecorderNode(ArmidNode):
             kept = f'its {count} messages are lost'
         elif lacking:
             kept += f', without its index ({lacking}): `armid recover` restores the index'
-        return RecordingEnded(f'{reason}; recording ends: {kept}')
+        raise RecordingEnded(f'{reason}; recording ends: {kept}')
 
 
 main = partial(run, RecorderNode)

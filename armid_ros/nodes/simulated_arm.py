@@ -109,7 +109,7 @@ class SimulatedArmNode(ArmidNode):
         NodeParameter(
             'real_time_factor',
             1.0,
-            'Simulated time per real time, if the computer can; who cannot follow loses '
+            'Simulated time per real time, if the computer is fast enough; slow subscribers lose '
             'messages. 0: moves only on request.',
             limits=(0.0, 1000.0),
             read_only=False,
@@ -144,10 +144,13 @@ class SimulatedArmNode(ArmidNode):
 
         """
         super().__init__('simulated_arm', **kwargs)
-        self._arm = arm or make_arm(self.value, self.get_logger().warn)
-        self._bare = described_arm(self.value)[0] if arm is None else None
+        self._bare: ArmModel | None = None
+        if arm is None:
+            self._bare, drives = described_arm(self.value)
+            arm = make_arm(self.value, self._bare, drives, self.get_logger().warn)
+        self._arm = arm
         self._dt_ns = round(self._arm.plant.dt * 1e9)
-        self._stride = self._steps_at(self.value('rate'))
+        self._stride = self._steps_at(self.value('rate'))  # refused before publishers are made
         self._follows = bool(self.value('use_sim_time'))
         self._origin_ns = start_ns
         if start_ns is None and not self._follows:
@@ -301,7 +304,7 @@ class SimulatedArmNode(ArmidNode):
             self.real_time.given_up = 0.0
             self._keep_pace()
         described = sensors_of(self.value, self._arm.joints)
-        known = {name: getattr(described, name) for name in names & SENSOR_PARAMETERS}
+        known = {name: getattr(described, name) for name in names & set(SENSOR_PARAMETERS)}
         self._arm.sensors = replace(self._arm.sensors, **known)
 
     def _with_effects(self, texts: Sequence[str]) -> ArmModel:
@@ -325,7 +328,7 @@ class SimulatedArmNode(ArmidNode):
             reference = waypoints_of(message).for_robot(self._arm.plant.robot)
             if reference.duration > LONGEST:
                 raise TrajectoryError(
-                    f'trajectory: it lasts {reference.duration:.4g} s; the longest that is taken '
+                    f'trajectory: it lasts {reference.duration:.4g} s; the longest accepted one '
                     f'lasts {LONGEST:g} s'
                 )
             stamp = message.header.stamp
@@ -334,8 +337,8 @@ class SimulatedArmNode(ArmidNode):
             if not -1.0 <= delay <= 60.0:  # the clocks differ
                 when = f'{delay:.3g} s from now' if delay > 0 else f'{-delay:.3g} s ago'
                 raise TrajectoryError(
-                    f'trajectory: it was to begin {when}; a sender and an arm in different times '
-                    'need use_sim_time on both or on neither'
+                    f'trajectory: its stamp is {when}; set use_sim_time on sender and arm, or on '
+                    'neither'
                 )
         except TrajectoryError as error:
             self._refuse(error)
@@ -343,8 +346,8 @@ class SimulatedArmNode(ArmidNode):
         self._pending = (start_ns, reference)
 
     def _refuse(self, error: TrajectoryError) -> None:
-        goes_on = 'goes on with the one before' if self.moving else 'stays where it is'
-        self.complaints.say('trajectory', f'{error}; it is refused, and the arm {goes_on}')
+        follows = 'follows the previous one' if self.moving else 'does not move'
+        self.complaints.say('trajectory', f'{error}; it is rejected, and the arm {follows}')
 
 
 main = partial(run, SimulatedArmNode)

@@ -40,20 +40,10 @@ _ERRORS = {
 }
 
 
-def write_trajectory(motion: Motion, lead: float) -> JointTrajectory:
-    """
-    Convert a motion to a message with one point per sample.
-
-    Parameters
-    ----------
-    motion : Motion
-        Motion for the arm.
-    lead : float
-        Time from the start to the first sample [s].
-
-    """
+def write_trajectory(motion: Motion) -> JointTrajectory:
+    """Convert a motion to a message with one point per sample, at its time from the start [s]."""
     message = JointTrajectory(joint_names=list(motion.joints))
-    for row, t in enumerate(motion.t - motion.t[0] + lead):
+    for row, t in enumerate(motion.t):
         message.points.append(
             JointTrajectoryPoint(
                 positions=motion.q[row].tolist(),
@@ -94,6 +84,8 @@ class TrajectoryController:
     client : ActionClient or None
         None if only the topic is used, no controller has offered the action so far, or
         control_msgs is not installed.
+    taken : bool
+        Whether another client has sent a goal since the last one of this node.
 
     """
 
@@ -116,13 +108,14 @@ class TrajectoryController:
         """
         self._publisher = node.create_publisher(JointTrajectory, 'joint_trajectory', STREAM)
         self.topic = str(self._publisher.topic_name)
-        beside = f'{self.topic.rpartition("/")[0]}/follow_joint_trajectory'
-        self.action = node.resolve_topic_name(node.value('action') or beside)
+        default = f'{self.topic.rpartition("/")[0]}/follow_joint_trajectory'
+        self.action = node.resolve_topic_name(node.value('action') or default)
         self.client: ActionClient | None = None
         self._node, self._on_end = node, on_end
         self._kind = node.value('interface')
         self._by_action, self._possible = False, self._kind != 'topic'
         self._goal: _Goal | None = None
+        self.taken = False
         self._error, self._seen = math.nan, -math.inf
         self._known: set[bytes] = set()
         self._requests: list[Future] = []
@@ -285,6 +278,7 @@ class TrajectoryController:
         assert self.client is not None
         before, self._goal = self._goal, _Goal(time.monotonic())
         goal, self._error, self._seen = self._goal, math.nan, time.monotonic()
+        self.taken = False
         message = self._kind_of_goal(trajectory=trajectory)
         for joint in trajectory.joint_names:
             message.path_tolerance.append(self._tolerance(name=joint, position=path))
@@ -295,7 +289,7 @@ class TrajectoryController:
         future = self.client.send_goal_async(
             message,
             goal_uuid=UUID(uuid=list(identifier)),
-            feedback_callback=self._guarded(lambda said: self._on_feedback(goal, said)),
+            feedback_callback=self._guarded(lambda message: self._on_feedback(goal, message)),
         )
         self._ask(future, lambda handle: self._on_answer(goal, handle))
         if before is not None:
@@ -336,10 +330,12 @@ class TrajectoryController:
         goals = {
             bytes(s.goal_info.goal_id.uuid) for s in message.status_list if s.status in active
         }
-        goal = self._goal
+        goal, new = self._goal, goals - self._known
         if goal is None or goal.handle is None:
             self._known |= goals
-        elif goals - self._known:
+            self.taken = self.taken or (goal is None and bool(new))
+        elif new:
+            self.taken = True
             self._end(goal, self._taken_over())
 
     def _taken_over(self) -> str:
@@ -352,8 +348,8 @@ class TrajectoryController:
             clients = node.get_client_names_and_types_by_node(name, space)
             if any(client == service for client, _ in clients):
                 found.append(f'{space.rstrip("/")}/{name}')
-        who = ', '.join(sorted(found)) or 'another client'
-        return f'the goal of {self.action} was cancelled or replaced by {who}'
+        names = ', '.join(sorted(found)) or 'another client'
+        return f'the goal of {self.action} was cancelled or replaced by {names}'
 
     def _end(self, goal: _Goal, reason: str) -> None:
         if goal is self._goal:

@@ -68,8 +68,6 @@ def positions(
     from armid_ros.arm import save_model
     from armid_ros.cli import options
     from armid_ros.estimate import Estimate
-    from armid_ros.files import json_text
-    from armid_ros.identification import write_document
     from armid_ros.positions.commands import read_commands
     from armid_ros.positions.fit import fit_positions
     from armid_ros.positions.loop import LoopModel
@@ -89,21 +87,15 @@ def positions(
         ]
         tick(0.1, 'fitting')
         found = fit_positions(LoopModel(robot, compensated), runs, known)
-    document = fit_document(found)
-    write_document(staged.folder / 'positions.json', document)
     source = options.kept_source(robot_source, robot, staged.folder)
     sure = np.isfinite(found.std)
     names = tuple(compress(found.parameters, sure))
     estimate = Estimate(names, found.values[sure], np.diag(found.std[sure] ** 2))
     save_model(staged.folder / 'model.yaml', found.arm, source, estimate)
-    staged.keep()
-    if as_json:
-        click.echo(json_text(document))
-        return
+    document = fit_document(found)
     step = f'armid simulate --model {out / "model.yaml"} --out simulated'
-    options.show(
-        fit_summary(found, document['verdict'], step), f'{out}: positions.json, model.yaml'
-    )
+    summary = None if as_json else fit_summary(found, document['verdict'], step)
+    options.deliver_document(staged, 'positions', document, summary, 'model.yaml')
 
 
 def gains_of(text: str, robot: Robot) -> FloatArray:

@@ -18,12 +18,12 @@ from itertools import pairwise
 from armid_ros.arm import ArmModel
 from armid_ros.errors import ModelError
 from armid_ros.estimate import ParameterName
-from armid_ros.motion import FloatArray
+from armid_ros.motion import FloatArray, Motion
 from armid_ros.recording import Recording
 from armid_ros.recording.recording import GAP_PERIODS
 from armid_ros.robots import Robot
 from armid_ros.simulation.closed_loop import CompiledLoop, run
-from armid_ros.simulation.controller import Controller, LinearFeedback, Targets
+from armid_ros.simulation.controller import Controller, LinearFeedback
 from armid_ros.simulation.plant import Plant
 import numpy as np
 import pinocchio as pin
@@ -216,11 +216,13 @@ class LoopModel:
             steps = int(np.ceil((window.t[-1] - window.start) / STEP)) + 1
             edges = window.start - x[0] + STEP * np.arange(steps + 2)
             u, du = window.commands.mean(edges)
-            targets = Targets(u, np.zeros_like(u), np.zeros_like(u), kd * du)
-            state = plant.state(*window.state)
-            torque = control.torque(state.q, state.dq, *targets.at(0))
+            still = np.zeros_like(u)
+            targets = Motion(self.robot.joints, edges[:-1], u, still, still, kd * du)
+            state, rows = plant.state(*window.state), range(1, len(u))
+            first = u[0], still[0], still[0]
+            torque = control.torque(state.q, state.dq, first, kd * du[0])
             try:
-                trace = run(plant, control, state, torque, targets[slice(1, None)], compiled)
+                trace = run(plant, control, state, torque, targets, rows, compiled)
             except (ModelError, FloatingPointError):  # an unstable loop
                 found.append(np.full_like(window.q, _FAR))
                 continue

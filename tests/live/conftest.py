@@ -6,7 +6,7 @@ from __future__ import annotations
 
 from armid_ros.arm import ArmModel
 from armid_ros.effects import parse_effect
-from armid_ros.live import DiagnosisRequest, InProcess
+from armid_ros.nodes.live import DiagnosisRequest, Worker
 from armid_ros.recording import Recording
 from armid_ros.simulation import Reference, Sensors, SimulatedArm
 import numpy as np
@@ -15,6 +15,26 @@ import pytest
 RATE = 200.0
 KNOWN = ('viscous_friction:viscous_coefficient=0.3', 'coulomb_friction:coulomb_torque=0.2')
 MORE_FRICTION = 'viscous_friction@elbow_pitch:viscous_coefficient=0.3'
+
+
+class InProcess:
+    """An assistant that runs each job at once, in this process."""
+
+    def __init__(self):
+        self._worker, self._results = Worker(), []
+
+    @property
+    def busy(self):
+        return bool(self._results)
+
+    def ask(self, job):
+        self._results.append(self._worker.run(job))
+
+    def poll(self):
+        return self._results.pop(0) if self._results else None
+
+    def close(self):
+        pass
 
 
 def moving(robot, duration, rng):
@@ -76,7 +96,6 @@ def asked(known_arm, changed):
 
 @pytest.fixture(scope='session')
 def answered(asked):
-    """Return the in-process diagnosis that answered the request, and its answer."""
-    here = InProcess()
-    here.ask(asked)
-    return here, here.poll()
+    """Return the worker that answered the request, and its answer."""
+    worker = Worker()
+    return worker, worker.run(asked)

@@ -4,7 +4,7 @@
 
 from __future__ import annotations
 
-from armid_ros.live.onset import onset
+from armid_ros.identification.online.onset import onset
 
 
 def test_nothing_is_found_where_nothing_changes(known_arm, healthy):

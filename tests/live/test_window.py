@@ -4,7 +4,7 @@
 
 from __future__ import annotations
 
-from armid_ros.live import SampleWindow
+from armid_ros.nodes.live import SampleWindow
 import numpy as np
 
 JOINTS = ('a', 'b')

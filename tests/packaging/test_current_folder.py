@@ -17,7 +17,7 @@ STARTS = {
         assert start_program(('--help',)).wait(60) == 0
         """,
     'the assistant of live_diagnosis': """
-        from armid_ros.live.assistant import Assistant, Plan
+        from armid_ros.nodes.live.assistant import Assistant, Plan
         assistant = Assistant()
         assistant.ask(Plan())
         assert assistant._pipe.poll(60)

@@ -12,7 +12,6 @@ import pytest
 
 #: Folders of plug-ins that bring a command, and its name.
 WITH_COMMAND = {
-    'controllers': 'export',
     'fleet': 'fleet',
     'papers/elastic': 'elastic',
     'papers/exo': 'exo',

@@ -4,30 +4,30 @@
 
 from __future__ import annotations
 
-import re
-
-from armid_ros.nodes.running.process import stray, unreadable
+from armid_ros.nodes.parameters.table import ParameterError
+from armid_ros.nodes.recorder import RecorderNode
+from armid_ros.nodes.running.process import _made, unreadable
 import pytest
+import rclpy
 from rclpy._rclpy_pybind11 import RCLError, UnknownROSArgsError
 from rclpy.context import Context
 
 
 @pytest.mark.parametrize(
-    ('arguments', 'said'),
+    'arguments',
     [
-        (['-p', 'bag'], '-p bag: .*NAME:=VALUE'),
-        (['-p'], '-p: .*NAME:=VALUE'),
-        (['-r', 'here'], '-r here: .*NAME:=OTHER_NAME'),
-        (['-r', '__node:=not-a-name'], '-r __node:=not-a-name: .*NAME:=OTHER_NAME'),
-        (['--params-file', 'nope.yaml'], 'nope.yaml: .*--params-file'),
-        (['--log-level', 'x'], '--log-level x: '),
-        (['--nonsense'], '--nonsense: .*--help'),
+        ['-p', 'bag'],
+        ['-r', '__node:=not-a-name'],
+        ['--params-file', 'nope.yaml'],
+        ['--log-level', 'x'],
+        ['--nonsense'],
     ],
 )
-def test_what_ros_cannot_read_is_named(arguments, said):
+def test_what_ros_cannot_read_is_named(arguments):
     with pytest.raises((RCLError, UnknownROSArgsError)) as error:
         Context().init(['--ros-args', *arguments])
-    assert re.match(said, unreadable(error.value))
+    said = unreadable(error.value)
+    assert ' '.join(arguments) in said and 'NAME:=VALUE' in said and ' at /' not in said
 
 
 def test_a_file_that_is_none_of_parameters_is_named_with_the_line(tmp_path):
@@ -35,12 +35,12 @@ def test_a_file_that_is_none_of_parameters_is_named_with_the_line(tmp_path):
     path.write_text('recorder:\n  rate: 3\n')
     with pytest.raises(RCLError) as error:
         Context().init(['--ros-args', '--params-file', str(path)])
-    said = unreadable(error.value)
-    assert said.startswith(f'{path}: ') and said.endswith('line 2')
+    assert str(path) in unreadable(error.value) and 'line 2' in unreadable(error.value)
 
 
-@pytest.mark.parametrize('others', [['robot:=my_arm.urdf'], ['--robot', 'my_arm.urdf']])
-def test_arguments_that_are_none_of_ros_are_named(others):
-    said = stray([*others, '--ros-args', '-p', 'rate:=200.0'], 'simulated_arm')
-    assert said.startswith(f'{" ".join(others)}: simulated_arm ')
-    assert stray(['--ros-args', '-p', 'rate:=200.0', '--'], 'simulated_arm') == ''
+def test_arguments_that_are_none_of_ros_are_named():
+    try:
+        with pytest.raises(ParameterError, match=r'robot:=my_arm\.urdf: .*NAME:=VALUE'):
+            _made(RecorderNode, ['robot:=my_arm.urdf', '--ros-args', '-p', 'record:=false'])
+    finally:
+        rclpy.try_shutdown()

@@ -38,7 +38,8 @@ def parameters(node):
     for given in node.parameters:
         if isinstance(given, str):
             content = yaml.safe_load(Path(given).read_text())
-            given = content.get(f'/**/{node.executable}', {}).get('ros__parameters', {})
+            patterns = [content.get(name, {}) for name in ('/**', f'/**/{node.executable}')]
+            given = {k: v for own in patterns for k, v in own.get('ros__parameters', {}).items()}
         found |= given
     return found
 
@@ -46,14 +47,21 @@ def parameters(node):
 def test_every_argument_has_an_effect_and_the_robot_has_to_be_known():
     with pytest.raises(RuntimeError, match='robot'):
         identify()
-    before = {k: (v.parameters, v.remappings) for k, v in identify(robot='a').items()}
+    before = {k: (parameters(v), v.remappings) for k, v in identify(robot='a').items()}
     for one in declared('identify'):
         other = {'diagnose': 'false', 'rehearse': 'true', 'simulate': 'true'}.get(one.name, '7')
         if one.name in ('namespace', 'params_file', 'use_sim_time'):
             continue
         nodes = identify(**{'robot': 'a', one.name: other})
-        after = {k: (v.parameters, v.remappings) for k, v in nodes.items()}
+        after = {k: (parameters(v), v.remappings) for k, v in nodes.items()}
         assert after != before, one.name
+
+
+def test_a_parameter_file_without_robot_moves_no_default_robot(tmp_path):
+    (tmp_path / 'own.yaml').write_text('{}')
+    nodes = identify(params_file=str(tmp_path / 'own.yaml'))
+    for name in ('excitation_publisher', 'identification_run'):
+        assert parameters(nodes[name])['robot'] == ''
 
 
 def test_the_arm_begins_when_the_node_asks_and_all_end_with_it(tmp_path):
@@ -68,7 +76,7 @@ def test_the_arm_begins_when_the_node_asks_and_all_end_with_it(tmp_path):
         'arm.urdf',
     )
     assert nodes['identification_run'].on_exit
-    assert nodes['excitation_publisher'].parameters[0] == str(CONFIG)
+    assert nodes['excitation_publisher'].parameters[1] == str(CONFIG)
     remapped = dict(nodes['excitation_publisher'].remappings)
     assert remapped['joint_trajectory'] == 'jtc/joint_trajectory'
 

@@ -217,13 +217,44 @@ def test_a_controller_that_another_client_takes_over_is_let_go(bench, arm, excit
     else:
         bench.spin_until(client.server_is_ready, 'the action')
         away = node._gate.run.at([3.0])
-        goal = write_trajectory(replace(away, dq=0 * away.dq, ddq=0 * away.ddq), 2.0)
+        goal = write_trajectory(replace(away, t=np.array([2.0]), dq=0 * away.dq, ddq=0 * away.ddq))
         client.send_goal_async(FollowJointTrajectory.Goal(trajectory=goal))
     bench.spin_until(lambda: node.condition()[0], 'the reason')
     sent = len(arm.goals)
     arm.run(104.0)
     assert len(arm.goals) == sent == (1 if how == 'cancelled' else 2)
     assert '/probe' in node.condition()[0]
+    client.destroy()
+
+
+def test_a_success_half_way_is_no_complete_run(bench, arm, excitation):
+    node = begun(bench, arm, excitation)
+    arm.run(101.5)
+    arm._end('succeed')
+    arm.run(104.0)
+    assert node.activity == node.condition()[1]['run'] == 'stopped'
+    assert 'reported the end' in node.condition()[0]
+    np.testing.assert_allclose(arm.state(arm.now).dq, 0.0, atol=1e-9)
+
+
+def test_a_goal_of_another_client_after_a_stop_is_not_stopped(bench, arm, excitation):
+    node = begun(bench, arm, excitation)
+    arm.run(101.5)
+    t = np.arange(0.1, 5.0, 0.1)
+    along = replace(node._gate.run.at(1.9 + t), t=t)
+    node.stop()
+    arm.run(102.0)
+    client = ActionClient(bench.probe, FollowJointTrajectory, NAME)
+    bench.spin_until(client.server_is_ready, 'the action')
+    message = write_trajectory(along)
+    message.points[-1].velocities = [0.0] * len(ROBOT.joints)
+    client.send_goal_async(FollowJointTrajectory.Goal(trajectory=message))
+    bench.spin_until(lambda: node._controller.taken, 'the goal of the other client')
+    sent = len(arm.goals)
+    arm.run(104.5)
+    assert not bench.call('excitation_publisher/stop').success
+    arm.run(105.0)
+    assert len(arm.goals) == sent
     client.destroy()
 
 

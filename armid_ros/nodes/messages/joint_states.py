@@ -21,22 +21,22 @@ from rclpy.time import Time
 
 #: Texts about faulty sequences of joint states, by reason.
 DISTURBANCES = {
-    'out_of_order': 'joint states whose stamp is not after that of the one before are left out',
-    'impossible': 'joint states with numbers that no arm has are left out',
-    'stamp': 'joint states whose stamp alone is off are left out',
-    'erratic': 'joint states that follow neither those before nor each other are left out',
-    'no_velocity': 'joint states without velocity are left out: measured_velocity requires it',
-    'jump_back': 'joint states jump back in time: their processing begins anew',
-    'position_step': 'positions step, as when a clock is set or an encoder is zeroed: the filters '
-    'begin anew',
-    'missing': 'joint states are missing between those that came: the history of the publisher is '
-    'shorter than a second, or the computer has too much to do',
-    'dropout': 'joint states are missing for longer than max_gap: the filters begin anew',
-    'frozen': 'positions stay at the same numbers while efforts change: look whether the driver '
-    'still reads the encoders',
+    'out_of_order': 'joint states whose stamp is not after the previous one are skipped',
+    'impossible': 'joint states with values that no arm can reach are skipped',
+    'stamp': 'joint states with a single wrong stamp are skipped',
+    'erratic': 'joint states that agree neither with earlier nor with later ones are skipped',
+    'no_velocity': 'joint states without velocity are skipped: measured_velocity requires it',
+    'jump_back': 'joint states jump back in time: their processing restarts',
+    'position_step': 'positions step, as after a step of the clock or the zeroing of an encoder: '
+    'the filters restart',
+    'missing': 'joint states are missing: the history of the publisher is shorter than a second, '
+    'or the computer is overloaded',
+    'dropout': 'joint states are missing for longer than max_gap: the filters restart',
+    'frozen': 'positions stay constant while efforts change: check whether the driver still reads '
+    'the encoders',
 }
 #: Reasons that two publishers of the same joints can cause.
-_OF_TWO = frozenset({'out_of_order', 'stamp', 'erratic', 'jump_back', 'position_step', 'spike'})
+OF_TWO = frozenset({'out_of_order', 'stamp', 'erratic', 'jump_back', 'position_step', 'spike'})
 
 
 class JointSample(NamedTuple):
@@ -161,7 +161,7 @@ class JointStateReader:
             )
             sec, nanosec = divmod(self._clock.now().nanoseconds, 10**9)
         if sec < 0 or nanosec >= 10**9:
-            raise RecordingError('joint states with a stamp that is no time are left out')
+            raise RecordingError('joint states with an invalid stamp are skipped')
         if self._epoch is None:
             self._epoch = sec
         return float(sec - self._epoch) + 1e-9 * nanosec
@@ -182,21 +182,3 @@ class JointStateReader:
             joint = self._joints[bad if self._merger is None else self._some[bad]]
             raise RecordingError(f"joint states where the {name} of '{joint}' is not a number")
         return values
-
-
-def disturbance(reason: str, several: str, text: str = '') -> str:
-    """
-    Return a text on faulty joint states.
-
-    Parameters
-    ----------
-    reason : str
-        A key of `DISTURBANCES`, or 'spike'.
-    several : str
-        Text that names several publishers; empty for one.
-    text : str
-        Text for a reason that is not a key.
-
-    """
-    said = text or DISTURBANCES[reason]
-    return f'{said}; {several}' if several and reason in _OF_TWO else said

@@ -9,14 +9,13 @@ from dataclasses import replace
 
 from armid_ros.arm import ArmModel
 from armid_ros.arm.model_file import load_model
-from armid_ros.effects import parse_effect
 from armid_ros.errors import RobotError
 from armid_ros.files import reading
 from armid_ros.nodes.parameters.table import NodeParameter, Values
 from armid_ros.recording.columns import numbers, per_joint
 from armid_ros.robots import load_robot, parse_gravity
 from armid_ros.robots.two_link import TwoLinkSet
-from armid_ros.simulation import ComputedTorque, GravityPD, Plant, Sensors, SimulatedArm
+from armid_ros.simulation import Plant, Sensors, SimulatedArm
 from armid_ros.simulation.elastic import (
     elastic_joints,
     make_elastic_arm,
@@ -46,12 +45,6 @@ ARM_PARAMETERS = (
         '',
         'Initial position, as q1,q2,...; empty: middle of the position limits [rad or m].',
     ),
-    NodeParameter(
-        'controller',
-        'computed_torque',
-        'Controller of an arm with rigid joints.',
-        choices=('computed_torque', 'gravity_pd'),
-    ),
     *(
         NodeParameter(
             name, [0.0], f'{what}, one or one per joint; 0: none.', unit, read_only=False
@@ -64,21 +57,7 @@ ARM_PARAMETERS = (
         )
     ),
     NodeParameter(
-        'velocity_from_encoder',
-        False,
-        'Compute the velocity by differentiating positions.',
-        read_only=False,
-    ),
-    NodeParameter(
         'torque_delay', 0, 'Delay of the torque measurement in time steps.', limits=(0, 100000)
-    ),
-    NodeParameter(
-        'acceleration_noise',
-        0.0,
-        'Standard deviation; of links on springs.',
-        'm/s^2',
-        limits=(0.0, 1000.0),
-        read_only=False,
     ),
     NodeParameter(
         'loop_gain',
@@ -91,12 +70,13 @@ ARM_PARAMETERS = (
 )
 
 
-_PER_JOINT = ('torque_noise', 'position_noise', 'velocity_noise', 'resolution')
-#: Parameters of the sensors that can be set while the arm moves.
-SENSOR_PARAMETERS = {*_PER_JOINT, 'velocity_from_encoder', 'acceleration_noise'}
+#: Parameters of the sensors that can be set while the arm moves, one number or one per joint.
+SENSOR_PARAMETERS = ('torque_noise', 'position_noise', 'velocity_noise', 'resolution')
 
 
-def make_arm(value: Values, warn: Callable[[str], object]) -> SimulatedArm:
+def make_arm(
+    value: Values, arm: ArmModel, drives: TwoLinkSet | None, warn: Callable[[str], object]
+) -> SimulatedArm:
     """
     Make the simulated arm that parameters describe, with elastic joints if it has any.
 
@@ -104,6 +84,8 @@ def make_arm(value: Values, warn: Callable[[str], object]) -> SimulatedArm:
     ----------
     value : callable
         Returns the value of a parameter of `ARM_PARAMETERS`.
+    arm, drives : ArmModel, and TwoLinkSet or None
+        Result of `described_arm`.
     warn : callable
         Called with texts on parts of the model that cannot be simulated.
 
@@ -113,7 +95,6 @@ def make_arm(value: Values, warn: Callable[[str], object]) -> SimulatedArm:
         If robot, model, effects or sensors are not valid or do not fit each other.
 
     """
-    arm, drives = described_arm(value)
     arm = with_effects(arm, value('effects'))
     n, dt = arm.robot.n_joints, value('time_step')
     rng = np.random.default_rng(value('seed'))
@@ -135,12 +116,7 @@ def make_arm(value: Values, warn: Callable[[str], object]) -> SimulatedArm:
             sensors=sensors,
             start=start or None,
         )
-    plant = Plant(arm, dt=dt)
-    controllers = {'computed_torque': ComputedTorque, 'gravity_pd': GravityPD}
-    controller = controllers[value('controller')](plant.arm)
-    return SimulatedArm(
-        plant, rng=rng, controller=controller, sensors=sensors, start=start or None
-    )
+    return SimulatedArm(Plant(arm, dt=dt), rng=rng, sensors=sensors, start=start or None)
 
 
 def sensors_of(value: Values, joints: Sequence[str]) -> Sensors:
@@ -154,10 +130,11 @@ def sensors_of(value: Values, joints: Sequence[str]) -> Sensors:
 
     """
     return Sensors(
-        **{name: per_joint(value(name), joints, f"parameter '{name}'") for name in _PER_JOINT},
-        velocity_from_encoder=value('velocity_from_encoder'),
+        **{
+            name: per_joint(value(name), joints, f"parameter '{name}'")
+            for name in SENSOR_PARAMETERS
+        },
         torque_delay=value('torque_delay'),
-        acceleration_noise=value('acceleration_noise'),
     )
 
 
@@ -178,9 +155,8 @@ def with_effects(arm: ArmModel, texts: Iterable[str]) -> ArmModel:
         If an effect or joint does not exist.
 
     """
-    for text in filter(None, texts):
-        arm = arm.with_effect(*parse_effect(text, arm.robot))
-    return arm
+    more = ArmModel.of(arm.robot, effects=tuple(filter(None, texts)))
+    return replace(arm, effects=arm.effects + more.effects, values=arm.values + more.values)
 
 
 def described_arm(value: Values) -> tuple[ArmModel, TwoLinkSet | None]:

@@ -4,8 +4,8 @@
 
 from __future__ import annotations
 
+from armid_ros.api.arguments import USUAL
 from armid_ros.arm import ArmModel, load_model
-from armid_ros.effects import make_effect, USUAL_EFFECTS
 from armid_ros.errors import TrajectoryError
 from armid_ros.excitation import (
     CollisionScene,
@@ -22,6 +22,7 @@ from armid_ros.excitation import (
 )
 from armid_ros.excitation.feasibility import excitation_faults
 from armid_ros.files import reading
+from armid_ros.nodes.parameters.arm import with_effects
 from armid_ros.nodes.parameters.table import NodeParameter, Values
 from armid_ros.robots import load_arms, load_robot
 import numpy as np
@@ -48,8 +49,8 @@ PUBLISHER_PARAMETERS = (
     NodeParameter(
         'file',
         '',
-        'Excitation to use (.yaml); empty: design one. Set on the running node it is what '
-        '~/start runs next.',
+        'Excitation to use (.yaml); empty: design one. A file set at run time is run by '
+        'the next ~/start.',
         read_only=False,
     ),
     NodeParameter(
@@ -67,21 +68,21 @@ PUBLISHER_PARAMETERS = (
     ),
     NodeParameter(
         'effects',
-        list(USUAL_EFFECTS),
+        USUAL.split(','),
         'Effects to excite, with the rigid body.',
     ),
     NodeParameter('clearance', 0.01, 'Distance kept between bodies.', 'm', limits=(0.0, 1.0)),
     NodeParameter(
         'floor',
         '',
-        'Height of the floor above the origin of the base [m], or none; empty: what is shipped '
+        'Height of the floor above the origin of the base [m], or none; empty: the height shipped '
         'with the robot, or the base plane of an arm that stands.',
     ),
     NodeParameter(
         'environment',
         '',
-        'YAML with what stands around the arm, or a planning scene of MoveIt, as ros2 topic '
-        'echo prints it; empty: nothing.',
+        'YAML of the obstacles around the arm, or a planning scene of MoveIt, as ros2 topic '
+        'echo prints it; empty: none.',
     ),
     NodeParameter(
         'design_time', 20.0, 'Limit of processor time of the search.', 's', limits=(1.0, 86400.0)
@@ -96,8 +97,8 @@ PUBLISHER_PARAMETERS = (
         'interface',
         'auto',
         'How trajectories are sent. action: as goals, which needs the package control_msgs. '
-        'topic: no controller answers. auto: by the action where there is one when the run '
-        'begins.',
+        'topic: as messages, which no controller answers. auto: by the action if a controller '
+        'offers it when the run begins.',
         choices=('auto', 'topic', 'action'),
     ),
     NodeParameter(
@@ -109,8 +110,8 @@ PUBLISHER_PARAMETERS = (
     NodeParameter(
         'goal_tolerance',
         0.0,
-        'How far a joint may be from the end for the goal to be reached; 0: what the controller '
-        'has. On the way the controller gets tracking_tolerance.',
+        'Largest distance of a joint from the end of a goal that is reached; 0: default of the '
+        'controller. Its path tolerance is tracking_tolerance.',
         'rad or m',
         limits=(0.0, 10.0),
         read_only=False,
@@ -150,8 +151,8 @@ PUBLISHER_PARAMETERS = (
     NodeParameter(
         'zero_stamp',
         False,
-        'Stamp the run with zero, which a controller takes for now: where the clocks of this '
-        'computer and of the robot differ. Stops are always stamped with zero.',
+        'Stamp the run with zero, so that the controller begins at once: for clocks of this '
+        'computer and of the robot that differ. Stops are always stamped with zero.',
     ),
     NodeParameter(
         'stopping',
@@ -263,9 +264,7 @@ def make_excitation(value: Values, rate: float, planner: TransferPlanner) -> Exc
         return checked(load_excitation(value('file')), planner, value('file'))
     arm = planner.arm
     own = {effect.name for effect in arm.effects}
-    for name in value('effects'):
-        if name not in own:
-            arm = arm.with_effect(make_effect(name, arm.robot))
+    arm = with_effects(arm, [name for name in value('effects') if name not in own])
     periods, run_in = value('n_periods'), value('run_in')
     settings = DesignSettings(
         period=whole_period(value('duration'), periods, run_in, rate),

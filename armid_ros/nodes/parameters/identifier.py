@@ -4,8 +4,8 @@
 
 from __future__ import annotations
 
+from armid_ros.api.arguments import USUAL
 from armid_ros.arm import ArmModel
-from armid_ros.effects import make_effect, USUAL_EFFECTS
 from armid_ros.identification.online.identifier import OnlineIdentifier, OnlineSettings
 from armid_ros.nodes.parameters.table import NodeParameter, Values
 from armid_ros.robots import load_robot, parse_gravity, Robot, robot_from_urdf
@@ -28,7 +28,7 @@ IDENTIFIER_PARAMETERS = (
     *ROBOT_PARAMETERS,
     NodeParameter(
         'effects',
-        list(USUAL_EFFECTS),
+        USUAL.split(','),
         'Effects to estimate with the rigid body, each as NAME[@joint+joint].',
     ),
     NodeParameter(
@@ -37,13 +37,6 @@ IDENTIFIER_PARAMETERS = (
         'Cut-off of the low-pass filter of torque and regressor.',
         'Hz',
         limits=(0.01, 1000.0),
-    ),
-    NodeParameter(
-        'row_rate',
-        0.0,
-        'Samples used per second; 0 for 40 times the cut-off.',
-        'Hz',
-        limits=(0.0, 10000.0),
     ),
     NodeParameter(
         'forgetting',
@@ -71,7 +64,7 @@ IDENTIFIER_PARAMETERS = (
     NodeParameter(
         'false_alarm_time',
         360000.0,
-        'Mean time between false reports of a change; 0: changes are not looked for.',
+        'Mean time between false reports of a change; 0: no search for changes.',
         's',
         limits=(0.0, 1e9),
         read_only=False,
@@ -104,10 +97,7 @@ def make_identifier(value: Values, description: str | None = None) -> OnlineIden
         If robot, effects or settings are not valid or do not fit each other.
 
     """
-    robot = robot_of(value, description)
-    arm = ArmModel(robot)
-    for text in value('effects'):
-        arm = arm.with_effect(make_effect(text, robot))
+    arm = ArmModel.of(robot_of(value, description), effects=value('effects'))
     return OnlineIdentifier(arm, settings_of(value, arm), rng=np.random.default_rng(0))
 
 
@@ -118,7 +108,6 @@ def settings_of(value: Values, arm: ArmModel) -> OnlineSettings:
         noise = noise * arm.robot.n_joints
     return OnlineSettings(
         cutoff=value('cutoff'),
-        row_rate=value('row_rate') or None,
         forgetting=value('forgetting'),
         torque_noise=noise if any(noise) else None,
         max_gap=value('max_gap'),

@@ -9,9 +9,8 @@ from pathlib import Path
 
 from armid_ros.api.arguments import read_recording
 from armid_ros.arm import ArmModel, load_misfit, load_model
-from armid_ros.effects import parse_effect
 from armid_ros.errors import ModelError
-from armid_ros.live import LiveDiagnosis, LiveSettings
+from armid_ros.nodes.live import LiveDiagnosis, LiveSettings
 from armid_ros.nodes.parameters.identifier import robot_of, ROBOT_PARAMETERS
 from armid_ros.nodes.parameters.table import NodeParameter, Values
 
@@ -81,9 +80,9 @@ LIVE_PARAMETERS = (
     NodeParameter(
         'learning',
         20.0,
-        'Motion at the beginning in which nothing is wrong. It gives the misfit of the model '
-        'where neither a baseline nor the model file does. 0: find all that the model lacks, not '
-        'changes alone.',
+        'Motion of the healthy arm at the beginning. The misfit of the model is computed from it '
+        'if neither a baseline nor the model file gives it. 0: diagnose all deviations from the '
+        'model, not only changes.',
         's',
         limits=(0.0, 600.0),
     ),
@@ -137,8 +136,8 @@ def make_diagnosis(value: Values, description: str | None = None) -> LiveDiagnos
     else:
         assert robot is not None  # the node then waits for robot_description
         arm = ArmModel(robot)
-    for text in value('effects'):
-        effect, values = parse_effect(text, arm.robot)
+    given = ArmModel.of(arm.robot, effects=value('effects'))
+    for effect, values in zip(given.effects, given.values, strict=True):
         if effect in arm.effects:
             known = list(arm.values)
             known[arm.effects.index(effect)] = values

@@ -7,7 +7,6 @@ from __future__ import annotations
 from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass
 import math
-import re
 from typing import Any
 
 from armid_ros.errors import ArmidError, meant
@@ -17,7 +16,6 @@ from rcl_interfaces.msg import (
     ParameterDescriptor,
     SetParametersResult,
 )
-from rclpy.exceptions import InvalidParameterTypeException, InvalidParameterValueException
 from rclpy.node import Node
 from rclpy.parameter import Parameter
 
@@ -82,10 +80,45 @@ class NodeParameter:
         choices = f' One of: {", ".join(self.choices)}.' if self.choices else ''
         return f'{self.description}{unit}{choices}'
 
+    def converted(self, value: Any) -> Value:
+        """
+        Return a value with the type of the parameter.
+
+        An integer is accepted for a float, one value for a list of one, and [] for no names.
+
+        Raises
+        ------
+        ParameterError
+            If the value has another type; the message has a valid value.
+
+        """
+        default, several = self.default, isinstance(self.default, list)
+        kind = type(default[0] if isinstance(default, list) else default)
+        one = not several or isinstance(value, str | float | int)
+        items = [value] if one else list(value or ())
+        if kind is str and not items:
+            return ['']
+        items = [float(item) if kind is float and type(item) is int else item for item in items]
+        if items and all(type(item) is kind for item in items):
+            typed: Value = items if several else items[0]
+            return typed
+        instead = f'use a value such as {str(default).lower() if kind is bool else default}'
+        if kind is str:
+            instead = f'use a text; quote what is no text twice: -p {self.name}:="\'{value}\'"'
+        raise ParameterError(f"parameter '{self.name}' cannot be {value}; {instead}")
+
     def objection(self, value: object) -> str:
-        """Return why a value of the right type and range is invalid; empty if it is valid."""
+        """Return why a value of the right type is invalid; empty if it is valid."""
         if isinstance(value, float) and not math.isfinite(value):
-            return f"parameter '{self.name}' must be a finite number"
+            return f"parameter '{self.name}' is {value}, not a finite number"
+        if isinstance(value, int | float) and self.limits is not None:
+            lower, upper = self.limits
+            if not lower <= value <= upper:
+                unit = f' {self.unit}' if self.unit else ''
+                return (
+                    f"parameter '{self.name}' is {value}, outside its range "
+                    f'{lower:g} to {upper:g}{unit}'
+                )
         if self.choices and value not in self.choices:
             return f"parameter '{self.name}' is '{value}', not one of {', '.join(self.choices)}"
         if self.check is not None:
@@ -100,9 +133,9 @@ class ParameterError(ArmidError):
     """A node was started with an invalid parameter."""
 
 
-def declare(node: Node, table: Iterable[NodeParameter]) -> None:
+def declare(node: Node, table: Iterable[NodeParameter]) -> dict[str, NodeParameter]:
     """
-    Declare the parameters of a table on a node, and check later changes.
+    Declare the parameters of a table on a node, check later changes, and return them by name.
 
     Raises
     ------
@@ -121,22 +154,17 @@ def declare(node: Node, table: Iterable[NodeParameter]) -> None:
                     return SetParametersResult(successful=False, reason=reason)
         return SetParametersResult(successful=True)
 
-    node.add_on_set_parameters_callback(validate)
     given = overrides(node)
-    for entry in entries.values():
-        nothing, default = entry.name in given and not _has_type(given[entry.name]), entry.default
-        if nothing:
-            if not (isinstance(default, list) and all(isinstance(one, str) for one in default)):
-                raise ParameterError(f"parameter '{entry.name}' is empty; {_instead(entry)}")
-            default = ['']
-        try:
-            node.declare_parameter(
-                entry.name, default, entry.descriptor(), ignore_override=nothing
-            )
-        except InvalidParameterTypeException as error:
-            raise ParameterError(_explain_type(entry, str(error))) from error
-        except InvalidParameterValueException as error:
-            raise ParameterError(_explain_value(entry, str(error))) from error
+    for name, entry in entries.items():
+        value = entry.default
+        if name in given:
+            value = entry.converted(given[name].value)
+            reason = entry.objection(value)
+            if reason:
+                raise ParameterError(reason)
+        node.declare_parameter(name, value, entry.descriptor(), ignore_override=True)
+    node.add_on_set_parameters_callback(validate)
+    return entries
 
 
 def overrides(node: Node) -> Mapping[str, Parameter]:
@@ -155,22 +183,6 @@ def unknown(node: Node) -> str:
     return f'{named}; left out, see --help'
 
 
-def as_declared(node: Node, parameter: Parameter) -> Parameter:
-    """Convert integers and empty lists to the declared type of a parameter."""
-    floats = {
-        Parameter.Type.DOUBLE: (Parameter.Type.INTEGER, float),
-        Parameter.Type.DOUBLE_ARRAY: (Parameter.Type.INTEGER_ARRAY, lambda v: list(map(float, v))),
-    }
-    if node.has_parameter(parameter.name):
-        declared = node.get_parameter(parameter.name).type_
-        whole, convert = floats.get(declared, (None, None))
-        if declared == Parameter.Type.STRING_ARRAY and not _has_type(parameter):
-            return Parameter(parameter.name, declared, [''])
-        if parameter.type_ == whole and convert is not None:
-            return Parameter(parameter.name, declared, convert(parameter.value))
-    return parameter
-
-
 def is_as(node: Node, parameter: Parameter) -> bool:
     """Return whether a parameter of a node already has a value."""
     if not node.has_parameter(parameter.name):
@@ -179,41 +191,6 @@ def is_as(node: Node, parameter: Parameter) -> bool:
     return bool(now == parameter.get_parameter_value())
 
 
-def _has_type(parameter: Parameter) -> bool:
-    """Return whether the type of a value is known; it is unknown for an empty list."""
-    return parameter.type_ is not Parameter.Type.NOT_SET and parameter.value != []
-
-
-def _instead(entry: NodeParameter) -> str:
-    """Return a hint with an example of a valid value."""
-    value = str(entry.default).lower() if isinstance(entry.default, bool) else entry.default
-    return f'use a value such as {value}' if value != '' else 'give it a text, or leave it out'
-
-
 def _of_ros(name: str) -> bool:
     """Return whether ROS declares a parameter on every node."""
     return name in _ROS or name.startswith('qos_overrides.')
-
-
-def _explain_type(entry: NodeParameter, text: str) -> str:
-    """Explain a wrong type, such as 100 instead of 100.0, with the correct form."""
-    found = re.search(r"to '(.*)' of type '(\w+)'", text, re.DOTALL)
-    value, given = found.groups() if found else ('?', '?')
-    if isinstance(entry.default, float):
-        instead = f'use {value}.0' if given == 'INTEGER' else f'use a number: {entry.default}'
-    elif isinstance(entry.default, str):
-        instead = f'quote it twice: -p {entry.name}:="\'{value}\'"'
-    else:
-        instead = _instead(entry)
-    return f"parameter '{entry.name}' cannot be {value} of type {given}; {instead}"
-
-
-def _explain_value(entry: NodeParameter, text: str) -> str:
-    found = re.search(r'value \((.*?)\) for parameter', text, re.DOTALL)
-    if found and entry.limits is not None and 'out of range' in text:
-        unit = f' {entry.unit}' if entry.unit else ''
-        return (
-            f"parameter '{entry.name}' is {found[1]}, outside its range "
-            f'{entry.limits[0]:g} to {entry.limits[1]:g}{unit}'
-        )
-    return text.partition('Reason: ')[2].removesuffix(f': {entry.name}') or text

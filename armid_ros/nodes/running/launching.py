@@ -5,8 +5,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
-from pathlib import Path
-import re
+from tempfile import NamedTemporaryFile
 from typing import Any, NamedTuple
 
 from armid_ros.files.cells import listed
@@ -114,10 +113,9 @@ def node(
     from launch_ros.actions import Node
 
     file = given.get('params_file', shipped)
+    with NamedTemporaryFile('w', prefix='armid_', suffix='.yaml', delete=False) as defaults:
+        yaml.safe_dump({'/**': {'ros__parameters': {'end_with_parent': True, **usual}}}, defaults)
     clock = {k: given[k] for k in ('use_sim_time',) if k in given}
-    said = parameters_named(file, full_name(given, executable)) if file else set()
-    usual = {'end_with_parent': True, **usual}
-    values = {k: v for k, v in usual.items() if k not in said} | clock | dict(chosen)
     # Of two matching patterns in parameter files, the later one takes precedence. With
     # name and namespace, launch writes the values under the full name, which comes last.
     return Node(
@@ -125,54 +123,7 @@ def node(
         executable=executable,
         name=executable,
         namespace=given.get('namespace', ''),
-        parameters=[*([file] if file else []), *([values] if values else [])],
+        parameters=[defaults.name, *filter(None, (file, clock | dict(chosen)))],
         output='screen',
         **more,
     )
-
-
-def full_name(given: Mapping[str, Any], executable: str) -> str:
-    """Return the full name of a node in its namespace."""
-    return '/'.join(['', *filter(None, given.get('namespace', '').split('/')), executable])
-
-
-def parameters_named(file: str, name: str) -> set[str]:
-    """
-    Return the names of the parameters that a parameter file sets for a node.
-
-    Parameters
-    ----------
-    file : str
-        YAML with `ros__parameters`, by node or by pattern.
-    name : str
-        Full name of the node.
-
-    Raises
-    ------
-    RuntimeError
-        The file cannot be read.
-
-    """
-    try:
-        content = yaml.safe_load(Path(file).read_text(encoding='utf-8'))
-    except (OSError, ValueError, yaml.YAMLError) as error:
-        raise RuntimeError(f'params_file: {file}: {error}') from error
-    found: set[str] = set()
-    pending = [('', content)]
-    while pending:
-        pattern, part = pending.pop()
-        for key, value in part.items() if isinstance(part, dict) else ():
-            if key != 'ros__parameters':
-                pending.append((f'{pattern}/{str(key).lstrip("/")}', value))
-                continue
-            # patterns as in rcl_yaml_param_parser
-            expression = re.escape(pattern).replace(r'/\*\*', r'(/\w+)*').replace(r'/\*', r'/\w+')
-            if re.fullmatch(expression, name):
-                found |= set(_flat(value))
-    return found
-
-
-def _flat(value: Any, prefix: str = '') -> list[str]:
-    if not isinstance(value, dict):
-        return [prefix]
-    return [name for key in value for name in _flat(value[key], f'{prefix}.{key}'.lstrip('.'))]

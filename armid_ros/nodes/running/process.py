@@ -28,8 +28,7 @@ from rclpy.utilities import remove_ros_args
 from threadpoolctl import threadpool_limits
 
 #: Syntax of ROS arguments.
-_WRITTEN = {'-p': '-p NAME:=VALUE', '-r': '-r NAME:=OTHER_NAME'}
-_FILE = '--params-file'
+_SYNTAX = 'write --ros-args -p NAME:=VALUE -r NAME:=OTHER_NAME --params-file FILE, and see --help'
 #: Timeout of the shutdown of DDS [s].
 LEAVING = 20.0
 
@@ -153,9 +152,9 @@ def _made(make_node: Callable[[], ArmidNode], args: Sequence[str] | None) -> Arm
         rclpy.init(args=args, signal_handler_options=SignalHandlerOptions.NO)
     except (RCLError, RCLInvalidROSArgsError, UnknownROSArgsError) as error:
         raise ParameterError(unreadable(error)) from error
-    said = stray(own, Path(sys.argv[0]).stem)
-    if said:
-        raise ParameterError(said)
+    others = remove_ros_args(['', *own])[1:]
+    if others:
+        raise ParameterError(f'{" ".join(others)}: no ROS arguments; {_SYNTAX}')
     node = make_node()
     node.warn_of_unknown()
     return node
@@ -184,7 +183,7 @@ def _leave(node: ArmidNode | None) -> list[str]:
 
 def unreadable(error: Exception) -> str:
     """
-    Return a text that names the argument ROS cannot read, with its syntax.
+    Return the text of an error of rclpy on its arguments, with their syntax.
 
     Parameters
     ----------
@@ -193,47 +192,7 @@ def unreadable(error: Exception) -> str:
 
     """
     text = re.sub(r',? at /\S+:\d+', '', str(error)).removeprefix('failed to initialize rcl: ')
-    text = ' '.join(text.split())
-    rule = re.search(r"Couldn't parse [\w ]+: '(.*)'\. Error: (.*)", text)
-    if rule:
-        flag, _, value = rule[1].partition(' ')
-        if flag == _FILE:
-            if not Path(value).exists():
-                return f'{value}: there is no such file ({_FILE})'
-            detail = rule[2].strip('. ')
-            return f'{value}: cannot be read as a file of parameters ({_FILE}): {detail}'
-        how = _WRITTEN.get(flag)
-        return f'{rule[1]}: {f"write {how}" if how else rule[2]}'
-    alone = re.search(r"Couldn't parse trailing (\S+) flag", text)
-    if alone:
-        return (
-            f'{alone[1]}: nothing follows it; write {_WRITTEN.get(alone[1], f"{alone[1]} VALUE")}'
-        )
-    unknown = re.findall(r"'([^']*)'", text)
-    if text.startswith('[') and unknown:
-        return f'{" ".join(unknown)}: unknown after --ros-args; see --help'
-    return text
-
-
-def stray(args: Sequence[str], program: str) -> str:
-    """
-    Return a text that names arguments that are not ROS arguments; empty if none.
-
-    Parameters
-    ----------
-    args : sequence of str
-        All arguments without the name of the program; the ROS arguments are valid.
-    program : str
-        Name of the program.
-
-    """
-    others = remove_ros_args([program, *args])[1:]
-    if not others:
-        return ''
-    return (
-        f'{" ".join(others)}: {program} takes only ROS arguments; write parameters as '
-        '--ros-args -p NAME:=VALUE, and see --help'
-    )
+    return f'{" ".join(text.split())}; {_SYNTAX}'
 
 
 def usage(node: type[ArmidNode]) -> str:

@@ -58,10 +58,10 @@ def export(
 ) -> None:
     """Write a model for a controller, a maker's load data or a simulator."""
     from armid_ros.cli import options
-    from armid_ros.controllers.dynamics import torque_code
-    from armid_ros.controllers.loads import load_of, load_text
-    from armid_ros.controllers.ranges import ranges_text
-    from armid_ros.controllers.sdf import arm_sdf, urdf_or_mjcf
+    from armid_ros.cli.export.dynamics import torque_code
+    from armid_ros.cli.export.loads import load_of, load_text
+    from armid_ros.cli.export.ranges import ranges_text
+    from armid_ros.cli.export.sdf import arm_sdf, urdf_or_mjcf
     from armid_ros.files import write_file
     from armid_ros.identification.parameters_file import read_parameters
 

@@ -10,91 +10,16 @@ moment of a change.
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
-
 from armid_ros.arm import ArmModel, Misfit
 from armid_ros.errors import IdentificationError
-from armid_ros.live.request import Answer, DiagnosisRequest, Healthy, WAITING
-from armid_ros.live.window import SampleWindow
+from armid_ros.nodes.live.request import Answer, DiagnosisRequest, LiveSettings, Named, WAITING
+from armid_ros.nodes.live.window import SampleWindow
 from armid_ros.recording import Recording
 import numpy as np
 import numpy.typing as npt
 
-Named = tuple[str, tuple[str, ...]]
-
 #: Verdicts that name an effect.
 NAMING = ('named', 'ambiguous', 'partial')
-
-
-@dataclass(frozen=True)
-class LiveSettings:
-    """
-    Settings of the live diagnosis.
-
-    Attributes
-    ----------
-    window : float
-        Longest motion that is diagnosed [s].
-    shortest : float
-        Shortest motion that is diagnosed [s].
-    every : float
-        Motion between two requests [s].
-    rate : float
-        Rate of the kept samples [Hz].
-    confirmations : int
-        Diagnoses in a row that must agree on an effect.
-    learning : float
-        Motion at the beginning in which the arm is healthy [s]. The misfit of the model is
-        computed from it if neither a baseline nor a misfit is given. 0: no misfit is used.
-    material : float
-        Share of a joint's torque below which a cause does not matter.
-
-    """
-
-    window: float = 20.0
-    shortest: float = 8.0
-    every: float = 4.0
-    rate: float = 200.0
-    confirmations: int = 2
-    learning: float = 20.0
-    material: float = 0.01
-
-    def __post_init__(self) -> None:
-        """Raise an IdentificationError if the window is shorter than the shortest motion."""
-        if not 0.0 < self.shortest <= self.window:
-            raise IdentificationError(
-                f'a window of {self.window:g} s is shorter than the shortest motion that is '
-                f'diagnosed, {self.shortest:g} s'
-            )
-
-
-@dataclass(frozen=True)
-class Belief:
-    """
-    Accepted and proposed model of the arm.
-
-    Attributes
-    ----------
-    accepted : ArmModel
-        Model that the diagnoses use.
-    proposed : ArmModel or None
-        Accepted model with the named effects; None if nothing is proposed.
-    named : tuple of (str, tuple of str)
-        Names and joints of the proposed effects.
-    rejected : frozenset of (str, tuple of str)
-        Names and joints of effects that are not proposed again.
-
-    """
-
-    accepted: ArmModel
-    proposed: ArmModel | None = None
-    named: tuple[Named, ...] = ()
-    rejected: frozenset[Named] = frozenset()
-
-    @property
-    def model(self) -> ArmModel:
-        """Return the proposed model, or the accepted one if nothing is proposed."""
-        return self.accepted if self.proposed is None else self.proposed
 
 
 class LiveDiagnosis:
@@ -118,8 +43,14 @@ class LiveDiagnosis:
     ----------
     settings : LiveSettings
         Present settings; see `use`.
-    belief : Belief
-        Accepted and proposed model of the arm.
+    accepted : ArmModel
+        Model that the diagnoses use.
+    proposed : ArmModel or None
+        Accepted model with the named effects; None if nothing is proposed.
+    named : tuple of (str, tuple of str)
+        Names and joints of the proposed effects.
+    learning : bool
+        Whether the motion of the healthy arm is still being collected.
     window : SampleWindow
         Latest samples.
     latest : Answer or None
@@ -147,28 +78,30 @@ class LiveDiagnosis:
     def reset(self) -> None:
         """Restart with the original model."""
         arm, self._baseline, self._misfit = self._given
-        self.belief = Belief(arm)
+        self.accepted = arm
+        self._rejected: set[Named] = set()
+        self._propose(None)
         self.latest: Answer | None = None
         self.asked = 0
         self._outdate()
         self.use(self.settings)
-        self._healthy: Healthy | None = None
+        self._healthy: tuple[ArmModel, Recording] | None = None
         known = bool(self._baseline) or self._misfit is not None
-        self._learned = known or not self.settings.learning
+        self.learning = not known and self.settings.learning > 0.0
 
     def use(self, settings: LiveSettings) -> None:
         """Use other settings, and empty the window."""
         self.settings = settings
-        joints, period = self.belief.accepted.robot.joints, 1.0 / settings.rate
+        joints, period = self.accepted.robot.joints, 1.0 / settings.rate
         self.window = SampleWindow(joints, max(settings.window, settings.learning), period)
         self._asked_at, self._next = 0.0, settings.every
         self._begin, self._changed = -np.inf, False
         self._agreed: list[Named] = []
 
     @property
-    def learning(self) -> bool:
-        """Return whether the motion of the healthy arm is still being collected."""
-        return not self._learned
+    def model(self) -> ArmModel:
+        """Return the proposed model, or the accepted one if nothing is proposed."""
+        return self.accepted if self.proposed is None else self.proposed
 
     @property
     def confirmed(self) -> bool:
@@ -197,7 +130,7 @@ class LiveDiagnosis:
             # keep the motion so far, from which the misfit of the model is computed
             began = self.window.end - self.settings.learning
             motion = self.window.recording(began, 'the motion in which nothing was wrong')
-            self._healthy, self._learned = Healthy(self.belief.accepted, motion), True
+            self._healthy, self.learning = (self.accepted, motion), False
             self._asked_at = self.window.moved
         return kept
 
@@ -212,12 +145,11 @@ class LiveDiagnosis:
         self._under_way, self._outdated = True, False
         begin = max(self.window.end - self.settings.window, self._begin)
         return DiagnosisRequest(
-            self.belief.accepted,
+            self.accepted,
             self.window.recording(begin, f'window {self.asked}'),
             self._baseline,
             self._misfit,
-            self.settings.shortest,
-            self.settings.material,
+            self.settings,
             self._seed,
             self.window.end,
             self._healthy,
@@ -246,22 +178,21 @@ class LiveDiagnosis:
             self._next = self.settings.shortest - answer.window.duration
             return False
         self.latest = answer
-        before = self.belief.model
+        before = self.model
         if answer.verdict in NAMING and answer.named:
             # count the diagnoses in a row with the same first effect
             named = answer.named[0]
             if self._agreed and self._agreed[-1] != named:
                 self._agreed = []
             self._agreed.append(named)
-            if self.confirmed and named not in self.belief.rejected:
-                self.belief = replace(self.belief, proposed=answer.arm, named=answer.named)
-            elif self.confirmed:
-                self.belief = replace(self.belief, proposed=None, named=())
+            if self.confirmed:
+                rejected = named in self._rejected
+                self._propose(None if rejected else answer.arm, answer.named)
         else:
             self._agreed = []
             if answer.verdict == 'consistent':
-                self.belief = replace(self.belief, proposed=None, named=())
-        return self.belief.model is not before
+                self._propose(None)
+        return self.model is not before
 
     def accept(self) -> None:
         """
@@ -273,12 +204,12 @@ class LiveDiagnosis:
             If nothing is proposed.
 
         """
-        proposed = self._proposed()
-        self.belief = Belief(proposed, rejected=self.belief.rejected)
-        self._outdate()
+        if self.proposed is None:
+            raise IdentificationError('nothing is proposed')
+        self.accepted = self.proposed
         if self._baseline and self.latest is not None:
             self._baseline = (self.latest.window,)
-        self._agreed = []
+        self._decided()
 
     def reject(self) -> None:
         """
@@ -290,16 +221,19 @@ class LiveDiagnosis:
             If nothing is proposed.
 
         """
-        self._proposed()
-        belief = self.belief
-        self.belief = Belief(belief.accepted, rejected=belief.rejected | {belief.named[0]})
-        self._outdate()
-        self._agreed = []
-
-    def _proposed(self) -> ArmModel:
-        if self.belief.proposed is None:
+        if self.proposed is None:
             raise IdentificationError('nothing is proposed')
-        return self.belief.proposed
+        self._rejected.add(self.named[0])
+        self._decided()
+
+    def _decided(self) -> None:
+        """Propose nothing, and count anew with the next request."""
+        self._propose(None)
+        self._agreed = []
+        self._outdate()
+
+    def _propose(self, arm: ArmModel | None, named: tuple[Named, ...] = ()) -> None:
+        self.proposed, self.named = arm, named if arm is not None else ()
 
     def _outdate(self) -> None:
         """Mark the pending answer as outdated."""

@@ -75,7 +75,7 @@ def torque_code(arm: ArmModel, language: str, source: str) -> tuple[str, tuple[s
     ]
     if left_out:
         lines += ['The model has these too, which are not in the torque:', *left_out]
-    law = files('armid_ros.controllers').joinpath('templates', template).read_text('utf-8')
+    law = files('armid_ros.cli.export').joinpath('templates', template).read_text('utf-8')
     text = Template(law).substitute(
         {name: _nested(values.tolist(), brackets, '\n') for name, values in tables.items()},
         comment='\n'.join(f'{comment} {" ".join(line.split())}' for line in lines),

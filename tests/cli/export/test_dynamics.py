@@ -6,7 +6,7 @@ import shutil
 import subprocess
 
 import armid_ros as ar
-from armid_ros.controllers.dynamics import DEAD_BAND, torque_code, torque_tables
+from armid_ros.cli.export.dynamics import DEAD_BAND, torque_code, torque_tables
 from armid_ros.effects import joint_columns
 from armid_ros.effects.traits import Traits
 import numpy as np

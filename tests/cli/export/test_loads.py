@@ -6,7 +6,7 @@ from math import pi
 import re
 
 import armid_ros as ar
-from armid_ros.controllers.loads import abb, franka, kuka, load_of, load_text, universal_robots
+from armid_ros.cli.export.loads import abb, franka, kuka, load_of, load_text, universal_robots
 from armid_ros.errors import ModelError
 import numpy as np
 import pinocchio as pin

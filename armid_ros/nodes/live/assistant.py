@@ -25,7 +25,7 @@ from armid_ros.api.diagnosis import DiagnosisResult
 from armid_ros.diagnosis import Diagnosis, next_run
 from armid_ros.errors import ArmidError, IdentificationError
 from armid_ros.excitation.schedule import excitation_text
-from armid_ros.live.request import Answer, answer, DiagnosisRequest
+from armid_ros.nodes.live.request import Answer, answer, DiagnosisRequest
 import numpy as np
 
 #: One thread of linear algebra: the matrices are small, and other processes need the cores.
@@ -81,52 +81,35 @@ Job = DiagnosisRequest | Save | Plan
 Result = Answer | Done
 
 
-class InProcess:
-    """Computes diagnoses at once, in the calling process."""
+class Worker:
+    """Runs jobs, and keeps the last diagnosis for later jobs."""
 
     def __init__(self) -> None:
         self._last: tuple[DiagnosisRequest, Diagnosis] | None = None
-        self._result: Result | None = None
 
-    @property
-    def busy(self) -> bool:
-        """Return whether a result is available."""
-        return self._result is not None
-
-    def ask(self, job: Job) -> None:
-        """Run a job."""
+    def run(self, job: Job) -> Result:
+        """Run a job; an error of the data or the disk is a result without success."""
         try:
-            self._result = self._done(job)
+            if isinstance(job, DiagnosisRequest):
+                found, diagnosis = answer(job)
+                if diagnosis is not None:
+                    self._last = job, diagnosis
+                return found
+            if self._last is None:
+                raise IdentificationError('nothing has been diagnosed so far')
+            request, diagnosis = self._last
+            if isinstance(job, Save):
+                result = DiagnosisResult(diagnosis, request.arm, (request.window,), ())
+                return Done(f'wrote {", ".join(Save.FILES)} to {result.save(job.folder)}')
+            run = next_run(diagnosis, np.random.default_rng(job.seed))
+            if run is None:
+                return Done('no candidates are ambiguous: no motion is needed', success=False)
+            return Done(run.sentence, excitation=excitation_text(run.excitation))
         except ArmidError as error:
-            self._result = Done(str(error), success=False)
+            return Done(str(error), success=False)
         except OSError as error:
             text = f'{error.filename}: cannot be written: {error.strerror}'
-            self._result = Done(text, success=False)
-
-    def poll(self) -> Result | None:
-        """Return the result, and clear it."""
-        result, self._result = self._result, None
-        return result
-
-    def close(self) -> None:
-        """Do nothing: there is no process."""
-
-    def _done(self, job: Job) -> Result:
-        if isinstance(job, DiagnosisRequest):
-            found, diagnosis = answer(job)
-            if diagnosis is not None:
-                self._last = job, diagnosis
-            return found
-        if self._last is None:
-            raise IdentificationError('nothing has been diagnosed so far')
-        request, diagnosis = self._last
-        if isinstance(job, Save):
-            result = DiagnosisResult(diagnosis, request.arm, (request.window,), ())
-            return Done(f'wrote {", ".join(Save.FILES)} to {result.save(job.folder)}')
-        run = next_run(diagnosis, np.random.default_rng(job.seed))
-        if run is None:
-            return Done('no candidates are ambiguous: no motion is needed', success=False)
-        return Done(run.sentence, excitation=excitation_text(run.excitation))
+            return Done(text, success=False)
 
 
 class Assistant:
@@ -141,40 +124,47 @@ class Assistant:
     """
 
     def __init__(self) -> None:
-        self.busy = False
+        self._pending = 0
         self._start()
+
+    @property
+    def busy(self) -> bool:
+        """Return whether a job is under way."""
+        return self._pending > 0
 
     def ask(self, job: Job) -> None:
         """
-        Begin a job; a new process is started if the last one has ended.
+        Send a job, which runs after the pending ones; a process that has ended is replaced.
+
+        A request of a diagnosis is larger than the buffer of the pipe. It would wait for the
+        pending jobs; send it when none is pending.
 
         Raises
         ------
         IdentificationError
-            If another job is under way, or the process has just ended.
+            If the process has just ended.
         OSError
             If a new process cannot be started.
 
         """
-        if self.busy:
-            raise IdentificationError('a diagnosis is under way; ask again in some seconds')
-        if self._process.poll() is not None:
+        if not self.busy and self._process.poll() is not None:
             self.close()
             self._start()
         try:
             self._pipe.send(job)
         except OSError as error:
             raise IdentificationError(f'the process that diagnoses has ended: {error}') from error
-        self.busy = True
+        self._pending += 1
 
     def poll(self) -> Result | None:
         """Return the result if one has arrived; None otherwise."""
         if self._pipe.closed or not self._pipe.poll():
             return None
-        self.busy = False
+        self._pending -= 1
         try:
             result: Result = self._pipe.recv()
         except (EOFError, OSError):  # the process ended, maybe during the transfer
+            self._pending = 0
             self._pipe.close()
             code = self._process.wait()
             return Done(f'the process that diagnoses has ended with {code}', success=False)
@@ -204,20 +194,15 @@ class Assistant:
             )
 
 
-#: Runs jobs one at a time.
-Helper = Assistant | InProcess
-
-
 def main(fd: int) -> None:
     """Run jobs from a socket until its other end is closed."""
     os.nice(10)  # lower priority than the nodes
-    helper = InProcess()
+    worker = Worker()
     with suppress(EOFError, OSError), Connection(fd) as pipe:
         while True:
             job = pipe.recv()
             try:
-                helper.ask(job)
-                result = helper.poll()
+                result = worker.run(job)
             except (
                 Exception
             ) as error:  # an unexpected error of one window must not end the process

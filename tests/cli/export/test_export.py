@@ -6,8 +6,8 @@ from pathlib import Path
 from xml.etree import ElementTree
 
 import armid_ros as ar
-from armid_ros.controllers.command import export, KINDS
-from armid_ros.controllers.sdf import arm_sdf
+from armid_ros.cli.export.command import export, KINDS
+from armid_ros.cli.export.sdf import arm_sdf
 from armid_ros.errors import ArmidError
 from click.testing import CliRunner
 import numpy as np
@@ -20,7 +20,7 @@ OTHERS = (
     'payload@elbow:payload_m=0.4,payload_mz=0.12,payload_Ixx=0.04,payload_Iyy=0.04',
     'torque_ripple@elbow:ripple_sine=0.2',
 )
-ROBOT = Path(__file__).parents[2] / 'examples' / 'arm.urdf'
+ROBOT = Path(__file__).parents[3] / 'examples' / 'arm.urdf'
 
 
 @pytest.fixture

@@ -56,7 +56,7 @@ def arm_sdf(arm: ArmModel, source: str) -> tuple[str, tuple[str, ...]]:
         'angles': pin.rpy.matrixToRpy,
         'infinity': np.inf,
     }
-    return str(render('model.sdf', values, 'armid_ros.controllers')) + '\n', left_out
+    return str(render('model.sdf', values, 'armid_ros.cli.export')) + '\n', left_out
 
 
 def _numbers(values: FloatArray) -> str:

@@ -7,14 +7,14 @@ from __future__ import annotations
 from types import SimpleNamespace
 
 from armid_ros.errors import IdentificationError
-from armid_ros.live import Answer, LiveDiagnosis, LiveSettings
-from armid_ros.live.request import WAITING
+from armid_ros.nodes.live import Answer, LiveDiagnosis, LiveSettings
+from armid_ros.nodes.live.request import WAITING
 import numpy as np
 import pytest
 
 
 class Named:
-    """As much of a finding as a belief looks at."""
+    """As much of a finding as the schedule reads."""
 
     def __init__(self, name, *joints):
         self.name, self.joints = name, joints
@@ -22,7 +22,7 @@ class Named:
 
 def said(arm, verdict, *findings, duration=8.0, end=0.0, changed=False):
     window = SimpleNamespace(duration=duration)
-    return Answer(verdict, verdict, findings, (), arm, window, end, 0.0, changed)
+    return Answer(verdict, verdict, arm, window, end, 0.0, changed, findings)
 
 
 @pytest.fixture
@@ -41,7 +41,7 @@ FRICTION, SPRING = Named('viscous_friction', 'elbow'), Named('joint_spring', 'el
 def test_names_that_do_not_agree_do_not_count(live, known_arm, patched):
     for finding in (FRICTION, SPRING, FRICTION, SPRING):
         live.take(said(patched, 'named', finding))
-    assert live.belief.model is known_arm
+    assert live.model is known_arm
 
 
 @pytest.mark.parametrize('between', ['consistent', 'unknown', 'bad_data', WAITING])
@@ -52,20 +52,20 @@ def test_what_names_nothing_begins_the_count_anew(live, known_arm, patched, betw
         said(patched, 'named', FRICTION),
     ):
         live.take(answer)
-    assert live.belief.proposed is None
+    assert live.proposed is None
 
 
 def test_what_was_rejected_is_not_proposed_again(live, known_arm, patched):
     for _ in range(2):
         live.take(said(patched, 'named', FRICTION))
     live.reject()
-    assert live.belief.model is known_arm
+    assert live.model is known_arm
     for _ in range(3):
         live.take(said(patched, 'named', FRICTION))
-    assert live.belief.model is known_arm
+    assert live.model is known_arm
     for _ in range(2):
         live.take(said(patched, 'named', SPRING))
-    assert live.belief.model is patched
+    assert live.model is patched
 
 
 @pytest.mark.parametrize('said_by_a_person', [LiveDiagnosis.accept, LiveDiagnosis.reject])
@@ -90,15 +90,15 @@ def test_with_nothing_proposed_there_is_nothing_to_accept_or_reject(live):
 
 def test_a_name_counts_the_second_time_until_it_is_gone_or_accepted(live, known_arm, patched):
     for _ in range(2):
-        assert live.belief.model is known_arm
+        assert live.model is known_arm
         counts = live.take(said(patched, 'named', FRICTION))
-    assert counts and live.belief.model is patched
+    assert counts and live.model is patched
     assert live.take(said(known_arm, 'consistent'))
-    assert live.belief.model is known_arm
+    assert live.model is known_arm
     for _ in range(2):
         live.take(said(patched, 'named', FRICTION))
     live.accept()
-    assert live.belief.accepted is live.request().arm is patched
+    assert live.accepted is live.request().arm is patched
 
 
 def stream(live, duration, moving=True, begin=0.0):
@@ -172,5 +172,5 @@ def test_the_misfit_is_learned_first_of_the_arm_as_it_was_then(known_arm, patche
     live.accept()
     request = live.request()
     assert request.arm is patched
-    assert request.healthy.arm is known_arm
-    assert request.healthy.recording.duration == pytest.approx(10.0, abs=0.1)
+    assert request.healthy[0] is known_arm
+    assert request.healthy[1].duration == pytest.approx(10.0, abs=0.1)
