@@ -122,7 +122,7 @@ class CollisionScene:
             joints = [joint for joint, one in zip(limits.joints, where, strict=True) if one]
             if joints:
                 found.append(f'the {name} of {_listed(joints)} ({reason})')
-        mass = robot.rigid_parameters.reshape(robot.n_joints, -1)[:, 0]
+        mass = robot.rigid_parameters.reshape(len(robot.links), -1)[:, 0]
         massless = [link for link, m in zip(robot.links, mass, strict=True) if not m > 0.0]
         if massless:
             found.append(f'the weight of {_listed(massless)} (no inertia)')

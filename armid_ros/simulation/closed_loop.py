@@ -202,6 +202,7 @@ class CompiledLoop:
         """Return the loop; None if the kernel does not support the plant or is not compiled."""
         action, dry = plant.action, plant.contacts
         usual = plant.springs is None and action.drive is None and action.hysteresis is None
+        usual = usual and plant.robot.mechanism is None
         of_joints = dry.friction is None and -1 not in dry.axes
         of_joints = of_joints and len(set(dry.axes)) == len(dry.axes)
         feedback, library = controller.feedback, kernel()

@@ -24,7 +24,6 @@ from armid_ros.simulation.contacts import Contacts, Modes, solve_box_complementa
 from armid_ros.simulation.plant import no_body, NoBodyError, Plant, Rotors, State
 from armid_ros.simulation.springs import ElasticJoints
 import numpy as np
-import pinocchio as pin
 from scipy.linalg.lapack import dgesv, dposv
 
 
@@ -54,22 +53,19 @@ def step(plant: Plant, state: State, torque: FloatArray) -> State:
             state = spring_substep(plant, plant.springs, state.rotors, state, torque)
         return State(steps, steps * plant.dt, *state[2:])
     half = plant.spans[1]
-    model, data, dq = plant.robot.model, plant.data, state.dq
+    robot, dq = plant.robot, state.dq
     q_middle = state.q + half * dq
     dq_middle = dq + half * state.ddq
-    weight = pin.nonLinearEffects(model, data, q_middle, dq_middle)
-    force = torque - weight
+    force = torque - plant.weight(q_middle, dq_middle)
     force -= plant.damping.dot(dq)
     memory, slipping = state.memory, plant.action.hysteresis
     middle = memory if slipping is None else slipping.advance(memory, half * dq)
     plant.resist(force, state.t + 0.5 * plant.dt, q_middle, dq_middle, middle)
     contacts, load = plant.contacts, None
     if contacts.friction is not None:
-        load = pin.rnea(model, data, q_middle, dq_middle, state.ddq)
+        load = robot.inverse_dynamics(plant.data, q_middle, dq_middle, state.ddq)
         contacts = contacts.under(load)
-    inertia = pin.crba(plant.model, data, q_middle)
-    if plant.coupling is not None:
-        inertia = inertia + plant.coupling
+    inertia = plant.inertia(q_middle)
 
     dq_next, ddq, modes = _end_velocity(plant, contacts, inertia, force, dq, state.modes)
     q_next = q_middle + half * dq_next
@@ -166,7 +162,7 @@ def spring_substep(
     twist = rotors.twist + half * springs.to_twists.dot(v)
     force, memory = _force(plant, springs, state, torque, q, v, twist)
     inertia = springs.rotors.copy()
-    inertia[e:, e:] += pin.crba(plant.robot.model, plant.data, q)
+    inertia[e:, e:] += plant.robot.inertia(plant.data, q)
     pull = springs.pull
     if springs.loose:
         pull, offset = springs.meshing(twist)
@@ -179,7 +175,7 @@ def spring_substep(
     if modes:
         response, contacts = after[:, 1:], plant.contacts
         if contacts.friction is not None:
-            load = pin.rnea(plant.robot.model, plant.data, q, v[e:], state.ddq)
+            load = plant.robot.inverse_dynamics(plant.data, q, v[e:], state.ddq)
             contacts = contacts.under(load)
         w, g = springs.friction @ x_next[e:], springs.friction @ response[e:]
         rub, modes = solve_box_complementarity(contacts.law, g, w, modes)
@@ -230,7 +226,7 @@ def _force(
     drive = torque.copy()
     plant.resist(drive, t, springs.at_motors(q, twist), motor_speed, middle_memory)
     force = springs.to_motors.T.dot(drive)
-    force[e:] -= pin.nonLinearEffects(robot.model, plant.data, q, v[e:])
+    force[e:] -= plant.weight(q, v[e:])
     if action.link_torque is not None:
         force[e:] -= action.link_torque(np.asarray(t), q, v[e:])
     if plant.hard_stops:

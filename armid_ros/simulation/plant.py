@@ -174,7 +174,8 @@ class Plant:
         The rigid body, with the inertia added to every joint: rotors, and the implicit part of the
         damping [kg m^2].
     coupling : ndarray, shape (n, n), or None
-        Added inertia between different joints [kg m^2].
+        Added inertia that the model does not have [kg m^2]: between different joints, or all of
+        it if joints are coupled.
     constant : ndarray, shape (n,), or None
         Constant torque that the actuators have to supply [N m].
     torque : callable (t, q, dq) -> ndarray (n,), or None
@@ -228,19 +229,22 @@ class Plant:
         inertia = zero if action.inertia is None else action.inertia
         friction, constant = split_constant(action.dry_friction, n)
         data = robot.model.createData()
-        mass = np.array(pin.crba(robot.model, data, robot.middle_pose))
+        mass = np.array(robot.inertia(data, robot.middle_pose))
         moved = np.abs(np.diag(mass + inertia))
         still = int(np.argmin(moved))
         if moved[still] < 1e-15:
+            joint = robot.joints[still]
+            link = robot.description.by_name[joint].child
             raise ModelError(
-                f"{robot.name}: joint '{robot.joints[still]}' moves no mass and no inertia, so "
-                f"its acceleration is infinite; give link '{robot.links[still]}' an <inertial>"
+                f"{robot.name}: joint '{joint}' moves no mass and no inertia, so "
+                f"its acceleration is infinite; give link '{link}' an <inertial>"
             )
         weight = _damping_weight(robot, mass + inertia, damping, self.dt)
         added = inertia + weight * self.dt * damping
-        coupling = added - np.diag(np.diag(added))
-        model = pin.Model(robot.model)
-        model.armature = np.diag(added).copy()
+        coupling, model = added, pin.Model(robot.model)
+        if robot.mechanism is None:
+            coupling = added - np.diag(np.diag(added))
+            model.armature = np.diag(added).copy()
         springs = None
         torque = sum_laws([law for law in (action.torque, action.link_torque) if law is not None])
         if self.elasticity is not None:
@@ -303,11 +307,26 @@ class Plant:
         memory = np.empty(0) if slipping is None else slipping.start(velocity)
         rotors = None
         if self.springs is not None:
-            load = pin.computeGeneralizedGravity(self.robot.model, self.data, position)
+            still = np.zeros(n)
+            load = self.robot.inverse_dynamics(self.data, position, still, still)
             joints = self.springs.joints
             rotors = Rotors(self.springs.twist(load), velocity[joints], acceleration[joints])
         t = steps * self.dt
         return State(steps, t, position, velocity, acceleration, modes, memory, rotors)
+
+    def weight(self, q: FloatArray, dq: FloatArray) -> FloatArray:
+        """Return the torques of gravity and velocities on the joints, shape (n,) [N m]."""
+        if self.robot.mechanism is None:
+            return np.asarray(pin.nonLinearEffects(self.robot.model, self.data, q, dq))
+        return self.robot.inverse_dynamics(self.data, q, dq, np.zeros(len(q)))
+
+    def inertia(self, q: FloatArray) -> FloatArray:
+        """Return the inertia matrix of the joints with the added inertia, (n, n) [kg m^2]."""
+        if self.robot.mechanism is None:
+            inertia = np.asarray(pin.crba(self.model, self.data, q))
+        else:
+            inertia = self.robot.inertia(self.data, q)
+        return inertia if self.coupling is None else inertia + self.coupling
 
     def motors(self, state: State) -> tuple[FloatArray, FloatArray, FloatArray]:
         """Return positions, velocities and accelerations of the motors, each of shape (n,)."""

@@ -242,10 +242,10 @@ class LinkAccelerometers:
         if places is None:
             places = [inertia.lever for inertia in list(model.inertias)[1:]]
         array = read_only(places)
-        if array.shape != (self.robot.n_joints, 3):
+        if array.shape != (len(self.robot.links), 3):
             raise RobotError(
                 f'{self.robot.name}: accelerometers need three coordinates for each of '
-                f'{self.robot.n_joints} links, got an array of shape {array.shape}'
+                f'{len(self.robot.links)} links, got an array of shape {array.shape}'
             )
         model = pin.Model(model)
         frames = [
@@ -266,7 +266,7 @@ class LinkAccelerometers:
     def read(self, q: FloatArray, dq: FloatArray, ddq: FloatArray) -> FloatArray:
         """Return the readings in one state, shape (n, 3) [m/s^2]; at rest gravity, upwards."""
         model, data = self._model, self._data
-        pin.forwardKinematics(model, data, q, dq, ddq)
+        pin.forwardKinematics(model, data, *self.robot.state(q, dq, ddq))
         up = -model.gravity.linear
         readings = np.empty((len(self._frames), 3))
         for joint, frame in enumerate(self._frames, 1):
