@@ -26,6 +26,7 @@ from armid_ros.excitation.limits import (
 from armid_ros.motion import Motion
 from armid_ros.robots import collision_model, CollisionModel, Robot
 import numpy as np
+import pinocchio as pin
 
 
 @dataclass(frozen=True)
@@ -141,7 +142,7 @@ class CollisionScene:
         bare = [
             link
             for link in dict.fromkeys([*robot.links, *heavy])
-            if model.frames[model.getFrameId(link)].parentJoint > 0
+            if model.frames[model.getFrameId(link, pin.FrameType.BODY)].parentJoint > 0
             and link not in (*with_body, *self.collision.left_out)
         ]
         if bare:

@@ -140,6 +140,11 @@ class Robot:
         return self.joints if self.mechanism is None else self.mechanism.joints
 
     @property
+    def all_joints(self) -> tuple[str, ...]:
+        """Return the moving joints, and the motors that move no body of their own."""
+        return tuple(dict.fromkeys([*self.moving, *self.joints]))
+
+    @property
     def tip(self) -> str:
         """Return the last moving joint; with coupled joints, the one at the end of the arm."""
         if self.mechanism is None:
@@ -150,6 +155,11 @@ class Robot:
             for chain, body in zip(self.model.supports, self.model.inertias, strict=True)
         ]
         return self.moving[int(np.argmax(reach[1:]))]
+
+    def slides(self, joint: str) -> bool:
+        """Return whether a driven or moving joint is prismatic."""
+        own = self if joint in self.joints else self.tree
+        return bool(own.prismatic[own.index(joint)])
 
     def body_of(self, joint: str) -> int:
         """Return the index of the body of a driven joint, or of the last that a motor moves."""

@@ -144,6 +144,8 @@ def compiled(name: str, payload: tuple[str, float] | None = None) -> mujoco.MjMo
     if payload is not None:
         model.body_mass[model.body(payload[0]).id] += payload[1]
         mujoco.mj_setConst(model, mujoco.MjData(model))
+    model.dof_solref[:] = [2.0 / RATE, 1.0]  # of dry friction, as stiff as it can be
+    model.dof_solimp[:] = [0.9999, 0.9999, 0.001, 0.5, 2.0]
     return model
 
 
