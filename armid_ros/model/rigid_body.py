@@ -100,9 +100,10 @@ def inverse_dynamics_derivatives(
     Notes
     -----
     Source: Carpentier and Mansard 2018; Pinocchio's computeRNEADerivatives. It divides by sums of
-    link masses, so it needs positive masses. For coupled joints with a constant J, the derivatives
-    are projected; for loops, those by position and velocity are central differences. If a fit has a negative mass, a ballast is added to
-    all links, and the derivatives of the ballast alone are subtracted: they are linear.
+    link masses, so it needs positive masses. If a fit has a negative mass, a ballast is added to
+    all links, and the derivatives of the ballast alone are subtracted: they are linear. With
+    coupled joints, the derivatives are projected; with loops, those by position and velocity are
+    central differences.
 
     """
     if robot.mechanism is not None:

@@ -30,6 +30,7 @@ from armid_ros.robots.robot import of_joints, Robot
 from armid_ros.robots.selection import leaders, standing_position
 import numpy as np
 import pinocchio as pin
+from scipy.linalg.lapack import dposv
 
 #: Suffix of the file of coupled joints in the folder of NAME.urdf, NAME.urdf.xacro or NAME.xml.
 SUFFIX = '.mechanism.yaml'
@@ -117,34 +118,27 @@ class Mechanism:
         """
         if self.constant:
             return Configuration(self.driven @ u + self.offset, self.driven, 0.0 * self.offset)
-        inside = np.clip(u, self.lower, self.upper)
-        q, by_q = self._closed(inside)
-        by_p = by_q @ self.passive
-        inverse = np.linalg.solve(by_p.T @ by_p, by_p.T)
-        jacobian = self.driven - self.passive @ (inverse @ (by_q @ self.driven))
-        drift = np.zeros(len(q))
-        if du is not None:
-            data, world = _SCRATCH.of(self).data, pin.LOCAL_WORLD_ALIGNED
-            pin.forwardKinematics(self.model, data, q, jacobian @ du, drift)
-            apart = [
-                pin.getFrameClassicalAcceleration(self.model, data, b, world).linear
-                - pin.getFrameClassicalAcceleration(self.model, data, a, world).linear
-                for a, b in self.loops
-            ]
-            drift = -self.passive @ (inverse @ np.concatenate(apart))
-        return Configuration(q + jacobian @ (u - inside), jacobian, drift)
+        solution = self._solved(u)
+        drift = np.zeros(len(solution[0])) if du is None else self._drift(*solution, du)
+        return Configuration(solution[0], solution[1], drift)
 
     def states(self, u: FloatArray, du: FloatArray | None = None) -> Configuration:
         """Return the moving joints in N states, each (N, n), of the driven joints."""
         m, n = self.driven.shape
         if self.constant:
             q = u @ self.driven.T + self.offset
-            jacobian = np.broadcast_to(self.driven, (len(u), m, n))
-            return Configuration(q, jacobian, np.zeros_like(q))
-        rates = itertools.repeat(None) if du is None else du
-        rows = [self.at(*row) for row in zip(u, rates, strict=False)]
-        q, jacobian, drift = (np.array([row[k] for row in rows]) for k in range(3))
-        return Configuration(q.reshape(-1, m), jacobian.reshape(-1, m, n), drift.reshape(-1, m))
+            return Configuration(q, np.broadcast_to(self.driven, (len(u), m, n)), np.zeros_like(q))
+        known, key = _SCRATCH.of(self)[2], u.tobytes()
+        if key not in known:
+            while len(known) > 8:  # of the motions at hand
+                known.pop(next(iter(known)))
+            known[key] = [self._solved(row) for row in u]
+        rows = known[key]
+        drift = np.zeros((len(u), m))
+        if du is not None:
+            drift[:] = [self._drift(*row, rate) for row, rate in zip(rows, du, strict=True)]
+        q, jacobian = (np.array([row[part] for row in rows]) for part in (0, 1))
+        return Configuration(q.reshape(-1, m), jacobian.reshape(-1, m, n), drift)
 
     def along(self, motion: Motion) -> tuple[Motion, FloatArray]:
         """Return the motion of the moving joints, and J of every sample, shape (N, m, n)."""
@@ -152,23 +146,28 @@ class Mechanism:
         dq, ddq = (np.einsum('kmn,kn->km', jacobian, x) for x in (motion.dq, motion.ddq))
         return Motion(self.joints, motion.t, q, dq, ddq + drift), jacobian
 
-    def _closed(self, u: FloatArray) -> tuple[FloatArray, FloatArray]:
-        """Return the moving joints (m,) with closed loops, and the slope of the gaps (3 L, m)."""
-        work = _SCRATCH.of(self)
-        begin, p = work.last
-        if np.abs(u - begin).max() > 0.5:  # the path from the start keeps the mode of assembly
+    def _solved(self, u: FloatArray) -> tuple[FloatArray, FloatArray, FloatArray]:
+        """
+        Return the moving joints with closed loops, and J, in one state of the driven joints.
+
+        The third result, (m, 3 L), are the changes of the moving joints that close a unit gap.
+
+        """
+        work, inside = _SCRATCH.of(self), np.clip(u, self.lower, self.upper)
+        data, (begin, p), _ = work
+        far = np.abs(inside - begin).max()
+        if far > 0.5:  # the path from the start keeps the mode of assembly
             begin, p = self.start
-        for share in np.linspace(0.0, 1.0, int(np.abs(u - begin).max() / 0.2) + 2)[1:]:
-            base = self.driven @ (begin + share * (u - begin)) + self.offset
+            far = np.abs(inside - begin).max()
+        for share in np.linspace(0.0, 1.0, int(far / 0.2) + 2)[1:] if far > 0.2 else (1.0,):
+            base = self.driven @ (begin + share * (inside - begin)) + self.offset
             for _ in range(20):
-                gap, by_q = self._gap(work.data, base + self.passive @ p)
+                gap, by_q = self._gap(data, base + self.passive @ p)
                 by_p = by_q @ self.passive
-                try:
-                    step = np.linalg.solve(by_p.T @ by_p, by_p.T @ gap)
-                except np.linalg.LinAlgError:
-                    raise RobotError(
-                        'the driven joints do not determine the passive ones'
-                    ) from None
+                _, inverse, failed = dposv(by_p.T @ by_p, by_p.T)
+                if failed:
+                    raise RobotError('the driven joints do not determine the passive ones')
+                step = inverse @ gap
                 p = p - step
                 if np.abs(step).max() < 1e-12:
                     break
@@ -177,8 +176,23 @@ class Mechanism:
                 f'a loop does not close: its points are {np.abs(gap).max():.3g} m apart with the '
                 f'driven joints at {np.round(u, 3).tolist()}'
             )
-        work.last = u.copy(), p
-        return base + self.passive @ p, by_q
+        work[1] = inside, p
+        closing = self.passive @ inverse
+        jacobian = self.driven - closing @ (by_q @ self.driven)
+        return base + self.passive @ p + jacobian @ (u - inside), jacobian, closing
+
+    def _drift(
+        self, q: FloatArray, jacobian: FloatArray, closing: FloatArray, du: FloatArray
+    ) -> FloatArray:
+        """Return the accelerations dJ/dt du, shape (m,), that keep the loops closed."""
+        data, world = _SCRATCH.of(self)[0], pin.LOCAL_WORLD_ALIGNED
+        pin.forwardKinematics(self.model, data, q, jacobian @ du, np.zeros(len(q)))
+        apart = [
+            pin.getFrameClassicalAcceleration(self.model, data, b, world).linear
+            - pin.getFrameClassicalAcceleration(self.model, data, a, world).linear
+            for a, b in self.loops
+        ]
+        return -closing @ np.concatenate(apart)
 
     def _gap(self, data: pin.Data, q: FloatArray) -> tuple[FloatArray, FloatArray]:
         """Return the vectors between the points of the loops, (3 L,) [m], and their slope."""
@@ -192,22 +206,15 @@ class Mechanism:
         return np.concatenate(gaps), np.concatenate(slopes)
 
 
-class _Work:
-    """Work space of a mechanism, and its last solution, near which the next search begins."""
-
-    def __init__(self, mechanism: Mechanism) -> None:
-        self.data, self.last = mechanism.model.createData(), mechanism.start
-
-
 class _Scratch(threading.local):
-    """Work space per mechanism and thread."""
+    """Per mechanism and thread: work space, last solution, and solutions of whole motions."""
 
     def __init__(self) -> None:
-        self._of: WeakKeyDictionary[Mechanism, _Work] = WeakKeyDictionary()
+        self._of: WeakKeyDictionary[Mechanism, list[Any]] = WeakKeyDictionary()
 
-    def of(self, mechanism: Mechanism) -> _Work:
+    def of(self, mechanism: Mechanism) -> list[Any]:
         if mechanism not in self._of:
-            self._of[mechanism] = _Work(mechanism)
+            self._of[mechanism] = [mechanism.model.createData(), mechanism.start, {}]
         return self._of[mechanism]
 
 
@@ -358,26 +365,28 @@ def _narrowed(
 def _closing(
     mechanism: Mechanism, tree: Robot, lower: FloatArray, upper: FloatArray
 ) -> tuple[Mechanism, FloatArray, FloatArray]:
-    """Narrow the range of driven joints to where loops close, passive joints keep their limits."""
+    """
+    Narrow the range of the driven joints to where loops close and passive joints keep limits.
+
+    Both hold a tenth beyond the result, because a motion may overshoot its limits.
+
+    """
     start = mechanism.start[0]
     moved = np.any(mechanism.passive, axis=1)
     slopes = [np.abs(mechanism.at(start + shift).jacobian[moved]) for shift in (0.0, 0.01, -0.01)]
     own = np.flatnonzero(np.max(slopes, axis=(0, 1)) > 1e-9)
-    ends = np.where(
-        np.isfinite([lower, upper]), [lower, upper], start + np.array([[-np.pi], [np.pi]])
-    )
-    count = 41 if len(own) == 1 else 9 if len(own) == 2 else 4
-    for share in np.linspace(1.0, 0.1, 19):
+    ends = np.array([lower, upper])
+    ends = np.where(np.isfinite(ends), ends, start + np.array([[-np.pi], [np.pi]]))
+    count = 21 if len(own) < 3 else 5
+    for share in np.linspace(1.1, 0.1, 21):
         box = start + share * (ends - start)
         grid = np.tile(start, (count ** len(own), 1))
-        axes = [np.linspace(box[0, k], box[1, k], count) for k in own]
-        grid[:, own] = list(itertools.product(*axes))
+        grid[:, own] = list(itertools.product(*np.linspace(*box[:, own], count).T))
         try:
             q, jacobian, _ = mechanism.states(grid)
         except RobotError:
             continue
-        slack = 1e-9
-        inside = (q >= tree.lower - slack) & (q <= tree.upper + slack)
+        inside = (q > tree.lower) & (q < tree.upper)
         # near a dead centre, the passive joints are much faster than the driven ones
         if inside[:, moved].all() and np.abs(jacobian).max() < 10.0:
             break
@@ -386,14 +395,15 @@ def _closing(
             'a loop does not close around the position of its driven joints nearest to zero, or '
             'its passive joints are beyond their limits there'
         )
-    if share < 1.0:
-        lower, upper = lower.copy(), upper.copy()
-        lower[own], upper[own] = box[:, own]
+    ends[:, own] = (start + share / 1.1 * (ends - start))[:, own]
+    within = [np.maximum(lower, ends[0]), np.minimum(upper, ends[1])]
+    reach = np.array([np.full(len(start), -np.inf), np.full(len(start), np.inf)])
+    reach[:, own] = box[:, own]
     largest = mechanism.largest.copy()
     # J between the samples: half of what it changes over the range is a generous margin
-    largest[moved] = np.abs(jacobian[:, moved]).max(axis=0) + 0.5 * np.ptp(jacobian, axis=0)[moved]
-    found = replace(mechanism, lower=lower, upper=upper, largest=read_only(largest))
-    return found, lower, upper
+    largest[moved] = (np.abs(jacobian).max(axis=0) + 0.5 * np.ptp(jacobian, axis=0))[moved]
+    found = replace(mechanism, lower=reach[0], upper=reach[1], largest=read_only(largest))
+    return found, within[0], within[1]
 
 
 def with_mechanism(text: str, path: Path) -> str:
@@ -429,9 +439,9 @@ def with_mechanism(text: str, path: Path) -> str:
 def _elements(document: Mapping[str, Any], urdf: str) -> list[str]:
     """Return the elements of a URDF for the contents of a file of coupled joints."""
 
-    def tag(name: str, *inside: str, **attributes: Any) -> str:
+    def tag(kind: str, /, *inside: str, **attributes: Any) -> str:
         pairs = ''.join(f' {key}={quoteattr(str(value))}' for key, value in attributes.items())
-        return f'<{name}{pairs}>{"".join(inside)}</{name}>'
+        return f'<{kind}{pairs}>{"".join(inside)}</{kind}>'
 
     root, lines = parse_xml(urdf), []
     carried = {child.get('link') for child in root.iterfind('joint/child')}

@@ -10,7 +10,7 @@ import mujoco
 import numpy as np
 
 RATE = 5000.0  # Hz
-RECORDED = 500.0  # Hz
+RECORDED = 250.0  # Hz
 
 
 def body(name: str, pos: str, joint: str, inertial: tuple, *inside: str) -> str:
