@@ -25,7 +25,8 @@ from armid_ros.robots.description import (
     parse_xml,
     Vector,
 )
-from armid_ros.robots.mechanism import couple, moving_joints, with_mechanism
+from armid_ros.robots.mechanism import couple, moving_joints
+from armid_ros.robots.mechanism_file import with_mechanism
 from armid_ros.robots.mjcf import is_mjcf, urdf_of_mjcf
 from armid_ros.robots.robot import of_joints, parse_gravity, Robot
 from armid_ros.robots.selection import driven_joints, several_arms, standing_position

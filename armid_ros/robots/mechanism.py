@@ -7,7 +7,7 @@ With J = df/du, the moving joints have dq = J du and ddq = J ddu + dJ/dt du, and
 of the torques tau of the moving joints gives the torques J^T tau of the driven joints. Constraint
 forces do no work and do not appear. The map is affine for mimic joints and differentials. Passive
 joints of a loop are solved for: Newton's method closes the loop, and the implicit function theorem
-gives their derivatives (Featherstone 2008, section 8.11; Khalil and Dombre 2002, chapter 7).
+gives their derivatives (Featherstone 2008, chapter 8; Khalil and Dombre 2002, chapter 7).
 
 """
 
@@ -16,24 +16,18 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 import itertools
-from pathlib import Path
 import threading
 from typing import Any, NamedTuple
 from weakref import WeakKeyDictionary
-from xml.sax.saxutils import quoteattr
 
 from armid_ros.errors import RobotError
-from armid_ros.files import load_yaml, read_text, reading
 from armid_ros.motion import FloatArray, Motion, read_only
-from armid_ros.robots.description import Description, Joint, parse_xml
+from armid_ros.robots.description import Description, Joint
 from armid_ros.robots.robot import of_joints, Robot
 from armid_ros.robots.selection import leaders, standing_position
 import numpy as np
 import pinocchio as pin
 from scipy.linalg.lapack import dposv
-
-#: Suffix of the file of coupled joints in the folder of NAME.urdf, NAME.urdf.xacro or NAME.xml.
-SUFFIX = '.mechanism.yaml'
 
 
 class Configuration(NamedTuple):
@@ -136,7 +130,8 @@ class Mechanism:
         rows = known[key]
         drift = np.zeros((len(u), m))
         if du is not None:
-            drift[:] = [self._drift(*row, rate) for row, rate in zip(rows, du, strict=True)]
+            pairs = zip(rows, du, strict=True)
+            drift[:] = [self._drift(q, slope, closing, x) for (q, slope, closing), x in pairs]
         q, jacobian = (np.array([row[part] for row in rows]) for part in (0, 1))
         return Configuration(q.reshape(-1, m), jacobian.reshape(-1, m, n), drift)
 
@@ -192,7 +187,7 @@ class Mechanism:
             - pin.getFrameClassicalAcceleration(self.model, data, a, world).linear
             for a, b in self.loops
         ]
-        return -closing @ np.concatenate(apart)
+        return np.asarray(-closing @ np.concatenate(apart))
 
     def _gap(self, data: pin.Data, q: FloatArray) -> tuple[FloatArray, FloatArray]:
         """Return the vectors between the points of the loops, (3 L,) [m], and their slope."""
@@ -381,7 +376,7 @@ def _closing(
     for share in np.linspace(1.1, 0.1, 21):
         box = start + share * (ends - start)
         grid = np.tile(start, (count ** len(own), 1))
-        grid[:, own] = list(itertools.product(*np.linspace(*box[:, own], count).T))
+        grid[:, own] = list(itertools.product(*np.linspace(box[0, own], box[1, own], count).T))
         try:
             q, jacobian, _ = mechanism.states(grid)
         except RobotError:
@@ -404,66 +399,3 @@ def _closing(
     largest[moved] = (np.abs(jacobian).max(axis=0) + 0.5 * np.ptp(jacobian, axis=0))[moved]
     found = replace(mechanism, lower=reach[0], upper=reach[1], largest=read_only(largest))
     return found, within[0], within[1]
-
-
-def with_mechanism(text: str, path: Path) -> str:
-    """
-    Return a URDF with the coupled joints of NAME.mechanism.yaml beside it, if there is one.
-
-    The result has elements of their own, which other readers of a URDF ignore.
-
-    Raises
-    ------
-    RobotError
-        If the file cannot be read, or has other contents.
-
-    """
-    name = path.name
-    for end in ('.xacro', '.urdf', '.xml'):
-        name = name.removesuffix(end)
-    path = path.with_name(name + SUFFIX)
-    if not path.is_file():
-        return text
-    with reading(path, RobotError):
-        document = load_yaml(read_text(path, RobotError))
-        if not isinstance(document, dict) or document.keys() - {'mimic', 'motors', 'loops'}:
-            raise RobotError('has to be a mapping with mimic, motors and loops')
-        try:
-            lines = _elements(document, text)
-        except (AttributeError, KeyError, TypeError) as error:
-            raise RobotError(f'an entry of mimic, motors or loops is malformed: {error}') from None
-    head, end, tail = text.rpartition('</robot>')
-    return ''.join([head, *(f'  {line}\n' for line in lines), end, tail])
-
-
-def _elements(document: Mapping[str, Any], urdf: str) -> list[str]:
-    """Return the elements of a URDF for the contents of a file of coupled joints."""
-
-    def tag(kind: str, /, *inside: str, **attributes: Any) -> str:
-        pairs = ''.join(f' {key}={quoteattr(str(value))}' for key, value in attributes.items())
-        return f'<{kind}{pairs}>{"".join(inside)}</{kind}>'
-
-    root, lines = parse_xml(urdf), []
-    carried = {child.get('link') for child in root.iterfind('joint/child')}
-    base = next(
-        link.get('name') for link in root.iterfind('link') if link.get('name') not in carried
-    )
-    for name, limits in (document.get('motors') or {}).items():
-        ends = {'lower': -np.inf, 'upper': np.inf, 'effort': np.inf, 'velocity': np.inf}
-        inside = tag('parent', link=base), tag('child', link=f'{name}_motor')
-        limit = tag('limit', **(ends | (limits or {})))
-        lines.append(tag('link', name=f'{name}_motor'))
-        lines.append(tag('joint', *inside, limit, name=name, type='revolute'))
-    for name, factors in (document.get('mimic') or {}).items():
-        offset = factors.pop('offset', 0.0)
-        for leader, factor in factors.items():
-            values = {'joint': leader, 'multiplier': factor, 'offset': offset}
-            lines.append(tag('mimic', follower=name, **values))
-            offset = 0.0
-    for loop in document.get('loops') or ():
-        points = [
-            tag('point', link=link, xyz=' '.join(map(str, xyz)))
-            for link, xyz in loop['points'].items()
-        ]
-        lines.append(tag('loop', *points, passive=' '.join(loop['passive'])))
-    return lines
