@@ -17,6 +17,7 @@ from xml.sax.saxutils import escape
 from armid_ros.errors import meant, RobotError
 from armid_ros.files import load_yaml, read_text, reading
 from armid_ros.motion import FloatArray
+from armid_ros.robots.coupling import couple, moving_joints
 from armid_ros.robots.description import (
     Description,
     INERTIA,
@@ -25,7 +26,6 @@ from armid_ros.robots.description import (
     parse_xml,
     Vector,
 )
-from armid_ros.robots.mechanism import couple, moving_joints
 from armid_ros.robots.mechanism_file import with_mechanism
 from armid_ros.robots.mjcf import is_mjcf, urdf_of_mjcf
 from armid_ros.robots.robot import of_joints, parse_gravity, Robot

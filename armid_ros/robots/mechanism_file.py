@@ -20,7 +20,7 @@ SUFFIX = '.mechanism.yaml'
 
 def with_mechanism(text: str, path: Path) -> str:
     """
-    Return a URDF with the coupled joints of NAME.mechanism.yaml beside it, if there is one.
+    Return a URDF with the coupled joints of NAME.mechanism.yaml in its folder, if it exists.
 
     The result has elements of their own, which other readers of a URDF ignore.
 

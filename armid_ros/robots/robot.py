@@ -8,17 +8,15 @@ from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 from pathlib import Path
-from typing import Any, TYPE_CHECKING
+from typing import Any
 
 from armid_ros.errors import RobotError
 from armid_ros.motion import FloatArray, freeze, read_only
 from armid_ros.robots.description import Description, Joint, parse_description, parse_xml
+from armid_ros.robots.mechanism import Mechanism
 import numpy as np
 import numpy.typing as npt
 import pinocchio as pin
-
-if TYPE_CHECKING:
-    from armid_ros.robots.mechanism import Mechanism
 
 GRAVITIES = {'earth': (0.0, 0.0, -9.81), 'moon': (0.0, 0.0, -1.62)}
 #: Number of inertial parameters of a link.
