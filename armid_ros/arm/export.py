@@ -62,7 +62,7 @@ def arm_urdf(arm: ArmModel) -> Exported:
     found, missing = place_values(arm, lambda effect: effect.traits.urdf_attribute)
     text = export_urdf(arm.body, found, _remarks('a URDF', missing))
     left_out = ('ros2_control',) if '<ros2_control' in arm.robot.urdf else ()
-    robot = arm.robot  # friction that was not identified keeps its described values
+    robot = arm.robot.tree  # friction that was not identified keeps its described values
     described = {'damping': robot.urdf_damping, 'friction': robot.urdf_friction}
     values = {
         key: dict(zip(robot.joints, own.tolist(), strict=True)) | found.get(key, {})
@@ -143,7 +143,7 @@ def torque_check(exported: Exported, arm: ArmModel) -> dict[str, Any]:
         import mujoco
     except ImportError:
         return {'not_checked': 'MuJoCo is not installed'}
-    robot = arm.body
+    robot = arm.body.tree
     motion = random_motion(robot, np.random.default_rng(0), STATES)
     placed = {
         key: np.array([exported.values.get(key, {}).get(joint, 0.0) for joint in robot.joints])

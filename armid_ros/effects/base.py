@@ -120,18 +120,24 @@ class Effect(ABC):
 
         """
         chosen = cls._default_joints(robot) if joints is None else joints
-        unknown = [name for name in chosen if name not in robot.joints]
+        known = cls._possible_joints(robot)
+        unknown = [name for name in chosen if name not in known]
         if unknown:
             raise ModelError(
                 f"{cls.name}: {robot.name} has no joint '{unknown[0]}'; "
-                f'its joints are {", ".join(robot.joints)}{meant(unknown[0], robot.joints)}'
+                f'its joints are {", ".join(known)}{meant(unknown[0], known)}'
             )
         effect = cls(tuple(chosen))
         return effect.with_shape(effect._default_shape(robot)) if cls.shapes else effect
 
     @classmethod
-    def _default_joints(cls, robot: Robot) -> tuple[str, ...]:
+    def _possible_joints(cls, robot: Robot) -> tuple[str, ...]:
+        """Return the joints on which the effect can act: those with an actuator."""
         return robot.joints
+
+    @classmethod
+    def _default_joints(cls, robot: Robot) -> tuple[str, ...]:
+        return cls._possible_joints(robot)
 
     def in_usual_place(self, robot: Robot) -> bool:
         """Return whether the effect is on its default joints; see `on`."""

@@ -42,6 +42,10 @@ _ATTACHMENT = tuple(
 class Attached(Effect):
     """An effect between a point of each link and an anchor."""
 
+    @classmethod
+    def _possible_joints(cls, robot: Robot) -> tuple[str, ...]:
+        return robot.moving
+
     def _default_shape(self, robot: Robot) -> FloatArray:
         """Attach at the centres of mass, or at the links if a centre is beyond the arm."""
         values, model = self.shape_values, robot.model

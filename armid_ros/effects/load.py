@@ -48,12 +48,16 @@ class _LinkBody(Effect):
     def adds_to(self, robot: Robot) -> tuple[int, ...]:
         """Return the indices of the rigid-body parameters of the links."""
         size = len(LINK_PARAMETERS)
-        return tuple(size * joint + i for joint in self.indices(robot.joints) for i in range(size))
+        return tuple(size * joint + i for joint in self.indices(robot.moving) for i in range(size))
+
+    @classmethod
+    def _possible_joints(cls, robot: Robot) -> tuple[str, ...]:
+        return robot.moving
 
 
 def described_spread(robot: Robot) -> FloatArray:
     """
-    Return the largest expected errors of the described rigid parameters, shape (n, 10).
+    Return the largest expected errors of the described rigid parameters, shape (m, 10).
 
     A described value may be wrong by about its own size. For a missing value, a tenth of a mean
     link is assumed.
@@ -89,12 +93,12 @@ class Payload(_LinkBody):
 
     @classmethod
     def _default_joints(cls, robot: Robot) -> tuple[str, ...]:
-        return robot.joints[-1:]
+        return (robot.tip,)
 
     @classmethod
     def places(cls, robot: Robot) -> tuple[tuple[str, ...], ...]:
         """Return all links, because any link may carry a body."""
-        return tuple((joint,) for joint in robot.joints)
+        return tuple((joint,) for joint in robot.moving)
 
     @classmethod
     def as_change(cls) -> type[Effect]:
@@ -106,7 +110,7 @@ class Payload(_LinkBody):
         if not self._weighs(values, std, arm):
             return False
         # the inertia of a body about the joint is at least that of a point mass at its centre
-        axis = arm.robot.geometry[self.indices(arm.robot.joints)[0]].turn
+        axis = arm.robot.geometry[self.indices(arm.robot.moving)[0]].turn
         x, y, z = axis
         share = np.array([x * x, 2.0 * x * y, y * y, 2.0 * x * z, 2.0 * y * z, z * z])
         if not np.all(std[4:][share != 0.0] > 0.0) or not axis.any():  # noqa: RUF069 - exact zero from the description
@@ -191,7 +195,7 @@ class LinkInertia(_LinkBody):
         """
         if not np.all(std[4:] > 0.0):
             return True
-        (link,) = self.indices(arm.robot.joints)
+        (link,) = self.indices(arm.robot.moving)
         own = arm.robot.rigid_parameters.reshape(-1, len(LINK_PARAMETERS))[link]
         # Ixx, Iyy, Izz
         there, left = (each[[4, 6, 9]] for each in (own, own + values + SURELY * std))

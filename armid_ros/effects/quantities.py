@@ -75,7 +75,7 @@ class Quantity:
 
         """
         size = max(self.upper, -self.lower)
-        if joint and self.unit == 'N m':
+        if joint in robot.joints and self.unit == 'N m':
             drive = float(robot.torque_limit[robot.joints.index(joint)])
             size = min(size, drive if drive > 0.0 else np.inf)
         if self.typical is None:
@@ -144,7 +144,7 @@ class Shape:
 
 def joint_unit(unit: str, joint: str, robot: Robot) -> str:
     """Return a unit for a joint: 'N m' becomes 'N' on a prismatic joint."""
-    slides = joint and robot.prismatic[robot.joints.index(joint)]
+    slides = joint and robot.slides(joint)
     return _PRISMATIC_UNITS.get(unit, unit) if slides else unit
 
 

@@ -21,6 +21,7 @@ from armid_ros.excitation.limits import has_velocity_limit, require_radians, SLO
 from armid_ros.motion import Motion
 from armid_ros.robots import collision_model, CollisionModel, Robot
 import numpy as np
+import pinocchio as pin
 
 
 @dataclass(frozen=True)
@@ -112,7 +113,7 @@ class CollisionScene:
             joints = [joint for joint, one in zip(robot.joints, where, strict=True) if one]
             if joints:
                 found.append(f'the {name} of {_listed(joints)} ({reason})')
-        mass = robot.rigid_parameters.reshape(robot.n_joints, -1)[:, 0]
+        mass = robot.rigid_parameters.reshape(len(robot.links), -1)[:, 0]
         massless = [link for link, m in zip(robot.links, mass, strict=True) if not m > 0.0]
         if massless:
             found.append(f'the weight of {_listed(massless)} (no inertia)')
@@ -131,7 +132,7 @@ class CollisionScene:
         bare = [
             link
             for link in dict.fromkeys([*robot.links, *heavy])
-            if model.frames[model.getFrameId(link)].parentJoint > 0
+            if model.frames[model.getFrameId(link, pin.FrameType.BODY)].parentJoint > 0
             and link not in (*with_body, *self.collision.left_out)
         ]
         if bare:

@@ -119,7 +119,7 @@ def kinematics_digest(robot: Robot) -> str:
     """
     digest = hashlib.sha256()
     model = robot.model
-    for index, (joint, link) in enumerate(zip(robot.joints, robot.links, strict=True), start=1):
+    for index, (joint, link) in enumerate(zip(robot.moving, robot.links, strict=True), start=1):
         place = model.jointPlacements[index]
         numbers = np.concatenate([place.rotation.ravel(), place.translation])
         rounded = np.round(numbers, 6) + 0.0  # no negative zero

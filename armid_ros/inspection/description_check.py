@@ -192,7 +192,7 @@ def check_links(found: Identification, described: ArmModel, grade: str, fault: s
 
     """
     robot, size = described.robot, PER_LINK
-    rigid = size * robot.n_joints
+    rigid = len(robot.rigid_parameters)
     difference = found.estimate.values - found.base.values(described.theta)
     factor = np.linalg.cholesky(found.estimate.covariance)
     rows = np.linalg.solve(factor, np.column_stack([found.base.grouping, difference]))
@@ -208,11 +208,11 @@ def check_links(found: Identification, described: ArmModel, grade: str, fault: s
     covariance = covariance * max(
         1.0, rest / freedom
     )  # Birge ratio: accounts for the unexplained residual
-    alone = [_fit(rows, spread, [k])[2] for k in range(robot.n_joints)]
+    alone = [_fit(rows, spread, [k])[2] for k in range(len(robot.links))]
     # if two links move alike, each of them explains the difference alone
     most = max(rest / _FURTHER, _REMAINS * len(rows)) if len(wrong) == 1 else 0.0
     body = robot.rigid_parameters.reshape(-1, size)[:, :4]
-    measured, std = np.full((2, robot.n_joints, 4), np.nan)
+    measured, std = np.full((2, len(robot.links), 4), np.nan)
     for position, k in enumerate(wrong):
         own = slice(size * position, size * position + 4)
         # a determined mass has a standard deviation below a tenth of the prior's
@@ -225,7 +225,7 @@ def check_links(found: Identification, described: ArmModel, grade: str, fault: s
         std[k] = np.sqrt(np.diag(slope @ covariance[own, own] @ slope.T))
     return LinkCheck(
         links=robot.links,
-        joints=robot.joints,
+        joints=robot.moving,
         mass=body[:, 0],
         centre=body[:, 1:] / np.where(body[:, :1] > NO_MASS, body[:, :1], np.nan),
         measured_mass=measured[:, 0],

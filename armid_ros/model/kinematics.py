@@ -66,12 +66,14 @@ class LinkFrames:
     Attributes
     ----------
     joints : tuple of str
-        All joints of the robot.
+        All moving joints of the robot.
     frames : dict
         Frames of the links, by the number of their joint.
-    lines, turns : ndarray, shape (n, 3, N)
+    lines, turns : ndarray, shape (m, 3, N)
         Twist of the moved bodies per unit velocity of each joint: velocity at the origin of the
         base frame [m/rad, or m/m], and angular velocity.
+    coupling : ndarray, shape (N, m, n), or None
+        Derivative of the moving joints by the driven ones; None if these are the same.
 
     """
 
@@ -79,6 +81,7 @@ class LinkFrames:
     frames: Mapping[int, _Frame]
     lines: FloatArray
     turns: FloatArray
+    coupling: FloatArray | None = None
 
     @classmethod
     def of(cls, robot: Robot, q: FloatArray, joints: Sequence[str] | None = None) -> LinkFrames:
@@ -100,9 +103,15 @@ class LinkFrames:
             If the robot has no such joint.
 
         """
-        ends = [robot.index(joint) for joint in joints or robot.joints]
+        ends = [
+            robot.index(joint) if robot.mechanism is None else robot.moving.index(joint)
+            for joint in joints or robot.moving
+        ]
         frames: dict[int, _Frame] = {}
-        lines, turns = np.zeros((2, robot.n_joints, 3, len(q)))
+        lines, turns = np.zeros((2, len(robot.moving), 3, len(q)))
+        coupling = None
+        if robot.mechanism is not None:
+            q, coupling, _ = robot.mechanism.states(q)
         for link in sorted({above for end in ends for above in robot.geometry[end].movers}):
             joint, angles = robot.geometry[link], q[:, link]
             origin = joint.origin[:, np.newaxis] + np.outer(joint.sliding, angles)
@@ -114,7 +123,7 @@ class LinkFrames:
             frames[link] = frame = _Frame(rotation, origin, joint.movers)
             turns[link] = frame.turned(joint.turn)
             lines[link] = frame.turned(joint.slide) + _cross(origin, turns[link])
-        return cls(robot.joints, frames, lines, turns)
+        return cls(robot.moving, frames, lines, turns, coupling)
 
     @classmethod
     def in_the_middle(cls, robot: Robot) -> LinkFrames:
@@ -134,7 +143,14 @@ class LinkFrames:
             positions[k] = self.places(joint, offset).T
             for mover in self.frames[self.joints.index(joint)].movers:
                 jacobians[k, mover] = self.lines[mover] + _cross(self.turns[mover], positions[k])
-        return positions.transpose(2, 0, 1), jacobians.transpose(3, 0, 2, 1)
+        by_moving = jacobians.transpose(3, 0, 2, 1)
+        return positions.transpose(2, 0, 1), self._by_driven(by_moving)
+
+    def _by_driven(self, by_moving: FloatArray) -> FloatArray:
+        """Return derivatives by the driven joints of those by the moving ones, (N, ..., m)."""
+        if self.coupling is None:
+            return by_moving
+        return np.asarray(np.einsum('k...m,kmn->k...n', by_moving, self.coupling))
 
     def torques(self, joint: str, places: FloatArray, forces: FloatArray) -> FloatArray:
         """
@@ -157,7 +173,7 @@ class LinkFrames:
         result += np.einsum('jxn,xn->nj', self.turns, moments)
         movers = self.frames[self.joints.index(joint)].movers
         result[:, [k for k in range(len(self.joints)) if k not in movers]] = 0.0
-        return np.asarray(result)
+        return self._by_driven(np.asarray(result))
 
 
 def _cross(a: FloatArray, b: FloatArray) -> FloatArray:

@@ -69,7 +69,7 @@ def export_mjcf(
     model = robot.model
     base = robot.base
     bodies = {0: world if base == 'world' else ElementTree.SubElement(world, 'body', name=base)}
-    for index, joint in enumerate(robot.joints):
+    for index, joint in enumerate(robot.moving):
         identity = index + 1
         body = ElementTree.SubElement(
             bodies[model.parents[identity]],
@@ -81,7 +81,7 @@ def export_mjcf(
         upper = inertia.inertia[[0, 1, 2, 0, 0, 1], [0, 1, 2, 1, 2, 2]]
         mass = {'pos': _numbers(inertia.lever), 'mass': repr(float(inertia.mass))}
         ElementTree.SubElement(body, 'inertial', mass | {'fullinertia': _numbers(upper)})
-        ElementTree.SubElement(body, 'joint', _joint(robot, index))
+        ElementTree.SubElement(body, 'joint', _joint(robot.tree, index))
         for key, table in values.items():
             if table.get(joint):
                 body[-1].set(key, repr(float(table[joint])))
@@ -90,6 +90,7 @@ def export_mjcf(
         'contacts of links with each other',
         *(['velocity limits'] if np.any(np.isfinite(robot.velocity_limit)) else []),
         *(f'joint {joint.name}' for joint in held_joints(robot)),
+        *_couplings(root, robot),
     ]
     lines = ''.join(
         f'\n    {line.replace("--", "- -")}'
@@ -98,9 +99,42 @@ def export_mjcf(
     root.insert(0, ElementTree.Comment(f'{lines}\n  '))
     actuators = ElementTree.SubElement(root, 'actuator')
     for joint in robot.joints:
-        ElementTree.SubElement(actuators, 'motor', name=joint, joint=joint)
+        if joint in robot.moving:
+            ElementTree.SubElement(actuators, 'motor', name=joint, joint=joint)
     ElementTree.indent(root)
     return ElementTree.tostring(root, encoding='unicode') + '\n', tuple(left_out)
+
+
+def _couplings(root: ElementTree.Element, robot: Robot) -> list[str]:
+    """Add the couplings of joints as equalities; return those that MuJoCo cannot have."""
+    if robot.mechanism is None:
+        return []
+    tendons = ElementTree.SubElement(root, 'tendon')
+    equal, left_out = ElementTree.SubElement(root, 'equality'), []
+    for joint in robot.moving:
+        mimic = robot.description.by_name[joint].mimic
+        if mimic is None:
+            continue
+        if not set(mimic.multipliers) <= set(robot.moving):
+            left_out.append(f'the coupling of joint {joint}, whose motors move no body')
+            continue
+        name = f'{joint}_coupling'
+        fixed = ElementTree.SubElement(tendons, 'fixed', name=name)
+        for leader, factor in {
+            joint: 1.0,
+            **{k: -x for k, x in mimic.multipliers.items()},
+        }.items():
+            ElementTree.SubElement(fixed, 'joint', joint=leader, coef=repr(factor))
+        constant = _numbers([mimic.offset, 0.0, 0.0, 0.0, 0.0])
+        ElementTree.SubElement(equal, 'tendon', tendon1=name, polycoef=constant)
+    for loop in robot.description.loops:
+        frames = [robot.model.getFrameId(link, pin.FrameType.BODY) for link in loop.links]
+        bodies = [robot.model.frames[frame].parentJoint for frame in frames]
+        names = [robot.links[body - 1] if body else robot.base for body in bodies]
+        place = robot.model.frames[frames[0]].placement.act(np.array(loop.points[0]))
+        ends = dict(zip(('body1', 'body2'), names, strict=True))
+        ElementTree.SubElement(equal, 'connect', ends, anchor=_numbers(place))
+    return left_out
 
 
 def _shapes(

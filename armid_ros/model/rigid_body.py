@@ -10,6 +10,7 @@ All its quantities are linear in the gravity vector and in the inertial paramete
 
 from __future__ import annotations
 
+from dataclasses import replace
 import threading
 from weakref import WeakKeyDictionary
 
@@ -31,13 +32,13 @@ def rigid_parameter_names(robot: Robot) -> tuple[ParameterName, ...]:
 
     Returns
     -------
-    tuple of ParameterName, length 10 n
-        Names such as 'm1', 'mx1', ... 'Izz1', 'm2', numbered by joint from 1.
+    tuple of ParameterName, length 10 m
+        Names such as 'm1', 'mx1', ... 'Izz1', 'm2', numbered by moving joint from 1.
 
     """
     return tuple(
         ParameterName(f'{name}{number}', joint, unit)
-        for number, joint in enumerate(robot.joints, start=1)
+        for number, joint in enumerate(robot.moving, start=1)
         for name, unit in zip(LINK_PARAMETERS, LINK_UNITS, strict=True)
     )
 
@@ -75,6 +76,9 @@ def inverse_dynamics(robot: Robot, motion: Motion) -> FloatArray:
         Torque [N m] or force [N].
 
     """
+    if robot.mechanism is not None:
+        motion, jacobian = robot.mechanism.along(motion)
+        return _projected(jacobian, inverse_dynamics(robot.tree, motion))
     model, data = robot.model, _SCRATCH.of(robot)
     tau = np.empty((len(motion), robot.n_joints))
     for k, (q, dq, ddq) in enumerate(zip(motion.q, motion.dq, motion.ddq, strict=True)):
@@ -97,9 +101,20 @@ def inverse_dynamics_derivatives(
     -----
     Source: Carpentier and Mansard 2018; Pinocchio's computeRNEADerivatives. It divides by sums of
     link masses, so it needs positive masses. If a fit has a negative mass, a ballast is added to
-    all links, and the derivatives of the ballast alone are subtracted: they are linear.
+    all links, and the derivatives of the ballast alone are subtracted: they are linear. With
+    coupled joints, the derivatives are projected; with loops, those by position and velocity are
+    central differences.
 
     """
+    if robot.mechanism is not None:
+        moved, jacobian = robot.mechanism.along(motion)
+        own = [
+            _projected(jacobian, x) @ jacobian
+            for x in inverse_dynamics_derivatives(robot.tree, moved)
+        ]
+        if robot.mechanism.constant:
+            return own[0], own[1], own[2]
+        return _difference(robot, motion, 'q'), _difference(robot, motion, 'dq'), own[2]
     lightest = float(np.min(robot.rigid_parameters[:: len(LINK_PARAMETERS)]))
     if lightest < 0.0:
         ballast = np.zeros_like(robot.rigid_parameters)
@@ -120,6 +135,26 @@ def inverse_dynamics_derivatives(
     return by_q, by_dq, by_ddq
 
 
+def _projected(jacobian: FloatArray, torques: FloatArray) -> FloatArray:
+    """Return J^T times torques of moving joints, (N, m, ...), or columns of them."""
+    return np.asarray(np.einsum('kmn,km...->kn...', jacobian, torques))
+
+
+def _difference(robot: Robot, motion: Motion, name: str) -> FloatArray:
+    """Differentiate the torques by the positions or velocities of each joint, (N, n, n)."""
+    step = 1e-5
+    slopes = []
+    for shift in step * np.eye(robot.n_joints):
+        ends = [
+            inverse_dynamics(
+                robot, replace(motion, **{name: getattr(motion, name) + sign * shift})
+            )
+            for sign in (1.0, -1.0)
+        ]
+        slopes.append((ends[0] - ends[1]) / (2.0 * step))
+    return np.stack(slopes, axis=2)
+
+
 def regressor(robot: Robot, motion: Motion) -> FloatArray:
     """
     Compute the matrix Y of tau = Y pi for every sample of a motion.
@@ -133,8 +168,8 @@ def regressor(robot: Robot, motion: Motion) -> FloatArray:
 
     Returns
     -------
-    ndarray, shape (N, n, 10 n)
-        Y of each sample, with joints as rows and ``rigid_parameter_names`` as columns.
+    ndarray, shape (N, n, 10 m)
+        Y of each sample, with driven joints as rows and ``rigid_parameter_names`` as columns.
 
     Notes
     -----
@@ -151,6 +186,9 @@ def regressor(robot: Robot, motion: Motion) -> FloatArray:
     >>> tau = y @ robot.rigid_parameters  # [N m]
 
     """
+    if robot.mechanism is not None:
+        motion, jacobian = robot.mechanism.along(motion)
+        return _projected(jacobian, regressor(robot.tree, motion))
     model, data = robot.model, _SCRATCH.of(robot)
     n = robot.n_joints
     y = np.empty((len(motion), n, len(LINK_PARAMETERS) * n))
@@ -176,6 +214,9 @@ def gravity_sensitivity(robot: Robot, q: FloatArray) -> FloatArray:
         Derivatives dtau/dg [N m per m/s^2], with g in the base frame.
 
     """
+    if robot.mechanism is not None:
+        positions, jacobian, _ = robot.mechanism.states(q)
+        return _projected(jacobian, gravity_sensitivity(robot.tree, positions))
     columns = np.empty((len(q), robot.n_joints, 3))
     for axis, unit_gravity in enumerate(np.eye(3)):
         model = robot.with_gravity(unit_gravity).model

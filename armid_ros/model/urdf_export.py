@@ -140,12 +140,13 @@ def _parameters(robot: Robot, urdf: str) -> FloatArray:
 
 
 def _without_inertials(urdf: str, links: Sequence[str]) -> str:
-    """Return a URDF without the inertials of some links."""
+    """Return a URDF with inertials of zero in some links."""
     document, root = _parsed(urdf)
     for link in _children(root, 'link'):
-        for inertial in list(_children(link, 'inertial')):
-            if link.getAttribute('name') in links:
-                link.removeChild(inertial)
+        for inertial in _children(link, 'inertial'):
+            for element in (_child(inertial, 'mass'), _child(inertial, 'inertia')):
+                for key in element.attributes.keys() if link.getAttribute('name') in links else ():
+                    element.setAttribute(key, '0')
     return _text(document)
 
 

@@ -107,14 +107,15 @@ def draw_poses(
 
     """
     solids, model = _solids(collision), collision.robot.model
-    frames = [_frames(model, q) for q in poses]
+    frames = [_frames(model, q) for q in map(collision.robot.positions, poses)]
     last = max(solids, key=lambda solid: solid.joint)
     middle = last.points.mean(axis=0)
-    track = np.array([flat(CORNER, _frames(model, q)[last.joint].act(middle)) for q in way])
+    places = collision.robot.positions(way)
+    track = np.array([flat(CORNER, _frames(model, q)[last.joint].act(middle)) for q in places])
     strip = _strip(solids, frames, (190.0, 230.0), track)
     bodies = []
     for solid, points in _outlines(solids, frames, strip):
-        share = round(100.0 * solid.joint / collision.robot.n_joints)
+        share = round(100.0 * solid.joint / len(collision.robot.links))
         colour = f'color-mix(in srgb, var(--residual) {share}%, var(--measured))'
         bodies.append((points, colour if solid.of_arm else OBSTACLE))
     tips = [flat(CORNER, frame[last.joint].act(middle)) for frame in frames]
@@ -148,21 +149,22 @@ def draw_arm(
 
     """
     solids, model = _solids(collision_model(robot)), robot.model
-    poses = [robot.middle_pose]
+    poses = [robot.positions(robot.middle_pose)]
     if q is not None and len(q):
         # poses that a single drawing is tried in
-        poses = list(q[np.linspace(0, len(q) - 1, min(12, len(q))).astype(np.intp)])
+        kept = np.linspace(0, len(q) - 1, min(12, len(q))).astype(np.intp)
+        poses = list(robot.positions(q[kept]))
     tried = [[_frames(model, pose)] for pose in poses]
     seen = [np.array([flat(CORNER, one.translation) for one in frames]) for (frames,) in tried]
     frames = tried[int(np.argmax([np.prod(np.ptp(one, axis=0) + _POINT) for one in seen]))]
     strip = _strip(solids, frames, (300.0, 240.0))
     bodies = []
     for solid, points in _outlines(solids, frames, strip):
-        chosen = solid.joint > 0 and robot.joints[solid.joint - 1] in marked
+        chosen = solid.joint > 0 and robot.moving[solid.joint - 1] in marked
         bodies.append((points, 'var(--predicted)' if chosen else 'var(--faint)'))
     dots = [
         (*strip.place(flat(CORNER, frames[0][k].translation), 0).tolist(), name)
-        for k, name in enumerate(robot.joints, start=1)
+        for k, name in enumerate(robot.moving, start=1)
     ]
     labels, y = [], 0.0
     for x, top, name in sorted((dot for dot in dots if dot[2] in marked), key=lambda dot: dot[1]):

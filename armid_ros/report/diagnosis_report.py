@@ -242,7 +242,7 @@ class Story(Section):
         names = ', '.join(name_in_words(one.name) for one in cause)
         found = [place.joint for place in self.diagnosis.where]
         named = {joint for one in cause for joint in one.joints}
-        joints = [joint for joint in robot.joints if joint in named] if cause else found[:1]
+        joints = [joint for joint in robot.all_joints if joint in named] if cause else found[:1]
         caption = f'coloured: {", ".join(joints)} ({names or "the largest gap"})'
         if any(not one.joints for one in cause):
             joints, caption = list(robot.joints), f'coloured: the whole arm ({names})'

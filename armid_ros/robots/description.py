@@ -5,7 +5,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 import math
 from xml.etree import ElementTree
@@ -52,11 +52,24 @@ class Inertial:
 
 @dataclass(frozen=True)
 class Mimic:
-    """A joint position that follows another one: multiplier * position + offset."""
+    """A joint position that follows others: offset plus the sum of multiplier times position."""
 
-    joint: str
-    multiplier: float
+    multipliers: Mapping[str, float]
     offset: float
+
+    @property
+    def joint(self) -> str:
+        """Return the joint that is followed, the first of several."""
+        return next(iter(self.multipliers))
+
+
+@dataclass(frozen=True)
+class Loop:
+    """Points of two links, in the frames of the links [m], that passive joints keep together."""
+
+    links: tuple[str, str]
+    points: tuple[Vector, Vector]
+    passive: tuple[str, ...]
 
 
 @dataclass(frozen=True)
@@ -98,6 +111,12 @@ class Description:
     links: dict[str, Inertial | None]
     joints: tuple[Joint, ...]
     notes: tuple[str, ...]
+    loops: tuple[Loop, ...] = ()
+
+    @property
+    def passive(self) -> tuple[str, ...]:
+        """Return the joints that loops move."""
+        return tuple(dict.fromkeys(joint for loop in self.loops for joint in loop.passive))
 
     def movable(self) -> tuple[Joint, ...]:
         """Joints with a degree of freedom."""
@@ -171,6 +190,12 @@ def parse_description(root: ElementTree.Element) -> Description:
     for element in root.findall('joint'):
         name = _name(element, joints)
         joints[name] = _joint(element, name, notes)
+    for element in root.findall('mimic'):
+        name = element.get('follower', '')
+        if name not in joints:
+            raise RobotError(f"a <mimic> has the follower '{name}', which does not exist")
+        mimic = _mimic(element, f"joint '{name}'", joints[name].mimic)
+        joints[name] = replace(joints[name], mimic=mimic)
     if GROUND not in links and any(joint.parent == GROUND for joint in joints.values()):
         notes.append(f"link '{GROUND}' is not in the file; taken as the ground")
         links = {GROUND: None, **links}
@@ -180,7 +205,30 @@ def parse_description(root: ElementTree.Element) -> Description:
         links=links,
         joints=tuple(joints.values()),
         notes=tuple(notes),
+        loops=tuple(_loop(element, links, joints) for element in root.findall('loop')),
     )
+
+
+def _loop(element: ElementTree.Element, links: Iterable[str], joints: Mapping[str, Joint]) -> Loop:
+    ends = [(end.get('link', ''), _vector(end, 'xyz', 'a <loop>')) for end in element]
+    passive = tuple(element.get('passive', '').split())
+    unknown = [link for link, _ in ends if link not in links]
+    unknown += [name for name in passive if name not in joints or not joints[name].movable]
+    if len(ends) != 2 or not passive or unknown:
+        raise RobotError(
+            'a <loop> needs two points of links and the passive movable joints that close it'
+            + (f"; '{unknown[0]}' is not among those of the file" if unknown else '')
+        )
+    return Loop((ends[0][0], ends[1][0]), (ends[0][1], ends[1][1]), passive)
+
+
+def _mimic(element: ElementTree.Element, where: str, known: Mimic | None) -> Mimic:
+    """Return what a joint follows, with one more joint that it follows."""
+    joint = element.get('joint', '')
+    before = {} if known is None else dict(known.multipliers)
+    before[joint] = before.get(joint, 0.0) + _number(element, 'multiplier', where, 1.0)
+    offset = _number(element, 'offset', where, 0.0)
+    return Mimic(before, offset + (0.0 if known is None else known.offset))
 
 
 def _carriers(links: Iterable[str], joints: Iterable[Joint]) -> dict[str, Joint]:
@@ -283,9 +331,7 @@ def _joint(element: ElementTree.Element, name: str, notes: list[str]) -> Joint:
     lower, upper, velocity, effort = _limits(element, kind, where, notes)
     mimic, followed = None, element.find('mimic')
     if followed is not None:
-        multiplier = _number(followed, 'multiplier', where, 1.0)
-        offset = _number(followed, 'offset', where, 0.0)
-        mimic = Mimic(followed.get('joint', ''), multiplier, offset)
+        mimic = _mimic(followed, where, None)
     dynamics = element.find('dynamics')
     damping, friction, armature = (
         0.0 if dynamics is None else _number(dynamics, key, where, 0.0)

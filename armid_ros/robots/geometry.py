@@ -316,7 +316,7 @@ def collision_model(
 def _leave_out_touching(robot: Robot, geometry: pin.GeometryModel) -> tuple[tuple[str, str], ...]:
     """Remove the pairs of links that touch at zero; return these pairs in alphabetical order."""
     data, placed = robot.model.createData(), geometry.createData()
-    pin.computeDistances(robot.model, data, geometry, placed, robot.zero_pose)
+    pin.computeDistances(robot.model, data, geometry, placed, robot.positions(robot.zero_pose))
     touching = {
         _links(robot, geometry, number)
         for number, result in enumerate(placed.distanceResults)
@@ -330,6 +330,7 @@ def _leave_out_touching(robot: Robot, geometry: pin.GeometryModel) -> tuple[tupl
 
 def _leave_out_separate(robot: Robot, geometry: pin.GeometryModel) -> None:
     """Remove pairs that one joint moves and that never touch, such as flange and wrist."""
+    robot = robot.tree
     data, placed = robot.model.createData(), geometry.createData()
     by_joint: dict[int, list[int]] = {}
     for number, pair in enumerate(geometry.collisionPairs):

@@ -17,6 +17,7 @@ from xml.sax.saxutils import escape
 from armid_ros.errors import meant, RobotError
 from armid_ros.files import load_yaml, read_text, reading
 from armid_ros.motion import FloatArray
+from armid_ros.robots.coupling import couple, moving_joints
 from armid_ros.robots.description import (
     Description,
     INERTIA,
@@ -25,8 +26,9 @@ from armid_ros.robots.description import (
     parse_xml,
     Vector,
 )
+from armid_ros.robots.mechanism_file import with_mechanism
 from armid_ros.robots.mjcf import is_mjcf, urdf_of_mjcf
-from armid_ros.robots.robot import parse_gravity, Robot
+from armid_ros.robots.robot import of_joints, parse_gravity, Robot
 from armid_ros.robots.selection import driven_joints, several_arms, standing_position
 from armid_ros.robots.xacro_expansion import expand_xacro
 import numpy as np
@@ -153,6 +155,7 @@ def load_robot(
         text = expand_xacro(path, arguments, packages)
     elif arguments:
         raise RobotError(f'{path}: not a xacro file, so it takes no arguments')
+    text = with_mechanism(text, path)
     for name, folder in packages.items():
         text = text.replace(f'package://{name}/', f'file://{escape(folder)}/')
     robot = robot_from_urdf(text, gravity=gravity, joints=joints, source=str(source), path=path)
@@ -192,24 +195,15 @@ def robot_from_urdf(
         driven = driven_joints(description, joints)
         model, locked = _kinematic_model(description, driven, {})
     model.gravity = pin.Motion(parse_gravity(gravity), np.zeros(3))
-    by_name = {joint.name: joint for joint in driven}
-    driven = tuple(by_name[name] for name in list(model.names)[1:])
-    model.lowerPositionLimit = np.array([joint.lower for joint in driven])
-    model.upperPositionLimit = np.array([joint.upper for joint in driven])
+    moving = [description.by_name[name] for name in list(model.names)[1:]]
+    model.lowerPositionLimit = np.array([joint.lower for joint in moving])
+    model.upperPositionLimit = np.array([joint.upper for joint in moving])
     robot = Robot(
+        **of_joints(moving),
         name=description.name,
         model=model,
-        joints=tuple(joint.name for joint in driven),
-        links=tuple(joint.child for joint in driven),
-        lower=np.array([joint.lower for joint in driven]),
-        upper=np.array([joint.upper for joint in driven]),
-        velocity_limit=np.array([joint.velocity for joint in driven]),
-        torque_limit=np.array([joint.effort for joint in driven]),
-        acceleration_limit=np.full(len(driven), np.inf),
-        prismatic=np.array([joint.kind == 'prismatic' for joint in driven]),
+        links=tuple(joint.child for joint in moving),
         urdf=text,
-        urdf_damping=np.array([joint.damping for joint in driven]),
-        urdf_friction=np.array([joint.friction for joint in driven]),
         notes=(
             *description.inertia_doubts(),
             *description.notes,
@@ -233,7 +227,8 @@ def robot_from_urdf(
         for joint, link, inertia in zip(robot.joints, robot.links, moved, strict=True)
         if inertia < 1e-12  # kg m^2 or kg; the smallest motor rotor is five orders above
     )
-    return replace(robot, notes=(*robot.notes, *light))
+    with reading(source, RobotError):
+        return couple(replace(robot, notes=(*robot.notes, *light)), driven, {})
 
 
 def _written_out(source: str | Path) -> tuple[str | Path, dict[str, str], dict[str, str]]:
@@ -272,27 +267,29 @@ def described_at(robot: Robot, positions: Mapping[str, float]) -> Robot:
     description = robot.description
     driven = [description.by_name[joint] for joint in robot.joints]
     model, _ = _kinematic_model(description, driven, positions)
-    return replace(robot, model=model).with_gravity(robot.gravity)
+    tree = replace(robot.tree, model=model).with_gravity(robot.gravity)
+    return tree if robot.mechanism is None else couple(tree, driven, positions)
 
 
 def _kinematic_model(
     description: Description, driven: Sequence[Joint], known: Mapping[str, float]
 ) -> tuple[pin.Model, tuple[str, ...]]:
-    """Return the model of the driven joints, and notes on where the other joints are locked."""
-    moving = {joint.name for joint in driven}
+    """Return the model of the moving joints, and notes on where the other joints are locked."""
+    moving = moving_joints(description, [joint.name for joint in driven])
     positions = {
         joint.name: standing_position(description, joint, known)
         for joint in description.movable()
         if joint.name not in moving
     }
+    notes = tuple(
+        f"joint '{name}': not driven, locked at {position:g} {description.by_name[name].unit}"
+        for name, position in positions.items()
+        if description.by_name[name] not in driven
+    )
     try:
         model = pin.buildModelFromXML(_kinematic_urdf(description, positions))
     except (RuntimeError, ValueError) as error:
         raise RobotError(' '.join(str(error).split())) from error
-    notes = tuple(
-        f"joint '{name}': not driven, locked at {position:g} {description.by_name[name].unit}"
-        for name, position in positions.items()
-    )
     return model, notes
 
 

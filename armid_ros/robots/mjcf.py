@@ -11,6 +11,7 @@ link is at its joint.
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 import math
 from pathlib import Path
 import re
@@ -135,9 +136,10 @@ class _Writer:
         if not np.allclose(model.opt.gravity, (0.0, 0.0, -9.81), atol=0.01):
             gravity = ','.join(f'{value:g}' for value in model.opt.gravity)
             self.notes.append(f'gravity {gravity} of the file is not read: --gravity={gravity}')
-        closed = sum(int(kind != kinds.mjEQ_JOINT) for kind in model.eq_type)
+        open_ = [k for k, kind in enumerate(model.eq_type) if kind != kinds.mjEQ_JOINT]
+        open_ = [k for k in open_ if not self._loop(k, anchors)]
         counts = {
-            'equalities (connect, weld, tendon)': closed,
+            'equalities (connect, weld, tendon)': len(open_),
             'tendons': model.ntendon,
             'bodies with gravcomp': int(np.count_nonzero(model.body_gravcomp)),
             'contact exclusions and pairs': model.nexclude + model.npair,
@@ -268,6 +270,35 @@ class _Writer:
             offset = constant + zero - factor * zero_of_leader
             values = {'joint': self.joints[leader], 'multiplier': _number(factor)}
             ElementTree.SubElement(element, 'mimic', values | {'offset': _number(offset)})
+
+    def _loop(self, equality: int, anchors: Mapping[int, FloatArray]) -> bool:
+        """Write a connect equality as a loop; return False for one without passive joints."""
+        model, kinds = self.model, self.mujoco.mjtEq
+        bodies = [int(model.eq_obj1id[equality]), int(model.eq_obj2id[equality])]
+        of_bodies = model.eq_objtype[equality] == self.mujoco.mjtObj.mjOBJ_BODY
+        if (
+            model.eq_type[equality] != kinds.mjEQ_CONNECT
+            or not of_bodies
+            or not all(body in anchors for body in bodies)
+        ):
+            return False
+        chains = [set[int](), set[int]()]
+        for chain, body in zip(chains, bodies, strict=True):
+            while body:
+                first = int(model.body_jntadr[body])
+                chain.update(range(first, first + int(model.body_jntnum[body])))
+                body = int(model.body_parentid[body])
+        moved = model.actuator_trntype == self.mujoco.mjtTrn.mjTRN_JOINT
+        driven = set(model.actuator_trnid[moved, 0].tolist())
+        passive = sorted((chains[0] ^ chains[1]) - driven)
+        if not driven or not passive:
+            return False
+        names = ' '.join(self.joints[joint] for joint in passive)
+        loop = ElementTree.SubElement(self.root, 'loop', passive=names)
+        for body, point in zip(bodies, model.eq_data[equality, :6].reshape(2, 3), strict=True):
+            xyz = _text(point - anchors[body])
+            ElementTree.SubElement(loop, 'point', link=self.bodies[body], xyz=xyz)
+        return True
 
     def _shapes(self, link: ElementTree.Element, body: int, anchor: FloatArray) -> None:
         model, kinds = self.model, self.mujoco.mjtGeom

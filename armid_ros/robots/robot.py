@@ -8,10 +8,12 @@ from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 from pathlib import Path
+from typing import Any
 
 from armid_ros.errors import RobotError
 from armid_ros.motion import FloatArray, freeze, read_only
-from armid_ros.robots.description import Description, parse_description, parse_xml
+from armid_ros.robots.description import Description, Joint, parse_description, parse_xml
+from armid_ros.robots.mechanism import Mechanism
 import numpy as np
 import numpy.typing as npt
 import pinocchio as pin
@@ -43,12 +45,12 @@ class Robot:
     name : str
         Name in the description, or the shipped name.
     model : pinocchio.Model
-        Rigid bodies of the driven joints, nq == nv == n. Links on joints that are not driven are
-        part of the body that carries them.
+        Rigid bodies of the moving joints, nq == nv == m; m = n unless joints are coupled. Links on
+        joints that do not move are part of the body that carries them.
     joints : tuple of str
         Driven joints in velocity order.
     links : tuple of str
-        Child link of each driven joint.
+        Child link of each moving joint, m of them.
     lower, upper : ndarray, shape (n,)
         Position limits [rad or m]; infinite where the description gives none.
     velocity_limit : ndarray, shape (n,)
@@ -67,6 +69,8 @@ class Robot:
         Sentences on assumptions and doubtful values in the description.
     path : Path or None
         The loaded file; meshes and collision exceptions (SRDF) are looked for from its folder.
+    mechanism : Mechanism or None
+        Map from the driven to the moving joints; None if these are the same.
 
     Examples
     --------
@@ -94,6 +98,7 @@ class Robot:
     urdf_friction: FloatArray = field(repr=False)
     notes: tuple[str, ...] = ()
     path: Path | None = None
+    mechanism: Mechanism | None = None
 
     def __repr__(self) -> str:
         """Return name, joints and mass in two lines."""
@@ -116,16 +121,90 @@ class Robot:
         prismatic = np.array(self.prismatic, dtype=np.bool_)
         prismatic.setflags(write=False)
         object.__setattr__(self, 'prismatic', prismatic)
-        if not self.model.nq == self.model.nv == len(self.joints):
+        if not self.model.nq == self.model.nv == len(self.moving):
             raise RobotError(
                 f'{self.name}: the model has nq = {self.model.nq} and nv = {self.model.nv}, '
-                f'but there are {len(self.joints)} driven joints'
+                f'but there are {len(self.moving)} moving joints'
             )
 
     @property
     def n_joints(self) -> int:
         """Return the number of driven joints n."""
         return len(self.joints)
+
+    @property
+    def moving(self) -> tuple[str, ...]:
+        """Return the joints that move a body: the driven joints and those coupled to them."""
+        return self.joints if self.mechanism is None else self.mechanism.joints
+
+    @property
+    def all_joints(self) -> tuple[str, ...]:
+        """Return the moving joints, and the motors that move no body of their own."""
+        return tuple(dict.fromkeys([*self.moving, *self.joints]))
+
+    @property
+    def tip(self) -> str:
+        """Return the last moving joint; with coupled joints, the one at the end of the arm."""
+        if self.mechanism is None:
+            return self.joints[-1]
+        lengths = [np.linalg.norm(place.translation) for place in self.model.jointPlacements]
+        reach = [
+            sum(lengths[number] for number in chain) + np.linalg.norm(body.lever)
+            for chain, body in zip(self.model.supports, self.model.inertias, strict=True)
+        ]
+        return self.moving[int(np.argmax(reach[1:]))]
+
+    def slides(self, joint: str) -> bool:
+        """Return whether a driven or moving joint is prismatic."""
+        own = self if joint in self.joints else self.tree
+        return bool(own.prismatic[own.index(joint)])
+
+    def body_of(self, joint: str) -> int:
+        """Return the index of the body of a driven joint, or of the last that a motor moves."""
+        if self.mechanism is None or joint in self.moving:
+            return self.moving.index(joint)
+        return int(np.flatnonzero(self.mechanism.driven[:, self.index(joint)])[-1])
+
+    @cached_property
+    def tree(self) -> Robot:
+        """The robot with all moving joints as driven ones; itself if no joints are coupled."""
+        if self.mechanism is None:
+            return self
+        own = [self.description.by_name[name] for name in self.moving]
+        return replace(self, **of_joints(own), mechanism=None)
+
+    def positions(self, q: FloatArray) -> FloatArray:
+        """Return the positions of the moving joints, (..., m), from the driven ones, (..., n)."""
+        if self.mechanism is None:
+            return q
+        rows = self.mechanism.states(q.reshape(-1, self.n_joints)).q
+        return rows.reshape(*q.shape[:-1], len(self.moving))
+
+    def state(
+        self, q: FloatArray, dq: FloatArray, ddq: FloatArray
+    ) -> tuple[FloatArray, FloatArray, FloatArray]:
+        """Return position, velocity and acceleration of the moving joints, each (m,)."""
+        if self.mechanism is None:
+            return q, dq, ddq
+        position, jacobian, drift = self.mechanism.at(q, dq)
+        return position, jacobian @ dq, jacobian @ ddq + drift
+
+    def inverse_dynamics(
+        self, data: pin.Data, q: FloatArray, dq: FloatArray, ddq: FloatArray
+    ) -> FloatArray:
+        """Return the torques of the driven joints in one state, shape (n,) [N m or N]."""
+        if self.mechanism is None:
+            return np.asarray(pin.rnea(self.model, data, q, dq, ddq))
+        position, jacobian, drift = self.mechanism.at(q, dq)
+        tau = pin.rnea(self.model, data, position, jacobian @ dq, jacobian @ ddq + drift)
+        return np.asarray(jacobian.T @ tau)
+
+    def inertia(self, data: pin.Data, q: FloatArray) -> FloatArray:
+        """Return the inertia matrix J^T M J of the driven joints, shape (n, n) [kg m^2]."""
+        if self.mechanism is None:
+            return np.asarray(pin.crba(self.model, data, q))
+        position, jacobian, _ = self.mechanism.at(q)
+        return np.asarray(jacobian.T @ pin.crba(self.model, data, position) @ jacobian)
 
     @cached_property
     def description(self) -> Description:
@@ -134,8 +213,8 @@ class Robot:
 
     @cached_property
     def geometry(self) -> tuple[JointGeometry, ...]:
-        """Geometry of each joint."""
-        return tuple(JointGeometry.of(self.model, k) for k in range(self.n_joints))
+        """Geometry of each moving joint."""
+        return tuple(JointGeometry.of(self.model, k) for k in range(len(self.links)))
 
     @property
     def gravity(self) -> FloatArray:
@@ -153,7 +232,7 @@ class Robot:
     @property
     def rigid_parameters(self) -> FloatArray:
         """
-        Rigid-body parameters of the driven bodies, shape (10 n,).
+        Rigid-body parameters of the moving bodies, shape (10 m,).
 
         Body by body m, m cx, m cy, m cz [kg, kg m] and Ixx, Ixy, Iyy, Ixz, Iyz, Izz [kg m^2]
         about the joint frame, which is the column order of pinocchio's
@@ -211,7 +290,7 @@ class Robot:
 
         Parameters
         ----------
-        parameters : array_like, shape (10 n,)
+        parameters : array_like, shape (10 m,)
             In the order of `rigid_parameters`. They need not be physically consistent, but a
             body without mass must not have a first moment.
 
@@ -222,14 +301,14 @@ class Robot:
 
         """
         pi = np.asarray(parameters, dtype=np.float64)
-        expected = (PER_LINK * self.n_joints,)
+        expected = (PER_LINK * len(self.links),)
         if pi.shape != expected or not np.all(np.isfinite(pi)):
             raise RobotError(
                 f'{self.name}: rigid parameters have to be {expected[0]} finite numbers, '
                 f'not an array of shape {pi.shape}'
             )
         model, place = self.model.copy(), self.path or self.name
-        for body, values in enumerate(pi.reshape(self.n_joints, PER_LINK)):
+        for body, values in enumerate(pi.reshape(-1, PER_LINK)):
             model.inertias[body + 1] = _inertia(f"{place}: link '{self.links[body]}'", values)
         return replace(self, model=model)
 
@@ -281,6 +360,21 @@ class JointGeometry:
             rotation @ motion[:3],
             np.stack([rotation, rotation @ cross, rotation @ cross @ cross], axis=2),
         )
+
+
+def of_joints(joints: Sequence[Joint]) -> dict[str, Any]:
+    """Return the fields of a `Robot` for some joints of its description."""
+    return {
+        'joints': tuple(joint.name for joint in joints),
+        'lower': np.array([joint.lower for joint in joints]),
+        'upper': np.array([joint.upper for joint in joints]),
+        'velocity_limit': np.array([joint.velocity for joint in joints]),
+        'torque_limit': np.array([joint.effort for joint in joints]),
+        'acceleration_limit': np.full(len(joints), np.inf),
+        'prismatic': np.array([joint.kind == 'prismatic' for joint in joints]),
+        'urdf_damping': np.array([joint.damping for joint in joints]),
+        'urdf_friction': np.array([joint.friction for joint in joints]),
+    }
 
 
 def position_range(lower: FloatArray, upper: FloatArray) -> tuple[FloatArray, FloatArray]:

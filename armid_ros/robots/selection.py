@@ -4,7 +4,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Callable, Collection, Iterable, Mapping, Sequence
 from dataclasses import dataclass
 
 from armid_ros.errors import meant, RobotError
@@ -28,7 +28,7 @@ class HeldJoint:
     unit : str
         'rad' or 'm'.
     follows : str
-        The joint that this joint mimics; empty if none.
+        The joint that this joint mimics, the first of several; empty if none.
     carries : tuple of str
         The driven joints that this joint moves.
 
@@ -45,38 +45,32 @@ def driven_joints(description: Description, names: Sequence[str] | None) -> tupl
     """
     Return the driven joints: the named joints, or all except those of a gripper.
 
-    A joint that mimics another one is never driven. By default, a joint of a gripper is not driven
-    either: a joint that a mimic joint follows, or whose name contains finger, gripper or jaw, if
-    it carries no joint of the arm.
+    A joint that mimics others, or that a loop moves, is never driven. By default, a joint of a
+    gripper is not driven either: a joint that a mimic joint follows alone, or whose name contains
+    finger, gripper or jaw, if neither it nor a joint that follows it carries a joint of the arm.
 
     Raises
     ------
     RobotError
-        If a name is unknown, repeated, not movable, a mimic joint, or followed by a mimic joint.
+        If a name is unknown, repeated, not movable, a mimic joint, or a passive joint of a loop.
         The message lists the joints that can be named.
 
     """
     if names is None:
-        free = [joint for joint in description.movable() if not joint.mimic]
-        led = {joint.mimic.joint for joint in description.joints if joint.mimic}
+        free = _free(description)
+        mimics = [(joint.name, joint.mimic) for joint in description.joints if joint.mimic]
+        led = {mimic.joint for _, mimic in mimics if len(mimic.multipliers) == 1}
         gripper = {
             joint.name
             for joint in free
             if joint.name in led or any(word in joint.name.lower() for word in GRIPPER_WORDS)
         }
         carriers = _carriers(description, [j.name for j in free if j.name not in gripper])
+        carriers |= {leader for name, m in mimics if name in carriers for leader in m.multipliers}
         chosen = tuple(j for j in free if j.name not in gripper or j.name in carriers)
         chosen = chosen or tuple(joint for joint in free if joint.name not in led)
     else:
         chosen = _by_name(description, names)
-    followers = {joint.mimic.joint: joint for joint in description.joints if joint.mimic}
-    for joint in chosen:
-        if joint.name in followers:
-            raise RobotError(
-                f"joint '{followers[joint.name].name}' mimics the driven joint "
-                f"'{joint.name}'; coupled mechanisms are not supported: leave '{joint.name}' out "
-                f"of the driven joints, or make '{followers[joint.name].name}' fixed"
-            )
     if not chosen:
         raise RobotError('no joint can be driven; a robot needs at least one')
     # Pinocchio keeps tensors of the joints cubed, 1 GB for 250; a humanoid with both hands has 70
@@ -165,33 +159,75 @@ def held_joints(robot: Robot) -> tuple[HeldJoint, ...]:
             tuple(name for name in robot.joints if joint.name in carriers[name]),
         )
         for joint in description.movable()
-        if joint.name not in robot.joints
+        if joint.name not in (*robot.joints, *robot.moving)
     )
 
 
 def standing_position(description: Description, joint: Joint, known: Mapping[str, float]) -> float:
     """Return the position of a joint that is not driven [rad or m]; by default nearest to 0."""
-    multiplier, offset = 1.0, 0.0
-    followed = {joint.name}
-    while joint.mimic and joint.name not in known:
-        offset += multiplier * joint.mimic.offset
-        multiplier *= joint.mimic.multiplier
-        leader = description.by_name.get(joint.mimic.joint)
+    factors, position = leaders(description, joint, known)
+    for name, factor in factors.items():
+        leader = description.by_name[name]
+        position += factor * known.get(name, min(max(0.0, leader.lower), leader.upper))
+    return position
+
+
+def leaders(
+    description: Description, joint: Joint, stop: Collection[str], above: tuple[str, ...] = ()
+) -> tuple[dict[str, float], float]:
+    """
+    Return the position of a joint as a sum over the joints that it follows.
+
+    Parameters
+    ----------
+    description : Description
+        The description.
+    joint : Joint
+        The joint.
+    stop : collection of str
+        Joints that count as free although they follow others.
+    above : tuple of str
+        The joints that follow this joint.
+
+    Returns
+    -------
+    factors : dict of str to float
+        Factor of the position of each joint that follows none; the joint itself if it is one.
+    offset : float
+        Position if those joints are at zero [rad or m].
+
+    Raises
+    ------
+    RobotError
+        If the joint follows itself.
+
+    """
+    if joint.mimic is None or joint.name in stop:
+        return {joint.name: 1.0}, 0.0
+    factors, offset = dict[str, float](), joint.mimic.offset
+    above = (*above, joint.name)
+    for name, multiplier in joint.mimic.multipliers.items():
+        leader = description.by_name.get(name)
         if leader is None:
-            return offset
-        if leader.name in followed:
-            raise RobotError(
-                f"joint '{leader.name}' mimics itself, directly or through other joints"
-            )
-        followed.add(leader.name)
-        joint = leader
-    position = known.get(joint.name, min(max(0.0, joint.lower), joint.upper))
-    return multiplier * position + offset
+            continue
+        if name in above:
+            raise RobotError(f"joint '{name}' mimics itself, directly or through other joints")
+        further, shift = leaders(description, leader, stop, above)
+        offset += multiplier * shift
+        for free, factor in further.items():
+            factors[free] = factors.get(free, 0.0) + multiplier * factor
+    return factors, offset
+
+
+def _free(description: Description) -> list[Joint]:
+    """Return the joints that can be driven."""
+    passive = description.passive
+    return [j for j in description.movable() if not j.mimic and j.name not in passive]
 
 
 def _by_name(description: Description, names: Sequence[str]) -> tuple[Joint, ...]:
     known, named = description.by_name, set[str]()
-    free = ', '.join(joint.name for joint in description.movable() if not joint.mimic)
+    free = ', '.join(joint.name for joint in _free(description))
     for name in names:
         if name not in known:
             raise RobotError(
@@ -202,6 +238,10 @@ def _by_name(description: Description, names: Sequence[str]) -> tuple[Joint, ...
         if known[name].mimic:
             raise RobotError(
                 f"joint '{name}' mimics another one and cannot be driven; joints to drive: {free}"
+            )
+        if name in description.passive:
+            raise RobotError(
+                f"joint '{name}' is moved by a loop and cannot be driven; joints to drive: {free}"
             )
         if name in named:
             raise RobotError(f"joint '{name}' is named twice among the driven joints")

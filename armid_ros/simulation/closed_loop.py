@@ -193,6 +193,7 @@ class CompiledLoop:
         """Return the loop; None if the kernel does not support the plant or is not compiled."""
         action, dry = plant.action, plant.contacts
         usual = plant.springs is None and action.drive is None and action.hysteresis is None
+        usual = usual and plant.robot.mechanism is None
         of_joints = dry.friction is None and dry.of_single_joints
         feedback, library = controller.feedback, kernel()
         if not (usual and of_joints) or feedback is None or library is None:

@@ -56,16 +56,14 @@ class LinearFeedback:
     weighs: bool = True
     stiffness: FloatArray | float = 0.0
     damping: FloatArray | float = 0.0
-    _model: pin.Model = field(init=False, repr=False)
+    _body: Robot = field(init=False, repr=False)
     _data: pin.Data = field(init=False, repr=False)
 
     def __post_init__(self) -> None:
-        """Make the rigid-body model and its scratch memory."""
-        model = pin.Model(self.robot.model)
-        if not self.weighs:
-            model.gravity.linear = np.zeros(3)
-        object.__setattr__(self, '_model', model)
-        object.__setattr__(self, '_data', model.createData())
+        """Make the rigid body and its scratch memory."""
+        body = self.robot if self.weighs else self.robot.with_gravity(np.zeros(3))
+        object.__setattr__(self, '_body', body)
+        object.__setattr__(self, '_data', body.model.createData())
 
     @classmethod
     def of(cls, arm: ArmModel, **terms: Any) -> LinearFeedback:
@@ -84,7 +82,7 @@ class LinearFeedback:
         ddq += 2.0 * self.bandwidth * slower
         if self.follows:
             ddq += desired[2]
-        tau: FloatArray = pin.rnea(self._model, self._data, q, self.follows * dq, ddq)
+        tau = self._body.inverse_dynamics(self._data, q, self.follows * dq, ddq)
         tau += self.added_inertia.dot(ddq)
         tau += self.stiffness * behind
         tau += self.damping * slower
@@ -207,7 +205,7 @@ class GravityPD(Controller):
         """Choose the gains."""
         body = LinearFeedback.of(self.arm)
         robot = body.robot
-        inertia = np.diag(pin.crba(robot.model, robot.model.createData(), robot.middle_pose))
+        inertia = np.diag(robot.inertia(robot.model.createData(), robot.middle_pose))
         inertia = inertia + np.diag(body.added_inertia)
         stiffness, damping = inertia * BANDWIDTH**2, 2.0 * BANDWIDTH * inertia
         feedback = replace(body, stiffness=read_only(stiffness), damping=read_only(damping))
@@ -282,7 +280,7 @@ class MotorControl(Controller):
         if springs is None:
             raise ModelError(f'{robot.name}: its joints are rigid; use ComputedTorque')
         joints, e = springs.joints, len(springs.joints)
-        link = np.diag(pin.crba(robot.model, robot.model.createData(), robot.middle_pose))
+        link = np.diag(robot.inertia(robot.model.createData(), robot.middle_pose))
         rotor = np.array(np.diag(springs.rotors)[e:])
         rotor[joints] = np.diag(springs.rotors)[:e]
         inertia = link + rotor

@@ -24,7 +24,6 @@ from armid_ros.simulation.contacts import Contacts, Modes
 from armid_ros.simulation.plant import no_body, NoBodyError, Plant, Rotors, State
 from armid_ros.simulation.springs import ElasticJoints
 import numpy as np
-import pinocchio as pin
 from scipy.linalg.lapack import dgesv, dposv
 
 
@@ -53,24 +52,21 @@ def step(plant: Plant, state: State, torque: FloatArray) -> State:
             assert state.rotors is not None
             state = spring_substep(plant, plant.springs, state.rotors, state, torque)
         return State(steps, steps * plant.dt, *state[2:])
-    half = 0.5 * plant.dt
-    model, data, dq = plant.robot.model, plant.data, state.dq
+    half, robot, dq = 0.5 * plant.dt, plant.robot, state.dq
     q_middle = state.q + half * dq
     dq_middle = dq + half * state.ddq
-    weight = pin.nonLinearEffects(model, data, q_middle, dq_middle)
-    force = torque - weight
+    force = torque - plant.weight(q_middle, dq_middle)
     force -= plant.damping.dot(dq)
     memory, slipping = state.memory, plant.action.hysteresis
     middle = memory if slipping is None else slipping.advance(memory, half * dq)
     plant.resist(force, state.t + 0.5 * plant.dt, q_middle, dq_middle, middle)
     contacts, load = plant.contacts, None
     if contacts.friction is not None:
-        load = pin.rnea(model, data, q_middle, dq_middle, state.ddq)
+        load = robot.inverse_dynamics(plant.data, q_middle, dq_middle, state.ddq)
         contacts = contacts.under(load)
-    inertia = pin.crba(model, data, q_middle) + plant.added_inertia
+    inertia = robot.inertia(plant.data, q_middle) + plant.added_inertia
     dq_next, ddq, modes = _end_velocity(plant, contacts, inertia, force, dq, state.modes)
     q_next = q_middle + half * dq_next
-    robot = plant.robot
     if plant.hard_stops and np.any((q_next < robot.lower) | (q_next > robot.upper)):
         q_next, dq_next, ddq, modes = _stop(plant, inertia, force, state, q_next, load)
     if slipping is not None:
@@ -154,7 +150,7 @@ def spring_substep(
     twist = rotors.twist + half * springs.to_twists.dot(v)
     force, memory = _force(plant, springs, state, torque, q, v, twist)
     inertia = springs.rotors.copy()
-    inertia[e:, e:] += pin.crba(plant.robot.model, plant.data, q)
+    inertia[e:, e:] += plant.robot.inertia(plant.data, q)
     pull = springs.pull
     if springs.loose:
         pull, offset = springs.meshing(twist)
@@ -167,7 +163,7 @@ def spring_substep(
     if modes:
         response, contacts = after[:, 1:], plant.contacts
         if contacts.friction is not None:
-            load = pin.rnea(plant.robot.model, plant.data, q, v[e:], state.ddq)
+            load = plant.robot.inverse_dynamics(plant.data, q, v[e:], state.ddq)
             contacts = contacts.under(load)
         w, g = springs.friction @ x_next[e:], springs.friction @ response[e:]
         rub, modes = contacts.torques(g, w, modes)
@@ -218,7 +214,7 @@ def _force(
     drive = torque.copy()
     plant.resist(drive, t, springs.at_motors(q, twist), motor_speed, middle_memory)
     force = springs.to_motors.T.dot(drive)
-    force[e:] -= pin.nonLinearEffects(robot.model, plant.data, q, v[e:])
+    force[e:] -= plant.weight(q, v[e:])
     if action.link_torque is not None:
         force[e:] -= action.link_torque(np.asarray(t), q, v[e:])
     if plant.hard_stops:

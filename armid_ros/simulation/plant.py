@@ -196,13 +196,15 @@ class Plant:
         self.contacts = Contacts.of(friction)
         self.constant: FloatArray | None = constant if constant.any() else None
         self.data = robot.model.createData()
-        mass = np.array(pin.crba(robot.model, self.data, robot.middle_pose))
+        mass = np.array(robot.inertia(self.data, robot.middle_pose))
         moved = np.abs(np.diag(mass + inertia))
         still = int(np.argmin(moved))
         if moved[still] < 1e-15:
+            joint = robot.joints[still]
+            link = robot.description.by_name[joint].child
             raise ModelError(
-                f"{robot.name}: joint '{robot.joints[still]}' moves no mass and no inertia, so "
-                f"its acceleration is infinite; give link '{robot.links[still]}' an <inertial>"
+                f"{robot.name}: joint '{joint}' moves no mass and no inertia, so "
+                f"its acceleration is infinite; give link '{link}' an <inertial>"
             )
         weight = _damping_weight(robot, mass + inertia, self.damping, dt)
         self.added_inertia: FloatArray = inertia + weight * dt * self.damping
@@ -253,11 +255,18 @@ class Plant:
         memory = np.empty(0) if slipping is None else slipping.start(velocity)
         rotors = None
         if self.springs is not None:
-            load = pin.computeGeneralizedGravity(self.robot.model, self.data, position)
+            still = np.zeros(n)
+            load = self.robot.inverse_dynamics(self.data, position, still, still)
             joints = self.springs.joints
             rotors = Rotors(self.springs.twist(load), velocity[joints], acceleration[joints])
         t = steps * self.dt
         return State(steps, t, position, velocity, acceleration, modes, memory, rotors)
+
+    def weight(self, q: FloatArray, dq: FloatArray) -> FloatArray:
+        """Return the torques of gravity and velocities on the joints, shape (n,) [N m]."""
+        if self.robot.mechanism is None:
+            return np.asarray(pin.nonLinearEffects(self.robot.model, self.data, q, dq))
+        return self.robot.inverse_dynamics(self.data, q, dq, np.zeros(len(q)))
 
     def motors(self, state: State) -> tuple[FloatArray, FloatArray, FloatArray]:
         """Return positions, velocities and accelerations of the motors, each of shape (n,)."""

@@ -239,18 +239,18 @@ class LinkAccelerometers:
         if places is None:
             places = [inertia.lever for inertia in list(robot.model.inertias)[1:]]
         array = np.asarray(places, dtype=float)
-        if array.shape != (robot.n_joints, 3):
+        if array.shape != (len(robot.links), 3):
             raise RobotError(
                 f'{robot.name}: accelerometers need three coordinates for each of '
-                f'{robot.n_joints} links, got an array of shape {array.shape}'
+                f'{len(robot.links)} links, got an array of shape {array.shape}'
             )
-        self._model, self._data = robot.model, robot.model.createData()
+        self._robot, self._data = robot, robot.model.createData()
         self._placements = [pin.SE3(np.eye(3), place) for place in array]
 
     def read(self, q: FloatArray, dq: FloatArray, ddq: FloatArray) -> FloatArray:
         """Return the readings in one state, shape (n, 3) [m/s^2]; at rest gravity, upwards."""
-        model, data = self._model, self._data
-        pin.forwardKinematics(model, data, q, dq, ddq)
+        model, data = self._robot.model, self._data
+        pin.forwardKinematics(model, data, *self._robot.state(q, dq, ddq))
         up = -model.gravity.linear
         readings = np.empty((len(self._placements), 3))
         for joint, place in enumerate(self._placements, 1):

@@ -149,10 +149,11 @@ def log_recording(
             ('residual/{}', 'residual'),
         ):
             curves.append((entity, times, np.concatenate([getattr(fit, name) for fit in fits])))
-    for j, joint in enumerate(robot.joints):
+    for j, joint in enumerate(robot.moving):
         turns = Rotation.from_matrix(frames[j].rotation.transpose(2, 0, 1)).as_quat()
         moved = rr.Transform3D.columns(translation=frames[j].origin.T, quaternion=turns)
         stream.send_columns(f'arm/{_part(joint)}', [_times(t)], moved)
+    for j, joint in enumerate(robot.joints):
         for entity, at, values in curves:
             known = np.isfinite(values[:, j])
             if known.any():
@@ -192,7 +193,7 @@ def _log_bodies(stream: Any, robot: Robot, marked: Sequence[str]) -> list[str]:
     def place(joint: int) -> tuple[str, tuple[int, int, int]]:
         if joint == 0:
             return 'arm/base', _LINK
-        name = robot.joints[joint - 1]
+        name = robot.moving[joint - 1]
         return f'arm/{_part(name)}', _MARKED if name in marked else _LINK
 
     for shape in shapes_of(robot, 'visual', 'collision'):

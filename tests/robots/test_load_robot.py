@@ -158,13 +158,15 @@ class TestDrivenJoints:
         assert arm.joints == ('shoulder', 'elbow')
         assert any("'right'" in note and '0.1 rad' in note for note in arm.notes)
 
-    def test_a_mimic_joint_within_the_arm_is_refused(self) -> None:
+    def test_a_mimic_joint_within_the_arm_moves_and_cannot_be_driven(self) -> None:
         mimic = '<mimic joint="shoulder"/>' + LIMIT
         linked = link('lower') + joint('elbow', 'upper', 'lower', inside=mimic)
         wrist = link('hand') + joint('wrist', 'lower', 'hand')
-        for joints in (None, ['elbow']):
-            with pytest.raises(RobotError, match="'elbow' mimics"):
-                robot_from_urdf(robot(ARM, linked, wrist), joints=joints)
+        arm = robot_from_urdf(robot(ARM, linked, wrist))
+        assert arm.joints == ('shoulder', 'wrist')
+        assert arm.moving == ('shoulder', 'elbow', 'wrist')
+        with pytest.raises(RobotError, match="'elbow' mimics"):
+            robot_from_urdf(robot(ARM, linked, wrist), joints=['elbow'])
 
     @pytest.mark.parametrize(
         ('joints', 'message'),

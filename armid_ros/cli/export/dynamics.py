@@ -12,6 +12,7 @@ from typing import Any
 from armid_ros.arm import ArmModel
 from armid_ros.arm.export import place_values
 from armid_ros.effects import Effect, USUAL_EFFECTS
+from armid_ros.errors import ModelError
 import numpy as np
 import numpy.typing as npt
 
@@ -36,6 +37,8 @@ def torque_tables(arm: ArmModel) -> tuple[dict[str, npt.NDArray[Any]], tuple[str
         Parameters that the tables have no place for, as lines.
 
     """
+    if arm.robot.mechanism is not None:
+        raise ModelError(f'{arm.robot.name}: the code has no coupled joints; use its model.yaml')
 
     def table_of(effect: Effect) -> str:
         attribute = effect.traits.mjcf_attribute

@@ -88,7 +88,7 @@ def load_of(arm: ArmModel, joint: str | None = None, frame: str | None = None) -
             f"the payload of joint '{joint}' has a mass of {ten[0]:.4g} kg, which no controller "
             'takes: record the arm with and without it again'
         )
-    model, number = arm.robot.model, arm.robot.index(joint) + 1
+    model, number = arm.robot.model, arm.robot.tree.index(joint) + 1
     frames = [f for f in model.frames if (f.parentJoint, f.type) == (number, pin.FrameType.BODY)]
     links = {str(one.name): one.placement for one in frames}
     # ROS-Industrial calls the frame of a flange tool0 or flange

@@ -79,7 +79,7 @@ def _masses_and_centres(
     """Return names (D,), values (D,), their derivatives (D, P), and the lowest values (D,)."""
     names, found = list(arm.parameters), arm.theta.copy()
     slopes, kept = np.eye(len(found)), np.ones(len(found), dtype=bool)
-    rigid = np.tile(np.where(np.arange(_SIZE) == 0, 0.0, -np.inf), arm.robot.n_joints)
+    rigid = np.tile(np.where(np.arange(_SIZE) == 0, 0.0, -np.inf), len(arm.robot.links))
     lowest = np.concatenate([rigid, *(effect.bounds()[0] for effect in arm.effects)])
     for first in range(0, len(rigid), _SIZE):
         joint, mass = names[first].joint, found[first]

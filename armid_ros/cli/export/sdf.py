@@ -34,8 +34,10 @@ def arm_sdf(arm: ArmModel, source: str) -> tuple[str, tuple[str, ...]]:
         If the parameters of a link are not those of a body.
 
     """
-    robot, urdf = arm.body, arm_urdf(arm)
+    robot, urdf = arm.body.tree, arm_urdf(arm)
+    coupled = [joint for joint in robot.joints if joint not in arm.robot.joints]
     left_out = (
+        *(f'the coupling of joint {joint} to driven ones' for joint in coupled),
         *urdf.without_place,
         'shapes of links, which identified.urdf has',
         *(f'joint {joint.name}, which is locked' for joint in held_joints(robot)),

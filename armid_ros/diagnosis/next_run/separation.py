@@ -155,7 +155,8 @@ class Load:
         """Return a load whose torque is at most `_LOAD` of the usable torque of each joint."""
         motion = trajectory.one_period(int(trajectory.period * _RATE))
         frame = _tip(arm.robot)
-        unit = np.abs(arm.rigid_columns(motion)[:, :, -10:] @ _point(arm.robot, frame)).max(axis=0)
+        columns = arm.rigid_columns(motion)[:, :, _carrier(arm.robot)]
+        unit = np.abs(columns @ _point(arm.robot, frame)).max(axis=0)
         able = np.minimum(arm.robot.torque_limit, 2.0 * np.abs(arm.joint_torque(motion)).max(0))
         felt = unit > 1e-3 * unit.max()
         mass = float(np.min(_LOAD * able[felt] / unit[felt]))
@@ -165,13 +166,20 @@ class Load:
     def on(self, arm: ArmModel) -> ArmModel:
         """Return the arm with the load."""
         parameters = arm.robot.rigid_parameters.copy()
-        parameters[-10:] += self.mass * _point(arm.robot, self.frame)
+        parameters[_carrier(arm.robot)] += self.mass * _point(arm.robot, self.frame)
         return replace(arm, robot=arm.robot.with_inertias(parameters))
+
+
+def _carrier(robot: Robot) -> slice:
+    """Return the places of the parameters of the last link."""
+    last = robot.moving.index(robot.tip)
+    return slice(10 * last, 10 * last + 10)
 
 
 def _tip(robot: Robot) -> str:
     """Return the frame of the last link that is farthest from the last joint."""
-    frames = [f for f in robot.model.frames if f.parentJoint == robot.model.njoints - 1]
+    last = robot.model.getJointId(robot.tip)
+    frames = [f for f in robot.model.frames if f.parentJoint == last]
     return str(max(frames, key=lambda f: float(np.linalg.norm(f.placement.translation))).name)
 
 
@@ -179,7 +187,7 @@ def _point(robot: Robot, frame: str) -> FloatArray:
     """Return the parameters of 1 kg at a frame, or at the centre of mass if it is at the joint."""
     place = robot.model.frames[robot.model.getFrameId(frame)].placement.translation
     if np.linalg.norm(place) < _NEAR:
-        place = robot.model.inertias[robot.model.njoints - 1].lever
+        place = robot.model.inertias[robot.model.getJointId(robot.tip)].lever
     body = pin.Inertia(1.0, place, np.zeros((3, 3)))
     return np.array(body.toDynamicParameters())
 

@@ -64,7 +64,7 @@ def findings(
         parts = [part for k in indices for part in said[k] if part.effect.name == name]
         steps = [explanation.steps[k] for k in own]
         joints = _joints([part.effect.joints for part in parts], arm)
-        order = [joint for joint in arm.robot.joints if joint in joints]
+        order = [joint for joint in arm.robot.all_joints if joint in joints]
         rows = _rows(parts)
         places = [*order, '']
         rows.sort(key=lambda row: places.index(row[0].joint) if row[0].joint in places else 0)
@@ -241,4 +241,4 @@ def _joints(groups: Sequence[tuple[str, ...]], arm: ArmModel) -> tuple[str, ...]
     joints = [joint for group in groups for joint in group]
     if any(len(group) > 1 for group in groups):
         return tuple(dict.fromkeys(joints))
-    return tuple(joint for joint in arm.robot.joints if joint in joints)
+    return tuple(joint for joint in arm.robot.all_joints if joint in joints)

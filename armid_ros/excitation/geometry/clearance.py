@@ -93,8 +93,8 @@ class ClearanceModel:
         Number of each pair in the collision model.
     pairs : ndarray of int, shape (number of pairs, 2)
         Bodies of each pair.
-    between : ndarray, shape (number of pairs, n)
-        +1 if a joint moves the second body only, -1 the first body only, 0 both or neither.
+    between : ndarray, shape (number of pairs, m)
+        +1 if a moving joint moves the second body only, -1 the first body only, 0 both or neither.
     levers : ndarray, shape (number of pairs, n)
         Largest motion of any point of either body per unit of a joint's motion [m/rad, m/m].
 
@@ -128,21 +128,24 @@ class ClearanceModel:
             [(int(p.first), int(p.second)) for p in collision.geometry.collisionPairs],
             dtype=np.intp,
         ).reshape(-1, 2)
-        moved = np.zeros((robot.n_joints + 1, robot.n_joints))  # base: last row, -1
+        tree = robot.tree
+        moved = np.zeros((tree.n_joints + 1, tree.n_joints))  # base: last row, -1
         for number, joint in enumerate(robot.geometry):
             moved[number, list(joint.movers)] = 1.0
         between = moved[joints[pairs[:, 1]]] - moved[joints[pairs[:, 0]]]
         reach = np.linalg.norm(spheres[:, :3], axis=1) + spheres[:, 3]
-        stroke = np.maximum(np.abs(robot.lower), np.abs(robot.upper))
-        stroke = np.where(robot.prismatic, np.minimum(stroke, 10.0), 0.0)  # 10 m without limits
-        levers = np.zeros((len(joints), robot.n_joints))
+        stroke = np.maximum(np.abs(tree.lower), np.abs(tree.upper))
+        stroke = np.where(tree.prismatic, np.minimum(stroke, 10.0), 0.0)  # 10 m without limits
+        levers = np.zeros((len(joints), tree.n_joints))
         for row, joint, length in zip(levers, joints, reach, strict=True):
             while joint >= 0:
-                row[joint] = 1.0 if robot.prismatic[joint] else length
+                row[joint] = 1.0 if tree.prismatic[joint] else length
                 length += np.linalg.norm(robot.geometry[joint].origin) + stroke[joint]
                 joint = robot.geometry[joint].parent
         first, second = levers[pairs[:, 0]], levers[pairs[:, 1]]
         most = np.where(between > 0.0, second, np.where(between < 0.0, first, 0.0))
+        if robot.mechanism is not None:
+            most = most @ robot.mechanism.largest
         numbers = np.arange(len(pairs))
         return cls(collision, margin, joints, spheres, planes, numbers, pairs, between, most)
 
@@ -177,7 +180,10 @@ class ClearanceModel:
         )
         motion = lines + np.cross(turns, moved)
         along = np.einsum('mjc,mc->mj', motion, normal)
-        return NearPairs(sample, pair, distance, along * self.between[pair])
+        by_q = along * self.between[pair]
+        if frames.coupling is not None:
+            by_q = np.einsum('km,kmn->kn', by_q, frames.coupling[sample])
+        return NearPairs(sample, pair, distance, by_q)
 
     def smallest(self, q: FloatArray, reach: float = np.inf) -> FloatArray:
         """Return the smallest distance of each pose, shape (N,) [m]; at most ``reach``."""
@@ -287,7 +293,7 @@ class ClearanceModel:
         """Return distances, normals to the second body and points of the first body of pairs."""
         model, geometry = self.collision.robot.model, self.collision.geometry
         data, placed = model.createData(), geometry.createData()
-        distance = np.empty(len(sample))
+        q, distance = self.collision.robot.positions(q), np.empty(len(sample))
         normal, point = np.empty((2, len(sample), 3))
         current = -1
         for row in np.argsort(sample, kind='stable'):

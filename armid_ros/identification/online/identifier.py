@@ -40,7 +40,7 @@ from armid_ros.identification.rows.causal import (
 )
 from armid_ros.identification.samples.spikes import SpikeGate
 from armid_ros.identification.samples.straight_line import StreamSample
-from armid_ros.model import BaseParameters
+from armid_ros.model import BaseParameters, regressor
 from armid_ros.motion import FloatArray, Motion
 import numpy as np
 import numpy.typing as npt
@@ -379,9 +379,12 @@ class OnlineIdentifier:
         state = (motion.q[None], motion.dq[None], motion.ddq[None])
         one = Motion(self.arm.robot.joints, np.array([motion.t]), *state)
         robot = self.arm.robot
-        rigid = pin.computeJointTorqueRegressor(
-            robot.model, self._data, motion.q, motion.dq, motion.ddq
-        )
+        if robot.mechanism is None:
+            rigid = pin.computeJointTorqueRegressor(
+                robot.model, self._data, motion.q, motion.dq, motion.ddq
+            )
+        else:
+            rigid = regressor(robot, one)
         rigid = rigid.reshape(robot.n_joints, -1)  # a vector for a single joint
         columns = np.concatenate([rigid, self.arm.effect_columns(one)[0]], axis=1)
         stacked = np.column_stack([motion.tau, columns.take(self.base.independent, axis=1)])

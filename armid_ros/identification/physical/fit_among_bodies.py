@@ -229,7 +229,7 @@ def physical_program(
     ends = [effect.bounds() for effect in arm.effects]
     lower, upper = (np.concatenate([np.empty(0), *(b[k] for b in ends)]) for k in (0, 1))
     boxes: dict[int, Box] = {
-        arm.robot.index(joint): (np.array(low, dtype=float), np.array(high, dtype=float))
+        arm.robot.tree.index(joint): (np.array(low, dtype=float), np.array(high, dtype=float))
         for joint, (low, high) in settings.boxes.items()
     }
     rigid = len(prior) - len(lower)
@@ -256,7 +256,7 @@ def bodily_prior(arm: ArmModel) -> tuple[FloatArray, tuple[str, ...]]:
 
     """
     theta = arm.theta.copy()
-    masses = [float(m) for m in theta[: PER_LINK * arm.robot.n_joints : PER_LINK] if m > 0.0]
+    masses = [float(m) for m in theta[: len(arm.robot.rigid_parameters) : PER_LINK] if m > 0.0]
     typical = float(np.mean(masses)) if masses else 1.0
     notes = []
     for index, link in enumerate(arm.robot.links):

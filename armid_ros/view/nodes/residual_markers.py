@@ -106,8 +106,9 @@ class ResidualMarkersNode(ListeningNode):
         lengths = _ARROW * self._reach * np.clip(self._now / full, -1.0, 1.0)
         markers = []
         for j, (joint, share) in enumerate(zip(robot.joints, self._shares(), strict=True)):
-            place, geometry = frames[j].origin[:, 0], robot.geometry[j]
-            axis = frames[j].turned(geometry.slide + geometry.turn)[:, 0]
+            body = robot.body_of(joint)
+            place, geometry = frames[body].origin[:, 0], robot.geometry[body]
+            axis = frames[body].turned(geometry.slide + geometry.turn)[:, 0]
             red = float(np.clip(share / self.value('full'), 0.0, 1.0))
             colour = ColorRGBA(r=red, g=1.0 - red, b=0.1, a=0.9)
             arrow = _marker('residual', Marker.ARROW, colour)
