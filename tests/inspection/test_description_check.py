@@ -64,7 +64,7 @@ def test_a_mass_that_the_description_lacks_is_recovered_with_its_interval():
     assert abs(links.measured_mass[2] - 1.4) < 4.0 * links.mass_std[2] < 0.04
     assert np.all(np.abs(links.measured_centre[2] - centre) < 4.0 * links.centre_std[2])
     assert 'elbow' in found.finding
-    assert '\n'.join(found.summary().full_text()).count('±') == 3  # finding, mass and centre
+    assert '\n'.join(found.summary().text()).count('±') == 3  # finding, mass and centre
 
 
 def test_a_description_that_is_right_agrees():
