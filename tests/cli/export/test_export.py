@@ -116,6 +116,7 @@ def test_what_cannot_be_written_is_an_error_with_the_answer(carrying, tmp_path):
     coupled = tmp_path / 'coupled.urdf'
     mimics = '<axis xyz="0 1 0"/><mimic joint="shoulder"/>'
     coupled.write_text(mimics.join(ROBOT.read_text().rsplit('<axis xyz="0 1 0"/>', 1)))
-    ar.save_model(tmp_path / 'coupled.yaml', ar.ArmModel.of(coupled), str(coupled))
+    robot = ar.load_robot(coupled, joints=('waist', 'shoulder'))
+    ar.save_model(tmp_path / 'coupled.yaml', ar.ArmModel(robot), str(coupled))
     with pytest.raises(ArmidError, match='no coupled joints'):
         run(tmp_path / 'coupled.yaml', '--to', 'cpp', '--out', tmp_path / 'o')
