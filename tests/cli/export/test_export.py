@@ -118,5 +118,6 @@ def test_what_cannot_be_written_is_an_error_with_the_answer(carrying, tmp_path):
     coupled.write_text(mimics.join(ROBOT.read_text().rsplit('<axis xyz="0 1 0"/>', 1)))
     robot = ar.load_robot(coupled, joints=('waist', 'shoulder'))
     ar.save_model(tmp_path / 'coupled.yaml', ar.ArmModel(robot), str(coupled))
+    of_two = ('--robot', coupled, '--joints', 'waist,shoulder')
     with pytest.raises(ArmidError, match='no coupled joints'):
-        run(tmp_path / 'coupled.yaml', '--to', 'cpp', '--out', tmp_path / 'o')
+        run(tmp_path / 'coupled.yaml', *of_two, '--to', 'cpp', '--out', tmp_path / 'o')
