@@ -108,6 +108,14 @@ def test_a_released_machine_falls_as_in_mujoco(name, robot):
     np.testing.assert_allclose(state.q, data.qpos[own], atol=0.003 * max(fallen, 0.1))
 
 
+@pytest.mark.parametrize(
+    'name',
+    [
+        *(pytest.param(loop, marks=pytest.mark.long) for loop in ('palletiser', 'parallelogram')),
+        *('wrist', 'gripper'),
+    ],
+    indirect=True,
+)
 def test_identification_and_a_payload_that_is_named(name, robot, run):
     days = [run(10.0, seed) for seed in (0, 1)]
     found = identify(robot, days[0], validate=days[1])

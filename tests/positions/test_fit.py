@@ -89,6 +89,7 @@ def test_most_intervals_hold_the_truth_and_the_residual_is_the_noise(robot, secr
     assert np.all(unaided.tracking > 20.0 * unaided.residual)
 
 
+@pytest.mark.long
 def test_viscous_friction_and_velocity_gain_are_one_without_commanded_velocities(robot, silent):
     found = fit_positions(LoopModel(robot), [silent])
     for joint in robot.joints:

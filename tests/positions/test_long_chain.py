@@ -11,7 +11,7 @@ import pytest
 
 from tests.positions.machine import play, random_chain, Secret
 
-pytestmark = pytest.mark.slow
+pytestmark = pytest.mark.long
 SECONDS = 12.0
 
 
