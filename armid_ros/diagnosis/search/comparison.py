@@ -158,19 +158,44 @@ class CauseComparison:
 
         """
         result = begun or self.first()
-        accepted, nuisance = list(result.accepted), result.nuisance
-        look = self.look(nuisance) if accepted else result.first
+        accepted = list(result.accepted)
+        look = self.look(result.nuisance) if accepted else result.first
+        accepted, nuisance = self._exchanged(*self._extended(accepted, look))
+        under = self._likeliest(nuisance)
+        return replace(result, accepted=tuple(accepted), nuisance=nuisance, under=under)
+
+    def _extended(self, accepted: list[Accepted], look: Look) -> tuple[list[Accepted], Nuisance]:
+        """Accept the best cause until none is significant."""
+        nuisance = look.nuisance
         while len(accepted) < _MOST:
             explained = sum(max(one.best.data, 0.0) for one in accepted)
             best = self.best(look, explained)
             if best is None:
                 break
-            accepted.append(best)
             nuisance = nuisance.and_cause(best.best.cause, best.best.fit.size)
-            accepted, nuisance = self._pruned(accepted, nuisance)
+            accepted, nuisance = self._pruned([*accepted, best], nuisance)
             look = self.look(nuisance)
-        under = self._likeliest(nuisance)
-        return replace(result, accepted=tuple(accepted), nuisance=nuisance, under=under)
+        return accepted, nuisance
+
+    def _exchanged(
+        self, accepted: list[Accepted], nuisance: Nuisance
+    ) -> tuple[list[Accepted], Nuisance]:
+        """Replace a cause that resembles several others, if they explain more without it."""
+        for k, one in enumerate(accepted if len(accepted) > 1 else ()):
+            look = self.look(nuisance.without(k))
+            others = [*accepted[:k], *accepted[k + 1 :]]
+            best = self.best(look, sum(max(other.best.data, 0.0) for other in others))
+            if best is None or best.best.cause.key == one.best.cause.key:
+                continue
+            found = self._extended(others, look)
+            if self._worth(*found) > self._worth(accepted, nuisance) + self.thresholds.tie:
+                return self._exchanged(*found)
+        return accepted, nuisance
+
+    def _worth(self, accepted: Sequence[Accepted], nuisance: Nuisance) -> float:
+        """Return the log posterior probability of the accepted causes, up to a constant."""
+        prior = sum(one.best.cause.prior for one in accepted)
+        return self._likeliest(nuisance).evidence + prior
 
     def best(self, look: Look, explained: float) -> Accepted | None:
         """Return the best cause of a comparison with its rivals; None if none is significant."""
