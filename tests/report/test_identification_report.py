@@ -372,4 +372,4 @@ def test_parameters_are_filtered_and_tables_are_copied(browser, first_plot):
         'URL.createObjectURL = blob => { blob.text().then(done); return "#"; };'
         'document.querySelectorAll("figure.chart .tool")[1].click(); })'
     )
-    assert saved.startswith('"x","measured: torque')
+    assert saved.startswith('"time [s]","measured: torque')
