@@ -100,7 +100,7 @@
       ...(whole ? {incrs: [1, 2, 5].flatMap((x) => [0, 1, 2, 3, 4, 5].map((n) => x * 10 ** n)).sort((a, b) => a - b)} : {}),
       label: label || null, side, font, labelFont: font, labelSize: 18, labelGap: 0, gap: 4,
       stroke: () => colour.soft,
-      size: vertical ? (u, values) => 16 + 7 * Math.max(5, ...(values || []).map((v) => v.length)) : 26,
+      size: vertical ? (u, values) => 16 + 7 * Math.max(6, ...(values || []).map((v) => v.length)) : 26,
       // A quarter of a low axis, so that at least two ticks are in sight.
       space: vertical ? (u, index, low, high, length) => Math.min(22, length / 4) : 60,
       values: (u, splits) => splits.map((value) => (value == null ? '' : String(Number(value.toPrecision(6))))),
