@@ -171,6 +171,7 @@ def _verdict(found: Watch, diagnoses: Diagnoses) -> VerdictSection:
             f'{counts["changed"]} changed suddenly, {counts["wearing"]} gradually. At most '
             f'{100.0 * found.alpha:g} % of the named arms are false alarms, on average.',
         ]
+        sentences[1:1] = _explained(found, diagnoses)
     if blamed:
         names = ', '.join(blamed)
         some = names if len(names) < longest else counted(len(blamed), 'arm')
@@ -185,6 +186,19 @@ def _verdict(found: Watch, diagnoses: Diagnoses) -> VerdictSection:
     tone = 'fair' if ill or blamed else 'good'
     step = f'Open the page of {named}.' if ill and len(named) < longest else ''
     return VerdictSection(grade, tone, sentences, beware, step=step)
+
+
+def _explained(found: Watch, diagnoses: Diagnoses) -> list[str]:
+    """Return what the diagnoses of changed arms name, in three sentences at most."""
+    sentences = []
+    for arm in found.arms:
+        diagnosis = diagnoses.get(arm.arm)
+        if arm.named and diagnosis is not None and diagnosis['verdict'] in _EXPLAINED:
+            lead = pretty(diagnosis['summary']).partition('. ')[0].rstrip('.')
+            day = change_rows(arm)[0]['first_day']
+            since = f', since {day}' if arm.named[0].kind == 'step' else ''
+            sentences.append(f'{arm.arm}: {lead}{since}.')
+    return sentences[:3]
 
 
 def _diagnosed(arm: WatchedArm, diagnosis: Mapping[str, Any] | None) -> str:

@@ -299,9 +299,6 @@ class BarChart(Templated):
         Label of each row, and its bars one below the other.
     roles : sequence of (str, str)
         Legend: role and meaning.
-    scale_by_row : bool
-        Whether each row fills the width with its own longest bar, as for joints of different
-        strength.
     full : float
         Value that fills the width; 0: that of the longest bar.
 
@@ -312,13 +309,11 @@ class BarChart(Templated):
 
     rows: Sequence[tuple[str, Sequence[Bar]]]
     roles: Sequence[tuple[Role, str]] = ()
-    scale_by_row: bool = False
     full: float = 0.0
 
-    def percent(self, row: int, bar: Bar) -> float:
+    def percent(self, bar: Bar) -> float:
         """Return the length of a bar as a percentage of the width."""
-        bars = self.rows[row][1] if self.scale_by_row else [b for _, bs in self.rows for b in bs]
-        longest = self.full or max(other.value for other in bars)
+        longest = self.full or max(other.value for _, bars in self.rows for other in bars)
         return round(100.0 * bar.value / longest, 2) if longest > 0.0 else 0.0
 
     @property
@@ -346,6 +341,8 @@ class VerdictSection(Section):
         Error or share of each joint or cause.
     step : str
         Next step; may be empty.
+    command : str
+        Next command after that step; may be empty.
 
     """
 
@@ -358,6 +355,7 @@ class VerdictSection(Section):
     beware: Sequence[str] = ()
     bars: BarChart | None = None
     step: str = ''
+    command: str = ''
 
 
 def next_steps_section(steps: Sequence[str]) -> ContentSection:

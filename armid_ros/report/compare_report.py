@@ -56,7 +56,7 @@ def compare_report(comparison: Comparison, origin: ResultOrigin) -> str:
     facts = []
     for heading, side in (('First', comparison.before), ('Second', comparison.after)):
         error = side.error_percent
-        error_text = '' if error is None else f'; relative torque error {error:.2f} %'
+        error_text = '' if error is None else f'; torque error over all joints {error:.2f} %'
         facts.append((heading, f'{side.source}: {robot_label(side.robot)}{error_text}'))
     rows = change_rows(comparison)
     sections: list[Section] = [

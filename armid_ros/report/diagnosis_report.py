@@ -285,18 +285,20 @@ class Story(Section):
     def _patch(self) -> list[str]:
         diagnosis = self.diagnosis
         patched = not diagnosis.harmful
-        meaning = {effect.name: f' ({effect.summary})' for effect in diagnosis.arm.effects}
-        added = [
-            name_in_words(finding.name) + meaning.get(finding.name, '')
-            for finding in diagnosis.findings
-            if patched
+        meaning = {effect.name: effect.summary for effect in diagnosis.arm.effects}
+        names = dict.fromkeys(one.name for one in diagnosis.findings if patched)
+        added = [name_in_words(name) for name in names]
+        explained = [
+            f'{words[0].upper()}{words[1:]}: {meaning[name]}.'
+            for name, words in zip(names, added, strict=True)
+            if name in meaning
         ]
         if self.gains:
             added.append(f'the learned residual of {", ".join(self.gains)}')
         if not added:
             return ['The model is unchanged.']
         more = ', with rigid body and friction refitted' * (diagnosis.refitted and patched)
-        return [f'model.yaml is the model with {" and ".join(added)}{more}.']
+        return [f'model.yaml is the model with {" and ".join(added)}{more}.', *explained]
 
     def _gap(self) -> list[str]:
         gap, robot = self.diagnosis.gap, self.diagnosis.arm.robot
@@ -362,7 +364,7 @@ def overlay_section(diagnosis: Diagnosis, gap: Gap, names: Mapping[str, str]) ->
             Chart(
                 t[kept],
                 [Series('measured', measured[kept], 'measured'), *models(before, after)],
-                '',
+                'time [s]',
                 f'torque [{unit}]',
                 link='overlay',
                 marks=marks,

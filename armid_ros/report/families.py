@@ -243,11 +243,32 @@ def joint_columns(
         if own:
             unit = f' [{pretty(units.pop())}]' if len(units) == 1 else ''
             columns[f'{head}{unit}'] = [cells[joint] for joint in joints]
-    described = result.base.values(description.theta)
-    differs = np.abs(estimate.values - described) > HALF_WIDTH * estimate.std
-    rigid = [
-        [k for k, one in enumerate(estimate.parameters) if one.rigid and one.joint == joint]
-        for joint in joints
-    ]
-    columns['not as URDF'] = [f'{differs[own].sum()} of {len(own)}' for own in rigid]
+    unlike = not_as_described(result, description)
+    columns['not as URDF'] = [f'{differ} of {count}' for differ, count in unlike.values()]
     return columns
+
+
+def not_as_described(result: Identification, description: ArmModel) -> dict[str, tuple[int, int]]:
+    """
+    Return how many rigid-body parameters of each joint contradict the description.
+
+    Parameters
+    ----------
+    result : Identification
+        The identified model.
+    description : ArmModel
+        The model before.
+
+    Returns
+    -------
+    dict of str to (int, int)
+        Parameters with the described value outside the 95 % interval, and all parameters.
+
+    """
+    estimate, described = result.estimate, result.base.values(description.theta)
+    differs = np.abs(estimate.values - described) > HALF_WIDTH * estimate.std
+    found = {}
+    for joint in result.arm.robot.joints:
+        own = [k for k, one in enumerate(estimate.parameters) if one.rigid and one.joint == joint]
+        found[joint] = int(differs[own].sum()), len(own)
+    return found

@@ -31,7 +31,12 @@ from armid_ros.report.blocks import (
     VerdictSection,
 )
 from armid_ros.report.charts import Chart, Series
-from armid_ros.report.families import effects_in_words, full_label, parameter_section
+from armid_ros.report.families import (
+    effects_in_words,
+    full_label,
+    not_as_described,
+    parameter_section,
+)
 from armid_ros.report.judgement import judge
 from armid_ros.report.notation import counted, digits, plain, pretty, robot_label
 from armid_ros.report.page import Page, Section
@@ -122,15 +127,19 @@ def identification_report(
         *((one, 'training', training.get(one.source, ())) for one in recordings),
         *((one, 'held-out', validation.get(one.source, ())) for one in validation_recordings),
     ]
+    unlike = []
+    if assessment.reference == 'description':
+        unlike = _unlike_description(not_as_described(result, description))
     forward, noise = (verification.forward, verification.noise) if verification else ((), None)
     sections: list[Section] = [
         VerdictSection(
             grade.word,
             TONES[grade.word],
-            (*grade.reasons, *judgement.sentences),
+            (*grade.reasons, *unlike, *judgement.sentences),
             judgement.beware,
             error_bars(described, training, validation),
             ''.join(judgement.next_steps[:1]),
+            origin.step,
         ),
         fit_section(described, training, validation, torque_reach(result, shown)),
         *([next_steps_section(judgement.next_steps)] if judgement.next_steps[1:] else []),
@@ -156,6 +165,16 @@ def identification_report(
         subtitle += f' · {counted(len(validation), "held-out recording")}'
     names = (*described.joints, *described.links)
     return Page(f'Identification of {described.name}', subtitle, sections, names=names).html()
+
+
+def _unlike_description(counts: Mapping[str, tuple[int, int]]) -> list[str]:
+    """Return a sentence on rigid-body parameters that contradict the URDF, or none."""
+    joints = [joint for joint, (differ, _) in counts.items() if differ]
+    differ, count = (sum(numbers) for numbers in zip(*counts.values(), strict=True))
+    return [
+        f'{differ} of {count} rigid-body parameters of the URDF are outside their 95 % intervals, '
+        f'at {", ".join(joints)}. Chance alone gives 5 %.'
+    ] * bool(joints)
 
 
 def _asked(
@@ -269,8 +288,8 @@ def _physical_section(
                 f'{quantifier} link is physically consistent: all four eigenvalues of the '
                 'pseudo-inertia have to be positive. The constraints change the torque error by '
                 f'{training:.2f} % on the training data and by {held_out:+.2f} % in '
-                f'cross-validation, which chose {certificate.weight:g} as the weight of the '
-                'description.'
+                f'cross-validation. Cross-validation chose {certificate.weight:g} as the weight '
+                'of the description.'
             ),
             DataTable(heads, rows, (0, 5)),
             BulletList(activity or [('No constraint is active.', 'fine')]),

@@ -11,8 +11,10 @@ from typing import Any, ClassVar
 
 from armid_ros.arm import ArmModel
 from armid_ros.diagnosis import Diagnosis
+from armid_ros.diagnosis.data.evidence import torque_rms
 from armid_ros.diagnosis.data.trajectory import Trajectory
 from armid_ros.diagnosis.diagnose import OPEN
+from armid_ros.diagnosis.settings import DiagnosisSettings
 from armid_ros.effects.learned import LearnedTorque, TorqueMap
 from armid_ros.errors import IdentificationError
 from armid_ros.files.cells import csv_cell
@@ -285,10 +287,13 @@ def learn_residual(diagnosis: Diagnosis, rng: np.random.Generator) -> Residual |
     import sklearn.linear_model  # noqa: F401 - so that its threads are limited as well
     from threadpoolctl import threadpool_limits
 
+    material = DiagnosisSettings.material * torque_rms(diagnosis.data)
     with threadpool_limits(1):
         learned = [
-            _learned(joint, rows, other, base, rng)
-            for joint, rows, other in zip(base.robot.joints, every, unseen, strict=True)
+            _learned(joint, rows, other, least, base, rng)
+            for joint, rows, other, least in zip(
+                base.robot.joints, every, unseen, material, strict=True
+            )
         ]
     found = [one for one in learned if one is not None]
     if not found:
@@ -301,9 +306,20 @@ def learn_residual(diagnosis: Diagnosis, rng: np.random.Generator) -> Residual |
 
 
 def _learned(
-    joint: str, rows: JointRows, unseen: JointRows | None, base: ArmModel, rng: np.random.Generator
+    joint: str,
+    rows: JointRows,
+    unseen: JointRows | None,
+    material: float,
+    base: ArmModel,
+    rng: np.random.Generator,
 ) -> JointResidual | None:
-    """Learn the map of one joint; None if it does not predict held-out blocks beyond chance."""
+    """
+    Learn the map of one joint.
+
+    It is None if it does not predict held-out blocks beyond chance. It is also None if its torque
+    is less than a material torque [N m] and it predicts no held-out recording.
+
+    """
     if len(rows) < _FEW:
         return None
     learned, predicted = learn_map(rows, rng)
@@ -318,7 +334,9 @@ def _learned(
         parts.append((near.residual, learned.torque(near.inputs)))
     residual, torque = (np.concatenate(one) for one in zip(*parts, strict=True))
     gain = share_of(residual, torque)
-    if gain <= 0.0:
+    held_out = share_of(*parts[1]) if len(parts) > 1 else None
+    is_material = float(np.sqrt(np.mean(torque**2))) >= material
+    if gain <= 0.0 or not (is_material or (held_out or 0.0) > 0.0):
         return None
     prismatic = bool(base.robot.prismatic[base.robot.joints.index(joint)])
     return JointResidual(
@@ -328,7 +346,7 @@ def _learned(
         float(np.sqrt(np.mean(residual**2))),
         float(np.sqrt(np.mean((residual - torque) ** 2))),
         gain,
-        share_of(*parts[1]) if len(parts) > 1 else None,
+        held_out,
         suggest_law(rows, prismatic),
     )
 

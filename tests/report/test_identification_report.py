@@ -139,6 +139,16 @@ def test_everything_asked_for_is_there_in_order(case, page):
     assert f'{case.result.condition_number:.3g}' in page.text
 
 
+def test_values_that_contradict_the_urdf_and_their_check_are_in_the_verdict(case):
+    wrong = case.description.with_theta(1.5 * case.description.theta)
+    command = 'armid check arm.urdf run.mcap'
+    page = report_of(case, description=wrong, origin=ResultOrigin('arm.urdf', step=command))
+    verdict = Reader(page).text.partition('Limitations')[0]
+    assert 'rigid-body parameters of the URDF' in verdict and command in verdict
+    joints = case.result.arm.robot.joints
+    assert any(joint in verdict.partition('95 % intervals, at ')[2] for joint in joints)
+
+
 def test_what_was_put_to_a_test_has_a_section(case, whole):
     reader = Reader(whole)
     added = {'Forward validation', 'Physical consistency', 'Encoder noise'}
@@ -372,4 +382,4 @@ def test_parameters_are_filtered_and_tables_are_copied(browser, first_plot):
         'URL.createObjectURL = blob => { blob.text().then(done); return "#"; };'
         'document.querySelectorAll("figure.chart .tool")[1].click(); })'
     )
-    assert saved.startswith('"x","measured: torque')
+    assert saved.startswith('"time [s]","measured: torque')

@@ -12,7 +12,7 @@ from armid_ros.report.provenance import ResultOrigin
 from armid_ros.residual import learn_residual
 from armid_ros.residual.gaussian_process import learn_map
 from armid_ros.residual.law import suggest_law
-from armid_ros.residual.learn import near_data
+from armid_ros.residual.learn import _learned, near_data
 from armid_ros.residual.rows import BLOCKS, JointRows
 import numpy as np
 import pytest
@@ -116,6 +116,17 @@ def test_what_has_no_name_is_learned_and_becomes_part_of_the_model(unknown, lear
     first = [float(x or 0.0) for x in table[1].split(',')[1:]]
     at = np.array(first[:3])
     assert learned.joints[0].learned.torque(at) == pytest.approx(first[3], abs=1e-5)
+
+
+def test_a_torque_that_is_not_material_is_not_learned(unknown):
+    """No held-out recording shows that the map is right."""
+    small = rows(lambda q, dq, w: 0.1 * np.sin(6.0 * q), noise=0.001)
+    rng, joint = np.random.default_rng(0), unknown.arm.robot.joints[0]
+    kept, gone = (
+        _learned(joint, small, None, material, unknown.arm, rng) for material in (0.01, 1.0)
+    )
+    assert kept is not None and kept.held_out is None
+    assert gone is None
 
 
 def test_a_map_that_harms_held_out_recordings_says_so(unknown, learned):

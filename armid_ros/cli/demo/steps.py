@@ -29,7 +29,7 @@ ROBOT = 'humanoid_arm'
 SENSORS = Sensors(
     torque_noise=np.array([0.02, 0.02, 0.01, 0.01, 0.004, 0.004]), resolution=2.0 * np.pi / 2**18
 )
-_RUNS = ('after_1', 'after_2', 'unused')
+_RUNS = ('after_1', 'after_2', 'held_out')
 
 
 def _facts() -> dict[str, Any]:

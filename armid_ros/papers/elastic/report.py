@@ -346,7 +346,7 @@ def elastic_document(result: TwoInertiaIdentification, robot: str) -> dict[str, 
     names = parameter_names(result.joints)
     std = [None] * len(names) if result.tuning is None else list(result.tuning.estimate.std)
     frequency = np.geomspace(5.0, BAND[1], 200)
-    antiresonance, resonance = frequencies(result.untuned)
+    antiresonance, resonance = frequencies(parameters)
     document: dict[str, Any] = {
         'schema': SCHEMA,
         'robot': robot,

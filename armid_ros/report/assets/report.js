@@ -100,8 +100,9 @@
       ...(whole ? {incrs: [1, 2, 5].flatMap((x) => [0, 1, 2, 3, 4, 5].map((n) => x * 10 ** n)).sort((a, b) => a - b)} : {}),
       label: label || null, side, font, labelFont: font, labelSize: 18, labelGap: 0, gap: 4,
       stroke: () => colour.soft,
-      size: vertical ? (u, values) => 16 + 7 * Math.max(5, ...(values || []).map((v) => v.length)) : 26,
-      space: vertical ? 22 : 60,
+      size: vertical ? (u, values) => 16 + 7 * Math.max(6, ...(values || []).map((v) => v.length)) : 26,
+      // A quarter of a low axis, so that at least two ticks are in sight.
+      space: vertical ? (u, index, low, high, length) => Math.min(22, length / 4) : 60,
       values: (u, splits) => splits.map((value) => (value == null ? '' : String(Number(value.toPrecision(6))))),
       grid: {stroke: () => colour.grid, width: 1},
       ticks: {stroke: () => colour.line, width: 1, size: 4},
@@ -152,8 +153,6 @@
     return (u) => {
       const {ctx, bbox} = u;
       withSoftPen(ctx);
-      ctx.textAlign = 'right';
-      ctx.textBaseline = 'bottom';
       for (const level of spec.levels) {
         const y = u.valToPos(level.y, 'y', true);
         ctx.setLineDash([4 * uPlot.pxRatio, 3 * uPlot.pxRatio]);
@@ -162,7 +161,12 @@
         ctx.lineTo(bbox.left + bbox.width, y);
         ctx.stroke();
         ctx.setLineDash([]);
-        write(ctx, level.label, bbox.left + bbox.width - 2, y - 2 * uPlot.pxRatio);
+        // Near the top, the text is below the line and at the left, clear of the buttons.
+        const top = y - bbox.top < 16 * uPlot.pxRatio;
+        ctx.textAlign = top ? 'left' : 'right';
+        ctx.textBaseline = top ? 'top' : 'bottom';
+        const x = top ? bbox.left + 4 * uPlot.pxRatio : bbox.left + bbox.width - 2;
+        write(ctx, level.label, x, y + (top ? 3 : -2) * uPlot.pxRatio);
       }
       ctx.restore();
     };

@@ -151,7 +151,7 @@ def _fit_charts(fits: Sequence[Fit], joint: int, unit: str, link: str) -> tuple[
             Series('measured', measured[kept], 'measured'),
             Series('predicted', predicted[kept], 'predicted'),
         ],
-        '',
+        'time [s]',
         f'torque [{unit}]' if unit == 'N m' else f'force [{unit}]',
         height=200,
         link=link,
@@ -209,17 +209,19 @@ def forward_section(
         if comment:
             own.append(Paragraph(f'{comment[:1].upper()}{comment[1:]}.'))
         errors = [1e3 * score.position_error for *_, score in models]
-        rows = [
-            (
-                robot.joints[joint],
-                [
-                    Bar(error[joint], role, f'{digits(error[joint])} m{pair.after.units[joint]}')
-                    for error, (role, *_) in zip(errors, models, strict=True)
-                ],
-            )
-            for joint in np.argsort(-np.max(errors, axis=0))
-        ]
-        own.append(BarChart(rows, [(role, label) for role, label, _ in models], True))
+        for unit in dict.fromkeys(pair.after.units):
+            rows = [
+                (
+                    robot.joints[joint],
+                    [
+                        Bar(error[joint], role, f'{digits(error[joint])} m{unit}')
+                        for error, (role, *_) in zip(errors, models, strict=True)
+                    ],
+                )
+                for joint in np.argsort(-np.max(errors, axis=0))
+                if pair.after.units[joint] == unit
+            ]
+            own.append(BarChart(rows, [(role, label) for role, label, _ in models]))
         own += _worst_joint(robot, pair, models)
         text = pair.after.worst
         if pair.before is not None:
