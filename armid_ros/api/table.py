@@ -35,7 +35,7 @@ class Summary:
     title : str
         Kind of the result, with the number that matters most.
     badge : str
-        One word; empty for none.
+        Verdict or grade in one word; empty if none.
     heads : sequence of str
         Headings of the columns.
     rows : sequence of sequence of str
@@ -143,7 +143,7 @@ class Shown(ABC):
         return '\n'.join(self.summary().text())
 
     def _repr_html_(self) -> str:
-        """Show the report in a notebook, in a frame of its own; without a report, the text."""
+        """Show the report in a frame of the notebook; without a report, show the text."""
         try:
             page = self.page()
         except ArmidError:  # a plan without a trajectory has no page
@@ -189,7 +189,7 @@ class ShownModel(Shown):
 
 
 def aligned(heads: Sequence[str], rows: Sequence[Sequence[str]]) -> list[str]:
-    """Align columns: names left, all others right; a row of one cell has no columns."""
+    """Align names to the left and other columns to the right; single cells span the row."""
     if not heads:
         return []
     table = [tuple(heads), *(tuple(row) for row in rows)]
