@@ -3,11 +3,11 @@
 """
 The misfit of a model: its residual in the recordings of its identification, kept in model.yaml.
 
-No real arm agrees with its model to within the noise, so a diagnosis of changes measures them in
-units of the misfit. The block ``misfit`` of model.yaml has ``unit``, ``data`` (held-out or
-training), ``rms`` of the residual by joint, and ``relative_error_percent`` of the torque. As a
-misfit grows with the torque, ``torque_rms`` has the torque of these recordings. As it includes
-noise, ``filters`` has the filters behind which it was measured.
+The residual of a real arm exceeds the noise, so a diagnosis measures changes in units of the
+misfit. The block ``misfit`` of model.yaml has ``unit``, ``data`` (held-out or training), ``rms``
+of the residual by joint, and ``relative_error_percent`` of the torque. As a misfit grows with the
+torque, ``torque_rms`` has the torque of these recordings. As it includes noise, ``filters`` has
+the filters behind which it was measured.
 
 """
 

@@ -78,8 +78,8 @@ def model_text(
     robot : str
         Shipped name or path of the description.
     estimate : Estimate, optional
-        Estimate with the standard deviations; only parameters that were estimated by themselves,
-        and not in a group, have one.
+        Estimate with the standard deviations; only parameters that were estimated individually,
+        not in a group, have a standard deviation.
     misfit : Misfit, optional
         Misfit of the model.
 
@@ -282,8 +282,8 @@ def in_words(arm: ArmModel) -> ArmModel:
     """
     Return the arm with its effects translated into those of the catalogue.
 
-    An effect that only a search uses, such as a gravity vector, becomes several effects: a tilted
-    base and the magnitude of gravity.
+    Effects that only a search uses are converted: a gravity vector becomes a base tilt and the
+    magnitude of gravity.
 
     """
     said = replace(arm, effects=(), values=())
@@ -418,7 +418,7 @@ def _arm(document: dict[str, Any], robot: Robot) -> ArmModel:
 
 
 def _values(rows: Sequence[dict[str, Any]], names: Sequence[ParameterName]) -> FloatArray:
-    """Return the values of parameters, each of which has to be given once, in its unit."""
+    """Return the values of parameters; each must be given once, in its unit."""
     table: dict[tuple[str, str], dict[str, Any]] = {}
     units = {(name.name, name.joint): [name.unit] for name in names}
     for row in rows:
