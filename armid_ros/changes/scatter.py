@@ -139,7 +139,7 @@ def splits(series: ParameterHistory, spread: Spread) -> Splits:
     """Return the steps and the trend of a series, in standard deviations of neighbours."""
     variance, freedom = variances(series, spread)
     std = np.sqrt(variance)
-    # outliers among their neighbours are moved to the edge of the noise
+    # outliers are clipped to the noise range of their neighbours
     windows = np.lib.stride_tricks.sliding_window_view(
         series.values, min(_WINDOW, len(series.values))
     )
@@ -260,7 +260,7 @@ def _alike(group: Sequence[ParameterHistory], found: Mapping[tuple[str, str], Sp
 
 
 def _ratio(series: ParameterHistory, spread: Spread) -> float:
-    """Return the ratio of the variance of a series to the usual one."""
+    """Return the ratio of the variance of a series to the usual variance."""
     stated = series.std[1:] ** 2 + series.std[:-1] ** 2 + 2.0 * spread.std**2
     squares = np.diff(series.values) ** 2 / np.maximum(stated, 1e-300)
     return max(float(np.median(squares)) / MEDIAN_SQUARE, 1e-100)
@@ -315,7 +315,7 @@ def _lasting(
         trends.append(cut.trend**2)
     if not steps:
         return 1.0, 1.0
-    # 10 series have the weight of the prior that scatter is not correlated over days
+    # the prior (scatter is uncorrelated over days) has the weight of 10 series
     weight = len(steps) / (len(steps) + 10.0)
     step, trend = (
         max(1.0, float(np.median(squares)) / MEDIAN_SQUARE) ** (0.5 * weight)
