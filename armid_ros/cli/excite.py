@@ -23,7 +23,7 @@ if TYPE_CHECKING:
 
 #: Kinds of trajectories for elastic joints.
 COURSES = ('multisine', 'steps')
-#: Options that both a course, for elastic joints, and a design take; a course takes --share too.
+#: Options that designs and trajectories for elastic joints share; the latter also have --share.
 _SHARED = {
     'robot_source', 'out', 'kind', 'duration', 'clearance', 'environment', 'floor', 'gravity',
     'joints', 'seed', 'force', 'crc', 'memory_limit',
@@ -31,7 +31,7 @@ _SHARED = {
 
 
 class Speed(click.ParamType[str | float]):
-    """A speed class, or a share of the velocity and acceleration limits."""
+    """Speed class, or share of the velocity and acceleration limits."""
 
     name = 'speed'
 

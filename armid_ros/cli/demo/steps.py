@@ -40,7 +40,7 @@ def _facts() -> dict[str, Any]:
 
 
 def true_arm(robot: Robot) -> ArmModel:
-    """Return the arm that is to be identified: other masses than described, and friction."""
+    """Return the arm to identify, with friction and other masses than described."""
     true = _facts()
     factors = np.array(true['mass_factors'])[:, np.newaxis]
     parameters = robot.rigid_parameters.reshape(-1, 10) * factors

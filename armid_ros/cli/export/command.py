@@ -1,6 +1,6 @@
 # Copyright 2026 The armid_ros developers
 # SPDX-License-Identifier: Apache-2.0
-"""The command ``armid export``: an identified arm in the form of another program."""
+"""The command ``armid export``: write an identified arm in the format of another program."""
 
 from __future__ import annotations
 
@@ -12,10 +12,10 @@ from armid_ros.errors import OutputError
 import click
 from click.core import ParameterSource
 
-#: Load data of makers, and all kinds in the order of the help.
+#: Kinds of load data by manufacturer, and all export kinds in the order of the help.
 LOADS = ('ur', 'franka', 'kuka', 'abb')
 KINDS = ('cpp', 'python', *LOADS, 'ranges', 'urdf', 'mjcf', 'sdf')
-#: Kinds that an option belongs to.
+#: Export kinds that each option applies to.
 _KINDS_OF = {'joint': LOADS, 'frame': LOADS, 'spread': ('ranges',)}
 
 

@@ -43,7 +43,7 @@ class CarriedLoad:
             key=lambda order: float(np.abs(np.diag(axes[:, order])).sum()),
         )
         axes = axes[:, order] * np.where(np.diag(axes[:, order]) < 0.0, -1.0, 1.0)
-        if np.linalg.det(axes) < 0.0:  # mirrored: turn the axis that is farthest from the frame's
+        if np.linalg.det(axes) < 0.0:  # left-handed: flip the axis farthest from the frame's
             axes[:, np.argmin(np.diag(axes))] *= -1.0
         return moments[order], axes
 
@@ -166,7 +166,7 @@ def abb(load: CarriedLoad) -> str:
     return f'PERS loaddata load1 := [{parts}];'
 
 
-#: How each maker writes a load and a comment.
+#: Format of a load and a comment for each manufacturer.
 MAKERS: dict[str, tuple[Callable[[CarriedLoad], str], str]] = {
     'ur': (universal_robots, '#'),
     'franka': (franka, '//'),
@@ -187,7 +187,7 @@ def load_text(load: CarriedLoad, maker: str, source: str) -> tuple[str, tuple[st
     place = 'tool (for a tload: the wrist)' if maker == 'abb' else 'flange'
     notes = [f'values are in the frame of --frame {load.frame}; it has to be that of the {place}']
     low, middle, high = np.linalg.eigvalsh(load.body.inertia)
-    if min(low, low + middle - high) < -1e-9 * abs(high):  # beyond rounding
+    if min(low, low + middle - high) < -1e-9 * abs(high):  # not a rounding error
         notes.append(
             f'no body has the principal moments {low:.3g}, {middle:.3g}, {high:.3g} kg m^2; the '
             'inertia is written as zero'
