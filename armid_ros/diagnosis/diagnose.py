@@ -3,8 +3,8 @@
 """
 The diagnosis: from recordings and a model to a verdict.
 
-Two models are compared with the data, each with and without single causes: the model as given
-(which shows errors of the description), and the model with body and known effects fitted anew.
+Two models are compared with the data, with and without single causes: the given model (which shows
+errors of the description), and the model with refitted body and known effects.
 
 """
 
@@ -41,9 +41,9 @@ from armid_ros.recording import Recording
 import numpy as np
 import numpy.typing as npt
 
-#: Verdicts that leave a part of the gap without a cause.
+#: Verdicts with an unexplained part of the gap.
 OPEN = ('unknown', 'partial')
-#: Called with the share of the work that is done, and the name of the present step.
+#: Callback with the completed share of the work and the name of the present step.
 Progress = Callable[[float, str], None]
 
 #: Note on recordings without two equal periods, whose difference would measure the noise.
@@ -51,7 +51,7 @@ _ASSUMED = (
     'noise of recordings without two equal periods is estimated from differences between '
     'neighbouring samples'
 )
-#: Note where a cause acts for a part of the time and no baseline shows when in held-out data.
+#: Note if a cause acts part of the time and its span in held-out data is unknown.
 _NOT_TIMED = (
     'held-out recordings are not used: without a baseline, the seconds in which the cause acts in '
     'them are not determined'
@@ -85,7 +85,7 @@ def diagnose(
     arm : ArmModel
         The given model: rigid body, gravity, known effects with values.
     recordings : sequence of Recording
-        The recordings in question, with torques; several motions are best.
+        The recordings to diagnose, with torques; several motions are best.
     validate : sequence of Recording
         Recordings that are predicted and not fitted.
     baseline : sequence of Recording
@@ -175,7 +175,7 @@ def _within(
     explainer: Explainer,
     read: tuple[Sequence[Recording], Sequence[Recording], Sequence[Recording]],
 ) -> Diagnosis | None:
-    """Diagnose only the seconds in which a cause acts; None if no cause explains the gap there."""
+    """Diagnose only the time span in which a cause acts; None if no cause explains that gap."""
     settings, look = explainer.settings, chosen.look
     recordings, validate, baseline = read
     if not settings.spans or look is None or not _hardly_explained(result, settings):
@@ -210,7 +210,7 @@ def _within(
 
 
 def _cut(span: Span, recording: Recording) -> Recording | None:
-    """Return the part of a recording in which a cause acts."""
+    """Return the time span of a recording in which a cause acts."""
     if span.whole:
         return recording
     inside = recording.t >= span.start + _UNSURE, recording.t <= span.stop - _UNSURE
@@ -236,7 +236,7 @@ def _each_alone(
 def _apart(
     arm: ArmModel, day: Sequence[Recording], used: Conditioning
 ) -> Iterator[tuple[Recording, npt.NDArray[np.bool_]]]:
-    """Yield recordings with joints that the model fits in other recordings and not in this one."""
+    """Yield recordings with joints whose torque the model fits in the other recordings only."""
     unit = np.ones(arm.robot.n_joints)
     bad, sound = np.zeros((2, len(day), len(unit)), dtype=bool)
     for k, one in enumerate(day):

@@ -60,7 +60,7 @@ class Doubt:
 
     @property
     def joints(self) -> tuple[str, ...]:
-        """Return the joints on which either acts; empty if one of them acts on the whole arm."""
+        """Return the joints of both effects; empty if one effect acts on the whole arm."""
         if not self.named.effect.joints or not self.rival.joints:
             return ()
         return tuple(dict.fromkeys((*self.named.effect.joints, *self.rival.joints)))
@@ -91,7 +91,7 @@ class Separation:
 
     @property
     def distinct(self) -> bool:
-        """Whether the run separates the two effects at all."""
+        """Whether the run separates the two effects."""
         return self.z >= NOTHING
 
     @staticmethod

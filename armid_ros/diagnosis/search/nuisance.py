@@ -5,7 +5,7 @@ The nuisance parameters of a comparison: body, friction, and the discrepancy of 
 
 For recording k, in weighted rows, in each joint
 
-    y_k = X_k b + B_k (d0 + d_k) + Z_k (g0 + [k is of the day in question] g + u_k) + e_k
+    y_k = X_k b + B_k (d0 + d_k) + Z_k (g0 + [k is of the diagnosed day] g + u_k) + e_k
 
 with the body b (prior: the description), the discrepancy d0 that all recordings share and d_k of
 one motion (Kennedy and O'Hagan, Bayesian calibration of computer models, 2001), and the values g
@@ -213,7 +213,7 @@ class Nuisance:
         acts: npt.NDArray[np.bool_] | None = None,
         known: tuple[FloatArray, float, float] | None = None,
     ) -> Nuisance:
-        """Return the nuisance with one more cause, acting on the day in question by default."""
+        """Return the nuisance with one more cause, acting on the diagnosed day by default."""
         term = CauseTerm(cause, size, self.rows.today if acts is None else acts, known)
         return replace(self, accepted=(*self.accepted, term))
 
@@ -416,7 +416,7 @@ class Nuisance:
 
 
 def _apart(rows: FloatArray, precision: FloatArray, group: npt.NDArray[np.bool_]) -> FloatArray:
-    """Return coordinates in which columns (S, r) of two groups are orthonormal, (r, r)."""
+    """Return the transform that makes columns (S, r) of two groups orthonormal, (r, r)."""
     turn = np.zeros_like(precision)
     for own in (np.flatnonzero(group), np.flatnonzero(~group)):
         held = precision[np.ix_(own, own)]

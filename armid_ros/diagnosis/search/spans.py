@@ -1,9 +1,9 @@
 # Copyright 2026 The armid_ros developers
 # SPDX-License-Identifier: Apache-2.0
 """
-The seconds in which a cause acts: a payload that is picked up and put down, a hose that pulls.
+Time spans in which a cause acts: a payload that is picked up and put down, a hose that pulls.
 
-Every cause is tried with columns of zero outside of a span of each recording. The span with
+Every cause is fitted with columns that are zero outside a span of each recording. The span with
 the largest evidence is found over pairs of change points, one recording after the other.
 
 """
@@ -25,7 +25,7 @@ from armid_ros.motion import FloatArray
 import numpy as np
 import numpy.typing as npt
 
-#: Time between change points that are tried [s], and the shortest span [s].
+#: Time between candidate change points [s], and the shortest span [s].
 _STEP, _SHORTEST = 0.25, 3.0
 #: Change points of the coarse pass, refining passes, and number of causes that are refined.
 _COARSE, _PASSES, _REFINED = 9, 2, 3
@@ -57,7 +57,7 @@ class Span:
 
 @dataclass(frozen=True)
 class _Timed:
-    """A cause with candidate change points in each recording of the day in question."""
+    """A cause with candidate change points in each recording of the diagnosed day."""
 
     ranked: Ranked
     look: Look
@@ -155,7 +155,7 @@ class _Timed:
         recording: int,
         tried: Iterable[tuple[int, int]],
     ) -> tuple[Ranked, Spans]:
-        """Return the likeliest of the spans tried for one recording."""
+        """Return the likeliest candidate span of one recording."""
         last, least = len(self.edges[recording]) - 1, round(_SHORTEST / _STEP)
         for a, b in tried:
             if 0 <= a <= b <= last and (b - a >= least or a == b == 0):
@@ -173,7 +173,7 @@ def _up_to(parts: FloatArray) -> FloatArray:
 
 def acting_spans(look: Look, thresholds: Thresholds) -> tuple[Span, ...]:
     """
-    Return the seconds in which the likeliest cause acts.
+    Return the time spans in which the likeliest cause acts.
 
     Parameters
     ----------
@@ -186,7 +186,7 @@ def acting_spans(look: Look, thresholds: Thresholds) -> tuple[Span, ...]:
     Returns
     -------
     tuple of Span
-        One for each recording of the day in question; empty if no span reaches these odds.
+        One for each recording of the diagnosed day; empty if no span reaches these odds.
 
     """
     if not look.ranking:
