@@ -1,7 +1,7 @@
 # Copyright 2026 The armid_ros developers
 # SPDX-License-Identifier: Apache-2.0
 """
-The base class of effects: one physical cause of joint torque besides the rigid body.
+The base class of effects: a physical cause of joint torque in addition to the rigid body.
 
 The simulation uses how an effect acts (``action``). The identification uses how the torques depend
 on its parameters (``columns``). The diagnosis checks whether this dependence explains a residual.
@@ -69,7 +69,7 @@ class Effect(ABC):
     summary: ClassVar[str]
     quantities: ClassVar[tuple[Quantity, ...]]
     shapes: ClassVar[tuple[Shape, ...]] = ()
-    #: Descriptions and prior knowledge; a table has those of the shipped effects.
+    #: Descriptions and prior knowledge; shipped effects have them in `traits.py`.
     traits: ClassVar[Traits] = Traits()
     #: Whether the torque of a joint at rest is undetermined between two levels.
     holds_at_rest: ClassVar[bool] = False
@@ -132,7 +132,7 @@ class Effect(ABC):
 
     @classmethod
     def _possible_joints(cls, robot: Robot) -> tuple[str, ...]:
-        """Return the joints on which the effect can act: those with an actuator."""
+        """Return the joints with an actuator, on which the effect can act."""
         return robot.joints
 
     @classmethod
@@ -388,14 +388,14 @@ def _spread_shape(
     joints: tuple[str, ...],
     among: tuple[str, ...],
 ) -> FloatArray:
-    """Return shape parameters for all joints, with defaults, shape (S, n)."""
+    """Return the shape parameters of all joints, defaults included, shape (S, n)."""
     spread = np.tile([[s.default] for s in shapes], len(among))
     spread[:, _places(joints, among)] = np.array(values).reshape(-1, len(shapes)).T
     return read_only(spread)
 
 
 class Arm(Protocol):
-    """A rigid body with effects; `armid_ros.arm.ArmModel` is one."""
+    """Protocol of a rigid body with effects, such as `armid_ros.arm.ArmModel`."""
 
     @property
     def robot(self) -> Robot:

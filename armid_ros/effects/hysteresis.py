@@ -38,7 +38,7 @@ class LoadDependentFriction(Effect):
         return joint_columns(self, motion, np.abs(load) * direction(motion))
 
     def action(self, values: FloatArray, arm: Arm) -> Action:
-        """Return dry friction whose levels move apart with the load."""
+        """Return dry friction whose upper and lower level depend on the load."""
         (share,) = scatter(self, values, arm.robot)
         zero = np.zeros_like(share)
         return Action(dry_friction=DryFriction(np.eye(len(share)), zero, zero, share))

@@ -1,7 +1,7 @@
 # Copyright 2026 The armid_ros developers
 # SPDX-License-Identifier: Apache-2.0
 """
-Torque that was learned from recordings, without a physical cause.
+Torque that is learned from recordings, without a physical model.
 
 Each joint has a map from position, velocity and load to torque: the mean of a Gaussian process on
 inducing points. Far from all points the mean is zero, and the standard deviation is that of the
@@ -83,7 +83,7 @@ class TorqueMap:
             )
 
     def __eq__(self, other: object) -> bool:
-        """Return whether another map has the same numbers."""
+        """Return whether two maps have equal values."""
         return isinstance(other, TorqueMap) and self._numbers == other._numbers
 
     def __hash__(self) -> int:

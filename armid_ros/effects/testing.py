@@ -121,7 +121,7 @@ def sines(robot: Robot, duration: float = 0.5, rate: float = 200.0) -> Motion:
 
 def check_effect(kind: type[Effect], robot: Robot | None = None) -> None:
     """
-    Check that a class of effects keeps its contract.
+    Check that an effect class satisfies the interface of `Effect`.
 
     Parameters
     ----------
@@ -253,7 +253,7 @@ def _compare(trial: EffectCase, values: FloatArray, columns: FloatArray) -> None
         )
 
 
-#: All checks, in the order in which they are made.
+#: All checks, in order.
 CHECKS: tuple[Callable[[EffectCase], None], ...] = (
     it_says_what_it_is,
     columns_have_one_place_per_parameter,
