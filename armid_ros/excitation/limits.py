@@ -117,7 +117,7 @@ class Limits:
         if not 0.0 < share <= 1.0:
             raise TrajectoryError(f'speed: a share of the limits in (0, 1], not {share:g}')
         span = robot.upper - robot.lower
-        # 2 % of the range are kept free at each end, and a tenth of the torque limit
+        # reserves: 2 % of the range at each end, and a tenth of the torque limit
         margin = 0.02 * reserve * np.where(np.isfinite(span), span, 0.0)
         top = np.where(has_velocity_limit(robot), robot.velocity_limit, SLOW_VELOCITY)
         given = robot.acceleration_limit
@@ -151,7 +151,7 @@ def has_velocity_limit(robot: Robot) -> npt.NDArray[np.bool_]:
 @dataclass(frozen=True)
 class Violation:
     """
-    One exceeded limit of one joint, at its largest excess.
+    Largest excess of one limit of one joint.
 
     Attributes
     ----------

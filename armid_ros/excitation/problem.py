@@ -1,6 +1,6 @@
 # Copyright 2026 The armid_ros developers
 # SPDX-License-Identifier: Apache-2.0
-"""A design problem: settings, parameters to identify, noise and limits."""
+"""Design problem: settings, parameters to identify, noise and limits."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ from armid_ros.motion import FloatArray, Motion, read_only
 import numpy as np
 import numpy.typing as npt
 
-#: Parameter sets that a design can target.
+#: Target parameter sets of a design.
 TARGETS = {
     'all': 'all base parameters of the rigid body, and those of the effects',
     'gravity': 'masses and first moments as an arm moving slowly shows them, and the effects',

@@ -1,7 +1,7 @@
 # Copyright 2026 The armid_ros developers
 # SPDX-License-Identifier: Apache-2.0
 """
-A whole excitation run: from rest into a periodic trajectory, through it, and back to rest.
+A complete excitation run: run-in from rest, periodic trajectory, and run-out to rest.
 
 The arm accelerates and decelerates along the path of the trajectory. Run-in and run-out therefore
 visit only poses of the periods. The way from another pose is a `Transfer`.
@@ -89,9 +89,9 @@ class Excitation:
         before = np.maximum(self.run_in - time, 0.0) / self.run_in
         after = np.maximum(time - (self.duration - self.run_in), 0.0) / self.run_in
         phase = time - self.run_in
-        # 1 - before is the share of the run-in done, x; the phase rate is _step(x), and the phase
-        # that is still to come before the first period is run_in * integral of _step from x to 1.
-        # The integral of _step from 0 to 1 is a half.
+        # x = 1 - before is the completed share of the run-in; the phase rate is _step(x), and the
+        # remaining phase before the first period is run_in * integral of _step from x to 1. The
+        # integral of _step from 0 to 1 is a half.
         lead = self.run_in * (0.5 - _step_integral(1.0 - before))
         lag = self.run_in * (0.5 - _step_integral(1.0 - after))
         end = self.n_periods * self.trajectory.period

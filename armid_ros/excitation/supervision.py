@@ -18,7 +18,7 @@ HANDOVER = 0.05
 
 
 class Path(Protocol):
-    """A path to follow: a `Run`, an `Excitation` or a `Transfer`."""
+    """Path to follow: a `Run`, an `Excitation` or a `Transfer`."""
 
     def at(self, t: npt.ArrayLike) -> Motion:
         """Evaluate the path at times [s]."""
