@@ -21,17 +21,17 @@ from typing import Any
 from armid_ros.errors import ArmidError
 import yaml
 
-#: Largest number of a document. No quantity is as large, and products of three stay finite.
+#: Largest allowed number in a document. Quantities are smaller, and products of three are finite.
 LARGEST = 1e100
 
-# The parser in C, where there is one, is ten times as fast.
+# The C parser, if installed, is ten times as fast.
 _Loader: Any = type('_Loader', (getattr(yaml, 'CSafeLoader', yaml.SafeLoader),), {})
 # Angles of joint_limits.yaml, such as '!degrees 90'.
 for _unit, _factor in (('!degrees', math.pi / 180.0), ('!radians', 1.0)):
     _Loader.add_constructor(
         _unit, lambda loader, node, factor=_factor: factor * float(loader.construct_scalar(node))
     )
-#: Errors that code can raise while it reads a document with unexpected content.
+#: Exceptions while a document with unexpected content is read.
 _UNEXPECTED = (
     ArithmeticError,
     AssertionError,

@@ -1,7 +1,7 @@
 # Copyright 2026 The armid_ros developers
 # SPDX-License-Identifier: Apache-2.0
 """
-Results of several files that replace an earlier result together or not at all.
+Atomic replacement of a result that has several files.
 
 A run writes into a staging folder inside the folder of its results, so both are on the same file
 system. Once all files are written, the whole folder is exchanged. A run that fails, or is
@@ -102,7 +102,7 @@ class Staged:
         goes = {STAGING, *names, *(path.name for path in self._earlier())}
         kept = [path for path in out.iterdir() if path.name not in goes]
         try:
-            _remove(new)  # left by a run that was killed
+            _remove(new)  # remains of a killed run
             new.mkdir()
             for path in (*kept, *self.folder.iterdir()):
                 if path.is_dir() and not path.is_symlink():
@@ -155,7 +155,7 @@ def staged(
     folder = out / STAGING
     try:
         out.mkdir(parents=True, exist_ok=True)
-        _remove(folder)  # left by a run that was killed
+        _remove(folder)  # remains of a killed run
         folder.mkdir()
     except OSError as error:
         raise OutputError(f'{out}: cannot be made or written to: {error.strerror}') from error
