@@ -107,7 +107,7 @@ def find_bags(patterns: Sequence[str], arm_pattern: str | None = None) -> list[B
         filesystem, path = opened(pattern)
         try:
             listed = filesystem.glob(path, detail=True)
-        except Exception as error:  # every store raises errors of its own
+        except Exception as error:  # stores raise different exceptions
             raise FleetError(f'{pattern}: cannot be listed: {error}') from error
         bags = list(_bags(filesystem, listed))
         if not bags:

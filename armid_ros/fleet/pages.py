@@ -188,7 +188,7 @@ def _verdict(found: Watch, diagnoses: Diagnoses) -> VerdictSection:
 
 
 def _diagnosed(arm: WatchedArm, diagnosis: Mapping[str, Any] | None) -> str:
-    """Return the verdict of a diagnosis if it found a fault without a named change, else ''."""
+    """Return the verdict of a diagnosis that found a gap and named no change, else ''."""
     if arm.named or diagnosis is None or diagnosis['verdict'] in ('consistent', 'failed'):
         return ''
     return str(diagnosis['verdict']).replace('_', ' ')
@@ -281,7 +281,7 @@ def _table(
 
 
 def _link(target: str, text: str) -> Markup:
-    """Return a text with a link to a page; without a page, the text alone."""
+    """Return a text with a link to a page, or the text alone if there is no page."""
     return Markup('<a href="{}">{}</a>').format(target, text) if target else escape(text)
 
 
