@@ -57,7 +57,7 @@ class StreamChecks:
         """Return the fault that prevents identification; empty without fault."""
         if self.silent and abs(self._moving) > SHORTEST:
             return SILENT
-        # the ranges are judged at each row, but seldom grow
+        # the ranges are checked at each row, but seldom increase
         lowest, highest = self._positions
         ranged = lowest.tobytes() + highest.tobytes()
         if self._judged is None or self._judged[0] != ranged:
@@ -109,7 +109,7 @@ class MissingSamples:
             self._doubtful = 0
 
     def _came_late(self) -> None:
-        """Remove one of the samples counted last."""
+        """Subtract a late sample from the latest missing samples."""
         if self._doubtful:
             self._doubtful -= 1
             self.count -= 1

@@ -99,7 +99,7 @@ class Conditioning:
     decimation : int
         Factor of the decimation.
     given : frozenset of {'cutoff', 'decimation'}
-        Settings that the user gave; the others were chosen from recordings.
+        Settings given by the user; the others were chosen from recordings.
 
     """
 
@@ -313,7 +313,7 @@ def decimate(values: FloatArray, used: Conditioning, stride: int = 1) -> FloatAr
     count = len(range(len(taps) // 2, len(values) - len(taps) // 2, factor))
     flat = values.reshape(len(values), -1)
     result = np.zeros((count, flat.shape[1]))
-    # a link moves no joint after its own: half are zero
+    # half are zero, as links have no torque in later joints
     active = np.flatnonzero(flat.any(axis=0))
     flat = np.ascontiguousarray(flat[:, active] if len(active) < flat.shape[1] else flat)
     size = 16  # output samples of one matrix product; larger ones multiply more zeros of the band

@@ -276,7 +276,7 @@ class SpikeGate:
         missed = self._lines_through(first)
         self._level.begin(missed, np.diff([s.x for s in first], axis=0), self._period)
         straight = [bool(np.all(self._off_by(m) <= 1.0)) for m in missed]
-        if not any(straight):  # erratic, or the noise has changed: it is learned anew
+        if not any(straight):  # erratic, or the noise has changed: measure it again
             off = np.max([self._off_by(m) for m in missed], axis=0)
             self._leave_out(Excursion(tuple(first), off, self._limits(missed[0])), True)
             self._level.forget()
@@ -292,7 +292,7 @@ class SpikeGate:
         return good
 
     def _judge(self, sample: StreamSample) -> list[StreamSample]:
-        """Judge another sample; return the samples that are now known to be good."""
+        """Classify another sample; return the samples that are now known to be good."""
         if self._first is not None:  # the samples before were erratic
             self._first.append(sample)
             return []
@@ -329,7 +329,7 @@ class SpikeGate:
         return []
 
     def _go_on(self) -> list[StreamSample]:
-        """Pass on the held samples, which are real; judge damaged ones among them again."""
+        """Pass on the held samples, which are valid; check them for damaged samples again."""
         held, self._held = self._held, []
         missed = self._lines_through(held)
         steady = ~self._pulsing
@@ -393,7 +393,7 @@ class SpikeGate:
     def _accept(
         self, samples: list[StreamSample], missed: Missed | None = None
     ) -> list[StreamSample]:
-        """Pass samples on, and learn from them."""
+        """Pass samples on, and update the noise estimate with them."""
         self._held = []
         for sample in samples:
             one = missed or missed_by(self._known, sample, self._period)
@@ -411,13 +411,13 @@ class SpikeGate:
         return [missed_by(samples[k : k + 2], samples[k + 2], self._period) for k in pairs]
 
     def _leave_out_ahead(self, samples: Sequence[StreamSample], missed: Missed) -> None:
-        """Leave out samples, if any, ahead of the first ones that are in line."""
+        """Drop the samples before the first samples that are in line."""
         if samples:
             off, limit = self._off_by(missed), self._limits(missed)
             self._leave_out(Excursion(tuple(samples), off, limit))
 
     def _leave_out(self, excursion: Excursion, erratic: bool = False) -> None:
-        """Count samples that are left out, by reason."""
+        """Count dropped samples by reason."""
         self.left_out.append(excursion)
         count = len(excursion.samples)
         if erratic:

@@ -45,7 +45,7 @@ Time = TypeVar('Time', float, FloatArray)
 @dataclass(frozen=True, eq=False)
 class StreamSample:
     """
-    One sample of a stream.
+    Sample of a stream.
 
     Attributes
     ----------
@@ -137,7 +137,7 @@ class Usual:
 
 class Missed(NamedTuple):
     """
-    Prediction error of a sample.
+    Prediction error of one sample.
 
     Attributes
     ----------
@@ -250,7 +250,7 @@ class NoiseLevel:
 
     def begin(self, missed: Sequence[Missed], moves: FloatArray, period: float) -> None:
         """
-        Learn from the first samples, of which some may be damaged.
+        Measure the usual errors of the first samples, some of which may be damaged.
 
         Parameters
         ----------
@@ -277,7 +277,7 @@ class NoiseLevel:
         self._waiting += 1
 
     def settle(self, period: float) -> None:
-        """Compute the usual error again if a window of errors is complete."""
+        """Update the usual error when a window of errors is complete."""
         if self._waiting < _WINDOW:
             return
         growths, moves = self._growths[: self._waiting], self._moves[: self._waiting]

@@ -163,7 +163,7 @@ def stacked(problems: Sequence[InteractionProblem]) -> InteractionProblem:
 
 
 def _one_machine(recording: Recording) -> Recording:
-    """Return a recording and its partner as one machine, without torques of the partner."""
+    """Return a recording with the joints of its partner, without torques of the partner."""
     assert recording.partner is not None and recording.tau is not None
     far = recording.partner.q
     return replace(

@@ -168,7 +168,7 @@ def _least_squares(problem: InteractionProblem, columns: FloatArray) -> FloatArr
     w = columns.reshape(-1, columns.shape[2])
     scale = np.linalg.norm(w, axis=0)
     springs = scale[: columns.shape[2] - len(problem.rigid)]
-    # a smaller RMS torque per stiffness [m^2] is that of a spring that is not extended
+    # with a smaller RMS torque per stiffness [m^2], the spring is not extended
     if not np.all(springs > 1e-9 * np.sqrt(len(w))):
         name = problem.segments[int(np.argmin(springs))]
         raise IdentificationError(f'{name}: its spring is never extended, so nothing shows it')
