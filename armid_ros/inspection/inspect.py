@@ -120,7 +120,7 @@ def inspect(
     recording : Recording
         The recording. With a robot, its joints are those of the robot, in the same order.
     robot : Robot, optional
-        Description, with which limits and units are checked and an identification is tried.
+        Description, for the check of limits and units and for a trial identification.
     topics : tuple of Topic, optional
         Topics of the bag.
     rng : numpy.random.Generator
@@ -180,7 +180,7 @@ def inspection_document(found: Inspection) -> dict[str, Any]:
 
 
 def notes_on(robot: Robot) -> list[str]:
-    """Return doubts and notes on a description, with one note on all joints not driven."""
+    """Return warnings and notes on a description, with one note on all undriven joints."""
     held = {f"joint '{joint.name}'" for joint in held_joints(robot)}
     others = [note for note in robot.notes if note.partition(': not')[0] not in held]
     return list(
