@@ -17,7 +17,7 @@ Samples = slice | npt.NDArray[np.intp] | npt.NDArray[np.bool_]
 
 def read_only(values: npt.ArrayLike) -> FloatArray:
     """
-    Return the values as a contiguous float64 array that cannot be written to.
+    Return the values as a read-only contiguous float64 array.
 
     An array that is already such a view of immutable memory is not copied.
 
