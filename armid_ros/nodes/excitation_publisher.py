@@ -109,8 +109,7 @@ class ExcitationPublisherNode(ArmidNode):
         self._simulated = bool(self.value('simulation') or self.value('use_sim_time'))
         if not self._simulated:
             return table
-        # A simulation needs no caution, but sends no joint states while it checks a long
-        # trajectory.
+        # Simulations are exempt: they send no joint states while they check a long trajectory.
         lively = {'speed': 'fast', 'start': True, 'state_timeout': 5.0, 'effort_factor': 0.0}
         return [replace(p, default=lively.get(p.name, p.default)) for p in table]
 
@@ -146,7 +145,7 @@ class ExcitationPublisherNode(ArmidNode):
         return elapsed if on_the_way else None
 
     def look(self) -> None:
-        """Start when controller and joint states are available; stop the arm if one is lost."""
+        """Start when controller and joint states are available; stop the arm if either is lost."""
         self._controller.look()
         now, patience = self._arm.now(), self.value('state_timeout')
         if self.elapsed is not None:
@@ -194,7 +193,7 @@ class ExcitationPublisherNode(ArmidNode):
         )
         gate = MotionGate.of(planned, self._planner)
         motion = planned.motion()
-        # the set point differs from the measured position
+        # the run starts at the set point, which differs from the measured position
         first = max(math.ceil(HANDOVER * self._rate), 1)
         message = write_trajectory(motion.select(slice(first, None)))
         self._controller.discover()  # no time passes between the stamp and the sending
@@ -213,7 +212,7 @@ class ExcitationPublisherNode(ArmidNode):
         self._begun_ns, self._begun = now.nanoseconds, self._arm.now() + late
         self._gate, self._ending, self._rehearsal = gate, None, None
         self._overloads, self._trouble, self._rehearsed = 0, '', ''
-        self._runs, self._outcome = self._runs + 1, 'complete'  # unless it is stopped
+        self._runs, self._outcome = self._runs + 1, 'complete'  # unless the run is stopped
         return self.tell(
             f'a run of {planned.duration:g} s, {planned.approach.duration:.1f} s of it to get '
             f'there, sent to {receiver}'
@@ -248,7 +247,7 @@ class ExcitationPublisherNode(ArmidNode):
 
     @property
     def activity(self) -> str:
-        """Return 'running' during a run, else how the last run ended."""
+        """Return 'running' during a run, else the result of the last run."""
         return 'running' if self.elapsed is not None else self._outcome
 
     def condition(self) -> tuple[str, Mapping[str, object]]:
@@ -397,7 +396,7 @@ class ExcitationPublisherNode(ArmidNode):
         self.tell(f'run complete: {gate.run.duration:.1f} s, approach included')
 
     def _on_goal_ended(self, reason: str) -> None:
-        """Handle the result of the controller: empty at the end of the run, else the reason."""
+        """Handle the result of the controller; the reason is empty after a complete run."""
         gate, elapsed = self._gate, self._arm.now() - self._begun
         if gate is None:  # the run was stopped before
             ending = self._ending

@@ -85,7 +85,7 @@ class _ElasticTopics:
 
 class SimulatedArmNode(ArmidNode):
     """
-    Simulates an arm that is commanded and measured by topics.
+    Simulates an arm with topics for commands and measurements.
 
     In real time the stamps are those of the system clock. At another real_time_factor the node
     also publishes /clock. With use_sim_time the simulation follows /clock. A model on the topic
@@ -334,7 +334,7 @@ class SimulatedArmNode(ArmidNode):
             stamp = message.header.stamp
             start_ns = stamp.sec * 10**9 + stamp.nanosec or self.stamp_ns
             delay = (start_ns - self.stamp_ns) * 1e-9
-            if not -1.0 <= delay <= 60.0:  # the clocks differ
+            if not -1.0 <= delay <= 60.0:  # sender and arm use different clocks
                 when = f'{delay:.3g} s from now' if delay > 0 else f'{-delay:.3g} s ago'
                 raise TrajectoryError(
                     f'trajectory: its stamp is {when}; set use_sim_time on sender and arm, or on '

@@ -73,7 +73,7 @@ class TrajectoryController:
     """
     Topic joint_trajectory and action follow_joint_trajectory of one controller.
 
-    A run uses the same of them until its end.
+    A run uses the same interface until its end.
 
     Attributes
     ----------
@@ -91,7 +91,7 @@ class TrajectoryController:
 
     def __init__(self, node: Any, on_end: Callable[[str], None]) -> None:
         """
-        Make the publisher, and look for the action.
+        Make the publisher and the action client.
 
         Parameters
         ----------
@@ -198,7 +198,7 @@ class TrajectoryController:
             self._publisher.publish(trajectory)
 
     def trouble(self, patience: float) -> str:
-        """Return a text if the controller is gone or does not answer for a time [s]; or empty."""
+        """Return a message if the controller is gone or silent for a time [s]; empty otherwise."""
         goal, now = self._goal, time.monotonic()
         if goal is None or not self._by_action:
             return ''
@@ -261,8 +261,8 @@ class TrajectoryController:
         """
         Send a goal that replaces the present one.
 
-        A controller of ros2_control replaces the old goal by itself. The old goal is cancelled as
-        well, since other controllers do not replace it.
+        Controllers of ros2_control replace the old goal. It is also cancelled, because other
+        controllers do not replace it.
 
         Parameters
         ----------
@@ -339,7 +339,7 @@ class TrajectoryController:
             self._end(goal, self._taken_over())
 
     def _taken_over(self) -> str:
-        """Return a text that the goal was replaced by another client, with its name."""
+        """Return a message that another client, named if known, has replaced the goal."""
         node, service = self._node, f'{self.action}/_action/send_goal'
         found = []
         for name, space in node.get_node_names_and_namespaces():

@@ -93,7 +93,7 @@ class _Ending:
 
 
 class _EndedAtOnce(BaseException):
-    """A signal arrived while the node was made; caught by `run` only."""
+    """A signal arrived during the construction of the node; caught by `run` only."""
 
 
 def run(make_node: Callable[[], ArmidNode], args: Sequence[str] | None = None) -> None:
