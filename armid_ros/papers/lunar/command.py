@@ -1,6 +1,6 @@
 # Copyright 2026 The armid_ros developers
 # SPDX-License-Identifier: Apache-2.0
-"""The paper on the humanoid arm for the moon, repeated by one command."""
+"""Command that reproduces the paper on the lunar humanoid arm."""
 
 from __future__ import annotations
 

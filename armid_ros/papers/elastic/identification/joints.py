@@ -142,7 +142,7 @@ def _columns(record: TwoEncoders) -> tuple[FloatArray, FloatArray, FloatArray, i
 def _joined(
     pieces: Sequence[tuple[FloatArray, FloatArray, FloatArray, int]],
 ) -> tuple[FloatArray, FloatArray, list[IntArray]]:
-    """Stack recordings, each with its own slope and offset, and cut them into blocks."""
+    """Stack recordings, with one slope and offset per recording, and cut them into blocks."""
     rows = sum(len(twist) for _, twist, _, _ in pieces)
     shared, count = pieces[0][0].shape[1] - 2, len(pieces)
     table = np.zeros((rows, shared + 2 * count))

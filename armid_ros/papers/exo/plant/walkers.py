@@ -1,7 +1,7 @@
 # Copyright 2026 The armid_ros developers
 # SPDX-License-Identifier: Apache-2.0
 """
-The leg pair that is free to walk: floating hips, the ground, and gaits whose feet do not slide.
+Walking leg pair: floating hips, ground contact, and gaits without sliding feet.
 
 The root of a description moves from the foot to the trunk, so that either foot can be on the
 ground. Two slides and a hinge connect ground and trunk; hip, knee and ankle of each leg follow.
@@ -118,7 +118,7 @@ def walkable(
     lean: float | None = None,
 ) -> WalkableGait:
     """
-    Find the nearest gait whose feet do not move on the ground.
+    Find the nearest gait without sliding feet.
 
     Parameters
     ----------
@@ -346,7 +346,7 @@ def contacts(robot: Robot) -> tuple[list[str], FloatArray]:
 def _hung(
     joint: str, parent: str, child: str, axis: str, body: pin.Inertia | None, up: float = 0.0
 ) -> str:
-    """Return the URDF of a joint and the link that it moves; one without a body slides."""
+    """Return the URDF of a joint and its link; a joint to a link without a body is a slide."""
     kind, far, inside = 'prismatic', '1000', ''
     if body is not None:
         kind, far = 'revolute', '3.2'
