@@ -3,8 +3,8 @@
 """
 Decompress data with a limit of the size.
 
-A few compressed bytes can expand to any size, so the stated size is the limit. Content of another
-size counts as damaged, and no more than the stated size is decompressed.
+A few compressed bytes can expand to any size, so the stated size is the limit. Content of a
+different size is damaged; at most the stated size is decompressed.
 
 """
 
@@ -99,7 +99,7 @@ def partly_decompressed(stored: _Buffer, compression: str, size: int) -> bytes:
 
 def unpacked(stream: BinaryIO, settings: ReadSettings, what: str) -> Iterator[bytes]:
     """
-    Yield the content of a zstd file or message, a piece at a time.
+    Yield the content of a zstd file or message in pieces.
 
     Not every writer states the size of the content in the frame, so that a limit is needed.
 

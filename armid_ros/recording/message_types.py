@@ -36,7 +36,7 @@ _BIG, _LITTLE = struct.Struct('>iI').unpack_from, struct.Struct('<iI').unpack_fr
 @dataclass(frozen=True)
 class MessageType:
     """
-    A message type as a bag describes it.
+    Message type, with its description in a bag.
 
     Attributes
     ----------

@@ -74,7 +74,7 @@ class TableColumn:
         unit, bracket = _normal_unit(self.unit), _BRACKETS.search(name)
         if bracket and not unit:
             unit = _normal_unit(bracket[1])
-        elif not unit:  # as in act_pos_deg[3]
+        elif not unit:  # name such as act_pos_deg[3]
             plain = re.sub(r'\[\d+\]$', '', name).rstrip('0123456789_').lower()
             unit = next((_UNITS[end] for end in _ENDINGS if plain.endswith(f'_{end}')), '')
         object.__setattr__(self, 'unit', unit)
@@ -190,7 +190,7 @@ class Table:
 
 
 def _at_most(names: Sequence[str]) -> str:
-    """Format the first names of a list, and the number of further ones."""
+    """Format the first names of a list, and the number of further names."""
     most = 40
     more = f' and {len(names) - most} more' if len(names) > most else ''
     return ', '.join(names[:most]) + more

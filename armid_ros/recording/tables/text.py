@@ -185,7 +185,7 @@ def _numbers(
                 values[k, j] = _number(cell, separator)
             except ValueError:
                 said.setdefault(j, {})[k] = cell
-    # a column with fewer numbers is one of words
+    # a column with fewer numbers contains text
     numeric = np.isfinite(values).mean(axis=0) >= 0.5
     wrong = [(j, *next(iter(of.items()))) for j, of in said.items() if numeric[j]]
     if wrong:
