@@ -34,7 +34,7 @@ HEADS = (
     'measured [m]',
     'explains',
 )
-#: Tone of each word of a verdict.
+#: Colour of each verdict.
 _TONES = {
     **{'unfit': 'bad', 'doubtful': 'fair', 'ready': 'good'},
     **{'wrong': 'bad', 'look': 'fair', 'clean': 'good'},
@@ -62,7 +62,7 @@ def inspection_report(found: Inspection, origin: ResultOrigin = DEFAULT_ORIGIN) 
     grade = inspection_word(found)
     first = 1 if grade == 'ready' else 2
     texts = [remark.text for remark in found.remarks]
-    texts.insert(first - 1, found.verdict)  # below the worst remark
+    texts.insert(first - 1, found.verdict)  # not worse than the worst remark
     sentences = [text[0].upper() + text[1:].replace('`', '').rstrip('.') + '.' for text in texts]
     sections: list[Section] = [
         VerdictSection(
@@ -297,7 +297,7 @@ def _curves_section(found: Inspection) -> ContentSection:
 
 
 def joint_heads(found: Inspection) -> tuple[str, ...]:
-    """Return the heads of the table of joints; with units, where all joints have the same."""
+    """Return the heads of the table of joints, with units if all joints have the same unit."""
     alike, unit = len(set(found.units)) == 1, found.units[0]
     length, speed, torque = (
         f' [{one}]' if alike else '' for one in (unit, f'{unit}/s', 'N' if unit == 'm' else 'N m')

@@ -15,11 +15,11 @@ from armid_ros.estimate import ParameterName
 from armid_ros.identification.fitting.identifiability import HALF_WIDTH
 from markupsafe import escape, Markup
 
-#: Stands for a missing number.
+#: Text for a missing number.
 DASH = '\N{EN DASH}'
-#: No quantity of an arm in SI units is as large.
+#: Larger than all quantities of an arm in SI units.
 _NO_NUMBER = 1e12
-#: Words that a page explains where they stand.
+#: Terms with a tooltip.
 TERMS = {
     'floor': 'Error that a perfect model would have: noise, or what the model before had.',
     'gap': 'Squared torque error of the given model, each joint in units of its floor.',
@@ -29,7 +29,7 @@ TERMS = {
 
 
 def pretty(unit: str) -> str:
-    """Return a unit, or a sentence with units, as it is printed: 'kg m²' for 'kg m^2'."""
+    """Format a unit, or a sentence with units: 'kg m²' for 'kg m^2'."""
     return unit.replace('^2', '²').replace('^3', '³')
 
 
@@ -151,7 +151,7 @@ def common_prefix(names: Sequence[str]) -> str:
     """
     first = names[0] if len(names) > 1 else ''
     ends = [first[: found.end()] for found in re.finditer(r'[_/.:-]', first)]
-    # letters of a prefix of names that is worth leaving out
+    # shortest prefix of names that is omitted [letters]
     rests = {end: [name.removeprefix(end) for name in names] for end in ends if len(end) > 5}
     shared = [end for end in rests if all(name.startswith(end) for name in names)]
     return max((end for end in shared if all(r[:1].isalpha() for r in rests[end])), default='')

@@ -189,7 +189,7 @@ def minor_section(diagnosis: Diagnosis, patched: bool) -> ContentSection:
 
 
 def detectable_section(sizes: Sequence[Detectable]) -> ContentSection:
-    """Return the smallest detectable size of every effect, where it shows best and worst."""
+    """Return the smallest detectable sizes of every effect, on the best and on the worst joint."""
     rows = [_detectable_row(name, sizes) for name in dict.fromkeys(one.name for one in sizes)]
     return ContentSection(
         'Smallest detectable effects',
