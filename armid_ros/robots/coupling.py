@@ -22,7 +22,7 @@ def moving_joints(description: Description, driven: Sequence[str]) -> tuple[str,
     """
     Return the joints that move a body when some joints are driven, in the order of the file.
 
-    A driven joint that others follow is a motor without a body of its own if its link and all
+    A driven joint that other joints follow is a motor without a body if its link and all
     links that it carries have no inertia.
 
     """
@@ -30,7 +30,7 @@ def moving_joints(description: Description, driven: Sequence[str]) -> tuple[str,
         {*driven, *description.passive},
         {name for name, inertial in description.links.items() if inertial},
     )
-    while True:  # up to the links that carry bodies
+    while True:  # rigid links up to the links with bodies
         more = {j.parent for j in description.joints if j.child in bodies} - bodies
         if not more:
             break
@@ -141,7 +141,7 @@ def _mechanism(
 def _narrowed(
     mechanism: Mechanism, tree: Robot, lower: FloatArray, upper: FloatArray
 ) -> tuple[FloatArray, FloatArray]:
-    """Return position limits of the driven joints that keep those of joints that follow them."""
+    """Narrow the position limits of driven joints so that coupled joints keep their limits."""
     lower, upper = lower.copy(), upper.copy()
     followers = ~np.any(mechanism.passive, axis=1)
     ends = np.stack([tree.lower, tree.upper], axis=1) - mechanism.offset[:, np.newaxis]
@@ -171,9 +171,9 @@ def _closing(
     mechanism: Mechanism, tree: Robot, lower: FloatArray, upper: FloatArray
 ) -> tuple[Mechanism, FloatArray, FloatArray]:
     """
-    Narrow the range of the driven joints to where loops close and passive joints keep limits.
+    Narrow the range of driven joints so that loops close and passive joints keep their limits.
 
-    Both hold a tenth beyond the result, because a motion may overshoot its limits.
+    Both conditions are satisfied a tenth beyond the result, because motions may overshoot limits.
 
     """
     start = mechanism.start[0]
