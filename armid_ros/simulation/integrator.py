@@ -95,7 +95,7 @@ def _end_velocity(
     taken, modes = contacts.torques(directions.dot(response), directions.dot(dq_free), modes)
     dq_next = dq_free - response.dot(taken)
     if 0 in modes:
-        # set the velocity of joints that stick to exactly zero, without rounding errors
+        # set the velocity of sticking joints to exactly zero
         fixed = [
             axis
             for axis, mode in zip(contacts.axes, modes, strict=True)
