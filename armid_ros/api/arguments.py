@@ -51,7 +51,7 @@ def robot_of(robot: RobotLike) -> Robot:
 
 
 def is_model(path: str | Path) -> bool:
-    """Return whether a path is that of a model.yaml, and not of a description."""
+    """Return whether a path names a model.yaml rather than a description."""
     return Path(path).suffix in ('.yaml', '.yml')
 
 
@@ -64,7 +64,7 @@ def describes_robot(one: RobotLike | RecordingLike) -> bool:
 
 
 def source_of(robot: Robot) -> str:
-    """Return the reference to a robot in files: its shipped name, its path, or its name."""
+    """Return the reference to a robot for files: its shipped name, its path, or its name."""
     for name in shipped_robots():
         if robot.path == shipped_path(name):
             return name
@@ -81,7 +81,7 @@ def arm_of(arm: RobotLike, effects: str = USUAL) -> ArmModel:
 
 
 def drivable(arm: RobotLike) -> ArmModel:
-    """Return an arm model; TrajectoryError if a name or path has joints of no arm."""
+    """Return an arm model; TrajectoryError if a name or path has joints outside all arms."""
     model = arm_of(arm)
     others = joints_beside_arms(model.robot) if isinstance(arm, str | Path) else ()
     if others:

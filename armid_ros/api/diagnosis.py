@@ -225,7 +225,7 @@ class DiagnosisResult(ShownModel):
 
             return learn_residual(self.core, np.random.default_rng(seed))
 
-        found, why = _tried('map', learned)
+        found, why = _attempt('map', learned)
         if found is None and not why:
             why = ('nothing was learned: the residual does not depend on the state of any joint',)
         return replace(self, residual=found, notes=(*self.notes, *why))
@@ -245,12 +245,12 @@ class DiagnosisResult(ShownModel):
                     progress=lambda _, what: progress(1.0, what),
                 )  # fmt: skip
 
-            found, why = _tried('simulation', simulated)
+            found, why = _attempt('simulation', simulated)
             forward, left_out = found or ((), ())
             result = replace(result, forward=forward, notes=(*result.notes, *left_out, *why))
         progress(1.0, 'next run')
         rng = np.random.default_rng(seed)
-        run, why = _tried('next run', lambda: next_run(self.core, rng))
+        run, why = _attempt('next run', lambda: next_run(self.core, rng))
         return replace(result, next_run=run, no_run='; '.join(why))
 
     def _steps(self, model: str) -> list[str]:
@@ -429,7 +429,7 @@ def require_residual() -> None:
     require_libraries()
 
 
-def _tried(what: str, make: Callable[[], _Made]) -> tuple[_Made | None, tuple[str, ...]]:
+def _attempt(what: str, make: Callable[[], _Made]) -> tuple[_Made | None, tuple[str, ...]]:
     """Return the result of a step, or None and the reason of its failure."""
     try:
         return make(), ()

@@ -250,7 +250,7 @@ class ExcitationResult(Shown):
         )
 
     def _of_run(self) -> tuple[str, list[str], str]:
-        """Return the fitness of the run in a word, sentences on run and search, and the remedy."""
+        """Return the verdict on the run, sentences on run and search, and the remedy."""
         try:
             run, fit = self.run, self.fitness
         except TrajectoryError as error:

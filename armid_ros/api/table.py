@@ -80,7 +80,7 @@ def data_frame(rows: Any) -> pandas.DataFrame:
 
 class Shown(ABC):
     """
-    A result that prints as its summary and is written as the commands write it.
+    Result that prints its summary, and that is saved in the format of the commands.
 
     Attributes
     ----------
@@ -101,7 +101,7 @@ class Shown(ABC):
         """Return a summary."""
 
     def stated(self, origin: ResultOrigin, robot: Robot | None = None) -> ResultOrigin:
-        """Fill in the robot and the next step: a sentence or a command."""
+        """Return the origin with robot and next step: a sentence or a command."""
         shown, known = self.summary(), origin if robot is None else origin.of(source_of(robot))
         step = origin.step or ''.join(shown.steps[:1]) or f'armid {shown.then}'
         return replace(known, step=step)
@@ -152,7 +152,7 @@ class Shown(ABC):
 
 
 class ShownModel(Shown):
-    """A result with a model of an arm, and residual torques."""
+    """Result with an arm model and residual torques."""
 
     @abstractmethod
     def _residuals(self) -> Iterable[ResidualPart]:
