@@ -375,7 +375,7 @@ class ArmModel:
         return tau
 
     def neighbours(self, period: float) -> int:
-        """Return the number of samples to either side that affect a reading, for a period [s]."""
+        """Return the number of samples on either side that affect a reading, for a period [s]."""
         action = self._acting
         if action.displacement is None and action.reading_memory == 0.0:  # noqa: RUF069 - of laws, never computed
             return 0

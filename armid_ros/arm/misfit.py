@@ -116,7 +116,7 @@ class Misfit:
 
 
 def louder(now: FloatArray, before: FloatArray) -> FloatArray:
-    """Return the ratio of the rms torque now to that before, at least 1, (n,)."""
+    """Return the ratio of the present rms torque to the earlier rms torque, at least 1, (n,)."""
     return np.asarray(np.maximum(now / np.maximum(before, 1e-12), 1.0))
 
 

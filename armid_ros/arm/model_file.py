@@ -230,7 +230,7 @@ def load_misfit(path: str | Path) -> Misfit | None:
 
 def read_model(text: str, robot: Robot, source: str) -> ArmModel:
     """
-    Return the arm model that the text of a model.yaml describes.
+    Parse the text of a model.yaml.
 
     Parameters
     ----------
@@ -319,8 +319,7 @@ def checked_model(text: str) -> dict[str, Any]:
     if strange:
         line = yaml_line(text, (strange[0],))
         raise ModelError(
-            f"line {line}: no key '{str(strange[0])[:40]}' is known; a model has "
-            f'{", ".join(_KEYS)}'
+            f"line {line}: unknown key '{str(strange[0])[:40]}'; a model has {', '.join(_KEYS)}"
         )
     _require(document, _NEEDED, 'a model')
     for place, row, units in _rows(document, text):
