@@ -156,7 +156,7 @@ def spreads(series: Sequence[ParameterHistory]) -> dict[tuple[str, str], Spread]
     names: dict[str, list[ParameterHistory]] = {}
     for one in series:
         names.setdefault(one.name, []).append(one)
-    alike = {name: _alike(group, found) for name, group in names.items()}
+    alike = {name: _prior_freedom(group, found) for name, group in names.items()}
     found = {one: replace(spread, alike=alike[one[0]]) for one, spread in found.items()}
     factors = {name: _lasting(group, found) for name, group in names.items()}
     return {
@@ -239,7 +239,9 @@ def _spread(group: Sequence[ParameterHistory]) -> Spread:
     return Spread(float(np.sqrt(extra)), freedom)
 
 
-def _alike(group: Sequence[ParameterHistory], found: Mapping[tuple[str, str], Spread]) -> float:
+def _prior_freedom(
+    group: Sequence[ParameterHistory], found: Mapping[tuple[str, str], Spread]
+) -> float:
     """
     Return the prior degrees of freedom of the variances of arms (empirical Bayes).
 
