@@ -236,7 +236,7 @@ def _model_of(path: Path, robot: Robot) -> ArmModel:
         return arm
     if known.joints == robot.joints and kinematics_digest(known) != kinematics_digest(robot):
         raise ArmidError(
-            f'{path}: was made with a description whose joints are elsewhere than those of '
+            f'{path}: was made with a description whose kinematics differ from those of '
             f'{robot.name}; give that description as --robot, or identify this arm'
         )
     return arm

@@ -292,7 +292,7 @@ def _refuse_other_options(context: click.Context, kind: str) -> None:
         fits = name in _SHARED or (name == 'share') == (kind in COURSES)
         given = context.get_parameter_source(name) is not click.core.ParameterSource.DEFAULT
         if given and not fits:
-            raise click.UsageError(f'{option.opts[0]} does not go with --kind {kind}')
+            raise click.UsageError(f'{option.opts[0]} is not available with --kind {kind}')
 
 
 def _driven(source: str, gravity: str, joints: str | None, bags: tuple[Path, ...]) -> Robot:

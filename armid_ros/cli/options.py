@@ -205,7 +205,7 @@ def read_settings() -> ReadSettings:
 
 
 def tell_damage(*recordings: Recording) -> None:
-    """Report damage of recording files on stderr, equal reports once."""
+    """Report damage of recording files on stderr, without repeats."""
     for text in dict.fromkeys(
         f'{r.source}: {r.report.damage}' for r in recordings if r.report.damage
     ):
@@ -331,7 +331,7 @@ def read(paths: Sequence[Path], robot: Robot, topic: str | None) -> list[Recordi
 
 
 def kept_source(source: str, robot: Robot, out: Path) -> str:
-    """Return the robot as files in a folder name it; write a robot from a bag to the folder."""
+    """Return the reference to the robot for files; write a robot from a bag to the folder."""
     if source == '-':
         write_file(out / 'robot.urdf', robot.urdf)
         return 'robot.urdf'

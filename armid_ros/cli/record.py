@@ -136,11 +136,11 @@ def _of_some_size(text: str, robot: Robot) -> tuple[Effect, FloatArray]:
             + f'; write {text.partition(":")[0]}:{first}=0.1'
         )
     if effect.traits.weighs:
-        _tell_impossible(text, values, robot)
+        _warn_impossible(text, values, robot)
     return effect, values
 
 
-def _tell_impossible(text: str, values: FloatArray, robot: Robot) -> None:
+def _warn_impossible(text: str, values: FloatArray, robot: Robot) -> None:
     """Warn of a payload that is physically inconsistent, or farther away than the arm is long."""
     from armid_ros.model.pseudo_inertia import Consistency
     from armid_ros.robots.robot import PER_LINK

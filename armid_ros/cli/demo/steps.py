@@ -83,7 +83,7 @@ def hidden_change(robot: Robot, rng: np.random.Generator, hide: str = '') -> Hid
 @dataclass(frozen=True)
 class HiddenChange:
     """
-    An effect that the arm has and its model lacks.
+    Effect of the arm that its model lacks.
 
     Attributes
     ----------

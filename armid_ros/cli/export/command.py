@@ -56,7 +56,7 @@ def export(
     frame: str | None,
     spread: float,
 ) -> None:
-    """Write a model for a controller, a maker's load data or a simulator."""
+    """Write a model for a controller, a simulator, or the load data of a manufacturer."""
     from armid_ros.cli import options
     from armid_ros.cli.export.dynamics import torque_code
     from armid_ros.cli.export.loads import load_of, load_text
@@ -77,7 +77,7 @@ def export(
     if robot_source is not None:
         robot = options.open_robot(robot_source, 'earth', joints)
     elif joints is not None:
-        raise click.UsageError('--joints needs the description they are of: name it with --robot')
+        raise click.UsageError('--joints needs the description of them: name it with --robot')
     arm = options.model_of(model, robot)
     notes: tuple[str, ...] = ()
     if kind in ('cpp', 'python'):

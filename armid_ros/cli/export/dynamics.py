@@ -63,7 +63,7 @@ def torque_tables(arm: ArmModel) -> tuple[dict[str, npt.NDArray[Any]], tuple[str
 
 def torque_code(arm: ArmModel, language: str, source: str) -> tuple[str, tuple[str, ...]]:
     """
-    Return the torque of an arm as code, and lines on parameters that are not in it.
+    Return code for the torque of an arm, and lines on parameters that it omits.
 
     The language is 'cpp', a C++17 header with torque(q, dq, ddq, tau), or 'python', a module with
     torque(q, dq, ddq) that returns tau; neither needs more than its standard mathematics. A

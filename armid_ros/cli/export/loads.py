@@ -86,7 +86,7 @@ def load_of(arm: ArmModel, joint: str | None = None, frame: str | None = None) -
     if not ten[0] > NO_MASS:
         raise ModelError(
             f"the payload of joint '{joint}' has a mass of {ten[0]:.4g} kg, which no controller "
-            'takes: record the arm with and without it again'
+            'accepts: record again with and without the payload'
         )
     model, number = arm.robot.model, arm.robot.tree.index(joint) + 1
     frames = [f for f in model.frames if (f.parentJoint, f.type) == (number, pin.FrameType.BODY)]
@@ -177,7 +177,7 @@ MAKERS: dict[str, tuple[Callable[[CarriedLoad], str], str]] = {
 
 def load_text(load: CarriedLoad, maker: str, source: str) -> tuple[str, tuple[str, ...]]:
     """
-    Return the file of the load data of a maker, a key of `MAKERS`, and notes that are in it too.
+    Return the load data file of a manufacturer, a key of `MAKERS`, and its notes.
 
     An inertia that no body can have is written as zero, a point mass. The source of the load is
     for the comment.
