@@ -155,12 +155,12 @@ def diagnose(
         tell(0.2, f'ties to {settings.partner.source}')
         tied = diagnose_ties(explainer, recordings, settings.partner)
         if tied is not None:
-            return _said(tied, notes, explainer, doubt, given)
+            return _as_diagnosis(tied, notes, explainer, doubt, given)
     chosen = explainer.chosen()
-    result = _said(chosen, notes, explainer, doubt, given)
-    return _within(result, chosen, explainer, (recordings, validate, baseline)) or _each_alone(
-        result, ([*recordings, *validate], baseline), used, explainer
-    )
+    result = _as_diagnosis(chosen, notes, explainer, doubt, given)
+    return _diagnose_span(
+        result, chosen, explainer, (recordings, validate, baseline)
+    ) or _each_alone(result, ([*recordings, *validate], baseline), used, explainer)
 
 
 def _hardly_explained(result: Diagnosis, settings: DiagnosisSettings) -> bool:
@@ -169,7 +169,7 @@ def _hardly_explained(result: Diagnosis, settings: DiagnosisSettings) -> bool:
     return result.verdict in OPEN or largest <= settings.thresholds.open_share
 
 
-def _within(
+def _diagnose_span(
     result: Diagnosis,
     chosen: Chosen,
     explainer: Explainer,
@@ -182,7 +182,7 @@ def _within(
         return None
     spans = acting_spans(look, settings.thresholds)
     timed = [*recordings, *validate][: len(spans)]
-    cut = [_cut(*each) for each in zip(spans, timed, strict=True)]
+    cut = [_cropped(*each) for each in zip(spans, timed, strict=True)]
     shorter, unseen = (
         [one for one in part if one is not None]
         for part in (cut[: len(recordings)], cut[len(recordings) :])
@@ -209,7 +209,7 @@ def _within(
     return found.acting_in([one for one in spans if one.stop > one.start])
 
 
-def _cut(span: Span, recording: Recording) -> Recording | None:
+def _cropped(span: Span, recording: Recording) -> Recording | None:
     """Return the time span of a recording in which a cause acts."""
     if span.whole:
         return recording
@@ -223,17 +223,17 @@ def _each_alone(
     used: Conditioning,
     explainer: Explainer,
 ) -> Diagnosis:
-    """Return the result, or `bad_data` if it is open or in doubt and a recording is faulty."""
+    """Return the result, or `bad_data` if it is inconclusive and a single recording is faulty."""
     arm = explainer.arm
     open_or_doubted = result.verdict in OPEN or bool(result.doubt)
     if not open_or_doubted or explainer.settings.partner is not None:
         return result
-    apart = [one for day in days for one in _apart(arm, day, used)]
+    apart = [one for day in days for one in _with_unfitted_joints(arm, day, used)]
     alone = mistaken_recordings(arm, apart, used)
     return _bad(plain_arm(arm), result.data, alone, result.notes) if alone else result
 
 
-def _apart(
+def _with_unfitted_joints(
     arm: ArmModel, day: Sequence[Recording], used: Conditioning
 ) -> Iterator[tuple[Recording, npt.NDArray[np.bool_]]]:
     """Yield recordings with joints whose torque the model fits in the other recordings only."""
@@ -249,7 +249,7 @@ def _apart(
             yield one, own
 
 
-def _said(
+def _as_diagnosis(
     chosen: Chosen, notes: Sequence[str], explainer: Explainer, doubt: str, given: ArmModel
 ) -> Diagnosis:
     """Return the diagnosis of an explanation; shares are measured on held-out data."""
@@ -257,7 +257,7 @@ def _said(
     explainer.tell(0.85, 'held-out gap')
     explanation, said = as_bodies(chosen.explanation)
     notes = [*notes, *chosen.notes, *(said if explanation.steps else ())]
-    unseen = _unseen(explainer.unseen, explanation, chosen)
+    unseen = _held_out_evidence(explainer.unseen, explanation, chosen)
     least = 0.0 if chosen.measured else settings.thresholds.headline
     explanation, shares = headline(explanation, least, settings)
     whole = shares.share(range(len(explanation.steps)))
@@ -314,7 +314,7 @@ def _said(
 def _not_visible(
     explanation: Explanation, found: Sequence[Finding], explainer: Explainer
 ) -> tuple[str, ...]:
-    """Return the effects that no place shows, in the order of the catalogue."""
+    """Return the effects that are not visible on any joint, in the order of the catalogue."""
     hidden = set() if explanation.survey is None else explanation.survey.hidden
     hidden -= {finding.name for finding in found}
     if explainer.baseline is None:  # what is fitted with every cause is seen in its own values
@@ -342,7 +342,7 @@ def _remarks(
     return [text for text, told in remarks.items() if text and told]
 
 
-def _unseen(
+def _held_out_evidence(
     data: Sequence[Trajectory], explanation: Explanation, chosen: Chosen
 ) -> Evidence | None:
     """Return the held-out recordings, weighted by the noise, or the misfit if larger."""

@@ -204,7 +204,7 @@ def trajectories(
 
 def thinnable(used: Conditioning) -> Conditioning:
     """
-    Lower the decimation of rows to a multiple of the decimation of columns.
+    Reduce the decimation of rows to a multiple of the decimation of columns.
 
     Each row then spans a whole number of columns' samples; at most an eighth more rows are kept.
 

@@ -83,7 +83,7 @@ class Isolability:
         ]
 
     def of_kinds(self) -> tuple[tuple[str, ...], FloatArray]:
-        """Return the names of visible effects, and the minimum of `apart` over places, (K, K)."""
+        """Return the names of visible effects, and the minimum of `apart` over joints, (K, K)."""
         names = [one.name for one in self.effects]
         kinds = tuple(dict.fromkeys(np.array(names)[self.seen].tolist()))
         places = [np.flatnonzero(self.seen & (np.array(names) == kind)) for kind in kinds]

@@ -71,7 +71,7 @@ class NextRun:
 
     @property
     def expected_z(self) -> float:
-        """Return the z-score of the pair that is separated least."""
+        """Return the z-score of the least separated pair."""
         return min(pair.z for pair in self.separations)
 
     @property

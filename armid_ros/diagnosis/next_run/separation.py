@@ -171,7 +171,7 @@ class Load:
 
 
 def _carrier(robot: Robot) -> slice:
-    """Return the places of the parameters of the last link."""
+    """Return the indices of the parameters of the last link."""
     last = robot.moving.index(robot.tip)
     return slice(10 * last, 10 * last + 10)
 

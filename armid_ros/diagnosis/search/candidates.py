@@ -101,7 +101,7 @@ class Causes:
         self, singles: Sequence[Cause], nuisance: Nuisance, under: Marginal
     ) -> Iterator[Cause]:
         """
-        Yield a law of friction in the joints that maximise its evidence, if two or more.
+        Yield a friction law on the joints that maximise its evidence, if at least two.
 
         Values of joints are independent under a common prior; each number of joints is as likely.
 
@@ -137,7 +137,7 @@ class Causes:
             yield from (one for one in members if (one.name, one.joints) not in self.fitted)
 
     def _divided(self, effect: Effect, singles: Sequence[Effect]) -> Iterator[Cause]:
-        """Yield a cause for each single effect; the columns of all are computed at once."""
+        """Yield a cause for each single effect; all columns are computed together."""
         robot, start = self.nuisance.arm.robot, 0
         places: list[tuple[Effect, tuple[int, ...], list[int]]] = []
         for one in singles:
@@ -336,7 +336,7 @@ def candidate_effects(
 def shaped(
     effect: Effect, members: list[Effect], arm: ArmModel, unexplained: Unexplained
 ) -> Iterator[tuple[Effect, list[Effect]]]:
-    """Yield an effect and its members in each starting shape; once if it has no shape."""
+    """Yield an effect and its candidates for each starting shape; once if it has no shape."""
     if not effect.shapes:
         yield effect, members
         return

@@ -112,7 +112,7 @@ class Explainer:
         """Choose the explanation of the gap."""
         if self.baseline is not None:
             return self._since(self.baseline)
-        return self._alone() if self.misfit is None else self._beside(self.misfit)
+        return self._alone() if self.misfit is None else self._explain_change(self.misfit)
 
     def _alone(self) -> Chosen:
         """Explain the gap of a model without a baseline or a known misfit."""
@@ -163,7 +163,7 @@ class Explainer:
 
     def _magnitude(self, result: Result) -> tuple[float | None, tuple[str, ...]]:
         """
-        Return the magnitude of gravity of a celestial body unless data deny it, with a note.
+        Return the magnitude of gravity of a celestial body unless data contradict, with a note.
 
         The odds of a magnitude are its posterior density over its prior density (Dickey 1971).
 
@@ -182,7 +182,7 @@ class Explainer:
                     return known, (_KNOWN_GRAVITY.format(sizes[known], known),)
         return None, ()
 
-    def _beside(self, written: Misfit) -> Chosen:
+    def _explain_change(self, written: Misfit) -> Chosen:
         """
         Explain the change since an identification if only the size of its misfit is known.
 
@@ -223,7 +223,7 @@ class Explainer:
         return Chosen(found, misfit, OWN_MISFIT, notes, untested, result.first)
 
     def _changes(self, result: Result, evidence: Evidence, spread: float) -> Explanation:
-        """Explain a change while the model stays as given."""
+        """Explain a change relative to the unchanged model."""
         nuisance = replace(result.nuisance, accepted=())
         fitted = tuple(range(nuisance.rows.before + count_recordings(self.prepared.data)))
         setting = result.under.setting

@@ -215,7 +215,7 @@ class CauseComparison:
     def look(self, nuisance: Nuisance) -> Look:
         """Compare every cause that is not accepted yet, and refine the shapes of the best."""
         settings, likeliest = self._settings(nuisance), self._likeliest(nuisance)
-        tried = settings if len(settings) == 1 else _leading(settings)
+        tried = settings if len(settings) == 1 else _leading_settings(settings)
         each = [
             (odds(cause, nuisance, one, bounded=False), cause, one)
             for cause, one in product(self._causes_of(nuisance), tried)
@@ -324,7 +324,7 @@ def settings_of_misfit(body: float) -> tuple[Setting, ...]:
     )
 
 
-def _leading(settings: Sequence[Marginal]) -> list[Marginal]:
+def _leading_settings(settings: Sequence[Marginal]) -> list[Marginal]:
     """Return the best setting and the one of noise alone, for each size of errors of the body."""
     found = []
     for body in dict.fromkeys(one.setting.body for one in settings):

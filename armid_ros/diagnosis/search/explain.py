@@ -98,7 +98,7 @@ def _open(
     result: Result, unknown: Sequence[Effect], settings: DiagnosisSettings
 ) -> Iterator[Trial]:
     """
-    Yield friction and offsets without given values; they are fitted with every cause.
+    Yield friction and offsets without given values, which are fitted with every cause.
 
     The odds of a nonzero value are the prior density at zero over the posterior density at zero
     (Dickey, The weighted likelihood ratio, 1971).

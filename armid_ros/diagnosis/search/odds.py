@@ -239,7 +239,7 @@ def odds(
 
 
 def _unseen(cause: Cause, nuisance: Nuisance) -> FloatArray:
-    """Return the largest values that a misfit in size only may contain, over their unit, (p,)."""
+    """Return the largest values within a misfit of known size, over their unit, (p,)."""
     torque = cause.torque[list(cause.joints)] * cause.unit
     misfit = nuisance.rows.amplitude[-1][list(cause.joints), np.newaxis]
     return np.asarray(THERE * np.min(misfit / np.maximum(torque, 1e-300), axis=0))
@@ -289,7 +289,7 @@ def usual_spread(causes: Sequence[Cause], nuisance: Nuisance, under: Marginal) -
 def without(
     square: FloatArray, aim: FloatArray, root: FloatArray
 ) -> tuple[FloatArray, FloatArray, float]:
-    """Integrate out values of covariance R R'; return the reduced equations and log evidence."""
+    """Marginalise values of covariance R R'; return the reduced equations and log evidence."""
     border = square @ root
     inner = root.T @ border
     lower = np.linalg.inv(np.linalg.cholesky(0.5 * (inner + inner.T) + np.eye(len(inner))))

@@ -264,7 +264,7 @@ class JointFit:
 
     def _moved(self, linear: Nuisance, means: FloatArray) -> FloatArray:
         """
-        Return the change of the values if the cause had acted on the first day as well.
+        Return the change of the values if the cause acted on the first day as well.
 
         The prior of a value on the first day has zero mean, and the present value as standard
         deviation.

@@ -133,7 +133,9 @@ class _Timed:
         found, spans = self.throughout, self._whole
         for k, edges in self.edges.items():
             coarse = np.unique(np.linspace(0, len(edges) - 1, _COARSE).astype(int)).tolist()
-            found, spans = self._better(found, spans, k, [(0, 0), *combinations(coarse, 2)])
+            found, spans = self._likeliest_span(
+                found, spans, k, [(0, 0), *combinations(coarse, 2)]
+            )
         return found, spans
 
     def refined(self, found: Ranked, spans: Spans) -> tuple[Ranked, Spans]:
@@ -145,10 +147,10 @@ class _Timed:
                     first, last = spans[k]
                     moves = range(-near, near + 1)
                     tried = [(first + x, last) if end == 0 else (first, last + x) for x in moves]
-                    found, spans = self._better(found, spans, k, tried)
+                    found, spans = self._likeliest_span(found, spans, k, tried)
         return found, spans
 
-    def _better(
+    def _likeliest_span(
         self,
         found: Ranked,
         spans: Spans,

@@ -166,13 +166,13 @@ class Look:
     usual: float
 
     def worth(self, one: Ranked, material: float) -> Trial:
-        """Return a ranked cause as a trial, with the odds and probability of its ranking."""
+        """Convert a ranked cause to a trial, with its odds and probability."""
         own = self.trial(one.cause, material, one.under)
         return replace(own, gain=2.0 * one.data, odds=one.odds, probability=one.probability)
 
     def trial(self, cause: Cause, material: float, under: Marginal | None = None) -> Trial:
         """
-        Return any cause as a trial, with its values, visibility and evidence.
+        Convert a cause to a trial, with its values, visibility and evidence.
 
         Parameters
         ----------
@@ -239,5 +239,5 @@ class Survey:
 
     @property
     def hidden(self) -> set[str]:
-        """Names of effects that are not visible in any place."""
+        """Names of effects that are not visible on any joint."""
         return {name for name, _ in self.unseen} - {one.effect.said_as for one in self.ranking}

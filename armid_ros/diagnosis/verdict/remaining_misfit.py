@@ -135,7 +135,7 @@ class RemainingMisfit:
     def _of_whole(
         self, parts: Sequence[Evidence], left: Sequence[Sequence[FloatArray]]
     ) -> Iterator[Excess]:
-        """Yield the excess of the fitted and of the held-out data."""
+        """Yield the excess of the fitted data and of the held-out data."""
         usual = 1.0 if self.chosen.measured else self.settings.thresholds.predicted
         more = usual, self.settings.thresholds.predicted
         where = 'in the recordings', 'in recordings that were not used'

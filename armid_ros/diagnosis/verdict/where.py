@@ -130,7 +130,7 @@ def where_left(
     settings: DiagnosisSettings,
     new: npt.NDArray[np.bool_],
 ) -> tuple[Where, ...]:
-    """Locate the residual of an arm beyond the limits of the patched model, or of a new law."""
+    """Locate the residual beyond the limits of the patched model, or of a new torque law."""
     patched, left = (shown.residuals(one) for one in (explanation.fitted.arm, arm))
     losses, limits = shown.chi2_per_row(left), shown.limits(patched, settings)
     beyond = np.where(new, losses, np.where(losses > limits, losses - 1.0, 0.0))
