@@ -96,8 +96,8 @@ class Effect(ABC):
         values = tuple(float(value) for value in self.shape) or defaults
         if len(values) != len(defaults):
             raise ModelError(
-                f'{self.name}: {len(values)} shape values for {len(self.owners)} times '
-                f'{", ".join(s.name for s in self.shapes) or "no shape"}'
+                f'{self.name}: {len(values)} shape values; {len(defaults)} are needed, '
+                f'{", ".join(s.name for s in self.shapes) or "none"} of each owner'
             )
         for index, value in enumerate(values):
             shape = self.shapes[index % len(self.shapes)]
@@ -160,7 +160,7 @@ class Effect(ABC):
 
     @classmethod
     def as_change(cls) -> type[Effect]:
-        """Return the class for a change between two days, when the effect may exist already."""
+        """Return the class for a change between two days, as the effect may exist before."""
         return cls
 
     def particulars(self) -> dict[str, Any]:
@@ -208,9 +208,8 @@ class Effect(ABC):
             spread = np.broadcast_to(np.asarray(values, dtype=float), size)
         except ValueError:
             raise ModelError(
-                f'{self.name}: the shape of {size[0]} owners with '
-                f'{", ".join(s.name for s in self.shapes) or "no shape"} has size {size}, '
-                f'not {np.shape(values)}'
+                f'{self.name}: the shape array has size {size}, not {np.shape(values)}: a row for '
+                f'each owner, columns {", ".join(s.name for s in self.shapes) or "none"}'
             ) from None
         return replace(self, shape=tuple(spread.ravel().tolist()))
 
@@ -310,7 +309,7 @@ class Effect(ABC):
 
     def action(self, values: FloatArray, arm: Arm) -> Action:
         """
-        Return how the effect acts on the plant with given parameter values.
+        Return the action of the effect on the plant for given parameter values.
 
         By default, the torque on the link side is columns @ values. This is correct for a torque
         that is linear in the values and depends on time, position and velocity only.

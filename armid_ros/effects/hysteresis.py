@@ -47,7 +47,7 @@ class LoadDependentFriction(Effect):
 @dataclass(frozen=True)
 class PreslidingHysteresis(Effect):
     """
-    Friction that builds up over a short travel after each reversal, tau = F h.
+    Friction that increases over a short distance after each reversal, tau = F h.
 
     dh = (1 - h sign(dq)) |dq| / s: asperities bend before they slip. The torque depends on the
     travel since the last reversal, not on velocity. The hysteresis loops are the same at any rate,

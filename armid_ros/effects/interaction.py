@@ -47,7 +47,7 @@ class Attached(Effect):
         return robot.moving
 
     def _default_shape(self, robot: Robot) -> FloatArray:
-        """Attach at the centres of mass, or at the links if a centre is beyond the arm."""
+        """Attach to the centres of mass, at most one reach of the arm from the joint."""
         values, model = self.shape_values, robot.model
         reach = max(float(np.linalg.norm(place.translation)) for place in model.jointPlacements)
         for row, joint in zip(values, self.joints, strict=True):
@@ -76,7 +76,7 @@ class Attached(Effect):
         """Return the anchors of the springs."""
 
     def action(self, values: FloatArray, arm: Arm) -> Action:
-        """Return the torque that the springs require."""
+        """Return an action with the torque of the springs."""
         robot, anchor = arm.robot, self._anchor(arm)
 
         def torque(t: FloatArray, q: FloatArray, dq: FloatArray) -> FloatArray:

@@ -75,7 +75,7 @@ class TorqueMap:
         count = len(self.weights)
         shapes = self.points.shape, self.noise.shape, self.lengths.shape
         if shapes != ((count, len(INPUTS)), (count,), (len(INPUTS),)):
-            raise ModelError(f'a torque map of {count} weights has arrays of shapes {shapes}')
+            raise ModelError(f'torque map of {count} weights: its arrays have shapes {shapes}')
         sizes = (*self.lengths, *self.noise, self.amplitude, self.knee)
         if not min(sizes) > 0.0:
             raise ModelError(
@@ -163,7 +163,7 @@ class TorqueMap:
 @dataclass(frozen=True)
 class LearnedTorque(Effect):
     """
-    Learned torque of joints over position, velocity and load, if no known effect explains it.
+    Learned torque of joints as a function of position, velocity and load.
 
     The load is the torque that holds the arm at its position. Far from the motions of the training
     data, the learned torque is zero. The effect is confounded with every other effect, and is

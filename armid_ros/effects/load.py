@@ -102,7 +102,7 @@ class Payload(_LinkBody):
 
     @classmethod
     def as_change(cls) -> type[Effect]:
-        """Return the class for a load that may have been put down."""
+        """Return the class for a change of the load."""
         return PayloadChange
 
     def plausible(self, values: FloatArray, std: FloatArray, arm: Arm) -> bool:

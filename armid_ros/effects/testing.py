@@ -174,7 +174,7 @@ def it_says_what_it_is(trial: EffectCase) -> None:
 
 
 def columns_have_one_place_per_parameter(trial: EffectCase) -> None:
-    """Fail if columns are not finite, or not of shape (N, n, P)."""
+    """Fail if columns have nonfinite values or a shape other than (N, n, P)."""
     columns = ArmModel(trial.robot).columns_of(trial.effect, trial.motion)
     assert np.all(np.isfinite(columns)), 'columns are not finite'
 

@@ -34,7 +34,7 @@ class LateReading(TorqueReading):
     def transfer(
         self, values: FloatArray, motion: Motion, tau: FloatArray, columns: FloatArray
     ) -> FloatArray:
-        """Return the columns, late by the same amount as the torque."""
+        """Return the columns with the delay of the torque."""
         return self._late(values, motion, columns)
 
     def columns(self, motion: Motion, arm: Arm) -> FloatArray:
