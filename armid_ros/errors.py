@@ -73,7 +73,7 @@ class IdentificationError(ArmidError):
 
 
 class RecordingEnded(RecordingError):
-    """Recording has to stop: the disk is full, or the file was removed."""
+    """Recording cannot continue: the disk is full, or the file was removed."""
 
 
 class OutputError(ArmidError):
