@@ -98,7 +98,7 @@ def _violations(
 
 
 def _outward(values: FloatArray, periodic: bool) -> FloatArray:
-    """Move samples away from their mean by a bound on the error between two samples."""
+    """Enlarge samples about their mean by a bound on the error between two samples."""
     # the bound is h^2 M / 8 for second derivatives below M, estimated from second differences;
     # nothing is added where dry friction makes the second differences jump
     if periodic:
@@ -180,7 +180,7 @@ def feasible_pose(
     clearance: ClearanceModel | None,
 ) -> FloatArray:
     """
-    Return the pose with the largest clearance among random poses that the arm can hold.
+    Return the pose with the largest clearance among random poses within torque limits.
 
     Raises
     ------

@@ -126,7 +126,7 @@ class MotionGate:
         self, set_point: FloatArray, speed: FloatArray, measured: FloatArray, largest: float
     ) -> Motion:
         """
-        Return the small straight step from the set point to the measured position.
+        Return the straight motion from the set point to the measured position.
 
         Parameters
         ----------

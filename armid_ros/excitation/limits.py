@@ -308,7 +308,7 @@ def _with_file(robot: Robot, path: Path) -> Robot:
         document = load_yaml(text)
         entries = document.get('joint_limits') if isinstance(document, dict) else None
         if not isinstance(entries, dict):
-            raise TrajectoryError('no mapping joint_limits, as MoveIt has it')
+            raise TrajectoryError('no mapping joint_limits as in MoveIt')
         if not entries.keys() & set(robot.joints):
             raise TrajectoryError(f'no limits for any of {", ".join(robot.joints)}')
         for j, joint in enumerate(robot.joints):
@@ -323,8 +323,8 @@ def _with_file(robot: Robot, path: Path) -> Robot:
                 lower[j], upper[j] = max(lower[j], ends[0]), min(upper[j], ends[1])
                 if not lower[j] < upper[j]:
                     raise TrajectoryError(
-                        f'{joint}: positions from {ends[0]:g} to {ends[1]:g} leave nothing of '
-                        f'{robot.lower[j]:g} to {robot.upper[j]:g} in the description'
+                        f'{joint}: positions from {ends[0]:g} to {ends[1]:g} are outside the '
+                        f'range {robot.lower[j]:g} to {robot.upper[j]:g} of the description'
                     )
             if entry.get('has_velocity_limits'):
                 given = _positive(entry.get('max_velocity'), f'{joint}: max_velocity')

@@ -132,7 +132,7 @@ def plan_run(
     seed: int = 0,
 ) -> Run:
     """
-    Plan the run of an excitation from the present pose of the arm, and back.
+    Plan the run of an excitation from the present pose of the arm and back to it.
 
     Parameters
     ----------

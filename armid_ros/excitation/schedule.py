@@ -62,7 +62,7 @@ class Excitation:
         if not self.duration <= MAX_DURATION:
             raise TrajectoryError(
                 f'excitation: {self.n_periods} periods of {self.trajectory.period:g} s, run-ins '
-                f'of {self.run_in:g} s last {self.duration:.3g} s; a day is the most'
+                f'of {self.run_in:g} s last {self.duration:.3g} s; the maximum is one day'
             )
 
     @property
@@ -116,7 +116,7 @@ class Excitation:
         """
         if set(joints) != set(self.joints):
             raise TrajectoryError(
-                f'its joints are {", ".join(self.joints)}, those of the robot {", ".join(joints)}'
+                f'joints {", ".join(self.joints)}, but the robot has {", ".join(joints)}'
             )
         order = [self.joints.index(joint) for joint in joints]
         path = self.trajectory
@@ -141,7 +141,7 @@ class Excitation:
 
         """
         if not 0.0 < share <= 1.0:
-            raise TrajectoryError(f'a share of {share:g} of the speed; it is above 0, at most 1')
+            raise TrajectoryError(f'speed share {share:g}: has to be above 0 and at most 1')
         samples = self._period_samples(rate)
         longer = float(np.ceil(samples / share - _WHOLE_SAMPLES)) / samples
         path = self.trajectory.stretched(self.trajectory.period * longer)

@@ -122,7 +122,7 @@ def jump_fault(
     tolerance: float,
 ) -> str:
     """
-    Return a message if a joint would jump when a trajectory began now.
+    Return a message if the start of a trajectory is too far from the present position.
 
     Parameters
     ----------

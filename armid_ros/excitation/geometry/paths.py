@@ -135,7 +135,7 @@ class _Tree:
         return len(self.poses) - 1
 
     def connect(self, target: FloatArray) -> int | None:
-        """Step towards a pose while possible; return its number in the tree if it is reached."""
+        """Step towards a pose while possible; return the index of the pose if it is reached."""
         while (reached := self.grow(target)) is not None:
             if np.array_equal(self.poses[reached], target):
                 return reached
@@ -151,7 +151,7 @@ class _Tree:
 
 
 def _shortened(path: list[FloatArray], free: _Free, rng: np.random.Generator) -> list[FloatArray]:
-    """Cut corners at random, and remove poses that a clear straight line can skip."""
+    """Shorten a path at random, and remove poses that a collision-free straight line can skip."""
     path = _skipped(path, free)
     # attempts to shorten the path
     for _ in range(60 if len(path) > 2 else 0):
@@ -166,7 +166,7 @@ def _shortened(path: list[FloatArray], free: _Free, rng: np.random.Generator) ->
 
 
 def _skipped(path: list[FloatArray], free: _Free) -> list[FloatArray]:
-    """Connect each pose with the farthest pose that a clear straight line reaches."""
+    """Connect each pose with the farthest pose on a collision-free straight line."""
     short, here = [path[0]], 0
     while here < len(path) - 1:
         here = next(

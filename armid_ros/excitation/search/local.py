@@ -143,14 +143,14 @@ class Search:
         return cost
 
     def step(self) -> None:
-        """Count a step of the work."""
+        """Count a step, for the progress."""
         self._steps += 1
         self._watch(min(self._steps / self._work, 1.0), self.cost)
         if time.process_time() - self._begun > self.problem.settings.time_budget:
             raise _OutOfTime
 
     def _improve(self, starts: list[FourierTrajectory]) -> None:
-        """Improve several trajectories in rounds; the worse half ends after every `_ROUNDS`."""
+        """Optimise several trajectories in rounds; drop the worse half after every `_ROUNDS`."""
         objective, watched = Objective(self.problem, self.prior), self.clearance
         if watched is not None:  # without pairs of bodies that are far apart in many poses
             limits = self.problem.limits
@@ -280,7 +280,7 @@ class _Branch:
 def _made_feasible(
     problem: DesignProblem, clearance: ClearanceModel | None, trajectory: FourierTrajectory
 ) -> FourierTrajectory | None:
-    """Reduce the amplitudes of the joints at fault, or of all joints if the joint is unknown."""
+    """Reduce the amplitudes of the joints beyond their limits, or of all joints if unknown."""
     for _ in range(12):  # reductions of the amplitudes
         faults = trajectory_faults(problem.arm, problem.limits, trajectory, clearance)
         if not faults:
