@@ -73,7 +73,7 @@ def reading(path: str | Path, error: type[ArmidError]) -> Iterator[None]:
             raise
         raise error(f'{path}: {problem}') from problem
     except _UNEXPECTED as problem:
-        raise error(f'{path}: {_said(problem)}') from problem
+        raise error(f'{path}: {_one_line(problem)}') from problem
 
 
 def finite(value: Any, what: str) -> float:
@@ -169,7 +169,7 @@ def _line(event: yaml.Event) -> int:
     return 0 if event.start_mark is None else int(event.start_mark.line) + 1
 
 
-def _said(problem: BaseException) -> str:
+def _one_line(problem: BaseException) -> str:
     """Format the error of a parser in one line."""
     if isinstance(problem, RecursionError):
         return 'nested too deep'

@@ -78,7 +78,7 @@ class Staged:
             for name in DOCUMENTS:
                 if name in names:
                     (self.out / name).unlink(missing_ok=True)
-            for path in self._earlier():
+            for path in self._earlier_files():
                 path.unlink()
             for name in names:
                 source, target = self.folder / name, self.out / name
@@ -99,7 +99,7 @@ class Staged:
         if Path.cwd().is_relative_to(out) or (old.st_uid, old.st_gid) != (own.st_uid, own.st_gid):
             return False
         new = out.with_name(f'.{out.name}{STAGING}')
-        goes = {STAGING, *names, *(path.name for path in self._earlier())}
+        goes = {STAGING, *names, *(path.name for path in self._earlier_files())}
         kept = [path for path in out.iterdir() if path.name not in goes]
         try:
             _remove(new)  # remains of a killed run
@@ -121,7 +121,7 @@ class Staged:
             _remove(new)
         return True
 
-    def _earlier(self) -> list[Path]:
+    def _earlier_files(self) -> list[Path]:
         """Return the files of an earlier result that the new one lacks."""
         spared = {path.resolve() for path in self.spared}
         return [
