@@ -293,7 +293,7 @@ def _drawing(
     links: Sequence[str] = (),
     title: str = '',
 ) -> tuple[Markup, tuple[float, float]]:
-    """Draw a series as a line, or as points with links; return drawing and range of ordinate."""
+    """Draw a series as a line, or as points with links; return drawing and ordinate range."""
     # [px]; a large curve has intervals
     (width, height), wide = ((250, 74), HALF_WIDTH) if links else ((84, 20), 0.0)
     low, high = float(np.min(values - wide * std)), float(np.max(values + wide * std))

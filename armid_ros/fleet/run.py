@@ -207,7 +207,7 @@ def identify_fleet(
 
 @dataclass(frozen=True)
 class _Waiting:
-    """An arm that waits for its tasks: its bags, and the bags that failed."""
+    """Arm without submitted tasks: its bags, and the bags that failed."""
 
     arm: str
     groups: tuple[Group, ...]
@@ -253,7 +253,7 @@ class _Run:
                 self._count(own)
 
     def work(self) -> None:
-        """Keep enough arms in progress that no worker is idle, until all arms are finished."""
+        """Process all arms, with enough arms in progress that no worker is idle."""
         # groups of bags in progress: a constant, and a number per thread
         limit = 2 + 3 * sum(self._client.nthreads().values())
         under_way: dict[Any, _UnderWay] = {}
