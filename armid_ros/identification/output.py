@@ -186,7 +186,7 @@ def require_as_identified(path: str | Path) -> None:
     for place, known in _found(Path(path)).items():
         if known is not None and _content(place) != known:
             raise ModelError(
-                f'{place}: is not the recording any more that {path} was identified from, its '
+                f'{place}: is no longer the recording that {path} was identified from: its '
                 'content is another. Give the baseline (--baseline), diagnose without one '
                 '(--no-baseline), or identify the arm again'
             )

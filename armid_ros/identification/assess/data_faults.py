@@ -229,7 +229,7 @@ def _factors_since(
 
 
 def _described_friction(arm: ArmModel) -> list[str]:
-    """Return a list with a note if the description states friction the model lacks."""
+    """Return a list with a note if the model lacks friction of the description."""
     robot = arm.robot
     there = {(effect.name, joint) for effect in arm.effects for joint in effect.joints}
     kinds = [kind for kind in CATALOGUE.values() if kind.traits.urdf_attribute]
@@ -252,7 +252,7 @@ def _described_friction(arm: ArmModel) -> list[str]:
 
 
 def _extremes(robot: Robot, recording: Recording) -> Iterator[str]:
-    """Yield notes on torques that saturate or exceed the limits of the drives."""
+    """Yield notes on torques that saturate, or exceed the limits of the drives."""
     if recording.tau is None:
         return
     source = recording.source or 'recording'

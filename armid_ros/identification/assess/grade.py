@@ -180,7 +180,7 @@ def _errors(
 
 
 class _Worst(NamedTuple):
-    """The worst joint: index, error, error without noise [%], and text of both."""
+    """The worst joint: index, error, error without noise [%], and text with both errors."""
 
     joint: int
     measured: float

@@ -120,7 +120,7 @@ def hypotheses(robot: Robot, motions: Sequence[Motion]) -> Iterator[Hypothesis]:
 
 
 def _of_all_torques(robot: Robot, motions: Sequence[Motion]) -> Iterator[Hypothesis]:
-    """Yield the best-fitting gravity and common torque factor that masses do not explain."""
+    """Yield the best-fitting gravity and torque factor, unless errors of masses explain them."""
     motion = thinned(motions, 600)
     if motion is None:
         return

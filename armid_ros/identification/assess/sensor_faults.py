@@ -137,7 +137,7 @@ def sensor_faults(
 
 
 def _jumps(robot: Robot, recording: Recording) -> Iterator[Fault]:
-    """Yield the first position jump that no joint can make and that does not revert."""
+    """Yield the first impossible position jump that does not revert."""
     if len(recording) < 2:
         return
     time = np.maximum(np.diff(recording.t), recording.period)[:, np.newaxis]
@@ -262,7 +262,7 @@ def _stays(
     why: str,
     always: str,
 ) -> Fault:
-    """Return the fault of a channel that is constant for a run, and its remedy if it always is."""
+    """Return the fault of a channel that is constant for a time, and a remedy if always."""
     when, remedy = 'throughout', always
     if run != (0, len(recording)):
         first, last = recording.t[run[0]], recording.t[run[1] - 1]

@@ -58,7 +58,7 @@ Torques = tuple[FloatArray, ...]
 @dataclass(frozen=True)
 class FittedValues:
     """
-    Fitted values with the arm and the torque they give.
+    Fitted values with their arm and their torque.
 
     Attributes
     ----------

@@ -232,11 +232,11 @@ class ResidualScale:
 
     @property
     def value(self) -> FloatArray:
-        """Return the factor of every joint, shape (m,); 1 in the beginning."""
+        """Return the factor of every joint, shape (m,); initially 1."""
         return np.ones(1) if self._value is None else self._value
 
     def learn(self, residual: FloatArray, weights: FloatArray) -> None:
-        """Learn from the residuals of a block over the assumed noise, shape (k, m)."""
+        """Update the scale with residuals of a block over the assumed noise, shape (k, m)."""
         used = np.sum(weights > 0.0, axis=0)
         if not used.any():
             return  # residuals during motion are kept while the arm is at rest

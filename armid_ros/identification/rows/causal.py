@@ -109,7 +109,7 @@ class TripleLag:
         return stages
 
     def _set_step(self, dt: float) -> None:
-        """Compute the state transition of the stages for a step."""
+        """Compute the state transition of the three lags for a time step."""
         # A ramp u is followed by stage i at u - i * slope / pole; the rest decays.
         x, step = self.pole * dt, self._step
         self._dt = dt

@@ -74,7 +74,9 @@ def laws_of_controllers(
         tau = motion.tau[rows, joint]
         direction = np.sign(motion.dq[rows, joint])
         law = np.column_stack([weight[rows, joint], direction, np.ones_like(tau)])
-        left, lacking = (_left(law, torque[rows, joint]) for torque in (motion.tau, needed))
+        left, lacking = (
+            _residual_rms(law, torque[rows, joint]) for torque in (motion.tau, needed)
+        )
         if left is None or lacking is None:
             silent += 1
             continue
@@ -93,7 +95,7 @@ def laws_of_controllers(
     return tuple(laws) if len(laws) > silent else ()
 
 
-def _left(law: FloatArray, torque: FloatArray) -> float | None:
+def _residual_rms(law: FloatArray, torque: FloatArray) -> float | None:
     """Return the RMS residual of a torque after the fit of a law; None with too few rows."""
     rank = int(np.linalg.matrix_rank(law)) if len(law) else 0
     # with fewer rows, any torque fits

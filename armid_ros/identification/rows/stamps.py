@@ -80,7 +80,7 @@ def rounded_stamps(recording: Recording) -> str:
 
 
 def _wander(t: FloatArray) -> float:
-    """Return the RMS distance of stamps from an even grid [s]; zero without short steps."""
+    """Return the RMS deviation of stamps from an even grid [s]; zero without short steps."""
     # lost samples make steps longer and none shorter; stamps with varying delays make short
     # steps too, and the steps alone do not determine the error of the stamps
     steps = np.diff(t)

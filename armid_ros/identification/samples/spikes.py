@@ -206,7 +206,7 @@ class SpikeGate:
 
     def possible(self, excursion: Excursion, lowest: FloatArray, highest: FloatArray) -> bool:
         """
-        Return whether the arm itself may have caused an excursion of a signal.
+        Return whether an excursion of a signal is physically possible.
 
         A position cannot jump and return. A torque can exceed its usual range, from `lowest` to
         `highest`, when free play is crossed, but by no more than the width of that range: an
@@ -247,7 +247,7 @@ class SpikeGate:
         return latest[-1] if latest else None
 
     def _in_time(self, sample: StreamSample) -> bool:
-        """Return whether a stamp continues the stream; two others in a row begin a new stretch."""
+        """Return whether a stamp continues the stream; two other stamps begin a new stretch."""
         tail, stray, self._stray = self._tail, self._stray, None
         dt = 0.0 if tail is None else sample.t - tail.t
         longest = self._max_gap * self._period
@@ -268,7 +268,7 @@ class SpikeGate:
         return False
 
     def _begin(self) -> list[StreamSample]:
-        """Learn noise and period from the first samples, and judge these."""
+        """Measure noise and period of the first samples, and check these samples."""
         raw, self._first = self._first or [], None
         first = all_unwrapped(raw, self._turn)
         self._period = float(np.median(np.diff([s.t for s in first])))
@@ -310,7 +310,7 @@ class SpikeGate:
             self._limit = self._limits(missed)
             self._suspect = np.flatnonzero(off > 1.0)
             return []
-        goes_on = self._goes_on(sample, off)
+        goes_on = self._continues(sample, off)
         if not goes_on and float(np.max(off[self._suspect])) <= 1.0:
             self._leave_out(Excursion(tuple(self._held), self._off, self._limit))
             self._held = []
@@ -323,12 +323,12 @@ class SpikeGate:
         if 2 * self._went_on > self._max_gap:
             if len(self._held) > 1 and self._stepped():
                 self._held[0] = replace(self._held[0], begins=True)
-            return self._go_on()
+            return self._release()
         self._leave_out(Excursion(tuple(self._held), self._off, self._limit), True)
         self._restart([])
         return []
 
-    def _go_on(self) -> list[StreamSample]:
+    def _release(self) -> list[StreamSample]:
         """Pass on the held samples, which are valid; check them for damaged samples again."""
         held, self._held = self._held, []
         missed = self._lines_through(held)
@@ -346,7 +346,7 @@ class SpikeGate:
             good = good + self._judge(sample)
         return good
 
-    def _goes_on(self, sample: StreamSample, off: FloatArray) -> bool:
+    def _continues(self, sample: StreamSample, off: FloatArray) -> bool:
         """Return whether a sample continues the held samples, by the old slope or a new one."""
         last = self._held[-1]
         before = self._held[-2] if len(self._held) > 1 else self._known[1]
@@ -406,7 +406,7 @@ class SpikeGate:
         return samples
 
     def _lines_through(self, samples: Sequence[StreamSample]) -> list[Missed]:
-        """Return the errors of each sample against the line through the two before."""
+        """Return the error of each sample against the line through the two previous samples."""
         pairs = range(len(samples) - 2)
         return [missed_by(samples[k : k + 2], samples[k + 2], self._period) for k in pairs]
 

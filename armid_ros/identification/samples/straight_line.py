@@ -297,7 +297,7 @@ class NoiseLevel:
         self._seen += 1
 
     def see_steps(self, moves: FloatArray) -> None:
-        """Learn the resolution from changes between samples, shape (k, m)."""
+        """Estimate the resolution from changes between samples, shape (k, m)."""
         self._steps = _smallest(np.concatenate([self._steps, np.abs(moves)]))
 
     def _least(self, period: float) -> FloatArray:

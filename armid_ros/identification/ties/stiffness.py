@@ -171,7 +171,7 @@ def _least_squares(problem: InteractionProblem, columns: FloatArray) -> FloatArr
     # with a smaller RMS torque per stiffness [m^2], the spring is not extended
     if not np.all(springs > 1e-9 * np.sqrt(len(w))):
         name = problem.segments[int(np.argmin(springs))]
-        raise IdentificationError(f'{name}: its spring is never extended, so nothing shows it')
+        raise IdentificationError(f'{name}: its spring is never extended: not identifiable')
     y = problem.tau - problem.known
     return np.asarray(np.linalg.lstsq(w / scale, y.ravel(), rcond=None)[0] / scale)
 
