@@ -226,7 +226,7 @@ def symbol(parameter: ParameterName) -> str:
 
 
 def _expression(row: FloatArray, leader: int, standard: tuple[ParameterName, ...]) -> str:
-    """Format a grouping with equal factors in front of their sum."""
+    """Format a linear combination, with common factors in front of sums."""
     text = standard[leader].name
     factors: dict[float, list[tuple[float, str]]] = {}
     # angles rounded to four digits make factors of 4e-6

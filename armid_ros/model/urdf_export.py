@@ -213,6 +213,6 @@ def _check(robot: Robot, urdf: str) -> None:
     if np.any(worst > 1e-11 * scale):
         link = robot.links[int(np.argmax(worst))]
         raise ModelError(
-            f"{robot.name}: the exported description has other parameters of link '{link}' when "
-            f'read again: they differ by {worst.max():.3g}'
+            f'{robot.name}: the exported description does not reproduce the parameters of link '
+            f"'{link}': they differ by {worst.max():.3g}"
         )
