@@ -120,7 +120,7 @@ class ArmidNode(Node):
         return survive
 
     def look_every(self, seconds: float, callback: Callable[[], None]) -> Timer:
-        """Call a function periodically in real time, independent of /clock."""
+        """Call a function periodically in real time, independently of /clock."""
         return self.create_timer(seconds, callback, clock=Clock(clock_type=ClockType.STEADY_TIME))
 
     @property
@@ -140,7 +140,7 @@ class ArmidNode(Node):
         return ''
 
     def look_for_trouble(self) -> None:
-        """Log once that simulated time is missing, or the problem that /diagnostics shows."""
+        """Log once that simulated time is missing, or the problem in /diagnostics."""
         missing = self.missing_clock
         if missing and not self._clock_missed:  # the topic of /diagnostics
             self.get_logger().warning(f'{missing}; until then the node waits')
@@ -191,7 +191,7 @@ class ArmidNode(Node):
         """
 
     def level(self, troubled: bool) -> bytes:
-        """Return the level of the status; overridden by nodes with levels above a warning."""
+        """Return the level of the status; nodes with levels above a warning override it."""
         return DiagnosticStatus.WARN if troubled else DiagnosticStatus.OK
 
     def further_statuses(self) -> Sequence[DiagnosticStatus]:

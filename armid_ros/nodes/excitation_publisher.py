@@ -169,7 +169,7 @@ class ExcitationPublisherNode(ArmidNode):
         return self._start(self.value('speed_scaling'))
 
     def rehearse(self) -> str:
-        """Run the excitation slowly; afterwards the status reports how the arm followed."""
+        """Run the excitation slowly; then the status reports tracking errors and torques."""
         speed = min(self.value('rehearsal_speed'), self.value('speed_scaling'))
         text = self._start(speed)
         assert self._gate is not None
@@ -226,15 +226,15 @@ class ExcitationPublisherNode(ArmidNode):
         return self._arm.fault_at_start(patience, difference, self._simulated)
 
     def stop(self) -> str:
-        """Bring the arm to rest on its path."""
+        """Stop the arm on its path."""
         self._waiting = False
         if self._gate is not None:
             elapsed = self._arm.now() - self._begun
             self._end_run('stopped by ~/stop')
             return self.tell(f'stopped {elapsed:.2f} s after the start')
-        ending = self._let_go()
+        ending = self._released()
         if ending is None:
-            raise TrajectoryError('nothing is under way')
+            raise TrajectoryError('no excitation is running')
         if ending.last is None:
             raise TrajectoryError(f'{ending.reason}; stop the arm there')
         now, limits = self._arm.now(), map(self.value, ('tracking_tolerance', 'stopping'))
@@ -289,7 +289,7 @@ class ExcitationPublisherNode(ArmidNode):
 
     def close(self) -> None:
         """Stop the arm unless it is at rest, and wait until the message has arrived."""
-        ending = self._let_go()
+        ending = self._released()
         sent = self._gate is not None or (ending is not None and ending.last is not None)
         if sent and self.context.ok():
             self.stop()
@@ -371,7 +371,7 @@ class ExcitationPublisherNode(ArmidNode):
         self._ending = replace(self._ending, last=motion)
         self._controller.bring_to_rest(write_trajectory(motion))
 
-    def _let_go(self) -> Ending | None:
+    def _released(self) -> Ending | None:
         """Return the ended run, without a motion to send if another client moves the arm."""
         ending = self._ending
         if ending is not None and self._controller.taken:
@@ -380,7 +380,7 @@ class ExcitationPublisherNode(ArmidNode):
 
     def _watch_ending(self) -> None:
         """Check that the arm comes to rest; hold a blocked arm at its position."""
-        ending = self._let_go()
+        ending = self._released()
         if ending is None:
             return
         limits = map(self.value, ('state_timeout', 'tracking_tolerance', 'stopping'))

@@ -165,7 +165,7 @@ class IdentificationRunNode(ArmidNode):
         }
 
     def close(self) -> None:
-        """Stop the run, the recording and the program that this node began."""
+        """Stop the run, the recording and the program that this node started."""
         self._stop_all()
         for future in self._stops:
             if self.executor is not None:  # the node that is stopped may have ended already
@@ -178,7 +178,7 @@ class IdentificationRunNode(ArmidNode):
                 self._program.kill()
 
     def _stop_all(self) -> None:
-        """Stop the run and the recording that this node began, the arm first."""
+        """Stop the run and then the recording that this node started."""
         for node in sorted(self._begun):
             if self._callers[node, 'stop'].service_is_ready():
                 self._stops.append(self._call(node, 'stop'))

@@ -218,7 +218,7 @@ class LiveDiagnosisNode(ListeningNode):
             self.live.use(settings_of(self.value))
 
     def close(self) -> None:
-        """End the process that diagnoses."""
+        """End the diagnosis process."""
         self._helper.close()
 
     def take_description(self, urdf: str) -> None:

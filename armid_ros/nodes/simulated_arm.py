@@ -261,7 +261,7 @@ class SimulatedArmNode(ArmidNode):
             self.step()
 
     def catch_up(self) -> None:
-        """Simulate until real time times the factor; time that cannot be made up is skipped."""
+        """Simulate until real time times the factor; skip time that cannot be caught up."""
         self._owed += self.real_time.catch_up(self._factor, self._stride * self._arm.plant.dt)
         # set the stamps to the system clock again, but not during a trajectory
         if self._owed and self._clock_publisher is None and not self.moving:
@@ -269,7 +269,7 @@ class SimulatedArmNode(ArmidNode):
             self._owed = 0.0
 
     def reset(self) -> str:
-        """Move the arm to its initial position; time continues."""
+        """Set the arm to its initial state; time continues."""
         self._arm.reset(self._arm.state.steps)
         self._pending = None
         return f'{self.hardware} is where it began'

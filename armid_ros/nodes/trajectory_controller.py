@@ -152,7 +152,7 @@ class TrajectoryController:
         return self._error if self.under_way else math.nan
 
     def look(self) -> None:
-        """Make a client of the action when a controller offers it."""
+        """Make an action client when a controller offers the action."""
         if self._possible and self.client is None and self._offered:
             self._make_client()
 
@@ -318,7 +318,7 @@ class TrajectoryController:
         if status == GoalStatus.STATUS_SUCCEEDED and not result.error_code:
             self._end(goal, '')
         elif status == GoalStatus.STATUS_CANCELED or result.error_code == _REPLACED:
-            self._end(goal, self._taken_over())
+            self._end(goal, self._replacement_message())
         else:
             why = _ERRORS.get(result.error_code, 'without a reason')
             detail = f' ({result.error_string})' if result.error_string else ''
@@ -336,9 +336,9 @@ class TrajectoryController:
             self.taken = self.taken or (goal is None and bool(new))
         elif new:
             self.taken = True
-            self._end(goal, self._taken_over())
+            self._end(goal, self._replacement_message())
 
-    def _taken_over(self) -> str:
+    def _replacement_message(self) -> str:
         """Return a message that another client, named if known, has replaced the goal."""
         node, service = self._node, f'{self.action}/_action/send_goal'
         found = []

@@ -37,7 +37,7 @@ class RealTime:
 
     def catch_up(self, factor: float, period: float) -> float:
         """
-        Simulate until real time times a factor; time that cannot be made up is skipped.
+        Simulate until real time times a factor; skip time that cannot be caught up.
 
         Parameters
         ----------
