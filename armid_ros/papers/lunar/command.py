@@ -25,7 +25,7 @@ _HEADS = {
 @parameters.seed
 @parameters.as_json
 def lunar(out: Path, seed: int, every: bool, as_json: bool) -> None:
-    """Repeat the lunar paper: tables, gravity parameters and torques, with its figures."""
+    """Reproduce the lunar paper: tables, gravity parameters and torques, with its numbers."""
     from armid_ros.cli import options
     from armid_ros.cli.options import provenance
     from armid_ros.cli.terminal import progress

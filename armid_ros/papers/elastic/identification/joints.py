@@ -94,7 +94,7 @@ def fit_transmission(records: Sequence[TwoEncoders], rng: np.random.Generator) -
     pieces = [_columns(record) for record in records]
     if sum(len(twist) for _, twist, _, _ in pieces) < 50:
         raise IdentificationError('the joint hardly moves: its stiffness cannot be found')
-    table, twist, blocks = _joined(pieces)
+    table, twist, blocks = _stacked_recordings(pieces)
     reversals = sum(count for _, _, _, count in pieces)
     # number of draws of bootstrap blocks
     draws = [rng.choice(len(blocks), len(blocks)) for _ in range(400)]
@@ -139,7 +139,7 @@ def _columns(record: TwoEncoders) -> tuple[FloatArray, FloatArray, FloatArray, i
     return own[moving], np.asarray((motor - link)[moving]), times, changes
 
 
-def _joined(
+def _stacked_recordings(
     pieces: Sequence[tuple[FloatArray, FloatArray, FloatArray, int]],
 ) -> tuple[FloatArray, FloatArray, list[IntArray]]:
     """Stack recordings, with one slope and offset per recording, and cut them into blocks."""

@@ -141,7 +141,7 @@ def sensitivities(
 
 def ringing(steps: Steps, parameters: TwoLinkParameters) -> FloatArray:
     """
-    Return derivatives of the velocities with respect to initial twist and link velocity.
+    Differentiate the velocities by initial twist and initial link velocity.
 
     Returns
     -------

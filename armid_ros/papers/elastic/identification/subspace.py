@@ -120,7 +120,7 @@ def identify_subspace(
     eigenvalues, vectors = np.linalg.eig(a)
     if np.any((np.abs(eigenvalues.imag) < 1e-12) & (eigenvalues.real <= 0.0)):
         raise IdentificationError(
-            f'subspace identification: order {order} gives poles that no sampled system has; '
+            f'subspace identification: order {order} gives impossible poles of a sampled system; '
             'use more data or another order'
         )
     poles = np.log(eigenvalues.astype(complex)) / dt

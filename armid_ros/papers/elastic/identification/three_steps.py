@@ -311,7 +311,7 @@ def identify_two_inertia(
     if not (first > 0.0 and beta > 0.0 and first * beta > gamma**2):
         raise IdentificationError(
             f'step 1 found alpha + mm gear^2 = {first:.3g}, beta = {beta:.3g} and gamma = '
-            f'{gamma:.3g} kg m^2, which no two links have. Is the slow motion strong enough? Do '
+            f'{gamma:.3g} kg m^2, which is impossible. Is the slow motion strong enough? Do '
             'torques and velocities of a joint have the same sign?'
         )
     alpha = max(first - max(rotor, 0.0), 1.01 * gamma**2 / beta)

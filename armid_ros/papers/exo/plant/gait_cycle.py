@@ -83,7 +83,7 @@ class GaitCycle:
         return np.asarray(ground.reshape(-1, 2, 2, 2).sum(axis=2))
 
     def trunk_moment(self, *, other: bool = False) -> FloatArray:
-        """Return the moment from outside that keeps the trunk at its lean, shape (N,) [N m]."""
+        """Return the external moment that keeps the lean of the trunk, shape (N,) [N m]."""
         robot = self.pair.other if other else self.pair.robot
         tau = self.torques.other_tau if other else self.torques.tau
         return np.asarray(tau[:, floating(robot)[2]])

@@ -251,7 +251,7 @@ def following(
     pair: TiedPair, t: FloatArray, moving: Callable[[tuple[str, ...], FloatArray], Motion]
 ) -> PairMotion:
     """
-    Return the motions of wearer and machine; the machine follows late, with errors.
+    Return the motions of wearer and machine; the machine follows with delay and errors.
 
     Parameters
     ----------

@@ -211,7 +211,7 @@ class _Curves:
 
 
 def _hanging(angle: FloatArray) -> FloatArray:
-    """Return unit vectors down, turned forward, shape (N, 2)."""
+    """Return downward unit vectors, rotated forward by angles, shape (N, 2)."""
     return np.column_stack([np.sin(angle), -np.cos(angle)])
 
 
@@ -278,7 +278,7 @@ def walker(robot: Robot) -> Robot:
         (FLOATING[2], trunk, '0 1 0', 'stance_hip'),
     ):
         body = None if of is None else robot.model.inertias[robot.index(f'{prefix}_{of}') + 1]
-        parts.append(_hung(f'{prefix}_{joint}', parent, child, axis, body))
+        parts.append(_joint_urdf(f'{prefix}_{joint}', parent, child, axis, body))
         parent = child
     lengths = leg_length(robot)
     for side in SIDES:
@@ -287,7 +287,7 @@ def walker(robot: Robot) -> Robot:
         for joint, link, axis, end in zip(_LEG, _LINKS, _AXES, ends, strict=True):
             child = f'{prefix}_{side}_{link}'
             body = robot.model.inertias[robot.index(f'{prefix}_swing_{joint}') + 1]
-            parts.append(_hung(f'{prefix}_{side}_{joint}', parent, child, axis, body, end))
+            parts.append(_joint_urdf(f'{prefix}_{side}_{joint}', parent, child, axis, body, end))
             parent = child
     return robot_from_urdf(''.join([*parts, '</robot>']), source=robot.name)
 
@@ -343,7 +343,7 @@ def contacts(robot: Robot) -> tuple[list[str], FloatArray]:
     return ankles, np.tile([[0.0, 0.0, 0.0], [leg_length(robot).foot, 0.0, 0.0]], (2, 1))
 
 
-def _hung(
+def _joint_urdf(
     joint: str, parent: str, child: str, axis: str, body: pin.Inertia | None, up: float = 0.0
 ) -> str:
     """Return the URDF of a joint and its link; a joint to a link without a body is a slide."""
