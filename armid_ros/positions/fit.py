@@ -186,7 +186,7 @@ def start_values(
 
 @dataclass(eq=False)
 class _Problem:
-    """Least squares of a model over windows, about a start with priors of given sizes."""
+    """Least-squares problem of a loop model over windows, with priors around the start values."""
 
     model: LoopModel
     windows: list[Window]
