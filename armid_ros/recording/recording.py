@@ -29,7 +29,7 @@ GAP_PERIODS = 5.0
 @dataclass(frozen=True)
 class TimeGap:
     """
-    A stretch without samples.
+    Time interval without samples.
 
     Attributes
     ----------

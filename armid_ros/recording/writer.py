@@ -224,8 +224,8 @@ class BagWriter:
         if known is not None:
             if known.type_name != type_name:
                 raise RecordingError(
-                    f'{self.path}: {name} is a topic of {known.type_name} already, '
-                    f'and cannot also be one of {type_name}'
+                    f'{self.path}: topic {name} has the type {known.type_name} already, '
+                    f'and cannot have {type_name}'
                 )
             return
         if definition is not None and type_hash is not None:

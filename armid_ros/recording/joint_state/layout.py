@@ -27,7 +27,7 @@ _FRAME = 12
 
 
 class MalformedMessage(ValueError):
-    """The bytes are no sensor_msgs/JointState."""
+    """The bytes are not a sensor_msgs/JointState."""
 
 
 @dataclass(frozen=True)
@@ -92,7 +92,7 @@ class JointStateLayout:
             raise MalformedMessage(f'not a JointState: {error}') from error
         layout = cls(order, frame_length, names, tuple(counts))
         if not 0 <= len(cdr) - layout.end <= layout.spare:
-            raise MalformedMessage(f'{len(cdr)} bytes where a JointState has {layout.end}')
+            raise MalformedMessage(f'{len(cdr)} bytes, but this JointState needs {layout.end}')
         return layout
 
     @property

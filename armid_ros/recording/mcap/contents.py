@@ -122,7 +122,7 @@ def _content(found: FileMap, chunk: Chunk, settings: ReadSettings) -> bytes | me
     """Return the content of a chunk; raise one of CORRUPT if the chunk is damaged."""
     stored = memoryview(found.data)[chunk.begin : chunk.end]
     if chunk.compression not in ('', 'zstd', 'lz4'):
-        raise ValueError(f"compressed with '{chunk.compression}'; zstd and lz4 can be read")
+        raise ValueError(f"unknown compression '{chunk.compression}'; zstd and lz4 are supported")
     if not chunk.whole:
         most = min(chunk.size, settings.memory_limit)
         if chunk.compression:
@@ -131,7 +131,7 @@ def _content(found: FileMap, chunk: Chunk, settings: ReadSettings) -> bytes | me
     if chunk.compression:
         content: bytes | memoryview = decompressed(stored, chunk.compression, chunk.size, settings)
     elif len(stored) != chunk.size:
-        raise ValueError(f'holds {len(stored)} bytes, but {chunk.size} are stated')
+        raise ValueError(f'has {len(stored)} bytes instead of the stated {chunk.size}')
     else:
         content = stored
     if settings.check_crc and zlib.crc32(content) != chunk.crc:

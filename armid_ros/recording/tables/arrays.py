@@ -156,7 +156,7 @@ def read_lerobot(path: Path, episode: int | None = None) -> Table:
 def _columns(
     path: Path, names: Mapping[str, Sequence[str]]
 ) -> tuple[tuple[TableColumn, ...], dict[str, Sequence[str]]]:
-    """Return the columns of numbers, and the cells of columns of words."""
+    """Return the columns of numbers, and the cells of text columns."""
     parquet = imported('pyarrow.parquet', path, 'Parquet')
     types = imported('pyarrow', path, 'Parquet').types
     stated = parquet.read_metadata(path)

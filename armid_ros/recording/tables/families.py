@@ -144,7 +144,7 @@ def choose(
     if twice:
         raise RecordingError(
             f"{table.source}: for {quantity}, '{pattern}' fits {' and '.join(twice)} for one "
-            'joint; name the columns with commas, or give each a name of its own'
+            'joint; list the columns with commas, or rename them'
         )
     members = dict(found)
     names = [renamed(label, rename) for label in labels]
@@ -265,7 +265,7 @@ def _by_number(label: str) -> tuple[int, str]:
 
 
 def _matching(table: Table, pattern: str) -> list[tuple[str, TableColumn]]:
-    """Return the columns that fit a pattern, by the label of their joint."""
+    """Return the columns that match a pattern, by the label of their joint."""
     exact = table.column(pattern)
     if exact is not None:
         return [('1', exact)]

@@ -302,7 +302,7 @@ def _time_unit(table: Table, column: TableColumn, said: str | None) -> str:
     if len(steps) and np.mean(steps < 0.0) > 0.5:  # sorting would reverse the motion
         raise RecordingError(
             f'{where} runs backwards, from {column.values[0]:.6g} to {column.values[-1]:.6g}. '
-            'Turn the rows round if the last was measured first, or leave the column out with '
+            'Reverse the rows if the last was measured first, or leave the column out with '
             '--time none --rate HZ if they are in order'
         )
     if said or column.unit in TIME_UNITS:
@@ -342,7 +342,7 @@ def measured(plan: TablePlan) -> Recording:
                 raise RecordingError(
                     f'{table.source}: column {column.name} has no number in {len(empty)} of '
                     f'{len(table)} rows, first in {table.where(int(empty[0]))}; leave '
-                    f'{source.quantity} out with --{source.quantity} none, or mend the file'
+                    f'{source.quantity} out with --{source.quantity} none, or repair the file'
                 )
     if np.mean(~stamped) > MAX_NOT_FINITE:
         raise RecordingError(

@@ -161,7 +161,7 @@ class Table:
                 raise RecordingError(
                     f"{self.source}: {len(named)} columns are called '{name}', with different "
                     f'values, first in {self.where(row)}: {named[0].values[row]:g} and '
-                    f'{other.values[row]:g}; give each a name of its own'
+                    f'{other.values[row]:g}; give them different names'
                 )
         return named[0] if named else None
 
