@@ -193,7 +193,7 @@ def rounded(values: npt.ArrayLike) -> list[float | None]:
 
 
 def script_json(data: dict[str, Any]) -> Markup:
-    """Return JSON that no name in it can turn into HTML."""
+    """Return JSON that is safe within HTML."""
     text = json.dumps(data, allow_nan=False, separators=(',', ':'))
     for character in '<>&\u2028\u2029':
         text = text.replace(character, f'\\u{ord(character):04x}')

@@ -83,13 +83,13 @@ def inspection_report(found: Inspection, origin: ResultOrigin = DEFAULT_ORIGIN) 
 
 
 def inspection_word(found: Inspection) -> str:
-    """Return the verdict on a recording in a word: ready, doubtful or unfit."""
+    """Return the verdict on a recording: ready, doubtful or unfit."""
     weights = {remark.weight for remark in found.remarks}
     return 'unfit' if 'bad' in weights else 'doubtful' if 'doubt' in weights else 'ready'
 
 
 def check_word(remarks: Sequence[Remark], found: LinkCheck | None) -> str:
-    """Return the verdict on a description in a word: clean, look or wrong."""
+    """Return the verdict on a description: clean, look or wrong."""
     weights = {remark.weight for remark in remarks}
     if 'bad' in weights or (found is not None and found.wrong):
         return 'wrong'
@@ -139,7 +139,7 @@ def _wrong_mass(found: LinkCheck, k: int) -> str:
 
 
 def link_rows(found: LinkCheck) -> list[tuple[str, ...]]:
-    """Return a row for every link, as `HEADS` has the columns."""
+    """Return a row for every link, with the columns of `HEADS`."""
     return [
         (
             f'{link} ({found.joints[k]})',
@@ -227,7 +227,7 @@ def _contents_section(found: Inspection) -> ContentSection:
 
 
 def _joints_section(found: Inspection) -> ContentSection:
-    """Return ranges, speeds and efforts; no head is broken within its unit."""
+    """Return ranges, speeds and efforts; heads have no line break within a unit."""
     heads = list(joint_heads(found))
     if len(set(found.units)) == 1:
         for column, like in ((2, 1), (5, 1), (8, 7)):

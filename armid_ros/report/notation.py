@@ -49,7 +49,7 @@ def plain(value: float, count: int = 3) -> str:
 
 
 def measured(value: float, reach: float) -> tuple[str, str]:
-    """Format a value and the half-width of its interval to the digits that this leaves."""
+    """Format a value and the half-width of its interval with as many digits as are significant."""
     if not (math.isfinite(reach) and reach > 0.0):
         return f'{value:.4g}', '0'
     decimals = max(0, 1 - math.floor(math.log10(reach)))

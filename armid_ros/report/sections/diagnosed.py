@@ -163,7 +163,7 @@ def evidence_section(diagnosis: Diagnosis) -> ContentSection:
 
 
 def minor_section(diagnosis: Diagnosis, patched: bool) -> ContentSection:
-    """Return the effects that are significant, and negligible or not confirmed, or added too."""
+    """Return the significant effects that are negligible, not confirmed, or added on request."""
     rows = [
         (
             name_in_words(one.name),
