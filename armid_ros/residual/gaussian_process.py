@@ -104,7 +104,7 @@ def _cells(rows: JointRows, labels: npt.NDArray[np.intp], used: npt.NDArray[np.b
 
 
 def _fitted(cells: _Cells, knee: float) -> tuple[float, _Scales]:
-    """Return the largest log marginal likelihood per cell, and its hyperparameters."""
+    """Maximise the log marginal likelihood; return it per cell, with the hyperparameters."""
     from sklearn.gaussian_process import GaussianProcessRegressor, kernels
 
     size = max(float(np.sqrt(np.mean(cells.torque**2))), 1e-12)
