@@ -76,9 +76,9 @@ def couple(tree: Robot, driven: Sequence[Joint], known: Mapping[str, float]) -> 
     own = of_joints(driven)
     start = np.clip(np.zeros(len(names)), own['lower'], own['upper'])
     mechanism = _mechanism(tree, names, start, known)
-    lower, upper = _narrowed(mechanism, tree, own['lower'], own['upper'])
+    lower, upper = _narrowed_limits(mechanism, tree, own['lower'], own['upper'])
     if mechanism.loops:
-        mechanism, lower, upper = _closing(mechanism, tree, lower, upper)
+        mechanism, lower, upper = _closing_range(mechanism, tree, lower, upper)
     share = np.sum(mechanism.largest, axis=1)
     rates = tree.velocity_limit / np.where(share > 0.0, share, 1.0)
     acts = mechanism.largest > 0.0
@@ -138,7 +138,7 @@ def _mechanism(
     )
 
 
-def _narrowed(
+def _narrowed_limits(
     mechanism: Mechanism, tree: Robot, lower: FloatArray, upper: FloatArray
 ) -> tuple[FloatArray, FloatArray]:
     """Narrow the position limits of driven joints so that coupled joints keep their limits."""
@@ -167,7 +167,7 @@ def _narrowed(
     return lower, upper
 
 
-def _closing(
+def _closing_range(
     mechanism: Mechanism, tree: Robot, lower: FloatArray, upper: FloatArray
 ) -> tuple[Mechanism, FloatArray, FloatArray]:
     """

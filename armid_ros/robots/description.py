@@ -271,7 +271,7 @@ def _check_tree(links: Iterable[str], joints: Iterable[Joint]) -> None:
     most = 500  # Pinocchio's reader descends by recursion
     if depth[deepest] > most:
         raise RobotError(
-            f"link '{deepest}' is {depth[deepest]} joints from the base; {most} are the most"
+            f"link '{deepest}' is {depth[deepest]} joints from the base; the maximum is {most}"
         )
 
 

@@ -95,7 +95,7 @@ def convex_bodies(path: Path, scale: FloatArray) -> tuple[coal.CollisionGeometry
 def _slabs(
     vertices: FloatArray, ends: npt.NDArray[np.intp], axis: FloatArray
 ) -> tuple[coal.ConvexBase, ...]:
-    """Return hulls of slabs across an axis; too thin a slab joins the slab before it."""
+    """Return hulls of slabs across an axis; thin slabs are merged with the previous slab."""
     along = vertices @ axis
     start, end = along[ends[:, 0]], along[ends[:, 1]]
     hulls: list[coal.ConvexBase] = []

@@ -127,7 +127,7 @@ class _Writer:
                 if free and any(self.model.body_rootid[k] == body != k for k in model.jnt_bodyid):
                     raise RobotError(
                         f"{self.path}: body '{self.bodies[body]}' floats, but the base of an arm "
-                        'is fixed: take its freejoint out'
+                        'is fixed: remove its freejoint'
                     )
                 continue
             anchors[body] = self._link(body, parent, list(joints), anchors[parent])

@@ -77,7 +77,7 @@ def driven_joints(description: Description, names: Sequence[str] | None) -> tupl
     most = 150
     if len(chosen) > most:
         raise RobotError(
-            f'{len(chosen)} joints are driven; {most} are the most that can be '
+            f'{len(chosen)} joints are driven; at most {most} can be '
             'identified together: name those of one arm with --joints'
         )
     return chosen
@@ -147,7 +147,7 @@ def load_arms(
 
 
 def held_joints(robot: Robot) -> tuple[HeldJoint, ...]:
-    """Return the movable joints of the description that are not driven."""
+    """Return the movable joints of the description that are locked."""
     description = robot.description
     carriers = {name: _carriers(description, [name]) for name in robot.joints}
     return tuple(
