@@ -233,7 +233,7 @@ def _hold(
     modes: Modes,
     moved: FloatArray,
 ) -> None:
-    """Keep the positions of motors that stay stuck, without rounding errors."""
+    """Keep the positions of sticking motors exactly, without rounding errors."""
     e = len(springs.joints)
     for axis, mode in zip(plant.contacts.axes, modes, strict=True):
         if mode != 0 or axis < 0:

@@ -263,7 +263,7 @@ class Plant:
         return State(steps, t, position, velocity, acceleration, modes, memory, rotors)
 
     def weight(self, q: FloatArray, dq: FloatArray) -> FloatArray:
-        """Return the torques of gravity and velocities on the joints, shape (n,) [N m]."""
+        """Return the joint torques of gravity and of velocities, shape (n,) [N m]."""
         if self.robot.mechanism is None:
             return np.asarray(pin.nonLinearEffects(self.robot.model, self.data, q, dq))
         return self.robot.inverse_dynamics(self.data, q, dq, np.zeros(len(q)))

@@ -165,7 +165,7 @@ class SimulatedArm:
 
     def start_on(self, reference: Reference) -> Reference:
         """
-        Put the arm on the first point of a reference, with its velocity, and begin the reference.
+        Start on the first point of a reference, with its velocity.
 
         The result is the reference with its joints in the order of the robot.
 
@@ -220,8 +220,8 @@ class SimulatedArm:
             )
         if arm.robot.joints != self.joints:
             raise ModelError(
-                f'{arm.robot.name}: an arm with the joints {", ".join(self.joints)} cannot become '
-                f'one with {", ".join(arm.robot.joints)}'
+                f'{arm.robot.name}: the new model has joints {", ".join(arm.robot.joints)}, '
+                f'but the arm has {", ".join(self.joints)}'
             )
         return Plant(arm, self.plant.dt, self.plant.hard_stops)
 
@@ -309,7 +309,7 @@ class SimulatedArm:
         return Sample(state.steps, state.t, q[0], dq[0], tau[0], link)
 
     def _begin(self, reference: Reference, steps: int) -> None:
-        """Put the arm on a reference without a past."""
+        """Start on a reference, with an empty sensor history."""
         first = reference.sample(np.zeros(1))
         self._state = self.plant.state(first.q[0], first.dq[0], first.ddq[0], steps)
         self._reference, self._begun = reference, steps
