@@ -46,7 +46,7 @@ def view(
     mark: tuple[str, ...],
     topic: str | None,
 ) -> None:
-    """Look at a recording in rerun: the moving arm, torques, and the residual of a model."""
+    """Show a recording in rerun: the moving arm, torques, and the residual of a model."""
     from armid_ros.arm import ArmModel
     from armid_ros.cli import options
     from armid_ros.view.rerun_log import log_recording, open_stream

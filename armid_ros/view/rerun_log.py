@@ -202,7 +202,7 @@ def _log_bodies(stream: Any, robot: Robot, marked: Sequence[str]) -> list[str]:
             absent.append(f"link '{shape.link}': mesh {shape.mesh} not found; not drawn")
             continue
         try:
-            drawing = _drawn(shape, colour)
+            drawing = _entity(shape, colour)
         except RobotError as error:
             notes.append(f"link '{shape.link}': {error}; not drawn")
             continue
@@ -223,7 +223,7 @@ def _log_bodies(stream: Any, robot: Robot, marked: Sequence[str]) -> list[str]:
     return [*all_in_one(absent), *notes]
 
 
-def _drawn(shape: LinkShape, colour: tuple[int, int, int]) -> Any:
+def _entity(shape: LinkShape, colour: tuple[int, int, int]) -> Any:
     """Convert a shape in its frame to an entity of rerun; RobotError for an invalid mesh."""
     rr = rerun()
     if shape.path is not None:
