@@ -213,7 +213,7 @@ def _predicted(
 
 
 def _sided(rests: Sequence[Motion]) -> npt.NDArray[np.bool_]:
-    """Mark readings after an approach; without approach, dry friction is only bounded."""
+    """Mark readings after an approach; without an approach, dry friction is only bounded."""
     return np.concatenate([one.dq for one in rests]).astype(bool)
 
 

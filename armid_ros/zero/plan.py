@@ -142,7 +142,7 @@ def _tour(
         if not planner.fault(over):
             parts += [pose + bump * (over - pose), rest]
     if not np.array_equal(now, poses[0]):
-        raise TrajectoryError(f'there is no way back from the poses: {reason}')
+        raise TrajectoryError(f'no return path from the poses: {reason}')
     q = np.roll(np.concatenate(parts), count // 2, axis=0)  # begins and ends in a rest
     q = np.concatenate([q, np.tile(q[-1], (-len(q) % int(rate), 1))])  # whole seconds
     period = len(q) / rate
