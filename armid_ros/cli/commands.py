@@ -141,7 +141,7 @@ def _tell_notes(context: click.Context) -> None:
 
 @cache
 def _imported(name: str) -> click.Command:
-    """Import a command; its options refuse numbers that are not finite."""
+    """Import a command; its options accept finite numbers only."""
     command: click.Command
     if name in COMMANDS:
         module = import_module(f'armid_ros.cli.{COMMANDS[name]}')
@@ -153,7 +153,7 @@ def _imported(name: str) -> click.Command:
 
 
 def _refuse_infinite(command: click.Command) -> None:
-    """Make a command and its subcommands refuse numbers that are not finite."""
+    """Restrict numbers in options of a command and its subcommands to finite numbers."""
     for below in command.commands.values() if isinstance(command, click.Group) else ():
         _refuse_infinite(below)
     for parameter in command.params:

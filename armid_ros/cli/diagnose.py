@@ -260,7 +260,7 @@ def open_partner(
 
     if source is None:
         if ties:
-            raise ModelError('give both --tie and --partner, the machine or person at the tie')
+            raise ModelError('--tie needs --partner, the other machine or person')
         return None
     other = load_robot(source, gravity=gravity)
     kept = str(Path(source).resolve()) if Path(source).is_file() else source

@@ -36,7 +36,7 @@ class CarriedLoad:
     body: pin.Inertia
 
     def principal(self) -> tuple[FloatArray, FloatArray]:
-        """Return moments (3,) [kg m^2] and axes, columns (3, 3), as near to the frame's as any."""
+        """Return principal moments (3,) [kg m^2] and axes (3, 3), columns, close to the frame."""
         moments, axes = np.linalg.eigh(self.body.inertia)
         order = max(
             map(list, permutations(range(3))),
