@@ -58,7 +58,7 @@ def doubt_of(
 
 
 def doubt_of_names(findings: Sequence[Finding]) -> str:
-    """Return a sentence if a named cause cannot arise between two days; else an empty one."""
+    """Return a sentence if a named cause cannot arise between two days; empty otherwise."""
     for one in findings:
         if one.name in CATALOGUE and CATALOGUE[one.name].traits.corrects:
             return (

@@ -17,7 +17,7 @@ from armid_ros.identification import SignalSettings
 @dataclass(frozen=True)
 class Thresholds:
     """
-    The thresholds of the diagnosis. Shares are of the squared held-out residual, in its unit.
+    Thresholds of the diagnosis. Shares are parts of the squared weighted held-out residual.
 
     Attributes
     ----------

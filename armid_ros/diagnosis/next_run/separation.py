@@ -136,7 +136,7 @@ class Separation:
 @dataclass(frozen=True)
 class Load:
     """
-    A known mass, for a second run of the same motion.
+    Known mass for a second run of the same motion.
 
     Attributes
     ----------
