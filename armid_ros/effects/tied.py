@@ -181,7 +181,7 @@ def tied_effect(
 
 def tied_as_written(entry: Mapping[str, Any], robot: Robot) -> Tied:
     """
-    Make a tied effect from an entry of model.yaml, with its ``particulars``.
+    Make a tied effect from its entry in model.yaml.
 
     Raises
     ------

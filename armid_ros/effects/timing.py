@@ -25,10 +25,10 @@ class LateReading(TorqueReading):
 
     @abstractmethod
     def _late(self, values: FloatArray, motion: Motion, x: FloatArray) -> FloatArray:
-        """Return late signals of all joints, shape (N, n, ...)."""
+        """Return delayed signals of all joints, shape (N, n, ...)."""
 
     def read(self, values: FloatArray, motion: Motion, tau: FloatArray) -> FloatArray:
-        """Return the late torque, shape (N, n) [N m]."""
+        """Return the delayed torque, shape (N, n) [N m]."""
         return self._late(values, motion, tau)
 
     def transfer(
