@@ -167,7 +167,7 @@ def random_feasible(
     found = _shrunk(arm, limits, around, clearance, 8 * _SHRINKS)
     if found is None:
         raise TrajectoryError(
-            f'no motion is possible about the pose {", ".join(f"{x:.2f}" for x in centre)}'
+            f'no motion around this pose is feasible: {", ".join(f"{x:.2f}" for x in centre)}'
             f': {trajectory_faults(arm, limits, around.scaled(0.01), clearance)}'
         )
     return found

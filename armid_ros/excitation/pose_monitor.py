@@ -83,7 +83,7 @@ class PoseMonitor:
 
     @property
     def sources(self) -> int:
-        """Number of different lists of joint names that were received."""
+        """Number of different joint name lists, one per sender."""
         return len(self._sources)
 
     def update(

@@ -257,8 +257,7 @@ def read_excitation(text: str, source: str) -> Excitation:
             raise TrajectoryError(f'not an excitation: it has to contain schema: {SCHEMA}')
         if content.get('start') is not None:  # an ignored start pose would change the motion
             raise TrajectoryError(
-                'an excitation has no start pose; remove it, and plan the way from that pose '
-                'with --start'
+                'an excitation cannot contain a start pose; remove it, and give it with --start'
             )
         joints = content['joints']
         trajectory = FourierTrajectory(

@@ -180,7 +180,7 @@ class _Branch:
     cost: float = np.inf
 
     def __post_init__(self) -> None:
-        """Bound the coefficients, in units of the value that alone reaches a limit."""
+        """Set the bounds of the coefficients, in units of the value that reaches a limit alone."""
         limits, settings = self.search.problem.limits, self.search.problem.settings
         low, high = position_range(limits.lower, limits.upper)
         half = 0.5 * (high - low)[:, np.newaxis]
