@@ -90,7 +90,7 @@ def finite(value: Any, what: str) -> float:
 
 
 def parsed_yaml(text: str, error: type[ArmidError]) -> Any:
-    """Parse YAML as `load_yaml`; raise an error of the package if it is invalid."""
+    """Parse YAML as `load_yaml`; raise an `ArmidError` if the text is invalid."""
     try:
         return load_yaml(text)
     except (yaml.YAMLError, ValueError) as fault:
