@@ -34,7 +34,7 @@ _QUIET = {
 @contextmanager
 def connected(scheduler: str | None, workers: int | None = None) -> Iterator[Client]:
     """
-    Connect to a cluster while the context is open.
+    Connect to a cluster; a context manager.
 
     Parameters
     ----------
