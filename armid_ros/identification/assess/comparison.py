@@ -62,7 +62,7 @@ class ParameterChange:
 @dataclass(frozen=True)
 class GroupChange:
     """
-    A group of parameters with the p-value of its change as a whole.
+    Group of parameters, with the p-value of their common change.
 
     Attributes
     ----------

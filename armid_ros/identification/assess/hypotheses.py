@@ -79,7 +79,7 @@ class Hypothesis:
 
     @property
     def of_data(self) -> bool:
-        """Whether only the data, and no change of the arm, can explain it."""
+        """Whether only an error of the data, and no change of the arm, explains the difference."""
         return self.kind in ('units', 'unit', 'degrees', 'sign', 'exchange')
 
 

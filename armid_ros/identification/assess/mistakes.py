@@ -75,7 +75,7 @@ class Mistake:
 
     @property
     def of_data(self) -> bool:
-        """Whether only the data, and no change of the arm, can explain it."""
+        """Whether only an error of the data, and no change of the arm, explains the difference."""
         return all(one.of_data for one in self.hypotheses)
 
     @property

@@ -29,7 +29,7 @@ LEAST_LEFT = 0.1
 
 
 def sandwich(bread: FloatArray, middle: FloatArray) -> FloatArray:
-    """Return the sandwich bread middle bread', positive semi-definite, shape (p, p)."""
+    """Return the sandwich covariance bread middle bread', positive semi-definite, (p, p)."""
     covariance = bread @ middle @ bread.T
     std = np.sqrt(np.maximum(np.abs(np.diag(covariance)), 1e-300))
     sizes, axes = np.linalg.eigh(covariance / np.outer(std, std))

@@ -333,7 +333,7 @@ class ChangeWatch:
         )
 
     def _name(self, found: FoundChange) -> Job:
-        """Restart from before a change, without the changed parameters, and report the change."""
+        """Restore the state before a change, forget the changed parameters, report the change."""
         change, size, reopened = found.change, found.change.size, found.change.reopened
         again = copy(self._estimator)
         for estimator, known, directions in (
@@ -372,6 +372,6 @@ class ChangeWatch:
 
 
 def _parts(items: Sequence[Item], size: int) -> Iterator[Sequence[Item]]:
-    """Yield items in groups of a size."""
+    """Yield slices of a given size."""
     for first in range(0, len(items), size):
         yield items[first : first + size]

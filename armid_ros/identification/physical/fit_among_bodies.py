@@ -294,7 +294,7 @@ def _held_out_errors(
     blocks: FloatArray,
     counts: FloatArray,
 ) -> tuple[tuple[float, float], ...]:
-    """Return weights with their held-out errors, relative to unconstrained fits."""
+    """Return the candidate weights with held-out errors, relative to unconstrained fits."""
     free = 0.0
     squares = dict.fromkeys(WEIGHTS, 0.0)
     for left_out, block in enumerate(blocks):

@@ -208,7 +208,7 @@ class Score:
 
     @staticmethod
     def of(fits: Sequence[Fit]) -> Score:
-        """Return the score of one or more stretches together."""
+        """Return the common score of one or more stretches."""
         used = np.concatenate([fit.informative for fit in fits])
         residual = used * np.concatenate([fit.residual for fit in fits])
         tau = used * np.concatenate([fit.tau for fit in fits])

@@ -110,7 +110,7 @@ class Conditioning:
 
     @property
     def kept_hz(self) -> float:
-        """Frequency up to which rows keep the signal [Hz]."""
+        """Upper frequency of the signal in the rows [Hz]."""
         # the decimation filter ends at this share of the rate of the rows
         return 0.4 * self.rate_hz / self.decimation
 
@@ -272,7 +272,7 @@ def _shortest(used: Conditioning) -> float:
 
 
 def no_stretch(recording: Recording, used: Conditioning) -> IdentificationError:
-    """Return the error that no stretch is long enough for the filters, with the needed length."""
+    """Return the error for recordings without a long enough stretch, with the required length."""
     spans = [recording.t[part[[0, -1]]] for part in unbroken(recording, used.rate_hz)]
     longest = max(float(last - first) for first, last in spans)
     left = longest - _shortest(used) + _CUTOFF_PERIODS / used.cutoff_hz

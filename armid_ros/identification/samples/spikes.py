@@ -242,7 +242,7 @@ class SpikeGate:
 
     @property
     def _tail(self) -> StreamSample | None:
-        """Return the newest sample that is not known to be damaged."""
+        """Return the newest sample that is not damaged, as far as known."""
         latest = self._held or self._first or self._known
         return latest[-1] if latest else None
 
@@ -380,7 +380,7 @@ class SpikeGate:
         return np.asarray(np.abs(missed.error) / limit)
 
     def _surely_in_line(self, missed: Missed) -> bool:
-        """Return whether a sample is within a lower bound of its limits, which is fast to test."""
+        """Return whether a sample is within a lower bound of its limits, a fast test."""
         # Limits grow with the factors `noise` and `bend`, and in proportion if both grow alike. So
         # they are at least the limits over one period times the smaller factor.
         least, usual = self._least, self._level.usual

@@ -155,7 +155,7 @@ class Missed(NamedTuple):
 
 
 def growth_over(step: Time, ahead: Time, period: float) -> tuple[Time, Time]:
-    """Return the growth of errors by noise and by an acceleration, a time ahead of two samples."""
+    """Return the growth of errors by noise and by acceleration, a time after two samples."""
     ratio = ahead / step
     noise: Time = ((1.0 + (1.0 + ratio) ** 2 + ratio**2) / 6.0) ** 0.5
     return noise, 0.5 * ahead * (ahead + step) / period**2
@@ -186,7 +186,7 @@ def all_unwrapped(samples: Sequence[StreamSample], turn: FloatArray) -> list[Str
 
 
 def robust_scale(missed: FloatArray, share: float) -> FloatArray:
-    """Return the standard deviation of errors (k, m), from the quantile of a share of them."""
+    """Return the standard deviation of errors, (k, m), from one of their quantiles."""
     ordered = np.sort(np.abs(missed), axis=0)  # numpy's quantile takes ten times as long
     place = share * (len(ordered) - 1)
     first = int(place)

@@ -244,7 +244,7 @@ class SensorNoise:
     used: Conditioning
 
     def floor(self, arm: ArmModel) -> FloatArray:
-        """Return the noise deviation of a row for an arm with its ties, shape (n,) [N m]."""
+        """Return the standard deviation of the noise of a row, ties included, shape (n,) [N m]."""
         problem = self._taut
         stiffness = dict.fromkeys(problem.spring_joints, 0.0)
         slack = dict.fromkeys(problem.spring_joints, 0.0)

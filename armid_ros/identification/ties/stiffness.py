@@ -89,7 +89,7 @@ class Interaction:
 
 def identify_interaction(problem: InteractionProblem) -> Interaction:
     """
-    Estimate stiffnesses, and free inertias with them, without the bias of noisy angles.
+    Estimate stiffnesses and free inertias without the bias of noisy angles.
 
     Parameters
     ----------
