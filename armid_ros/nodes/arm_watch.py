@@ -81,7 +81,7 @@ class ArmWatch:
         return np.array([known.get(joint, math.nan) for joint in self._joints])
 
     def now(self) -> float:
-        """Return the time for ages of messages [s], steady or simulated, without clock steps."""
+        """Return a time without clock steps, steady or simulated, for the age of messages [s]."""
         clock = self._node.get_clock()
         if not clock.ros_time_is_active:
             return float(self._steady.now().nanoseconds * 1e-9)

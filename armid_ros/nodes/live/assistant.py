@@ -153,7 +153,7 @@ class Assistant:
         try:
             self._pipe.send(job)
         except OSError as error:
-            raise IdentificationError(f'the process that diagnoses has ended: {error}') from error
+            raise IdentificationError(f'the diagnosis process has ended: {error}') from error
         self._pending += 1
 
     def poll(self) -> Result | None:
