@@ -130,7 +130,7 @@ def read_sides(
     path: str | Path, robot: Robot, settings: ReadSettings = DEFAULT
 ) -> tuple[Recording, Recording]:
     """
-    Read motors and links of any arm from a bag.
+    Read the motions of motors and links of any arm from a bag.
 
     Raises
     ------

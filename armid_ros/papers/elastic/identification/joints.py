@@ -221,7 +221,7 @@ class SpringEstimate:
 
     @property
     def antiresonance(self) -> float:
-        """Natural frequency of the link on its spring with the motor held [Hz]."""
+        """Natural frequency of the link on its spring with a blocked motor [Hz]."""
         return float(np.sqrt(self.transmission.stiffness[0] / self.inertia) / (2.0 * np.pi))
 
     @property
