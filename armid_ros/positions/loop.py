@@ -139,7 +139,7 @@ class _PositionControl(Controller):
 @dataclass(frozen=True, eq=False)
 class LoopModel:
     """
-    A robot with a position controller, drives and a tool, as a function of P parameters.
+    Robot with position controller, drives and tool, as a function of P parameters.
 
     Attributes
     ----------
