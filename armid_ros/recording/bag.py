@@ -189,7 +189,7 @@ class Bag(Source):
         return b''.join(unpacked(io.BytesIO(message), self._settings, 'a compressed message'))
 
     def _open(self, file: Path) -> Source:
-        """Open one file."""
+        """Open a storage file."""
         storage = _STORAGES.get(_storage_suffix(file))
         if storage is None:  # this import takes as long as reading a bag
             from armid_ros.recording.ros1_source import Ros1Source

@@ -156,7 +156,7 @@ def plan(
         pattern, lacking = position
         if pattern:
             raise RecordingError(
-                f"{table.source}: of positions '{pattern}' has no column of numbers for "
+                f"{table.source}: positions '{pattern}' have no numeric column for "
                 f'{", ".join(lacking)}; name their columns with --position or --rename, or leave '
                 f'joints out with --joints. Its columns are {table.listed()}'
             )

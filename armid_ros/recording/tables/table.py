@@ -129,7 +129,7 @@ class Table:
         object.__setattr__(self, 'columns', there)
         object.__setattr__(self, 'words', {**empty, **self.words})
         if not there:
-            raise RecordingError(f'{self.source}: there is no column of numbers in it')
+            raise RecordingError(f'{self.source}: it has no column of numbers')
         if len({len(column.values) for column in there}) > 1:
             counts = ', '.join(f'{c.name} {len(c.values)}' for c in there)
             raise RecordingError(f'{self.source}: columns differ in length: {counts}')
@@ -225,7 +225,7 @@ def table_of_arrays(
     }
     counts = Counter(size for values in usable.values() for size in set(values.shape) if size > 1)
     if not counts:
-        raise RecordingError(f'{source}: there is no array of numbers in it')
+        raise RecordingError(f'{source}: it has no array of numbers')
     length = max(counts, key=lambda size: (counts[size] if size > 50 else 0, size))
     columns: list[TableColumn] = []
     for name, values in usable.items():
