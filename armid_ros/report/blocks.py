@@ -214,7 +214,7 @@ class Fold(Templated):
 @dataclass(frozen=True)
 class Panels(Templated):
     """
-    Blocks side by side, each with a heading.
+    Adjacent blocks with headings.
 
     Attributes
     ----------

@@ -85,7 +85,7 @@ def _plus_minus(value: float, std: float, unit: str) -> str:
 
 
 def percent(share: float) -> str:
-    """Return a share of the gap as a percentage, the digit that matters kept: '96 %', '0.4 %'."""
+    """Format a share of the gap as a percentage with its significant digit: '96 %', '0.4 %'."""
     if not math.isfinite(share):
         return DASH
     return words.percent(share)

@@ -246,7 +246,7 @@ def isolability_section(isolability: Isolability) -> ContentSection:
 
 
 def _detectable_row(name: str, sizes: Sequence[Detectable]) -> tuple[str, str, str, str]:
-    """Return the cells of one effect, below the heads `_DETECTABLE`."""
+    """Return the cells of one effect, for the columns `_DETECTABLE`."""
 
     def place(one: Detectable) -> str:
         return ', '.join(one.joints) or 'the arm'
