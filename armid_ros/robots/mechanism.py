@@ -27,7 +27,7 @@ from scipy.linalg.lapack import dposv
 
 class Configuration(NamedTuple):
     """
-    The moving joints in one state of the driven joints, or in N states.
+    State of the moving joints for one or N states of the driven joints.
 
     Attributes
     ----------
