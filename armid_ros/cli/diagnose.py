@@ -236,7 +236,7 @@ def _model_of(path: Path, robot: Robot) -> ArmModel:
         return arm
     if known.joints == robot.joints and kinematics_digest(known) != kinematics_digest(robot):
         raise ArmidError(
-            f'{path}: was made with a description whose kinematics differ from those of '
+            f'{path}: was made with a description with other joints than those of '
             f'{robot.name}; give that description as --robot, or identify this arm'
         )
     return arm
@@ -260,7 +260,7 @@ def open_partner(
 
     if source is None:
         if ties:
-            raise ModelError('--tie needs --partner, the other machine or person')
+            raise ModelError('give both --tie and --partner, the machine or person at the tie')
         return None
     other = load_robot(source, gravity=gravity)
     kept = str(Path(source).resolve()) if Path(source).is_file() else source
