@@ -45,7 +45,7 @@ if TYPE_CHECKING:
     from armid_ros.recording import Recording, write_recording
     from armid_ros.robots import load_robot, Robot, shipped_robots
 
-#: Public names, and the modules that they are imported from.
+#: Public names and their modules.
 _HOMES = {
     'load_robot': 'armid_ros.robots',
     'shipped_robots': 'armid_ros.robots',

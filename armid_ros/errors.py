@@ -10,7 +10,7 @@ from difflib import get_close_matches
 
 def nearest(name: str, names: Iterable[str]) -> str:
     """Return the most similar of the names; empty if none is similar enough."""
-    # one letter in four may differ
+    # up to a quarter of the letters may differ
     return next(iter(get_close_matches(name, list(names), 1, 0.75)), '')
 
 
@@ -24,7 +24,7 @@ def visible(text: str) -> str:
     """
     Return a text with escaped control characters, safe for a terminal.
 
-    Names come from files and messages; an escape sequence in one must not move the cursor.
+    Names come from files and messages; their escape sequences must not control the terminal.
 
     """
     if text.isprintable():
@@ -65,7 +65,7 @@ class ModelError(ArmidError):
 
 
 class TrajectoryError(ArmidError):
-    """A trajectory violates the limits of the robot, or cannot be made within them."""
+    """A trajectory violates the limits of the robot, or no trajectory satisfies them."""
 
 
 class IdentificationError(ArmidError):
@@ -73,7 +73,7 @@ class IdentificationError(ArmidError):
 
 
 class RecordingEnded(RecordingError):
-    """Recording has to stop: the disk is full, or the file was removed."""
+    """Recording cannot continue: the disk is full, or the file was removed."""
 
 
 class OutputError(ArmidError):

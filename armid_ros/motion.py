@@ -17,7 +17,7 @@ Samples = slice | npt.NDArray[np.intp] | npt.NDArray[np.bool_]
 
 def read_only(values: npt.ArrayLike) -> FloatArray:
     """
-    Return the values as a contiguous float64 array that cannot be written to.
+    Return the values as a read-only contiguous float64 array.
 
     An array that is already such a view of immutable memory is not copied.
 
@@ -125,7 +125,7 @@ class Motion:
     def of_states(
         cls, joints: tuple[str, ...], q: npt.ArrayLike, dq: npt.ArrayLike, ddq: npt.ArrayLike
     ) -> Motion:
-        """Return a motion through states, one per second; of shape (N, n) or (n,), or numbers."""
+        """Return a motion of given states, one per second, each (N, n), (n,) or a number."""
         parts = np.broadcast_arrays(np.atleast_2d(q), dq, ddq)
         return cls(joints, np.arange(len(parts[0]), dtype=float), *map(np.array, parts))
 

@@ -4,7 +4,7 @@
 Entry points that add commands and nodes: of the fleet, of the papers and of other packages.
 
 A package names a click command in the group ``armid_ros.commands``, and the module of a node,
-which has a function ``main``, in the group ``armid_ros.nodes``. Effects have a group of their own.
+which has a function ``main``, in the group ``armid_ros.nodes``. Effects have a separate group.
 
 """
 
@@ -31,7 +31,7 @@ def plug_ins(kind: str) -> dict[str, EntryPoint]:
         'commands' or 'nodes', the last part of the name of the group.
 
     """
-    from importlib.metadata import entry_points  # slow import, not needed to start core commands
+    from importlib.metadata import entry_points  # slow import, which core commands do not need
 
     found = {}
     for entry in entry_points(group=f'armid_ros.{kind}'):

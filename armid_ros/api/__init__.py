@@ -3,7 +3,7 @@
 """
 The public functions of ``import armid_ros``, one job per file.
 
-The packages below compute; here paths become robots and recordings, an integer becomes a random
-generator, and results print themselves.
+The packages below compute; this package loads robots and recordings from paths, makes a random
+generator from a seed, and prints results.
 
 """

@@ -29,20 +29,20 @@ RobotLike = Robot | ArmModel | str | Path
 RecordingLike = Recording | str | Path
 #: A random generator, or a seed.
 Rng = np.random.Generator | int
-#: Called with the share of the work that is done and, if it changes, the name of the step.
+#: Callback with the completed share of the work and, if it changes, the name of the step.
 Progress = Callable[..., None]
 
-#: A number, one a joint, or these as text: '1798/7, 50'.
+#: One number, one per joint, or the same as text: '1798/7, 50'.
 _Numbers = float | str | Sequence[float]
 
-#: Ends of the names of files that describe a robot.
+#: Suffixes of robot description files.
 _DESCRIPTIONS = ('.urdf', '.xacro', '.xml')
 #: Effects that are fitted with the rigid body by default.
 USUAL = ','.join(USUAL_EFFECTS)
 
 
 def robot_of(robot: RobotLike) -> Robot:
-    """Return a robot, loaded where a name or path is given."""
+    """Return a robot; a name or path is loaded."""
     if isinstance(robot, ArmModel):
         return robot.robot
     if isinstance(robot, Robot):
@@ -51,7 +51,7 @@ def robot_of(robot: RobotLike) -> Robot:
 
 
 def is_model(path: str | Path) -> bool:
-    """Return whether a path is that of a model.yaml, and not of a description."""
+    """Return whether a path names a model.yaml rather than a description."""
     return Path(path).suffix in ('.yaml', '.yml')
 
 
@@ -64,7 +64,7 @@ def describes_robot(one: RobotLike | RecordingLike) -> bool:
 
 
 def source_of(robot: Robot) -> str:
-    """Return the reference to a robot in files: its shipped name, its path, or its name."""
+    """Return the reference to a robot for files: its shipped name, its path, or its name."""
     for name in shipped_robots():
         if robot.path == shipped_path(name):
             return name
@@ -81,7 +81,7 @@ def arm_of(arm: RobotLike, effects: str = USUAL) -> ArmModel:
 
 
 def drivable(arm: RobotLike) -> ArmModel:
-    """Return an arm model; TrajectoryError if a name or path has joints of no arm."""
+    """Return an arm model; TrajectoryError if a name or path has joints outside all arms."""
     model = arm_of(arm)
     others = joints_beside_arms(model.robot) if isinstance(arm, str | Path) else ()
     if others:
@@ -132,7 +132,7 @@ def with_sources_apart(*groups: list[Recording]) -> tuple[list[Recording], ...]:
 
     def named(recording: Recording) -> Recording:
         source = recording.source or 'recording'
-        if Path(source).exists():  # the same one, if it is given twice
+        if Path(source).exists():  # a recording that is given twice is read once
             return recording
         taken[source] = count = taken.get(source, 0) + 1
         return replace(recording, source=source if count == 1 else f'{source} {count}')

@@ -138,7 +138,7 @@ def design_excitation(
     if acceleration is not None:
         robot = replace(robot, acceleration_limit=np.nan_to_num(acceleration, nan=np.inf))
     model = replace(model, robot=robot)
-    # one search of an arm of many joints: each step of it takes seconds
+    # one search for an arm of many joints, as each step takes seconds
     searches, seconds = (1, 25.0) if robot.n_joints > 20 else (4, 120.0)
     run_in = min(2.0, 0.1 * duration)  # [s]
     settings = DesignSettings(
@@ -164,7 +164,7 @@ def design_excitation(
     return _searched(model, settings, scene, start, earlier, rng, rival, progress)
 
 
-excite = design_excitation  # as the command is called
+excite = design_excitation  # name of the command
 
 
 def _searched(

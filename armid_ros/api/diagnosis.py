@@ -68,7 +68,7 @@ class DiagnosisResult(ShownModel):
     core : Diagnosis
         Everything that the diagnosis found.
     description : ArmModel
-        The model in question, without the named effects.
+        The diagnosed model, without the named effects.
     recordings, held_out, baseline : tuple of Recording
         Recordings that are diagnosed, only predicted, and from when the model was right.
     settings : DiagnosisSettings
@@ -119,7 +119,7 @@ class DiagnosisResult(ShownModel):
 
     @property
     def verdict(self) -> str:
-        """One word: consistent, named, ambiguous, partial, unknown, not_repeatable, bad_data."""
+        """Verdict: consistent, named, ambiguous, partial, unknown, not_repeatable or bad_data."""
         return self.core.verdict
 
     @property
@@ -225,7 +225,7 @@ class DiagnosisResult(ShownModel):
 
             return learn_residual(self.core, np.random.default_rng(seed))
 
-        found, why = _tried('map', learned)
+        found, why = _attempt('map', learned)
         if found is None and not why:
             why = ('nothing was learned: the residual does not depend on the state of any joint',)
         return replace(self, residual=found, notes=(*self.notes, *why))
@@ -245,12 +245,12 @@ class DiagnosisResult(ShownModel):
                     progress=lambda _, what: progress(1.0, what),
                 )  # fmt: skip
 
-            found, why = _tried('simulation', simulated)
+            found, why = _attempt('simulation', simulated)
             forward, left_out = found or ((), ())
             result = replace(result, forward=forward, notes=(*result.notes, *left_out, *why))
         progress(1.0, 'next run')
         rng = np.random.default_rng(seed)
-        run, why = _tried('next run', lambda: next_run(self.core, rng))
+        run, why = _attempt('next run', lambda: next_run(self.core, rng))
         return replace(result, next_run=run, no_run='; '.join(why))
 
     def _steps(self, model: str) -> list[str]:
@@ -283,7 +283,7 @@ class DiagnosisResult(ShownModel):
         elif self.verdict in OPEN and self.residual is None:
             then = 'diagnose'
         elif self.verdict == 'ambiguous' and self.next_run is None:
-            then = ''  # a person has to separate the names
+            then = ''  # the user has to distinguish the named effects
         else:
             anew = self.core.doubt or self.core.harmful or self.verdict in OPEN
             then = 'identify' if anew else 'simulate'
@@ -323,7 +323,7 @@ def diagnose(
     Parameters
     ----------
     arm : identification, model, robot, name or path
-        The model in question. A result of ``identify`` and the path of its model.yaml supply the
+        The model to diagnose. A result of ``identify`` and the path of its model.yaml supply the
         misfit of the identification, which does not count as a gap. An `ArmModel` or a robot has
         no misfit.
     recordings : recording or path, or several
@@ -335,7 +335,7 @@ def diagnose(
         default the recordings of the identification, if they exist and none of them is
         diagnosed; ``()``: no baseline.
     against : recording or path, or several
-        Recordings of a simulator. The model in question is then identified from these. Their
+        Recordings of a simulator. The model to diagnose is then identified from these. Their
         motion may differ from that of ``recordings``.
     effects : str
         Catalogue names with commas: effects of a robot without a model; with ``against`` the
@@ -429,9 +429,9 @@ def require_residual() -> None:
     require_libraries()
 
 
-def _tried(what: str, make: Callable[[], _Made]) -> tuple[_Made | None, tuple[str, ...]]:
-    """Return the result of a step; if it fails, None and the reason."""
+def _attempt(what: str, make: Callable[[], _Made]) -> tuple[_Made | None, tuple[str, ...]]:
+    """Return the result of a step, or None and the reason of its failure."""
     try:
         return make(), ()
-    except Exception as error:  # whatever it is, the diagnosis itself stands
+    except Exception as error:  # the diagnosis itself is valid after any error
         return None, (f'there is no {what}: {error or type(error).__name__}',)

@@ -42,7 +42,7 @@ if TYPE_CHECKING:
 
 #: Waypoints per second of a JointTrajectory; controllers interpolate between them.
 WAYPOINT_RATE = 50.0
-#: Word of a result without a way to its trajectory.
+#: Verdict if no path to the trajectory was found.
 NO_WAY = 'no trajectory'
 #: Name of the bag.
 BAG = 'trajectory'
@@ -62,7 +62,7 @@ class ExcitationResult(Shown):
     scene : CollisionScene
         Bodies, floor and surroundings for the check of clearance.
     given_start : ndarray, shape (n,), or None
-        Pose to leave from and to return to [rad or m]; the free pose nearest to zero by default.
+        Start and end pose [rad or m]; the free pose nearest to zero by default.
     after : tuple of str
         Names of the recordings whose information the trajectory adds to.
     seed : int
@@ -216,7 +216,7 @@ class ExcitationResult(Shown):
         """
         for name in ('excitation.yaml', 'excitation.csv'):
             save_excitation(self.core.excitation, folder / name)
-        for name in ('excitation.yaml', 'excitation.csv'):  # where a way there is found
+        for name in ('excitation.yaml', 'excitation.csv'):  # if a path to the trajectory is found
             save_excitation(self.run.excitation, folder / name)
         robot = self.arm.robot
         write_joint_trajectory(folder / BAG, self.run.motion(), robot_description=robot.urdf)
@@ -225,7 +225,7 @@ class ExcitationResult(Shown):
         page = folder / 'report.html'
         try:
             write_file(page, self.page(origin))
-        except Exception as error:  # whatever it is, the trajectory is written and good
+        except Exception as error:  # the written trajectory is valid after any error
             sys.stderr.write(f'{settled(page)}: not written: {type(error).__name__}: {error}\n')
         return document
 
@@ -250,7 +250,7 @@ class ExcitationResult(Shown):
         )
 
     def _of_run(self) -> tuple[str, list[str], str]:
-        """Return the fitness of the run in a word, sentences on run and search, and the remedy."""
+        """Return the verdict on the run, sentences on run and search, and the remedy."""
         try:
             run, fit = self.run, self.fitness
         except TrajectoryError as error:

@@ -163,7 +163,7 @@ class IdentificationResult(ShownModel):
 
     @property
     def grade(self) -> str:
-        """Grade in one word: good, poor or unusable."""
+        """Grade: good, poor or unusable."""
         return self.graded.word
 
     @cached_property
@@ -267,7 +267,7 @@ class IdentificationResult(ShownModel):
         damaged = [one for one in read if one.report.unwrapped or not one.report.unharmed]
         steps = judge(core, self.validation, read, self.verification).next_steps
         then = 'inspect'
-        if self.grade != 'unusable':  # of a good model, that of its links
+        if self.grade != 'unusable':  # a good model is saved with its links
             named = (
                 name for name in ('diagnose', 'excite') if f'armid {name}' in ''.join(steps[:1])
             )

@@ -31,7 +31,7 @@ def simulate(
     rng: Rng = 0,
 ) -> Recording:
     """
-    Let a simulated arm follow a trajectory and record it.
+    Record a simulated arm that follows a trajectory.
 
     Parameters
     ----------

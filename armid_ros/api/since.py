@@ -30,7 +30,7 @@ def recordings_since(
     """
     Return the given baseline; by default the recordings of the identification.
 
-    There is no default baseline if one of these recordings is diagnosed.
+    The default baseline is empty if one of these recordings is diagnosed.
 
     """
     if baseline is not None:

@@ -35,7 +35,7 @@ class Summary:
     title : str
         Kind of the result, with the number that matters most.
     badge : str
-        One word; empty for none.
+        Verdict or grade in one word; empty if none.
     heads : sequence of str
         Headings of the columns.
     rows : sequence of sequence of str
@@ -80,7 +80,7 @@ def data_frame(rows: Any) -> pandas.DataFrame:
 
 class Shown(ABC):
     """
-    A result that prints as its summary and is written as the commands write it.
+    Result that prints its summary, and that is saved in the format of the commands.
 
     Attributes
     ----------
@@ -101,7 +101,7 @@ class Shown(ABC):
         """Return a summary."""
 
     def stated(self, origin: ResultOrigin, robot: Robot | None = None) -> ResultOrigin:
-        """Fill in the robot and the next step: a sentence or a command."""
+        """Return the origin with robot and next step: a sentence or a command."""
         shown, known = self.summary(), origin if robot is None else origin.of(source_of(robot))
         step = origin.step or ''.join(shown.steps[:1]) or f'armid {shown.then}'
         return replace(known, step=step)
@@ -143,7 +143,7 @@ class Shown(ABC):
         return '\n'.join(self.summary().text())
 
     def _repr_html_(self) -> str:
-        """Show the report in a notebook, in a frame of its own; without a report, the text."""
+        """Show the report in a frame of the notebook; without a report, show the text."""
         try:
             page = self.page()
         except ArmidError:  # a plan without a trajectory has no page
@@ -152,7 +152,7 @@ class Shown(ABC):
 
 
 class ShownModel(Shown):
-    """A result with a model of an arm, and residual torques."""
+    """Result with an arm model and residual torques."""
 
     @abstractmethod
     def _residuals(self) -> Iterable[ResidualPart]:
@@ -189,7 +189,7 @@ class ShownModel(Shown):
 
 
 def aligned(heads: Sequence[str], rows: Sequence[Sequence[str]]) -> list[str]:
-    """Align columns: names left, all others right; a row of one cell has no columns."""
+    """Align names to the left and other columns to the right; single cells span the row."""
     if not heads:
         return []
     table = [tuple(heads), *(tuple(row) for row in rows)]

@@ -46,7 +46,7 @@ class ArmModel:
     """
     A rigid body plus effects: tau = Y pi + sum over effects of tau_e(motion; theta_e).
 
-    Motions are recorded ones; the model includes the effects of the sensors.
+    Motions are those of a recording; the model includes the effects of the sensors.
 
     Attributes
     ----------
@@ -105,8 +105,8 @@ class ArmModel:
         robot : Robot, str or Path
             A robot, a shipped name, or the path of a URDF or xacro.
         effects : str or sequence of str or Effect
-            Effects, or their names in the catalogue; one text may list names with commas. A text
-            may have joints, 'payload@wrist'. A text of one effect may have values,
+            Effects, or their names in the catalogue; one string may list several names with
+            commas. A text may have joints, 'payload@wrist'. A text of one effect may have values,
             'viscous_friction:viscous_coefficient=0.1'.
         gravity : str or sequence of float
             'earth', 'moon', or a vector in the base frame [m/s^2]; not used for a Robot.
@@ -307,7 +307,7 @@ class ArmModel:
         Parameters
         ----------
         effect : Effect
-            An effect of the arm, or one that it may lack.
+            Effect of the arm, or a candidate effect.
         motion : Motion
             Recorded motion; a whole unbroken stretch unless the effect is instantaneous.
 
@@ -375,11 +375,11 @@ class ArmModel:
         return tau
 
     def neighbours(self, period: float) -> int:
-        """Return the number of samples to either side that affect a reading, for a period [s]."""
+        """Return the number of samples on either side that affect a reading, for a period [s]."""
         action = self._acting
         if action.displacement is None and action.reading_memory == 0.0:  # noqa: RUF069 - of laws, never computed
             return 0
-        # four more samples to either side for second derivatives by finite differences
+        # four more samples on either side, for second derivatives by finite differences
         return int(np.ceil(action.reading_memory / period)) + 4
 
     @cached_property

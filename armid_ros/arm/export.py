@@ -91,7 +91,7 @@ def place_values(
     arm: ArmModel, attribute: Callable[[Effect], str]
 ) -> tuple[dict[str, dict[str, float]], tuple[str, ...]]:
     """
-    Return values by attribute and joint, and a line for each that has no place in a format.
+    Return values by attribute and joint, and a line for each value that a format cannot contain.
 
     The attribute names the place of an effect, and is empty if there is none. Effects that change
     the body are part of it, and in neither.

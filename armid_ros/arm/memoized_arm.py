@@ -19,7 +19,7 @@ _Result = TypeVar('_Result')
 
 @dataclass
 class _Regressor:
-    """A regressor of a recorded motion, and its filtered rows; each has only one filter."""
+    """Regressor of a recorded motion, and its rows under one filter."""
 
     motion: Motion
     columns: FloatArray
@@ -29,7 +29,7 @@ class _Regressor:
 @dataclass(frozen=True, repr=False)
 class _Memoized(ArmModel):
     """
-    An arm with caches of torques and regressors.
+    Arm with cached torques and regressors.
 
     Regressors depend on motion and gravity, not on inertial parameters, so copies share them.
 

@@ -78,8 +78,8 @@ def model_text(
     robot : str
         Shipped name or path of the description.
     estimate : Estimate, optional
-        Estimate with the standard deviations; only parameters that were estimated by themselves,
-        and not in a group, have one.
+        Estimate with the standard deviations; only parameters that were estimated individually,
+        not in a group, have a standard deviation.
     misfit : Misfit, optional
         Misfit of the model.
 
@@ -230,7 +230,7 @@ def load_misfit(path: str | Path) -> Misfit | None:
 
 def read_model(text: str, robot: Robot, source: str) -> ArmModel:
     """
-    Return the arm model that the text of a model.yaml describes.
+    Parse the text of a model.yaml.
 
     Parameters
     ----------
@@ -282,8 +282,8 @@ def in_words(arm: ArmModel) -> ArmModel:
     """
     Return the arm with its effects translated into those of the catalogue.
 
-    An effect that only a search uses, such as a gravity vector, becomes several effects: a tilted
-    base and the magnitude of gravity.
+    Effects that only a search uses are converted: a gravity vector becomes a base tilt and the
+    magnitude of gravity.
 
     """
     said = replace(arm, effects=(), values=())
@@ -319,8 +319,7 @@ def checked_model(text: str) -> dict[str, Any]:
     if strange:
         line = yaml_line(text, (strange[0],))
         raise ModelError(
-            f"line {line}: no key '{str(strange[0])[:40]}' is known; a model has "
-            f'{", ".join(_KEYS)}'
+            f"line {line}: unknown key '{str(strange[0])[:40]}'; a model has {', '.join(_KEYS)}"
         )
     _require(document, _NEEDED, 'a model')
     for place, row, units in _rows(document, text):
@@ -418,7 +417,7 @@ def _arm(document: dict[str, Any], robot: Robot) -> ArmModel:
 
 
 def _values(rows: Sequence[dict[str, Any]], names: Sequence[ParameterName]) -> FloatArray:
-    """Return the values of parameters, each of which has to be given once, in its unit."""
+    """Return the values of parameters; each must be given once, in its unit."""
     table: dict[tuple[str, str], dict[str, Any]] = {}
     units = {(name.name, name.joint): [name.unit] for name in names}
     for row in rows:

@@ -72,7 +72,7 @@ class HistoryChange:
 @dataclass(frozen=True)
 class Judged:
     """
-    Test result of an arm.
+    Result of the change tests of one arm.
 
     Attributes
     ----------
@@ -83,7 +83,7 @@ class Judged:
     p : float
         P-value of the first change, corrected for the number of series of the arm.
     adjusted : float
-        Smallest false discovery rate at which the arm is named.
+        Smallest false discovery rate at which the arm is reported as changed.
 
     """
 

@@ -139,7 +139,7 @@ def splits(series: ParameterHistory, spread: Spread) -> Splits:
     """Return the steps and the trend of a series, in standard deviations of neighbours."""
     variance, freedom = variances(series, spread)
     std = np.sqrt(variance)
-    # outliers among their neighbours are moved to the edge of the noise
+    # outliers are clipped to the noise range of their neighbours
     windows = np.lib.stride_tricks.sliding_window_view(
         series.values, min(_WINDOW, len(series.values))
     )
@@ -156,7 +156,7 @@ def spreads(series: Sequence[ParameterHistory]) -> dict[tuple[str, str], Spread]
     names: dict[str, list[ParameterHistory]] = {}
     for one in series:
         names.setdefault(one.name, []).append(one)
-    alike = {name: _alike(group, found) for name, group in names.items()}
+    alike = {name: _prior_freedom(group, found) for name, group in names.items()}
     found = {one: replace(spread, alike=alike[one[0]]) for one, spread in found.items()}
     factors = {name: _lasting(group, found) for name, group in names.items()}
     return {
@@ -239,7 +239,9 @@ def _spread(group: Sequence[ParameterHistory]) -> Spread:
     return Spread(float(np.sqrt(extra)), freedom)
 
 
-def _alike(group: Sequence[ParameterHistory], found: Mapping[tuple[str, str], Spread]) -> float:
+def _prior_freedom(
+    group: Sequence[ParameterHistory], found: Mapping[tuple[str, str], Spread]
+) -> float:
     """
     Return the prior degrees of freedom of the variances of arms (empirical Bayes).
 
@@ -260,7 +262,7 @@ def _alike(group: Sequence[ParameterHistory], found: Mapping[tuple[str, str], Sp
 
 
 def _ratio(series: ParameterHistory, spread: Spread) -> float:
-    """Return the ratio of the variance of a series to the usual one."""
+    """Return the ratio of the variance of a series to the usual variance."""
     stated = series.std[1:] ** 2 + series.std[:-1] ** 2 + 2.0 * spread.std**2
     squares = np.diff(series.values) ** 2 / np.maximum(stated, 1e-300)
     return max(float(np.median(squares)) / MEDIAN_SQUARE, 1e-100)
@@ -315,7 +317,7 @@ def _lasting(
         trends.append(cut.trend**2)
     if not steps:
         return 1.0, 1.0
-    # 10 series have the weight of the prior that scatter is not correlated over days
+    # the prior (scatter is uncorrelated over days) has the weight of 10 series
     weight = len(steps) / (len(steps) + 10.0)
     step, trend = (
         max(1.0, float(np.median(squares)) / MEDIAN_SQUARE) ** (0.5 * weight)

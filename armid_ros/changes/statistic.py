@@ -36,7 +36,7 @@ def quadratic_form(
         Twice the logarithm of the likelihood ratio, and its degrees of freedom.
 
     """
-    if score.shape[-1] == 1:  # a number is its own eigenvalue
+    if score.shape[-1] == 1:  # the eigenvalue of a 1 x 1 matrix is its element
         sizes, along = information[..., 0], score
     else:
         sizes, vectors = np.linalg.eigh(information)
@@ -100,7 +100,7 @@ def two_means(x: FloatArray, weights: FloatArray) -> tuple[FloatArray, FloatArra
 
 
 def beyond_chance(chances: Sequence[float] | FloatArray, allowed: float) -> list[bool]:
-    """Return which changes are significant at a family-wise error rate (Holm 1979)."""
+    """Return the changes that are significant at a family-wise error rate (Holm 1979)."""
     beyond = [False] * len(chances)
     for tried, index in enumerate(np.argsort(chances)):
         if chances[index] > allowed / (len(chances) - tried):

@@ -10,7 +10,7 @@ from armid_ros.cli import parameters
 from armid_ros.cli.terminal import say
 import click
 
-#: Stands for a blank at which no line ends.
+#: Placeholder for a non-breaking space.
 _JOINED = '\u00a0'
 
 

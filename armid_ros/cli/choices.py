@@ -11,7 +11,7 @@ from __future__ import annotations
 
 #: Effects that are fitted if none are named; `armid_ros.effects.USUAL_EFFECTS`.
 USUAL_EFFECTS = ('viscous_friction', 'coulomb_friction', 'torque_offset')
-#: Effects of some size; `armid_ros.effects.catalogue.EXAMPLES`.
+#: Examples of effects with values; `armid_ros.effects.catalogue.EXAMPLES`.
 EFFECT_EXAMPLES = 'viscous_friction:viscous_coefficient=0.1 or payload@wrist:payload_m=0.3'
 #: `armid_ros.identification.fitting.least_squares.ESTIMATORS`.
 ESTIMATORS = ('ols', 'wls', 'irls', 'iv')
@@ -31,7 +31,7 @@ CRITERIA = {
     'condition': 'condition number of the weighted regressor',
     'T': 'torque that a rival model cannot explain',
 }
-#: Parameters that count in the criterion; `armid_ros.excitation.TARGETS`.
+#: Parameters in the criterion; `armid_ros.excitation.TARGETS`.
 TARGETS = {
     'all': 'all base parameters of the rigid body, and those of the effects',
     'gravity': 'masses and first moments as an arm moving slowly shows them, and the effects',

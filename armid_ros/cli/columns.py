@@ -32,7 +32,7 @@ def _option(*names: str, **facts: Any) -> Callable[[Any], Any]:
 
 
 def _rules(ctx: click.Context, parameter: click.Parameter, value: Any) -> Any:
-    """Store pairs of names; refuse malformed ones."""
+    """Store pairs of names; raise an error for malformed pairs."""
     rules = []
     for text in value:
         old, *new = listed(text, ':')
@@ -48,7 +48,7 @@ def _rules(ctx: click.Context, parameter: click.Parameter, value: Any) -> Any:
 
 
 def _numbers(ctx: click.Context, parameter: click.Parameter, value: str | None) -> Any:
-    """Store one number, or one for each joint."""
+    """Store one number, or one number per joint."""
     if value is not None:
         from armid_ros.recording.columns import numbers
 
@@ -132,7 +132,7 @@ options = together(
     _option('--episode', type=int, metavar='N', help='Episode of a LeRobot dataset.'),
 )
 
-#: How recordings are read, and how the result is printed.
+#: Options for reading recordings and printing results.
 recordings = together(options, parameters.topic, parameters.setting, parameters.as_json)
 
 

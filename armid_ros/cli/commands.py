@@ -46,9 +46,9 @@ COMMANDS = {
 
 #: Defaults of options, in the current folder.
 FILE = 'armid.toml'
-#: Key of the context for notes that stderr shows after the work; an error is one line.
+#: Context key of notes that are printed on stderr after the work; an error is one line.
 NOTES = 'armid.notes'
-#: Key of the context for the arguments of the command as they were typed.
+#: Context key of the typed arguments of the command.
 TYPED = 'armid.typed'
 
 
@@ -71,7 +71,7 @@ class Commands(click.Group):
         """
         Find the command and apply the options of armid.toml.
 
-        The error on an unknown command names the most similar one.
+        The error message for an unknown command suggests the most similar command.
 
         """
         try:
@@ -110,7 +110,7 @@ class Commands(click.Group):
             result = super().invoke(ctx)
             _tell_notes(ctx)
             return result
-        except click.exceptions.Exit:  # with a code of its own
+        except click.exceptions.Exit:  # keeps its exit code
             _tell_notes(ctx)
             raise
         except KeyboardInterrupt:
@@ -125,7 +125,7 @@ class Commands(click.Group):
                 raise
             click.echo(f'armid: {remedy}', err=True)
             sys.exit(2)
-        except OSError as error:  # a disk that is full, a folder that went away
+        except OSError as error:  # such as a full disk or a deleted folder
             if error.errno == errno.EPIPE:  # the reader has closed the pipe
                 os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
                 sys.exit(141)  # 128 and the number of SIGPIPE
@@ -141,7 +141,7 @@ def _tell_notes(context: click.Context) -> None:
 
 @cache
 def _imported(name: str) -> click.Command:
-    """Import a command; its options refuse numbers that are not finite."""
+    """Import a command; its options accept finite numbers only."""
     command: click.Command
     if name in COMMANDS:
         module = import_module(f'armid_ros.cli.{COMMANDS[name]}')
@@ -153,7 +153,7 @@ def _imported(name: str) -> click.Command:
 
 
 def _refuse_infinite(command: click.Command) -> None:
-    """Make a command and its subcommands refuse numbers that are not finite."""
+    """Restrict numbers in options of a command and its subcommands to finite numbers."""
     for below in command.commands.values() if isinstance(command, click.Group) else ():
         _refuse_infinite(below)
     for parameter in command.params:
@@ -183,8 +183,8 @@ def project_options(
     """
     Return the defaults of a command from armid.toml, and print them on stderr.
 
-    A key outside of a table sets the option of this name of every command. A key in the table of
-    a command sets the option of that command only.
+    A key outside of a table sets this option for all commands. A key in the table of a command
+    sets the option for that command only.
 
     Parameters
     ----------

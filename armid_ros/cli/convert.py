@@ -105,7 +105,7 @@ def _bag(path: Path, out: Path | None) -> None:
     if out is None:
         raise RecordingError(f'{path}: --dry-run is for tables; armid inspect shows a bag')
     if not is_ros1(path) and not settings.rename:
-        topics(path)  # refuses what is no bag
+        topics(path)  # raises an error if the path is not a bag
         raise RecordingError(
             f'{path}: nothing to do: a bag of ROS 2 stays as it is without --rename'
         )

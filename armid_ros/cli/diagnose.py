@@ -211,7 +211,7 @@ def diagnose(
 
 
 def _identified_from(model: Path, diagnosed: list[Path]) -> tuple[Path, ...]:
-    """Return the recordings of the identification as baseline; none if one is diagnosed."""
+    """Return the recordings of the identification as baseline; empty if one is diagnosed."""
     from armid_ros.identification.output import identified_from, require_as_identified
 
     found = identified_from(model)
@@ -232,11 +232,11 @@ def _model_of(path: Path, robot: Robot) -> ArmModel:
     arm = options.model_of(path, robot)
     try:
         known = load_model(path).robot
-    except ArmidError:  # it was moved, or comes from a bag
+    except ArmidError:  # the description was moved, or is inside a bag
         return arm
     if known.joints == robot.joints and kinematics_digest(known) != kinematics_digest(robot):
         raise ArmidError(
-            f'{path}: was made with a description whose joints are elsewhere than those of '
+            f'{path}: was made with a description with other joints than those of '
             f'{robot.name}; give that description as --robot, or identify this arm'
         )
     return arm

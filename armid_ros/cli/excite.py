@@ -23,7 +23,7 @@ if TYPE_CHECKING:
 
 #: Kinds of trajectories for elastic joints.
 COURSES = ('multisine', 'steps')
-#: Options that both a course, for elastic joints, and a design take; a course takes --share too.
+#: Options that designs and trajectories for elastic joints share; the latter also have --share.
 _SHARED = {
     'robot_source', 'out', 'kind', 'duration', 'clearance', 'environment', 'floor', 'gravity',
     'joints', 'seed', 'force', 'crc', 'memory_limit',
@@ -31,7 +31,7 @@ _SHARED = {
 
 
 class Speed(click.ParamType[str | float]):
-    """A speed class, or a share of the velocity and acceleration limits."""
+    """Speed class, or share of the velocity and acceleration limits."""
 
     name = 'speed'
 
@@ -292,7 +292,7 @@ def _refuse_other_options(context: click.Context, kind: str) -> None:
         fits = name in _SHARED or (name == 'share') == (kind in COURSES)
         given = context.get_parameter_source(name) is not click.core.ParameterSource.DEFAULT
         if given and not fits:
-            raise click.UsageError(f'{option.opts[0]} does not go with --kind {kind}')
+            raise click.UsageError(f'{option.opts[0]} is not available with --kind {kind}')
 
 
 def _driven(source: str, gravity: str, joints: str | None, bags: tuple[Path, ...]) -> Robot:

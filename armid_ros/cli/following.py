@@ -22,7 +22,7 @@ from armid_ros.errors import ModelError
 from armid_ros.identification.output import identified_from
 import click
 
-#: Output folder of each command, in the parent of the folder of the command before.
+#: Output folder of each command, next to the output folder of the previous command.
 _OUT = {
     'identify': 'model',
     'diagnose': 'diagnosis',
@@ -32,7 +32,7 @@ _OUT = {
 }
 #: Commands that take no recordings.
 _ALONE = ('excite', 'simulate')
-#: Options of a run that the next command does not repeat.
+#: Options that are not copied to the next command.
 _OWN = {'robot_source', 'out', 'as_json', 'strict', 'every', 'no_baseline'}
 
 
@@ -83,7 +83,7 @@ def _subject(
         model = before.with_name('model.yaml')
         more = ['--model', model] if then == 'diagnose' and model.exists() else []
         for source in [after] if more else [before, after]:
-            with suppress(ModelError):  # it does not name its recordings
+            with suppress(ModelError):  # model.yaml does not name its recordings
                 bags += identified_from(source)
         return result.core.after.robot, list(dict.fromkeys(bags)) or [Path('BAG')], more
     if isinstance(result, ExcitationResult):
@@ -104,7 +104,7 @@ def _subject(
 
 
 def _typed(context: click.Context, kept: Iterable[str]) -> Iterator[str]:
-    """Yield the options of some names as they were typed."""
+    """Yield the typed values of the named options."""
     known = {
         text: one for one in context.command.params for text in (*one.opts, *one.secondary_opts)
     }

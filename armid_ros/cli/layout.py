@@ -17,7 +17,7 @@ import click
 @click.option('--namespace', default='', help='Namespace of the nodes, as left_arm.')
 @parameters.joints
 def layout(robot_source: str, out: Path, namespace: str, joints: str | None) -> None:
-    """Write layouts for PlotJuggler, Foxglove and RViz that show this robot's joints by name."""
+    """Write layouts of PlotJuggler, Foxglove and RViz with the joints of a robot."""
     from armid_ros.cli import options
     from armid_ros.files import write_file
     from armid_ros.report.layouts import plotter_layouts, SCHEMA

@@ -35,7 +35,7 @@ def main(name: str | None = None) -> int | None:
 
 
 def lacking(error: ModuleNotFoundError) -> str | None:
-    """Return how to install a missing module; None if the module is not part of ROS 2."""
+    """Return install instructions for a missing ROS 2 module; None for other modules."""
     module = (error.name or '').partition('.')[0]
     if module == 'armid_msgs':
         return (

@@ -50,7 +50,7 @@ if TYPE_CHECKING:
 
 Corners = tuple[Sequence[float], Sequence[float]]
 
-#: Key of the context for the plans of tables that have been shown.
+#: Context key of the table plans that were printed.
 _SHOWN = 'armid.columns.shown'
 
 
@@ -205,7 +205,7 @@ def read_settings() -> ReadSettings:
 
 
 def tell_damage(*recordings: Recording) -> None:
-    """Report damage of recording files on stderr, equal reports once."""
+    """Report damage of recording files on stderr, without repeats."""
     for text in dict.fromkeys(
         f'{r.source}: {r.report.damage}' for r in recordings if r.report.damage
     ):
@@ -293,13 +293,13 @@ def box(text: str, robot: Robot) -> tuple[str, Corners]:
 
 
 def per_joint(text: str | None, robot: Robot, option: str) -> FloatArray | None:
-    """Parse one number for all joints, or one for each; None without text."""
+    """Parse one number for all joints, or one number per joint; None without text."""
     with reading(option, RobotError):
         return None if text is None else values_per_joint(numbers(text), robot.joints, repr(text))
 
 
 def read(paths: Sequence[Path], robot: Robot, topic: str | None) -> list[Recording]:
-    """Read the joints of bags and tables; print guesses on stderr, equal ones once."""
+    """Read the joints of bags and tables; print guessed columns on stderr, without repeats."""
     settings, reading = columns.settings(), read_settings()
     shown: set[str] = click.get_current_context().meta.setdefault(_SHOWN, set())
 
@@ -311,7 +311,7 @@ def read(paths: Sequence[Path], robot: Robot, topic: str | None) -> list[Recordi
         shown.add(body)
 
     for path in paths if settings.rename else ():
-        if ':' in path.name and not path.exists():  # a second pair without an option of its own
+        if ':' in path.name and not path.exists():  # a second pair without --rename
             raise RecordingError(
                 f"there is no recording '{path}'; to rename several names, repeat the option: "
                 f"--rename '{settings.rename[-1][0]}:{settings.rename[-1][1]}' --rename '{path}'"
@@ -331,7 +331,7 @@ def read(paths: Sequence[Path], robot: Robot, topic: str | None) -> list[Recordi
 
 
 def kept_source(source: str, robot: Robot, out: Path) -> str:
-    """Return the robot as files in a folder name it; write a robot from a bag to the folder."""
+    """Return the reference to the robot for files; write a robot from a bag to the folder."""
     if source == '-':
         write_file(out / 'robot.urdf', robot.urdf)
         return 'robot.urdf'

@@ -15,7 +15,7 @@ import click
 
 _Command = TypeVar('_Command', bound=Callable[..., Any])
 
-#: Keys of the context for values that several options and commands share.
+#: Context keys of values that several options and commands share.
 FORCE, CRC, MEMORY = 'armid.force', 'armid.crc', 'armid.memory'
 PACKAGES = 'armid.packages'
 
@@ -32,7 +32,7 @@ def together(*options: Callable[[Any], Any]) -> Callable[[_Command], _Command]:
 
 
 class OutPath(click.Path):
-    """A path to write to: an empty one, which would be the current folder, is refused."""
+    """Output path; an empty path, which would be the current folder, is an error."""
 
     def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> Any:
         """Return the path."""
@@ -100,7 +100,7 @@ folder = together(
     ),
     force,
 )
-#: How bags are read.
+#: Options for reading bags.
 reading = together(
     click.option(
         '--crc/--no-crc',

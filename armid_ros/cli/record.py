@@ -1,6 +1,6 @@
 # Copyright 2026 The armid_ros developers
 # SPDX-License-Identifier: Apache-2.0
-"""Bags of a simulated arm, and repair of bags whose writer was killed."""
+"""Simulated recordings, and repair of bags whose writer was killed."""
 
 from __future__ import annotations
 
@@ -68,10 +68,10 @@ def simulate(
     **noise: Any,
 ) -> None:
     """
-    Let a simulated arm follow a trajectory and record it.
+    Record a simulated arm that follows a trajectory.
 
-    Joints with joint_elasticity and rotor_inertia have motors with a motion of their own; such an
-    arm is recorded on both sides of its springs.
+    Joints with joint_elasticity and rotor_inertia have motors that move relative to the links;
+    such an arm is recorded on both sides of its springs.
 
     """
     from armid_ros.api.simulation import reference_of
@@ -136,12 +136,12 @@ def _of_some_size(text: str, robot: Robot) -> tuple[Effect, FloatArray]:
             + f'; write {text.partition(":")[0]}:{first}=0.1'
         )
     if effect.traits.weighs:
-        _tell_impossible(text, values, robot)
+        _warn_impossible(text, values, robot)
     return effect, values
 
 
-def _tell_impossible(text: str, values: FloatArray, robot: Robot) -> None:
-    """Warn of a payload that no body can be, or whose centre is beyond the arm's length."""
+def _warn_impossible(text: str, values: FloatArray, robot: Robot) -> None:
+    """Warn of a payload that is physically inconsistent, or farther away than the arm is long."""
     from armid_ros.model.pseudo_inertia import Consistency
     from armid_ros.robots.robot import PER_LINK
     import numpy as np

@@ -24,7 +24,7 @@ def say(text: str, colour: str | None = None) -> None:
 @contextmanager
 def progress(what: str) -> Iterator[Tick]:
     """
-    Show a bar while work goes on; yields tick(share, what=None).
+    Show a progress bar; yields tick(share, what=None).
 
     Without a terminal there is a line on stderr every ten seconds.
 

@@ -3,8 +3,8 @@
 """
 The diagnosis: from recordings and a model to a verdict.
 
-Two models are compared with the data, each with and without single causes: the model as given
-(which shows errors of the description), and the model with body and known effects fitted anew.
+Two models are compared with the data, with and without single causes: the given model (which shows
+errors of the description), and the model with refitted body and known effects.
 
 """
 
@@ -41,9 +41,9 @@ from armid_ros.recording import Recording
 import numpy as np
 import numpy.typing as npt
 
-#: Verdicts that leave a part of the gap without a cause.
+#: Verdicts with an unexplained part of the gap.
 OPEN = ('unknown', 'partial')
-#: Called with the share of the work that is done, and the name of the present step.
+#: Callback with the completed share of the work and the name of the present step.
 Progress = Callable[[float, str], None]
 
 #: Note on recordings without two equal periods, whose difference would measure the noise.
@@ -51,7 +51,7 @@ _ASSUMED = (
     'noise of recordings without two equal periods is estimated from differences between '
     'neighbouring samples'
 )
-#: Note where a cause acts for a part of the time and no baseline shows when in held-out data.
+#: Note if a cause acts part of the time and its span in held-out data is unknown.
 _NOT_TIMED = (
     'held-out recordings are not used: without a baseline, the seconds in which the cause acts in '
     'them are not determined'
@@ -85,7 +85,7 @@ def diagnose(
     arm : ArmModel
         The given model: rigid body, gravity, known effects with values.
     recordings : sequence of Recording
-        The recordings in question, with torques; several motions are best.
+        The recordings to diagnose, with torques; several motions are best.
     validate : sequence of Recording
         Recordings that are predicted and not fitted.
     baseline : sequence of Recording
@@ -155,12 +155,12 @@ def diagnose(
         tell(0.2, f'ties to {settings.partner.source}')
         tied = diagnose_ties(explainer, recordings, settings.partner)
         if tied is not None:
-            return _said(tied, notes, explainer, doubt, given)
+            return _as_diagnosis(tied, notes, explainer, doubt, given)
     chosen = explainer.chosen()
-    result = _said(chosen, notes, explainer, doubt, given)
-    return _within(result, chosen, explainer, (recordings, validate, baseline)) or _each_alone(
-        result, ([*recordings, *validate], baseline), used, explainer
-    )
+    result = _as_diagnosis(chosen, notes, explainer, doubt, given)
+    return _diagnose_span(
+        result, chosen, explainer, (recordings, validate, baseline)
+    ) or _each_alone(result, ([*recordings, *validate], baseline), used, explainer)
 
 
 def _hardly_explained(result: Diagnosis, settings: DiagnosisSettings) -> bool:
@@ -169,20 +169,20 @@ def _hardly_explained(result: Diagnosis, settings: DiagnosisSettings) -> bool:
     return result.verdict in OPEN or largest <= settings.thresholds.open_share
 
 
-def _within(
+def _diagnose_span(
     result: Diagnosis,
     chosen: Chosen,
     explainer: Explainer,
     read: tuple[Sequence[Recording], Sequence[Recording], Sequence[Recording]],
 ) -> Diagnosis | None:
-    """Diagnose only the seconds in which a cause acts; None if no cause explains the gap there."""
+    """Diagnose only the time span in which a cause acts; None if no cause explains that gap."""
     settings, look = explainer.settings, chosen.look
     recordings, validate, baseline = read
     if not settings.spans or look is None or not _hardly_explained(result, settings):
         return None
     spans = acting_spans(look, settings.thresholds)
     timed = [*recordings, *validate][: len(spans)]
-    cut = [_cut(*each) for each in zip(spans, timed, strict=True)]
+    cut = [_cropped(*each) for each in zip(spans, timed, strict=True)]
     shorter, unseen = (
         [one for one in part if one is not None]
         for part in (cut[: len(recordings)], cut[len(recordings) :])
@@ -209,8 +209,8 @@ def _within(
     return found.acting_in([one for one in spans if one.stop > one.start])
 
 
-def _cut(span: Span, recording: Recording) -> Recording | None:
-    """Return the part of a recording in which a cause acts."""
+def _cropped(span: Span, recording: Recording) -> Recording | None:
+    """Return the time span of a recording in which a cause acts."""
     if span.whole:
         return recording
     inside = recording.t >= span.start + _UNSURE, recording.t <= span.stop - _UNSURE
@@ -223,20 +223,20 @@ def _each_alone(
     used: Conditioning,
     explainer: Explainer,
 ) -> Diagnosis:
-    """Return the result, or `bad_data` if it is open or in doubt and a recording is faulty."""
+    """Return the result, or `bad_data` if it is inconclusive and a single recording is faulty."""
     arm = explainer.arm
     open_or_doubted = result.verdict in OPEN or bool(result.doubt)
     if not open_or_doubted or explainer.settings.partner is not None:
         return result
-    apart = [one for day in days for one in _apart(arm, day, used)]
+    apart = [one for day in days for one in _with_unfitted_joints(arm, day, used)]
     alone = mistaken_recordings(arm, apart, used)
     return _bad(plain_arm(arm), result.data, alone, result.notes) if alone else result
 
 
-def _apart(
+def _with_unfitted_joints(
     arm: ArmModel, day: Sequence[Recording], used: Conditioning
 ) -> Iterator[tuple[Recording, npt.NDArray[np.bool_]]]:
-    """Yield recordings with joints that the model fits in other recordings and not in this one."""
+    """Yield recordings with joints whose torque the model fits in the other recordings only."""
     unit = np.ones(arm.robot.n_joints)
     bad, sound = np.zeros((2, len(day), len(unit)), dtype=bool)
     for k, one in enumerate(day):
@@ -249,7 +249,7 @@ def _apart(
             yield one, own
 
 
-def _said(
+def _as_diagnosis(
     chosen: Chosen, notes: Sequence[str], explainer: Explainer, doubt: str, given: ArmModel
 ) -> Diagnosis:
     """Return the diagnosis of an explanation; shares are measured on held-out data."""
@@ -257,7 +257,7 @@ def _said(
     explainer.tell(0.85, 'held-out gap')
     explanation, said = as_bodies(chosen.explanation)
     notes = [*notes, *chosen.notes, *(said if explanation.steps else ())]
-    unseen = _unseen(explainer.unseen, explanation, chosen)
+    unseen = _held_out_evidence(explainer.unseen, explanation, chosen)
     least = 0.0 if chosen.measured else settings.thresholds.headline
     explanation, shares = headline(explanation, least, settings)
     whole = shares.share(range(len(explanation.steps)))
@@ -314,7 +314,7 @@ def _said(
 def _not_visible(
     explanation: Explanation, found: Sequence[Finding], explainer: Explainer
 ) -> tuple[str, ...]:
-    """Return the effects that no place shows, in the order of the catalogue."""
+    """Return the effects that are not visible on any joint, in the order of the catalogue."""
     hidden = set() if explanation.survey is None else explanation.survey.hidden
     hidden -= {finding.name for finding in found}
     if explainer.baseline is None:  # what is fitted with every cause is seen in its own values
@@ -342,7 +342,7 @@ def _remarks(
     return [text for text, told in remarks.items() if text and told]
 
 
-def _unseen(
+def _held_out_evidence(
     data: Sequence[Trajectory], explanation: Explanation, chosen: Chosen
 ) -> Evidence | None:
     """Return the held-out recordings, weighted by the noise, or the misfit if larger."""

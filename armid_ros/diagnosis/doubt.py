@@ -58,7 +58,7 @@ def doubt_of(
 
 
 def doubt_of_names(findings: Sequence[Finding]) -> str:
-    """Return a sentence if a named cause cannot arise between two days; else an empty one."""
+    """Return a sentence if a named cause cannot arise between two days; empty otherwise."""
     for one in findings:
         if one.name in CATALOGUE and CATALOGUE[one.name].traits.corrects:
             return (
@@ -84,7 +84,7 @@ def _changed(
         return times, times / most
 
     times, beyond = compared(baseline)
-    if misfit.filters is not None and beyond.max() > 1.0:  # other filters pass more noise
+    if misfit.filters is not None and beyond.max() > 1.0:  # the misfit had other filters
         try:
             parts = trajectories(recordings, Conditioning(*misfit.filters), arm)
         except IdentificationError:  # too short for these filters, or sampled more slowly

@@ -82,7 +82,7 @@ def choose_filters(
     """
     Return the filters of an identification, narrowed to the band that a diagnosis needs.
 
-    The cut-off is chosen from the baseline if there is one: its residual has no missing effect.
+    The cut-off is chosen from the baseline, if any, as the baseline has no missing effect.
 
     """
     used = conditioning([*recordings, *baseline], settings.signals)

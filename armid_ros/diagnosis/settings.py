@@ -17,12 +17,12 @@ from armid_ros.identification import SignalSettings
 @dataclass(frozen=True)
 class Thresholds:
     """
-    The thresholds of the diagnosis. Shares are of the squared held-out residual, in its unit.
+    Thresholds of the diagnosis. Shares are parts of the squared weighted held-out residual.
 
     Attributes
     ----------
     alarm : float
-        Log odds required to accept that an effect is there, or has changed: 50 to 1.
+        Log odds required to accept that an effect is present, or has changed: 50 to 1.
     alone : float
         Log odds required of a cause and of its rivals, once one of them reaches `alarm`: 7 to 1.
     tie : float
@@ -94,7 +94,7 @@ class DiagnosisSettings:
     library : tuple of str
         Effects of the catalogue that may be named.
     own : tuple of type of Effect
-        Effects of the user that may be named as well.
+        User-defined effects that may be named.
     partner : Partner or None
         Another machine that was recorded with the arm, to which it may be tied. Springs and
         contacts are then searched for between the two, and not at unknown places.
@@ -105,7 +105,7 @@ class DiagnosisSettings:
     everything : bool
         Whether causes that are not material are added to the patched model as well.
     spans : bool
-        Whether causes that act for a part of the time are tried if a gap stays open.
+        Whether causes that act part of the time are compared if a gap remains.
     prior : mapping of str to str
         Frequency of effects on this arm, by name: often, usual, seldom or never.
     thresholds : Thresholds

@@ -30,7 +30,7 @@ NO_FRICTION = 1e-12
 
 
 class Displacement(NamedTuple):
-    """A change of a motion: of position, velocity and acceleration, each of shape (N, n, ...)."""
+    """Change of position, velocity and acceleration, each of shape (N, n, ...)."""
 
     q: FloatArray
     dq: FloatArray
@@ -90,7 +90,7 @@ class DryFriction:
 @dataclass(frozen=True)
 class BlurredMotion(Motion):
     """
-    A motion whose direction changes smoothly where it reverses, as tanh(dq / width).
+    Motion whose direction is smoothed at reversals, as tanh(dq / width).
 
     The sign of a velocity has no useful gradient for the search for a trajectory.
 
@@ -294,7 +294,7 @@ def merge_actions(robot: Robot, actions: Sequence[Action]) -> Action:
 
 
 def sum_laws(laws: Sequence[TorqueLaw]) -> TorqueLaw | None:
-    """Return the sum of torque laws; None without a law."""
+    """Return the sum of torque laws; None if there is no law."""
 
     def torque(t: FloatArray, q: FloatArray, dq: FloatArray) -> FloatArray:
         return np.asarray(sum(law(t, q, dq) for law in laws))

@@ -1,7 +1,7 @@
 # Copyright 2026 The armid_ros developers
 # SPDX-License-Identifier: Apache-2.0
 """
-The base class of effects: one physical cause of joint torque besides the rigid body.
+The base class of effects: a physical cause of joint torque in addition to the rigid body.
 
 The simulation uses how an effect acts (``action``). The identification uses how the torques depend
 on its parameters (``columns``). The diagnosis checks whether this dependence explains a residual.
@@ -69,7 +69,7 @@ class Effect(ABC):
     summary: ClassVar[str]
     quantities: ClassVar[tuple[Quantity, ...]]
     shapes: ClassVar[tuple[Shape, ...]] = ()
-    #: Descriptions and prior knowledge; a table has those of the shipped effects.
+    #: Descriptions and prior knowledge; shipped effects have them in `traits.py`.
     traits: ClassVar[Traits] = Traits()
     #: Whether the torque of a joint at rest is undetermined between two levels.
     holds_at_rest: ClassVar[bool] = False
@@ -96,8 +96,8 @@ class Effect(ABC):
         values = tuple(float(value) for value in self.shape) or defaults
         if len(values) != len(defaults):
             raise ModelError(
-                f'{self.name}: {len(values)} shape values for {len(self.owners)} times '
-                f'{", ".join(s.name for s in self.shapes) or "no shape"}'
+                f'{self.name}: {len(values)} shape values; {len(defaults)} are needed, '
+                f'{", ".join(s.name for s in self.shapes) or "none"} of each owner'
             )
         for index, value in enumerate(values):
             shape = self.shapes[index % len(self.shapes)]
@@ -132,7 +132,7 @@ class Effect(ABC):
 
     @classmethod
     def _possible_joints(cls, robot: Robot) -> tuple[str, ...]:
-        """Return the joints on which the effect can act: those with an actuator."""
+        """Return the joints with an actuator, on which the effect can act."""
         return robot.joints
 
     @classmethod
@@ -160,7 +160,7 @@ class Effect(ABC):
 
     @classmethod
     def as_change(cls) -> type[Effect]:
-        """Return the class for a change between two days, when the effect may exist already."""
+        """Return the class for a change between two days, as the effect may exist before."""
         return cls
 
     def particulars(self) -> dict[str, Any]:
@@ -208,9 +208,8 @@ class Effect(ABC):
             spread = np.broadcast_to(np.asarray(values, dtype=float), size)
         except ValueError:
             raise ModelError(
-                f'{self.name}: the shape of {size[0]} owners with '
-                f'{", ".join(s.name for s in self.shapes) or "no shape"} has size {size}, '
-                f'not {np.shape(values)}'
+                f'{self.name}: the shape array has size {size}, not {np.shape(values)}: a row for '
+                f'each owner, columns {", ".join(s.name for s in self.shapes) or "none"}'
             ) from None
         return replace(self, shape=tuple(spread.ravel().tolist()))
 
@@ -310,7 +309,7 @@ class Effect(ABC):
 
     def action(self, values: FloatArray, arm: Arm) -> Action:
         """
-        Return how the effect acts on the plant with given parameter values.
+        Return the action of the effect on the plant for given parameter values.
 
         By default, the torque on the link side is columns @ values. This is correct for a torque
         that is linear in the values and depends on time, position and velocity only.
@@ -388,14 +387,14 @@ def _spread_shape(
     joints: tuple[str, ...],
     among: tuple[str, ...],
 ) -> FloatArray:
-    """Return shape parameters for all joints, with defaults, shape (S, n)."""
+    """Return the shape parameters of all joints, defaults included, shape (S, n)."""
     spread = np.tile([[s.default] for s in shapes], len(among))
     spread[:, _places(joints, among)] = np.array(values).reshape(-1, len(shapes)).T
     return read_only(spread)
 
 
 class Arm(Protocol):
-    """A rigid body with effects; `armid_ros.arm.ArmModel` is one."""
+    """Protocol of a rigid body with effects, such as `armid_ros.arm.ArmModel`."""
 
     @property
     def robot(self) -> Robot:

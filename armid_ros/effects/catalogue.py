@@ -1,7 +1,7 @@
 # Copyright 2026 The armid_ros developers
 # SPDX-License-Identifier: Apache-2.0
 """
-The catalogue: every effect that can be simulated, estimated and named.
+Catalogue of all effects that can be simulated, estimated and named.
 
 The effects below are shipped. Other effects come from ``register``, or from installed packages: an
 entry point of the group ``armid_ros.effects`` names a class, or a module that registers classes.
@@ -48,7 +48,7 @@ import numpy as np
 
 #: Entry-point group of packages that provide effects.
 GROUP = 'armid_ros.effects'
-#: Pattern of names, which occur in files, on command lines and between '@', '+', ':' and ','.
+#: Pattern of names; names occur in files, on command lines, and next to '@', '+', ':' and ','.
 _NAME = re.compile(r'[a-z][a-z0-9_]*')
 
 _EFFECTS: tuple[type[Effect], ...] = (
@@ -331,7 +331,7 @@ def make_effect(text: str, robot: Robot) -> Effect:
     return CATALOGUE.find(name).on(robot, listed(joints, '+') if joints else None)
 
 
-#: Two examples of texts for `parse_effect`, for help texts and messages.
+#: Two example arguments of `parse_effect`, for help texts and messages.
 EXAMPLES = 'viscous_friction:viscous_coefficient=0.1 or payload@wrist:payload_m=0.3'
 
 

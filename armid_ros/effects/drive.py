@@ -41,7 +41,7 @@ class RotorInertia(Effect):
         return Action(inertia=np.diag(inertia))
 
 
-#: Lowest order of a ripple [1/rev]; gravity has lower ones.
+#: Lowest order of a ripple [1/rev]; gravity has lower orders.
 _SLOWEST = 1.5
 #: Number of returned orders.
 _MOST_PEAKS = 3
@@ -86,7 +86,7 @@ class TorqueRipple(Effect):
         return (np.array(orders),)
 
     def plausible(self, values: FloatArray, std: FloatArray, arm: Arm) -> bool:
-        """Return whether the order is above the lowest one, which other causes explain."""
+        """Return whether the order exceeds the lowest order, which other causes explain."""
         return bool(np.all(self.shape_values > 1.05 * _SLOWEST))
 
     def columns(self, motion: Motion, arm: Arm) -> FloatArray:
@@ -162,7 +162,7 @@ def wave_gains(
 @dataclass(frozen=True)
 class ActuatorSaturation(TorqueReading):
     """
-    Saturation: torque beyond a level that a drive does not supply or does not report.
+    Saturation: a drive does not supply, or does not report, torque beyond a level.
 
     With the excess over the level L, e(x) = sign(x) max(|x| - L, 0):
 
@@ -183,8 +183,7 @@ class ActuatorSaturation(TorqueReading):
         Quantity('lost_share', '', lower=0.0, upper=1.0, typical=(0.05, 1.0)),
         Quantity('clipped_share', '', lower=0.0, upper=1.0, typical=(0.05, 1.0)),
     )
-    #: Start values near the highest measured torque; far below, the effect would be the whole
-    #: torque.
+    #: Start values near the highest measured torque; lower values would replace the whole torque.
     shapes = (
         Shape('saturation_torque', 'N m', 1e-6, 1e6, 10.0, (0.3, 1.0, 3.0, 10.0, 30.0), near=0.08),
     )

@@ -85,7 +85,7 @@ class AsymmetricFriction(Effect):
     holds_at_rest = True
 
     def plausible(self, values: FloatArray, std: FloatArray, arm: Arm) -> bool:
-        """Return whether the total friction still opposes motion in both directions."""
+        """Return whether the total friction opposes motion in both directions."""
         friction = arm.action().dry_friction
         if friction is None:
             return True
@@ -99,7 +99,7 @@ class AsymmetricFriction(Effect):
         return joint_columns(self, motion, forwards**2, forwards * motion.dq)
 
     def action(self, values: FloatArray, arm: Arm) -> Action:
-        """Return the shift of the dry friction levels, and the torque that grows with |dq|."""
+        """Return the shift of the dry friction levels, and the torque proportional to |dq|."""
         coulomb, viscous = scatter(self, values, arm.robot)
 
         def torque(t: FloatArray, q: FloatArray, dq: FloatArray) -> FloatArray:

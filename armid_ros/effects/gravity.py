@@ -61,7 +61,7 @@ class GravityMagnitude(_GravityEffect):
         return np.asarray(arm.gravity_columns(motion) @ direction)
 
     def plausible(self, values: FloatArray, std: FloatArray, arm: Arm) -> bool:
-        """Return whether gravity keeps its direction; otherwise the base would be upside down."""
+        """Return whether gravity keeps its direction, so that the base is not upside down."""
         return bool(values[0] > -np.linalg.norm(arm.robot.gravity))
 
     def action(self, values: FloatArray, arm: Arm) -> Action:

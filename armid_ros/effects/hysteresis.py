@@ -38,7 +38,7 @@ class LoadDependentFriction(Effect):
         return joint_columns(self, motion, np.abs(load) * direction(motion))
 
     def action(self, values: FloatArray, arm: Arm) -> Action:
-        """Return dry friction whose levels move apart with the load."""
+        """Return dry friction whose upper and lower level depend on the load."""
         (share,) = scatter(self, values, arm.robot)
         zero = np.zeros_like(share)
         return Action(dry_friction=DryFriction(np.eye(len(share)), zero, zero, share))
@@ -47,7 +47,7 @@ class LoadDependentFriction(Effect):
 @dataclass(frozen=True)
 class PreslidingHysteresis(Effect):
     """
-    Friction that builds up over a short travel after each reversal, tau = F h.
+    Friction that increases over a short distance after each reversal, tau = F h.
 
     dh = (1 - h sign(dq)) |dq| / s: asperities bend before they slip. The torque depends on the
     travel since the last reversal, not on velocity. The hysteresis loops are the same at any rate,

@@ -28,8 +28,8 @@ import numpy as np
 #: Positions and velocities of all k anchors [m, m/s] at times of shape (N,), each (N or 1, k, 3).
 Anchor = Callable[[FloatArray], tuple[FloatArray, FloatArray]]
 
-#: Anchors of straps to try: distances from the mean position of the attachment, over the spread of
-#: its positions, in all directions of a cube. Slacks are quantiles of the length.
+#: Candidate anchors of straps: distances from the mean position of the attachment, over the spread
+#: of its positions, in all directions of a cube. Slacks are quantiles of the length.
 _DISTANCES, _SLACKS = (0.0, 0.7, 1.5, 3.0), (0.0, 0.2, 0.4, 0.6, 0.8)
 
 _AXES = ('x', 'y', 'z')
@@ -47,13 +47,13 @@ class Attached(Effect):
         return robot.moving
 
     def _default_shape(self, robot: Robot) -> FloatArray:
-        """Attach at the centres of mass, or at the links if a centre is beyond the arm."""
+        """Attach to the centres of mass, at most one reach of the arm from the joint."""
         values, model = self.shape_values, robot.model
         reach = max(float(np.linalg.norm(place.translation)) for place in model.jointPlacements)
         for row, joint in zip(values, self.joints, strict=True):
             lever = model.inertias[model.getJointId(joint)].lever
             away = float(np.linalg.norm(lever))
-            # the link of an arm without other joints has an assumed reach of 1 m
+            # the assumed reach of an arm with one joint is 1 m
             row[:3] = lever * min((reach or 1.0) / max(away, 1e-12), 1.0)
         return values
 
@@ -76,7 +76,7 @@ class Attached(Effect):
         """Return the anchors of the springs."""
 
     def action(self, values: FloatArray, arm: Arm) -> Action:
-        """Return the torque that the springs require."""
+        """Return an action with the torque of the springs."""
         robot, anchor = arm.robot, self._anchor(arm)
 
         def torque(t: FloatArray, q: FloatArray, dq: FloatArray) -> FloatArray:
@@ -197,7 +197,7 @@ class InterfaceSlack(Attached):
             columns = rest(straps)
             own, aim = np.sum(columns**2, axis=0), columns.T @ target
             gain = np.maximum(aim, 0.0) ** 2 / np.maximum(own, max(1e-12 * own.max(), 1e-300))
-            best = np.argsort(-gain)[:2]  # both are compared with other causes
+            best = np.argsort(-gain)[:2]  # both become candidate causes
             starts.append([(*shape[:3], *anchors[k], slacks[k]) for k in best])
         return tuple(np.array(starts).transpose(2, 0, 1))
 

@@ -1,7 +1,7 @@
 # Copyright 2026 The armid_ros developers
 # SPDX-License-Identifier: Apache-2.0
 """
-Torque that was learned from recordings, without a physical cause.
+Torque that is learned from recordings, without a physical model.
 
 Each joint has a map from position, velocity and load to torque: the mean of a Gaussian process on
 inducing points. Far from all points the mean is zero, and the standard deviation is that of the
@@ -75,7 +75,7 @@ class TorqueMap:
         count = len(self.weights)
         shapes = self.points.shape, self.noise.shape, self.lengths.shape
         if shapes != ((count, len(INPUTS)), (count,), (len(INPUTS),)):
-            raise ModelError(f'a torque map of {count} weights has arrays of shapes {shapes}')
+            raise ModelError(f'torque map of {count} weights: its arrays have shapes {shapes}')
         sizes = (*self.lengths, *self.noise, self.amplitude, self.knee)
         if not min(sizes) > 0.0:
             raise ModelError(
@@ -83,7 +83,7 @@ class TorqueMap:
             )
 
     def __eq__(self, other: object) -> bool:
-        """Return whether another map has the same numbers."""
+        """Return whether two maps have equal values."""
         return isinstance(other, TorqueMap) and self._numbers == other._numbers
 
     def __hash__(self) -> int:
@@ -163,7 +163,7 @@ class TorqueMap:
 @dataclass(frozen=True)
 class LearnedTorque(Effect):
     """
-    Learned torque of joints over position, velocity and load, if no known effect explains it.
+    Learned torque of joints as a function of position, velocity and load.
 
     The load is the torque that holds the arm at its position. Far from the motions of the training
     data, the learned torque is zero. The effect is confounded with every other effect, and is
@@ -238,7 +238,7 @@ class LearnedTorque(Effect):
 
 
 def counted(inputs: FloatArray, knee: float) -> FloatArray:
-    """Return inputs (..., 3) with velocities on the scale u of `TorqueMap`."""
+    """Convert velocities among inputs, (..., 3), to the scale u of `TorqueMap`."""
     velocity = knee * np.arcsinh(inputs[..., 1] / knee)
     return np.stack([inputs[..., 0], velocity, inputs[..., 2]], axis=-1)
 

@@ -102,7 +102,7 @@ class Payload(_LinkBody):
 
     @classmethod
     def as_change(cls) -> type[Effect]:
-        """Return the class for a load that may have been put down."""
+        """Return the class for a change of the load."""
         return PayloadChange
 
     def plausible(self, values: FloatArray, std: FloatArray, arm: Arm) -> bool:
@@ -143,9 +143,9 @@ class Payload(_LinkBody):
 @dataclass(frozen=True)
 class PayloadChange(Payload):
     """
-    Change of the payload of a link; a payload may have been put down.
+    Change of the payload of a link, which may be negative.
 
-    A negative mass is a payload that was put down. The model contains it in the link that held it.
+    A negative mass is a payload that was put down, which the model contains in its link.
 
     """
 
@@ -153,10 +153,9 @@ class PayloadChange(Payload):
 
     def plausible(self, values: FloatArray, std: FloatArray, arm: Arm) -> bool:
         """
-        Return whether the change can be a load that was picked up or put down.
+        Return whether the change is plausible for a load that was picked up or put down.
 
-        The load may be heavier than the links, because a description often lacks the load that the
-        arm held before.
+        The load may be heavier than the links, because descriptions often lack the previous load.
 
         """
         return self._weighs(np.concatenate([np.abs(values[:1]), values[1:]]), std, arm)

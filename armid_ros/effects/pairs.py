@@ -47,7 +47,7 @@ class _Pairs(Effect):
         return tuple(chain.from_iterable(pairwise(robot.joints)))
 
     def in_usual_place(self, robot: Robot) -> bool:
-        """Return True: no pair of joints is more usual than another."""
+        """Return True, as no pair of joints is more likely than others."""
         return True
 
     @classmethod
@@ -61,7 +61,7 @@ class _Pairs(Effect):
         return self.joints[::2]
 
     def parameters(self, robot: Robot) -> tuple[ParameterName, ...]:
-        """Name the parameters, pair by pair, with the units between the two joints."""
+        """Return the parameter names of each pair, with the units of the two joints."""
         return tuple(
             ParameterName(q.name, first, pair_unit(q.unit, first, second, robot))
             for first, second in zip(self.joints[::2], self.joints[1::2], strict=True)

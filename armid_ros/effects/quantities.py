@@ -136,7 +136,7 @@ class Shape:
             return False
         if self.lower >= 0.0:
             least = min((start for start in self.grid if start > 0.0), default=0.0)
-            # a wider confidence interval is uninformative
+            # values with wider confidence intervals are uninformative
             return half_width <= 3.0 * max(value, least)
         span = max(self.grid, default=0.0) - min(self.grid, default=0.0)
         return span <= 0.0 or half_width <= span

@@ -3,8 +3,8 @@
 """
 Base classes of effects on the recording: on positions, or on torque readings.
 
-A recording is the motion of an arm seen through position sensors and its torque seen through
-torque sensors. The torque that a model predicts for a recorded motion is
+A recording contains the motion of an arm as measured by position sensors, and its torque as
+measured by torque sensors. The torque that a model predicts for a recorded motion is
 
     reading(torque(motion + displacement)),
 
@@ -25,7 +25,7 @@ import numpy as np
 
 @dataclass(frozen=True)
 class Displacing(Effect):
-    """An effect that makes the true motion of the links differ from the recorded one."""
+    """Effect that displaces the links from the recorded motion."""
 
     @abstractmethod
     def displacements(self, motion: Motion, arm: Arm) -> Displacement:
@@ -55,7 +55,7 @@ class Displacing(Effect):
 
 @dataclass(frozen=True)
 class TorqueReading(Effect):
-    """An effect that makes the recorded torque differ from the true one."""
+    """Effect that changes the recorded torque."""
 
     @abstractmethod
     def read(self, values: FloatArray, motion: Motion, tau: FloatArray) -> FloatArray:

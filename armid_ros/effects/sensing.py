@@ -47,7 +47,7 @@ class TorqueOffset(Effect):
 @dataclass(frozen=True)
 class TorqueGain(TorqueReading):
     """
-    Torque readings that are too large by a share, reading = (1 + epsilon) tau.
+    Torque readings with a relative error, reading = (1 + epsilon) tau.
 
     The cause is a wrong motor constant or sensor scale. The same share in all joints is exactly
     collinear with a scaling of all masses, inertias and friction; one known payload distinguishes

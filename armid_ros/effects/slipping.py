@@ -91,7 +91,7 @@ class Hysteresis:
         by_way = np.zeros_like(way)
         for element in np.flatnonzero(by_state.any(axis=0)):
             path, state, distance = way[:, element], states[:, element], self.distance[element]
-            # backwards, as the state of a stretch begins with that of the one before
+            # backwards, as the initial state of a stretch is the final state of the previous one
             for first, last, end in reversed(_stretches(path)):
                 own = slice(first + 1, last + 1)
                 decay = np.exp(-np.abs(path[own] - path[first]) / distance)

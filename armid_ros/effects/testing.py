@@ -121,7 +121,7 @@ def sines(robot: Robot, duration: float = 0.5, rate: float = 200.0) -> Motion:
 
 def check_effect(kind: type[Effect], robot: Robot | None = None) -> None:
     """
-    Check that a class of effects keeps its contract.
+    Check that an effect class satisfies the interface of `Effect`.
 
     Parameters
     ----------
@@ -174,7 +174,7 @@ def it_says_what_it_is(trial: EffectCase) -> None:
 
 
 def columns_have_one_place_per_parameter(trial: EffectCase) -> None:
-    """Fail if columns are not finite, or not of shape (N, n, P)."""
+    """Fail if columns have nonfinite values or a shape other than (N, n, P)."""
     columns = ArmModel(trial.robot).columns_of(trial.effect, trial.motion)
     assert np.all(np.isfinite(columns)), 'columns are not finite'
 
@@ -253,7 +253,7 @@ def _compare(trial: EffectCase, values: FloatArray, columns: FloatArray) -> None
         )
 
 
-#: All checks, in the order in which they are made.
+#: All checks, in order.
 CHECKS: tuple[Callable[[EffectCase], None], ...] = (
     it_says_what_it_is,
     columns_have_one_place_per_parameter,

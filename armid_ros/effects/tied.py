@@ -63,9 +63,9 @@ class Tied(Attached):
         beside, names = motion.partner, self.points
         if beside is None or not set(names) <= set(beside.names):
             raise ModelError(
-                f'{self.name} of {", ".join(self.joints)}: it ends at points of '
-                f'{self.partner or "another machine"} ({", ".join(names)}), whose motion was not '
-                f'recorded with that of the arm; name it with --partner'
+                f'{self.name} of {", ".join(self.joints)}: the motion of its anchor points on '
+                f'{self.partner or "another machine"} ({", ".join(names)}) was not recorded; name '
+                f'that machine with --partner'
             )
         columns = [beside.names.index(name) for name in names]
         position, velocity = beside.position[:, columns], beside.velocity[:, columns]
@@ -181,7 +181,7 @@ def tied_effect(
 
 def tied_as_written(entry: Mapping[str, Any], robot: Robot) -> Tied:
     """
-    Make a tied effect from an entry of model.yaml, with its ``particulars``.
+    Make a tied effect from its entry in model.yaml.
 
     Raises
     ------

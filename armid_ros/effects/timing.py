@@ -21,20 +21,20 @@ from scipy.signal import butter, lfilter, sosfiltfilt
 
 @dataclass(frozen=True)
 class LateReading(TorqueReading):
-    """A late torque reading, whose error is proportional to the rate of the torque."""
+    """Late torque reading; its error is proportional to the rate of the torque."""
 
     @abstractmethod
     def _late(self, values: FloatArray, motion: Motion, x: FloatArray) -> FloatArray:
-        """Return late signals of all joints, shape (N, n, ...)."""
+        """Return delayed signals of all joints, shape (N, n, ...)."""
 
     def read(self, values: FloatArray, motion: Motion, tau: FloatArray) -> FloatArray:
-        """Return the late torque, shape (N, n) [N m]."""
+        """Return the delayed torque, shape (N, n) [N m]."""
         return self._late(values, motion, tau)
 
     def transfer(
         self, values: FloatArray, motion: Motion, tau: FloatArray, columns: FloatArray
     ) -> FloatArray:
-        """Return the columns, late by the same amount as the torque."""
+        """Return the columns with the delay of the torque."""
         return self._late(values, motion, columns)
 
     def columns(self, motion: Motion, arm: Arm) -> FloatArray:
@@ -61,7 +61,7 @@ class LateReading(TorqueReading):
 @dataclass(frozen=True)
 class TimeDelay(LateReading):
     """
-    Torque readings older than the positions they are recorded with, reading(t) = tau(t - delay).
+    Torque readings that are delayed relative to the positions, reading(t) = tau(t - delay).
 
     The torque is cubic between samples, with the slopes of `rate_of_change` (Hermite's spline).
     By default, the whole arm has one delay, as with one late clock or bus; named joints have one
@@ -105,7 +105,7 @@ class TimeDelay(LateReading):
 @dataclass(frozen=True)
 class TorqueLag(LateReading):
     """
-    Torque readings behind a first-order low-pass, T dreading/dt + reading = tau.
+    Torque readings filtered by a first-order low-pass, T dreading/dt + reading = tau.
 
     The cause is a current loop or the filter of a sensor. The first order is -dtau/dt, as for
     time_delay. In addition the lag attenuates by 1 / sqrt(1 + (omega T)^2), which is visible in
@@ -177,7 +177,7 @@ def smoothed(motion: Motion) -> Motion:
 
 def low_pass(t: FloatArray, x: FloatArray, lag: float) -> FloatArray:
     """
-    Filter samples on an even time base, T dy/dt + y = x, from a start in steady change.
+    Filter evenly spaced samples, T dy/dt + y = x, from an initial state of constant rate.
 
     The filter is computed as y = x - T v, where v is the filtered rate of x, and the rate is
     linear between samples. It is of second order in the step for any ratio of lag and step. A

@@ -3,8 +3,8 @@
 """
 Descriptions and prior knowledge of the shipped effects, in one table.
 
-The classes of effects contain the law of the torque. This table contains everything else: texts,
-frequency of occurrence, and the attributes of a description that hold the quantities.
+The classes of effects contain the law of the torque. This table contains texts, frequency of
+occurrence, and the URDF attributes of the quantities.
 
 """
 
@@ -16,12 +16,12 @@ from dataclasses import dataclass
 @dataclass(frozen=True)
 class Traits:
     """
-    Knowledge on a kind of effect apart from its torque law.
+    Texts and prior knowledge of an effect class, in addition to its torque law.
 
     Attributes
     ----------
     shown_by : str
-        The experiment that identifies the effect best, in words.
+        Description of the experiment that identifies the effect best.
     look_at : str
         Part of the robot to inspect before the next recording.
     sign : str

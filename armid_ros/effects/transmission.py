@@ -71,7 +71,7 @@ class JointElasticity(Displacing):
 @dataclass(frozen=True)
 class Backlash(Displacing):
     """
-    Free play of a gear, q_link = q_motor - b / 2 on the flank that carries the load.
+    Free play of a gear, q_link = q_motor - b / 2 on the loaded flank.
 
     When the load changes its sign, the link leaves its flank and crosses to the other flank, with
     the acceleration load / M_jj relative to the motor, and lands without a bounce. The width of

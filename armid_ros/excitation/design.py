@@ -128,7 +128,7 @@ def design(
     settings : DesignSettings
         Settings of the design.
     rng : Generator
-        Source of randomness; the same state gives the same trajectory.
+        Source of randomness; equal states give equal trajectories.
     collision : CollisionModel, optional
         Bodies to keep apart by ``settings.clearance``, such as ``collision_model(arm.robot)``, or
         ``with_obstacles`` of it.
@@ -180,7 +180,7 @@ def design(
 
 def placed(problem: DesignProblem, trajectory: FourierTrajectory) -> Excitation:
     """
-    Return a run of a trajectory that keeps all limits from rest to rest.
+    Return a run from rest to rest along a trajectory, within all limits.
 
     The run enters the trajectory at the point where the run-in uses the smallest share of the
     limits. The run-in is made longer until all limits are kept.
@@ -202,7 +202,7 @@ def placed(problem: DesignProblem, trajectory: FourierTrajectory) -> Excitation:
 
     run_in = settings.run_in
     last = ''
-    for _ in range(12):  # run-ins, each longer than the last
+    for _ in range(12):  # run-ins of increasing duration
         runs = [
             Excitation(
                 trajectory.shifted(k * trajectory.period / _ENTRIES),

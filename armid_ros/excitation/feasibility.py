@@ -1,7 +1,7 @@
 # Copyright 2026 The armid_ros developers
 # SPDX-License-Identifier: Apache-2.0
 """
-Feasible trajectories: the check of one, random ones, and templates of motions.
+Feasible trajectories: check, random trajectories, and motion templates.
 
 Position, velocity, acceleration and torque are sampled densely. A bound on the increase of a curve
 between two samples is added. The clearance is proven on every interval.
@@ -98,7 +98,7 @@ def _violations(
 
 
 def _outward(values: FloatArray, periodic: bool) -> FloatArray:
-    """Move samples away from their mean by a bound on the error between two samples."""
+    """Enlarge samples about their mean by a bound on the error between two samples."""
     # the bound is h^2 M / 8 for second derivatives below M, estimated from second differences;
     # nothing is added where dry friction makes the second differences jump
     if periodic:
@@ -112,7 +112,7 @@ def _outward(values: FloatArray, periodic: bool) -> FloatArray:
     return np.asarray(values + np.sign(values - values.mean(axis=0)) * size / 8.0)
 
 
-#: How often the amplitudes of a trajectory are reduced until it is feasible.
+#: Largest number of amplitude reductions to make a trajectory feasible.
 _SHRINKS = 6
 
 #: Samples per period and harmonic for the first check of a drawn trajectory.
@@ -167,7 +167,7 @@ def random_feasible(
     found = _shrunk(arm, limits, around, clearance, 8 * _SHRINKS)
     if found is None:
         raise TrajectoryError(
-            f'no motion is possible about the pose {", ".join(f"{x:.2f}" for x in centre)}'
+            f'no motion around this pose is feasible: {", ".join(f"{x:.2f}" for x in centre)}'
             f': {trajectory_faults(arm, limits, around.scaled(0.01), clearance)}'
         )
     return found
@@ -180,7 +180,7 @@ def feasible_pose(
     clearance: ClearanceModel | None,
 ) -> FloatArray:
     """
-    Return the pose with the largest clearance among random poses that the arm can hold.
+    Return the pose with the largest clearance among random poses within torque limits.
 
     Raises
     ------
@@ -282,7 +282,7 @@ CLEARANCE = 0.01
 @dataclass(frozen=True)
 class Template:
     """
-    A kind of motion of some joints, to be scaled to the limits.
+    Template of a motion of some joints, which is scaled to the limits.
 
     Attributes
     ----------
@@ -325,7 +325,7 @@ class Template:
         """
         limits = Limits.of(arm.robot, speed=self.speed)
         faults = ''
-        # number of draws of a motion of single joints; each draw has another pose of the other
+        # number of draws of a single-joint motion; each draw has a different pose of the other
         # joints
         for _ in range(6):
             whole = random_feasible(

@@ -107,8 +107,8 @@ class MotionGate:
         """
         phase = float(np.clip(phase, 0.0, self.run.duration))
         path = self.run.at([phase])
-        # half a cosine takes pi / 2 times as long as a constant deceleration; a run within its
-        # limits needs no longer to come to rest than it lasts
+        # half a cosine takes pi / 2 times as long as a constant deceleration; the duration of a
+        # run within its limits is enough for a stop
         needed = float((np.abs(path.dq[0]) / self.limits.acceleration).max()) * np.pi / 2.0
         longest = _LONGEST * max(duration, min(needed, self.run.duration))
         motion = slowed(self.run, phase, duration, self.run.rate)
@@ -126,7 +126,7 @@ class MotionGate:
         self, set_point: FloatArray, speed: FloatArray, measured: FloatArray, largest: float
     ) -> Motion:
         """
-        Return the small straight step from the set point to the measured position.
+        Return the straight motion from the set point to the measured position.
 
         Parameters
         ----------
@@ -210,7 +210,7 @@ class Ending:
     begun : float
         When the run began [s].
     last : Motion or None
-        Motion that was sent last, without an approach to its first sample. None: another client
+        Latest sent motion, without an approach to its first sample. None: another client
         uses the controller, and no motion is sent.
     sent : float
         Time at which the motion was sent [s].
@@ -234,7 +234,7 @@ class Ending:
     def stopped_again(
         self, monitor: PoseMonitor, now: float, tolerance: float, duration: float
     ) -> Motion | None:
-        """Return a new stop if the arm still moves along the path of the run; otherwise None."""
+        """Return a new stop if the arm still moves along the path of the run, else None."""
         phase = now - self.begun
         if self.last is None or now - self.sent < self.last.t[-1]:
             return None
@@ -280,7 +280,7 @@ class Ending:
 
         """
         if self.last is not None and self.blocked and monitor.unsteady(_REST) == '':
-            # the arm is held where it is, if the step of the set point is allowed
+            # the arm is stopped at its position if the step of the set point is allowed
             ending, measured = replace(self, blocked=False), monitor.pose.q
             row = int(np.searchsorted(self.last.t, now - self.sent))
             row = min(row, len(self.last.t) - 1)

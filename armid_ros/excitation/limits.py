@@ -117,7 +117,7 @@ class Limits:
         if not 0.0 < share <= 1.0:
             raise TrajectoryError(f'speed: a share of the limits in (0, 1], not {share:g}')
         span = robot.upper - robot.lower
-        # 2 % of the range are kept free at each end, and a tenth of the torque limit
+        # reserves: 2 % of the range at each end, and a tenth of the torque limit
         margin = 0.02 * reserve * np.where(np.isfinite(span), span, 0.0)
         top = np.where(has_velocity_limit(robot), robot.velocity_limit, SLOW_VELOCITY)
         given = robot.acceleration_limit
@@ -151,7 +151,7 @@ def has_velocity_limit(robot: Robot) -> npt.NDArray[np.bool_]:
 @dataclass(frozen=True)
 class Violation:
     """
-    One exceeded limit of one joint, at its largest excess.
+    Largest excess of one limit of one joint.
 
     Attributes
     ----------
@@ -308,7 +308,7 @@ def _with_file(robot: Robot, path: Path) -> Robot:
         document = load_yaml(text)
         entries = document.get('joint_limits') if isinstance(document, dict) else None
         if not isinstance(entries, dict):
-            raise TrajectoryError('no mapping joint_limits, as MoveIt has it')
+            raise TrajectoryError('no mapping joint_limits as in MoveIt')
         if not entries.keys() & set(robot.joints):
             raise TrajectoryError(f'no limits for any of {", ".join(robot.joints)}')
         for j, joint in enumerate(robot.joints):
@@ -323,8 +323,8 @@ def _with_file(robot: Robot, path: Path) -> Robot:
                 lower[j], upper[j] = max(lower[j], ends[0]), min(upper[j], ends[1])
                 if not lower[j] < upper[j]:
                     raise TrajectoryError(
-                        f'{joint}: positions from {ends[0]:g} to {ends[1]:g} leave nothing of '
-                        f'{robot.lower[j]:g} to {robot.upper[j]:g} in the description'
+                        f'{joint}: positions from {ends[0]:g} to {ends[1]:g} are outside the '
+                        f'range {robot.lower[j]:g} to {robot.upper[j]:g} of the description'
                     )
             if entry.get('has_velocity_limits'):
                 given = _positive(entry.get('max_velocity'), f'{joint}: max_velocity')

@@ -83,7 +83,7 @@ class PoseMonitor:
 
     @property
     def sources(self) -> int:
-        """Number of different lists of joint names that were received."""
+        """Number of different joint name lists, one per sender."""
         return len(self._sources)
 
     def update(
@@ -132,7 +132,7 @@ class PoseMonitor:
             seen = self.pose.seen[source.joints].max()
             last = _State(seen, 0, self.pose.q[source.joints], dq)
         elif state.stamp_ns == last.stamp_ns != 0 and np.array_equal(last.q, q):
-            return  # the same message again
+            return  # repeated message
         fault = self._unreachable(source, state, last)
         if fault:
             self._reject(fault, now)
@@ -241,7 +241,7 @@ class PoseMonitor:
         # encoder noise, added to the change of position that the velocity limit allows [rad or m]
         beyond = step - 0.02 - self._velocity[source.joints] * max(passed, 0.0)
         k = int(np.argmax(beyond))
-        if not beyond[k] > 0.0:  # NaN if no position was known
+        if not beyond[k] > 0.0:  # NaN before the first position
             return ''
         j = source.joints[k]
         unit = self._units[j]

@@ -1,6 +1,6 @@
 # Copyright 2026 The armid_ros developers
 # SPDX-License-Identifier: Apache-2.0
-"""A design problem: settings, parameters to identify, noise and limits."""
+"""Design problem: settings, parameters to identify, noise and limits."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ from armid_ros.motion import FloatArray, Motion, read_only
 import numpy as np
 import numpy.typing as npt
 
-#: Parameter sets that a design can target.
+#: Target parameter sets of a design.
 TARGETS = {
     'all': 'all base parameters of the rigid body, and those of the effects',
     'gravity': 'masses and first moments as an arm moving slowly shows them, and the effects',
@@ -104,9 +104,7 @@ class DesignSettings:
             if name not in known:
                 raise TrajectoryError(f"no {kind} '{name}'; there are {', '.join(known)}")
         if self.focus and self.criterion == 'T':
-            raise TrajectoryError(
-                "focus is possible with every criterion except 'T', which has a rival"
-            )
+            raise TrajectoryError("focus is not available with criterion 'T', which has a rival")
         self._require_numbers()
 
     def _require_numbers(self) -> None:
@@ -130,7 +128,7 @@ class DesignSettings:
         if not duration <= MAX_DURATION:
             raise TrajectoryError(
                 f'{self.n_periods} periods of {self.period:g} s and run-ins of {self.run_in:g} s '
-                f'last {duration:.3g} s; a day is the most'
+                f'last {duration:.3g} s; the maximum is one day'
             )
 
     @property
@@ -165,7 +163,7 @@ def whole_period(duration: float, n_periods: int, run_in: float, rate: float) ->
     if not 1.0 <= period < np.inf:
         raise TrajectoryError(
             f'duration {duration:g} s leaves {period:.3g} s for each of {n_periods} '
-            'periods; give it more time, or fewer periods'
+            'periods; give a longer duration, or fewer periods'
         )
     return round(period * rate) / rate
 
@@ -223,7 +221,7 @@ class DesignProblem:
         noise = torque_noise(arm, settings)
         if (settings.criterion == 'T') != (rival is not None):
             raise TrajectoryError(
-                "criterion 'T' compares two models: it needs a rival, and a rival needs it"
+                "criterion 'T' and a rival need each other: give both or neither"
             )
         whole = arm if rival is None else _joined(arm, rival)
         motion = random_motion(arm.robot, rng)
@@ -267,7 +265,7 @@ class DesignProblem:
             names = ', '.join(effect.name for effect in self.arm.effects) or 'nothing'
             raise TrajectoryError(
                 f'no motion distinguishes the model with {names} from its rival, which can make '
-                'the same torques; give the effects that the rival lacks another size'
+                'the same torques; change the values of the effects that the rival lacks'
             )
 
     def columns(self, motion: Motion) -> FloatArray:

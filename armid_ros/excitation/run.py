@@ -90,7 +90,7 @@ class Run:
         states = np.empty((3, len(time), len(self.joints)))
         for k, (path, elapsed) in enumerate(parts):
             some = choice == k
-            if some.any():  # the single time of a moving arm is of one part
+            if some.any():  # a moving arm at a single time is in one part of the run
                 motion = path.at(elapsed[some])
                 states[:, some] = motion.q, motion.dq, motion.ddq
         return Motion(self.joints, time, *states)
@@ -132,7 +132,7 @@ def plan_run(
     seed: int = 0,
 ) -> Run:
     """
-    Plan the run of an excitation from the present pose of the arm, and back.
+    Plan the run of an excitation from the present pose of the arm and back to it.
 
     Parameters
     ----------
@@ -171,8 +171,8 @@ def _unwound(
     excitation: Excitation, arm: ArmModel, limits: Limits, start: FloatArray
 ) -> Excitation:
     """Return the excitation shifted by whole turns, as close to a start pose as limits allow."""
-    # A joint with a range of two turns reaches most poses at two positions. Above a floor, a path
-    # to one of them is often blocked, as the shoulder would have to swing through the floor.
+    # A joint with a range of two turns reaches most poses at two positions. The path to one of the
+    # two is often blocked, as the shoulder would hit the floor.
     trajectory = excitation.trajectory
     samples = 400
     q = trajectory.one_period(samples).q

@@ -151,7 +151,7 @@ def _listed(names: Sequence[str]) -> str:
 
 
 FIT, PARTLY, UNFIT = 'fit to run', 'partly checked', 'not to be run'
-#: What makes an unchecked item checked, by words of the item.
+#: Remedy for each kind of unchecked item.
 _REMEDIES = {
     'the floor': 'the height of the floor (--floor Z)',
     'mesh not found': 'the folder of the meshes (--package P=FOLDER)',

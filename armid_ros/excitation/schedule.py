@@ -1,7 +1,7 @@
 # Copyright 2026 The armid_ros developers
 # SPDX-License-Identifier: Apache-2.0
 """
-A whole excitation run: from rest into a periodic trajectory, through it, and back to rest.
+A complete excitation run: run-in from rest, periodic trajectory, and run-out to rest.
 
 The arm accelerates and decelerates along the path of the trajectory. Run-in and run-out therefore
 visit only poses of the periods. The way from another pose is a `Transfer`.
@@ -62,7 +62,7 @@ class Excitation:
         if not self.duration <= MAX_DURATION:
             raise TrajectoryError(
                 f'excitation: {self.n_periods} periods of {self.trajectory.period:g} s, run-ins '
-                f'of {self.run_in:g} s last {self.duration:.3g} s; a day is the most'
+                f'of {self.run_in:g} s last {self.duration:.3g} s; the maximum is one day'
             )
 
     @property
@@ -89,9 +89,9 @@ class Excitation:
         before = np.maximum(self.run_in - time, 0.0) / self.run_in
         after = np.maximum(time - (self.duration - self.run_in), 0.0) / self.run_in
         phase = time - self.run_in
-        # 1 - before is the share of the run-in done, x; the phase rate is _step(x), and the phase
-        # that is still to come before the first period is run_in * integral of _step from x to 1.
-        # The integral of _step from 0 to 1 is a half.
+        # x = 1 - before is the completed share of the run-in; the phase rate is _step(x), and the
+        # remaining phase before the first period is run_in * integral of _step from x to 1. The
+        # integral of _step from 0 to 1 is a half.
         lead = self.run_in * (0.5 - _step_integral(1.0 - before))
         lag = self.run_in * (0.5 - _step_integral(1.0 - after))
         end = self.n_periods * self.trajectory.period
@@ -116,7 +116,7 @@ class Excitation:
         """
         if set(joints) != set(self.joints):
             raise TrajectoryError(
-                f'its joints are {", ".join(self.joints)}, those of the robot {", ".join(joints)}'
+                f'joints {", ".join(self.joints)}, but the robot has {", ".join(joints)}'
             )
         order = [self.joints.index(joint) for joint in joints]
         path = self.trajectory
@@ -141,7 +141,7 @@ class Excitation:
 
         """
         if not 0.0 < share <= 1.0:
-            raise TrajectoryError(f'a share of {share:g} of the speed; it is above 0, at most 1')
+            raise TrajectoryError(f'speed share {share:g}: has to be above 0 and at most 1')
         samples = self._period_samples(rate)
         longer = float(np.ceil(samples / share - _WHOLE_SAMPLES)) / samples
         path = self.trajectory.stretched(self.trajectory.period * longer)
@@ -257,8 +257,7 @@ def read_excitation(text: str, source: str) -> Excitation:
             raise TrajectoryError(f'not an excitation: it has to contain schema: {SCHEMA}')
         if content.get('start') is not None:  # an ignored start pose would change the motion
             raise TrajectoryError(
-                'an excitation has no start pose; remove it, and plan the way from that pose '
-                'with --start'
+                'an excitation cannot contain a start pose; remove it, and give it with --start'
             )
         joints = content['joints']
         trajectory = FourierTrajectory(

@@ -18,7 +18,7 @@ HANDOVER = 0.05
 
 
 class Path(Protocol):
-    """A path to follow: a `Run`, an `Excitation` or a `Transfer`."""
+    """Path to follow: a `Run`, an `Excitation` or a `Transfer`."""
 
     def at(self, t: npt.ArrayLike) -> Motion:
         """Evaluate the path at times [s]."""
@@ -122,7 +122,7 @@ def jump_fault(
     tolerance: float,
 ) -> str:
     """
-    Return a message if a joint would jump when a trajectory began now.
+    Return a message if the start of a trajectory is too far from the present position.
 
     Parameters
     ----------

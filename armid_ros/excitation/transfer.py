@@ -114,11 +114,11 @@ class TransferPlanner:
             (1.875 * way / velocity).max(axis=1),
             np.sqrt((10.0 / np.sqrt(3.0)) * way / limits.acceleration).max(axis=1),
         )
-        # a transfer without motion has a positive duration as well
+        # the duration is positive for a transfer without motion, too
         t = np.append(0.0, np.cumsum(np.maximum(needed, 1e-6)))
         transfer = Transfer(limits.joints, t, poses)
         transfer = transfer.lasting(max(transfer.duration, shortest))
-        for _ in range(20):  # durations, each longer than the last
+        for _ in range(20):  # increasing durations
             # the torque is checked at 200 samples
             motion = transfer.at(np.linspace(0.0, transfer.duration, 200))
             violations = check_limits(limits, motion, self.arm.joint_torque(motion))
@@ -128,7 +128,7 @@ class TransferPlanner:
         raise TrajectoryError(f'no transfer to the trajectory keeps the limits: {violations[0]}')
 
     def fault(self, q: FloatArray) -> str:
-        """Return why an arm may not stand in a pose, shape (n,); empty if it may."""
+        """Return why a pose, (n,), is not allowed; empty if it is allowed."""
         violations = check_limits(self.limits, Motion.of_states(self.limits.joints, q, 0.0, 0.0))
         overload = self._overload(q[np.newaxis])
         if violations or overload:
@@ -156,7 +156,7 @@ class TransferPlanner:
         if not reason:
             return zero
         rng = np.random.default_rng(0)
-        # 200 poses about zero at each of these distances
+        # 200 random poses around zero at each of these distances
         for distance in (0.1, 0.2, 0.4, 0.8, 1.6, 3.2):
             about = zero + distance * rng.uniform(-1.0, 1.0, (200, len(zero)))
             about = np.clip(about, self.limits.lower, self.limits.upper)
@@ -176,7 +176,7 @@ class TransferPlanner:
             other[j] = zero[j]
             if not self.fault(other):
                 q = other
-        rounded = np.where(q == zero, zero, np.round(q, 2))  # decimals that a person can type
+        rounded = np.where(q == zero, zero, np.round(q, 2))  # few decimals, for the command line
         return q if self.fault(rounded) else rounded
 
     def _overload(self, q: FloatArray) -> str:

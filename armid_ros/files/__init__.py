@@ -1,7 +1,7 @@
 # Copyright 2026 The armid_ros developers
 # SPDX-License-Identifier: Apache-2.0
 """
-Files as untrusted input, and as output that is whole or absent.
+Reading of untrusted files, and atomic writing of results.
 
 Readers of text use `read_text` (no FIFO, no device, a bounded size), `load_yaml` (bounded
 depth and expansion) and `reading`, which converts errors of a parser into an error of the

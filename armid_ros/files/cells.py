@@ -11,7 +11,7 @@ _GUARDED = ('=', '+', '-', '@', '#', '\t', '\r', "'")
 
 
 def csv_cell(name: str) -> str:
-    """Return a name as a cell: with an apostrophe before a formula, and quotes as needed."""
+    """Format a name as a CSV cell: with an apostrophe before a formula, and quotes if needed."""
     text = f"'{name}" if name.startswith(_GUARDED) else name
     if any(char in text for char in ',"\r\n'):
         text = '"' + text.replace('"', '""') + '"'

@@ -21,17 +21,17 @@ from typing import Any
 from armid_ros.errors import ArmidError
 import yaml
 
-#: Largest number of a document. No quantity is as large, and products of three stay finite.
+#: Largest allowed number in a document. Quantities are smaller, and products of three are finite.
 LARGEST = 1e100
 
-# The parser in C, where there is one, is ten times as fast.
+# The C parser, if installed, is ten times as fast.
 _Loader: Any = type('_Loader', (getattr(yaml, 'CSafeLoader', yaml.SafeLoader),), {})
 # Angles of joint_limits.yaml, such as '!degrees 90'.
 for _unit, _factor in (('!degrees', math.pi / 180.0), ('!radians', 1.0)):
     _Loader.add_constructor(
         _unit, lambda loader, node, factor=_factor: factor * float(loader.construct_scalar(node))
     )
-#: Errors that code can raise while it reads a document with unexpected content.
+#: Exceptions while a document with unexpected content is read.
 _UNEXPECTED = (
     ArithmeticError,
     AssertionError,
@@ -73,7 +73,7 @@ def reading(path: str | Path, error: type[ArmidError]) -> Iterator[None]:
             raise
         raise error(f'{path}: {problem}') from problem
     except _UNEXPECTED as problem:
-        raise error(f'{path}: {_said(problem)}') from problem
+        raise error(f'{path}: {_one_line(problem)}') from problem
 
 
 def finite(value: Any, what: str) -> float:
@@ -90,7 +90,7 @@ def finite(value: Any, what: str) -> float:
 
 
 def parsed_yaml(text: str, error: type[ArmidError]) -> Any:
-    """Parse YAML as `load_yaml`; raise an error of the package if it is invalid."""
+    """Parse YAML as `load_yaml`; raise an `ArmidError` if the text is invalid."""
     try:
         return load_yaml(text)
     except (yaml.YAMLError, ValueError) as fault:
@@ -169,7 +169,7 @@ def _line(event: yaml.Event) -> int:
     return 0 if event.start_mark is None else int(event.start_mark.line) + 1
 
 
-def _said(problem: BaseException) -> str:
+def _one_line(problem: BaseException) -> str:
     """Format the error of a parser in one line."""
     if isinstance(problem, RecursionError):
         return 'nested too deep'

@@ -98,7 +98,7 @@ _MARKED = ('.html', '.json', '.yaml', '.rviz', 'plotjuggler.xml')
 
 def write_file(path: str | Path, content: str | bytes) -> None:
     """
-    Write a file under a temporary name and move it, so that it is whole or absent.
+    Write a file under a temporary name and rename it, so that it is complete or absent.
 
     Parameters
     ----------
@@ -239,7 +239,7 @@ def _refuse_other_results(path: Path, schema: str, robot: str) -> None:
 
 
 def _in_words(schema: str) -> str:
-    """Return the kind of result of a schema such as 'armid/comparison/1', in words."""
+    """Return the name of the kind of result of a schema such as 'armid/comparison/1'."""
     parts = schema.split('/')
     return f'results of kind {parts[1]}' if len(parts) == 3 else schema
 
@@ -324,7 +324,7 @@ def refuse_replacing(folder: Path, names: Collection[str]) -> None:
 
 
 def _foreign(folder: Path, names: Sequence[str]) -> Iterator[str]:
-    """Return foreign files; files that cannot have a mark count only if all names are such."""
+    """Return foreign files; files without a possible mark count only if no file can have one."""
     known = [name for name in names if name.endswith(_MARKED)]
     return (name for name in known or names if not is_own(folder / name))
 
@@ -347,6 +347,6 @@ def is_own(path: Path) -> bool:
         return False
     try:
         with open_regular(path, OutputError) as stream:
-            return _MARK.search(stream.read(4096)) is not None  # the beginning
+            return _MARK.search(stream.read(4096)) is not None  # the mark is at the beginning
     except (OutputError, OSError):
         return False

@@ -1,7 +1,7 @@
 # Copyright 2026 The armid_ros developers
 # SPDX-License-Identifier: Apache-2.0
 """
-Results of several files that replace an earlier result together or not at all.
+Atomic replacement of a result that has several files.
 
 A run writes into a staging folder inside the folder of its results, so both are on the same file
 system. Once all files are written, the whole folder is exchanged. A run that fails, or is
@@ -78,7 +78,7 @@ class Staged:
             for name in DOCUMENTS:
                 if name in names:
                     (self.out / name).unlink(missing_ok=True)
-            for path in self._earlier():
+            for path in self._earlier_files():
                 path.unlink()
             for name in names:
                 source, target = self.folder / name, self.out / name
@@ -99,10 +99,10 @@ class Staged:
         if Path.cwd().is_relative_to(out) or (old.st_uid, old.st_gid) != (own.st_uid, own.st_gid):
             return False
         new = out.with_name(f'.{out.name}{STAGING}')
-        goes = {STAGING, *names, *(path.name for path in self._earlier())}
+        goes = {STAGING, *names, *(path.name for path in self._earlier_files())}
         kept = [path for path in out.iterdir() if path.name not in goes]
         try:
-            _remove(new)  # left by a run that was killed
+            _remove(new)  # remains of a killed run
             new.mkdir()
             for path in (*kept, *self.folder.iterdir()):
                 if path.is_dir() and not path.is_symlink():
@@ -121,7 +121,7 @@ class Staged:
             _remove(new)
         return True
 
-    def _earlier(self) -> list[Path]:
+    def _earlier_files(self) -> list[Path]:
         """Return the files of an earlier result that the new one lacks."""
         spared = {path.resolve() for path in self.spared}
         return [
@@ -155,7 +155,7 @@ def staged(
     folder = out / STAGING
     try:
         out.mkdir(parents=True, exist_ok=True)
-        _remove(folder)  # left by a run that was killed
+        _remove(folder)  # remains of a killed run
         folder.mkdir()
     except OSError as error:
         raise OutputError(f'{out}: cannot be made or written to: {error.strerror}') from error

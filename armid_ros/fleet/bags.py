@@ -72,7 +72,7 @@ def folder_of(arm: str) -> str:
 
 
 def file_name(arm: str) -> str:
-    """Return the name of an arm as a file name; other than letters and digits are escaped."""
+    """Return the name of an arm as a file name; all but letters and digits are escaped."""
     return ''.join(char if char.isalnum() else quote(char, safe='') for char in arm)
 
 
@@ -107,7 +107,7 @@ def find_bags(patterns: Sequence[str], arm_pattern: str | None = None) -> list[B
         filesystem, path = opened(pattern)
         try:
             listed = filesystem.glob(path, detail=True)
-        except Exception as error:  # every store raises errors of its own
+        except Exception as error:  # stores raise different exceptions
             raise FleetError(f'{pattern}: cannot be listed: {error}') from error
         bags = list(_bags(filesystem, listed))
         if not bags:
@@ -137,7 +137,7 @@ def find_bags(patterns: Sequence[str], arm_pattern: str | None = None) -> list[B
 def _bags(
     filesystem: Any, listed: Mapping[str, Mapping[str, Any]]
 ) -> Iterator[tuple[str, int, str]]:
-    """Yield path, size and version of all bags; files of a listed directory are parts of it."""
+    """Yield path, size and version of all bags; files of a bag directory are parts of the bag."""
 
     def version(info: Mapping[str, Any]) -> str:
         found = [str(info[name]) for name in _VERSIONS if info.get(name)][:1]

@@ -24,7 +24,7 @@ _QUIET = {
     'distributed.admin.system-monitor.interval': '2s',
     'distributed.worker.memory.monitor-interval': '500ms',
     'distributed.scheduler.active-memory-manager.start': False,
-    # MALLOC_TRIM_THRESHOLD_ is left out: with it, every array is allocated by the kernel anew
+    # MALLOC_TRIM_THRESHOLD_ is left out: with it, the kernel allocates every array again
     'distributed.nanny.pre-spawn-environ': dict.fromkeys(
         ('OMP_NUM_THREADS', 'MKL_NUM_THREADS', 'OPENBLAS_NUM_THREADS'), '1'
     ),
@@ -34,7 +34,7 @@ _QUIET = {
 @contextmanager
 def connected(scheduler: str | None, workers: int | None = None) -> Iterator[Client]:
     """
-    Connect to a cluster while the context is open.
+    Connect to a cluster; a context manager.
 
     Parameters
     ----------
@@ -73,7 +73,7 @@ def connected(scheduler: str | None, workers: int | None = None) -> Iterator[Cli
 def _local(count: int) -> Iterator[Client]:
     """Connect to processes of this machine."""
     before = os.environ.get('PYTHONSAFEPATH', '')
-    os.environ['PYTHONSAFEPATH'] = '1'  # no worker runs a module of the current folder
+    os.environ['PYTHONSAFEPATH'] = '1'  # workers do not import modules from the current folder
     try:
         with tempfile.TemporaryDirectory(prefix='armid-fleet-') as folder:
             with (

@@ -90,8 +90,8 @@ def _results(out: str, doing: str) -> Iterator[tuple[Store, Callable[..., None]]
 
 
 def _print_shown(lines: Sequence[str], rest: str) -> None:
-    """Print the first lines, and where the rest is."""
-    most = 8  # all are among the results
+    """Print the first lines, and the location of the others."""
+    most = 8  # the results contain all of them
     for line in lines[:most]:
         say(line)
     if len(lines) > most:

@@ -40,13 +40,13 @@ BEFORE, AFTER = 3, 3
 DIAGNOSES = pa.schema(
     [
         ('arm', pa.string()),
-        ('verdict', pa.string()),  # of the diagnosis, or failed
+        ('verdict', pa.string()),  # verdict of the diagnosis, or 'failed'
         ('summary', pa.string()),
         ('effects', pa.list_(pa.string())),  # names of the catalogue, the largest first
         ('closed', pa.float64()),  # share of the gap on data not used to fit
         ('baseline', pa.list_(pa.string())),  # bags
         ('bags', pa.list_(pa.string())),
-        ('report', pa.string()),  # in the results; empty if there is none
+        ('report', pa.string()),  # path in the results; empty if there is no report
     ]
 )
 
@@ -165,7 +165,7 @@ def one_arm(
             )
             report = f'reports/{folder_of(str(case["arm"]))}/diagnosis'
             folder = result.save(stack.enter_context(TemporaryDirectory(prefix='armid-report-')))
-            # report.html last, because the pages link to it
+            # report.html is written last, because pages link to it
             for file in sorted(folder.iterdir(), key=lambda file: file.name == 'report.html'):
                 store.write(f'{report}/{file.name}', file.read_bytes())
     except ArmidError as error:

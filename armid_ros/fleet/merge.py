@@ -325,7 +325,7 @@ def _prepared(bag: BagFile, path: str, job: Job, budget: int) -> BagSummary:
     stamped = datetime.datetime.fromtimestamp(start_ns * 1e-9, datetime.UTC)
     day = bag.day or stamped.date().isoformat()
     apart = datetime.date.fromisoformat(day) - stamped.date()
-    # a clock that counts from its start; a difference of one day is a time zone
+    # the clock counts from its start; a difference of one day is due to the time zone
     if abs(apart.days) > 1:
         start_ns += apart.days * DAY_NS
     held = None if kept is None else tuple(kept)

@@ -202,7 +202,7 @@ def _explained(found: Watch, diagnoses: Diagnoses) -> list[str]:
 
 
 def _diagnosed(arm: WatchedArm, diagnosis: Mapping[str, Any] | None) -> str:
-    """Return the verdict of a diagnosis if it found a fault without a named change, else ''."""
+    """Return the verdict of a diagnosis that found a gap and named no change, else ''."""
     if arm.named or diagnosis is None or diagnosis['verdict'] in ('consistent', 'failed'):
         return ''
     return str(diagnosis['verdict']).replace('_', ' ')
@@ -295,7 +295,7 @@ def _table(
 
 
 def _link(target: str, text: str) -> Markup:
-    """Return a text with a link to a page; without a page, the text alone."""
+    """Return a text with a link to a page, or the text alone if there is no page."""
     return Markup('<a href="{}">{}</a>').format(target, text) if target else escape(text)
 
 
@@ -307,7 +307,7 @@ def _drawing(
     links: Sequence[str] = (),
     title: str = '',
 ) -> tuple[Markup, tuple[float, float]]:
-    """Draw a series as a line, or as points with links; return drawing and range of ordinate."""
+    """Draw a series as a line, or as points with links; return drawing and ordinate range."""
     # [px]; a large curve has intervals
     (width, height), wide = ((250, 74), HALF_WIDTH) if links else ((84, 20), 0.0)
     low, high = float(np.min(values - wide * std)), float(np.max(values + wide * std))

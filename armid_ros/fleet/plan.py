@@ -332,7 +332,7 @@ def choose_filters(
     problem, wanted = 'there is none', settings.signals
     turns: Counter[str] = Counter()
     order = []
-    for bag in bags:  # one bag of each arm before a second bag of any arm
+    for bag in bags:  # the first bag of every arm, then the second bags
         turns[bag.arm] += 1
         order.append((turns[bag.arm], bag))
     # four bags are enough; some cannot be read

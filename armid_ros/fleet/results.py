@@ -4,7 +4,7 @@
 The tables of results: their columns, and the rows of a bag or an arm.
 
     bags/arm=A/day=D/BAG.parquet         one row: what was recorded, its fit and normal equations
-    parameters/arm=A/day=D/BAG.parquet   one row per parameter: estimate of the bag by itself
+    parameters/arm=A/day=D/BAG.parquet   one row per parameter: estimate of the single bag
     arms/arm=A/estimate.parquet          one row per parameter: estimate of all bags
     refused/arm=A/BAG.parquet            one row: why a bag is not used
 
@@ -81,7 +81,7 @@ REFUSED = pa.schema(
         ('version', pa.string()),
         ('settings', pa.string()),
         ('run', pa.string()),
-        ('failed', pa.bool_()),  # by a store or a worker, not by the bag
+        ('failed', pa.bool_()),  # caused by a store or a worker, not by the bag
         ('reason', pa.string()),
     ]
 )

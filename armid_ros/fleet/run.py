@@ -96,7 +96,7 @@ class FleetOutcome:
         return tuple(sorted((one for a in self.arms for one in a.refused), key=lambda r: r.bag))
 
 
-#: Bags of an arm that are read by one task.
+#: Bags of one arm that one task reads.
 Group = tuple[BagFile, ...]
 #: All bags of an arm, and their fit; None instead of the fit if there are too few rows.
 Fitted = tuple[MergedBags, FleetFit | None]
@@ -157,7 +157,7 @@ def grouped(bags: Sequence[BagFile]) -> tuple[Group, ...]:
     Divide the bags of an arm into groups for tasks, in order.
 
     Groups depend on sizes alone, so the order of sums, and so the last digit, is the same on every
-    cluster. A bag of unknown size is a group of its own.
+    cluster. A bag of unknown size forms a separate group.
 
     """
     groups: list[list[BagFile]] = []
@@ -207,12 +207,12 @@ def identify_fleet(
 
 @dataclass(frozen=True)
 class _Waiting:
-    """An arm that waits for its tasks: its bags, and the bags that failed."""
+    """Arm without submitted tasks: its bags, and the bags that failed."""
 
     arm: str
     groups: tuple[Group, ...]
     refused: tuple[Refused, ...] = ()
-    hit: int = 0  # number of times that its workers ended because of other tasks
+    hit: int = 0  # number of worker failures due to other tasks
 
 
 @dataclass
@@ -253,7 +253,7 @@ class _Run:
                 self._count(own)
 
     def work(self) -> None:
-        """Keep enough arms in progress that no worker is idle, until all arms are finished."""
+        """Process all arms, with enough arms in progress that no worker is idle."""
         # groups of bags in progress: a constant, and a number per thread
         limit = 2 + 3 * sum(self._client.nthreads().values())
         under_way: dict[Any, _UnderWay] = {}
@@ -316,10 +316,10 @@ class _Run:
         return _UnderWay(arm, prepared, fitted, products, last)
 
     def _begin_again(self, tasks: _UnderWay) -> None:
-        """Queue a failed arm again, without the bags that caused the failure."""
+        """Repeat a failed arm without the bags that caused the failure."""
         # A failed group is divided into single bags, to find the bag that fails. Tasks that depend
         # on a failed task fail too, so the noise tasks are checked only if all bags were read. If
-        # another bag may have ended the worker, the bag is read once more alone.
+        # another bag may have killed the worker, the bag is read once more alone.
         arm = tasks.arm
         job, futures = self._job_of[arm.arm], tasks.prepared
         if tasks.fitted.status == 'finished' and all(one.status != 'error' for one in futures):
@@ -334,7 +334,7 @@ class _Run:
             elif len(group) > 1:
                 groups.extend((bag,) for bag in group)
             else:
-                if isinstance(future.exception(), KilledWorker):  # once more, without the others
+                if isinstance(future.exception(), KilledWorker):  # repeat the task alone
                     future = self._submit(take, group, self._job(arm.arm), 1, retries=RETRIES)
                     next(as_completed([future], raise_errors=False))
                 if future.status != 'error':

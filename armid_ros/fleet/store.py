@@ -22,7 +22,7 @@ from pyarrow import parquet
 
 
 class StoreError(Exception):
-    """A store failed or gave a wrong answer; the operation can be repeated."""
+    """A store failed or gave an invalid answer; the operation can be repeated."""
 
 
 def opened(url: str) -> tuple[Any, str]:
@@ -66,7 +66,7 @@ def fetched(url: str) -> Iterator[str]:
             raise RecordingError(f'{url}: there is no such bag') from error
         except PermissionError as error:
             raise RecordingError(f'{url}: no permission to read: {error}') from error
-        except Exception as error:  # every store raises errors of its own
+        except Exception as error:  # stores raise different exceptions
             raise StoreError(f'{url}: {type(error).__name__}: {error}') from error
         yield here
 

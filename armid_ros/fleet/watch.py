@@ -1,7 +1,7 @@
 # Copyright 2026 The armid_ros developers
 # SPDX-License-Identifier: Apache-2.0
 """
-A fleet over time: histories of its results, changes and alarms.
+History of a fleet: results over time, changes and alarms.
 
     watch/arms.parquet      one row per arm: health and adjusted p-value
     watch/changes.parquet   one row per significant change of an arm

@@ -282,7 +282,7 @@ def _among_bodies(
     settings: IdentificationSettings,
     rng: np.random.Generator,
 ) -> tuple[IdentificationSettings, BaseParameters, FittedValues, PhysicalCertificate] | None:
-    """Fit physically consistent links; None if not requested, or impossible and not required."""
+    """Fit physically consistent links; None if not requested, or optional and impossible."""
     if settings.method == 'iv' or not (settings.physical or settings.prefers_bodies):
         return None
     known = settings.physical or PhysicalSettings()

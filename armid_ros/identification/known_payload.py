@@ -3,10 +3,10 @@
 """
 Estimation of drive gains from a known payload.
 
-No motion distinguishes efforts that are all too large by one factor from an arm that is too heavy
-by that factor. A body of known mass that only some recordings have distinguishes them. Each joint
-measures k (Y pi + p), where p is the torque of the known body. So the gain k is the coefficient of
-p in the regression of its effort on its columns and p.
+A common factor of all efforts cannot be distinguished from the same factor of all masses. A body
+of known mass in some of the recordings distinguishes them. Each joint measures k (Y pi + p), where
+p is the torque of the known body. So the gain k is the coefficient of p in the regression of its
+effort on its columns and p.
 
 """
 

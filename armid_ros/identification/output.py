@@ -30,7 +30,7 @@ from armid_ros.robots import Robot
 import numpy as np
 
 SCHEMA = 'armid/identification/1'
-#: File that tools rewrite without changing the data.
+#: File that tools may rewrite without a change of the data; it is not part of the digest.
 _NOT_DATA = 'metadata.yaml'
 
 
@@ -122,7 +122,7 @@ def kinematics_digest(robot: Robot) -> str:
     for index, (joint, link) in enumerate(zip(robot.moving, robot.links, strict=True), start=1):
         place = model.jointPlacements[index]
         numbers = np.concatenate([place.rotation.ravel(), place.translation])
-        rounded = np.round(numbers, 6) + 0.0  # no negative zero
+        rounded = np.round(numbers, 6) + 0.0  # avoid negative zero
         kind = model.joints[index].shortname()
         parts = (
             joint,
@@ -186,7 +186,7 @@ def require_as_identified(path: str | Path) -> None:
     for place, known in _found(Path(path)).items():
         if known is not None and _content(place) != known:
             raise ModelError(
-                f'{place}: is not the recording any more that {path} was identified from, its '
+                f'{place}: is no longer the recording that {path} was identified from: its '
                 'content is another. Give the baseline (--baseline), diagnose without one '
                 '(--no-baseline), or identify the arm again'
             )

@@ -27,7 +27,7 @@ from armid_ros.robots import load_robot
 import numpy as np
 import yaml
 
-#: Remainder of a grouping, as a share of it, below which it is a combination of others.
+#: Relative remainder below which a grouping is a linear combination of others.
 _SAME_GROUPING = 1e-6
 _SCHEMAS = (SCHEMA, MODEL)
 
@@ -167,7 +167,7 @@ class ParameterFile:
 
     def regrouped_as(self, other: ParameterFile) -> ParameterFile:
         """
-        Return the values, and values of another grouping as far as they follow from these.
+        Return the values, and the values of another grouping that follow from them.
 
         A motion that identifies less groups more parameters; its values are combinations of those
         of a richer motion.
@@ -245,14 +245,14 @@ def read_parameters(path: str | Path) -> ParameterFile:
         robot = load_robot(str(described) if is_file(described) else read.robot)
     except ArmidError:
         return read
-    read_model(text, robot, str(path))  # it has to contain all parameters of the robot
+    read_model(text, robot, str(path))  # the file must contain all parameters of the robot
     return replace(read, joints=robot.joints, kinematics=kinematics_digest(robot))
 
 
 def _identification_of(path: Path, model: Mapping[str, Any]) -> ParameterFile | None:
     """Read the identification.json in the folder of a model.yaml if it belongs to it."""
-    # It has the groups of parameters from which the model was made, with their covariance. It
-    # belongs to the model if the model's values yield those of every group.
+    # identification.json has the parameter groups of the model and their covariance. It belongs to
+    # the model if the values of the model reproduce the value of every group.
     file = path.with_name('identification.json')
     if not is_file(file):
         return None

@@ -110,7 +110,7 @@ def description_remarks(robot: Robot) -> tuple[Remark, ...]:
 
 
 def _of_joints(robot: Robot) -> Iterator[Remark]:
-    """Check limits, and axes whose length in the file is not one; a model scales them."""
+    """Check limits, and axes that are not unit vectors in the file; the model normalises them."""
     for k, name in enumerate(robot.joints):
         if robot.prismatic[k]:
             continue
@@ -264,7 +264,7 @@ def _selected(rows: FloatArray, spread: FloatArray, total: float) -> list[int]:
     every = range(len(spread) // PER_LINK)
     wrong: list[int] = []
     rest = total
-    # more wrong links cannot be distinguished from a wrong model
+    # with more wrong links, the model itself may be wrong
     while len(wrong) < min(3, len(every)) and rest > _REMAINS * len(rows):
         left = {k: _fit(rows, spread, [*wrong, k])[2] for k in every if k not in wrong}
         best = min(left, key=left.__getitem__)

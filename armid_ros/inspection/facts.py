@@ -31,7 +31,7 @@ STILL = 1e-3
 @dataclass(frozen=True)
 class Sampling:
     """
-    Time of a recording in numbers.
+    Statistics of the time stamps of a recording.
 
     Attributes
     ----------
@@ -98,7 +98,7 @@ def find_repetition(recording: Recording) -> float | None:
 @dataclass(frozen=True)
 class JointFacts:
     """
-    One joint of a recording in numbers, in the units of the file.
+    Statistics of one joint of a recording, in the units of the file.
 
     Attributes
     ----------
@@ -264,7 +264,7 @@ def try_identification(robot: Robot, recording: Recording, rng: np.random.Genera
     factors, correlation = torque_factors(ArmModel(robot), motions)
     score = Score.of(result.training)
     errors = score.joint_relative_error_percent
-    beyond = beyond_noise(errors, result.training, result.used)  # noise makes no model poor
+    beyond = beyond_noise(errors, result.training, result.used)  # noise does not reduce the grade
     return TrialFit(
         relative_error_percent=score.relative_error_percent,
         rank=result.base.rank,

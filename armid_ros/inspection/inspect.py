@@ -89,7 +89,7 @@ class Inspection:
             return 'Refused by `armid identify`.'
         if self.trial.grade != 'good':
             reason = self.trial.reasons[0]
-            said = _said(reason, [remark.text for remark in self.remarks])
+            said = _contains_any(reason, [remark.text for remark in self.remarks])
             why = '.' if said else f': {reason}'
             return f'Graded {self.trial.grade} by `armid identify`{why}'
         return (
@@ -120,7 +120,7 @@ def inspect(
     recording : Recording
         The recording. With a robot, its joints are those of the robot, in the same order.
     robot : Robot, optional
-        Description, with which limits and units are checked and an identification is tried.
+        Description, for the check of limits and units and for a trial identification.
     topics : tuple of Topic, optional
         Topics of the bag.
     rng : numpy.random.Generator
@@ -180,7 +180,7 @@ def inspection_document(found: Inspection) -> dict[str, Any]:
 
 
 def notes_on(robot: Robot) -> list[str]:
-    """Return doubts and notes on a description, with one note on all joints not driven."""
+    """Return warnings and notes on a description, with one note on all undriven joints."""
     held = {f"joint '{joint.name}'" for joint in held_joints(robot)}
     others = [note for note in robot.notes if note.partition(': not')[0] not in held]
     return list(
@@ -193,16 +193,18 @@ def worst_first(remarks: Iterable[Remark]) -> tuple[Remark, ...]:
     return tuple(sorted(remarks, key=lambda remark: get_args(Weight).index(remark.weight)))
 
 
-def _said(text: str, others: Iterable[str]) -> bool:
-    """Return whether a text contains one of several others, regardless of case."""
+def _contains_any(text: str, others: Iterable[str]) -> bool:
+    """Return whether a text contains one of several words, regardless of case."""
     return any(other.casefold() in text.casefold() for other in others)
 
 
 def _of_fit(trial: TrialFit, said: Sequence[str]) -> Iterator[Remark]:
-    """Yield the faults that identify finds and that no remark contains already."""
+    """Yield the faults found by identify that no remark contains already."""
     weight: Weight = 'bad' if trial.grade == 'unusable' else 'doubt'
     others = [*said, *trial.elsewhere]
-    yield from (Remark(weight, fault) for fault in trial.faults if not _said(fault, others))
+    yield from (
+        Remark(weight, fault) for fault in trial.faults if not _contains_any(fault, others)
+    )
     if trial.poor and not trial.faults:
         yield Remark(
             'doubt',

@@ -124,7 +124,7 @@ def group_columns(
     Parameters
     ----------
     w : ndarray, shape (M, P)
-        Regressor over states that excite everything, M >= P.
+        Regressor over states that excite all parameters, M >= P.
     standard : tuple of ParameterName
         Names of the P columns. Earlier columns are kept in preference to later ones; within a
         link, inertia is kept first and mass last.
@@ -202,7 +202,7 @@ def _named(
 
 def levelled(robot: Robot) -> Robot:
     """
-    Return the robot with gravity exactly along an axis of its first joint, if it nearly is.
+    Return the robot with gravity aligned to an axis of its first joint, if nearly aligned.
 
     A base that hangs at a rounded angle of 3.1416 excites first moments by 7e-6 of their weight,
     which no recording shows.
@@ -226,7 +226,7 @@ def symbol(parameter: ParameterName) -> str:
 
 
 def _expression(row: FloatArray, leader: int, standard: tuple[ParameterName, ...]) -> str:
-    """Format a grouping with equal factors in front of their sum."""
+    """Format a linear combination, with common factors in front of sums."""
     text = standard[leader].name
     factors: dict[float, list[tuple[float, str]]] = {}
     # angles rounded to four digits make factors of 4e-6

@@ -127,7 +127,7 @@ class LinkFrames:
 
     @classmethod
     def in_the_middle(cls, robot: Robot) -> LinkFrames:
-        """Return the frames with all joints in the middle of their range, or at 0 without one."""
+        """Return the frames with all joints in the middle of their range; 0 without limits."""
         return cls.of(robot, robot.middle_pose[np.newaxis])
 
     def places(self, joint: str, offset: FloatArray) -> FloatArray:
@@ -147,7 +147,7 @@ class LinkFrames:
         return positions.transpose(2, 0, 1), self._by_driven(by_moving)
 
     def _by_driven(self, by_moving: FloatArray) -> FloatArray:
-        """Return derivatives by the driven joints of those by the moving ones, (N, ..., m)."""
+        """Convert derivatives by the moving joints, (N, ..., m), to the driven joints."""
         if self.coupling is None:
             return by_moving
         return np.asarray(np.einsum('k...m,kmn->k...n', by_moving, self.coupling))

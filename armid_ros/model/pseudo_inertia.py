@@ -125,7 +125,7 @@ class Consistency:
 
     @property
     def consistent(self) -> bool:
-        """Whether a body with positive density can have these parameters."""
+        """Whether the parameters are possible for a body with positive density."""
         return bool(self.eigenvalues[0] > 0.0)
 
 

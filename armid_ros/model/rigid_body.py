@@ -51,7 +51,7 @@ def link_unit(name: str) -> tuple[str, ...]:
 
 
 class _Scratch(threading.local):
-    """Work space of Pinocchio, kept per robot and thread, as making it is slow."""
+    """Work space of Pinocchio, cached per robot and thread, as its construction is slow."""
 
     def __init__(self) -> None:
         self._of: WeakKeyDictionary[Robot, pin.Data] = WeakKeyDictionary()
@@ -199,7 +199,7 @@ def regressor(robot: Robot, motion: Motion) -> FloatArray:
 
 def gravity_sensitivity(robot: Robot, q: FloatArray) -> FloatArray:
     """
-    Differentiate the joint torques by the gravity vector, exactly as they are linear in gravity.
+    Differentiate the joint torques by the gravity vector; torques are linear in gravity.
 
     Parameters
     ----------

@@ -1,7 +1,7 @@
 # Copyright 2026 The armid_ros developers
 # SPDX-License-Identifier: Apache-2.0
 """
-A URDF with other inertial parameters, and otherwise unchanged.
+Export of a URDF with new inertial parameters, otherwise unchanged.
 
 A driven joint may move several links, on fixed joints or on joints that are not driven. The other
 links keep their inertials as far as physical consistency permits. The driven joint's own link gets
@@ -94,7 +94,7 @@ def export_urdf(
 
 
 def _parsed(urdf: str) -> tuple[minidom.Document, minidom.Element]:
-    """Return a description, whose comments and prefixes stay, and its root."""
+    """Parse a description with comments and prefixes; return it and its root."""
     document = expatbuilder.parseString(urdf, namespaces=False)
     assert document.documentElement is not None
     return document, document.documentElement
@@ -213,6 +213,6 @@ def _check(robot: Robot, urdf: str) -> None:
     if np.any(worst > 1e-11 * scale):
         link = robot.links[int(np.argmax(worst))]
         raise ModelError(
-            f"{robot.name}: the exported description has other parameters of link '{link}' when "
-            f'read again: they differ by {worst.max():.3g}'
+            f'{robot.name}: the exported description does not reproduce the parameters of link '
+            f"'{link}': they differ by {worst.max():.3g}"
         )

@@ -64,7 +64,7 @@ class ArmWatch:
         self._stepped_ns = 0
         self._jumps = node.get_clock().create_jump_callback(
             JumpThreshold(
-                min_forward=Duration(seconds=60.0),  # as in simulated_arm: the clock was set
+                min_forward=Duration(seconds=60.0),  # the clock was set, as in simulated_arm
                 min_backward=Duration(nanoseconds=-1),
                 on_clock_change=False,
             ),
@@ -81,7 +81,7 @@ class ArmWatch:
         return np.array([known.get(joint, math.nan) for joint in self._joints])
 
     def now(self) -> float:
-        """Return the time for ages of messages [s], steady or simulated, without clock steps."""
+        """Return a time without clock steps, steady or simulated, for the age of messages [s]."""
         clock = self._node.get_clock()
         if not clock.ros_time_is_active:
             return float(self._steady.now().nanoseconds * 1e-9)
@@ -94,7 +94,7 @@ class ArmWatch:
                 self._states.callback(taken[0])
 
     def staleness(self, timeout: float) -> str:
-        """Return a text that names joints without a new position for a time [s]; empty if none."""
+        """Return a message on joints without a new position for a time [s]; empty if none."""
         fault = self.monitor.pose.staleness(self.now(), timeout)
         topic = self._states.topic_name
         if (

@@ -56,7 +56,7 @@ class _JumpGuard:
         try:
             robot = robot_from_urdf(deserialize_message(cdr, String).data)
         except ArmidError:
-            return  # an invalid description is not checked here
+            return  # invalid descriptions are reported elsewhere
         self._limits = dict(zip(robot.joints, robot.velocity_limit.tolist(), strict=True))
 
     def objection(self, cdr: bytes) -> str:
@@ -94,7 +94,7 @@ class _JumpGuard:
 
 class BagPlayerNode(ArmidNode):
     """
-    Publishes the messages of a bag, serialised as they were recorded.
+    Publishes the messages of a bag, with unchanged serialisation.
 
     A JointTrajectory is sent only if no joint of the arm that publishes joint_states would jump.
     If the bag itself has joint_states, its trajectories are sent only if no other node publishes

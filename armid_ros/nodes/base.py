@@ -22,7 +22,7 @@ from rclpy.subscription import Subscription
 from rclpy.timer import Timer
 from std_srvs.srv import Trigger
 
-#: Period of the check for new publishers and answers [s].
+#: Period of the checks for new publishers and for answers [s].
 LOOK_PERIOD = 0.1
 
 #: Parameters of every node.
@@ -30,7 +30,7 @@ COMMON = (
     NodeParameter(
         'executor',
         'single',
-        'Executor when the node is a process of its own; events takes less processor time at '
+        'Executor if the node runs in its own process; events takes less processor time at '
         '1 kHz, but is experimental in Jazzy.',
         choices=('single', 'events'),
     ),
@@ -120,7 +120,7 @@ class ArmidNode(Node):
         return survive
 
     def look_every(self, seconds: float, callback: Callable[[], None]) -> Timer:
-        """Call a function periodically in real time, independent of /clock."""
+        """Call a function periodically in real time, independently of /clock."""
         return self.create_timer(seconds, callback, clock=Clock(clock_type=ClockType.STEADY_TIME))
 
     @property
@@ -140,9 +140,9 @@ class ArmidNode(Node):
         return ''
 
     def look_for_trouble(self) -> None:
-        """Log once that simulated time is missing, or the problem that /diagnostics shows."""
+        """Log once that simulated time is missing, or the problem in /diagnostics."""
         missing = self.missing_clock
-        if missing and not self._clock_missed:  # /diagnostics needs it
+        if missing and not self._clock_missed:  # the topic of /diagnostics
             self.get_logger().warning(f'{missing}; until then the node waits')
         self._clock_missed = bool(missing)
         trouble = '' if missing else self.condition()[0]
@@ -191,7 +191,7 @@ class ArmidNode(Node):
         """
 
     def level(self, troubled: bool) -> bytes:
-        """Return the level of the status; overridden by nodes with levels above a warning."""
+        """Return the level of the status; nodes with levels above a warning override it."""
         return DiagnosticStatus.WARN if troubled else DiagnosticStatus.OK
 
     def further_statuses(self) -> Sequence[DiagnosticStatus]:

@@ -16,7 +16,7 @@ FATAL = (OSError, MemoryError, RecordingEnded)
 
 class Complaints:
     """
-    Inputs that a node rejected, by kind.
+    Counts and log messages of the inputs that a node rejected, by kind.
 
     Attributes
     ----------
@@ -46,7 +46,7 @@ class Complaints:
         self.latest = text
         self.fresh = True
         logged = self._logged.setdefault(kind, set())
-        if text not in logged and len(logged) < 10:  # so that the log does not overflow
+        if text not in logged and len(logged) < 10:  # limits the size of the log
             logged.add(text)
             self._logger.warning(text)
 
@@ -61,5 +61,5 @@ class Complaints:
         self._logger.debug(''.join(traceback.format_exception(error)))
 
     def settle(self) -> None:
-        """Begin a new period of reporting."""
+        """Reset `fresh` at the start of a new reporting period."""
         self.fresh = False

@@ -109,8 +109,7 @@ class ExcitationPublisherNode(ArmidNode):
         self._simulated = bool(self.value('simulation') or self.value('use_sim_time'))
         if not self._simulated:
             return table
-        # A simulation needs no caution, but sends no joint states while it checks a long
-        # trajectory.
+        # Simulations are exempt: they send no joint states while they check a long trajectory.
         lively = {'speed': 'fast', 'start': True, 'state_timeout': 5.0, 'effort_factor': 0.0}
         return [replace(p, default=lively.get(p.name, p.default)) for p in table]
 
@@ -146,7 +145,7 @@ class ExcitationPublisherNode(ArmidNode):
         return elapsed if on_the_way else None
 
     def look(self) -> None:
-        """Start when controller and joint states are available; stop the arm if one is lost."""
+        """Start when controller and joint states are available; stop the arm if either is lost."""
         self._controller.look()
         now, patience = self._arm.now(), self.value('state_timeout')
         if self.elapsed is not None:
@@ -170,7 +169,7 @@ class ExcitationPublisherNode(ArmidNode):
         return self._start(self.value('speed_scaling'))
 
     def rehearse(self) -> str:
-        """Run the excitation slowly; afterwards the status reports how the arm followed."""
+        """Run the excitation slowly; then the status reports tracking errors and torques."""
         speed = min(self.value('rehearsal_speed'), self.value('speed_scaling'))
         text = self._start(speed)
         assert self._gate is not None
@@ -194,7 +193,7 @@ class ExcitationPublisherNode(ArmidNode):
         )
         gate = MotionGate.of(planned, self._planner)
         motion = planned.motion()
-        # the set point differs from the measured position
+        # the run starts at the set point, which differs from the measured position
         first = max(math.ceil(HANDOVER * self._rate), 1)
         message = write_trajectory(motion.select(slice(first, None)))
         self._controller.discover()  # no time passes between the stamp and the sending
@@ -213,7 +212,7 @@ class ExcitationPublisherNode(ArmidNode):
         self._begun_ns, self._begun = now.nanoseconds, self._arm.now() + late
         self._gate, self._ending, self._rehearsal = gate, None, None
         self._overloads, self._trouble, self._rehearsed = 0, '', ''
-        self._runs, self._outcome = self._runs + 1, 'complete'  # unless it is stopped
+        self._runs, self._outcome = self._runs + 1, 'complete'  # unless the run is stopped
         return self.tell(
             f'a run of {planned.duration:g} s, {planned.approach.duration:.1f} s of it to get '
             f'there, sent to {receiver}'
@@ -227,15 +226,15 @@ class ExcitationPublisherNode(ArmidNode):
         return self._arm.fault_at_start(patience, difference, self._simulated)
 
     def stop(self) -> str:
-        """Bring the arm to rest on its path."""
+        """Stop the arm on its path."""
         self._waiting = False
         if self._gate is not None:
             elapsed = self._arm.now() - self._begun
             self._end_run('stopped by ~/stop')
             return self.tell(f'stopped {elapsed:.2f} s after the start')
-        ending = self._let_go()
+        ending = self._released()
         if ending is None:
-            raise TrajectoryError('nothing is under way')
+            raise TrajectoryError('no excitation is running')
         if ending.last is None:
             raise TrajectoryError(f'{ending.reason}; stop the arm there')
         now, limits = self._arm.now(), map(self.value, ('tracking_tolerance', 'stopping'))
@@ -248,7 +247,7 @@ class ExcitationPublisherNode(ArmidNode):
 
     @property
     def activity(self) -> str:
-        """Return 'running' during a run, else how the last run ended."""
+        """Return 'running' during a run, else the result of the last run."""
         return 'running' if self.elapsed is not None else self._outcome
 
     def condition(self) -> tuple[str, Mapping[str, object]]:
@@ -290,7 +289,7 @@ class ExcitationPublisherNode(ArmidNode):
 
     def close(self) -> None:
         """Stop the arm unless it is at rest, and wait until the message has arrived."""
-        ending = self._let_go()
+        ending = self._released()
         sent = self._gate is not None or (ending is not None and ending.last is not None)
         if sent and self.context.ok():
             self.stop()
@@ -372,7 +371,7 @@ class ExcitationPublisherNode(ArmidNode):
         self._ending = replace(self._ending, last=motion)
         self._controller.bring_to_rest(write_trajectory(motion))
 
-    def _let_go(self) -> Ending | None:
+    def _released(self) -> Ending | None:
         """Return the ended run, without a motion to send if another client moves the arm."""
         ending = self._ending
         if ending is not None and self._controller.taken:
@@ -381,7 +380,7 @@ class ExcitationPublisherNode(ArmidNode):
 
     def _watch_ending(self) -> None:
         """Check that the arm comes to rest; hold a blocked arm at its position."""
-        ending = self._let_go()
+        ending = self._released()
         if ending is None:
             return
         limits = map(self.value, ('state_timeout', 'tracking_tolerance', 'stopping'))
@@ -397,7 +396,7 @@ class ExcitationPublisherNode(ArmidNode):
         self.tell(f'run complete: {gate.run.duration:.1f} s, approach included')
 
     def _on_goal_ended(self, reason: str) -> None:
-        """Handle the result of the controller: empty at the end of the run, else the reason."""
+        """Handle the result of the controller; the reason is empty after a complete run."""
         gate, elapsed = self._gate, self._arm.now() - self._begun
         if gate is None:  # the run was stopped before
             ending = self._ending

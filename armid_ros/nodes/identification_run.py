@@ -46,7 +46,7 @@ def start_program(program: Program) -> subprocess.Popen[bytes]:
 
 class IdentificationRunNode(ArmidNode):
     """
-    Runs an identification from excitation to report, and then ends.
+    Runs a complete identification, from excitation to report, and ends.
 
     The node calls `recorder` and `excitation_publisher` for each run. After all runs it starts
     `armid identify` and `armid diagnose` on the recordings. The last of several runs is held out.
@@ -141,7 +141,7 @@ class IdentificationRunNode(ArmidNode):
         return self._failure
 
     def look(self) -> None:
-        """Take the next step if the condition of the present step is met."""
+        """Start the next step if the condition of the present step is met."""
         if self._done:
             return
         try:
@@ -165,7 +165,7 @@ class IdentificationRunNode(ArmidNode):
         }
 
     def close(self) -> None:
-        """Stop the run, the recording and the program that this node began."""
+        """Stop the run, the recording and the program that this node started."""
         self._stop_all()
         for future in self._stops:
             if self.executor is not None:  # the node that is stopped may have ended already
@@ -178,7 +178,7 @@ class IdentificationRunNode(ArmidNode):
                 self._program.kill()
 
     def _stop_all(self) -> None:
-        """Stop the run and the recording that this node began, the arm first."""
+        """Stop the run and then the recording that this node started."""
         for node in sorted(self._begun):
             if self._callers[node, 'stop'].service_is_ready():
                 self._stops.append(self._call(node, 'stop'))
@@ -210,7 +210,7 @@ class IdentificationRunNode(ArmidNode):
             yield from self._ended('diagnose', folder / 'diagnosis', bags, *model)
 
     def _excited(self, service: str, what: str = 'rehearsal') -> Iterator[Wait]:
-        """Start a run, again until it starts or the timeout has passed; wait until it ends."""
+        """Start a run, with retries until the timeout, and wait until it ends."""
         before = int(self._state.get('runs', 0))
         deadline = time.monotonic() + self.value('patience')
         while True:

@@ -108,7 +108,7 @@ class ListeningNode(ArmidNode):
 
     def report(self, reason: str, text: str = '') -> None:
         """
-        Complain of faulty joint states, with their publishers if two of them can cause the fault.
+        Report faulty joint states, with their publishers if two publishers can cause the fault.
 
         Parameters
         ----------

@@ -129,7 +129,7 @@ class LiveDiagnosisNode(ListeningNode):
         return f'planning; the motion goes out on {self._runs.topic_name}'
 
     def look(self) -> None:
-        """Check the publishers of joint states, and take results of the process."""
+        """Check the publishers of joint states, and handle results of the process."""
         super().look()
         self.take_answer()
 
@@ -153,7 +153,7 @@ class LiveDiagnosisNode(ListeningNode):
             self._take(result)
         elif not result.success:
             self.complaints.say('diagnosis', result.text)
-        else:  # of saving or planning
+        else:  # result of saving or planning
             self.tell(result.text)
             if result.excitation:
                 self._runs.publish(String(data=result.excitation))
@@ -218,7 +218,7 @@ class LiveDiagnosisNode(ListeningNode):
             self.live.use(settings_of(self.value))
 
     def close(self) -> None:
-        """End the process that diagnoses."""
+        """End the diagnosis process."""
         self._helper.close()
 
     def take_description(self, urdf: str) -> None:

@@ -68,7 +68,7 @@ class Progress:
         self.duration, self.t, self.real_time_factor = duration, 0.0, 0.0
 
     def see(self, now_ns: int) -> None:
-        """Take the time of the clock [ns], and report every second of it."""
+        """Update the time of the clock [ns], and report every second."""
         self.t = (now_ns - EPOCH_NS) * 1e-9
         self.real_time_factor = self.t / max(time.monotonic() - self._begun, 1e-9)
         if self.t >= self._due:
@@ -133,7 +133,7 @@ def run_lockstep(
             SimulatedArmNode, arm, EPOCH_NS, rate=rate, real_time_factor=0.0, use_sim_time=False
         )
         limits = Limits.of(arm.plant.robot, speed=1.0, reserve=False)
-        planner = TransferPlanner(ArmModel(arm.plant.robot), limits, None)  # nothing can be hit
+        planner = TransferPlanner(ArmModel(arm.plant.robot), limits, None)  # no obstacles
         publisher = stage.add(
             ExcitationPublisherNode, excitation, planner, start=False, approach=approach
         )
@@ -169,7 +169,7 @@ def run_lockstep(
             stage.spin_until(lambda begun=begun: publisher.last_stamp_ns == begun, 'joint_states')
         publisher.start()
         stage.spin_until(lambda: plant.moving or plant.complaints.counts, 'joint_trajectory')
-        settling = 0.5  # of the filters, after the run [s]
+        settling = 0.5  # settling time of the filters after the run [s]
         run = Progress(publisher.duration + (begun - EPOCH_NS) * 1e-9 + settling, on_progress)
         while run.t < run.duration:
             run.see(step())

@@ -109,7 +109,7 @@ class OnlineIdentifierNode(ListeningNode):
         self._timer = self.create_timer(1.0 / self.value('estimate_rate'), self.publish_estimate)
 
     def reset(self) -> str:
-        """Delete the estimate, and start again."""
+        """Delete the estimate and restart."""
         identifier = self._require()
         identifier.reset()
         self._adopt(identifier)
@@ -150,7 +150,7 @@ class OnlineIdentifierNode(ListeningNode):
                 text = self.save()
             except ArmidError as error:
                 text = f'the estimate is lost: {error}'
-            print(text, file=sys.stderr)  # the log is closed when a signal ends the node
+            print(text, file=sys.stderr)  # the logger is closed if a signal ends the node
 
     def publish_estimate(self) -> None:
         """Publish the estimate if it has changed."""

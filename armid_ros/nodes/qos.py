@@ -20,7 +20,7 @@ STREAM = QoSProfile(depth=10)
 LATCHED = QoSProfile(depth=1, durability=DurabilityPolicy.TRANSIENT_LOCAL)
 #: Messages a subscription holds while its node is busy: 1 s at 1 kHz.
 DEPTH = 1000
-#: Joint states, of which none may be lost. While a subscriber is not scheduled, shared memory
+#: Joint states, without losses. While a subscriber is not scheduled, shared memory
 #: holds 512 messages, half a second at 1 kHz. Later messages are sent again from the history of
 #: the publisher, of this depth.
 SAMPLES = QoSProfile(depth=DEPTH)
@@ -52,7 +52,7 @@ def recorded(publishers: Sequence[TopicEndpointInfo]) -> tuple[Qos, ...]:
 
 
 def offered(profiles: Sequence[Qos]) -> QoSProfile:
-    """Return the profile for playing a recorded topic, the weakest of the recorded ones."""
+    """Return the QoS for playing a recorded topic: the weakest of the recorded profiles."""
     best_effort = any(p.reliability is QosReliability.BEST_EFFORT for p in profiles)
     latched = {p.durability for p in profiles} == {QosDurability.TRANSIENT_LOCAL}
     return _profile(DEPTH, not best_effort, latched)
@@ -111,7 +111,7 @@ class MatchedSubscription:
 
     @property
     def several(self) -> str:
-        """Return a text that names several publishers of the topic; empty for one or none."""
+        """Return a message on several publishers of the topic; empty for one or none."""
         found = self._node.get_publishers_info_by_topic(self.topic)
         if len(found) < 2:
             return ''

@@ -86,7 +86,7 @@ class RecorderNode(ArmidNode):
         self._wanted = self._topics_wanted()
         self._writer: BagWriter | None = None
         self._subscriptions_by_topic: dict[str, MatchedSubscription] = {}
-        self._refused: dict[str, Sequence[str]] = {}  # types of rejected topics
+        self._refused: dict[str, Sequence[str]] = {}  # rejected topics and their types
         self._held: list[tuple[str, bool, bytes]] = []  # topic, whether it has stamps, message
         self._bags = 0
         self.message_count = 0
@@ -117,7 +117,7 @@ class RecorderNode(ArmidNode):
         if self._writer is not None:
             raise RecordingError(f'recording into {self._writer.path} already')
         name = self.value('bag') or f'armid_{datetime.now():%Y_%m_%d-%H_%M_%S}'
-        # The first bag must not exist; bags of later ~/start calls get a number.
+        # The path of the first bag must not exist; bags of later ~/start calls get a number.
         path = Path(name).expanduser()
         number = self._bags
         while number and path.exists():

@@ -85,7 +85,7 @@ class _ElasticTopics:
 
 class SimulatedArmNode(ArmidNode):
     """
-    Simulates an arm that is commanded and measured by topics.
+    Simulates an arm with topics for commands and measurements.
 
     In real time the stamps are those of the system clock. At another real_time_factor the node
     also publishes /clock. With use_sim_time the simulation follows /clock. A model on the topic
@@ -261,7 +261,7 @@ class SimulatedArmNode(ArmidNode):
             self.step()
 
     def catch_up(self) -> None:
-        """Simulate until real time times the factor; time that cannot be made up is skipped."""
+        """Simulate until real time times the factor; skip time that cannot be caught up."""
         self._owed += self.real_time.catch_up(self._factor, self._stride * self._arm.plant.dt)
         # set the stamps to the system clock again, but not during a trajectory
         if self._owed and self._clock_publisher is None and not self.moving:
@@ -269,7 +269,7 @@ class SimulatedArmNode(ArmidNode):
             self._owed = 0.0
 
     def reset(self) -> str:
-        """Move the arm to its initial position; time continues."""
+        """Set the arm to its initial state; time continues."""
         self._arm.reset(self._arm.state.steps)
         self._pending = None
         return f'{self.hardware} is where it began'
@@ -334,7 +334,7 @@ class SimulatedArmNode(ArmidNode):
             stamp = message.header.stamp
             start_ns = stamp.sec * 10**9 + stamp.nanosec or self.stamp_ns
             delay = (start_ns - self.stamp_ns) * 1e-9
-            if not -1.0 <= delay <= 60.0:  # the clocks differ
+            if not -1.0 <= delay <= 60.0:  # sender and arm use different clocks
                 when = f'{delay:.3g} s from now' if delay > 0 else f'{-delay:.3g} s ago'
                 raise TrajectoryError(
                     f'trajectory: its stamp is {when}; set use_sim_time on sender and arm, or on '

@@ -73,7 +73,7 @@ class TrajectoryController:
     """
     Topic joint_trajectory and action follow_joint_trajectory of one controller.
 
-    A run uses the same of them until its end.
+    A run uses the same interface until its end.
 
     Attributes
     ----------
@@ -91,7 +91,7 @@ class TrajectoryController:
 
     def __init__(self, node: Any, on_end: Callable[[str], None]) -> None:
         """
-        Make the publisher, and look for the action.
+        Make the publisher and the action client.
 
         Parameters
         ----------
@@ -152,7 +152,7 @@ class TrajectoryController:
         return self._error if self.under_way else math.nan
 
     def look(self) -> None:
-        """Make a client of the action when a controller offers it."""
+        """Make an action client when a controller offers the action."""
         if self._possible and self.client is None and self._offered:
             self._make_client()
 
@@ -198,7 +198,7 @@ class TrajectoryController:
             self._publisher.publish(trajectory)
 
     def trouble(self, patience: float) -> str:
-        """Return a text if the controller is gone or does not answer for a time [s]; or empty."""
+        """Return a message if the controller is gone or silent for a time [s]; empty otherwise."""
         goal, now = self._goal, time.monotonic()
         if goal is None or not self._by_action:
             return ''
@@ -261,8 +261,8 @@ class TrajectoryController:
         """
         Send a goal that replaces the present one.
 
-        A controller of ros2_control replaces the old goal by itself. The old goal is cancelled as
-        well, since other controllers do not replace it.
+        Controllers of ros2_control replace the old goal. It is also cancelled, because other
+        controllers do not replace it.
 
         Parameters
         ----------
@@ -318,7 +318,7 @@ class TrajectoryController:
         if status == GoalStatus.STATUS_SUCCEEDED and not result.error_code:
             self._end(goal, '')
         elif status == GoalStatus.STATUS_CANCELED or result.error_code == _REPLACED:
-            self._end(goal, self._taken_over())
+            self._end(goal, self._replacement_message())
         else:
             why = _ERRORS.get(result.error_code, 'without a reason')
             detail = f' ({result.error_string})' if result.error_string else ''
@@ -336,10 +336,10 @@ class TrajectoryController:
             self.taken = self.taken or (goal is None and bool(new))
         elif new:
             self.taken = True
-            self._end(goal, self._taken_over())
+            self._end(goal, self._replacement_message())
 
-    def _taken_over(self) -> str:
-        """Return a text that the goal was replaced by another client, with its name."""
+    def _replacement_message(self) -> str:
+        """Return a message that another client, named if known, has replaced the goal."""
         node, service = self._node, f'{self.action}/_action/send_goal'
         found = []
         for name, space in node.get_node_names_and_namespaces():

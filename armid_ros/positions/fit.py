@@ -42,7 +42,7 @@ _OF_DELAY, _OF_CENTER, _OF_RADIUS = 0.03, 0.1, 0.02
 _BLOCK = 0.5
 #: Smallest torque of a joint at the start over that of the strongest joint.
 _LIGHTEST = 0.03
-#: Most samples of a recording from which the start is found.
+#: Largest number of samples of a recording for the start values.
 _THINNED = 2000
 #: Rounds of the fit with newly estimated noise of the joints.
 _ROUNDS = 3
@@ -148,7 +148,7 @@ def start_values(
     side = np.sign(dq) * (np.abs(dq) > 0.05 * np.abs(dq).max(axis=0))
     free = np.array([gains is None, gains is None, True, True, True])
     if gains is None and not any(np.any(commands.dq) for _, commands in runs):
-        free[3] = False  # velocity gain and viscous friction act alike
+        free[3] = False  # velocity gain and viscous friction are collinear
     least, level = np.inf, np.sum(load**2, axis=0) + 1e-12
     for delay in _DELAYS:
         means = []
@@ -179,14 +179,14 @@ def start_values(
     sizes = np.array([effort / error, effort / speed, effort / rate, effort / speed, effort])
     size = np.concatenate([[_OF_DELAY], sizes.ravel(), [mass / _PRIOR]])
     size = np.concatenate([size, 3 * [_OF_CENTER], [_OF_RADIUS]])
-    # a value that starts at its limit hardly leaves it
+    # start values inside the limits, as the solver hardly leaves a limit
     values[free] = np.maximum(values, 0.02 * sizes)[free]
     return np.concatenate([[best], values.ravel(), [0.01 * mass, 0.0, 0.0, 0.0, _OF_RADIUS]]), size
 
 
 @dataclass(eq=False)
 class _Problem:
-    """Least squares of a model over windows, about a start with priors of given sizes."""
+    """Least-squares problem of a loop model over windows, with priors around the start values."""
 
     model: LoopModel
     windows: list[Window]

@@ -83,7 +83,7 @@ class CommandedMotion:
 @dataclass(frozen=True, eq=False)
 class Window:
     """
-    A part of a recording, simulated from a measured state.
+    Part of a recording that is simulated from a measured state.
 
     Attributes
     ----------
@@ -131,7 +131,7 @@ def windows_of(recording: Recording, commands: CommandedMotion) -> Iterator[Wind
 
 @dataclass(frozen=True, eq=False)
 class _PositionControl(Controller):
-    """A controller that is its feedback law."""
+    """Controller defined by its feedback law."""
 
     feedback: LinearFeedback
 
@@ -139,7 +139,7 @@ class _PositionControl(Controller):
 @dataclass(frozen=True, eq=False)
 class LoopModel:
     """
-    A robot with a position controller, drives and a tool, as a function of P parameters.
+    Robot with position controller, drives and tool, as a function of P parameters.
 
     Attributes
     ----------
@@ -223,7 +223,7 @@ class LoopModel:
             torque = control.torque(state.q, state.dq, first, kd * du[0])
             try:
                 trace = run(plant, control, state, torque, targets, rows, compiled)
-            except (ModelError, FloatingPointError):  # an unstable loop
+            except (ModelError, FloatingPointError):  # the simulation is unstable
                 found.append(np.full_like(window.q, _FAR))
                 continue
             q, dq, _ = trace.links

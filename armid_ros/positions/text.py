@@ -12,7 +12,7 @@ from armid_ros.report.notation import measured
 import numpy as np
 
 SCHEMA = 'armid/positions/1'
-#: Residual over the tracking error of a joint, above which a fit does not explain the positions.
+#: Residual over tracking error of a joint, above which the fit is reported as poor.
 _POOR = 0.3
 #: Given gains differ from the data beyond this number of standard errors, and this share.
 _DIFFERS, _SHARE = 3.0, 0.02

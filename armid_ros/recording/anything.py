@@ -27,7 +27,7 @@ from armid_ros.recording.source import DEFAULT, listed, ReadSettings, Topic
 if TYPE_CHECKING:
     from armid_ros.recording.tables import TablePlan
 
-#: Shows the plan by which a table is read.
+#: Callback that shows the plan of a table.
 Show = Callable[['TablePlan'], None]
 #: Package that reads tables, a plug-in.
 _TABLES = 'armid_ros.recording.tables'
@@ -55,7 +55,7 @@ def read_tables(
     Parameters
     ----------
     paths : sequence of Path
-        Files whose columns stand side by side.
+        Files with the columns of the same samples.
     columns : ColumnSettings
         Which columns hold which quantity, in which unit; missing settings are guessed.
     joints : sequence of str, optional

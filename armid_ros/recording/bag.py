@@ -1,6 +1,6 @@
 # Copyright 2026 The armid_ros developers
 # SPDX-License-Identifier: Apache-2.0
-"""Read a bag as one source of messages: a file, or a directory with or without metadata."""
+"""Open a bag as a source of messages: a file, or a directory with or without metadata."""
 
 from __future__ import annotations
 
@@ -127,7 +127,7 @@ class Bag(Source):
         fits: Callable[[Topic], bool] | None = None,
     ) -> Topic:
         """
-        Return the topic of a type, or one that fits: the only one, or the one of a given name.
+        Return the topic of a type or with a matching type: the named topic, or the only one.
 
         Raises
         ------
@@ -189,14 +189,14 @@ class Bag(Source):
         return b''.join(unpacked(io.BytesIO(message), self._settings, 'a compressed message'))
 
     def _open(self, file: Path) -> Source:
-        """Open one file."""
+        """Open a storage file."""
         storage = _STORAGES.get(_storage_suffix(file))
         if storage is None:  # this import takes as long as reading a bag
             from armid_ros.recording.ros1_source import Ros1Source
 
             storage = Ros1Source
         with reading(file, RecordingError):
-            if file.suffix in _COMPRESSED:  # the temporary file is removed with the stack
+            if file.suffix in _COMPRESSED:  # closing the stack deletes the temporary file
                 folder = self._stack.enter_context(tempfile.TemporaryDirectory(prefix='armid-'))
                 plain = Path(folder, file.stem)
                 try:
@@ -228,7 +228,7 @@ def is_bag_file(path: Path) -> bool:
 
 
 def _files_of(path: Path) -> BagMetadata:
-    """Return the metadata of a bag; without metadata.yaml, its files alone."""
+    """Return the metadata of a bag; without metadata.yaml, only its files."""
     if not os.path.lexists(path):
         raise RecordingError(f'{path}: there is no such bag')
     if not path.is_dir():

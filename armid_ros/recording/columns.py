@@ -22,7 +22,7 @@ TIME_UNITS = {'s': 1.0, 'ms': 1e-3, 'us': 1e-6, 'ns': 1e-9}
 #: Settings for tables only, and settings for the meaning of numbers, for tables and bags.
 _WHERE = ('time', 'time_unit', 'rate_hz', 'position', 'velocity', 'effort', 'episode')
 _WHAT = ('degrees', 'position_scale', 'effort_scale', 'zero', 'gear')
-#: Command-line options that are not called like their setting.
+#: Command-line options whose name differs from that of the setting.
 _OPTIONS = {'rate_hz': '--rate', 'effort_scale': '--effort-scale or --current-gain'}
 
 
@@ -86,7 +86,7 @@ class ColumnSettings:
 
 
 def renamed(name: str, rules: Rules) -> str:
-    """Rename a joint by the first rule that fits the whole name, or else its beginning."""
+    """Rename a joint by the first rule that matches the name, or else its beginning."""
     for old, new in sorted(rules, key=lambda rule: rule[0] != name):
         if name.startswith(old):
             return new + name[len(old) :]
@@ -161,7 +161,7 @@ def refuse_columns(path: str | Path, settings: ColumnSettings, *, copied: bool =
         reason = 'changes no bag that is copied; give it to the command that reads the bag'
         reasons |= dict.fromkeys(_WHAT, reason)
     for name, reason in reasons.items():
-        if getattr(settings, name) != getattr(ColumnSettings, name):  # its default
+        if getattr(settings, name) != getattr(ColumnSettings, name):  # unchanged default
             option = _OPTIONS.get(name, f'--{name.replace("_", "-")}')
             raise RecordingError(f'{path}: {option} {reason}')
 
@@ -192,7 +192,7 @@ def in_si(
     dq = None if dq is None else dq * turn
     if tau is not None:
         tau = tau * per_joint(settings.effort_scale or (1.0,), joints, 'the scale of efforts')
-    if settings.gear:  # motor = G q, whence tau = G^T tau_motor
+    if settings.gear:  # motor = G q, and therefore tau = G^T tau_motor
         gear = np.diag(per_joint(settings.gear, joints, 'the gear ratio'))
         for motor, joint, ratio in settings.coupling:
             gear[_position(motor, joints), _position(joint, joints)] = ratio

@@ -3,8 +3,8 @@
 """
 Decompress data with a limit of the size.
 
-A few compressed bytes can expand to any size, so the stated size is the limit. Content of another
-size counts as damaged, and no more than the stated size is decompressed.
+A few compressed bytes can expand to any size, so the stated size is the limit. Content of a
+different size is damaged; at most the stated size is decompressed.
 
 """
 
@@ -55,7 +55,7 @@ def decompressed(stored: _Buffer, compression: str, size: int, settings: ReadSet
     else:
         stated = int(lz4.frame.get_frame_info(stored)['content_size']) or -1
     if stated not in (-1, size):  # -1: the frame states no size
-        raise ValueError(f'holds {stated} bytes, but {size} are stated')
+        raise ValueError(f'has {stated} bytes instead of the stated {size}')
     settings.require(size, 'a chunk')
     if not size:
         return b''
@@ -65,9 +65,9 @@ def decompressed(stored: _Buffer, compression: str, size: int, settings: ReadSet
         decompressor = lz4.frame.LZ4FrameDecompressor()
         content = bytes(decompressor.decompress(stored, max_length=size))
         if not decompressor.eof and decompressor.decompress(b'', max_length=1):
-            raise ValueError(f'holds more than the {size} bytes stated')
+            raise ValueError(f'has more than the stated {size} bytes')
     if len(content) != size:
-        raise ValueError(f'holds {len(content)} bytes, but {size} are stated')
+        raise ValueError(f'has {len(content)} bytes instead of the stated {size}')
     return content
 
 
@@ -99,7 +99,7 @@ def partly_decompressed(stored: _Buffer, compression: str, size: int) -> bytes:
 
 def unpacked(stream: BinaryIO, settings: ReadSettings, what: str) -> Iterator[bytes]:
     """
-    Yield the content of a zstd file or message, a piece at a time.
+    Yield the content of a zstd file or message in pieces.
 
     Not every writer states the size of the content in the frame, so that a limit is needed.
 

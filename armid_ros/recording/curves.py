@@ -15,7 +15,7 @@ def draw_joints(
     joints: Sequence[str], curves: Mapping[str, tuple[FloatArray, FloatArray]], quantity: str
 ) -> npt.NDArray[np.object_]:
     """
-    Draw the curves of each joint in axes of their own.
+    Draw the curves of each joint in separate axes.
 
     Parameters
     ----------

@@ -36,7 +36,7 @@ _BIG, _LITTLE = struct.Struct('>iI').unpack_from, struct.Struct('<iI').unpack_fr
 @dataclass(frozen=True)
 class MessageType:
     """
-    A message type as a bag describes it.
+    Message type, with its description in a bag.
 
     Attributes
     ----------
@@ -89,7 +89,7 @@ def store_for(described: MessageType) -> Typestore:
     if not described.definition:
         store = get_typestore(Stores.ROS2_JAZZY)
         if described.name not in store.fielddefs:
-            raise RecordingError(f'type {described.name}: the bag does not hold its definition')
+            raise RecordingError(f'type {described.name}: its definition is missing in the bag')
         return store
     store = Typestore()
     if described.encoding == 'ros2idl':

@@ -81,7 +81,7 @@ def bag_information(
 
     """
     count = sum(topic.count for topic in topics)
-    # as rosbag2 writes it for a bag without messages
+    # value of rosbag2 for a bag without messages
     start = {'nanoseconds_since_epoch': start_ns if count else 2**63 - 1}
     duration = {'nanoseconds': end_ns - start_ns if count else 0}
     files = [] if file_name is None else [file_name]
@@ -122,7 +122,7 @@ def bag_information(
 
 
 def dump(information: Mapping[str, Any] | Sequence[Mapping[str, Any]]) -> str:
-    """Return a map, or a list of them, as YAML."""
+    """Return a map, or a list of maps, as YAML."""
     # The C dumper takes 1 ms and may be missing; the Python dumper takes 10 ms.
     dumper = getattr(yaml, 'CSafeDumper', yaml.SafeDumper)
     return str(yaml.dump(information, Dumper=dumper, sort_keys=False, allow_unicode=True))

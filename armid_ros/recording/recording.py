@@ -29,7 +29,7 @@ GAP_PERIODS = 5.0
 @dataclass(frozen=True)
 class TimeGap:
     """
-    A stretch without samples.
+    Time interval without samples.
 
     Attributes
     ----------
@@ -346,7 +346,7 @@ class Recording:
             If no stretch is long enough, or the cut-off exceeds half of the rate.
 
         """
-        # the filters of identification are above this package
+        # imported here, as identification depends on this package
         filtered = import_module('armid_ros.api.arguments').motion_of(self, cutoff)
         assert isinstance(filtered, Motion)
         return filtered
@@ -408,7 +408,7 @@ def recorded_together(
 
 def given_twice(fitted: Sequence[Recording], held_out: Sequence[Recording] = ()) -> str:
     """
-    Return a text that names the recordings that are given twice.
+    Return a message on recordings that are given twice; empty if there are none.
 
     A recording that is fitted twice has twice the weight, and a fitted recording is not held out.
     Two recordings are the same if positions and torques agree: two simulated runs may share their

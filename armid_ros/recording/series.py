@@ -1,7 +1,7 @@
 # Copyright 2026 The armid_ros developers
 # SPDX-License-Identifier: Apache-2.0
 """
-Assemble decoded messages into samples on one time base.
+Combine decoded messages to samples on one time base.
 
 Messages that name the same joints form a series. The series with the most samples gives the time
 base. The other series are interpolated linearly, except over their gaps.
@@ -52,7 +52,7 @@ def gather(pieces: Sequence[JointSamples]) -> list[JointSamples]:
 def clock_problem(
     stamps: IntArray, position: FloatArray | None, receive: IntArray | None = None
 ) -> str:
-    """Return why stamps are not usable; empty if they are."""
+    """Return why stamps are not usable; empty if they are usable."""
     first = int(np.argmax(stamps != 0))
     if first and np.count_nonzero(stamps[first:] == 0) <= 0.01 * len(stamps):
         stamps = stamps[first:]  # simulated time is zero until the first /clock
@@ -65,7 +65,7 @@ def clock_problem(
         return ''
     repeated = steps == 0
     if position is not None and not zero and repeated.any():
-        # A message recorded twice also repeats its values; it is no fault of the clock.
+        # A message that was recorded twice repeats its values; the clock is not at fault.
         at = np.flatnonzero(repeated)
         repeated[at] = (position[at] != position[at + 1]).any(axis=1)
     if repeated.mean() > 0.5:
@@ -196,8 +196,8 @@ def longest_run(stamps: IntArray) -> slice | None:
     # The next message must also be earlier; otherwise a single message was late.
     down[:-1] &= stamps[2:] - stamps[:-2] < -RESTART_NS
     for back in np.flatnonzero((steps < 0) & ~down):
-        # Late messages fill a hole, so that the total matches the sampling rate. A clock that was
-        # set back gives twice as many messages.
+        # Late messages fill a gap, so that their number matches the sampling rate. A clock that
+        # was set back gives twice as many messages.
         first, last = stamps[back + 1], stamps[back]
         before = int(np.count_nonzero(stamps[: back + 1] >= first))
         after = int(np.argmax(np.append(stamps[back + 1 :], last + 1) > last))
@@ -228,7 +228,7 @@ def _sorted(series: JointSamples, counts: Counter[str]) -> JointSamples:
 def _resampled(
     series: JointSamples, stamps: IntArray
 ) -> tuple[JointSamples, npt.NDArray[np.bool_], npt.NDArray[np.bool_]]:
-    """Interpolate a series at other stamps; also return which values are valid, and exact."""
+    """Interpolate a series at other stamps; also return masks of valid and of exact values."""
     if len(series) == len(stamps) and np.array_equal(series.stamps, stamps):
         everywhere = np.ones(len(stamps), np.bool_)
         return series, everywhere, everywhere
@@ -341,7 +341,7 @@ def assemble(
     **about: Any,
 ) -> Recording:
     """
-    Assemble a recording from samples that may be late, repeated, split or not finite.
+    Make a recording from samples that may be late, repeated, split or not finite.
 
     Parameters
     ----------

@@ -19,9 +19,9 @@ import numpy.typing as npt
 from rosbags.interfaces import Qos
 
 IntArray = npt.NDArray[np.int64]
-#: Encoding of listed topics whose messages the source cannot return.
+#: Encoding of topics whose messages cannot be read.
 UNREADABLE = 'unreadable'
-#: Messages of a block.
+#: Number of messages of a block.
 BLOCK_MESSAGES = 4096
 
 
@@ -186,7 +186,7 @@ class Damage:
 
 
 class Source(ABC):
-    """A storage of messages: one file, or the files of one bag."""
+    """Storage of messages: one file, or the files of one bag."""
 
     def __init__(self, path: Path, settings: ReadSettings = DEFAULT) -> None:
         """

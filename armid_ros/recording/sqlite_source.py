@@ -32,7 +32,7 @@ from armid_ros.recording.source import (
 import numpy as np
 
 _JOURNALS = ('-wal', '-journal')
-# Condition for a valid row: an integer time and binary data.
+# SQL condition for valid rows: an integer time and binary data.
 _WHOLE = "typeof(timestamp) = 'integer' AND timestamp >= 0 AND typeof(data) = 'blob'"
 _ERRORS = (sqlite3.Error, UnicodeDecodeError, OverflowError, MemoryError)
 
@@ -43,7 +43,7 @@ class SqliteSource(Source):
     def __init__(self, path: Path, settings: ReadSettings = DEFAULT) -> None:
         """Open a file of rosbag2."""
         super().__init__(path, settings)
-        # After a crash SQLite must replay the journal beside the file, which 'immutable' ignores.
+        # After a crash, SQLite must replay the journal of the file, which 'immutable' ignores.
         # Without a journal 'immutable' also works in a read-only folder.
         journal = any(is_file(path.with_name(path.name + end)) for end in _JOURNALS)
         mode = 'mode=ro' if journal else 'immutable=1'
@@ -114,13 +114,13 @@ class SqliteSource(Source):
                 yield RawMessage(_text(name), time, time, data)
 
     def _opened(self) -> dict[str, set[str]]:
-        """Check that the file is one of rosbag2, and return the columns of its tables."""
+        """Check that the file is a bag of rosbag2, and return the columns of its tables."""
         database = self._database
         database.text_factory = lambda text: text.decode('utf-8', 'replace')
         database.setlimit(sqlite3.SQLITE_LIMIT_LENGTH, min(self._settings.memory_limit, 2**31 - 1))
         with suppress(sqlite3.Error):  # old versions of SQLite lack this pragma
             database.execute('PRAGMA trusted_schema = OFF')
-        # Only tables are read: a view could run an endless computation.
+        # Only tables are read, as a view could run an endless computation.
         tables = {
             name
             for (name,) in database.execute("SELECT name FROM sqlite_master WHERE type = 'table'")

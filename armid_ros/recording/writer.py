@@ -42,7 +42,7 @@ from rosbags.interfaces import Qos
 
 # For JointState at 3 kHz (1 MB/s) chunks are closed by age, not by size.
 DEFAULT_CHUNK_SIZE = 512 * 1024
-# With the time of writing, a kill loses less than 0.3 s of messages.
+# Including the time of writing, a kill loses less than 0.3 s of messages.
 DEFAULT_CHUNK_AGE = 0.2
 
 
@@ -224,8 +224,8 @@ class BagWriter:
         if known is not None:
             if known.type_name != type_name:
                 raise RecordingError(
-                    f'{self.path}: {name} is a topic of {known.type_name} already, '
-                    f'and cannot also be one of {type_name}'
+                    f'{self.path}: topic {name} has the type {known.type_name} already, '
+                    f'and cannot have {type_name}'
                 )
             return
         if definition is not None and type_hash is not None:
@@ -324,7 +324,7 @@ class BagWriter:
         at_once = max(1, self._chunk_size // record.itemsize)
         for at in range(0, len(messages), at_once):
             some = messages[at : at + at_once]
-            # The sequence number, a field between them, stays zero.
+            # The sequence number, the field between them, is zero.
             records = np.zeros(len(some), record)
             head = records['head']
             head['opcode'] = Opcode.MESSAGE
@@ -417,7 +417,7 @@ class BagWriter:
         self._mcap.finish()
         information = bag_information(self.topics, self.file.name, *self.time_range)
         text = dump({'rosbag2_bagfile_information': information})
-        write_file(self.path / FILE_NAME, text)  # after an interruption complete or absent
+        write_file(self.path / FILE_NAME, text)  # complete or absent after an interruption
 
     def _write_information(self, file_name: str | None) -> None:
         """Write the metadata record that rosbag2 writes at the beginning and end of the file."""

@@ -1,7 +1,7 @@
 # Copyright 2026 The armid_ros developers
 # SPDX-License-Identifier: Apache-2.0
 """
-Drawings of an arm as it hangs: outlines of its collision bodies from a corner, far ones first.
+Drawings of an arm with gravity downwards: outlines of its collision bodies, far bodies first.
 
 An arm without bodies is drawn as bars from each joint to the joints that it carries; the last bar
 ends beyond its centre of mass.
@@ -30,7 +30,7 @@ _MARGIN = 0.03
 _ROUND = 16
 #: Colour of obstacles.
 OBSTACLE = 'var(--line)'
-#: Smaller bodies stand for a link without a body, and are not drawn [m].
+#: Smaller bodies represent links without a body, and are not drawn [m].
 _POINT = 1e-3
 #: Height of a line of text [px].
 _LINE = 16.0
@@ -134,7 +134,7 @@ def draw_arm(
     robot: Robot, marked: Sequence[str], q: FloatArray | None = None, label: str = ''
 ) -> ArmDrawing:
     """
-    Draw an arm in the pose that shows most of it.
+    Draw an arm in the pose with the largest visible area.
 
     Parameters
     ----------
@@ -151,7 +151,7 @@ def draw_arm(
     solids, model = _solids(collision_model(robot)), robot.model
     poses = [robot.positions(robot.middle_pose)]
     if q is not None and len(q):
-        # poses that a single drawing is tried in
+        # candidate poses of a single drawing
         kept = np.linspace(0, len(q) - 1, min(12, len(q))).astype(np.intp)
         poses = list(robot.positions(q[kept]))
     tried = [[_frames(model, pose)] for pose in poses]
@@ -187,7 +187,7 @@ def draw_arm(
 
 @dataclass(frozen=True)
 class _Solid:
-    """A body: all points within a radius of some, in the frame of a joint of the model."""
+    """A body: all points within a radius of given points, in the frame of a joint of the model."""
 
     joint: int
     of_arm: bool
@@ -195,7 +195,7 @@ class _Solid:
     radius: float
 
     def seen(self, frame: pin.SE3) -> tuple[FloatArray, float]:
-        """Return the outline as seen, shape (K, 2) [m], and how near it is to the eye."""
+        """Return the projected outline, shape (K, 2) [m], and its depth."""
         points = self.points @ frame.rotation.T + frame.translation
         turn = np.linspace(0.0, 2.0 * np.pi, _ROUND, endpoint=False)
         ring = max(self.radius, 1e-4) * np.column_stack([np.cos(turn), np.sin(turn)])
@@ -222,7 +222,7 @@ def _strip(
 def _outlines(
     solids: Sequence[_Solid], frames: Sequence[list[pin.SE3]], strip: Strip
 ) -> Iterator[tuple[_Solid, str]]:
-    """Yield each body with its outline on the paper, the far ones of each pose first."""
+    """Yield each body with its projected outline, far bodies of each pose first."""
     for pose, frame in enumerate(frames):
         seen = [(solid, *solid.seen(frame[solid.joint])) for solid in solids]
         for solid, hull, _ in sorted(seen, key=lambda one: one[2]):
@@ -240,7 +240,7 @@ def _solids(collision: CollisionModel) -> list[_Solid]:
             up = np.array([0.0, 0.0, shape.halfLength])
             points, radius = np.concatenate([rim + up, rim - up]), 0.0
         else:
-            points, radius = outline(shape)  # no points if it is endless
+            points, radius = outline(shape)  # unbounded shapes have no points
         if len(points) and (radius > _POINT or np.ptp(points, axis=0).max() > _POINT):
             placed = points @ body.placement.rotation.T + body.placement.translation
             solids.append(_Solid(int(body.parentJoint), body.parentFrame > 0, placed, radius))
@@ -252,7 +252,7 @@ def _solids(collision: CollisionModel) -> list[_Solid]:
 
 
 def _frames(model: pin.Model, q: FloatArray) -> list[pin.SE3]:
-    """Return where the joints of a model are in a pose, seen upright: gravity points down."""
+    """Return the positions of the joints of a model in a pose, with gravity downwards."""
     data, upright = model.createData(), pin.SE3.Identity()
     pin.forwardKinematics(model, data, np.asarray(q, dtype=float))
     if np.any(model.gravity.linear):
@@ -305,7 +305,7 @@ class Strip:
         return round(self.pitch * self.count, 1), round(self.height + 30.0, 1)
 
     def place(self, points: FloatArray, pose: int) -> FloatArray:
-        """Return where flat points, shape (..., 2) [m], are in the frame of a pose [px]."""
+        """Convert flat points, shape (..., 2) [m], to the frame of a pose [px]."""
         right = pose * self.pitch + self.scale * (points[..., 0] - self.left)
         down = self.scale * (self.top - points[..., 1])
         return np.asarray(np.round(np.stack([right, down], axis=-1), 1))

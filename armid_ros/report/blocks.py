@@ -30,7 +30,7 @@ class ContentSection(Section):
 
     template: ClassVar[str] = 'content.html'
 
-    title: str  # type: ignore[misc]  # of an instance, not of a class
+    title: str  # type: ignore[misc]  # instance attribute
     blocks: Sequence[Templated]
 
 
@@ -191,7 +191,7 @@ class BulletList(Templated):
 @dataclass(frozen=True)
 class Fold(Templated):
     """
-    Blocks below a line that opens them.
+    Blocks that a click on a line opens.
 
     Attributes
     ----------
@@ -214,7 +214,7 @@ class Fold(Templated):
 @dataclass(frozen=True)
 class Panels(Templated):
     """
-    Blocks side by side, each with a heading.
+    Adjacent blocks with headings.
 
     Attributes
     ----------

@@ -1,7 +1,7 @@
 # Copyright 2026 The armid_ros developers
 # SPDX-License-Identifier: Apache-2.0
 """
-Interactive charts of a page: data and roles here, drawing in assets/report.js.
+Data and roles of the interactive charts of a page; assets/report.js draws them.
 
 A series has a role, not a colour: the style sheet has a colour for each role, one for light, one
 for dark and one for paper.
@@ -135,7 +135,7 @@ class Chart(Templated):
 
 def thinned(*series: npt.ArrayLike, most: int = 3000) -> npt.NDArray[np.intp]:
     """
-    Thin samples so that the curve looks the same.
+    Reduce the number of samples without a visible change of the curve.
 
     Parameters
     ----------
@@ -182,7 +182,7 @@ def joined_time(parts: Sequence[FloatArray]) -> FloatArray:
 
 
 def rounded(values: npt.ArrayLike) -> list[float | None]:
-    """Return values with as many digits as a screen shows, None for NaN."""
+    """Return values rounded to the resolution of a screen, None for NaN."""
     array = np.asarray(values, dtype=float)
     finite = array[np.isfinite(array)]
     span = float(np.ptp(finite)) if len(finite) else 0.0
@@ -193,7 +193,7 @@ def rounded(values: npt.ArrayLike) -> list[float | None]:
 
 
 def script_json(data: dict[str, Any]) -> Markup:
-    """Return JSON that no name in it can turn into HTML."""
+    """Return JSON that is safe within HTML."""
     text = json.dumps(data, allow_nan=False, separators=(',', ':'))
     for character in '<>&\u2028\u2029':
         text = text.replace(character, f'\\u{ord(character):04x}')
@@ -212,7 +212,7 @@ def image_data(colour: FloatArray, strength: FloatArray) -> str:
         Opacity, clipped to 0 to 1.
 
     """
-    from matplotlib.image import imsave  # takes long to import, and few pages have an image
+    from matplotlib.image import imsave  # slow import, and few pages have an image
 
     pixels = np.concatenate([colour, np.clip(np.abs(strength), 0.0, 1.0)[..., None]], axis=-1)
     png = BytesIO()

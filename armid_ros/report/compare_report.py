@@ -87,7 +87,7 @@ def verdict(comparison: Comparison) -> tuple[str, str]:
 
 
 def change_rows(comparison: Comparison) -> list[tuple[str, ...]]:
-    """Return a row for each parameter that changed, as `HEADS` has the columns."""
+    """Return a row for each changed parameter, with the columns of `HEADS`."""
     rows = []
     for change in comparison.changed:
         values = [(change.before, change.before_std), (change.after, change.after_std)]

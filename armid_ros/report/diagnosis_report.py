@@ -217,7 +217,7 @@ def _verdict(
 @dataclass(frozen=True)
 class Story(Section):
     """
-    The story of a diagnosis: questions of a reader with their answers.
+    Summary of a diagnosis as questions of a reader with answers.
 
     Attributes
     ----------
@@ -402,7 +402,7 @@ def _of_recording(gap: Gap, shown: Overlay, joint: int) -> tuple[FloatArray, ...
 
 def whole_overlays(diagnosis: Diagnosis, recordings: Sequence[Recording]) -> Gap | None:
     """
-    Return the gap with curves of whole recordings if a cause acts for part of the time.
+    Return the gap with curves of whole recordings if a cause acts part of the time.
 
     Parameters
     ----------

@@ -34,7 +34,7 @@ HEADS = (
     'measured [m]',
     'explains',
 )
-#: Tone of each word of a verdict.
+#: Colour of each verdict.
 _TONES = {
     **{'unfit': 'bad', 'doubtful': 'fair', 'ready': 'good'},
     **{'wrong': 'bad', 'look': 'fair', 'clean': 'good'},
@@ -62,7 +62,7 @@ def inspection_report(found: Inspection, origin: ResultOrigin = DEFAULT_ORIGIN) 
     grade = inspection_word(found)
     first = 1 if grade == 'ready' else 2
     texts = [remark.text for remark in found.remarks]
-    texts.insert(first - 1, found.verdict)  # below the worst remark
+    texts.insert(first - 1, found.verdict)  # not worse than the worst remark
     sentences = [text[0].upper() + text[1:].replace('`', '').rstrip('.') + '.' for text in texts]
     sections: list[Section] = [
         VerdictSection(
@@ -83,13 +83,13 @@ def inspection_report(found: Inspection, origin: ResultOrigin = DEFAULT_ORIGIN) 
 
 
 def inspection_word(found: Inspection) -> str:
-    """Return the verdict on a recording in a word: ready, doubtful or unfit."""
+    """Return the verdict on a recording: ready, doubtful or unfit."""
     weights = {remark.weight for remark in found.remarks}
     return 'unfit' if 'bad' in weights else 'doubtful' if 'doubt' in weights else 'ready'
 
 
 def check_word(remarks: Sequence[Remark], found: LinkCheck | None) -> str:
-    """Return the verdict on a description in a word: clean, look or wrong."""
+    """Return the verdict on a description: clean, look or wrong."""
     weights = {remark.weight for remark in remarks}
     if 'bad' in weights or (found is not None and found.wrong):
         return 'wrong'
@@ -139,7 +139,7 @@ def _wrong_mass(found: LinkCheck, k: int) -> str:
 
 
 def link_rows(found: LinkCheck) -> list[tuple[str, ...]]:
-    """Return a row for every link, as `HEADS` has the columns."""
+    """Return a row for every link, with the columns of `HEADS`."""
     return [
         (
             f'{link} ({found.joints[k]})',
@@ -227,7 +227,7 @@ def _contents_section(found: Inspection) -> ContentSection:
 
 
 def _joints_section(found: Inspection) -> ContentSection:
-    """Return ranges, speeds and efforts; no head is broken within its unit."""
+    """Return ranges, speeds and efforts; heads have no line break within a unit."""
     heads = list(joint_heads(found))
     if len(set(found.units)) == 1:
         for column, like in ((2, 1), (5, 1), (8, 7)):
@@ -297,7 +297,7 @@ def _curves_section(found: Inspection) -> ContentSection:
 
 
 def joint_heads(found: Inspection) -> tuple[str, ...]:
-    """Return the heads of the table of joints; with units, where all joints have the same."""
+    """Return the heads of the table of joints, with units if all joints have the same unit."""
     alike, unit = len(set(found.units)) == 1, found.units[0]
     length, speed, torque = (
         f' [{one}]' if alike else '' for one in (unit, f'{unit}/s', 'N' if unit == 'm' else 'N m')

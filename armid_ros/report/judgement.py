@@ -22,7 +22,7 @@ import numpy as np
 GOOD_CONDITION, WEAK_CONDITION = 100.0, 1000.0
 
 
-#: A limitation and its remedy; either may be empty.
+#: A limitation and its remedy; one of them may be empty.
 Caution = tuple[str, str]
 
 
@@ -71,7 +71,7 @@ def judge(
     training = Score.of(result.training)
     fits = [fit for part in validation.values() for fit in part]
     held_out = Score.of(fits) if fits else None
-    # of a physical certificate only active constraints and its notes
+    # only active constraints and notes of a physical certificate
     known = set()
     if result.physical is not None:
         given = result.physical
@@ -123,11 +123,11 @@ def _sentences(result: Identification, verification: Verification | None) -> Ite
 def _of_errors(
     result: Identification, training: Score, held_out: Score | None
 ) -> Iterator[Caution]:
-    """Yield statements on the errors of training and held-out data."""
+    """Yield sentences on the errors of training and held-out data."""
     if held_out is None:
         yield '', 'Record another motion of armid excite, and test the model on it: --validate.'
     else:
-        # of a weaker torque, the same residual is a larger share
+        # the same residual is a larger share of a weaker torque
         stronger = np.linalg.norm(held_out.torque_rms) / np.linalg.norm(training.torque_rms)
         ratio = held_out.relative_error_percent / max(training.relative_error_percent, 1e-9)
         ratio *= min(float(stronger), 1.0)

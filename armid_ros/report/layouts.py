@@ -10,7 +10,7 @@ from typing import Any
 
 from armid_ros.report.page import render
 
-#: Of the files, in a comment or a variable: which of them may be written over.
+#: Schema in a comment or a variable of each file; files with a schema may be overwritten.
 SCHEMA = 'armid/layout/1'
 #: Colours of PlotJuggler, in its order.
 _COLOURS = (

@@ -15,11 +15,11 @@ from armid_ros.estimate import ParameterName
 from armid_ros.identification.fitting.identifiability import HALF_WIDTH
 from markupsafe import escape, Markup
 
-#: Stands for a missing number.
+#: Text for a missing number.
 DASH = '\N{EN DASH}'
-#: No quantity of an arm in SI units is as large.
+#: Larger than all quantities of an arm in SI units.
 _NO_NUMBER = 1e12
-#: Words that a page explains where they stand.
+#: Terms with a tooltip.
 TERMS = {
     'floor': 'Error that a perfect model would have: noise, or what the model before had.',
     'gap': 'Squared torque error of the given model, each joint in units of its floor.',
@@ -29,7 +29,7 @@ TERMS = {
 
 
 def pretty(unit: str) -> str:
-    """Return a unit, or a sentence with units, as it is printed: 'kg m²' for 'kg m^2'."""
+    """Format a unit, or a sentence with units: 'kg m²' for 'kg m^2'."""
     return unit.replace('^2', '²').replace('^3', '³')
 
 
@@ -49,7 +49,7 @@ def plain(value: float, count: int = 3) -> str:
 
 
 def measured(value: float, reach: float) -> tuple[str, str]:
-    """Format a value and the half-width of its interval to the digits that this leaves."""
+    """Format a value and the half-width of its interval with as many digits as are significant."""
     if not (math.isfinite(reach) and reach > 0.0):
         return f'{value:.4g}', '0'
     decimals = max(0, 1 - math.floor(math.log10(reach)))
@@ -85,7 +85,7 @@ def _plus_minus(value: float, std: float, unit: str) -> str:
 
 
 def percent(share: float) -> str:
-    """Return a share of the gap as a percentage, the digit that matters kept: '96 %', '0.4 %'."""
+    """Format a share of the gap as a percentage with its significant digit: '96 %', '0.4 %'."""
     if not math.isfinite(share):
         return DASH
     return words.percent(share)
@@ -151,7 +151,7 @@ def common_prefix(names: Sequence[str]) -> str:
     """
     first = names[0] if len(names) > 1 else ''
     ends = [first[: found.end()] for found in re.finditer(r'[_/.:-]', first)]
-    # letters of a prefix of names that is worth leaving out
+    # shortest prefix of names that is omitted [letters]
     rests = {end: [name.removeprefix(end) for name in names] for end in ends if len(end) > 5}
     shared = [end for end in rests if all(name.startswith(end) for name in names)]
     return max((end for end in shared if all(r[:1].isalpha() for r in rests[end])), default='')

@@ -1,9 +1,9 @@
 # Copyright 2026 The armid_ros developers
 # SPDX-License-Identifier: Apache-2.0
 """
-The page of a report: one file that loads nothing, with sections one below the other.
+The page of a report: one file without external resources, with a sequence of sections.
 
-A section is a small frozen dataclass with a title and a template of its own.
+A section is a small frozen dataclass with a title and a template.
 
 """
 
@@ -31,7 +31,7 @@ from armid_ros.report.notation import (
 from jinja2 import Environment, PackageLoader, StrictUndefined
 from markupsafe import Markup
 
-#: Names of joints and links whose common prefix the page that is being made leaves out.
+#: Names of joints and links whose common prefix the present page omits.
 _names: ContextVar[Sequence[str]] = ContextVar('_names', default=())
 
 
@@ -118,15 +118,15 @@ class Page:
         token = _names.set(self.names)
         text = render('page.html', {'page': self, 'prefix': common_prefix(self.names), **assets})
         _names.reset(token)
-        # passwords: values of arguments named so, and those in addresses
+        # passwords in arguments and in URLs
         shown = re.sub(r'(\w*(?:passw|token|secret)\w*:?=)[^\s<"&]+', r'\1***', str(text))
         shown = re.sub(r'://[^/\s@<>"]+:[^/\s@<>"]+@', '://***@', shown)
-        # control characters, which names of files may have, are spelled out
+        # escape control characters in file names
         return re.sub(r'[\x00-\x08\x0b\x0c\x0e-\x1f\x7f-\x9f]', lambda c: repr(c[0])[1:-1], shown)
 
 
 def _short(text: str) -> Markup:
-    """Return a label with short names of joints and links, markup and all."""
+    """Return a label, markup included, with short names of joints and links."""
     return Markup(without_prefix(text, _names.get()))
 
 

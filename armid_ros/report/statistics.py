@@ -23,7 +23,7 @@ from armid_ros.report.charts import Chart, Series
 from armid_ros.robots import Robot
 import numpy as np
 
-#: Share of a joint's residual that one variable explains, from which there is something to find.
+#: Share of a joint's residual explained by one variable, above which the trend is reported.
 TELLING_SHARE = 0.15
 
 
@@ -177,7 +177,7 @@ def residual_section(robot: Robot, fits: Sequence[Fit], role: str) -> ContentSec
 def _cloud(x: FloatArray, residual: FloatArray, xlabel: str, ylabel: str) -> Chart:
     """Draw a residual against a variable of the same samples, with its mean in bins."""
     trend = Trend.of(x, residual)
-    # points of a cloud; more of them hide each other
+    # largest number of points of a cloud
     chosen = np.unique(np.linspace(0, max(len(x) - 1, 0), min(500, len(x))).astype(np.intp))
     abscissa = np.concatenate([x[chosen], trend.centre])
     points = np.concatenate([residual[chosen], np.full(len(trend.centre), np.nan)])
@@ -237,7 +237,7 @@ def residual_by_variable(
 def explained_shares(fits: Sequence[Fit], joint: int) -> dict[str, float]:
     """Return the shares of a joint's residual explained by speed, position and load."""
     residual, axes = residual_by_variable(fits, joint)
-    # fewer samples of a residual go with nothing
+    # fewer samples of a residual show no trend
     if len(residual) < 20:
         return {}
     return {name: Trend.of(x, residual).share for name, x in axes.items()}

@@ -104,7 +104,7 @@ def _cells(rows: JointRows, labels: npt.NDArray[np.intp], used: npt.NDArray[np.b
 
 
 def _fitted(cells: _Cells, knee: float) -> tuple[float, _Scales]:
-    """Return the largest log marginal likelihood per cell, and its hyperparameters."""
+    """Maximise the log marginal likelihood; return it per cell, with the hyperparameters."""
     from sklearn.gaussian_process import GaussianProcessRegressor, kernels
 
     size = max(float(np.sqrt(np.mean(cells.torque**2))), 1e-12)
@@ -115,7 +115,7 @@ def _fitted(cells: _Cells, knee: float) -> tuple[float, _Scales]:
     regressor = GaussianProcessRegressor(smooth + kernels.WhiteKernel(0.1, (1e-6, 2.0)))
     points = counted(cells.points, knee)
     span = _span(points)
-    # a hundred points are enough for the scales; cells are in no order
+    # a hundred points are enough for the scales; the order of cells is arbitrary
     some = slice(None, None, max(1, len(points) // 100))
     with warnings.catch_warnings():
         warnings.simplefilter('ignore')  # a length scale at its bound: an input is irrelevant
@@ -124,7 +124,7 @@ def _fitted(cells: _Cells, knee: float) -> tuple[float, _Scales]:
     lengths = np.asarray(found.k2.length_scale, dtype=float)
     lengths = np.where(lengths > 0.9 * _LENGTHS[1], np.inf, lengths * span)
     amplitude = float(size * np.sqrt(found.k1.constant_value))
-    # per cell and in units of torque, so that fits with different knees are comparable
+    # normalised per cell, in units of torque, so that fits with different knees are comparable
     evidence = float(regressor.log_marginal_likelihood_value_) / len(cells.torque[some])
     noise = float(size * np.sqrt(white.noise_level))
     return evidence - float(np.log(size)), _Scales(noise, lengths, amplitude, knee)

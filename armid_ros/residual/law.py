@@ -22,7 +22,7 @@ import numpy as np
 
 
 class Term(NamedTuple):
-    """Text of a function of q, dq and the load w, such as 'dq^3', its factor and its unit."""
+    """Term of a law: function of q, dq and the load w, such as 'dq^3', with factor and unit."""
 
     text: str
     coefficient: float
@@ -69,7 +69,7 @@ class Law:
 def _library(
     inputs: FloatArray, low: float, high: float, prismatic: bool
 ) -> list[tuple[str, str, FloatArray]]:
-    """Return the terms that are tried: text, unit of the factor, and values along the data."""
+    """Return the candidate terms: text, unit of the factor, and values along the data."""
     q, dq, w = inputs.T
     sign = np.sign(dq)
     force, x = ('N', 'm') if prismatic else ('N m', 'rad')
@@ -106,7 +106,7 @@ def _library(
 
 def suggest_law(rows: JointRows, prismatic: bool) -> Law | None:
     """
-    Return the law that approximates a residual; None if no law of the library does.
+    Return the law that approximates a residual; None if there is no such law in the library.
 
     Parameters
     ----------
@@ -154,7 +154,7 @@ def _fit(x: FloatArray, residual: FloatArray, count: int) -> FloatArray:
     size = np.sqrt(np.mean(x**2, axis=0))
     scale = np.where(size > 0.0, size, 1.0)
     with warnings.catch_warnings():
-        warnings.simplefilter('ignore')  # if terms depend on each other, the first one is used
+        warnings.simplefilter('ignore')  # of linearly dependent terms, the first is used
         found = orthogonal_mp(x / scale, residual, n_nonzero_coefs=count)
     chosen = np.flatnonzero(found)
     factors = np.zeros(x.shape[1])

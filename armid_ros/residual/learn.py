@@ -36,7 +36,7 @@ from markupsafe import Markup
 import numpy as np
 import numpy.typing as npt
 
-#: A joint with fewer rows has too few data for a map.
+#: Smallest number of rows of a joint for a map.
 _FEW = 100
 
 
@@ -93,7 +93,7 @@ class Residual:
     joints : tuple of JointResidual
         Joints whose residual is predictable; the largest residual first.
     table_file : str
-        File beside model.yaml with the maps on a grid of position, velocity and load.
+        File in the folder of model.yaml, with the maps on a grid of position, velocity and load.
 
     """
 
@@ -323,7 +323,7 @@ def _learned(
     if len(rows) < _FEW:
         return None
     learned, predicted = learn_map(rows, rng)
-    # the map has to reduce the error of held-out blocks, even without the best block
+    # a map must reduce the error of held-out blocks, even without the best block
     saved = rows.residual**2 - (rows.residual - predicted) ** 2
     blocks = np.bincount(rows.block, saved, BLOCKS)
     if not blocks.sum() - blocks.max() > 0.0:

@@ -22,7 +22,7 @@ def moving_joints(description: Description, driven: Sequence[str]) -> tuple[str,
     """
     Return the joints that move a body when some joints are driven, in the order of the file.
 
-    A driven joint that others follow is a motor without a body of its own if its link and all
+    A driven joint that other joints follow is a motor without a body if its link and all
     links that it carries have no inertia.
 
     """
@@ -30,7 +30,7 @@ def moving_joints(description: Description, driven: Sequence[str]) -> tuple[str,
         {*driven, *description.passive},
         {name for name, inertial in description.links.items() if inertial},
     )
-    while True:  # up to the links that carry bodies
+    while True:  # rigid links up to the links with bodies
         more = {j.parent for j in description.joints if j.child in bodies} - bodies
         if not more:
             break
@@ -76,9 +76,9 @@ def couple(tree: Robot, driven: Sequence[Joint], known: Mapping[str, float]) -> 
     own = of_joints(driven)
     start = np.clip(np.zeros(len(names)), own['lower'], own['upper'])
     mechanism = _mechanism(tree, names, start, known)
-    lower, upper = _narrowed(mechanism, tree, own['lower'], own['upper'])
+    lower, upper = _narrowed_limits(mechanism, tree, own['lower'], own['upper'])
     if mechanism.loops:
-        mechanism, lower, upper = _closing(mechanism, tree, lower, upper)
+        mechanism, lower, upper = _closing_range(mechanism, tree, lower, upper)
     share = np.sum(mechanism.largest, axis=1)
     rates = tree.velocity_limit / np.where(share > 0.0, share, 1.0)
     acts = mechanism.largest > 0.0
@@ -138,10 +138,10 @@ def _mechanism(
     )
 
 
-def _narrowed(
+def _narrowed_limits(
     mechanism: Mechanism, tree: Robot, lower: FloatArray, upper: FloatArray
 ) -> tuple[FloatArray, FloatArray]:
-    """Return position limits of the driven joints that keep those of joints that follow them."""
+    """Narrow the position limits of driven joints so that coupled joints keep their limits."""
     lower, upper = lower.copy(), upper.copy()
     followers = ~np.any(mechanism.passive, axis=1)
     ends = np.stack([tree.lower, tree.upper], axis=1) - mechanism.offset[:, np.newaxis]
@@ -167,13 +167,13 @@ def _narrowed(
     return lower, upper
 
 
-def _closing(
+def _closing_range(
     mechanism: Mechanism, tree: Robot, lower: FloatArray, upper: FloatArray
 ) -> tuple[Mechanism, FloatArray, FloatArray]:
     """
-    Narrow the range of the driven joints to where loops close and passive joints keep limits.
+    Narrow the range of driven joints so that loops close and passive joints keep their limits.
 
-    Both hold a tenth beyond the result, because a motion may overshoot its limits.
+    Both conditions are satisfied a tenth beyond the result, because motions may overshoot limits.
 
     """
     start = mechanism.start[0]

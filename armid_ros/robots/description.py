@@ -34,7 +34,7 @@ class Inertial:
     inertia: tuple[float, ...]
 
     def doubt(self) -> str | None:
-        """Return why no mass distribution has this inertia; None if one exists."""
+        """Return why no mass distribution has this inertia; None if it is valid."""
         ixx, ixy, ixz, iyy, iyz, izz = self.inertia
         tensor = np.array([[ixx, ixy, ixz], [ixy, iyy, iyz], [ixz, iyz, izz]])
         moments = np.linalg.eigvalsh(tensor)
@@ -52,7 +52,7 @@ class Inertial:
 
 @dataclass(frozen=True)
 class Mimic:
-    """A joint position that follows others: offset plus the sum of multiplier times position."""
+    """Position of a mimic joint: offset plus the sum of multiplier times followed position."""
 
     multipliers: Mapping[str, float]
     offset: float
@@ -74,7 +74,7 @@ class Loop:
 
 @dataclass(frozen=True)
 class Joint:
-    """A joint of the URDF; a limit that is not given is infinite."""
+    """Joint of a URDF; missing limits are infinite."""
 
     name: str
     kind: str
@@ -148,7 +148,7 @@ def parse_xml(text: str) -> ElementTree.Element:
     try:
         parser.Parse(text, True)
         root = builder.close()
-    except ValueError as error:  # an unknown encoding, or invalid characters
+    except ValueError as error:  # unknown encoding or invalid characters
         raise RobotError(f'malformed XML: {error}') from None
     except expat.ExpatError as error:
         reason = str(error).split(':')[0]
@@ -223,7 +223,7 @@ def _loop(element: ElementTree.Element, links: Iterable[str], joints: Mapping[st
 
 
 def _mimic(element: ElementTree.Element, where: str, known: Mimic | None) -> Mimic:
-    """Return what a joint follows, with one more joint that it follows."""
+    """Add a followed joint to the mimic relation of a joint."""
     joint = element.get('joint', '')
     before = {} if known is None else dict(known.multipliers)
     before[joint] = before.get(joint, 0.0) + _number(element, 'multiplier', where, 1.0)
@@ -232,7 +232,7 @@ def _mimic(element: ElementTree.Element, where: str, known: Mimic | None) -> Mim
 
 
 def _carriers(links: Iterable[str], joints: Iterable[Joint]) -> dict[str, Joint]:
-    """Return the joint that carries each link; in a tree, every link except the base has one."""
+    """Return the parent joint of each link; every link except the base has one."""
     carriers: dict[str, Joint] = {}
     for joint in joints:
         for role, link in (('parent', joint.parent), ('child', joint.child)):
@@ -271,7 +271,7 @@ def _check_tree(links: Iterable[str], joints: Iterable[Joint]) -> None:
     most = 500  # Pinocchio's reader descends by recursion
     if depth[deepest] > most:
         raise RobotError(
-            f"link '{deepest}' is {depth[deepest]} joints from the base; {most} are the most"
+            f"link '{deepest}' is {depth[deepest]} joints from the base; the maximum is {most}"
         )
 
 
@@ -324,7 +324,7 @@ def _joint(element: ElementTree.Element, name: str, notes: list[str]) -> Joint:
     axis = element.find('axis')
     x, y, z = (1.0, 0.0, 0.0) if axis is None else _vector(axis, 'xyz', where)
     length = math.hypot(x, y, z)
-    if length < 1e-100:  # cannot be normalised
+    if length < 1e-100:  # a zero vector cannot be normalised
         if kind in MOVABLE:
             raise RobotError(f'the axis of {where} has no direction')
         x, y, z, length = 1.0, 0.0, 0.0, 1.0

@@ -182,7 +182,7 @@ def sticks(model: pin.Model) -> list[tuple[int, FloatArray]]:
 
 
 def all_in_one(notes: Sequence[str]) -> tuple[str, ...]:
-    """Return notes on meshes as one, with their count and the first; none for none."""
+    """Combine notes on meshes into one note with their number and the first mesh."""
     if len(notes) < 2:
         return tuple(notes)
     return (f'{len(notes)} meshes not found, such as that of {notes[0]}',)
@@ -266,10 +266,10 @@ def collision_model(
 
     Four kinds of pairs are not checked: links that cannot move against each other, links joined by
     a joint, pairs that one joint moves and that touch nowhere in its range, and pairs that the
-    SRDF disables. The SRDF is looked for beside the URDF and in ../srdf: the file with the name of
-    the URDF or of the robot, or the only file. Without an SRDF, pairs that touch at zero (or at
-    the limits nearest to zero) are left out and noted, because their collision bodies are drawn
-    too large.
+    SRDF disables. The SRDF is searched in the folder of the URDF and in ../srdf: the file with the
+    name of the URDF or of the robot, or the only file. Without an SRDF, pairs that touch at zero
+    (or at the limits nearest to zero) are left out and noted, because their collision bodies are
+    drawn too large.
 
     Parameters
     ----------
@@ -329,7 +329,7 @@ def _leave_out_touching(robot: Robot, geometry: pin.GeometryModel) -> tuple[tupl
 
 
 def _leave_out_separate(robot: Robot, geometry: pin.GeometryModel) -> None:
-    """Remove pairs that one joint moves and that never touch, such as flange and wrist."""
+    """Remove link pairs that one joint moves and that never touch, such as flange and wrist."""
     robot = robot.tree
     data, placed = robot.model.createData(), geometry.createData()
     by_joint: dict[int, list[int]] = {}

@@ -101,8 +101,8 @@ def load_robot(
         A shipped name (see `shipped_robots`), the path of a URDF, xacro or MJCF file, or the text
         of a URDF, such as a /robot_description. Meshes need not exist. A xacro file is a program,
         which can read any file and the environment, so name only one that you trust. It is
-        expanded in a process of its own, for 20 s of processor time at most; a text is never
-        expanded. Packages that it refers to are looked for around it, in ROS_PACKAGE_PATH and in
+        expanded in a separate process, for 20 s of processor time at most; a text is never
+        expanded. Its packages are searched in enclosing folders, in ROS_PACKAGE_PATH and in
         AMENT_PREFIX_PATH. Arguments and folders of other packages may follow the path: 'arm.xacro
         tool:=true package:grippers:=../grippers'.
     gravity : str or array_like, shape (3,)
@@ -182,7 +182,7 @@ def robot_from_urdf(
     source : str
         Name of the text in error messages.
     path : Path, optional
-        File of the text; meshes and the SRDF are looked for from its folder.
+        File of the text; meshes and the SRDF are searched from its folder.
 
     Raises
     ------
@@ -274,7 +274,7 @@ def described_at(robot: Robot, positions: Mapping[str, float]) -> Robot:
 def _kinematic_model(
     description: Description, driven: Sequence[Joint], known: Mapping[str, float]
 ) -> tuple[pin.Model, tuple[str, ...]]:
-    """Return the model of the moving joints, and notes on where the other joints are locked."""
+    """Return the model of the moving joints, and notes on the positions of locked joints."""
     moving = moving_joints(description, [joint.name for joint in driven])
     positions = {
         joint.name: standing_position(description, joint, known)
@@ -337,7 +337,7 @@ def _join(numbers: Sequence[float]) -> str:
     return ' '.join(map(repr, numbers))
 
 
-#: Suffix of the mounting file beside NAME.urdf or NAME.urdf.xacro.
+#: Suffix of the mounting file in the folder of NAME.urdf or NAME.urdf.xacro.
 SUFFIX = '.mounting.yaml'
 
 

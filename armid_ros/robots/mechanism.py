@@ -27,7 +27,7 @@ from scipy.linalg.lapack import dposv
 
 class Configuration(NamedTuple):
     """
-    The moving joints in one state of the driven joints, or in N states.
+    State of the moving joints for one or N states of the driven joints.
 
     Attributes
     ----------
@@ -92,7 +92,7 @@ class Mechanism:
 
     def at(self, u: FloatArray, du: FloatArray | None = None) -> Configuration:
         """
-        Return the moving joints in one state of the driven joints.
+        Return the state of the moving joints for one state of the driven joints.
 
         Parameters
         ----------
@@ -119,7 +119,7 @@ class Mechanism:
             return Configuration(q, np.broadcast_to(self.driven, (len(u), m, n)), np.zeros_like(q))
         known, key = _SCRATCH.of(self)[2], u.tobytes()
         if key not in known:
-            while len(known) > 8:  # of the motions at hand
+            while len(known) > 8:  # cache of the latest motions
                 known.pop(next(iter(known)))
             known[key] = [self._solved(row) for row in u]
         rows = known[key]
@@ -146,7 +146,7 @@ class Mechanism:
         work, inside = _SCRATCH.of(self), np.clip(u, self.lower, self.upper)
         data, (begin, p), _ = work
         far = np.abs(inside - begin).max()
-        if far > 0.5:  # the path from the start keeps the mode of assembly
+        if far > 0.5:  # continuation from the start keeps the assembly mode
             begin, p = self.start
             far = np.abs(inside - begin).max()
         for share in np.linspace(0.0, 1.0, int(far / 0.2) + 2)[1:] if far > 0.2 else (1.0,):

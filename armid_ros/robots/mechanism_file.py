@@ -22,7 +22,7 @@ def with_mechanism(text: str, path: Path) -> str:
     """
     Return a URDF with the coupled joints of NAME.mechanism.yaml in its folder, if it exists.
 
-    The result has elements of their own, which other readers of a URDF ignore.
+    The result has additional elements, which other readers of a URDF ignore.
 
     Raises
     ------

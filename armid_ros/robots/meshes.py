@@ -34,7 +34,7 @@ def find_mesh(name: str, urdf: Path | None) -> Path | None:
     """
     Return the file of a mesh name in a URDF; None if the file is not found.
 
-    'package://NAME/...' is looked for in the `package_folders`. A relative path starts at the
+    'package://NAME/...' is searched in the `package_folders`. A relative path starts at the
     folder of the URDF.
 
     """
@@ -49,7 +49,7 @@ def find_mesh(name: str, urdf: Path | None) -> Path | None:
 
 
 def load_mesh(path: Path, scale: FloatArray) -> Any:
-    """Return a mesh as coal has it, scaled along its axes; RobotError if the file is none."""
+    """Return a scaled mesh as an object of coal; RobotError if the file is not a mesh."""
     try:
         return coal.MeshLoader().load(str(path), scale)
     except (RuntimeError, ValueError) as error:
@@ -95,7 +95,7 @@ def convex_bodies(path: Path, scale: FloatArray) -> tuple[coal.CollisionGeometry
 def _slabs(
     vertices: FloatArray, ends: npt.NDArray[np.intp], axis: FloatArray
 ) -> tuple[coal.ConvexBase, ...]:
-    """Return hulls of slabs across an axis; too thin a slab joins the slab before it."""
+    """Return hulls of slabs across an axis; thin slabs are merged with the previous slab."""
     along = vertices @ axis
     start, end = along[ends[:, 0]], along[ends[:, 1]]
     hulls: list[coal.ConvexBase] = []
@@ -119,7 +119,7 @@ def _slabs(
 
 
 def _join(slabs: Sequence[coal.ConvexBase]) -> tuple[coal.ConvexBase, ...]:
-    """Join neighbours, first the pair whose common hull grows least."""
+    """Merge neighbours, first the pair with the smallest increase of volume of the common hull."""
     bodies = list(slabs)
     apart = [body.computeVolume() for body in bodies]
     common = [_common_hull(*pair) for pair in pairwise(bodies)]
@@ -149,7 +149,7 @@ def _volume(bodies: Sequence[coal.ConvexBase]) -> float:
 
 
 def _hull(points: FloatArray) -> coal.ConvexBase:
-    """Return the convex hull of points (k, 3); ValueError for flat points, which crash qhull."""
+    """Return the convex hull of points (k, 3); ValueError for coplanar points."""
     if len(points) < 4:
         raise ValueError('fewer than four points')
     spread = np.linalg.svd(points - points.mean(axis=0), compute_uv=False)

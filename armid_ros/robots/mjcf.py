@@ -30,7 +30,7 @@ _ROOT = re.compile(r'(?:\s|<\?(?>.*?\?>)|<!--(?>.*?-->))*+<mujoco[\s/>]', re.DOT
 
 
 def is_mjcf(text: str) -> bool:
-    """Return whether the root element of a text is the one of an MJCF."""
+    """Return whether the root element of a text is that of an MJCF."""
     return _ROOT.match(text) is not None
 
 
@@ -127,11 +127,11 @@ class _Writer:
                 if free and any(self.model.body_rootid[k] == body != k for k in model.jnt_bodyid):
                     raise RobotError(
                         f"{self.path}: body '{self.bodies[body]}' floats, but the base of an arm "
-                        'is fixed: take its freejoint out'
+                        'is fixed: remove its freejoint'
                     )
                 continue
             anchors[body] = self._link(body, parent, list(joints), anchors[parent])
-        # add notes on elements that act in MuJoCo and do not exist in a URDF
+        # add notes on elements of MuJoCo that do not exist in a URDF
         model, kinds = self.model, self.mujoco.mjtEq
         if not np.allclose(model.opt.gravity, (0.0, 0.0, -9.81), atol=0.01):
             gravity = ','.join(f'{value:g}' for value in model.opt.gravity)
@@ -312,7 +312,7 @@ class _Writer:
             x, y, z = (float(value) for value in model.geom_size[geom])
             kind = kinds(int(model.geom_type[geom]))
             pieces: list[tuple[str, dict[str, str], float]] = []
-            if kind in (kinds.mjGEOM_BOX, kinds.mjGEOM_ELLIPSOID):  # the box that contains it
+            if kind in (kinds.mjGEOM_BOX, kinds.mjGEOM_ELLIPSOID):  # bounding box
                 pieces = [('box', {'size': _text([2 * x, 2 * y, 2 * z])}, 0.0)]
             elif kind == kinds.mjGEOM_SPHERE:
                 pieces = [('sphere', {'radius': _number(x)}, 0.0)]

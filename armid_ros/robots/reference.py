@@ -128,7 +128,7 @@ class Reference:
         span = (self.t[segment + 1] - self.t[segment])[:, np.newaxis]
         outside = ((t < self.t[0]) | (t > self.t[-1]))[:, np.newaxis]
         u = np.clip((t - self.t[segment])[:, np.newaxis] / span, 0.0, 1.0)
-        u = np.repeat(u, len(self.joints), axis=1)  # twice as fast as a column
+        u = np.repeat(u, len(self.joints), axis=1)  # twice as fast as with a column
         q, dq, ddq = np.zeros((3, *u.shape))
         for c in self._coefficients[::-1]:
             ddq = ddq * u + 2.0 * dq
@@ -194,7 +194,7 @@ class Reference:
 
     def after(self, q: FloatArray, dq: FloatArray, ddq: FloatArray) -> Reference:
         """
-        Return the reference with a waypoint added at time zero, where the arm is.
+        Return the reference with a waypoint added at time zero, at the position of the arm.
 
         The time of the first point has to be later than zero.
 

@@ -37,8 +37,8 @@ class Robot:
     A fixed-base robot with n driven joints, each revolute or prismatic.
 
     The model is never changed; `with_gravity` and `with_inertias` return a robot with a copy of
-    it. Friction, damping and rotor inertia do not act in the model: they are effects, with
-    parameters of their own.
+    it. Friction, damping and rotor inertia are not part of the model: they are effects with
+    separate parameters.
 
     Attributes
     ----------
@@ -68,7 +68,7 @@ class Robot:
     notes : tuple of str
         Sentences on assumptions and doubtful values in the description.
     path : Path or None
-        The loaded file; meshes and collision exceptions (SRDF) are looked for from its folder.
+        The loaded file; meshes and collision exceptions (SRDF) are searched from its folder.
     mechanism : Mechanism or None
         Map from the driven to the moving joints; None if these are the same.
 
@@ -139,12 +139,12 @@ class Robot:
 
     @property
     def all_joints(self) -> tuple[str, ...]:
-        """Return the moving joints, and the motors that move no body of their own."""
+        """Return the moving joints and the motors without a body."""
         return tuple(dict.fromkeys([*self.moving, *self.joints]))
 
     @property
     def tip(self) -> str:
-        """Return the last moving joint; with coupled joints, the one at the end of the arm."""
+        """Return the last moving joint; with coupled joints, the joint at the end of the arm."""
         if self.mechanism is None:
             return self.joints[-1]
         lengths = [np.linalg.norm(place.translation) for place in self.model.jointPlacements]
@@ -279,7 +279,7 @@ class Robot:
             ) from None
 
     def with_gravity(self, vector: Sequence[float] | FloatArray) -> Robot:
-        """Return the robot in another gravity, shape (3,) [m/s^2] in the base frame."""
+        """Return the robot with another gravity vector, (3,) [m/s^2], in the base frame."""
         model = self.model.copy()
         model.gravity = pin.Motion(parse_gravity(vector), np.zeros(3))
         return replace(self, model=model)

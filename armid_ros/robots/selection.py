@@ -17,7 +17,7 @@ GRIPPER_WORDS = ('finger', 'gripper', 'jaw')
 @dataclass(frozen=True)
 class HeldJoint:
     """
-    A joint that could move and is not driven.
+    Movable joint that is not driven.
 
     Attributes
     ----------
@@ -77,7 +77,7 @@ def driven_joints(description: Description, names: Sequence[str] | None) -> tupl
     most = 150
     if len(chosen) > most:
         raise RobotError(
-            f'{len(chosen)} joints are driven; {most} are the most that can be '
+            f'{len(chosen)} joints are driven; at most {most} can be '
             'identified together: name those of one arm with --joints'
         )
     return chosen
@@ -118,7 +118,7 @@ def driven_in_words(robot: Robot) -> tuple[str, ...]:
     arms = several_arms(robot.description, robot.joints)
     if not locked:
         return arms
-    most = 8  # are named
+    most = 8  # joints are named
     more = f' and {len(locked) - most} more' if len(locked) > most else ''
     named = ', '.join(locked[:most])
     return (f'not driven, and locked: {named}{more}; --joints A,B,... chooses others', *arms)
@@ -126,7 +126,7 @@ def driven_in_words(robot: Robot) -> tuple[str, ...]:
 
 def joints_beside_arms(robot: Robot) -> tuple[str, ...]:
     """
-    Return the driven joints that belong to no arm, such as wheels, a head or a torso.
+    Return the driven joints outside all arms, such as wheels, a head or a torso.
 
     The result is empty for a robot without an arm.
 
@@ -147,7 +147,7 @@ def load_arms(
 
 
 def held_joints(robot: Robot) -> tuple[HeldJoint, ...]:
-    """Return the movable joints of the description that are not driven."""
+    """Return the movable joints of the description that are locked."""
     description = robot.description
     carriers = {name: _carriers(description, [name]) for name in robot.joints}
     return tuple(

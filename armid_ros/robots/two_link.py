@@ -77,7 +77,7 @@ class TwoLinkParameters:
         if not (self.alpha > 0.0 and self.alpha * self.beta > self.gamma**2):
             raise RobotError(
                 f'two links: alpha = {self.alpha:g}, beta = {self.beta:g} and gamma = '
-                f'{self.gamma:g} kg m^2 are not those of bodies; alpha beta has to exceed gamma^2'
+                f'{self.gamma:g} kg m^2 are impossible; alpha beta has to exceed gamma^2'
             )
 
     @property

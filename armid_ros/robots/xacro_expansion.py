@@ -87,7 +87,7 @@ def expand_xacro(path: Path, arguments: Mapping[str, str], packages: Mapping[str
             f'{MEMORY_LIMIT >> 20} MiB'
         )
     answer: dict[str, Any] = {}
-    with suppress(ValueError):  # the process died before it answered
+    with suppress(ValueError):  # the process ended without an answer
         answer = json.loads(done.stdout)
     if 'text' not in answer:
         reason = answer.get('error') or f'not expanded within {MEMORY_LIMIT >> 20} MiB'
@@ -108,7 +108,7 @@ def package_folders(
     file : Path or None
         The description that refers to it.
     given : mapping of str to str or Path, optional
-        Folders of packages by name; a package in this mapping is not looked for elsewhere.
+        Folders of packages by name; a package in this mapping is not searched elsewhere.
 
     Yields
     ------
@@ -131,7 +131,7 @@ def package_folders(
 
 
 def _packages(root: Path, name: str) -> Iterator[Path]:
-    """Yield packages of a name among a folder, its subfolders, and such folders in these."""
+    """Yield packages of a name in a folder and in two levels of subfolders."""
     folders = [root]
     if root != root.parent:
         with suppress(OSError):
@@ -152,7 +152,7 @@ def _paths(variable: str) -> list[str]:
 
 
 def main() -> None:
-    """Read one request and write the answer; limit memory and processor time before."""
+    """Limit memory and processor time, then read one request and write the answer."""
     request = json.load(sys.stdin)
     answers = os.fdopen(os.dup(1), 'w', encoding='utf-8')
     os.dup2(2, 1)  # output of the expansion must not mix with the answer
@@ -227,7 +227,7 @@ def _find_packages(xacro: Any, request: dict[str, Any], missing: dict[str, str])
 
 
 def _reason(error: Exception, request: dict[str, Any], missing: dict[str, str]) -> str:
-    """Return why a file cannot be expanded, and a remedy."""
+    """Return the reason why a file cannot be expanded, and a remedy."""
     import xacro.substitution_args
 
     text = ' '.join(str(error).split()) or type(error).__name__
@@ -273,12 +273,12 @@ def _place(xacro: Any) -> str:
 
 
 def _declared(xacro: Any, path: str) -> dict[str, str | None]:
-    """Return the declared arguments with their default; None where one has to be given."""
+    """Return the declared arguments with their defaults; None for required arguments."""
     known: dict[str, str | None] = {}
     for file in (path, *xacro.all_includes):
         try:
             elements = xacro.parse(None, file).getElementsByTagName('xacro:arg')
-        except Exception:  # the error of the main file is reported elsewhere
+        except Exception:  # errors of the main file are reported elsewhere
             continue
         for element in elements:
             default = element.getAttribute('default') if element.hasAttribute('default') else None

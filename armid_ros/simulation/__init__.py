@@ -3,7 +3,7 @@
 """
 The simulated arm: a plant with stick-slip friction, a controller, drives and sensors.
 
-`simulate` lets an arm follow a reference and records it. A `SimulatedArm` accepts trajectories
+`simulate` records an arm that follows a reference. A `SimulatedArm` accepts trajectories
 while simulated time advances. `step` integrates one step of the plant. Joints are rigid unless the
 plant has an `Elasticity`.
 

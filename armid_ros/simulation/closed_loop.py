@@ -44,7 +44,7 @@ _ADDRESS, _REAL, _COUNT = ctypes.c_void_p, ctypes.c_double, ctypes.c_int64
 
 
 class _Structure(ctypes.Structure):
-    """A structure of the kernel, which keeps the arrays to which it points."""
+    """Base of the C structures of the kernel, with references to the arrays that they use."""
 
     arrays: tuple[npt.NDArray[Any], ...]
 
@@ -183,7 +183,7 @@ class CompiledLoop:
             feedback.follows,
             *(gain.ctypes.data for gain in gains),
         )
-        # a structure holds a copy of its rigid body
+        # the structure contains a copy of the rigid body
         self._plant.arrays = *body.arrays, *arrays
         self._controller.arrays = *nominal.arrays, *gains
         self.addresses = self._plant.address, self._controller.address
@@ -230,7 +230,7 @@ class CompiledLoop:
         arrays = (*moved, tau, *(values[rows.start : rows.stop] for values in asked))
         addresses = [array.ctypes.data for array in arrays]
 
-        def advance(state: State, row: int, arrays: object = arrays) -> int:  # keeps them alive
+        def advance(state: State, row: int, arrays: object = arrays) -> int:  # references
             modes = np.array(state.modes, dtype=np.int64)
             reached: int = library.advance(
                 *self.addresses, modes.ctypes.data, state.t, row, last, *addresses
@@ -299,7 +299,7 @@ def run(
     compiled: CompiledLoop | None = None,
 ) -> Trace:
     """
-    Let an arm follow a reference.
+    Simulate an arm that follows a reference.
 
     Parameters
     ----------

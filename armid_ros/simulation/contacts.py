@@ -83,7 +83,7 @@ def solve_box_complementarity(
                 system[k], f[k] = g[k], w_free[k]
                 system[k, k] *= 1.0 + shift
             f = np.asarray(dgesv(system, f, 1, 1)[2])
-        # elements that violate their condition, each with the mode to try next
+        # elements that violate their condition, each with its next mode
         broken = []
         speeds = (w_free - g.dot(f)).tolist()
         for k, (speed, torque) in enumerate(zip(speeds, f.tolist(), strict=True)):
@@ -171,7 +171,7 @@ def split_constant(friction: DryFriction | None, n_joints: int) -> tuple[DryFric
     share = np.zeros(len(friction.lower)) if friction.load_share is None else friction.load_share
     constant = (span <= NO_FRICTION) & (np.abs(share) <= NO_FRICTION)
     first = np.argsort(np.argmax(friction.directions != 0.0, axis=1), kind='stable')  # noqa: RUF069 - directions of single joints are exact
-    able = first[~constant[first]]  # in the order of the joints
+    able = first[~constant[first]]  # sorted by joint
     sticking = DryFriction(
         np.ascontiguousarray(friction.directions[able]),
         friction.lower[able],

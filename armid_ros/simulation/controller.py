@@ -117,8 +117,8 @@ class Controller:
         """
         Return the desired motion of the motors, with the feedforward torque.
 
-        The reference has one row per step. `asked` is the position, shape (n,), that a controller
-        commanded before for the first row, if any.
+        The reference has one row per step. `asked` is the previously commanded position, shape
+        (n,), for the first row, if any.
 
         """
         return desired.with_torque(self.feedforward(desired))

@@ -78,8 +78,8 @@ def elastic_joints(arm: ArmModel) -> tuple[tuple[str, ...], tuple[str, ...]]:
     """
     Return the elastic joints: those with rotor inertia, and those without.
 
-    A motor without inertia has no motion of its own. Its spring is simulated as a twist that
-    follows the load without delay.
+    A motor without inertia has no independent motion. The twist of its spring follows the load
+    without delay.
 
     """
     action, joints = arm.action(), arm.robot.joints
@@ -92,7 +92,7 @@ def elastic_joints(arm: ArmModel) -> tuple[tuple[str, ...], tuple[str, ...]]:
 
 
 def no_rotor(joints: Sequence[str]) -> str:
-    """Return a note on how springs are simulated whose motors have no inertia."""
+    """Return a note on the simulation of springs whose motors have no inertia."""
     return (
         f'{", ".join(joints)}: joint_elasticity without rotor_inertia, so that no motor moves on '
         'its own. All joints are simulated as rigid ones whose encoders read the twist under '

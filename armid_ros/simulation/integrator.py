@@ -95,7 +95,7 @@ def _end_velocity(
     taken, modes = contacts.torques(directions.dot(response), directions.dot(dq_free), modes)
     dq_next = dq_free - response.dot(taken)
     if 0 in modes:
-        # set the velocity of joints that stick to exactly zero, without rounding errors
+        # set the velocity of sticking joints to exactly zero
         fixed = [
             axis
             for axis, mode in zip(contacts.axes, modes, strict=True)
@@ -233,7 +233,7 @@ def _hold(
     modes: Modes,
     moved: FloatArray,
 ) -> None:
-    """Keep the positions of motors that stay stuck, without rounding errors."""
+    """Keep the positions of sticking motors exactly, without rounding errors."""
     e = len(springs.joints)
     for axis, mode in zip(plant.contacts.axes, modes, strict=True):
         if mode != 0 or axis < 0:

@@ -111,7 +111,7 @@ class State(NamedTuple):
     memory : ndarray, shape (h,)
         States of the friction with hysteresis.
     rotors : Rotors, or None
-        The motors with a motion of their own; None if all joints are rigid.
+        The motors with independent motion; None if all joints are rigid.
 
     """
 
@@ -263,7 +263,7 @@ class Plant:
         return State(steps, t, position, velocity, acceleration, modes, memory, rotors)
 
     def weight(self, q: FloatArray, dq: FloatArray) -> FloatArray:
-        """Return the torques of gravity and velocities on the joints, shape (n,) [N m]."""
+        """Return the joint torques of gravity and of velocities, shape (n,) [N m]."""
         if self.robot.mechanism is None:
             return np.asarray(pin.nonLinearEffects(self.robot.model, self.data, q, dq))
         return self.robot.inverse_dynamics(self.data, q, dq, np.zeros(len(q)))
@@ -302,7 +302,7 @@ class Plant:
         self, at_lower: npt.NDArray[np.bool_], at_upper: npt.NDArray[np.bool_]
     ) -> Contacts:
         """
-        Return the friction elements, followed by the stops that joints touch.
+        Return the friction elements and then the active joint stops.
 
         A stop is an element that holds any torque in one direction. Its law is w <= 0, f >= 0, w f
         = 0 at the upper limit.

@@ -72,7 +72,7 @@ def simulate(
     progress: Callable[[float], None] | None = None,
 ) -> SimulatedRun:
     """
-    Let an arm follow a reference from its first point and record it.
+    Record a simulated arm that follows a reference from its first point.
 
     Parameters
     ----------
@@ -115,7 +115,7 @@ def record(
     progress: Callable[[float], None] | None = None,
 ) -> SimulatedRun:
     """
-    Let a simulated arm follow a reference from its first point and record it, as `simulate` does.
+    Record a given simulated arm that follows a reference from its first point; see `simulate`.
 
     Parameters
     ----------
@@ -167,7 +167,7 @@ def _followed(
 ) -> tuple[FloatArray, FloatArray, FloatArray]:
     """Simulate steps; return the motion of motors and links, and the torques."""
     plant, pieces, done = arm.plant, [], 0
-    with np.errstate(over='ignore', invalid='ignore'):  # overflow is detected below
+    with np.errstate(over='ignore', invalid='ignore'):  # overflow is checked below
         for trace in arm.traces(steps):
             q, dq, ddq = trace.motors
             lost = ~(np.abs(dq[:-1]) < _LOST)

@@ -175,7 +175,7 @@ class RecentPast:
         self._plant = plant
         self._delay = delay
         memory = int(np.ceil(plant.sensing.reading_memory / plant.dt))
-        # extra samples beyond those that a reading depends on, for derivatives
+        # additional samples for derivatives
         self._length = memory + delay + 8
         given = torque if plant.action.drive is None else plant.action.drive(torque)
         q, dq, _ = plant.motors(state)
@@ -248,7 +248,7 @@ class LinkAccelerometers:
         self._placements = [pin.SE3(np.eye(3), place) for place in array]
 
     def read(self, q: FloatArray, dq: FloatArray, ddq: FloatArray) -> FloatArray:
-        """Return the readings in one state, shape (n, 3) [m/s^2]; at rest gravity, upwards."""
+        """Return the readings in one state, (n, 3) [m/s^2]; at rest, minus gravity."""
         model, data = self._robot.model, self._data
         pin.forwardKinematics(model, data, *self._robot.state(q, dq, ddq))
         up = -model.gravity.linear
@@ -259,6 +259,6 @@ class LinkAccelerometers:
         return readings
 
     def readings(self, link: Motion) -> FloatArray:
-        """Return the readings along a motion of the links, shape (n, N, 3) [m/s^2]."""
+        """Return the accelerometer readings along a motion, shape (n, N, 3) [m/s^2]."""
         rows = [self.read(*row) for row in zip(link.q, link.dq, link.ddq, strict=True)]
         return np.asarray(np.stack(rows, axis=1))

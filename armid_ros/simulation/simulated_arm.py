@@ -63,7 +63,7 @@ class Sample:
         Position [rad or m], velocity and torque [N m or N] as measured. With elastic joints, these
         are readings of the motors, and the torque is that of the next step.
     link : LinkSample, or None
-        Readings on the link side of the springs; None if all joints are rigid.
+        Readings link side of the springs; None if all joints are rigid.
 
     """
 
@@ -165,7 +165,7 @@ class SimulatedArm:
 
     def start_on(self, reference: Reference) -> Reference:
         """
-        Put the arm on the first point of a reference, with its velocity, and begin the reference.
+        Start on the first point of a reference, with its velocity.
 
         The result is the reference with its joints in the order of the robot.
 
@@ -182,7 +182,7 @@ class SimulatedArm:
 
     def become(self, arm: ArmModel) -> None:
         """
-        Replace the arm model and keep the state, such as when the arm picks up a load.
+        Replace the arm model and keep the state, for example when the arm picks up a load.
 
         The controller is not changed, and therefore does not know the new model.
 
@@ -220,8 +220,8 @@ class SimulatedArm:
             )
         if arm.robot.joints != self.joints:
             raise ModelError(
-                f'{arm.robot.name}: an arm with the joints {", ".join(self.joints)} cannot become '
-                f'one with {", ".join(arm.robot.joints)}'
+                f'{arm.robot.name}: the new model has joints {", ".join(arm.robot.joints)}, '
+                f'but the arm has {", ".join(self.joints)}'
             )
         return Plant(arm, self.plant.dt, self.plant.hard_stops)
 
@@ -246,7 +246,7 @@ class SimulatedArm:
         if curve.t[0] > 0.0:
             curve = curve.after(now.q[0], now.dq[0], now.ddq[0])
         else:
-            # a trajectory that begins at once has to begin where the arm should be [rad or m]
+            # largest distance of a due first point from the desired position [rad or m]
             advice = 'give its first point a later time, to get there'
             self._require_none('starts away by', curve.q[0] - now.q[0], 0.01, '', advice)
             if curve.dq is not None:
@@ -290,14 +290,14 @@ class SimulatedArm:
             yield trace
 
     def read(self, steps: int = 1) -> Sample:
-        """Return the present sensor readings, some steps after the last ones."""
+        """Advance some steps, and return the sensor readings."""
         state, dt = self._state, steps * self.plant.dt
         q, dq, tau = (row[np.newaxis] for row in self._past.latest())
         q, dq, tau = self.sensors.measure(q, dq, tau, dt, self.rng, self._previous)
         self._previous = q[0]
         if self.plant.springs is None:
             return Sample(state.steps, state.t, q[0], dq[0], tau[0])
-        # on the link side of the springs
+        # link side of the springs
         at, speed, none = state.q[np.newaxis], state.dq[np.newaxis], np.zeros((1, len(state.q)))
         at, speed, _ = self.sensors.measure(at, speed, none, dt, self.rng, self._previous_link)
         self._previous_link = at[0]
@@ -309,7 +309,7 @@ class SimulatedArm:
         return Sample(state.steps, state.t, q[0], dq[0], tau[0], link)
 
     def _begin(self, reference: Reference, steps: int) -> None:
-        """Put the arm on a reference without a past."""
+        """Start on a reference, with an empty sensor history."""
         first = reference.sample(np.zeros(1))
         self._state = self.plant.state(first.q[0], first.dq[0], first.ddq[0], steps)
         self._reference, self._begun = reference, steps
@@ -334,7 +334,7 @@ class SimulatedArm:
         self._targets = self.controller.targets(self._desired(steps + 1), asked)
 
     def _desired(self, count: int) -> Motion:
-        """Return the desired motion at successive steps from the present one on."""
+        """Return the desired motion at successive steps from the present step on."""
         first, times = self._state.steps, self.plant.times
         motion = self._reference.sample(times(first - self._begun, count))
         return replace(motion, t=times(first, count))

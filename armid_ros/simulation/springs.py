@@ -129,7 +129,7 @@ class ElasticJoints:
             to_motors.T @ (none if x is None else x) @ to_motors
             for x in (action.inertia, action.damping)
         )
-        # natural frequency of a link on its stop, times the substep; low enough for the
+        # natural frequency of a link on its stop times the substep, small enough for the
         # integration
         free, rate = 1.0 / np.diag(np.linalg.inv(mass)), 0.1 * elasticity.substeps / dt
         rub = np.diag(np.broadcast_to(np.asarray(elasticity.link_damping, dtype=float), (n,)))
@@ -180,7 +180,7 @@ class ElasticJoints:
 
 
 def _required(robot: Robot, action: Action) -> Transmission:
-    """Return the transmission of an arm; raise a ModelError if no motor can move on its own."""
+    """Return the transmission of an arm; raise a ModelError if no motor moves independently."""
     springs = action.transmission
     if springs is None or not np.any(np.isfinite(springs.stiffness)):
         raise ModelError(

@@ -46,7 +46,7 @@ def view(
     mark: tuple[str, ...],
     topic: str | None,
 ) -> None:
-    """Look at a recording in rerun: the moving arm, torques, and the residual of a model."""
+    """Show a recording in rerun: the moving arm, torques, and the residual of a model."""
     from armid_ros.arm import ArmModel
     from armid_ros.cli import options
     from armid_ros.view.rerun_log import log_recording, open_stream
@@ -57,7 +57,7 @@ def view(
         robot = options.open_robot(robot_source, gravity, joints, [bag]) if robot_source else None
         arm = options.model_of(model / 'model.yaml' if model.is_dir() else model, robot)
     (recording,) = options.read([bag], arm.robot, topic)
-    if model is not None and not mark:  # the joints of the effects that a diagnosis names
+    if model is not None and not mark:  # joints of the named effects of a diagnosis
         path = (model if model.is_dir() else model.parent) / 'diagnosis.json'
         if path.is_file():
             effects = json.loads(path.read_text(encoding='utf-8'))['effects']

@@ -1,7 +1,7 @@
 # Copyright 2026 The armid_ros developers
 # SPDX-License-Identifier: Apache-2.0
 """
-A recording in rerun: curves and arm on one timeline, in a window or in a file.
+Display of a recording in rerun: curves and arm on one timeline, in a window or a file.
 
 Entities are ``arm/<joint>``, ``torque/<joint>/measured`` and ``predicted``, ``residual/<joint>``,
 ``position/<joint>`` and ``velocity/<joint>``.
@@ -202,7 +202,7 @@ def _log_bodies(stream: Any, robot: Robot, marked: Sequence[str]) -> list[str]:
             absent.append(f"link '{shape.link}': mesh {shape.mesh} not found; not drawn")
             continue
         try:
-            drawing = _drawn(shape, colour)
+            drawing = _entity(shape, colour)
         except RobotError as error:
             notes.append(f"link '{shape.link}': {error}; not drawn")
             continue
@@ -223,11 +223,11 @@ def _log_bodies(stream: Any, robot: Robot, marked: Sequence[str]) -> list[str]:
     return [*all_in_one(absent), *notes]
 
 
-def _drawn(shape: LinkShape, colour: tuple[int, int, int]) -> Any:
-    """Return a shape in its own frame as rerun draws it; RobotError for a broken mesh."""
+def _entity(shape: LinkShape, colour: tuple[int, int, int]) -> Any:
+    """Convert a shape in its frame to an entity of rerun; RobotError for an invalid mesh."""
     rr = rerun()
     if shape.path is not None:
-        load_mesh(shape.path, np.ones(3))  # the viewer ignores a broken mesh without a message
+        load_mesh(shape.path, np.ones(3))  # the viewer ignores invalid meshes without a message
         return rr.Asset3D(path=shape.path, albedo_factor=colour)
     look = {'colors': colour, 'fill_mode': 'solid'}
     if shape.kind == 'box':

@@ -70,7 +70,7 @@ def plan(
             f'armid zero fit BAG --robot {robot_source} --out zeros'
         )
         shown = result.summary()
-        # the last line is on the precision relative to zeros, tilt and tool described as 0
+        # the last line states the precision relative to described zeros, tilt and tool of 0
         summary = replace(shown, then='', lines=shown.lines[:-1], steps=[step])
         origin = options.origin(robot_source, read, result.seed)
         options.deliver(result, staged, origin, as_json, summary)

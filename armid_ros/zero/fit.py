@@ -29,7 +29,7 @@ import pinocchio as pin
 from scipy.stats import t as student
 
 SCHEMA = 'armid/zero/1'
-#: Quantities that may be held known, and the effects that are then not fitted.
+#: Quantities that may be fixed, and the effects that are then not fitted.
 KNOWN = {'gain': 'torque_gain', 'tilt': 'base_tilt', 'tool': 'payload'}
 #: Quantity of each effect; if it is not determined, the effect is not in the model.
 _OF = {'torque_gain': 'gain', 'torque_offset': 'zero', 'base_tilt': 'tilt', 'payload': 'mass'}
@@ -50,7 +50,7 @@ MORE = 'record a run of armid zero plan'
 @dataclass(frozen=True)
 class FittedQuantity:
     """
-    A fitted quantity with half of its 95 % interval; 0: held known.
+    Fitted quantity with half of its 95 % interval; 0 for a fixed quantity.
 
     The joint is empty for a quantity of the whole arm. The reason why the quantity is not
     determined ends with a remedy; it is empty for a determined one.
@@ -166,7 +166,7 @@ def fit_rests(
     robots : sequence of Robot
         The described arm in each recording, with its known payload.
     known : collection of str
-        Quantities of `KNOWN` that are held at their described values.
+        Quantities of `KNOWN` that are fixed to their described values.
     link_error : float
         Standard deviation of masses and first moments of links, as a share of their size; 0: the
         description is exact.
@@ -187,7 +187,7 @@ def fit_rests(
     solved = _solved(arms, rests, np.array(prior), scales)
     arm = arms[-1].with_theta(arms[-1].theta + solved.x)
     q = np.concatenate([one.q for one in rests])
-    # poses that are 0.1 rad or m apart from all before
+    # poses at least 0.1 rad or m from all previous poses
     poses = sum(bool(np.all(np.abs(q[:k] - q[k]).max(axis=1) > 0.1)) for k in range(len(q)))
     few = f'{poses} poses are too few; {MORE}' if solved.freedom < 3.0 else ''
     before, after = (y - _predicted(arms, rests, x)[0] for x in (0.0 * solved.x, solved.x))
@@ -213,7 +213,7 @@ def _predicted(
 
 
 def _sided(rests: Sequence[Motion]) -> npt.NDArray[np.bool_]:
-    """Mark readings after an approach; without approach, dry friction is only bounded."""
+    """Mark readings after an approach; without an approach, dry friction is only bounded."""
     return np.concatenate([one.dq for one in rests]).astype(bool)
 
 
@@ -296,7 +296,7 @@ def _quantities(
 
 
 def _reason(arm: ArmModel, solved: _Solution, slope: FloatArray, limit: float) -> str:
-    """Return why a quantity with these slopes over the free parameters is not determined."""
+    """Return why a quantity is not determined, from its derivatives by the free parameters."""
     std = np.sqrt(np.diag(solved.covariance))
     most = int(np.argmax(np.abs(slope) * std))
     correlation = np.abs(solved.covariance[most]) / std
@@ -326,7 +326,7 @@ def fit_document(
     verdict = 'in part' if any(one.reason for one in found.quantities) else 'determined'
     if all(one.reason for one in found.quantities if one.name == 'zero'):
         verdict = 'not determined'
-    # readings are explained to a tenth of the largest one of the joint
+    # readings are explained to a tenth of the largest reading of the joint
     if np.any(found.residual > 0.1 * found.largest) or min(gains, default=1.0) < 0.0:
         verdict = 'not explained'
     rms = zip(found.arm.robot.joints, found.before, found.residual, strict=True)

@@ -33,7 +33,7 @@ from armid_ros.robots.robot import position_range
 from armid_ros.zero.fit import arm_at_rest
 import numpy as np
 
-#: Motion beyond a pose and back [rad or m].
+#: Distance of the motion beyond a pose and back [rad or m].
 BEYOND = 0.1
 
 
@@ -58,7 +58,7 @@ def plan_zero(
     planner = TransferPlanner.of(arm, scene, settings.speed)
     assert planner.limits is not None and planner.clearance is not None
     inside = replace(planner.limits, lower=limits.lower, upper=limits.upper)
-    # half as much again, as the smoothing cuts corners
+    # 50 % more, as the filter shortens the motion
     reserve = replace(planner.clearance, margin=1.5 * scene.clearance)
     careful = replace(planner, limits=inside, clearance=reserve)
     chosen = _poses(careful, inside, model, poses, torque_noise(arm, settings), rng)
@@ -88,7 +88,7 @@ def _poses(
     """
     robot = model.robot
     lower, upper = position_range(limits.lower, limits.upper)
-    turn = np.where(robot.prismatic, np.inf, np.pi)  # weight repeats after a turn
+    turn = np.where(robot.prismatic, np.inf, np.pi)  # gravity torque is periodic with a full turn
     lower, upper = np.maximum(lower, -turn), np.minimum(upper, turn)
     room = np.minimum(BEYOND, 0.1 * (upper - lower))
     drawn = rng.uniform(lower + room, upper - room, (400, robot.n_joints))
@@ -142,7 +142,7 @@ def _tour(
         if not planner.fault(over):
             parts += [pose + bump * (over - pose), rest]
     if not np.array_equal(now, poses[0]):
-        raise TrajectoryError(f'there is no way back from the poses: {reason}')
+        raise TrajectoryError(f'no return path from the poses: {reason}')
     q = np.roll(np.concatenate(parts), count // 2, axis=0)  # begins and ends in a rest
     q = np.concatenate([q, np.tile(q[-1], (-len(q) % int(rate), 1))])  # whole seconds
     period = len(q) / rate

@@ -1,6 +1,6 @@
 # Copyright 2026 The armid_ros developers
 # SPDX-License-Identifier: Apache-2.0
-"""The seconds of a recording in which all joints are at rest."""
+"""Time spans of a recording in which all joints are at rest."""
 
 from __future__ import annotations
 
@@ -32,7 +32,7 @@ def find_rests(recording: Recording) -> Motion:
             'torque with --topic or --effort'
         )
     size = max(round(WINDOW / max(recording.period, 1e-6)), 3)
-    # neither single wrong readings of an encoder nor its noise end a rest
+    # outliers and noise of an encoder do not end a rest
     q = median_filter(recording.q, (5, 1), mode='nearest')
     q = uniform_filter1d(q, max(size // 5, 1), axis=0, mode='nearest')
     spread = maximum_filter1d(q, size, axis=0) - minimum_filter1d(q, size, axis=0)
@@ -52,7 +52,7 @@ def find_rests(recording: Recording) -> Motion:
         first = int(np.searchsorted(t, t[begin] + SETTLING))
         pose, came = q[first:end].mean(axis=0), np.zeros(q.shape[1])
         for j, way in enumerate((pose - q[before:begin]).T):
-            # motion after which dry friction acts against its direction [rad or m]
+            # distance after which dry friction is opposed to the motion [rad or m]
             apart = np.flatnonzero(np.abs(way) > 0.03)
             came[j] = np.sign(way[apart[-1]]) if len(apart) else 0.0
         rests.append((t[begin], pose, came, tau[first:end].mean(axis=0)))

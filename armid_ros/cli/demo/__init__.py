@@ -1,3 +1,3 @@
 # Copyright 2026 The armid_ros developers
 # SPDX-License-Identifier: Apache-2.0
-"""`armid demo`: all commands once, and a story in which a hidden change is found."""
+"""`armid demo`: run every command once, and diagnose a hidden change."""

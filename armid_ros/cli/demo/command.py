@@ -19,7 +19,7 @@ if TYPE_CHECKING:
     from armid_ros.motion import FloatArray
     from armid_ros.nodes.lockstep import Progress
 
-#: Files that a folder to be filled may hold already, from a demo before.
+#: Files of an earlier demo, which the output folder may contain.
 OUTPUTS = ('bag', 'excitation.yaml', 'model.yaml', 'identification.json', 'report.html', 'story')
 
 

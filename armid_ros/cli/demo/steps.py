@@ -40,7 +40,7 @@ def _facts() -> dict[str, Any]:
 
 
 def true_arm(robot: Robot) -> ArmModel:
-    """Return the arm that is to be identified: other masses than described, and friction."""
+    """Return the arm to identify, with friction and other masses than described."""
     true = _facts()
     factors = np.array(true['mass_factors'])[:, np.newaxis]
     parameters = robot.rigid_parameters.reshape(-1, 10) * factors
@@ -83,7 +83,7 @@ def hidden_change(robot: Robot, rng: np.random.Generator, hide: str = '') -> Hid
 @dataclass(frozen=True)
 class HiddenChange:
     """
-    An effect that the arm has and its model lacks.
+    Effect of the arm that its model lacks.
 
     Attributes
     ----------

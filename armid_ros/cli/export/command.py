@@ -1,6 +1,6 @@
 # Copyright 2026 The armid_ros developers
 # SPDX-License-Identifier: Apache-2.0
-"""The command ``armid export``: an identified arm in the form of another program."""
+"""The command ``armid export``: write an identified arm in the format of another program."""
 
 from __future__ import annotations
 
@@ -12,10 +12,10 @@ from armid_ros.errors import OutputError
 import click
 from click.core import ParameterSource
 
-#: Load data of makers, and all kinds in the order of the help.
+#: Kinds of load data by manufacturer, and all export kinds in the order of the help.
 LOADS = ('ur', 'franka', 'kuka', 'abb')
 KINDS = ('cpp', 'python', *LOADS, 'ranges', 'urdf', 'mjcf', 'sdf')
-#: Kinds that an option belongs to.
+#: Export kinds that each option applies to.
 _KINDS_OF = {'joint': LOADS, 'frame': LOADS, 'spread': ('ranges',)}
 
 
@@ -56,7 +56,7 @@ def export(
     frame: str | None,
     spread: float,
 ) -> None:
-    """Write a model for a controller, a maker's load data or a simulator."""
+    """Write a model for a controller, a simulator, or the load data of a manufacturer."""
     from armid_ros.cli import options
     from armid_ros.cli.export.dynamics import torque_code
     from armid_ros.cli.export.loads import load_of, load_text
@@ -77,7 +77,7 @@ def export(
     if robot_source is not None:
         robot = options.open_robot(robot_source, 'earth', joints)
     elif joints is not None:
-        raise click.UsageError('--joints needs the description they are of: name it with --robot')
+        raise click.UsageError('--joints needs the description of them: name it with --robot')
     arm = options.model_of(model, robot)
     notes: tuple[str, ...] = ()
     if kind in ('cpp', 'python'):

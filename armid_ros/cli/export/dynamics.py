@@ -16,9 +16,9 @@ from armid_ros.errors import ModelError
 import numpy as np
 import numpy.typing as npt
 
-#: Tables of the law, by the attribute of MJCF that holds their values; an offset has none.
+#: Tables of the torque law by MJCF attribute; an offset has no attribute.
 _TABLES = {'damping': 'VISCOUS', 'frictionloss': 'COULOMB', 'armature': 'ROTOR', '': 'OFFSET'}
-#: Template of the law, brackets of a table, and sign of a comment.
+#: Template of the torque law, brackets of a table, and comment prefix.
 _LANGUAGES = {'cpp': ('torque.hpp', '{}', '//'), 'python': ('torque.py.txt', '[]', '#')}
 #: Speed up to which there is no Coulomb friction [rad/s or m/s]: the noise of a velocity at rest.
 DEAD_BAND = 1e-3
@@ -42,7 +42,7 @@ def torque_tables(arm: ArmModel) -> tuple[dict[str, npt.NDArray[Any]], tuple[str
 
     def table_of(effect: Effect) -> str:
         attribute = effect.traits.mjcf_attribute
-        known = attribute or effect.name in USUAL_EFFECTS  # not of a user, with another law
+        known = attribute or effect.name in USUAL_EFFECTS  # shipped law only
         return _TABLES.get(attribute, '') if known else ''
 
     placed, left_out = place_values(arm, table_of)
@@ -63,7 +63,7 @@ def torque_tables(arm: ArmModel) -> tuple[dict[str, npt.NDArray[Any]], tuple[str
 
 def torque_code(arm: ArmModel, language: str, source: str) -> tuple[str, tuple[str, ...]]:
     """
-    Return the torque of an arm as code, and lines on parameters that are not in it.
+    Return code for the torque of an arm, and lines on parameters that it omits.
 
     The language is 'cpp', a C++17 header with torque(q, dq, ddq, tau), or 'python', a module with
     torque(q, dq, ddq) that returns tau; neither needs more than its standard mathematics. A

@@ -36,14 +36,14 @@ class CarriedLoad:
     body: pin.Inertia
 
     def principal(self) -> tuple[FloatArray, FloatArray]:
-        """Return moments (3,) [kg m^2] and axes, columns (3, 3), as near to the frame's as any."""
+        """Return principal moments (3,) [kg m^2] and axes (3, 3), columns, close to the frame."""
         moments, axes = np.linalg.eigh(self.body.inertia)
         order = max(
             map(list, permutations(range(3))),
             key=lambda order: float(np.abs(np.diag(axes[:, order])).sum()),
         )
         axes = axes[:, order] * np.where(np.diag(axes[:, order]) < 0.0, -1.0, 1.0)
-        if np.linalg.det(axes) < 0.0:  # mirrored: turn the axis that is farthest from the frame's
+        if np.linalg.det(axes) < 0.0:  # left-handed: flip the axis farthest from the frame's
             axes[:, np.argmin(np.diag(axes))] *= -1.0
         return moments[order], axes
 
@@ -86,7 +86,7 @@ def load_of(arm: ArmModel, joint: str | None = None, frame: str | None = None) -
     if not ten[0] > NO_MASS:
         raise ModelError(
             f"the payload of joint '{joint}' has a mass of {ten[0]:.4g} kg, which no controller "
-            'takes: record the arm with and without it again'
+            'accepts: record again with and without the payload'
         )
     model, number = arm.robot.model, arm.robot.tree.index(joint) + 1
     frames = [f for f in model.frames if (f.parentJoint, f.type) == (number, pin.FrameType.BODY)]
@@ -166,7 +166,7 @@ def abb(load: CarriedLoad) -> str:
     return f'PERS loaddata load1 := [{parts}];'
 
 
-#: How each maker writes a load and a comment.
+#: Format of a load and a comment for each manufacturer.
 MAKERS: dict[str, tuple[Callable[[CarriedLoad], str], str]] = {
     'ur': (universal_robots, '#'),
     'franka': (franka, '//'),
@@ -177,7 +177,7 @@ MAKERS: dict[str, tuple[Callable[[CarriedLoad], str], str]] = {
 
 def load_text(load: CarriedLoad, maker: str, source: str) -> tuple[str, tuple[str, ...]]:
     """
-    Return the file of the load data of a maker, a key of `MAKERS`, and notes that are in it too.
+    Return the load data file of a manufacturer, a key of `MAKERS`, and its notes.
 
     An inertia that no body can have is written as zero, a point mass. The source of the load is
     for the comment.
@@ -187,7 +187,7 @@ def load_text(load: CarriedLoad, maker: str, source: str) -> tuple[str, tuple[st
     place = 'tool (for a tload: the wrist)' if maker == 'abb' else 'flange'
     notes = [f'values are in the frame of --frame {load.frame}; it has to be that of the {place}']
     low, middle, high = np.linalg.eigvalsh(load.body.inertia)
-    if min(low, low + middle - high) < -1e-9 * abs(high):  # beyond rounding
+    if min(low, low + middle - high) < -1e-9 * abs(high):  # not a rounding error
         notes.append(
             f'no body has the principal moments {low:.3g}, {middle:.3g}, {high:.3g} kg m^2; the '
             'inertia is written as zero'

@@ -25,7 +25,7 @@ _HEAD = """\
 # Ranges of {robot} for domain randomisation, written by armid export, from {source}.
 # low, high: 95 %. from: recordings, or description with {spread:g} of the described value as std.
 # Errors are correlated: independent draws scatter the torque more than the recordings do.
-# A parameter without std is one of which the model has no standard deviation.
+# A parameter without std has no standard deviation in the model.
 """
 
 
@@ -34,9 +34,9 @@ def ranges_text(arm: ArmModel, known: ParameterFile, spread: float, source: str)
     Return a YAML with name, joint, unit, mean, std, low, high and from of each parameter.
 
     Rows are masses and centres of mass of links, in the frames of their joints, and the parameters
-    of effects. What is known comes from the recordings: combinations with a covariance, or single
-    values. The prior standard deviation of a link's parameters is the spread, a share of what the
-    description has. The source of the model is for the comment.
+    of effects. The information comes from the recordings: combinations with a covariance, or
+    single values. The prior standard deviation of a link's parameters is the spread, a share of
+    what the description has. The source of the model is for the comment.
 
     """
     information = known.information(arm.parameters)

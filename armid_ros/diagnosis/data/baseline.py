@@ -117,7 +117,7 @@ def _described_spread(arm: ArmModel) -> FloatArray:
 @dataclass(frozen=True)
 class Baseline:
     """
-    Recordings in which nothing was wrong.
+    Recordings from when the model was right.
 
     Attributes
     ----------

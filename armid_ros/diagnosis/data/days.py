@@ -1,6 +1,6 @@
 # Copyright 2026 The armid_ros developers
 # SPDX-License-Identifier: Apache-2.0
-"""Recordings of the baseline (first day) and of the day in question, in weighted rows."""
+"""Recordings of the baseline (first day) and of the diagnosed day, in weighted rows."""
 
 from __future__ import annotations
 
@@ -26,7 +26,7 @@ class Rows:
     Attributes
     ----------
     data : tuple of Trajectory
-        Trajectories of the first day, then of the day in question; `fold` counts through both.
+        Trajectories of the first day, then of the diagnosed day; `fold` counts through both.
     sigma : tuple of ndarray, each (n,)
         Unit of each trajectory [N m].
     before : int
@@ -46,7 +46,7 @@ class Rows:
 
     @classmethod
     def over_noise(cls, evidence: Evidence) -> Rows:
-        """Weight data of one day by their noise; the unit of discrepancies is the rms torque."""
+        """Weight data of one day by their noise; discrepancies are in units of the rms torque."""
         torque = np.maximum(evidence.torque_rms, 1e-3 * evidence.torque_rms.max())
         amplitude = (torque,) * count_recordings(evidence.data)
         return cls(evidence.data, evidence.sigma, 0, amplitude).not_below_rounding()
@@ -68,7 +68,7 @@ class Rows:
 
     @cached_property
     def today(self) -> npt.NDArray[np.bool_]:
-        """Return whether each recording is of the day in question, (K,)."""
+        """Return whether each recording is of the diagnosed day, (K,)."""
         return np.arange(max(part.fold for part in self.data) + 1) >= self.before
 
     @property
@@ -78,12 +78,12 @@ class Rows:
 
     @cached_property
     def in_question(self) -> list[int]:
-        """Return the indices of the trajectories of the day in question."""
+        """Return the indices of the trajectories of the diagnosed day."""
         return [k for k, part in enumerate(self.data) if self.today[part.fold]]
 
     @cached_property
     def informative(self) -> FloatArray:
-        """Return the number of informative rows of the day in question, at least 1, (n,)."""
+        """Return the number of informative rows of the diagnosed day, at least 1, (n,)."""
         count = np.sum([(self.weight[k] > 0.0).sum(axis=0) for k in self.in_question], axis=0)
         return np.asarray(np.maximum(count, 1), dtype=float)
 

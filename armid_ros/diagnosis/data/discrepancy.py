@@ -74,7 +74,7 @@ def discrepancy_columns(data: Sequence[Trajectory], arm: Arm) -> list[FloatArray
 
 
 def _unasked_friction(motion: Motion, arm: Arm) -> FloatArray:
-    """Return the columns of each friction law that no joint has by default, (N, n, L)."""
+    """Return the columns of the friction laws that are not fitted by default, (N, n, L)."""
     laws = [kind(motion.joints).columns(motion, arm) for kind in UNASKED_FRICTION]
     return np.stack([np.diagonal(columns, axis1=1, axis2=2) for columns in laws], axis=2)
 

@@ -1,7 +1,7 @@
 # Copyright 2026 The armid_ros developers
 # SPDX-License-Identifier: Apache-2.0
 """
-The data in the unit of the gap: their noise, or the misfit of the model.
+Data in units of the noise, or of the misfit of the model.
 
 The noise is the difference between the residuals of two equal periods of one trajectory. Each
 residual is evaluated at the positions measured in its period, so the difference includes encoder
@@ -27,7 +27,7 @@ from scipy import signal, stats
 
 #: Largest lag at which residuals may be correlated [rows].
 _LAGS = 20
-#: Where fewer informative rows than this remain, all rows are used.
+#: Smallest number of informative rows; with fewer, all rows are used.
 _FEW = 20
 #: Ratio of the noise of torques, which is coloured, to white noise with the same second
 #: differences: at most this in 95 % of the joints of 48 recordings with two equal periods.
@@ -40,7 +40,7 @@ _SLOW_HZ, _FAST_HZ, _WINDOW = 4.0, (6.0, 12.0), 2.5
 @dataclass(frozen=True)
 class Evidence:
     """
-    Data with the unit in which the gap is measured.
+    Data, and the unit in which the gap is measured.
 
     Attributes
     ----------
@@ -110,7 +110,7 @@ class Evidence:
 
     @property
     def assumed(self) -> bool:
-        """Whether the noise of some data is assumed, as no motion in them repeats."""
+        """Whether the noise is assumed for some trajectory, because no period repeats in it."""
         return any(part.period is None for part in self.data)
 
     def limits(self, residual: Sequence[FloatArray], settings: DiagnosisSettings) -> FloatArray:

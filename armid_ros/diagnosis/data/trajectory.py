@@ -93,7 +93,7 @@ class Trajectory:
 
     @cached_property
     def informative(self) -> npt.NDArray[np.bool_]:
-        """Return False where a joint rests or reverses: its friction is unknown, shape (M, n)."""
+        """Return False where a joint rests or reverses, with unknown friction, shape (M, n)."""
         return np.asarray(self.unsure <= self.allowed)
 
     def reduce(self, values: FloatArray) -> FloatArray:
@@ -173,7 +173,7 @@ def trajectories(
     allowed: FloatArray | None = None,
 ) -> list[Trajectory]:
     """
-    Cut recordings into unbroken stretches, conditioned alike.
+    Cut recordings into unbroken stretches with the same filters.
 
     The largest uncertain share of an informative row is `allowed`, (n,); see `Trajectory`.
 
@@ -204,7 +204,7 @@ def trajectories(
 
 def thinnable(used: Conditioning) -> Conditioning:
     """
-    Lower the decimation of rows to a multiple of the decimation of columns.
+    Reduce the decimation of rows to a multiple of the decimation of columns.
 
     Each row then spans a whole number of columns' samples; at most an eighth more rows are kept.
 

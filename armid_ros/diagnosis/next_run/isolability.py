@@ -51,7 +51,7 @@ class Isolability:
         return np.array([np.isfinite(one.size) for one in self.effects])
 
     def rivals(self, k: int) -> list[Detectable]:
-        """Return the visible effects that cannot be distinguished from one, nearest first."""
+        """Return the visible effects that cannot be distinguished from this one, nearest first."""
         order = np.argsort(self.apart[k])
         near = [j for j in order if j != k and self.seen[j] and self.apart[k, j] < DISTINCT]
         return [self.effects[j] for j in near]
@@ -83,7 +83,7 @@ class Isolability:
         ]
 
     def of_kinds(self) -> tuple[tuple[str, ...], FloatArray]:
-        """Return the names of visible effects, and the minimum of `apart` over places, (K, K)."""
+        """Return the names of visible effects, and the minimum of `apart` over joints, (K, K)."""
         names = [one.name for one in self.effects]
         kinds = tuple(dict.fromkeys(np.array(names)[self.seen].tolist()))
         places = [np.flatnonzero(self.seen & (np.array(names) == kind)) for kind in kinds]

@@ -1,7 +1,7 @@
 # Copyright 2026 The armid_ros developers
 # SPDX-License-Identifier: Apache-2.0
 """
-The next run: of many possible motions, the one that best separates named effects from rivals.
+The next run: the motion that best separates named effects from rivals.
 
 T-optimality (Atkinson and Fedorov 1975): the value of a motion is the squared torque of the named
 effect, over the unit of the gap, that the rival, fitted jointly with the nuisance parameters,
@@ -36,9 +36,9 @@ from armid_ros.excitation.feasibility import CLEARANCE, Template, templates
 from armid_ros.robots import collision_model, CollisionModel
 import numpy as np
 
-#: File in which a run is stored.
+#: File name of a planned run.
 EXPERIMENT_FILE = 'experiment.yaml'
-#: Standard deviations of a sure separation: a motion that reaches it needs no payload.
+#: Sufficient separation in standard deviations; a motion that reaches it needs no payload.
 _SURE = 5.0
 #: Largest number of standard deviations that is stated: the noise is not known well enough.
 _CERTAIN = 30.0
@@ -71,7 +71,7 @@ class NextRun:
 
     @property
     def expected_z(self) -> float:
-        """Return the z-score of the pair that is separated least."""
+        """Return the z-score of the least separated pair."""
         return min(pair.z for pair in self.separations)
 
     @property

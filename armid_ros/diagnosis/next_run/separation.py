@@ -60,7 +60,7 @@ class Doubt:
 
     @property
     def joints(self) -> tuple[str, ...]:
-        """Return the joints on which either acts; empty if one of them acts on the whole arm."""
+        """Return the joints of both effects; empty if one effect acts on the whole arm."""
         if not self.named.effect.joints or not self.rival.joints:
             return ()
         return tuple(dict.fromkeys((*self.named.effect.joints, *self.rival.joints)))
@@ -91,7 +91,7 @@ class Separation:
 
     @property
     def distinct(self) -> bool:
-        """Whether the run separates the two effects at all."""
+        """Whether the run separates the two effects."""
         return self.z >= NOTHING
 
     @staticmethod
@@ -136,7 +136,7 @@ class Separation:
 @dataclass(frozen=True)
 class Load:
     """
-    A known mass, for a second run of the same motion.
+    Known mass for a second run of the same motion.
 
     Attributes
     ----------
@@ -171,7 +171,7 @@ class Load:
 
 
 def _carrier(robot: Robot) -> slice:
-    """Return the places of the parameters of the last link."""
+    """Return the indices of the parameters of the last link."""
     last = robot.moving.index(robot.tip)
     return slice(10 * last, 10 * last + 10)
 

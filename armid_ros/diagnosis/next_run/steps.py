@@ -19,7 +19,7 @@ from armid_ros.effects import CATALOGUE
 from armid_ros.estimate import name_in_words
 from armid_ros.identification.fitting.identifiability import excludes_zero, HALF_WIDTH
 
-#: Place of the patched model, for readers of the report.
+#: Location of the patched model, for the report.
 MODEL = 'model.yaml in the folder of this diagnosis'
 
 
@@ -43,7 +43,7 @@ def next_steps(
     no_run : str
         Reason why no run was planned, if one was requested.
     model : str
-        Place of the patched model, in words.
+        Location of the patched model, in words.
     worse : sequence of str
         Joints in which a simulation with the patched model has a larger error than before.
     learned : bool

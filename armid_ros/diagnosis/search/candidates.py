@@ -1,10 +1,10 @@
 # Copyright 2026 The armid_ros developers
 # SPDX-License-Identifier: Apache-2.0
 """
-Every cause that is compared: each effect of the catalogue, per joint, pair or whole arm.
+All candidate causes: each effect of the catalogue, per joint, pair or whole arm.
 
-An effect with shape parameters is a family of causes on a grid, of which the best is refined
-later. The columns of an effect are computed for all joints at once and divided among its causes.
+An effect with shape parameters is a family of causes on a grid; the best cause is refined later.
+The columns of an effect are computed for all joints at once and divided among its causes.
 
 """
 
@@ -34,7 +34,7 @@ from armid_ros.robots import Robot
 import numpy as np
 from scipy import optimize
 
-#: Largest number of combinations of shape values that a search starts from.
+#: Largest number of combinations of start values of shapes.
 _MOST_SHAPES = 12
 #: Largest distance of side lobes from a peak of a spectrum, and half width of the peak [1/rev].
 _LOBES, _PEAK = 3.0, 0.2
@@ -74,7 +74,7 @@ class Causes:
     )
 
     def causes(self, nuisance: Nuisance, under: Marginal) -> list[Cause]:
-        """Return every cause that is not accepted yet, one for each starting shape."""
+        """Return the causes that are not accepted yet, one for each starting shape."""
         arm, result, families = nuisance.arm, list[Cause](), list[Cause]()
         there = [term.cause.effect for term in nuisance.accepted]
         taken = {(one.name, place) for one in there for place in (one.joints, *zip(one.joints))}
@@ -101,7 +101,7 @@ class Causes:
         self, singles: Sequence[Cause], nuisance: Nuisance, under: Marginal
     ) -> Iterator[Cause]:
         """
-        Yield a law of friction in the joints that maximise its evidence, if two or more.
+        Yield a friction law on the joints that maximise its evidence, if at least two.
 
         Values of joints are independent under a common prior; each number of joints is as likely.
 
@@ -137,7 +137,7 @@ class Causes:
             yield from (one for one in members if (one.name, one.joints) not in self.fitted)
 
     def _divided(self, effect: Effect, singles: Sequence[Effect]) -> Iterator[Cause]:
-        """Yield a cause for each single effect; the columns of all are computed at once."""
+        """Yield a cause for each single effect; all columns are computed together."""
         robot, start = self.nuisance.arm.robot, 0
         places: list[tuple[Effect, tuple[int, ...], list[int]]] = []
         for one in singles:
@@ -177,7 +177,7 @@ class Causes:
         )
 
     def reshaped(self, cause: Cause, shape: FloatArray) -> Cause | None:
-        """Return a cause with another shape; None where it is impossible or invisible."""
+        """Return a cause with another shape; None if the shape is impossible or has no torque."""
         try:
             effect = cause.effect.with_shape(shape)
             columns = self._columns(effect)
@@ -191,7 +191,7 @@ class Causes:
     def made(
         self, effect: Effect, kept: tuple[int, ...], columns: Sequence[FloatArray]
     ) -> Cause | None:
-        """Make a cause from columns (M, n, p); None if all are zero on the day in question."""
+        """Make a cause from columns (M, n, p); None if all are zero on the diagnosed day."""
         rows, robot = self.nuisance.rows, self.nuisance.arm.robot
         torque = _torque_of(columns, rows)
         seen = torque.any(axis=0)
@@ -209,7 +209,7 @@ class Causes:
 
 
 def _torque_of(columns: Sequence[FloatArray], rows: Rows) -> FloatArray:
-    """Return the rms torque of a unit of each column on the day in question, (n, p) [N m]."""
+    """Return the rms torque per unit of each column on the diagnosed day, (n, p) [N m]."""
     squares = np.zeros((len(rows.torque), columns[0].shape[2]))
     for k in rows.in_question:
         moving = rows.weight[k][:, :, np.newaxis] > 0.0
@@ -225,7 +225,7 @@ def _unit(own: SelectedEffect, torque: FloatArray, rows: Rows, robot: Robot) -> 
         most = [q.largest(owner, robot) for owner in effect.owners for q in effect.quantities]
         spread = np.where(np.isinf(spread), most, spread)
     spread = spread[kept]
-    if effect.adds_to(robot):  # a load and an error of a link are bodies alike
+    if effect.adds_to(robot):  # a load and an error of a link have the same columns
         spread = (float(robot.rigid_parameters[::10].sum()) * _BODY)[kept]
     largest = 1.0 / np.maximum(np.max(torque / rows.torque[:, np.newaxis], axis=0), 1e-12)
     return np.asarray(np.minimum(largest, np.where(spread > 0.0, spread, np.inf)))
@@ -263,7 +263,7 @@ def cause_of(
     prior : float
         Log odds before any data.
     torque : ndarray, shape (n, p), optional
-        Torque of a unit of each value on the day in question [N m].
+        Torque per unit of each value on the diagnosed day [N m].
 
     """
     joints = np.flatnonzero(np.any([x.any(axis=(0, 2)) for x in columns], axis=0)).tolist()
@@ -293,7 +293,7 @@ def cause_of(
 
 
 def _unexplained(nuisance: Nuisance, under: Marginal) -> Unexplained:
-    """Return the residual of the day in question, from which shapes are initialised."""
+    """Return the residual of the diagnosed day, from which shapes are initialised."""
     rows = nuisance.rows
     values = nuisance.means(under)
     motions = [part.motion for part in rows.data]
@@ -336,7 +336,7 @@ def candidate_effects(
 def shaped(
     effect: Effect, members: list[Effect], arm: ArmModel, unexplained: Unexplained
 ) -> Iterator[tuple[Effect, list[Effect]]]:
-    """Yield an effect and its members in each starting shape; once if it has no shape."""
+    """Yield an effect and its candidates for each starting shape; once if it has no shape."""
     if not effect.shapes:
         yield effect, members
         return
@@ -370,7 +370,7 @@ def line_search(
         moved[index] = np.exp(x) if positive else x
         return moved
 
-    if kind.unit == '1/rev':  # side lobes beside the peak are almost as high
+    if kind.unit == '1/rev':  # side lobes are almost as high as the peak
         scan = value + np.linspace(-_LOBES, _LOBES, 25)
         value = max(scan[scan > kind.lower].tolist(), key=lambda x: gain(at(x)))
         low, high = value - _PEAK, value + _PEAK

@@ -1,6 +1,6 @@
 # Copyright 2026 The armid_ros developers
 # SPDX-License-Identifier: Apache-2.0
-"""A cause that is compared: an effect with a shape in one place, and its columns."""
+"""A candidate cause: an effect with a shape on certain joints, and its columns."""
 
 from __future__ import annotations
 
@@ -37,7 +37,7 @@ class Cause:
     products, own, aim : tuple of ndarray, each (q, p), (p, p), (p,)
         Products of `columns` with the nuisance columns, with themselves, and with the residual.
     torque : ndarray, shape (n, p)
-        Torque of a unit of each value on the day in question, root mean square [N m].
+        Root mean square torque per unit of each value on the diagnosed day [N m].
     shapes : int
         Number of shapes that were tried.
 
@@ -61,13 +61,13 @@ class Cause:
         return self.effect.name, self.effect.joints, self.kept
 
     def whole(self, values: FloatArray, robot: Robot) -> FloatArray:
-        """Return all parameters of the effect, from values of the kept ones; others are zero."""
+        """Return all parameters of the effect from the fitted values; the others are zero."""
         whole = np.zeros(len(self.effect.parameters(robot)))
         whole[list(self.kept)] = values
         return whole
 
     def among(self, effect: Effect, values: npt.NDArray[np.intp], shapes: int) -> Cause:
-        """Return the cause with some of its values, which belong to an effect on fewer joints."""
+        """Return the cause with a subset of its values, those of an effect on fewer joints."""
         return replace(
             self,
             effect=effect,

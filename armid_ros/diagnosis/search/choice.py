@@ -48,11 +48,11 @@ from armid_ros.robots import GRAVITIES
 import numpy as np
 
 Progress = Callable[[float, str], None]
-#: Smallest part of a misfit that is no noise, as a share: the estimate of noise varies by 5 %. Of
+#: Smallest share of a misfit that is not noise: the estimate of noise varies by 5 %. Of
 #: 20 effects that appeared in a running arm 20 were named, and 15 with a share of 1.
 _LEAST_PART = 0.3
 #: Largest number of fits of gravity of another direction: torque is bilinear in gravity and body.
-#: With 2 as many of 20 mountings are within 1 degree and 2 %.
+#: With 2 fits, the number of mountings out of 20 within 1 degree and 2 % is the same.
 _MOST_TURNS = 5
 _KNOWN_GRAVITY = 'the magnitude of gravity is taken as that of the {}, {:g} m/s^2'
 OWN_MISFIT = 'the error of the model before'
@@ -62,7 +62,7 @@ _AS_EXACT = (
     'values of the model are taken as exact, for want of its identification.json: intervals do '
     'not include their errors'
 )
-#: Recordings that would separate a change from a misfit, if there are none or one a day.
+#: Recordings that separate a change from a misfit, if there is at most one a day.
 _NO_BASELINE = (
     'Without a baseline, an error of the model in this motion is not excluded: give recordings '
     'from before (--baseline).'
@@ -95,7 +95,7 @@ class Explainer:
     misfit : Misfit or None
         Misfit of the model when it was identified.
     unseen : sequence of Trajectory
-        Held-out data of the day in question.
+        Held-out data of the diagnosed day.
 
     """
 
@@ -112,7 +112,7 @@ class Explainer:
         """Choose the explanation of the gap."""
         if self.baseline is not None:
             return self._since(self.baseline)
-        return self._alone() if self.misfit is None else self._beside(self.misfit)
+        return self._alone() if self.misfit is None else self._explain_change(self.misfit)
 
     def _alone(self) -> Chosen:
         """Explain the gap of a model without a baseline or a known misfit."""
@@ -163,7 +163,7 @@ class Explainer:
 
     def _magnitude(self, result: Result) -> tuple[float | None, tuple[str, ...]]:
         """
-        Return the magnitude of gravity of a celestial body unless data deny it, with a note.
+        Return the magnitude of gravity of a celestial body unless data contradict, with a note.
 
         The odds of a magnitude are its posterior density over its prior density (Dickey 1971).
 
@@ -182,9 +182,9 @@ class Explainer:
                     return known, (_KNOWN_GRAVITY.format(sizes[known], known),)
         return None, ()
 
-    def _beside(self, written: Misfit) -> Chosen:
+    def _explain_change(self, written: Misfit) -> Chosen:
         """
-        Explain the change since an identification of which only the size of the misfit is known.
+        Explain the change since an identification if only the size of its misfit is known.
 
         Without the recordings, its form is unknown: any cause may be a part of it. See `odds`.
 
@@ -193,7 +193,7 @@ class Explainer:
         misfit = written.of(self.arm.robot, torque_rms(prepared.data))
         noise = _noise_within(misfit, prepared, misfit)
         evidence = Evidence(prepared.data, tuple(np.maximum(s, misfit) for s in noise), noise)
-        # a misfit contains noise, of which no cause is a part
+        # a misfit contains noise, which no cause explains
         rest = misfit**2 - np.mean(np.square(noise), axis=0)
         part = np.maximum(rest, (_LEAST_PART * misfit) ** 2)
         amplitude = (np.sqrt(part),) * count_recordings(prepared.data)
@@ -223,7 +223,7 @@ class Explainer:
         return Chosen(found, misfit, OWN_MISFIT, notes, untested, result.first)
 
     def _changes(self, result: Result, evidence: Evidence, spread: float) -> Explanation:
-        """Explain a change while the model stays as given."""
+        """Explain a change relative to the unchanged model."""
         nuisance = replace(result.nuisance, accepted=())
         fitted = tuple(range(nuisance.rows.before + count_recordings(self.prepared.data)))
         setting = result.under.setting
@@ -236,7 +236,7 @@ class Explainer:
         """
         Return the rows of both days, held-out recordings included.
 
-        The misfit of the model grows with the torque or the speed, whichever grew more.
+        The misfit of the model is scaled with the torque or the speed, whichever increased more.
 
         """
         today, more = self.prepared.data, self.unseen

@@ -33,18 +33,18 @@ from armid_ros.effects import Effect
 from armid_ros.motion import FloatArray
 import numpy as np
 
-#: Amplitudes of the discrepancies d0 and d_k that are tried with a baseline, over the misfit.
+#: Candidate amplitudes of the discrepancies d0 and d_k with a baseline, over the misfit.
 _SHARED, _OWN = (0.1, 0.2, 0.4, 0.8, 1.6, 3.2, 6.4), (0.2, 0.4, 0.8)
-#: Amplitudes of the noise that are tried with a baseline, over the misfit, which contains noise.
+#: Candidate amplitudes of the noise with a baseline, over the misfit, which contains noise.
 _NOISE = (0.15, 0.3, 0.5, 0.8, 1.1)
-#: Amplitudes of d0 and d_k that are tried without a baseline, over the torque; log prior odds.
+#: Candidate amplitudes of d0 and d_k without a baseline, over the torque; log prior odds.
 _SHARES = ((0.0, 0.0), (0.02, -1.0), (0.06, -2.0), (0.15, -3.0))
-#: Errors of the described body that are tried without a baseline, over the largest expected ones:
+#: Candidate errors of the described body without a baseline, over the largest expected errors:
 #: exact, a tenth (masses off by 10 %, centres of mass by a centimetre), and all.
 _BODIES = (0.0, 0.1, 1.0)
 #: Amplitudes of the noise without a baseline, over that of two equal periods; log prior odds.
 _FACTORS = ((1.0, 0.0), (1.3, -1.0), (2.0, -3.0), (4.0, -5.0))
-#: Number of causes with refined shapes, and of causes compared last; most accepted causes.
+#: Number of causes with refined shapes, of causes in the final comparison, and of accepted causes.
 _REFINED, _COMPARED, _MOST = 5, 14, 5
 #: Every eighth cause is used to estimate the usual spread.
 _SAMPLED = 8
@@ -138,7 +138,7 @@ class CauseComparison:
         return Result((), self.nuisance, look.under, look, effects)
 
     def begun(self, before: Result) -> Result:
-        """Return the causes of another comparison that act on the whole arm, fitted anew."""
+        """Return the refitted causes of another comparison that act on the whole arm."""
         accepted = [one for one in before.accepted if not one.best.cause.effect.joints]
         nuisance = self.nuisance
         for one in accepted:
@@ -240,7 +240,7 @@ class CauseComparison:
     def look(self, nuisance: Nuisance) -> Look:
         """Compare every cause that is not accepted yet, and refine the shapes of the best."""
         settings, likeliest = self._settings(nuisance), self._likeliest(nuisance)
-        tried = settings if len(settings) == 1 else _leading(settings)
+        tried = settings if len(settings) == 1 else _leading_settings(settings)
         each = [
             (odds(cause, nuisance, one, bounded=False), cause, one)
             for cause, one in product(self._causes_of(nuisance), tried)
@@ -349,7 +349,7 @@ def settings_of_misfit(body: float) -> tuple[Setting, ...]:
     )
 
 
-def _leading(settings: Sequence[Marginal]) -> list[Marginal]:
+def _leading_settings(settings: Sequence[Marginal]) -> list[Marginal]:
     """Return the best setting and the one of noise alone, for each size of errors of the body."""
     found = []
     for body in dict.fromkeys(one.setting.body for one in settings):

@@ -68,7 +68,7 @@ def explain(
         steps.append(trial)
     there = [trial for trial in _open(result, unknown, settings) if trial.odds > alarm]
     large = {t.effect.name for t in there if np.any(np.abs(t.values) >= t.least)}
-    for trial in there:  # without it in all joints, its torque would bias the other values
+    for trial in there:  # in all joints, or its torque biases other values
         if trial.effect.name in large:
             named.append(trial.named)
             values.append(trial.values)
@@ -98,7 +98,7 @@ def _open(
     result: Result, unknown: Sequence[Effect], settings: DiagnosisSettings
 ) -> Iterator[Trial]:
     """
-    Yield friction and offsets without given values; they are fitted with every cause.
+    Yield friction and offsets without given values, which are fitted with every cause.
 
     The odds of a nonzero value are the prior density at zero over the posterior density at zero
     (Dickey, The weighted likelihood ratio, 1971).
@@ -149,7 +149,7 @@ def survey_of(
 ) -> Survey:
     """Summarise the first comparison of all causes; the named causes come first."""
     look, material = result.first, settings.material
-    # Without the causes, the likeliest setting may be one that hides others.
+    # The likeliest setting without the causes may hide other causes.
     under = look.nuisance.marginal(result.under.setting)
     look = replace(look, under=under)
     ranking = sorted(look.ranking, key=lambda one: one.cause.key not in named)

@@ -4,7 +4,7 @@
 An explanation of a gap: the named effects, and the arm with them.
 
 A fit of base parameters may give links that are not physically consistent. They are replaced by
-the consistent links nearest to the description that fit as well, so that the arm can be simulated.
+consistent links near the description with an equally good fit.
 
 """
 
@@ -26,7 +26,7 @@ from armid_ros.motion import FloatArray
 import numpy as np
 
 NOISE, ESTIMATED = 'noise', 'an estimate of the error of such a model'
-#: Weights of the description that are tried; the largest with as good a fit is used.
+#: Candidate weights of the description; the largest weight with an equally good fit is used.
 _WEIGHTS = (1e-3, 1e-5, 1e-7)
 #: Largest ratio of squared residuals at which physically consistent links fit as well.
 _ALIKE = 1.05
@@ -56,7 +56,7 @@ class Explanation:
     problem : JointFit or None
         Data and model in which the values are fitted; None in a finished diagnosis.
     refitted : bool
-        Whether the rigid body was fitted anew.
+        Whether the rigid body was refitted.
 
     """
 
@@ -71,12 +71,12 @@ class Explanation:
     refitted: bool = False
 
     def without(self, *names: int) -> Explanation:
-        """Return the explanation without some of its causes; the other causes are fitted anew."""
+        """Return the explanation without some of its causes; the other causes are refitted."""
         fewer = self.only([k for k in range(len(self.steps)) if k not in names])
         return replace(fewer, minor=(*self.minor, *(self.steps[k] for k in names)))
 
     def only(self, keep: Sequence[int]) -> Explanation:
-        """Return the explanation with some of its causes, in this order, fitted anew."""
+        """Return the explanation with some of its causes, refitted, in the given order."""
         assert self.problem is not None
         own = self.fitted
         named, values = [own.named[k] for k in keep], [own.values[k] for k in keep]

@@ -5,7 +5,7 @@ The nuisance parameters of a comparison: body, friction, and the discrepancy of 
 
 For recording k, in weighted rows, in each joint
 
-    y_k = X_k b + B_k (d0 + d_k) + Z_k (g0 + [k is of the day in question] g + u_k) + e_k
+    y_k = X_k b + B_k (d0 + d_k) + Z_k (g0 + [k is of the diagnosed day] g + u_k) + e_k
 
 with the body b (prior: the description), the discrepancy d0 that all recordings share and d_k of
 one motion (Kennedy and O'Hagan, Bayesian calibration of computer models, 2001), and the values g
@@ -123,7 +123,7 @@ class Nuisance:
         described[given, given] += (_DESCRIBED * values[given]) ** -2.0
         joints = range(arm.robot.n_joints)
         flat = [x.reshape(-1, base.rank) for x in rows.weighted(columns, joints)]
-        turn = _apart(np.concatenate(flat), described, unset)
+        turn = _orthonormal_transform(np.concatenate(flat), described, unset)
         functions = discrepancy_columns(rows.data, arm)
         both = [
             np.concatenate([x @ turn, own], axis=2)
@@ -213,7 +213,7 @@ class Nuisance:
         acts: npt.NDArray[np.bool_] | None = None,
         known: tuple[FloatArray, float, float] | None = None,
     ) -> Nuisance:
-        """Return the nuisance with one more cause, acting on the day in question by default."""
+        """Return the nuisance with one more cause, acting on the diagnosed day by default."""
         term = CauseTerm(cause, size, self.rows.today if acts is None else acts, known)
         return replace(self, accepted=(*self.accepted, term))
 
@@ -230,7 +230,7 @@ class Nuisance:
 
     @property
     def spans(self) -> list[slice]:
-        """Return the positions of the values of each accepted cause among all parameters."""
+        """Return the indices of the values of each accepted cause among all parameters."""
         size = self.columns[0].shape[2]
         counts = [len(one.cause.unit) for one in self.accepted]
         stops = size + np.cumsum(counts, dtype=int)
@@ -347,7 +347,7 @@ class Nuisance:
         scale: float,
         size: FloatArray,
     ) -> tuple[MotionDiscrepancy, float]:
-        """Marginalise d_k of a prior size (n,); return it with the log of its integral."""
+        """Marginalise d_k with prior amplitude (n,); return d_k and the log of the integral."""
         place, functions = self.discrepancy, self.discrepancy.shape[1]
         own = square[place[:, :, np.newaxis], place[:, np.newaxis, :]] * scale
         held = own + np.eye(functions) * size[:, np.newaxis, np.newaxis] ** -2.0
@@ -415,8 +415,10 @@ class Nuisance:
         return max(float(np.median(found)) if found else least, 1.0)
 
 
-def _apart(rows: FloatArray, precision: FloatArray, group: npt.NDArray[np.bool_]) -> FloatArray:
-    """Return coordinates in which columns (S, r) of two groups are orthonormal, (r, r)."""
+def _orthonormal_transform(
+    rows: FloatArray, precision: FloatArray, group: npt.NDArray[np.bool_]
+) -> FloatArray:
+    """Return the transform that makes columns (S, r) of two groups orthonormal, (r, r)."""
     turn = np.zeros_like(precision)
     for own in (np.flatnonzero(group), np.flatnonzero(~group)):
         held = precision[np.ix_(own, own)]

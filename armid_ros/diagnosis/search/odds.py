@@ -25,7 +25,7 @@ import numpy.typing as npt
 from scipy import special
 
 #: Spreads: variances of values between recordings over those for white noise. Equal values,
-#: spreads that are tried for a cause, and spreads that are tried for all causes in a baseline.
+#: candidate spreads of a cause, and candidate spreads of all causes in a baseline.
 EQUAL = np.zeros(1)
 OWN_SPREADS = np.array([0.0, 1.0, 3.0, 10.0, 30.0, 100.0])
 _USUAL_SPREADS = np.array([0.0, 0.5, 1.0, 2.0, 4.0, 8.0, 16.0, 32.0, 64.0, 128.0])
@@ -78,7 +78,7 @@ class CauseInformation:
     vector : ndarray, shape (G p,)
         Matrix times mean.
     today : ndarray of bool, shape (G,)
-        Whether each group is of the day in question.
+        Whether each group is of the diagnosed day.
     visible : float
         Share of the length of the columns that the nuisance columns cannot reproduce.
 
@@ -138,7 +138,7 @@ class CauseInformation:
         return len(self.vector) // len(self.today)
 
     def of_day(self, today: bool) -> CauseInformation:
-        """Return the information of one of the days, today or before."""
+        """Return the information of one day: the diagnosed day or the baseline."""
         of_it = self.today == today
         kept = np.flatnonzero(np.repeat(of_it, self.size))
         matrix = self.matrix[np.ix_(kept, kept)]
@@ -224,7 +224,7 @@ def odds(
                 0.5 * np.sum(along / wide, axis=1),
             )
     assert best is not None
-    # All values of a cause follow one misfit, so only recordings are independent.
+    # All values of a cause vary with one misfit, so only recordings are independent.
     weight = prior + (changed - prior) / p
     weight -= np.logaddexp.reduce(weight)
     factor = -float(np.logaddexp.reduce(weight + nothing - changed))
@@ -239,7 +239,7 @@ def odds(
 
 
 def _unseen(cause: Cause, nuisance: Nuisance) -> FloatArray:
-    """Return the largest values that a misfit in size only may contain, over their unit, (p,)."""
+    """Return the largest values within a misfit of known size, over their unit, (p,)."""
     torque = cause.torque[list(cause.joints)] * cause.unit
     misfit = nuisance.rows.amplitude[-1][list(cause.joints), np.newaxis]
     return np.asarray(THERE * np.min(misfit / np.maximum(torque, 1e-300), axis=0))
@@ -289,7 +289,7 @@ def usual_spread(causes: Sequence[Cause], nuisance: Nuisance, under: Marginal) -
 def without(
     square: FloatArray, aim: FloatArray, root: FloatArray
 ) -> tuple[FloatArray, FloatArray, float]:
-    """Integrate out values of covariance R R'; return the reduced equations and log evidence."""
+    """Marginalise values of covariance R R'; return the reduced equations and log evidence."""
     border = square @ root
     inner = root.T @ border
     lower = np.linalg.inv(np.linalg.cholesky(0.5 * (inner + inner.T) + np.eye(len(inner))))

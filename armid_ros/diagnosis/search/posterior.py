@@ -5,7 +5,7 @@ Values of the named effects: the mean and the covariance of their posterior.
 
 The model is that of the comparison of causes (`Nuisance`), with body, friction, discrepancy and
 earlier values of the cause integrated out. Encoder offsets, delays, elasticities and shapes are
-linear to first order only: the columns are computed anew at each mean (Gauss-Newton), and values
+linear to first order only: the columns are recomputed at each mean (Gauss-Newton), and values
 stay within their physical bounds.
 
 """
@@ -33,7 +33,7 @@ import numpy as np
 SAME_GRAVITY = 0.003
 #: Largest number of Gauss-Newton steps; the comparison has refined the shapes already.
 _MOST_ROUNDS = 4
-#: Shares of a step that are tried until the loss falls.
+#: Step lengths of the line search, until the loss decreases.
 _SHARES = (1.0, 0.5, 0.2)
 #: Relative change of the loss at which the fit has converged.
 _SETTLED = 1e-4
@@ -214,12 +214,12 @@ class JointFit:
         return self._arm(state, there.means(there.marginal(self.setting, self.recordings)))
 
     def as_described(self) -> JointFit:
-        """Return the fit with the body held at the description."""
+        """Return the fit with the body fixed to the description."""
         return replace(self, setting=replace(self.setting, body=0.0))
 
     def rest(self, fitted: Fitted) -> list[FloatArray]:
         """
-        Return the residual of the day in question without body and discrepancy.
+        Return the residual of the diagnosed day without body and discrepancy.
 
         Returns
         -------
@@ -264,7 +264,7 @@ class JointFit:
 
     def _moved(self, linear: Nuisance, means: FloatArray) -> FloatArray:
         """
-        Return the change of the values if the cause had acted on the first day as well.
+        Return the change of the values if the cause acted on the first day as well.
 
         The prior of a value on the first day has zero mean, and the present value as standard
         deviation.

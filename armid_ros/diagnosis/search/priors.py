@@ -8,13 +8,13 @@ from armid_ros.effects import CATALOGUE, Effect
 from armid_ros.robots import Robot
 import numpy as np
 
-#: Log odds of an effect by its frequency, which the user may choose, relative to the usual odds.
+#: Log odds by frequency of an effect, which the user may set, relative to the default odds.
 HOW_OFTEN = {'often': 2.0, 'usual': 0.0, 'seldom': -3.0, 'never': -30.0}
 #: Log odds of a changed link between two days, which practically never happens.
 NEVER = -5.0
 #: Log odds of a load on an inner link, between two days.
 INNER = -2.0
-#: Log odds of another unusual place: a delay of one joint, a lag of the whole arm.
+#: Log odds of other unusual joints: a delay of one joint, a lag of the whole arm.
 ELSEWHERE = -1.5
 #: Log odds of causes outside of the arm, which can pull in any direction.
 OUTSIDE = -4.0
@@ -23,7 +23,7 @@ RARER = -0.05
 #: Probability that a law outside of the catalogue acts and resembles the best cause: 6 of 70
 #: names of development arms.
 UNLISTED = 0.09
-#: Log odds of each shape parameter that the data choose.
+#: Log odds per fitted shape parameter.
 SHAPE = -3.0
 #: Prior standard deviations of the values over the unit of a cause, equally likely.
 SIZES = np.array([0.01, 0.03, 0.1, 0.3, 1.0])
@@ -33,7 +33,7 @@ THERE = 0.3
 
 
 def log_prior(effect: Effect, robot: Robot, changed: bool) -> float:
-    """Return the log odds of an effect in one place before any data."""
+    """Return the prior log odds of an effect on certain joints."""
     names, name = list(CATALOGUE), effect.said_as
     odds = RARER * (names.index(name) if name in CATALOGUE else len(names))
     odds += SHAPE * len(effect.shape)

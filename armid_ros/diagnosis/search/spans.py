@@ -1,9 +1,9 @@
 # Copyright 2026 The armid_ros developers
 # SPDX-License-Identifier: Apache-2.0
 """
-The seconds in which a cause acts: a payload that is picked up and put down, a hose that pulls.
+Time spans in which a cause acts: a payload that is picked up and put down, a hose that pulls.
 
-Every cause is tried with columns of zero outside of a span of each recording. The span with
+Every cause is fitted with columns that are zero outside a span of each recording. The span with
 the largest evidence is found over pairs of change points, one recording after the other.
 
 """
@@ -25,7 +25,7 @@ from armid_ros.motion import FloatArray
 import numpy as np
 import numpy.typing as npt
 
-#: Time between change points that are tried [s], and the shortest span [s].
+#: Time between candidate change points [s], and the shortest span [s].
 _STEP, _SHORTEST = 0.25, 3.0
 #: Change points of the coarse pass, refining passes, and number of causes that are refined.
 _COARSE, _PASSES, _REFINED = 9, 2, 3
@@ -57,7 +57,7 @@ class Span:
 
 @dataclass(frozen=True)
 class _Timed:
-    """A cause with candidate change points in each recording of the day in question."""
+    """A cause with candidate change points in each recording of the diagnosed day."""
 
     ranked: Ranked
     look: Look
@@ -133,7 +133,9 @@ class _Timed:
         found, spans = self.throughout, self._whole
         for k, edges in self.edges.items():
             coarse = np.unique(np.linspace(0, len(edges) - 1, _COARSE).astype(int)).tolist()
-            found, spans = self._better(found, spans, k, [(0, 0), *combinations(coarse, 2)])
+            found, spans = self._likeliest_span(
+                found, spans, k, [(0, 0), *combinations(coarse, 2)]
+            )
         return found, spans
 
     def refined(self, found: Ranked, spans: Spans) -> tuple[Ranked, Spans]:
@@ -145,17 +147,17 @@ class _Timed:
                     first, last = spans[k]
                     moves = range(-near, near + 1)
                     tried = [(first + x, last) if end == 0 else (first, last + x) for x in moves]
-                    found, spans = self._better(found, spans, k, tried)
+                    found, spans = self._likeliest_span(found, spans, k, tried)
         return found, spans
 
-    def _better(
+    def _likeliest_span(
         self,
         found: Ranked,
         spans: Spans,
         recording: int,
         tried: Iterable[tuple[int, int]],
     ) -> tuple[Ranked, Spans]:
-        """Return the likeliest of the spans tried for one recording."""
+        """Return the likeliest candidate span of one recording."""
         last, least = len(self.edges[recording]) - 1, round(_SHORTEST / _STEP)
         for a, b in tried:
             if 0 <= a <= b <= last and (b - a >= least or a == b == 0):
@@ -173,7 +175,7 @@ def _up_to(parts: FloatArray) -> FloatArray:
 
 def acting_spans(look: Look, thresholds: Thresholds) -> tuple[Span, ...]:
     """
-    Return the seconds in which the likeliest cause acts.
+    Return the time spans in which the likeliest cause acts.
 
     Parameters
     ----------
@@ -186,7 +188,7 @@ def acting_spans(look: Look, thresholds: Thresholds) -> tuple[Span, ...]:
     Returns
     -------
     tuple of Span
-        One for each recording of the day in question; empty if no span reaches these odds.
+        One for each recording of the diagnosed day; empty if no span reaches these odds.
 
     """
     if not look.ranking:

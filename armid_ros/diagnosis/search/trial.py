@@ -41,7 +41,7 @@ class Trial:
     gain : float
         Twice the log Bayes factor of the torque that it explains.
     odds : float
-        Log odds that the cause is there, or has changed.
+        Log odds that the cause is present, or has changed.
     share : float
         Squares of the torque of the cause over those of the residual.
     replicated : int
@@ -78,7 +78,7 @@ class Trial:
 
     @property
     def p(self) -> float:
-        """Probability that the cause is not there, or has not changed."""
+        """Probability that the cause is absent, or has not changed."""
         return float(np.exp(-np.logaddexp(0.0, self.odds)))
 
 
@@ -96,7 +96,7 @@ class Ranked:
     data : float
         Log Bayes factor of the torque that it explains.
     odds : float
-        Log odds that the cause is there, or has changed.
+        Log odds that the cause is present, or has changed.
     under : Marginal
         Nuisance parameters under the likeliest setting with this cause.
     probability : float
@@ -118,16 +118,16 @@ class Ranked:
 
     @property
     def left(self) -> float:
-        """Half of the remaining squares of the weighted residual."""
+        """Half the sum of squares of the remaining weighted residual."""
         return self.under.loss - self.fit.explained
 
     def ahead(self, other: Ranked, levels: Thresholds) -> float:
         """
         Return the log odds over another cause; positive if this one is likelier.
 
-        As laws are inexact, a lead does not count below the share `inexact` of the explained part,
-        and below the share `same_fit` - 1 of the smaller residual. Number of values and prior odds
-        then decide.
+        As torque laws are inexact, differences below the share `inexact` of the explained part, or
+        below the share `same_fit` - 1 of the smaller residual, are ignored. Then the number of
+        values and the prior odds decide.
 
         """
         lead = self.fit.explained - other.fit.explained
@@ -166,13 +166,13 @@ class Look:
     usual: float
 
     def worth(self, one: Ranked, material: float) -> Trial:
-        """Return a ranked cause as a trial, with the odds and probability of its ranking."""
+        """Convert a ranked cause to a trial, with its odds and probability."""
         own = self.trial(one.cause, material, one.under)
         return replace(own, gain=2.0 * one.data, odds=one.odds, probability=one.probability)
 
     def trial(self, cause: Cause, material: float, under: Marginal | None = None) -> Trial:
         """
-        Return any cause as a trial, with its values, visibility and evidence.
+        Convert a cause to a trial, with its values, visibility and evidence.
 
         Parameters
         ----------
@@ -214,7 +214,7 @@ class Look:
 
     @cached_property
     def _left(self) -> float:
-        """Sum of squares of the weighted residual of the day in question."""
+        """Sum of squares of the weighted residual of the diagnosed day."""
         values = self.nuisance.means(self.under)
         today = np.flatnonzero(self.nuisance.rows.today).tolist()
         return max(float(sum(np.sum(self.nuisance.rest(values, k) ** 2) for k in today)), 1e-300)
@@ -239,5 +239,5 @@ class Survey:
 
     @property
     def hidden(self) -> set[str]:
-        """Names of effects that are not visible in any place."""
+        """Names of effects that are not visible on any joint."""
         return {name for name, _ in self.unseen} - {one.effect.said_as for one in self.ranking}

@@ -36,10 +36,10 @@ from armid_ros.motion import FloatArray, Motion
 from armid_ros.recording import Recording
 import numpy as np
 
-#: Least reduction of the squares over noise by slack: z > 5.
+#: Smallest reduction of chi-squared for a significant slack: z > 5.
 _LEAST_GAIN = 25.0
-#: Squares over noise that each fitted inertia has to explain to reject the description. It is one
-#: by chance, or two if filters correlate neighbouring rows.
+#: Reduction of chi-squared per fitted inertia above which the description is rejected. Its
+#: expected value is one, or two if filters correlate neighbouring rows.
 _TOLD = 5.0
 
 
@@ -47,7 +47,7 @@ def diagnose_ties(
     explainer: Explainer, recordings: Sequence[Recording], partner: Partner
 ) -> Chosen | None:
     """
-    Explain a gap by ties to another machine, and by causes of the remaining residual.
+    Explain a gap by ties to another machine, and the remaining residual by other causes.
 
     Returns
     -------
@@ -69,7 +69,7 @@ def diagnose_ties(
         )
         return Chosen(found, nothing, NOISE) if at_floor(found, settings) else None
     evidence = Evidence.over_noise(prepared.data, prepared.sigma)
-    for _ in range(2):  # noise of angles in the springs is measured only with the ties fitted
+    for _ in range(2):  # the noise of spring angles is estimated only with fitted ties
         problem = JointFit.over_noise(arm, evidence, explainer.rng)
         fitted = problem.fit(named, values)
         sigma = [noise_floor(part, fitted.arm).sigma for part in prepared.data]

@@ -99,7 +99,7 @@ def predicted(
     """
     Return the gain of each cause on held-out data; causes are added in a given order.
 
-    A cause that makes the prediction of these data worse becomes small print.
+    A cause that makes the prediction of these data worse is listed as minor.
 
     """
     fewer = [explanation.only(order[:count]) for count in range(1, len(order))]
@@ -173,7 +173,7 @@ class _Fold:
 
 
 def _folds(problem: JointFit, linear: Nuisance) -> list[_Fold]:
-    """Return the folds of the day in question, each predicted from all other rows."""
+    """Return the folds of the diagnosed day, each predicted from all other rows."""
     rows, found = linear.rows, list[_Fold]()
     part_of_arm = np.ones(len(linear.cross[0]), dtype=bool)
     part_of_arm[: linear.rank] = problem.stated

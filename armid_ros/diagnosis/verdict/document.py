@@ -229,7 +229,7 @@ def _sizes(trial: Trial, robot: Robot) -> Iterator[tuple[int, float]]:
 
 def _said_size(trial: Trial, arm: ArmModel) -> tuple[ParameterName, float]:
     """
-    Return a parameter of the effect as named, with its smallest detectable size.
+    Return a parameter of the effect under its catalogue name, with its detectable size.
 
     The size is inf if no possible size of the effect is detectable.
 

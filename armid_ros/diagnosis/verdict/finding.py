@@ -1,7 +1,7 @@
 # Copyright 2026 The armid_ros developers
 # SPDX-License-Identifier: Apache-2.0
 """
-The result of a diagnosis, and causes as they are reported.
+Result of a diagnosis, and its reported causes.
 
 A cause has its name, joints, values, share of the gap, and rivals.
 
@@ -113,7 +113,7 @@ class Finding:
     @property
     def experiment(self) -> str:
         """
-        Return the experiment that separates it from its likeliest rival; empty without rival.
+        Return the experiment that excludes the likeliest rival; empty without rival.
 
         No motion separates a payload from the link that carries it: the payload has to be weighed.
 
@@ -238,11 +238,11 @@ class Diagnosis:
     arm : ArmModel
         The patched model; the given one if nothing was named or a patch would make it worse.
     data : tuple of Trajectory
-        The recordings in question.
+        The diagnosed recordings.
     not_visible : tuple of str
         Effects of the catalogue that these data cannot show.
     refitted : bool
-        Whether the rigid body was fitted anew.
+        Whether the rigid body was refitted.
     notes : tuple of str
         Notes for the reader of the report.
     baseline : str

@@ -30,7 +30,7 @@ _RIVALS = 2
 
 @dataclass(frozen=True)
 class _NamedEffect:
-    """A fitted cause of an explanation as an effect of the catalogue."""
+    """Fitted cause of an explanation, converted to an effect of the catalogue."""
 
     effect: Effect
     parameters: tuple[ParameterName, ...]
@@ -108,7 +108,7 @@ def _rows(parts: Sequence[_NamedEffect]) -> list[tuple[ParameterName, float, flo
 
 def small_print(explanation: Explanation) -> tuple[Finding, ...]:
     """
-    Return findings of causes that are significant and not material, the likeliest first.
+    Return findings of significant causes that are not material, the likeliest first.
 
     Causes with a significant value beyond its bound, which a comparison permits within noise, are
     left out.

@@ -31,7 +31,7 @@ _SLIGHTLY = 0.05
 #: Largest residual at rest over dry friction in motion: breakaway friction is twice as large, and
 #: the friction of the model, whose direction is arbitrary at rest, adds one.
 _HELD = 3.0
-#: Words on a joint that is held: for a table, within a sentence, and at its end.
+#: Texts on a blocked joint: for a table, within a sentence, and at its end.
 _WHERE = 'at rest or turning round, and more than friction: a stop, a brake or a contact'
 _TURNING = 'where it stands still or turns round'
 _BESIDE = ' in addition to friction: a stop, a brake or a contact does that'
@@ -86,7 +86,7 @@ class RemainingMisfit:
         return unlisted_laws(explanation, self.settings)
 
     def as_it_is(self, explanation: Explanation) -> Excess | None:
-        """Return the excess with the body as given; None if it is not refitted."""
+        """Return the excess with the given body; None if the body is not refitted."""
         if not explanation.refitted:
             return None
         part, given, fitted = self._parts(explanation)[:1], self.given.theta, explanation.fitted
@@ -135,7 +135,7 @@ class RemainingMisfit:
     def _of_whole(
         self, parts: Sequence[Evidence], left: Sequence[Sequence[FloatArray]]
     ) -> Iterator[Excess]:
-        """Yield the excess of the fitted and of the held-out data."""
+        """Yield the excess of the fitted data and of the held-out data."""
         usual = 1.0 if self.chosen.measured else self.settings.thresholds.predicted
         more = usual, self.settings.thresholds.predicted
         where = 'in the recordings', 'in recordings that were not used'
@@ -151,7 +151,7 @@ class RemainingMisfit:
         for part in self._data(explanation):
             arm = explanation.fitted.arm
             excess = standing(arm, part, part.residuals(arm), surely)
-            if before is not None:  # subtract what held the joint before, such as a brake
+            if before is not None:  # subtract the earlier blocking torque, such as a brake
                 unit = (before.misfit,) * len(before.data)
                 rows = Evidence.over_noise(before.data, unit)
                 then = standing(self.given, rows, before.residual, surely)

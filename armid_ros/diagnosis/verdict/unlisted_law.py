@@ -3,8 +3,8 @@
 """
 Laws that the catalogue lacks: a new torque of one joint over its velocity or position.
 
-The discrepancy of a model differs between motions by its usual size. A law that is new on the day
-in question is a discrepancy several times larger, the same in all recordings of that day. The
+The discrepancy of a model differs between motions by its usual size. A law that is new on the
+diagnosed day is a several times larger discrepancy, the same in all recordings of that day. The
 log odds of the larger size are compared with the alarm odds, while the named causes, the body and
 the usual discrepancy are fitted as well.
 
@@ -36,7 +36,7 @@ _POSITIONS, _SPEEDS = 12, np.array([0.03, 0.1, 0.25, 0.5, 0.75, 1.0])
 
 @dataclass(frozen=True)
 class UnlistedLaw(Effect):
-    """A torque of one joint over its velocity or position, linear between knots."""
+    """Torque of one joint as a function of its velocity or position, linear between knots."""
 
     of: str = 'velocity'
     knots: tuple[float, ...] = ()
@@ -46,7 +46,7 @@ class UnlistedLaw(Effect):
     quantities = (Quantity('knot_torque', 'N m'),)
 
     def columns(self, motion: Motion, arm: Arm) -> FloatArray:
-        """Return the torque of a unit at each knot, (N, n, number of knots)."""
+        """Return the torque per unit knot value, (N, n, number of knots)."""
         link, (joint,) = arm.link_motion(motion), self.indices(motion.joints)
         x = (link.dq if self.of == 'velocity' else link.q)[:, joint]
         columns = np.zeros((len(x), motion.n_joints, len(self.knots)))

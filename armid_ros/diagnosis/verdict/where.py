@@ -18,7 +18,7 @@ import numpy.typing as npt
 
 #: Bins of a quantity over which the residual is averaged.
 _BINS = 16
-#: Least share of the mean square residual in the means of bins of a quantity that is named.
+#: Smallest share of the mean square residual that the bin means of a named quantity explain.
 _TELLING = 0.15
 #: Relative squared deviation of the means up to which they count as constant, or proportional.
 _CURVED = 0.15
@@ -108,7 +108,7 @@ def where_it_is(
     new: npt.NDArray[np.bool_],
 ) -> tuple[Where, ...]:
     """
-    Locate the gap in the data on which it is measured.
+    Locate the gap in the held-out or fitted data.
 
     If causes are named, their explained part of the gap is located: the misfit of the model may be
     larger in other joints.
@@ -130,7 +130,7 @@ def where_left(
     settings: DiagnosisSettings,
     new: npt.NDArray[np.bool_],
 ) -> tuple[Where, ...]:
-    """Locate the residual of an arm beyond the limits of the patched model, or of a new law."""
+    """Locate the residual beyond the limits of the patched model, or of a new torque law."""
     patched, left = (shown.residuals(one) for one in (explanation.fitted.arm, arm))
     losses, limits = shown.chi2_per_row(left), shown.limits(patched, settings)
     beyond = np.where(new, losses, np.where(losses > limits, losses - 1.0, 0.0))

@@ -27,7 +27,7 @@ IntArray = npt.NDArray[np.intp]
 @dataclass(frozen=True)
 class NearPairs:
     """
-    The m pairs of bodies that are close to each other in some of N poses.
+    Pairs of bodies (m) that are close to each other in some of N poses.
 
     Attributes
     ----------
@@ -214,7 +214,7 @@ class ClearanceModel:
         times: FloatArray,
     ) -> Approach | None:
         """
-        Prove that no pair comes closer than the margin on a path, or return an approach that does.
+        Prove that all pairs keep the margin on a path, or return an approach that violates it.
 
         On an interval, the distance of a pair is at least the mean of the distances at both ends,
         minus half the distance that the joints between the bodies can move them. An interval for

@@ -72,7 +72,7 @@ class Obstacle:
         """Check the names, the kind and the numbers."""
         if not all(isinstance(name, str) for name in (self.name, self.kind, *self.ignore)):
             raise TrajectoryError(
-                f"obstacle '{self.name}': name, kind and the links to ignore are texts; quote them"
+                f"obstacle '{self.name}': names and kind have to be strings; quote them"
             )
         if self.kind not in KINDS:
             raise TrajectoryError(
@@ -169,7 +169,7 @@ def with_obstacles(collision: CollisionModel, obstacles: Sequence[Obstacle]) -> 
 
 
 def obstacles_alone(collision: CollisionModel, obstacles: Sequence[Obstacle]) -> CollisionModel:
-    """Return the bodies of ``with_obstacles``, each checked against the obstacles only."""
+    """Return the bodies of ``with_obstacles``, checked only against the obstacles."""
     geometry = collision.geometry.copy()
     geometry.removeAllCollisionPairs()
     return with_obstacles(replace(collision, geometry=geometry), obstacles)

@@ -1,7 +1,7 @@
 # Copyright 2026 The armid_ros developers
 # SPDX-License-Identifier: Apache-2.0
 """
-The floor that an arm must not hit, which a URDF does not contain, and the heights of its bodies.
+Floor of an arm, which a URDF does not contain, and heights of the bodies above it.
 
 The height of the floor is given by the user or by a file beside the description. By default, the
 floor is the base plane of a standing arm. For an arm that hangs or reaches below its base, the

@@ -23,7 +23,7 @@ import numpy as np
 #: m].
 _STEP, _INTERVAL = 0.6, 0.1
 
-#: Function that returns whether the arm can hold poses of shape (N, n).
+#: Callback that returns whether the static torque of poses, (N, n), is within the limits.
 Held = Callable[[FloatArray], bool]
 #: Function that returns whether the straight line between two poses, shape (n,), is allowed.
 _Free = Callable[[FloatArray, FloatArray], bool]
@@ -114,7 +114,7 @@ def clear_line(
 
 @dataclass
 class _Tree:
-    """A tree of poses that are joined by clear straight lines, from a root on."""
+    """Tree of poses, connected by collision-free straight lines."""
 
     poses: list[FloatArray]
     free: _Free
@@ -135,7 +135,7 @@ class _Tree:
         return len(self.poses) - 1
 
     def connect(self, target: FloatArray) -> int | None:
-        """Step towards a pose while possible; return its number in the tree if it is reached."""
+        """Step towards a pose while possible; return the index of the pose if it is reached."""
         while (reached := self.grow(target)) is not None:
             if np.array_equal(self.poses[reached], target):
                 return reached
@@ -151,9 +151,9 @@ class _Tree:
 
 
 def _shortened(path: list[FloatArray], free: _Free, rng: np.random.Generator) -> list[FloatArray]:
-    """Cut corners at random, and remove poses that a clear straight line can skip."""
+    """Shorten a path at random, and remove poses that a collision-free straight line can skip."""
     path = _skipped(path, free)
-    # trials to cut a corner
+    # attempts to shorten the path
     for _ in range(60 if len(path) > 2 else 0):
         i, j = np.sort(rng.integers(0, len(path) - 1, 2))
         if i == j:
@@ -166,7 +166,7 @@ def _shortened(path: list[FloatArray], free: _Free, rng: np.random.Generator) ->
 
 
 def _skipped(path: list[FloatArray], free: _Free) -> list[FloatArray]:
-    """Connect each pose with the farthest pose that a clear straight line reaches."""
+    """Connect each pose with the farthest pose on a collision-free straight line."""
     short, here = [path[0]], 0
     while here < len(path) - 1:
         here = next(

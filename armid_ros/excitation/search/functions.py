@@ -160,8 +160,8 @@ _CLEARANCE_UNIT = 0.1
 #: 60, their weight in the soft maximum is exp(-36).
 _CLEARANCE_REACH = 0.6
 
-#: Number of stretches of the period, each with its own clearance constraint, so that a step of the
-#: solver avoids several close approaches at once.
+#: Number of stretches of the period, each with one clearance constraint, so that a solver step can
+#: avoid several close approaches at once.
 _STRETCHES = 20
 
 
@@ -180,7 +180,7 @@ class Constraints:
     clearance : ClearanceModel or None
         Bodies to keep apart.
     reserve : float
-        Share of every limit that is kept free for peaks between the samples.
+        Share of every limit that is reserved for peaks between the samples.
     sharpness : float
         Sharpness of the soft maximum.
     more_times : ndarray

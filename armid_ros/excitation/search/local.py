@@ -3,11 +3,11 @@
 """
 The search: local optimisation of the best random trajectories within all limits.
 
-Several searches begin. After every second round the worse half of them ends, so that most of the
-work is spent on the best searches. The solver is SLSQP of SciPy, sequential quadratic programming;
-docs/excitation.md compares it with others. The solver works on samples. After each round the
-result is checked between the samples. The times of faults are added to the samples of the next
-round.
+Several searches start. After every second round, the worse half is stopped, so that most of the
+computing time is spent on the best searches. The solver is SLSQP of SciPy, sequential quadratic
+programming; docs/excitation.md compares it with others. The solver works on samples. After each
+round the result is checked between the samples. The times of faults are added to the samples of
+the next round.
 
 """
 
@@ -52,7 +52,7 @@ class _OutOfTime(Exception):
 
 class Search:
     """
-    A search that keeps the best trajectory so far and can be ended at any time.
+    Search that stores the best trajectory so far and can be stopped at any time.
 
     Parameters
     ----------
@@ -108,7 +108,7 @@ class Search:
 
         """
         try:
-            # each search starts from one of the best candidates
+            # start values: the best candidates
             problem, settings = self.problem, self.problem.settings
             drawn: list[tuple[float, FourierTrajectory]] = []
             for _ in range(self._candidates):
@@ -143,16 +143,16 @@ class Search:
         return cost
 
     def step(self) -> None:
-        """Count a step of the work."""
+        """Count a step, for the progress."""
         self._steps += 1
         self._watch(min(self._steps / self._work, 1.0), self.cost)
         if time.process_time() - self._begun > self.problem.settings.time_budget:
             raise _OutOfTime
 
     def _improve(self, starts: list[FourierTrajectory]) -> None:
-        """Improve several trajectories in rounds; the worse half ends after every `_ROUNDS`."""
+        """Optimise several trajectories in rounds; drop the worse half after every `_ROUNDS`."""
         objective, watched = Objective(self.problem, self.prior), self.clearance
-        if watched is not None:  # without pairs that stay apart in many poses
+        if watched is not None:  # without pairs of bodies that are far apart in many poses
             limits = self.problem.limits
             lower, upper = position_range(limits.lower, limits.upper)
             # The solver ignores pairs of bodies that stay 1 cm beyond the margin in 1000 random
@@ -180,7 +180,7 @@ class _Branch:
     cost: float = np.inf
 
     def __post_init__(self) -> None:
-        """Bound the coefficients, in units of the value that alone reaches a limit."""
+        """Set the bounds of the coefficients, in units of the value that reaches a limit alone."""
         limits, settings = self.search.problem.limits, self.search.problem.settings
         low, high = position_range(limits.lower, limits.upper)
         half = 0.5 * (high - low)[:, np.newaxis]
@@ -234,7 +234,7 @@ class _Branch:
             self.sharpness = _SHARPNESS[-1]
 
     def _solve(self, constraints: Constraints, iterations: int) -> tuple[FloatArray, int]:
-        """Return where SLSQP ends, shape (n, 1 + 2 H) in units of the scale, and its steps."""
+        """Return the solution of SLSQP, (n, 1 + 2 H) in units of the scale, and its steps."""
         count, scale = 0, self.scale
         x = self.trajectory.coefficients / scale
 
@@ -280,7 +280,7 @@ class _Branch:
 def _made_feasible(
     problem: DesignProblem, clearance: ClearanceModel | None, trajectory: FourierTrajectory
 ) -> FourierTrajectory | None:
-    """Reduce the amplitudes of the joints at fault, or of all joints if the joint is unknown."""
+    """Reduce the amplitudes of the joints beyond their limits, or of all joints if unknown."""
     for _ in range(12):  # reductions of the amplitudes
         faults = trajectory_faults(problem.arm, problem.limits, trajectory, clearance)
         if not faults:

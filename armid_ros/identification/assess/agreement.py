@@ -12,7 +12,7 @@ from armid_ros.motion import FloatArray
 import numpy as np
 import scipy.stats
 
-#: Number of standard deviations to either side of the true value.
+#: Half width of the interval around the true value, in standard deviations.
 WIDTH = 2.0
 #: Degrees of freedom of an estimated covariance. It follows the spectrum of the residual in the
 #: band of the motion, of which a run of 20 s contains little. In 23 simulations of the demo, the
@@ -24,11 +24,11 @@ FREEDOM = 40.0
 @dataclass(frozen=True)
 class Agreement:
     """
-    An estimate compared with the true values.
+    Comparison of an estimate with the true values.
 
-    Errors of correlated parameters come together, so the number of large errors means little. The
-    squared distance of all parameters, in the metric of their covariance, has a known
-    distribution: Fisher's F times their number, if the covariance is estimated.
+    Errors of correlated parameters occur together, so the number of large errors is not
+    informative. The squared distance of all parameters, in the metric of their covariance, has a
+    known distribution: Fisher's F times their number, if the covariance is estimated.
 
     Attributes
     ----------
@@ -74,7 +74,7 @@ class Agreement:
         return self.lower <= self.distance <= self.upper
 
     def sentence(self) -> str:
-        """Return how many parameters agree with the truth, and chi-squared of all."""
+        """Return the number of parameters that agree with the truth, and chi-squared."""
         chance = '' if self.holds else '; repeat it with another --seed'
         return (
             f'{self.within} of {self.parameters} parameters within 2 sigma of the truth '

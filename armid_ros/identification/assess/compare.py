@@ -53,7 +53,7 @@ CHANCE = 0.05
 #: Eigenvalues of a scaled covariance below this share of the largest are rounding errors, as are
 #: differences of a value below this share of it.
 _ROUNDING = 1e-10
-#: Share of its torque below which the residual of a joint is due to filters, not to the arm.
+#: Residual of a joint, as a share of its torque, below which filters rather than the arm cause it.
 _LEAST_RESIDUAL = 1e-3
 #: Name of a link parameter in the terms of base parameters, with the number of the link.
 _NUMBERED = re.compile(r'(?:m[xyz]?|I[xyz]{2})(\d+)$')
@@ -118,7 +118,7 @@ def compare(before: ParameterFile, after: ParameterFile) -> Comparison:
 
 
 def _require_two_of_one_robot(before: ParameterFile, after: ParameterFile) -> None:
-    """Raise an error if the joints differ, or if one result is given twice."""
+    """Raise an error if the joints differ, or if both results are the same."""
     if before.kinematics and after.kinematics and before.kinematics != after.kinematics:
         apart = set(before.joints).symmetric_difference(after.joints)
         how = (
@@ -153,7 +153,7 @@ def _nothing_shared(before: ParameterFile, after: ParameterFile) -> str:
 
 
 def _only_in(one: ParameterFile, other: ParameterFile) -> Iterator[NotCompared]:
-    """Yield the parameters of one result without a value in the other."""
+    """Yield the parameters that only one of two results has."""
     for name in one.values:
         if name in other.values or name in other.without_std:
             continue
@@ -245,7 +245,7 @@ def _find_load(
     terms: Sequence[Mapping[str, float]], difference: FloatArray, covariance: FloatArray
 ) -> LoadChange | None:
     """Return the load that explains the changes, on the outermost such link; None without."""
-    # arms hold things at the outermost link; a mass that may be zero is no load
+    # arms hold loads at the outermost link; a mass that may be zero is not a load
     std = np.sqrt(np.diag(covariance))
     if not len(std) or not np.all(std > 0.0):
         return None

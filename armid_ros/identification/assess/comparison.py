@@ -1,6 +1,6 @@
 # Copyright 2026 The armid_ros developers
 # SPDX-License-Identifier: Apache-2.0
-"""Result of a comparison of two identifications: changes, and parameters of only one."""
+"""Result of a comparison of two identifications: changes, and parameters that only one has."""
 
 from __future__ import annotations
 
@@ -62,7 +62,7 @@ class ParameterChange:
 @dataclass(frozen=True)
 class GroupChange:
     """
-    A group of parameters with the p-value of its change as a whole.
+    Group of parameters, with the p-value of their common change.
 
     Attributes
     ----------
@@ -198,7 +198,7 @@ class Comparison:
 
     @property
     def unusable(self) -> tuple[ParameterFile, ...]:
-        """Return which of the two results is graded unusable."""
+        """Return the results that are graded unusable."""
         both = self.before, self.after
         return tuple(one for one in both if one.fit is not None and one.fit.unusable)
 
@@ -241,7 +241,7 @@ class Comparison:
 
     @property
     def changed_together(self) -> tuple[GroupChange, ...]:
-        """Return the groups that changed although none of their own parameters did."""
+        """Return the groups that changed although none of their single parameters changed."""
         sure = {change.parameter for change in self.changed}
         return tuple(g for g in self.groups if g.changed and not sure.intersection(g.parameters))
 

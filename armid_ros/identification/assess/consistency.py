@@ -36,8 +36,8 @@ from scipy.stats import chi2
 
 #: Share of the sampling rate above which the spectrum of positions is noise.
 _NOISE_ABOVE = 0.3
-#: Negligible difference between the two fits in standard deviations. It counts little in the test,
-#: as two fits of the same data are distinguishable to a thousandth.
+#: Negligible difference between the two fits, in standard deviations. Without it, the test is too
+#: sensitive: two fits of the same data are distinguishable to a thousandth.
 NEGLIGIBLE = 0.1
 #: Smallest bias that matters, in standard deviations: it reduces 95 % intervals to 94 %.
 BIAS_LIMIT = 0.25
@@ -97,7 +97,7 @@ class NoiseCheck:
 
     def findings(self) -> tuple[tuple[str, bool], tuple[str, bool]]:
         """
-        Return sentences on the findings, each with whether it is satisfactory.
+        Return a sentence per finding, and whether the finding is satisfactory.
 
         If the test is significant and the bias by noise is negligible, the two fits differ for
         another reason: an effect that the model lacks affects them differently.

@@ -42,7 +42,7 @@ import numpy.typing as npt
 _GAINS = 4.0
 #: Largest ratio of a factor since a baseline to the factor of a unit of force: masses cancel.
 _NEAR_SINCE = 1.05
-#: Ratio of a torque to the limit of its drive above which a note is given.
+#: Ratio of a torque to the drive limit above which a note is given.
 _BEYOND = 1.5
 #: Share of samples at the largest value of a reading, above which it is clipped.
 _CLIPPED = 0.02
@@ -61,9 +61,9 @@ def check_data(
     Parameters
     ----------
     arm : ArmModel
-        Model that the data are compared with.
+        Model to compare the data with.
     recordings : sequence of Recording
-        The data as they were recorded.
+        The unprocessed recordings.
     used : Conditioning
         Filters.
     data : sequence of Stretch
@@ -229,7 +229,7 @@ def _factors_since(
 
 
 def _described_friction(arm: ArmModel) -> list[str]:
-    """Return a list with a note if the description states friction the model lacks."""
+    """Return a list with a note if the model lacks friction of the description."""
     robot = arm.robot
     there = {(effect.name, joint) for effect in arm.effects for joint in effect.joints}
     kinds = [kind for kind in CATALOGUE.values() if kind.traits.urdf_attribute]
@@ -252,7 +252,7 @@ def _described_friction(arm: ArmModel) -> list[str]:
 
 
 def _extremes(robot: Robot, recording: Recording) -> Iterator[str]:
-    """Yield notes on torques that saturate or exceed the limits of the drives."""
+    """Yield notes on torques that saturate, or exceed the limits of the drives."""
     if recording.tau is None:
         return
     source = recording.source or 'recording'

@@ -180,7 +180,7 @@ def _errors(
 
 
 class _Worst(NamedTuple):
-    """The worst joint: index, error, error without noise [%], and text of both."""
+    """The worst joint: index, error, error without noise [%], and text with both errors."""
 
     joint: int
     measured: float
@@ -241,11 +241,11 @@ def _resting(result: Identification, validation: Mapping[str, Sequence[Fit]]) ->
 
 def beyond_noise(errors: FloatArray, fits: Sequence[Fit], used: Conditioning) -> FloatArray:
     """
-    Return the relative torque errors of joints without the share of torque noise.
+    Return the relative torque errors of joints, corrected for torque noise.
 
     Noise counts twice: in a row, and in its prediction if that is as uncertain as a measurement
-    (leverage of one, Hoaglin and Welsch 1978). A model is not at fault if its error is no larger
-    than that of a sensor.
+    (leverage of one, Hoaglin and Welsch 1978). An error as large as that of a sensor is not an
+    error of the model.
 
     Parameters
     ----------

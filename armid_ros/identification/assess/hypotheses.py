@@ -30,9 +30,9 @@ import numpy as np
 
 #: Possible errors of the zero of a joint [degrees]: of an encoder, an axis or a drawing.
 TURNS = (-135.0, -90.0, -45.0, 45.0, 90.0, 135.0, 180.0)
-#: Largest difference of a gravity vector from a known one that replaces it, over the known length.
+#: Largest distance of a gravity vector from the known vector that replaces it, over its length.
 _KNOWN = 0.3
-#: Correlation from which the factor of a joint is known: the residual is 15 % of torque or less.
+#: Smallest correlation for a reliable factor of a joint: the residual is below 15 % of torque.
 _CLEAR = 0.989
 
 Quantity = Literal['position', 'torque', 'position and torque']
@@ -42,7 +42,7 @@ QUANTITIES: tuple[Quantity, ...] = ('position and torque', 'position', 'torque')
 @dataclass(frozen=True, eq=False)
 class Hypothesis:
     """
-    A possible mistake in a recording.
+    Hypothesis of a mistake in a recording.
 
     Attributes
     ----------
@@ -79,7 +79,7 @@ class Hypothesis:
 
     @property
     def of_data(self) -> bool:
-        """Whether only the data, and no change of the arm, can explain it."""
+        """Whether only an error of the data, and no change of the arm, explains the difference."""
         return self.kind in ('units', 'unit', 'degrees', 'sign', 'exchange')
 
 
@@ -120,7 +120,7 @@ def hypotheses(robot: Robot, motions: Sequence[Motion]) -> Iterator[Hypothesis]:
 
 
 def _of_all_torques(robot: Robot, motions: Sequence[Motion]) -> Iterator[Hypothesis]:
-    """Yield the best-fitting gravity and common torque factor that masses do not explain."""
+    """Yield the best-fitting gravity and torque factor, unless errors of masses explain them."""
     motion = thinned(motions, 600)
     if motion is None:
         return
@@ -137,7 +137,7 @@ def _of_all_torques(robot: Robot, motions: Sequence[Motion]) -> Iterator[Hypothe
 
 
 def in_unit(robot: Robot, joint: int, unit: str) -> Hypothesis:
-    """Return the hypothesis that the torque of a joint is in another unit."""
+    """Return the hypothesis that the torque of a joint is not in N m."""
     wrong, right = effort_unit(robot, joint, unit), robot.torque_units[joint]
     return Hypothesis(
         'unit',
@@ -177,9 +177,9 @@ def shifted(motion: Motion, seconds: float) -> Motion:
 
 def other_gravity(robot: Robot, vector: FloatArray) -> Hypothesis | None:
     """
-    Return the hypothesis of another gravity vector, a known one if one is near.
+    Return the hypothesis of another gravity vector, replaced by a nearby known vector.
 
-    The described length along any axis is known, too.
+    Known vectors include the described magnitude along any axis.
 
     Parameters
     ----------
@@ -294,7 +294,7 @@ def _in_degrees(robot: Robot, joint: int | None = None) -> Hypothesis:
 
 
 def _beyond_masses(factor: float) -> bool:
-    """Whether a factor is too far from one to be an error of all masses."""
+    """Whether a factor is too large or too small for a common error of all masses."""
     return not 1.0 / LIMITS.torque_factor < factor < LIMITS.torque_factor
 
 

@@ -1,7 +1,7 @@
 # Copyright 2026 The armid_ros developers
 # SPDX-License-Identifier: Apache-2.0
 """
-Delay of the torques of a recording against its positions, with a confidence interval.
+Delay between torques and positions of a recording, with a confidence interval.
 
 A delay shifts the whole torque in time. Presliding friction delays only the friction: after a
 reversal it grows with the distance that the joint has travelled (Dahl 1968), which takes tens of

@@ -70,12 +70,12 @@ class Mistake:
 
     @property
     def joint(self) -> int:
-        """Return the joint whose torque is explained best."""
+        """Return the joint with the best explained torque."""
         return int(np.argmax(self.before.joints.clip(max=1.0) - self.after.joints))
 
     @property
     def of_data(self) -> bool:
-        """Whether only the data, and no change of the arm, can explain it."""
+        """Whether only an error of the data, and no change of the arm, explains the difference."""
         return all(one.of_data for one in self.hypotheses)
 
     @property
@@ -133,7 +133,7 @@ def shared_mistakes(
 
 
 class _Row(NamedTuple):
-    """A hypothesis with its errors and its likelihood ratios over their limits."""
+    """Hypothesis with its errors, and its likelihood ratios over their limits."""
 
     hypothesis: Hypothesis
     described: PredictionError
@@ -158,7 +158,7 @@ def find_mistake(robot: Robot, recording: Recording, used: Conditioning) -> Mist
     Returns
     -------
     Mistake or None
-        None if the data are best as recorded, or if errors of the links may be the cause.
+        None if the recorded data fit best, or if errors of the links may be the cause.
 
     """
     slow = slow_motions([recording], used)
@@ -194,7 +194,7 @@ def find_mistake(robot: Robot, recording: Recording, used: Conditioning) -> Mist
     tried = rows([*hypotheses(robot, slow), *([] if late is None else [delayed(*late)])])
     for ratio in ('as_described', 'as_fitted'):
         tried += rows(max(tried, key=attrgetter(ratio)).hypothesis.nearby())
-    # first choice: hypotheses that explain more than any body near the description
+    # prefer hypotheses that explain more than any body near the description
     sure = [row for row in tried if _predicts(robot, row) and row.as_described >= 1.0]
     both = [row for row in sure if row.as_fitted >= 1.0]
     if both:

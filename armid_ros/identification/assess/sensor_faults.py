@@ -104,9 +104,9 @@ def sensor_faults(
     Parameters
     ----------
     arm : ArmModel
-        Model that the data are compared with.
+        Model to compare the data with.
     recordings : sequence of Recording
-        The data as they were recorded, with torques.
+        The unprocessed recordings, with torques.
     rows : sequence of Stretch
         The data in rows.
     used : Conditioning
@@ -137,7 +137,7 @@ def sensor_faults(
 
 
 def _jumps(robot: Robot, recording: Recording) -> Iterator[Fault]:
-    """Yield the first position jump that no joint can make and that does not revert."""
+    """Yield the first impossible position jump that does not revert."""
     if len(recording) < 2:
         return
     time = np.maximum(np.diff(recording.t), recording.period)[:, np.newaxis]
@@ -168,7 +168,7 @@ def encoder_faults(recording: Recording, units: Sequence[str] | None) -> Iterato
     # A wheel or a turntable may have constant speed, whose integral is its distance.
     way = np.ptp(recording.q - recording.dq * (t - t[0])[:, np.newaxis], axis=0)
     changes = np.ptp(recording.dq, axis=0) > 0.0
-    measured = bool(np.any((moved > REST_RANGE) & changes))  # or the driver sends no velocities
+    measured = bool(np.any((moved > REST_RANGE) & changes))  # or velocities are absent
     for j, unit in enumerate(units):
         start, stop = _longest_same(recording.q[:, j])
         # range of a joint at rest, plus a step of the encoder
@@ -262,7 +262,7 @@ def _stays(
     why: str,
     always: str,
 ) -> Fault:
-    """Return the fault of a channel that is constant for a run, and its remedy if it always is."""
+    """Return the fault of a channel that is constant for a time, and a remedy if always."""
     when, remedy = 'throughout', always
     if run != (0, len(recording)):
         first, last = recording.t[run[0]], recording.t[run[1] - 1]
@@ -366,7 +366,7 @@ def held_elsewhere(
     robot: Robot, recordings: Sequence[Recording], motions: Sequence[Motion]
 ) -> Iterator[Fault]:
     """
-    Yield undriven joints that were at another position, if that matters.
+    Yield undriven joints at another position than described, if the torque error is relevant.
 
     If such a joint moves, or carries driven joints at another position, the arm differs from the
     model. The size of this error is the change of the described torque along the recorded motion,
@@ -407,7 +407,7 @@ def held_elsewhere(
 
 
 def _elsewhere(joint: HeldJoint, lowest: float, highest: float, moves: bool, makes: str) -> str:
-    """Describe where a joint was, its effect on the torque, and the remedy."""
+    """Describe the position of a joint, its effect on the torque, and the remedy."""
     name, unit = joint.name, joint.unit
     model = f'the model has it at {joint.position:.3g} {unit}'
     if not moves:

@@ -156,7 +156,7 @@ def forward_validation(
     feedback = LinearFeedback.of(nominal, bandwidth=BANDWIDTH, weighs=False)
     controller = _RecordedTorque(reference, feedback)
     along = arm.along(reference)
-    # limits so far away that no joint reaches them [rad or m]
+    # practically infinite position limits [rad or m]
     far, free = np.full(motion.n_joints, 1e4), np.full(motion.n_joints, np.inf)
     robot = replace(along.robot, lower=-far, upper=far, velocity_limit=free, torque_limit=free)
     plant = Plant(replace(along, robot=robot), hard_stops=False)
@@ -205,7 +205,7 @@ class ForwardValidation:
 
     @property
     def worse(self) -> tuple[str, ...]:
-        """Joints whose error grew by more than simulations vary."""
+        """Joints whose error increased significantly."""
         if self.before is None:
             return ()
         before, after = self.before.position_error, self.after.position_error
@@ -240,7 +240,7 @@ class Verification:
     forward : tuple of ForwardValidation
         Simulations along held-out recordings.
     left_out : tuple of str
-        Tests that were not made, with reasons.
+        Omitted tests, with reasons.
 
     """
 
@@ -322,7 +322,7 @@ def simulate_held_out(
     pairs : tuple of ForwardValidation
         Results, one per simulated recording.
     left_out : tuple of str
-        Tests that were not made, with reasons.
+        Omitted tests, with reasons.
 
     """
     if not held_out:

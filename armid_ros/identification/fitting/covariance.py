@@ -29,7 +29,7 @@ LEAST_LEFT = 0.1
 
 
 def sandwich(bread: FloatArray, middle: FloatArray) -> FloatArray:
-    """Return the sandwich bread middle bread', positive semi-definite, shape (p, p)."""
+    """Return the sandwich covariance bread middle bread', positive semi-definite, (p, p)."""
     covariance = bread @ middle @ bread.T
     std = np.sqrt(np.maximum(np.abs(np.diag(covariance)), 1e-300))
     sizes, axes = np.linalg.eigh(covariance / np.outer(std, std))
@@ -123,7 +123,7 @@ def noise_products(
             shares = np.einsum('ab,ab->b', taken, taken).reshape(-1, 2).sum(axis=1)
             leverage = shares / max(np.count_nonzero(informative), 1)
             spectrum = _noise_spectrum(left[:, joint], informative, leverage)
-            spectrum[1:-1] *= 2.0  # the constant and the Nyquist bin have no mirror image
+            spectrum[1:-1] *= 2.0  # the constant and the Nyquist bin have no conjugate
             transformed *= np.repeat(np.sqrt(spectrum / (2 * count)), 2)
             products[np.ix_(active, active)] += transformed @ transformed.T
     return products
@@ -179,9 +179,9 @@ def scatter(problem: Sequence[Regression], weights: FloatArray, values: FloatArr
     """
     Return the jackknife changes of each value; the squared changes sum to its variance.
 
-    A change is weighted by how well the other recordings determine the value. For white noise, the
-    sum of squares is then the variance of least squares, also if one recording determines most of
-    a value. A value that the others do not determine has no change.
+    The weight of a change is the precision with which the other recordings determine the value.
+    For white noise, the sum of squares is then the variance of least squares, also if one
+    recording determines most of a value. A value that the others do not determine has no change.
 
     Parameters
     ----------

@@ -1,7 +1,7 @@
 # Copyright 2026 The armid_ros developers
 # SPDX-License-Identifier: Apache-2.0
 """
-Parameters of an arm that given data determine, and their bounds.
+Parameters that given data determine, and their bounds.
 
 Parameters that a motion does not separate are grouped. Parameters that the data determine worse
 than the description keep their described values: the mean squared error of an unbiased estimate is
@@ -98,9 +98,9 @@ def determined(
     arm: ArmModel, base: BaseParameters, problem: Sequence[Regression], method: Method
 ) -> tuple[BaseParameters, tuple[Regression, ...], Solution]:
     """
-    Hold parameters at the description if it is more certain than the data.
+    Fix parameters to the description if it is more certain than the data.
 
-    One parameter is held at a time, as this makes the others more certain.
+    Parameters are fixed one at a time, as each fixed parameter makes the others more certain.
 
     Parameters
     ----------

@@ -36,7 +36,7 @@ _OF_HALVES, _OF_CUTOFFS = 4000, 6000
 _WINDOWS = 8
 #: Smallest share of rows remaining with a cut-off; with less, it is too low for the stretches.
 _KEPT = 0.8
-#: Number of stretches that are predicted in turn; their losses give the standard error of a mean.
+#: Number of folds (stretches); their losses give the standard error of the mean.
 _STRETCHES = 16
 #: Smallest gain, as a share of the error, for which a cut-off is lowered. Jitter and slack raise
 #: the error by a third or more on every tested machine.
@@ -122,8 +122,8 @@ def cutoff_of_torques(
     Lower the cut-off of the position filter while held-out torques are predicted better.
 
     The chosen cut-off is the highest with a held-out loss within a tenth, or one standard error,
-    of the least. So clean data keep their cut-off. Source of the standard error: Breiman et al.,
-    Classification and Regression Trees, 1984.
+    of the least. Thus the cut-off of clean data does not change. Source of the standard error:
+    Breiman et al., Classification and Regression Trees, 1984.
 
     Parameters
     ----------
@@ -185,7 +185,7 @@ def _shared(
     problem: Sequence[Sequence[Regression]], shorter: Sequence[Sequence[Regression]]
 ) -> list[Regression]:
     """Return the rows of each recording that remain with a lower cut-off."""
-    # A lower cut-off removes more rows at the ends, where arms start and stop and losses differ.
+    # A lower cut-off removes more rows at the ends, where the arm starts and stops.
     result = []
     for parts, others in zip(problem, shorter, strict=True):
         for part in parts:
@@ -198,7 +198,7 @@ def _shared(
 
 
 def _as_good(losses: FloatArray, best: FloatArray) -> bool:
-    """Whether losses are as small as the best ones, within one standard error or `_NEAR`."""
+    """Whether losses equal the smallest loss within one standard error or `_NEAR`."""
     worse = losses - best
     deviation = np.std(worse, ddof=1) / np.sqrt(len(worse))
     return bool(np.mean(worse) <= max(float(deviation), _NEAR))

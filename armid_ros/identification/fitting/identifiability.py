@@ -1,6 +1,6 @@
 # Copyright 2026 The armid_ros developers
 # SPDX-License-Identifier: Apache-2.0
-"""Parameters that data do not identify, with reasons, which are reported in place of numbers."""
+"""Parameters that data do not identify; reports contain the reason instead of a value."""
 
 from __future__ import annotations
 

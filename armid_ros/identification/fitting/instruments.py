@@ -180,7 +180,7 @@ def linear_problem(
     *,
     linear: bool,
 ) -> Sequence[Regression]:
-    """Return the linear problem of an arm, with a constant where its torque is not linear."""
+    """Return the linear problem of an arm, with a constant term if its torque is nonlinear."""
     if linear:
         return regressions(arm, base.independent, recordings, used)
     return linearised(arm, base, recordings, used)[0]

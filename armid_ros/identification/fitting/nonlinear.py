@@ -47,7 +47,7 @@ _LITTLE = 0.1
 _STUCK = 0.5
 #: Damping factors of a step, relative to the squared columns.
 _DAMPINGS = tuple(10.0 ** np.arange(-8.0, 3.0))
-#: Largest cost of an undamped step, over the cost that the linear model predicts.
+#: Largest ratio of the cost of an undamped step to the cost that the linear model predicts.
 _KEPT = 2.0
 #: Negligible deviation due to inertia, over the standard deviation of the fit.
 _NEGLIGIBLE = 0.1
@@ -58,7 +58,7 @@ Torques = tuple[FloatArray, ...]
 @dataclass(frozen=True)
 class FittedValues:
     """
-    Fitted values with the arm and the torque they give.
+    Fitted values with their arm and their torque.
 
     Attributes
     ----------
@@ -182,7 +182,7 @@ def curved(before: ArmModel, after: ArmModel, motions: Sequence[Motion]) -> bool
 
 def moved(arm: ArmModel, base: BaseParameters, values: FloatArray, free: FloatArray) -> ArmModel:
     """
-    Return the arm with given values of its base parameters.
+    Return the arm with new values of its base parameters.
 
     In unidentifiable directions, effects keep their values and rigid parameters change as little
     as possible: directions of rigid parameters alone are unidentifiable for any effects.
@@ -207,8 +207,8 @@ def moved(arm: ArmModel, base: BaseParameters, values: FloatArray, free: FloatAr
     links = theta[:rigid].reshape(-1, len(LINK_PARAMETERS))
     lacking = (np.abs(links[:, 0]) < NO_MASS) & np.any(np.abs(links[:, 1:4]) >= NO_MASS, axis=1)
     if np.any(lacking):
-        # the data gave a moment to a link that is described without mass, and do not determine
-        # its mass: a mass changes no torque if the parameters of links before it change as well
+        # the fit gave a first moment to a link without described mass, whose mass is not
+        # identifiable: with suitable changes of previous links, it changes no torque
         mass = np.zeros_like(links)
         # the centre of mass of such a link is assumed 0.2 m away
         mass[lacking, 0] = np.linalg.norm(links[lacking, 1:4], axis=1) / 0.2
@@ -220,7 +220,7 @@ def linearised(
     arm: ArmModel, base: BaseParameters, recordings: Sequence[Recording], used: Conditioning
 ) -> tuple[tuple[Regression, ...], Torques]:
     """
-    Linearise the torque of an arm about the values that it has.
+    Linearise the torque of an arm about its present values.
 
     Returns
     -------

@@ -74,7 +74,7 @@ class NormalEquations:
             counts += part.informative.sum(axis=0)
             for joint in range(n_joints):
                 rows = np.column_stack([part.columns[:, joint], target[:, joint]])
-                active = np.flatnonzero(rows.any(axis=0))  # links before a joint have zero columns
+                active = np.flatnonzero(rows.any(axis=0))  # proximal links: zero columns
                 rows = rows[:, active] * weight[:, joint, np.newaxis]
                 products[joint][np.ix_(active, active)] += rows.T @ rows
         return cls(products, counts)
@@ -235,7 +235,7 @@ def within(
 
 
 def positive(scale: FloatArray) -> FloatArray:
-    """Bound scales from below, so that an exactly fitted joint has finite weight."""
+    """Apply a lower bound to scales, so that an exactly fitted joint has finite weight."""
     floor = max(1e-9 * float(np.max(scale)), 1e-100)
     return np.maximum(scale, floor)
 

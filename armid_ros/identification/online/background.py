@@ -3,9 +3,9 @@
 """
 Background computation between the samples of a stream, in pieces.
 
-A stream must not wait, so a computation that takes longer than one sample is a generator that
-yields after every piece of bounded size. Each sample runs a few pieces, in an order that depends
-on the samples alone. The results therefore do not depend on the speed of the computer.
+A stream must not wait. Computations that take longer than one sample are therefore generators,
+which yield after every piece of bounded size. Each sample runs a few pieces, in an order that
+depends on the samples alone. The results therefore do not depend on the speed of the computer.
 
 """
 
@@ -56,7 +56,7 @@ class Background:
         for _ in range(pieces):
             if not self._jobs:
                 return
-            job = self._jobs.popleft()  # a job that fails is not tried again
+            job = self._jobs.popleft()  # failed jobs are not repeated
             try:
                 next(job)
             except StopIteration:

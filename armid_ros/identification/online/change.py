@@ -59,7 +59,7 @@ class ChangeCandidate:
         return f'{text} at {self.joint}' if self.joint else text
 
     def includes(self, other: ChangeCandidate) -> bool:
-        """Whether this candidate includes the other one."""
+        """Whether this candidate includes another candidate."""
         return set(other.parameters) <= set(self.parameters)
 
 
@@ -133,7 +133,7 @@ def change_candidates(arm: ArmModel, base: BaseParameters) -> tuple[ChangeCandid
             first += count
     several = {joint: columns for joint, columns in friction.items() if len(columns) > 1}
     found += [_candidate('friction', joint, base, columns) for joint, columns in several.items()]
-    # a body that a link may hold; its parameters add to the link's own
+    # a load on a link; its parameters add to the parameters of the link
     for body in (kind.on(arm.robot) for kind in CATALOGUE.values() if kind.traits.weighs):
         columns, names = list(body.adds_to(arm.robot)), body.parameters(arm.robot)
         if columns:
@@ -148,15 +148,15 @@ def _candidate(
     added_to: Sequence[int],
     names: Sequence[ParameterName] = (),
 ) -> ChangeCandidate:
-    """Return the candidate of an effect, or of a body whose parameters add to a link's."""
+    """Return the candidate of an effect, or of a body that adds to the parameters of a link."""
     columns = base.grouping[:, added_to]
     # a maximal set of independent columns, in order
     lengths = np.linalg.norm(columns, axis=0)
     unit = columns / np.where(lengths > 0.0, lengths, 1.0)
     ranks = [np.linalg.matrix_rank(unit[:, :k], _INDEPENDENT) for k in range(len(lengths) + 1)]
     independent = np.flatnonzero(np.diff(ranks)).tolist()
-    # Of a body that an arm picks up, mass and first moments are reported. Its inertia about its
-    # own centre has a torque that is small compared with theirs.
+    # Mass and first moments of a load are reported. The torque of its inertia about its centre is
+    # comparatively small.
     kept = [k for k in independent if not names or k < 4]
     parameters = names or [base.standard[k] for k in added_to]
     return ChangeCandidate(

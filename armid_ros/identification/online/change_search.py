@@ -41,7 +41,7 @@ from scipy.linalg import lapack
 
 #: Lengths of the tested windows, in blocks.
 _LENGTHS = (2, 4, 8)
-#: Number of blocks with the torque of a change after which it is named despite rivals.
+#: Number of blocks with torque of the change after which it is named despite rivals.
 _LATEST = 6
 #: Difference of log-likelihoods above which one explanation is clearly better than another.
 _CLEAR = 5.0
@@ -289,7 +289,7 @@ class ChangeSearch:
                 self.interrupt()
                 return found
         self._waiting.append(statistics)
-        if len(self._waiting) > _LENGTHS[-1]:  # a change in it would have been named by now
+        if len(self._waiting) > _LENGTHS[-1]:  # a change would be named by now
             for m, values in self._waiting.popleft().items():
                 self._work.begin(self._calibrations[m].update(*values))
         return None
@@ -323,7 +323,7 @@ class ChangeSearch:
         return ratios
 
     def _judge(self, residual_scale: float) -> Pieces[FoundChange | None]:
-        """Return onset and cause of the change, or None while they are not clear."""
+        """Return onset and cause of the change, or None if they are still ambiguous."""
         rows = []
         for k in range(len(self._blocks) - 1):
             window = yield from self._window(k, residual_scale)

@@ -133,7 +133,7 @@ class NuisanceRows:
 
 @dataclass(eq=False)
 class _Stretch:
-    """Rows that are not searched yet; `end` is None before an interruption."""
+    """Rows to be searched; `end` is None before an interruption."""
 
     begin: float
     narrow: RecursiveLeastSquares
@@ -263,7 +263,7 @@ class ChangeWatch:
             self._searching = False
 
     def _unsearched(self) -> list[Row]:
-        """Take all rows that are not searched yet."""
+        """Remove and return all rows to be searched."""
         stretches = (*self._queued, *([self._open] if self._open else ()))
         self._queued.clear()
         self._open = None
@@ -333,7 +333,7 @@ class ChangeWatch:
         )
 
     def _name(self, found: FoundChange) -> Job:
-        """Restart from before a change, without the changed parameters, and report the change."""
+        """Restore the state before a change, forget the changed parameters, report the change."""
         change, size, reopened = found.change, found.change.size, found.change.reopened
         again = copy(self._estimator)
         for estimator, known, directions in (
@@ -349,8 +349,8 @@ class ChangeWatch:
             yield from self._learn_both(again, (yield from self._widened(rows)))
         at_once(self._learn_both(again, at_once(self._widened(rows))))
         self._estimator.restore(again)
-        # A change shakes the arm, and the parameters were not learned from such motion: the
-        # covariance grows by the ratio of squared residuals to the usual ones.
+        # A change causes unusual motion, for which the parameters were not learned. The covariance
+        # is therefore multiplied by the ratio of squared residuals to usual squared residuals.
         squares = count = 0.0
         for block in found.after:
             columns, tau, weights = (np.stack(part) for part in zip(*block.samples, strict=True))
@@ -372,6 +372,6 @@ class ChangeWatch:
 
 
 def _parts(items: Sequence[Item], size: int) -> Iterator[Sequence[Item]]:
-    """Yield items in groups of a size."""
+    """Yield slices of a given size."""
     for first in range(0, len(items), size):
         yield items[first : first + size]

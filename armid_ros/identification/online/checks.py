@@ -57,7 +57,7 @@ class StreamChecks:
         """Return the fault that prevents identification; empty without fault."""
         if self.silent and abs(self._moving) > SHORTEST:
             return SILENT
-        # the ranges are judged at each row, but seldom grow
+        # the ranges are checked at each row, but seldom increase
         lowest, highest = self._positions
         ranged = lowest.tobytes() + highest.tobytes()
         if self._judged is None or self._judged[0] != ranged:
@@ -92,7 +92,7 @@ class MissingSamples:
         last = self._last
         # a timestamp that is more than 1 s back belongs to a restarted clock
         if last is not None and last - 1.0 < t <= last:
-            self._came_late()
+            self._subtract_late()
             return
         self._last = t
         # a silence of 10 s is a stopped stream without missing samples
@@ -104,12 +104,12 @@ class MissingSamples:
             self._doubtful = round(steps) - 1
             self.count += self._doubtful
         elif steps <= 0.5:
-            self._came_late()
+            self._subtract_late()
         else:
             self._doubtful = 0
 
-    def _came_late(self) -> None:
-        """Remove one of the samples counted last."""
+    def _subtract_late(self) -> None:
+        """Subtract a late sample from the latest missing samples."""
         if self._doubtful:
             self._doubtful -= 1
             self.count -= 1

@@ -3,9 +3,9 @@
 """
 Online identification: an estimate that is updated with one joint state at a time.
 
-A row is taken in two steps. Its prediction by the estimate before it is needed at once. The update
-with the row may wait for the next sample, which usually brings no row, so no sample has to do
-both. Reading the estimate runs a pending update first.
+A row is processed in two steps. Its prediction by the previous estimate is computed at once. The
+update with the row is delayed to the next sample, which usually has no row, so that no sample
+needs both steps. Reading the estimate runs a pending update first.
 
 """
 
@@ -236,7 +236,7 @@ class OnlineIdentifier:
         return self.__dict__
 
     def _process(self, sample: StreamSample) -> OnlineSample | None:
-        """Filter a good sample, which may begin a stretch; return the new row or None."""
+        """Filter a valid sample; return the new row or None."""
         if sample.begins:
             self._filter.restart('position_step')
         self._checks.take(sample.t)
@@ -244,7 +244,7 @@ class OnlineIdentifier:
         if motion is None:
             return None
         if self._filter.generation != self._generation:
-            # the row filter starts anew, together with the motion filter
+            # the row filter restarts together with the motion filter
             self._row_filter.reset()
             self._add_pending_row()
             self._scores.interrupt()

@@ -1,6 +1,6 @@
 # Copyright 2026 The armid_ros developers
 # SPDX-License-Identifier: Apache-2.0
-"""Parameters that a motion does not identify, and the motion that would identify them."""
+"""Parameters that a motion does not identify, and the motion that identifies them."""
 
 from __future__ import annotations
 

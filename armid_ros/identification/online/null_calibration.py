@@ -142,7 +142,7 @@ class NullCalibration:
         """Compute the factors from statistics of later windows, where 0 means no data."""
         counts = np.sum(later > 0.0, axis=0)
         independent = counts / self._overlap
-        judged = independent >= 12.0  # fewer independent windows permit no test
+        judged = independent >= 12.0  # too few independent windows for a test
         if not judged.any():
             return
         single = np.full(len(self._sizes), np.nan)
@@ -205,7 +205,7 @@ class NullCalibration:
 
 
 def _in_pieces(values: FloatArray) -> Iterator[slice]:
-    """Yield slices of the columns, one for each piece of work."""
+    """Yield the columns in slices, one per piece of work."""
     width = max(1, 4_000 // max(1, len(values)))
     for first in range(0, values.shape[1], width):
         yield slice(first, first + width)
@@ -232,19 +232,19 @@ class ResidualScale:
 
     @property
     def value(self) -> FloatArray:
-        """Return the factor of every joint, shape (m,); 1 in the beginning."""
+        """Return the factor of every joint, shape (m,); initially 1."""
         return np.ones(1) if self._value is None else self._value
 
     def learn(self, residual: FloatArray, weights: FloatArray) -> None:
-        """Learn from the residuals of a block over the assumed noise, shape (k, m)."""
+        """Update the scale with residuals of a block over the assumed noise, shape (k, m)."""
         used = np.sum(weights > 0.0, axis=0)
         if not used.any():
-            return  # an arm at rest must not forget the residuals of its motion
+            return  # residuals during motion are kept while the arm is at rest
         squares = np.sum(residual, axis=0) ** 2
         if self._seen is None:
             self._seen = History(len(squares), BLOCKS)
         self._seen.append(np.where(used > 0, squares / np.maximum(used, 1), np.nan))
-        if len(self._seen) < 16:  # with fewer blocks, the assumed noise is better
+        if len(self._seen) < 16:  # with fewer blocks, the assumed noise is used
             return
         later = self._seen.values[len(self._seen) // 2 :]
         known = np.any(later > 0.0, axis=0)

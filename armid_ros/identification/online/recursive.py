@@ -28,7 +28,7 @@ import numpy as np
 import numpy.typing as npt
 from scipy.linalg import lapack
 
-#: A smaller forgetting factor forgets within ten samples, which is not identification.
+#: Smallest forgetting factor; with less, the memory is shorter than ten samples.
 SMALLEST_FORGETTING = 0.9
 #: Standard deviation of every parameter before the first sample, in its SI unit. Robots have
 #: parameters of 1e-4 to 1e3; a parameter that the data do not identify keeps this deviation.
@@ -67,7 +67,7 @@ class RecursiveLeastSquares:
     noise : array_like, shape (m,)
         Standard deviation of the noise of the m rows of a sample, usually one per joint [N m].
     forgetting : float
-        1 keeps everything. Below 1, a direction that is excited all the time is estimated from
+        1: all samples are kept. Below 1, a permanently excited direction is estimated from
         about the last 1 / (1 - forgetting) samples.
     start : array_like, shape (P,), optional
         Prior mean, zero by default. The prior standard deviation PRIOR_STD is so large that the
@@ -212,7 +212,7 @@ class RecursiveLeastSquares:
         return np.asarray(np.sqrt(weights) / self._noise)
 
     def copied(self) -> RecursiveLeastSquares:
-        """Return a copy, which later updates do not change."""
+        """Return a copy that is independent of later updates."""
         other = copy(self)
         other._root, other._right = self._root.copy('F'), self._right.copy('F')
         return other
@@ -245,7 +245,7 @@ class RecursiveLeastSquares:
     def forgetting(self, factor: float) -> None:
         check_forgetting(factor)
         self._forgetting = factor
-        self._take(self._root, self._values)  # R theta is not kept up while samples are forgotten
+        self._take(self._root, self._values)  # R theta is not updated while samples are forgotten
 
     @property
     def root(self) -> FloatArray:

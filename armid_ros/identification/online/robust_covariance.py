@@ -56,7 +56,7 @@ class RobustCovariance:
     Parameters
     ----------
     window : int
-        Rows in a window, which should last longer than errors do.
+        Rows in a window, which should be longer than the correlation time of errors.
     forgetting : float
         Forgetting factor per row; a window removes no more information than it brings.
     work : Background
@@ -91,7 +91,7 @@ class RobustCovariance:
         rows, tau : ndarray, shapes (m, P) and (m,)
             Rows and torques in units of the assumed noise; zero where not used.
         values : ndarray, shape (P,)
-            Estimate of which the residuals are computed if this sample ends a window.
+            Estimate for the residuals of the window, used if this sample ends a window.
 
         """
         if self._rows is None:

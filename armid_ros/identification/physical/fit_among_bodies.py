@@ -1,12 +1,12 @@
 # Copyright 2026 The armid_ros developers
 # SPDX-License-Identifier: Apache-2.0
 """
-Torque least squares over physically consistent parameters.
+Least squares of torques, constrained to physically consistent parameters.
 
-The constraints are part of the fit. Projecting an unconstrained estimate on the nearest body
-afterwards would spoil the torques, as the distance in parameters does not measure them. Parameters
-that the data do not determine come from the description. Its weight is chosen by cross-validation
-with blocks of the training data.
+The constraints are part of the fit. A projection of an unconstrained estimate on the nearest body
+would increase the torque error, which the distance in parameters does not measure. Parameters that
+the data do not determine come from the description. Its weight is chosen by cross-validation with
+blocks of the training data.
 
 """
 
@@ -55,7 +55,7 @@ class PhysicalSettings:
     Attributes
     ----------
     total_mass : float or None
-        Mass of everything that the driven joints move [kg], from a scale for example.
+        Total mass of the moving links [kg], from a scale for example.
     boxes : mapping of str to (sequence of float, sequence of float)
         Joint, and two corners [m], in the joint frame, of a box that contains the link.
     mass_range : float or None
@@ -206,7 +206,7 @@ def _bodies(
 
 
 def far_from_described(robot: Robot, masses: FloatArray) -> tuple[str, ...]:
-    """Return at most one note, on links whose mass, (n,) [kg], is far from the description."""
+    """Return a note on links whose mass, (n,) [kg], is far from the description, or none."""
     described = robot.rigid_parameters[::PER_LINK]
     named = [
         f'{link} {mass:.3g} kg, described {known:.3g} kg'
@@ -294,7 +294,7 @@ def _held_out_errors(
     blocks: FloatArray,
     counts: FloatArray,
 ) -> tuple[tuple[float, float], ...]:
-    """Return weights with their held-out errors, relative to unconstrained fits."""
+    """Return the candidate weights with held-out errors, relative to unconstrained fits."""
     free = 0.0
     squares = dict.fromkeys(WEIGHTS, 0.0)
     for left_out, block in enumerate(blocks):

@@ -121,7 +121,7 @@ class PhysicalProgram:
         variables = size + _LOG_DETERMINANT * self.n_links
         hessian = np.zeros((variables, variables))
         hessian[:size, :size] = change.T @ information @ change
-        # decides directions of effects without data or another prior
+        # prior of effects in directions without data
         hessian[range(rigid, size), range(rigid, size)] += 1e-9
         identity = [float(i == j) for j in range(4) for i in range(j + 1)]
         gradient = np.zeros(variables)

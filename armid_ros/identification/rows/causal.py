@@ -6,10 +6,10 @@ Causal filtering and differentiation of a stream of joint states.
 Two low-passes in series. The motion filter G turns positions into positions, velocities and
 accelerations and is applied to the torque as well. The regressor, a nonlinear function of the
 motion, is evaluated behind G, and the row filter F is applied to its rows and to the torque. F is
-linear and the same on both sides, so the equation tau = Y theta holds behind it, whatever its
-initial state. Only G has to be fast, as F[Y(q)] and Y(F[q]) differ by terms of order (w / w_F)^2
-for a motion of frequency w. With G four times as fast as F, this error is one sixteenth of the
-error of a single filter in front of the regressor.
+linear and the same on both sides, so the equation tau = Y theta holds for filtered signals, for
+any initial state. Only G has to be fast, as F[Y(q)] and Y(F[q]) differ by terms of order (w /
+w_F)^2 for a motion of frequency w. With G four times as fast as F, this error is one sixteenth of
+the error of a single filter in front of the regressor.
 
 """
 
@@ -39,7 +39,7 @@ _GAP = 1.5
 #: Default noise of a torque sensor, over the torque limit of its joint. Only the ratios between
 #: joints matter, as the size of the noise then follows from the residuals.
 _NOISE_OF_LIMIT = 0.01
-#: No arm has positions or torques beyond this [SI units]; their squares would drown all others.
+#: Largest valid position or torque [SI units]; squares of larger numbers dominate the rest.
 LARGEST = 1e6
 
 
@@ -109,7 +109,7 @@ class TripleLag:
         return stages
 
     def _set_step(self, dt: float) -> None:
-        """Compute the state transition of the stages for a step."""
+        """Compute the state transition of the three lags for a time step."""
         # A ramp u is followed by stage i at u - i * slope / pole; the rest decays.
         x, step = self.pole * dt, self._step
         self._dt = dt
@@ -146,7 +146,7 @@ class CausalMotion(NamedTuple):
 
 class CausalFilter:
     """
-    Filter and differentiate joint states as they come.
+    Filter and differentiate a stream of joint states.
 
     The sampling period is the median of the first intervals, learned again after every restart.
     A sample with a wrong length, or with a number that is not finite or above LARGEST, is left
@@ -204,7 +204,7 @@ class CausalFilter:
         self.reset()
 
     def reset(self) -> None:
-        """Start anew and set the counters to zero."""
+        """Restart, and set the counters to zero."""
         self.rejected: Counter[str] = Counter()
         self.restarts: Counter[str] = Counter()
         self._begin()
@@ -366,7 +366,7 @@ class RowNoise:
         bandwidth = float(2.0 * np.trapezoid(power, f))
         gain = float(np.sqrt(period * bandwidth))
         # the largest value of the impulse response of both filters in series [1/s]
-        ratio = motion_pole / row_pole  # in the time of the row filter
+        ratio = motion_pole / row_pole  # time in units of the row filter
         response = signals.impulse(
             ([], [-ratio] * 3 + [-1.0] * 3, ratio**3), T=np.linspace(0, 20, 401)
         )

@@ -1,6 +1,6 @@
 # Copyright 2026 The armid_ros developers
 # SPDX-License-Identifier: Apache-2.0
-"""Conditions on recordings for an identification, and remedies where they fail."""
+"""Required conditions on recordings for an identification, with remedies."""
 
 from __future__ import annotations
 
@@ -56,7 +56,7 @@ _NEAR_FORCE = 1.2
 _FORCE_UNITS = {'N m': 'N', 'N mm': 'mN', 'N cm': 'cN', 'kN m': 'kN'}
 #: Share of its top speed below which a joint may be held by friction with any torque.
 SLOW = 0.05
-#: Message on absent torques.
+#: Message on missing torques.
 SILENT = 'the torque of every joint is constant; fill in effort'
 
 

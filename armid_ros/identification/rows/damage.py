@@ -76,7 +76,7 @@ def impossible_excursions(
     gate: SpikeGate, t: FloatArray, x: FloatArray, floor: FloatArray
 ) -> list[Excursion]:
     """
-    Return the excursions of a recording that no arm makes, as a gate would find them.
+    Return the physically impossible excursions of a recording, as found by a gate.
 
     Usual errors and ranges are those of the whole recording. The gate processes only samples too
     far off their prediction, and the samples after them.

@@ -1,7 +1,7 @@
 # Copyright 2026 The armid_ros developers
 # SPDX-License-Identifier: Apache-2.0
 """
-Torques that are a law of a controller instead of the torque that the motion needs.
+Torques that follow a control law instead of the dynamics of the arm.
 
 Gravity compensation outputs the weight of the arm while a hand moves it; energy shaping outputs a
 constant torque in the direction of motion. Such a torque is a function of position and direction
@@ -74,7 +74,9 @@ def laws_of_controllers(
         tau = motion.tau[rows, joint]
         direction = np.sign(motion.dq[rows, joint])
         law = np.column_stack([weight[rows, joint], direction, np.ones_like(tau)])
-        left, lacking = (_left(law, torque[rows, joint]) for torque in (motion.tau, needed))
+        left, lacking = (
+            _residual_rms(law, torque[rows, joint]) for torque in (motion.tau, needed)
+        )
         if left is None or lacking is None:
             silent += 1
             continue
@@ -93,10 +95,10 @@ def laws_of_controllers(
     return tuple(laws) if len(laws) > silent else ()
 
 
-def _left(law: FloatArray, torque: FloatArray) -> float | None:
+def _residual_rms(law: FloatArray, torque: FloatArray) -> float | None:
     """Return the RMS residual of a torque after the fit of a law; None with too few rows."""
     rank = int(np.linalg.matrix_rank(law)) if len(law) else 0
-    # fewer rows fit any torque
+    # with fewer rows, any torque fits
     if len(law) < 10 * max(rank, 1):
         return None
     return float(np.sqrt(np.sum(residual_of_fit(torque, law) ** 2) / (len(law) - rank)))

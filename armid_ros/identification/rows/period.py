@@ -10,8 +10,7 @@ import numpy as np
 #: Positions of two periods agree within this share of the range of motion.
 _SAME = 0.02
 #: Smallest range of some joint in a period, in units of `_SAME`: slower motion agrees with itself
-#: after any lag, but hardly moves by one unit in it. Of 108 recordings of 17 arms, 30 % more or
-#: less changes none.
+#: after any lag. Of 108 recordings of 17 arms, 30 % more or less changes none.
 _FARTHER = 3.0
 
 
@@ -76,6 +75,6 @@ def mean_change(positions: FloatArray, lag: int, where: slice) -> float:
 
 
 def parabola_minimum(before: float, least: float, after: float) -> float:
-    """Return where a parabola through values at -1, 0 and 1 is least; 0 if it has no minimum."""
+    """Return the minimum of a parabola through values at -1, 0 and 1; 0 if it has none."""
     bend = before - 2.0 * least + after
     return float(0.5 * (before - after) / bend) if 0.0 < bend < np.inf else 0.0

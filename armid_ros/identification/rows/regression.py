@@ -29,7 +29,7 @@ from armid_ros.recording import Recording
 import numpy as np
 import numpy.typing as npt
 
-#: A joint is at rest while it is slower than this share of its own top speed ...
+#: A joint is at rest while it is slower than this share of its top speed ...
 REST_SPEED = 0.02
 #: ... for at least this long [s]; a reversal of direction is shorter.
 REST_TIME = 0.2
@@ -45,7 +45,7 @@ class Stretch:
     Attributes
     ----------
     source : str
-        The recording it comes from.
+        Source recording.
     motion : Motion
         Decimated motion of M samples with the filtered measured torque.
     informative : ndarray of bool, shape (M, n)
@@ -208,7 +208,7 @@ class Score:
 
     @staticmethod
     def of(fits: Sequence[Fit]) -> Score:
-        """Return the score of one or more stretches together."""
+        """Return the common score of one or more stretches."""
         used = np.concatenate([fit.informative for fit in fits])
         residual = used * np.concatenate([fit.residual for fit in fits])
         tau = used * np.concatenate([fit.tau for fit in fits])

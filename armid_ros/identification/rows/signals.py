@@ -99,7 +99,7 @@ class Conditioning:
     decimation : int
         Factor of the decimation.
     given : frozenset of {'cutoff', 'decimation'}
-        Settings that the user gave; the others were chosen from recordings.
+        Settings given by the user; the others were chosen from recordings.
 
     """
 
@@ -110,7 +110,7 @@ class Conditioning:
 
     @property
     def kept_hz(self) -> float:
-        """Frequency up to which rows keep the signal [Hz]."""
+        """Upper frequency of the signal in the rows [Hz]."""
         # the decimation filter ends at this share of the rate of the rows
         return 0.4 * self.rate_hz / self.decimation
 
@@ -272,7 +272,7 @@ def _shortest(used: Conditioning) -> float:
 
 
 def no_stretch(recording: Recording, used: Conditioning) -> IdentificationError:
-    """Return the error that no stretch is long enough for the filters, with the needed length."""
+    """Return the error for recordings without a long enough stretch, with the required length."""
     spans = [recording.t[part[[0, -1]]] for part in unbroken(recording, used.rate_hz)]
     longest = max(float(last - first) for first, last in spans)
     left = longest - _shortest(used) + _CUTOFF_PERIODS / used.cutoff_hz
@@ -313,7 +313,7 @@ def decimate(values: FloatArray, used: Conditioning, stride: int = 1) -> FloatAr
     count = len(range(len(taps) // 2, len(values) - len(taps) // 2, factor))
     flat = values.reshape(len(values), -1)
     result = np.zeros((count, flat.shape[1]))
-    # a link moves no joint after its own: half are zero
+    # half are zero, as links have no torque in later joints
     active = np.flatnonzero(flat.any(axis=0))
     flat = np.ascontiguousarray(flat[:, active] if len(active) < flat.shape[1] else flat)
     size = 16  # output samples of one matrix product; larger ones multiply more zeros of the band

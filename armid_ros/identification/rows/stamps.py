@@ -18,7 +18,7 @@ _BLURRED = 0.1
 _WINDOW = 50
 #: Step between two messages below which a joint may be at rest with noise [rad or m].
 _LEAST_STEP = 1e-3
-#: A message is contradicted if its neighbours differ from each other by so many times less.
+#: Smallest ratio of a message's distance from its neighbours to that between the neighbours.
 _CLOSER = 5.0
 #: Number of contradicted messages, and their share, below which they are faulty samples.
 _FEWEST, _SHARE_OF_MESSAGES = 20, 0.01
@@ -80,7 +80,7 @@ def rounded_stamps(recording: Recording) -> str:
 
 
 def _wander(t: FloatArray) -> float:
-    """Return the RMS distance of stamps from an even grid [s]; zero without short steps."""
+    """Return the RMS deviation of stamps from an even grid [s]; zero without short steps."""
     # lost samples make steps longer and none shorter; stamps with varying delays make short
     # steps too, and the steps alone do not determine the error of the stamps
     steps = np.diff(t)
@@ -93,11 +93,11 @@ def _wander(t: FloatArray) -> float:
 
 def two_senders(recording: Recording) -> str:
     """
-    Return a message on positions that jump to and fro between two tracks; empty otherwise.
+    Return a message on positions that alternate between two tracks; empty otherwise.
 
     A message has another sender than its neighbours if some joint is far from both, the two are
-    near each other, and the step is faster than usual motion. Such messages form a track of their
-    own, whereas values of a faulty encoder are scattered.
+    near each other, and the step is faster than usual motion. Such messages form a separate track;
+    values of a faulty encoder are scattered.
 
     """
     t, q = recording.t, recording.q

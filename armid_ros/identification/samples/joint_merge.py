@@ -1,6 +1,6 @@
 # Copyright 2026 The armid_ros developers
 # SPDX-License-Identifier: Apache-2.0
-"""Lookup of joints by name, and merging of streams with some joints each into one stream."""
+"""Lookup of joints by name, and merging of streams with different joints."""
 
 from __future__ import annotations
 
@@ -45,7 +45,7 @@ class _Part:
         return bool(self.samples) and self.samples[-1][0] >= t
 
     def at(self, t: float) -> FloatArray | None:
-        """Return the values at a time that the samples reach; None if no sample is near."""
+        """Return the interpolated values at a time; None if no sample is near."""
         while len(self.samples) > 1 and self.samples[1][0] <= t:
             self.samples.popleft()
         first, values = self.samples[0]

@@ -206,7 +206,7 @@ class SpikeGate:
 
     def possible(self, excursion: Excursion, lowest: FloatArray, highest: FloatArray) -> bool:
         """
-        Return whether the arm itself may have caused an excursion of a signal.
+        Return whether an excursion of a signal is physically possible.
 
         A position cannot jump and return. A torque can exceed its usual range, from `lowest` to
         `highest`, when free play is crossed, but by no more than the width of that range: an
@@ -242,12 +242,12 @@ class SpikeGate:
 
     @property
     def _tail(self) -> StreamSample | None:
-        """Return the newest sample that is not known to be damaged."""
+        """Return the newest sample that is not damaged, as far as known."""
         latest = self._held or self._first or self._known
         return latest[-1] if latest else None
 
     def _in_time(self, sample: StreamSample) -> bool:
-        """Return whether a stamp continues the stream; two others in a row begin a new stretch."""
+        """Return whether a stamp continues the stream; two other stamps begin a new stretch."""
         tail, stray, self._stray = self._tail, self._stray, None
         dt = 0.0 if tail is None else sample.t - tail.t
         longest = self._max_gap * self._period
@@ -268,7 +268,7 @@ class SpikeGate:
         return False
 
     def _begin(self) -> list[StreamSample]:
-        """Learn noise and period from the first samples, and judge these."""
+        """Measure noise and period of the first samples, and check these samples."""
         raw, self._first = self._first or [], None
         first = all_unwrapped(raw, self._turn)
         self._period = float(np.median(np.diff([s.t for s in first])))
@@ -276,7 +276,7 @@ class SpikeGate:
         missed = self._lines_through(first)
         self._level.begin(missed, np.diff([s.x for s in first], axis=0), self._period)
         straight = [bool(np.all(self._off_by(m) <= 1.0)) for m in missed]
-        if not any(straight):  # erratic, or the noise has changed: it is learned anew
+        if not any(straight):  # erratic, or the noise has changed: measure it again
             off = np.max([self._off_by(m) for m in missed], axis=0)
             self._leave_out(Excursion(tuple(first), off, self._limits(missed[0])), True)
             self._level.forget()
@@ -292,7 +292,7 @@ class SpikeGate:
         return good
 
     def _judge(self, sample: StreamSample) -> list[StreamSample]:
-        """Judge another sample; return the samples that are now known to be good."""
+        """Classify another sample; return the samples that are now known to be good."""
         if self._first is not None:  # the samples before were erratic
             self._first.append(sample)
             return []
@@ -310,7 +310,7 @@ class SpikeGate:
             self._limit = self._limits(missed)
             self._suspect = np.flatnonzero(off > 1.0)
             return []
-        goes_on = self._goes_on(sample, off)
+        goes_on = self._continues(sample, off)
         if not goes_on and float(np.max(off[self._suspect])) <= 1.0:
             self._leave_out(Excursion(tuple(self._held), self._off, self._limit))
             self._held = []
@@ -323,13 +323,13 @@ class SpikeGate:
         if 2 * self._went_on > self._max_gap:
             if len(self._held) > 1 and self._stepped():
                 self._held[0] = replace(self._held[0], begins=True)
-            return self._go_on()
+            return self._release()
         self._leave_out(Excursion(tuple(self._held), self._off, self._limit), True)
         self._restart([])
         return []
 
-    def _go_on(self) -> list[StreamSample]:
-        """Pass on the held samples, which are real; judge damaged ones among them again."""
+    def _release(self) -> list[StreamSample]:
+        """Pass on the held samples, which are valid; check them for damaged samples again."""
         held, self._held = self._held, []
         missed = self._lines_through(held)
         steady = ~self._pulsing
@@ -346,7 +346,7 @@ class SpikeGate:
             good = good + self._judge(sample)
         return good
 
-    def _goes_on(self, sample: StreamSample, off: FloatArray) -> bool:
+    def _continues(self, sample: StreamSample, off: FloatArray) -> bool:
         """Return whether a sample continues the held samples, by the old slope or a new one."""
         last = self._held[-1]
         before = self._held[-2] if len(self._held) > 1 else self._known[1]
@@ -380,7 +380,7 @@ class SpikeGate:
         return np.asarray(np.abs(missed.error) / limit)
 
     def _surely_in_line(self, missed: Missed) -> bool:
-        """Return whether a sample is within a lower bound of its limits, which is fast to test."""
+        """Return whether a sample is within a lower bound of its limits, a fast test."""
         # Limits grow with the factors `noise` and `bend`, and in proportion if both grow alike. So
         # they are at least the limits over one period times the smaller factor.
         least, usual = self._least, self._level.usual
@@ -393,7 +393,7 @@ class SpikeGate:
     def _accept(
         self, samples: list[StreamSample], missed: Missed | None = None
     ) -> list[StreamSample]:
-        """Pass samples on, and learn from them."""
+        """Pass samples on, and update the noise estimate with them."""
         self._held = []
         for sample in samples:
             one = missed or missed_by(self._known, sample, self._period)
@@ -406,18 +406,18 @@ class SpikeGate:
         return samples
 
     def _lines_through(self, samples: Sequence[StreamSample]) -> list[Missed]:
-        """Return the errors of each sample against the line through the two before."""
+        """Return the error of each sample against the line through the two previous samples."""
         pairs = range(len(samples) - 2)
         return [missed_by(samples[k : k + 2], samples[k + 2], self._period) for k in pairs]
 
     def _leave_out_ahead(self, samples: Sequence[StreamSample], missed: Missed) -> None:
-        """Leave out samples, if any, ahead of the first ones that are in line."""
+        """Drop the samples before the first samples that are in line."""
         if samples:
             off, limit = self._off_by(missed), self._limits(missed)
             self._leave_out(Excursion(tuple(samples), off, limit))
 
     def _leave_out(self, excursion: Excursion, erratic: bool = False) -> None:
-        """Count samples that are left out, by reason."""
+        """Count dropped samples by reason."""
         self.left_out.append(excursion)
         count = len(excursion.samples)
         if erratic:

@@ -45,7 +45,7 @@ Time = TypeVar('Time', float, FloatArray)
 @dataclass(frozen=True, eq=False)
 class StreamSample:
     """
-    One sample of a stream.
+    Sample of a stream.
 
     Attributes
     ----------
@@ -137,7 +137,7 @@ class Usual:
 
 class Missed(NamedTuple):
     """
-    Prediction error of a sample.
+    Prediction error of one sample.
 
     Attributes
     ----------
@@ -155,7 +155,7 @@ class Missed(NamedTuple):
 
 
 def growth_over(step: Time, ahead: Time, period: float) -> tuple[Time, Time]:
-    """Return the growth of errors by noise and by an acceleration, a time ahead of two samples."""
+    """Return the growth of errors by noise and by acceleration, a time after two samples."""
     ratio = ahead / step
     noise: Time = ((1.0 + (1.0 + ratio) ** 2 + ratio**2) / 6.0) ** 0.5
     return noise, 0.5 * ahead * (ahead + step) / period**2
@@ -186,7 +186,7 @@ def all_unwrapped(samples: Sequence[StreamSample], turn: FloatArray) -> list[Str
 
 
 def robust_scale(missed: FloatArray, share: float) -> FloatArray:
-    """Return the standard deviation of errors (k, m), from the quantile of a share of them."""
+    """Return the standard deviation of errors, (k, m), from one of their quantiles."""
     ordered = np.sort(np.abs(missed), axis=0)  # numpy's quantile takes ten times as long
     place = share * (len(ordered) - 1)
     first = int(place)
@@ -250,7 +250,7 @@ class NoiseLevel:
 
     def begin(self, missed: Sequence[Missed], moves: FloatArray, period: float) -> None:
         """
-        Learn from the first samples, of which some may be damaged.
+        Measure the usual errors of the first samples, some of which may be damaged.
 
         Parameters
         ----------
@@ -277,7 +277,7 @@ class NoiseLevel:
         self._waiting += 1
 
     def settle(self, period: float) -> None:
-        """Compute the usual error again if a window of errors is complete."""
+        """Update the usual error when a window of errors is complete."""
         if self._waiting < _WINDOW:
             return
         growths, moves = self._growths[: self._waiting], self._moves[: self._waiting]
@@ -297,7 +297,7 @@ class NoiseLevel:
         self._seen += 1
 
     def see_steps(self, moves: FloatArray) -> None:
-        """Learn the resolution from changes between samples, shape (k, m)."""
+        """Estimate the resolution from changes between samples, shape (k, m)."""
         self._steps = _smallest(np.concatenate([self._steps, np.abs(moves)]))
 
     def _least(self, period: float) -> FloatArray:

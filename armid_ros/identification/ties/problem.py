@@ -105,7 +105,7 @@ class InteractionProblem:
 
     @property
     def motion_noise(self) -> FloatArray:
-        """Covariance of errors of the motion of a sample by noisy angles, shape (3 J, 3 J)."""
+        """Covariance of the motion errors of a sample due to noisy angles, shape (3 J, 3 J)."""
         return np.asarray(self.motion_lags[0])
 
     @property

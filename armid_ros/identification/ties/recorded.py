@@ -163,7 +163,7 @@ def stacked(problems: Sequence[InteractionProblem]) -> InteractionProblem:
 
 
 def _one_machine(recording: Recording) -> Recording:
-    """Return a recording and its partner as one machine, without torques of the partner."""
+    """Return a recording with the joints of its partner, without torques of the partner."""
     assert recording.partner is not None and recording.tau is not None
     far = recording.partner.q
     return replace(
@@ -244,7 +244,7 @@ class SensorNoise:
     used: Conditioning
 
     def floor(self, arm: ArmModel) -> FloatArray:
-        """Return the noise deviation of a row for an arm with its ties, shape (n,) [N m]."""
+        """Return the standard deviation of the noise of a row, ties included, shape (n,) [N m]."""
         problem = self._taut
         stiffness = dict.fromkeys(problem.spring_joints, 0.0)
         slack = dict.fromkeys(problem.spring_joints, 0.0)

@@ -89,7 +89,7 @@ class Interaction:
 
 def identify_interaction(problem: InteractionProblem) -> Interaction:
     """
-    Estimate stiffnesses, and free inertias with them, without the bias of noisy angles.
+    Estimate stiffnesses and free inertias without the bias of noisy angles.
 
     Parameters
     ----------
@@ -168,10 +168,10 @@ def _least_squares(problem: InteractionProblem, columns: FloatArray) -> FloatArr
     w = columns.reshape(-1, columns.shape[2])
     scale = np.linalg.norm(w, axis=0)
     springs = scale[: columns.shape[2] - len(problem.rigid)]
-    # a smaller RMS torque per stiffness [m^2] is that of a spring that is not extended
+    # with a smaller RMS torque per stiffness [m^2], the spring is not extended
     if not np.all(springs > 1e-9 * np.sqrt(len(w))):
         name = problem.segments[int(np.argmin(springs))]
-        raise IdentificationError(f'{name}: its spring is never extended, so nothing shows it')
+        raise IdentificationError(f'{name}: its spring is never extended: not identifiable')
     y = problem.tau - problem.known
     return np.asarray(np.linalg.lstsq(w / scale, y.ravel(), rcond=None)[0] / scale)
 

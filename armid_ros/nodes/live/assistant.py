@@ -1,7 +1,7 @@
 # Copyright 2026 The armid_ros developers
 # SPDX-License-Identifier: Apache-2.0
 """
-Compute diagnoses in a separate process, so that joint states at 1 kHz never wait.
+Diagnoses in a separate process, so that joint states at 1 kHz are not delayed.
 
 Jobs are sent to the process and results returned through a pair of sockets. The process ends when
 the other end is closed, so that it never outlives its parent.
@@ -134,7 +134,7 @@ class Assistant:
 
     def ask(self, job: Job) -> None:
         """
-        Send a job, which runs after the pending ones; a process that has ended is replaced.
+        Send a job, which runs after the pending jobs; start a new process if the old one ended.
 
         A request of a diagnosis is larger than the buffer of the pipe. It would wait for the
         pending jobs; send it when none is pending.
@@ -153,7 +153,7 @@ class Assistant:
         try:
             self._pipe.send(job)
         except OSError as error:
-            raise IdentificationError(f'the process that diagnoses has ended: {error}') from error
+            raise IdentificationError(f'the diagnosis process has ended: {error}') from error
         self._pending += 1
 
     def poll(self) -> Result | None:
@@ -163,7 +163,7 @@ class Assistant:
         self._pending -= 1
         try:
             result: Result = self._pipe.recv()
-        except (EOFError, OSError):  # the process ended, maybe during the transfer
+        except (EOFError, OSError):  # the process ended, possibly during the transfer
             self._pending = 0
             self._pipe.close()
             code = self._process.wait()

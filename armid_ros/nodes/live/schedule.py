@@ -110,7 +110,7 @@ class LiveDiagnosis:
 
     @property
     def due(self) -> bool:
-        """Return whether there was enough motion since the last request."""
+        """Return whether the motion since the last request is long enough."""
         if self.learning or not self._holds(self.settings.shortest):
             return False
         return self.window.moved - self._asked_at >= self._next
@@ -158,7 +158,7 @@ class LiveDiagnosis:
 
     def take(self, answer: Answer) -> bool:
         """
-        Handle an answer; an outdated one is ignored.
+        Handle an answer; an outdated answer is ignored.
 
         Returns
         -------
@@ -171,7 +171,7 @@ class LiveDiagnosis:
             return False
         if answer.changed:
             self._begin, self._changed = answer.end - answer.window.duration, True
-        if answer.verdict == 'consistent':  # a later change shows in the residual again
+        if answer.verdict == 'consistent':  # a later change is detected in the residual
             self._changed = False
         if answer.verdict == WAITING:
             self._agreed = []
@@ -227,7 +227,7 @@ class LiveDiagnosis:
         self._decided()
 
     def _decided(self) -> None:
-        """Propose nothing, and count anew with the next request."""
+        """Clear the proposal and the count of agreeing diagnoses."""
         self._propose(None)
         self._agreed = []
         self._outdate()

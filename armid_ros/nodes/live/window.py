@@ -12,7 +12,7 @@ import numpy.typing as npt
 _EARLY = 0.25
 #: Velocity of all joints below which the arm is at rest [rad/s or m/s].
 _REST_VELOCITY = 0.01
-#: Longest gap, and longest step back in time, before the window begins anew [periods].
+#: Longest gap, and longest step back in time, without a restart of the window [periods].
 _LONGEST_GAP = 20.0
 
 
@@ -21,7 +21,7 @@ class SampleWindow:
     Latest samples of an arm, one per period, without gaps.
 
     Further samples are skipped, so that a period of 5 ms gives 200 samples per second at any input
-    rate. Late and repeated samples are skipped too. The window begins anew after a gap or a jump
+    rate. Late and repeated samples are skipped too. The window is cleared after a gap or a jump
     back in time.
 
     Parameters

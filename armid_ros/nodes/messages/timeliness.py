@@ -37,11 +37,11 @@ class Freshness:
 
     @property
     def stopped(self) -> bool:
-        """Return whether messages have stopped after the first one."""
+        """Return whether messages have stopped after the first message."""
         return self.silence > 0.5  # joint states below 2 Hz are not usable for identification
 
     def trouble(self) -> str:
-        """Return a text if messages have stopped; empty otherwise."""
+        """Return a message if the topic has stopped; empty otherwise."""
         return f'{self._what} stopped {self.silence:.1f} s ago' if self.stopped else ''
 
 
@@ -73,12 +73,12 @@ class StampDifference:
         self._recent.append(self._late)
 
     def side(self, late: float) -> str:
-        """Return on which side of the clock stamps with a delay [s] are."""
+        """Return whether stamps with a delay [s] are ahead of the clock or behind."""
         clock = '/clock' if self._clock.ros_time_is_active else "this computer's clock"
         return f'{"behind" if late > 0.0 else "ahead of"} {clock}'
 
     def of_results(self, topic: str) -> str:
-        """Return a text if the stamps of results are far from the clock; empty otherwise."""
+        """Return a message if the stamps of results are far from the clock; empty otherwise."""
         # tf2 keeps ten seconds, so that RViz cannot draw older results; the messages that wait in
         # the queue of a busy node, at most 1000, are younger
         if abs(self._late) <= 10.0:

@@ -78,7 +78,7 @@ def make_arm(
     value: Values, arm: ArmModel, drives: TwoLinkSet | None, warn: Callable[[str], object]
 ) -> SimulatedArm:
     """
-    Make the simulated arm that parameters describe, with elastic joints if it has any.
+    Make the simulated arm from parameters, with elastic joints if any.
 
     Parameters
     ----------

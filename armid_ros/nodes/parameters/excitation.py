@@ -243,7 +243,7 @@ def make_planner(value: Values) -> tuple[TransferPlanner, tuple[str, ...]]:
 
 def make_excitation(value: Values, rate: float, planner: TransferPlanner) -> Excitation:
     """
-    Load or design the excitation that parameters describe.
+    Load or design an excitation according to parameters.
 
     Parameters
     ----------

@@ -84,7 +84,7 @@ class NodeParameter:
         """
         Return a value with the type of the parameter.
 
-        An integer is accepted for a float, one value for a list of one, and [] for no names.
+        An integer is accepted for a float, a single value for a list of one, and [] for no names.
 
         Raises
         ------
@@ -174,7 +174,7 @@ def overrides(node: Node) -> Mapping[str, Parameter]:
 
 
 def unknown(node: Node) -> str:
-    """Return a text that names overrides that the node does not have; empty if none."""
+    """Return a message on overrides of unknown parameters; empty if there are none."""
     mine = {name for name in node.get_parameters_by_prefix('') if not _of_ros(name)}
     wrong = [name for name in overrides(node) if name not in mine and not _of_ros(name)]
     if not wrong:

@@ -93,7 +93,7 @@ class _Ending:
 
 
 class _EndedAtOnce(BaseException):
-    """A signal arrived while the node was made; caught by `run` only."""
+    """A signal arrived during the construction of the node; caught by `run` only."""
 
 
 def run(make_node: Callable[[], ArmidNode], args: Sequence[str] | None = None) -> None:
@@ -125,7 +125,7 @@ def run(make_node: Callable[[], ArmidNode], args: Sequence[str] | None = None) -
         ending.with_parent = node.value('end_with_parent')
         with steady():
             while rclpy.ok() and not (node.finished or ending.due):
-                executor.spin_once(timeout_sec=0.1)  # the events executor hangs otherwise
+                executor.spin_once(timeout_sec=0.1)  # otherwise the events executor hangs
     except (_EndedAtOnce, ExternalShutdownException):
         pass
     except RCLError:  # the context was shut down between the check and the wait

@@ -37,7 +37,7 @@ class RealTime:
 
     def catch_up(self, factor: float, period: float) -> float:
         """
-        Simulate until real time times a factor; time that cannot be made up is skipped.
+        Simulate until real time times a factor; skip time that cannot be caught up.
 
         Parameters
         ----------
@@ -69,7 +69,7 @@ class RealTime:
         return behind
 
     def trouble(self, advice: str) -> str:
-        """Return a text with the skipped time and the remedy; empty if none was skipped."""
-        if self.given_up <= 0.5:  # a start may take as long
+        """Return a message with the skipped time and the remedy; empty if none was skipped."""
+        if self.given_up <= 0.5:  # delays during the start are normal
             return ''
         return f'{self.given_up:.1f} s of real time were skipped: {advice}'

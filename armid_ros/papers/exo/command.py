@@ -69,7 +69,7 @@ def exo(
     as_json: bool,
 ) -> None:
     """
-    Find what ties an exoskeleton to its wearer.
+    Identify the springs between an exoskeleton and its wearer.
 
     Without a BAG the shipped pair walks, is recorded with noise, and its springs are found again.
 

@@ -71,7 +71,7 @@ def find_slack(problem: Callable[[float], InteractionProblem]) -> Slack:
             fits[slack] = identify_interaction(problem(slack))
         return fits[slack].misfit
 
-    # [m]; a strap with more slack is not worn
+    # [m]; largest plausible slack of a strap
     best = min((0.0, 0.001, 0.002, 0.004, 0.006), key=misfit)
     bend = np.inf
     # steps on either side of the best slack [m]

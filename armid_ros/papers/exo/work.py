@@ -94,7 +94,7 @@ def identify_ties(
 
 
 def single_support(pair: TiedPair, gait: Gait) -> tuple[PairMotion, FloatArray, str]:
-    """Return the motion of single support, over the gait cycle of the swing leg."""
+    """Return the motion of single support as a function of the gait cycle of the swing leg."""
     known = read_assumptions()
     begin, end = known['single_support'].value
     cycle = known['cycle_time'].value

@@ -1,6 +1,6 @@
 # Copyright 2026 The armid_ros developers
 # SPDX-License-Identifier: Apache-2.0
-"""The paper on the humanoid arm for the moon, repeated by one command."""
+"""Command that reproduces the paper on the lunar humanoid arm."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ _HEADS = {
 @parameters.seed
 @parameters.as_json
 def lunar(out: Path, seed: int, every: bool, as_json: bool) -> None:
-    """Repeat the lunar paper: tables, gravity parameters and torques, with its figures."""
+    """Reproduce the lunar paper: tables, gravity parameters and torques, with its numbers."""
     from armid_ros.cli import options
     from armid_ros.cli.options import provenance
     from armid_ros.cli.terminal import progress

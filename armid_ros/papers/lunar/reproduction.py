@@ -235,7 +235,7 @@ def reproduce(
     *, seed: int, progress: Callable[[float, str], None] = lambda share, what: None
 ) -> Reproduction:
     """
-    Repeat the paper.
+    Reproduce all tables of the paper.
 
     Parameters
     ----------

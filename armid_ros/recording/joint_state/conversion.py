@@ -1,6 +1,6 @@
 # Copyright 2026 The armid_ros developers
 # SPDX-License-Identifier: Apache-2.0
-"""Yield JointState messages of a topic, also those inside messages of another type."""
+"""Yield JointState messages of a topic, including those inside messages of other types."""
 
 from __future__ import annotations
 
@@ -45,7 +45,7 @@ def joint_state_blocks(bag: Bag, topic: Topic) -> Iterator[MessageBlock]:
                 message = store.deserialize_cdr(block.message(at), described.name)
                 state = getattr(message, inside)
                 messages.append(bytes(store.serialize_cdr(state, JOINT_STATE)))
-            except Exception:  # the decoder counts it as malformed
+            except Exception:  # the decoder counts such messages as malformed
                 messages.append(bytes(4))
         yield MessageBlock.joined(messages, block.log_time, block.publish_time)
 
@@ -66,7 +66,7 @@ def require_standard(bag: Bag, topic: Topic) -> None:
 
 
 def _inside(described: MessageType) -> str:
-    """Return the JointState field of a type, the measured one of several; '' if none."""
+    """Return the JointState field of a type; of several fields, the measured one; '' if none."""
     own = described.definition.split('\n===', 1)[0]
     found = _INSIDE.findall(own)
     return next((name for name in found if 'measured' in name), found[0] if found else '')

@@ -1,6 +1,6 @@
 # Copyright 2026 The armid_ros developers
 # SPDX-License-Identifier: Apache-2.0
-"""Decode JointState messages: blocks of them to arrays, and one at a time."""
+"""Decode JointState messages, in blocks or one by one."""
 
 from __future__ import annotations
 
@@ -240,7 +240,7 @@ class _Plan:
 
 class JointStateValues(NamedTuple):
     """
-    Values of one message.
+    Values of one JointState message.
 
     Attributes
     ----------

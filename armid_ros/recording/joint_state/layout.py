@@ -27,7 +27,7 @@ _FRAME = 12
 
 
 class MalformedMessage(ValueError):
-    """The bytes are no sensor_msgs/JointState."""
+    """The bytes are not a sensor_msgs/JointState."""
 
 
 @dataclass(frozen=True)
@@ -92,17 +92,17 @@ class JointStateLayout:
             raise MalformedMessage(f'not a JointState: {error}') from error
         layout = cls(order, frame_length, names, tuple(counts))
         if not 0 <= len(cdr) - layout.end <= layout.spare:
-            raise MalformedMessage(f'{len(cdr)} bytes where a JointState has {layout.end}')
+            raise MalformedMessage(f'{len(cdr)} bytes, but this JointState needs {layout.end}')
         return layout
 
     @property
     def names_offset(self) -> int:
-        """Where the count of names is."""
+        """Offset of the number of names."""
         return _align(_FRAME + 4 + self.frame_length, 4)
 
     @cached_property
     def names_end(self) -> int:
-        """Where the last name ends."""
+        """End of the last name."""
         position = self.names_offset + 4
         for name in self.names:
             position = _align(position, 4) + 4 + len(name.encode()) + 1
@@ -110,7 +110,7 @@ class JointStateLayout:
 
     @cached_property
     def places(self) -> tuple[tuple[int, int], ...]:
-        """Where the number of positions, velocities and efforts is, and where they begin."""
+        """Offsets of the counts, and of the first values, of positions, velocities and efforts."""
         places, position = [], self.names_end
         for count in self.counts:
             at = _align(position, 4)
@@ -122,13 +122,13 @@ class JointStateLayout:
 
     @cached_property
     def end(self) -> int:
-        """Where the last value ends."""
+        """End of the last value."""
         return self.places[-1][1] + 8 * self.counts[-1]
 
     @cached_property
     def spare(self) -> int:
         """Largest number of padding bytes after the last value."""
-        # A writer reserves room to align what follows, and for each empty sequence as well.
+        # Writers add padding to align the next field, also for empty sequences.
         return 7 + 4 * self.counts.count(0)
 
     def dtype(self, length: int) -> np.dtype[np.void]:
@@ -193,11 +193,11 @@ class JointStateLayout:
         return whole and int.from_bytes(data[: self.end], 'little') & mask == fixed
 
     def fits(self, rows: npt.NDArray[np.void]) -> npt.NDArray[np.bool_]:
-        """Return which messages, read as records of this layout, have this layout."""
+        """Return a mask of the messages, read as records of this layout, that have this layout."""
         fixed, mask = self.fixed
         expected, bits = fixed['names'][0], mask['names'][0]
         names = rows['names']
-        # As a rule all padding is alike, and plain comparison of the first row's is enough.
+        # Padding is usually equal in all rows, so a comparison with the first row is enough.
         reference = names[0]
         if np.array_equal(reference & bits, expected):
             equal = names == reference

@@ -43,7 +43,7 @@ def read_chunks(
         A chunk takes more memory than the settings allow.
 
     """
-    # either all chunks of a writer have checksums, or none
+    # a writer adds checksums to all chunks or to none
     check = settings.check_crc and any(chunk.crc for chunk in found.chunks)
     settings = replace(settings, check_crc=check)
     chunks = list(chunks)
@@ -122,7 +122,7 @@ def _content(found: FileMap, chunk: Chunk, settings: ReadSettings) -> bytes | me
     """Return the content of a chunk; raise one of CORRUPT if the chunk is damaged."""
     stored = memoryview(found.data)[chunk.begin : chunk.end]
     if chunk.compression not in ('', 'zstd', 'lz4'):
-        raise ValueError(f"compressed with '{chunk.compression}'; zstd and lz4 can be read")
+        raise ValueError(f"unknown compression '{chunk.compression}'; zstd and lz4 are supported")
     if not chunk.whole:
         most = min(chunk.size, settings.memory_limit)
         if chunk.compression:
@@ -131,7 +131,7 @@ def _content(found: FileMap, chunk: Chunk, settings: ReadSettings) -> bytes | me
     if chunk.compression:
         content: bytes | memoryview = decompressed(stored, chunk.compression, chunk.size, settings)
     elif len(stored) != chunk.size:
-        raise ValueError(f'holds {len(stored)} bytes, but {chunk.size} are stated')
+        raise ValueError(f'has {len(stored)} bytes instead of the stated {chunk.size}')
     else:
         content = stored
     if settings.check_crc and zlib.crc32(content) != chunk.crc:
@@ -161,7 +161,7 @@ def messages_in(found: FileMap, contents: Contents) -> tuple[IntArray, npt.NDArr
     data, parts = contents
     ranges = np.array([(begin, end) for _, begin, end in parts], np.int64)
     if all(chunk.indexes and chunk.whole for chunk, _, _ in parts):
-        # offsets beyond a chunk are set to its end, where none of its messages can begin
+        # offsets beyond a chunk are set to its end, where no message can begin
         listed = [
             np.minimum(np.frombuffer(found.data, '<u8', 2 * count, at)[1::2], chunk.size).astype(
                 np.int64
@@ -224,7 +224,7 @@ def tiled(
         return None
     behind = offsets + RECORD_HEADER + lengths.astype(np.int64)
     gaps = np.flatnonzero(behind[:-1] != offsets[1:])
-    # where a chunk begins or a message ends, a message begins, the chunk ends, or definitions lie
+    # begins of chunks and ends of messages, begins of messages, ends of chunks, definitions
     starts = np.sort(np.concatenate([begins, behind[gaps], behind[-1:]]))
     stops = np.sort(np.concatenate([offsets[:1], offsets[gaps + 1], ends]))
     if (starts > stops).any():

@@ -180,7 +180,7 @@ def _walk(found: FileMap) -> tuple[list[tuple[int, int, int]], int | None, int |
     while position + RECORD_HEADER <= size:
         opcode, length = struct.unpack_from('<BQ', data, position)
         begin, end = position + RECORD_HEADER, position + RECORD_HEADER + length
-        # opcodes that are not defined; higher ones are for private use
+        # undefined opcodes; higher opcodes are for private use
         if not opcode or 0x10 <= opcode < 0x80:
             break
         if end > size:

@@ -3,10 +3,10 @@
 """
 Write MCAP files, one system call per chunk.
 
-Unlike the writer of mcap, this one may be interrupted anywhere, for example by KeyboardInterrupt.
-Each step commits its result in one assignment at its end. The next step first truncates the file
-to the committed size. Thousands of messages can be written at once. Specification:
-https://mcap.dev/spec
+Unlike the writer of the package mcap, this writer may be interrupted anywhere, as by
+KeyboardInterrupt. Each step commits its result in one assignment at its end. The next step first
+truncates the file to the committed size. Thousands of messages can be written at once.
+Specification: https://mcap.dev/spec
 
 """
 
@@ -220,7 +220,7 @@ class McapWriter:
         self._index.close()
 
     def _tail(self) -> bytes:
-        """Return the summary and the footer, which follow the last chunk."""
+        """Return the summary and the footer, the records after the last chunk."""
         data_end = _record(DataEnd(0))
         begin = self.committed.position + len(data_end)
         counts, (start, end) = self.committed.counts, self.committed.time_range
@@ -283,8 +283,8 @@ class McapWriter:
             while len(rest):
                 rest = rest[self._stream.write(rest) :]
         except OSError as error:
-            # A full disk stores a part of the data; it is cut off, so that the file ends with a
-            # step.
+            # If the disk is full, partially written data are truncated, so that the file ends with
+            # a complete step.
             with suppress(OSError):
                 self._stream.truncate(position)
             raise RecordingError(f'{self._path}: cannot be written: {error.strerror}') from error

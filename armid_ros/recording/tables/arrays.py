@@ -55,7 +55,7 @@ def read_matlab(path: Path) -> Table:
     from scipy.io import loadmat, whosmat
 
     raw = read_content(path)
-    if b'\x89HDF' in raw[:1024]:  # first bytes of HDF5, after 512 other bytes
+    if b'\x89HDF' in raw[:1024]:  # signature of HDF5, after a user block of 512 bytes
         return read_hdf5(path)
     for name, shape, _ in whosmat(io.BytesIO(raw)):
         _require_packed(f'{path}: {name[:40]!r}', 8 * math.prod(shape), len(raw))
@@ -156,7 +156,7 @@ def read_lerobot(path: Path, episode: int | None = None) -> Table:
 def _columns(
     path: Path, names: Mapping[str, Sequence[str]]
 ) -> tuple[tuple[TableColumn, ...], dict[str, Sequence[str]]]:
-    """Return the columns of numbers, and the cells of columns of words."""
+    """Return the columns of numbers, and the cells of text columns."""
     parquet = imported('pyarrow.parquet', path, 'Parquet')
     types = imported('pyarrow', path, 'Parquet').types
     stated = parquet.read_metadata(path)
@@ -191,7 +191,7 @@ def _columns(
 def _elements(
     path: Path, name: str, cells: Sequence[Sequence[Any] | None], labels: Sequence[str]
 ) -> Iterator[tuple[str, list[Any]]]:
-    """Yield name and cells of each element of lists; None for missing rows."""
+    """Yield the name and the cells of each list element; None for missing rows."""
     rows = [one or () for one in cells]
     width = max(map(len, rows), default=0)
     if any(isinstance(row[0], (list, dict)) for row in rows if row):

@@ -23,7 +23,7 @@ import numpy as np
 
 QuantityName = Literal['position', 'velocity', 'effort']
 
-#: Words for a current, which a gain converts to a torque.
+#: Words for a motor current, which a gain converts to a torque.
 CURRENTS = ('current', 'currents', 'curr', 'cur', 'i', 'iq', 'amp', 'amps', 'ampere', 'amperes')
 WORDS: dict[QuantityName, dict[str, float]] = {
     'position': dict.fromkeys(('position', 'positions', 'pos', 'q', 'qpos', 'jpos'), 3.0)
@@ -47,7 +47,7 @@ _QUALIFIERS = (
     ('meas measured act actual fb feedback observation', 1.0),
     ('filt filtered est estimated se disc mot motor', -0.3),  # processed
     ('cmd command commanded des desired target ref reference con goal set setpoint', -2.0),
-    ('ctrl control action ff feedforward traj leader', -2.0),  # not measured either
+    ('ctrl control action ff feedforward traj leader', -2.0),  # not measured
     ('err error ext external fric friction pert model pred predicted residual limit', -2.0),
     ('min max std temp temperature tcp ee cart cartesian acc ddq imu rel', -2.0),
     ('init gravity kin dyn', -2.0),
@@ -144,7 +144,7 @@ def choose(
     if twice:
         raise RecordingError(
             f"{table.source}: for {quantity}, '{pattern}' fits {' and '.join(twice)} for one "
-            'joint; name the columns with commas, or give each a name of its own'
+            'joint; list the columns with commas, or rename them'
         )
     members = dict(found)
     names = [renamed(label, rename) for label in labels]
@@ -174,7 +174,7 @@ def guess(
     table: Table, quantity: QuantityName, joints: Sequence[str] | None, rename: Rules = ()
 ) -> tuple[QuantityColumns | None, tuple[str, tuple[str, ...]]]:
     """
-    Return the most likely columns of a quantity, and the nearest columns that lack joints.
+    Return the most likely columns of a quantity, and the most similar columns that lack joints.
 
     Parameters
     ----------
@@ -196,7 +196,7 @@ def guess(
         pattern is empty if no column is that of a joint.
 
     """
-    groups: dict[str, dict[str, TableColumn]] = {}  # by pattern and label of the joint
+    groups: dict[str, dict[str, TableColumn]] = {}  # by pattern, then by label of the joint
     for column in table.columns:
         for pattern, label in _readings(column, joints, rename):
             groups.setdefault(pattern, {})[label] = column
@@ -220,7 +220,7 @@ def guess(
 
 
 def guess_time(table: Table) -> TableColumn | None:
-    """Return the column with the name of a time that increases, or else decreases."""
+    """Return the column that is named as a time and increases, or else decreases."""
     for way in (1.0, -1.0):
         scores = {}
         for column in table.columns:
@@ -265,7 +265,7 @@ def _by_number(label: str) -> tuple[int, str]:
 
 
 def _matching(table: Table, pattern: str) -> list[tuple[str, TableColumn]]:
-    """Return the columns that fit a pattern, by the label of their joint."""
+    """Return the columns that match a pattern, by the label of their joint."""
     exact = table.column(pattern)
     if exact is not None:
         return [('1', exact)]

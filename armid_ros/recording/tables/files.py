@@ -82,7 +82,7 @@ def open_table(path: Path, *, episode: int | None = None) -> Table:
         return _with_stamps(_with_dates(_with_names(table)))
     except RecordingError:
         raise
-    except Exception as problem:  # the libraries raise arbitrary exceptions
+    except Exception as problem:  # libraries may raise any exception
         said = ' '.join(str(problem).split())[:500]
         raise RecordingError(
             f'{path}: cannot be read, it may be damaged: {type(problem).__name__}: {said}'

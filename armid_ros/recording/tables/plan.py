@@ -1,6 +1,6 @@
 # Copyright 2026 The armid_ros developers
 # SPDX-License-Identifier: Apache-2.0
-"""Plan which column and unit each quantity is read from, and convert a table by the plan."""
+"""Choose column and unit of each quantity of a table, and convert the table accordingly."""
 
 from __future__ import annotations
 
@@ -156,7 +156,7 @@ def plan(
         pattern, lacking = position
         if pattern:
             raise RecordingError(
-                f"{table.source}: of positions '{pattern}' has no column of numbers for "
+                f"{table.source}: positions '{pattern}' have no numeric column for "
                 f'{", ".join(lacking)}; name their columns with --position or --rename, or leave '
                 f'joints out with --joints. Its columns are {table.listed()}'
             )
@@ -172,7 +172,7 @@ def plan(
     for quantity in _OTHERS:
         found = _source(table, quantity, settings, names)
         if isinstance(found, tuple) and joints is None:
-            # match the joints by number, as the names differ or are missing
+            # match joints by number, because names differ or are missing
             numbers = [str(k) for k in range(len(position.columns))]
             by_number = _source(table, quantity, settings, numbers)
             found = found if isinstance(by_number, tuple) else by_number
@@ -197,7 +197,7 @@ def _source(
     settings: ColumnSettings,
     joints: Sequence[str] | None,
 ) -> QuantityColumns | tuple[str, tuple[str, ...]]:
-    """Return the source of a quantity, given or guessed; without one, the lacking joints."""
+    """Return the given or guessed source of a quantity, or the joints that it lacks."""
     asked = getattr(settings, quantity)
     if asked is not None and asked.lower() == 'none':
         return '', ()
@@ -259,7 +259,7 @@ def _far(
     if position.unit != 'rad' or settings.gear or settings.position_scale:
         return
     reach = np.fmax.reduce(np.abs(position.values()))
-    far = reach > 4.5 * np.pi  # probably not in rad or m
+    far = reach > 4.5 * np.pi  # the unit is probably not rad or m
     turned, slid = far & ~slides, far & slides
     if turned.any() and not settings.degrees:
         yield f'positions reach {reach[turned].max():.4g}: --degrees, or motor angles (--gear)?'
@@ -302,7 +302,7 @@ def _time_unit(table: Table, column: TableColumn, said: str | None) -> str:
     if len(steps) and np.mean(steps < 0.0) > 0.5:  # sorting would reverse the motion
         raise RecordingError(
             f'{where} runs backwards, from {column.values[0]:.6g} to {column.values[-1]:.6g}. '
-            'Turn the rows round if the last was measured first, or leave the column out with '
+            'Reverse the rows if the last was measured first, or leave the column out with '
             '--time none --rate HZ if they are in order'
         )
     if said or column.unit in TIME_UNITS:
@@ -342,7 +342,7 @@ def measured(plan: TablePlan) -> Recording:
                 raise RecordingError(
                     f'{table.source}: column {column.name} has no number in {len(empty)} of '
                     f'{len(table)} rows, first in {table.where(int(empty[0]))}; leave '
-                    f'{source.quantity} out with --{source.quantity} none, or mend the file'
+                    f'{source.quantity} out with --{source.quantity} none, or repair the file'
                 )
     if np.mean(~stamped) > MAX_NOT_FINITE:
         raise RecordingError(
@@ -360,7 +360,7 @@ def measured(plan: TablePlan) -> Recording:
         topic += f' (--effort names columns of it; not read are {plan.unread})'
     others: list[PositionRange] = []
     position, settings = plan.sources[0], plan.settings
-    # of joints that were not requested, if their unit is known
+    # joints that were not requested, with known unit
     if not (settings.gear or settings.zero) and len(set(position.factor)) == 1:
         for label, column in position.rest.items():
             values = column.finite * position.factor[0]
@@ -389,7 +389,7 @@ def measured(plan: TablePlan) -> Recording:
 
 
 def _times(plan: TablePlan) -> tuple[FloatArray, int]:
-    """Return times [s] since a stamp, and this stamp [ns]; 1 s if none is known."""
+    """Return times [s] since a stamp, and this stamp [ns]; the stamp is 1 s if unknown."""
     if plan.time is None:
         assert plan.rate_hz is not None
         return np.arange(len(plan.table)) / plan.rate_hz, 10**9
@@ -403,6 +403,6 @@ def _times(plan: TablePlan) -> tuple[FloatArray, int]:
     if not len(there):
         raise RecordingError(f'{plan.table.source}: column {plan.time.name} has no time in it')
     origin = float(there[0])
-    epoch = origin * scale > 1e8  # later times are counted from 1970
-    # Differences first: counted from 1970, nanoseconds do not fit into a float.
+    epoch = origin * scale > 1e8  # later times count from 1970
+    # Differences first: nanoseconds since 1970 do not fit into a float.
     return (values - origin) * scale, int(origin * scale * 1e9) if epoch else 10**9

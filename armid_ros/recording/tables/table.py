@@ -74,7 +74,7 @@ class TableColumn:
         unit, bracket = _normal_unit(self.unit), _BRACKETS.search(name)
         if bracket and not unit:
             unit = _normal_unit(bracket[1])
-        elif not unit:  # as in act_pos_deg[3]
+        elif not unit:  # name such as act_pos_deg[3]
             plain = re.sub(r'\[\d+\]$', '', name).rstrip('0123456789_').lower()
             unit = next((_UNITS[end] for end in _ENDINGS if plain.endswith(f'_{end}')), '')
         object.__setattr__(self, 'unit', unit)
@@ -129,7 +129,7 @@ class Table:
         object.__setattr__(self, 'columns', there)
         object.__setattr__(self, 'words', {**empty, **self.words})
         if not there:
-            raise RecordingError(f'{self.source}: there is no column of numbers in it')
+            raise RecordingError(f'{self.source}: it has no column of numbers')
         if len({len(column.values) for column in there}) > 1:
             counts = ', '.join(f'{c.name} {len(c.values)}' for c in there)
             raise RecordingError(f'{self.source}: columns differ in length: {counts}')
@@ -161,7 +161,7 @@ class Table:
                 raise RecordingError(
                     f"{self.source}: {len(named)} columns are called '{name}', with different "
                     f'values, first in {self.where(row)}: {named[0].values[row]:g} and '
-                    f'{other.values[row]:g}; give each a name of its own'
+                    f'{other.values[row]:g}; give them different names'
                 )
         return named[0] if named else None
 
@@ -190,7 +190,7 @@ class Table:
 
 
 def _at_most(names: Sequence[str]) -> str:
-    """Format the first names of a list, and the number of further ones."""
+    """Format the first names of a list, and the number of further names."""
     most = 40
     more = f' and {len(names) - most} more' if len(names) > most else ''
     return ', '.join(names[:most]) + more
@@ -225,7 +225,7 @@ def table_of_arrays(
     }
     counts = Counter(size for values in usable.values() for size in set(values.shape) if size > 1)
     if not counts:
-        raise RecordingError(f'{source}: there is no array of numbers in it')
+        raise RecordingError(f'{source}: it has no array of numbers')
     length = max(counts, key=lambda size: (counts[size] if size > 50 else 0, size))
     columns: list[TableColumn] = []
     for name, values in usable.items():

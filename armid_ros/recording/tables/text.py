@@ -41,7 +41,7 @@ def read_text(path: Path) -> Table:
     names = _split(header, separator) if header else [f'[{k}]' for k in range(len(cells))]
     if len(names) != len(cells):
         raise RecordingError(
-            f'{path}: {len(names)} names ({", ".join(names[:6])} ...) stand above {len(cells)} '
+            f'{path}: {len(names)} names ({", ".join(names[:6])} ...), but {len(cells)} '
             f'values in line {first + 1}'
         )
     widths = [len(_elements(cell)) or None for cell in cells]
@@ -118,7 +118,7 @@ def _has_numbers(line: str) -> bool:
 
 
 def _as_many(header: str, row: str) -> bool:
-    """Return whether two lines have equally many cells."""
+    """Return whether two lines have the same number of cells."""
     separator = _separator([row])
     return bool(header) and len(_split(header, separator)) == len(_split(row, separator))
 
@@ -142,7 +142,7 @@ def _elements(cell: str) -> list[str]:
 
 
 def _number(cell: str, separator: str) -> float:
-    """Convert a cell to a number, NaN if empty; raise a ValueError for a word."""
+    """Convert a cell to a number, NaN if empty; raise a ValueError for text."""
     if cell.lower() in _EMPTY:
         return np.nan
     if separator != ',' and _DECIMAL_COMMA.fullmatch(cell):
@@ -158,7 +158,7 @@ def _numbers(
     widths: list[int | None],
     first_line: int,
 ) -> tuple[FloatArray, dict[str, Sequence[str]], tuple[str, ...]]:
-    """Return the values, shape (N, columns), cells of words by column, and notes."""
+    """Return the values, shape (N, columns), text cells by column, and notes."""
     with suppress(ValueError):  # fast path if every cell is a number
         delimiter = None if separator == ' ' else separator
         values = np.loadtxt(io.StringIO('\n'.join(rows)), delimiter=delimiter, ndmin=2)
@@ -185,7 +185,7 @@ def _numbers(
                 values[k, j] = _number(cell, separator)
             except ValueError:
                 said.setdefault(j, {})[k] = cell
-    # a column with fewer numbers is one of words
+    # a column with fewer numbers contains text
     numeric = np.isfinite(values).mean(axis=0) >= 0.5
     wrong = [(j, *next(iter(of.items()))) for j, of in said.items() if numeric[j]]
     if wrong:

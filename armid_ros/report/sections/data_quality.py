@@ -97,7 +97,7 @@ def _repeatability(
                     joint,
                     f'{digits(varying[k])} {unit}',
                     f'{digits(residual[k])} {unit}',
-                    # from half of the residual on, a better model would help
+                    # with half of the residual or more, the model can be improved
                     TableCell(f'{shares[k]:.0f} %', 'telling' if shares[k] > 50.0 else ''),
                 )
             )
@@ -128,7 +128,7 @@ def repeatability(fits: Sequence[Fit]) -> tuple[float, FloatArray, FloatArray] |
 
     Two periods are compared in the longest stretch of a recording; None where nothing repeats. The
     difference is of the residual, in which each period has its own positions. Torque that depends
-    on the motion alone cancels, be it modelled or not.
+    on the motion alone cancels, modelled or not.
 
     Returns
     -------
@@ -141,7 +141,7 @@ def repeatability(fits: Sequence[Fit]) -> tuple[float, FloatArray, FloatArray] |
 
     """
     fit = max(fits, key=lambda one: len(one.motion))
-    # a period is looked for in the first 150 s
+    # the period is searched for in the first 150 s
     count = int(np.searchsorted(fit.motion.t, fit.motion.t[0] + 150.0))
     motion = fit.motion.select(slice(count))
     fewest = 20  # pairs of samples for a standard deviation

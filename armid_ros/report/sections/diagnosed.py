@@ -163,7 +163,7 @@ def evidence_section(diagnosis: Diagnosis) -> ContentSection:
 
 
 def minor_section(diagnosis: Diagnosis, patched: bool) -> ContentSection:
-    """Return the effects that are significant, and negligible or not confirmed, or added too."""
+    """Return the significant effects that are negligible, not confirmed, or added on request."""
     rows = [
         (
             name_in_words(one.name),
@@ -189,7 +189,7 @@ def minor_section(diagnosis: Diagnosis, patched: bool) -> ContentSection:
 
 
 def detectable_section(sizes: Sequence[Detectable]) -> ContentSection:
-    """Return the smallest detectable size of every effect, where it shows best and worst."""
+    """Return the smallest detectable sizes of every effect, on the best and on the worst joint."""
     rows = [_detectable_row(name, sizes) for name in dict.fromkeys(one.name for one in sizes)]
     return ContentSection(
         'Smallest detectable effects',
@@ -246,7 +246,7 @@ def isolability_section(isolability: Isolability) -> ContentSection:
 
 
 def _detectable_row(name: str, sizes: Sequence[Detectable]) -> tuple[str, str, str, str]:
-    """Return the cells of one effect, below the heads `_DETECTABLE`."""
+    """Return the cells of one effect, for the columns `_DETECTABLE`."""
 
     def place(one: Detectable) -> str:
         return ', '.join(one.joints) or 'the arm'

@@ -25,7 +25,7 @@ from sensor_msgs.msg import JointState
 from std_msgs.msg import ColorRGBA
 from visualization_msgs.msg import Marker, MarkerArray
 
-#: Sizes as shares of the reach of the arm: arrow at the full scale, its shaft, letters.
+#: Sizes as shares of the reach of the arm: full-scale arrow, shaft, letters.
 _ARROW, _SHAFT, _LETTER = 0.25, 0.015, 0.05
 
 
@@ -74,7 +74,7 @@ class ResidualMarkersNode(ListeningNode):
         self.look_every(1.0 / self.value('rate'), self.draw)
 
     def condition(self) -> tuple[str, Mapping[str, object]]:
-        """Return what is missing to draw the arm, and the share that colours each joint."""
+        """Return the missing inputs, and the residual share that colours each joint."""
         if self.robot is None:
             return self.awaited, {}
         if not np.isfinite(self._q).all():
@@ -95,7 +95,7 @@ class ResidualMarkersNode(ListeningNode):
         for number, marker in enumerate(markers):
             marker.header.frame_id, marker.header.stamp = self._frame, stamp
             marker.id = number
-            marker.lifetime = Duration(sec=2)  # s; markers that are not drawn anew vanish
+            marker.lifetime = Duration(sec=2)  # s; markers disappear unless they are drawn again
         self._markers.publish(MarkerArray(markers=markers))
 
     def _of_joints(self, robot: Robot) -> Sequence[Marker]:
@@ -168,9 +168,9 @@ class ResidualMarkersNode(ListeningNode):
         self._told = f'{message.verdict.replace("_", " ")}: {message.summary}'
 
     def _averaged(self, what: str, t: float, before: FloatArray, values: FloatArray) -> FloatArray:
-        """Update a mean square with a sample; the first sample starts the average."""
+        """Update a running mean square with a sample."""
         step, self._seen[what] = t - self._seen[what], t
-        # averages over 2 s
+        # averaging time of 2 s
         share = 1.0 if not before.any() else float(np.clip(step / 2.0, 0.0, 1.0))
         return np.asarray(before + share * (values**2 - before))
 

@@ -1,7 +1,7 @@
 # Copyright 2026 The armid_ros developers
 # SPDX-License-Identifier: Apache-2.0
 """
-Two links driven through springs: identification in three steps.
+Identification of two links with elastic transmissions, in three steps.
 
 Rigid least squares; subspaces of each joint on its own, with computed interaction torques as
 inputs; physical parameters, tuned to closed-loop step responses. ``identify_two_inertia`` runs all

@@ -130,7 +130,7 @@ def read_sides(
     path: str | Path, robot: Robot, settings: ReadSettings = DEFAULT
 ) -> tuple[Recording, Recording]:
     """
-    Read motors and links of any arm from a bag.
+    Read the motions of motors and links of any arm from a bag.
 
     Raises
     ------
@@ -173,7 +173,7 @@ def _experiments(
 def _common(
     path: str | Path, names: Sequence[str], stamps: Sequence[npt.NDArray[np.int64]]
 ) -> npt.NDArray[np.int64]:
-    """Return the timestamps that all topics have in common [us]; some messages may be lost."""
+    """Return the timestamps that all topics share [us]; some messages may be lost."""
     common: npt.NDArray[np.int64] = reduce(np.intersect1d, stamps)
     # least share of samples with a common timestamp on all topics
     if len(common) < 0.9 * max(map(len, stamps)):

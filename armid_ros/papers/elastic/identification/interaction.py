@@ -1,7 +1,7 @@
 # Copyright 2026 The armid_ros developers
 # SPDX-License-Identifier: Apache-2.0
 """
-Steps 2 and 3a: each joint separately, with the interaction torque of the other link as input.
+Steps 2 and 3a: single joints, with the interaction torque of the other link as input.
 
 Keep alpha for link 1 and beta for link 2 and call the rest of the link equations interaction
 torques ti; then alpha v1' + dl1 v1 = tau_g1 - ti1 and beta v2' + dl2 v2 = tau_g2 - ti2, which are

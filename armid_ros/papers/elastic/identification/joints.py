@@ -94,7 +94,7 @@ def fit_transmission(records: Sequence[TwoEncoders], rng: np.random.Generator) -
     pieces = [_columns(record) for record in records]
     if sum(len(twist) for _, twist, _, _ in pieces) < 50:
         raise IdentificationError('the joint hardly moves: its stiffness cannot be found')
-    table, twist, blocks = _joined(pieces)
+    table, twist, blocks = _stacked_recordings(pieces)
     reversals = sum(count for _, _, _, count in pieces)
     # number of draws of bootstrap blocks
     draws = [rng.choice(len(blocks), len(blocks)) for _ in range(400)]
@@ -139,10 +139,10 @@ def _columns(record: TwoEncoders) -> tuple[FloatArray, FloatArray, FloatArray, i
     return own[moving], np.asarray((motor - link)[moving]), times, changes
 
 
-def _joined(
+def _stacked_recordings(
     pieces: Sequence[tuple[FloatArray, FloatArray, FloatArray, int]],
 ) -> tuple[FloatArray, FloatArray, list[IntArray]]:
-    """Stack recordings, each with its own slope and offset, and cut them into blocks."""
+    """Stack recordings, with one slope and offset per recording, and cut them into blocks."""
     rows = sum(len(twist) for _, twist, _, _ in pieces)
     shared, count = pieces[0][0].shape[1] - 2, len(pieces)
     table = np.zeros((rows, shared + 2 * count))
@@ -221,7 +221,7 @@ class SpringEstimate:
 
     @property
     def antiresonance(self) -> float:
-        """Natural frequency of the link on its spring with the motor held [Hz]."""
+        """Natural frequency of the link on its spring with a blocked motor [Hz]."""
         return float(np.sqrt(self.transmission.stiffness[0] / self.inertia) / (2.0 * np.pi))
 
     @property

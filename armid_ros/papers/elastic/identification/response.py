@@ -3,9 +3,9 @@
 """
 Closed-loop velocity responses of the two-link arm, with exact derivatives by its parameters.
 
-Many runs at once, as arrays; the derivatives come from the complex step, f(x + ih) = f + ih f',
-through every operation of the integration, friction included: the real part decides which joints
-slip and which stick. The scheme is the plant's: the Pade approximation (2, 2) of the exponential
+All runs are integrated together, as arrays. Derivatives are computed by the complex step, f(x +
+ih) = f + ih f', through the whole integration, friction included: the real part decides which
+joints slip or stick. The scheme is the plant's: the Pade approximation (2, 2) of the exponential
 for motors, springs and links, the middle of the step for what is not linear. Squire and Trapp 1998
 for the complex step. The thirteen parameters that are tuned are a vector with names.
 
@@ -68,7 +68,7 @@ _SUBSTEPS = 2
 @dataclass(frozen=True, eq=False)
 class Steps:
     """
-    Closed-loop experiments of equal length, to be simulated together.
+    Closed-loop experiments of equal length, which are simulated together.
 
     Attributes
     ----------
@@ -141,7 +141,7 @@ def sensitivities(
 
 def ringing(steps: Steps, parameters: TwoLinkParameters) -> FloatArray:
     """
-    Return derivatives of the velocities with respect to initial twist and link velocity.
+    Differentiate the velocities by initial twist and initial link velocity.
 
     Returns
     -------

@@ -85,7 +85,7 @@ def fit_rigid(runs: Sequence[ElasticRun]) -> RigidFit:
     products = normal.summed()[:-1, :-1]
     scale = np.sqrt(np.diag(products))
     if not np.all(scale > 0.0):
-        raise IdentificationError('the rigid fit needs motion of both joints; one stands')
+        raise IdentificationError('the rigid fit needs motion of both joints; one rests')
     sizes = np.linalg.eigvalsh(products / np.outer(scale, scale))
     # least singular value relative to the largest for identifiable columns
     if sizes[0] < 1e-6**2 * sizes[-1]:

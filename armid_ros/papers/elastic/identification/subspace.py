@@ -120,7 +120,7 @@ def identify_subspace(
     eigenvalues, vectors = np.linalg.eig(a)
     if np.any((np.abs(eigenvalues.imag) < 1e-12) & (eigenvalues.real <= 0.0)):
         raise IdentificationError(
-            f'subspace identification: order {order} gives poles that no sampled system has; '
+            f'subspace identification: order {order} gives impossible poles of a sampled system; '
             'use more data or another order'
         )
     poles = np.log(eigenvalues.astype(complex)) / dt
@@ -162,7 +162,7 @@ def _inputs(
     modal: ComplexArray,
     hold: Sequence[Hold],
 ) -> ComplexArray:
-    """Fit the input matrix to whole experiments, each with an initial state of its own."""
+    """Fit the input matrix to whole experiments, with one initial state per experiment."""
     m = experiments[0].u.shape[1]
     kept = np.flatnonzero(poles.imag >= 0.0)
     normal, right = [], []
@@ -188,7 +188,7 @@ def _inputs(
         else:
             b[k] = solution[place] + 1j * solution[place + 1]
             twin = int(np.argmin(np.abs(poles - poles[k].conj())))
-            # The eigenvectors of the pair are conjugate, so the inputs are.
+            # The eigenvectors of the pair are conjugate, and so are the inputs.
             b[twin] = b[k].conj()
             place += 2
     return b

@@ -4,9 +4,9 @@
 The three steps in order, from measured experiments to physical parameters, and step 3b.
 
 Step 3b fits simulated velocity responses to the measured ones: nonlinear least squares in the
-logarithms of the parameters, so that all stay positive. The data determine the sum of the viscous
-frictions of motor and link, dl + dm gear^2, but hardly their ratio. A free ratio makes the fit
-diverge, and a fixed one biases the stiffness. The ratio therefore has a prior with a standard
+logarithms of the parameters, which are therefore positive. The data determine the sum of the
+viscous frictions of motor and link, dl + dm gear^2, but hardly their ratio. A free ratio makes the
+fit diverge, and a fixed one biases the stiffness. The ratio therefore has a prior with a standard
 deviation of a factor of two. Coulomb torques start from step 1 and are nuisance parameters. An arm
 at rest still vibrates: these initial vibrations are treated as correlated noise of the velocities.
 
@@ -93,7 +93,7 @@ def tune(
     loop: VelocityLoop,
 ) -> Tuning:
     """
-    Tune the parameters to velocity responses under the loop that drove them.
+    Tune the parameters to closed-loop velocity responses.
 
     Parameters
     ----------
@@ -311,7 +311,7 @@ def identify_two_inertia(
     if not (first > 0.0 and beta > 0.0 and first * beta > gamma**2):
         raise IdentificationError(
             f'step 1 found alpha + mm gear^2 = {first:.3g}, beta = {beta:.3g} and gamma = '
-            f'{gamma:.3g} kg m^2, which no two links have. Is the slow motion strong enough? Do '
+            f'{gamma:.3g} kg m^2, which is impossible. Is the slow motion strong enough? Do '
             'torques and velocities of a joint have the same sign?'
         )
     alpha = max(first - max(rotor, 0.0), 1.01 * gamma**2 / beta)
@@ -340,7 +340,7 @@ def identify_two_inertia(
         begin = untuned if start is None else replace(start, coulomb=untuned.coulomb)
         tuning = tune(steps, begin, loop)
     progress(1.0, 'done')
-    # poses that represent all poses
+    # representative poses
     angles = np.quantile(
         np.concatenate([run.link.q[:, 1] for run in runs]), np.linspace(0.02, 0.98, 25)
     )

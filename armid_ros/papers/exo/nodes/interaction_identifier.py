@@ -41,7 +41,7 @@ _DAMAGED = DISTURBANCES | {
 
 class InteractionIdentifierNode(ArmidNode):
     """
-    Identifies the springs between exoskeleton and wearer, from torques and both's angles.
+    Identifies the springs between exoskeleton and wearer from torques and joint angles.
 
     Attributes
     ----------
@@ -178,7 +178,7 @@ class InteractionIdentifierNode(ArmidNode):
                     raise RecordingError(f'{len(message.name)} names but {len(part)} of {name}')
             signal = np.concatenate([part[order] for part in parts])
             if not np.all(np.abs(signal) <= LARGEST):
-                raise RecordingError('values that no machine reaches')
+                raise RecordingError('implausibly large values')
             stamp = message.header.stamp
             if stamp.sec < 0 or stamp.nanosec >= 10**9:
                 raise RecordingError('an invalid timestamp')

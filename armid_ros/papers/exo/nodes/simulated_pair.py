@@ -128,7 +128,7 @@ class SimulatedPairNode(ArmidNode):
         return self.stamp_ns
 
     def catch_up(self) -> None:
-        """Simulate up to real time times the factor; a delay that is too long is dropped."""
+        """Simulate up to real time times the factor; skip time that cannot be caught up."""
         if not self.pair.fallen:
             factor = self.value('real_time_factor')
             skipped = self.real_time.catch_up(factor, 1.0 / self.value('rate'))

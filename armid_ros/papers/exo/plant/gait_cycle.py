@@ -83,7 +83,7 @@ class GaitCycle:
         return np.asarray(ground.reshape(-1, 2, 2, 2).sum(axis=2))
 
     def trunk_moment(self, *, other: bool = False) -> FloatArray:
-        """Return the moment from outside that keeps the trunk at its lean, shape (N,) [N m]."""
+        """Return the external moment that keeps the lean of the trunk, shape (N,) [N m]."""
         robot = self.pair.other if other else self.pair.robot
         tau = self.torques.other_tau if other else self.torques.tau
         return np.asarray(tau[:, floating(robot)[2]])
@@ -91,13 +91,13 @@ class GaitCycle:
     def support(self, *, other: bool = False) -> npt.NDArray[np.int_]:
         """Return the number of feet that bear weight, shape (N,)."""
         robot = self.pair.other if other else self.pair.robot
-        # a foot that bears less does not count
+        # smallest considered load of a foot
         return np.asarray(np.sum(self.feet(other=other)[:, :, 1] > 0.01 * weight(robot), axis=1))
 
 
 @dataclass(frozen=True)
 class _Course:
-    """Points of one machine about its hips over a cycle, every half step of the integration."""
+    """Points of one machine relative to its hips over a cycle, at every half integration step."""
 
     contact: FloatArray  # (2 K, 4, 2)
     contact_speed: FloatArray

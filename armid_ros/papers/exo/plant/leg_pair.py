@@ -3,8 +3,8 @@
 """
 Two machines tied by springs: joint torques, spring forces, and motions on one foot.
 
-A pair is any two robots with a common base frame. The shipped one is a man and the exoskeleton
-that he wears, tied at both thighs and both shanks.
+A pair is any two robots with a common base frame. The shipped pair is a man with an exoskeleton,
+tied at both thighs and both shanks.
 
 The exercises of a person for an identification are sums of a few sines of hip and knee of both
 legs; the stance foot is flat and the trunk upright. The machine follows its wearer with less
@@ -113,7 +113,7 @@ class TiedPair(TiedMachines):
 
 class PairMotion(NamedTuple):
     """
-    Motions of both machines on one time base.
+    Motions of both machines on a common time base.
 
     Attributes
     ----------
@@ -251,7 +251,7 @@ def following(
     pair: TiedPair, t: FloatArray, moving: Callable[[tuple[str, ...], FloatArray], Motion]
 ) -> PairMotion:
     """
-    Return the motions of wearer and machine; the machine follows late, with errors.
+    Return the motions of wearer and machine; the machine follows with delay and errors.
 
     Parameters
     ----------

@@ -51,7 +51,7 @@ def splined(t: FloatArray, tau: FloatArray, rate: float) -> DrivingTorque:
 
 def runge_kutta(rate: Rate, k: int, h: float, x: FloatArray) -> tuple[FloatArray, FloatArray]:
     """
-    Advance a state over samples k to k + 2, of which k + 1 is the middle, to order 4.
+    Advance a state by one Runge-Kutta step of order 4, from sample k over k + 1 to k + 2.
 
     Parameters
     ----------
@@ -87,7 +87,7 @@ def drive_by_torque(
     on_ground: bool = False,
 ) -> Motion:
     """
-    Integrate the driven joints of the machine; everything else moves as prescribed.
+    Integrate the driven joints of the machine; all other joints follow the prescribed motion.
 
     Parameters
     ----------
@@ -224,7 +224,7 @@ _BLOCK = 50
 @dataclass(frozen=True, eq=False)
 class PairSample:
     """
-    One reading of both machines.
+    One sample of the sensor readings of both machines.
 
     Attributes
     ----------

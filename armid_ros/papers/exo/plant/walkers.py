@@ -1,7 +1,7 @@
 # Copyright 2026 The armid_ros developers
 # SPDX-License-Identifier: Apache-2.0
 """
-The leg pair that is free to walk: floating hips, the ground, and gaits whose feet do not slide.
+Walking leg pair: floating hips, ground contact, and gaits without sliding feet.
 
 The root of a description moves from the foot to the trunk, so that either foot can be on the
 ground. Two slides and a hinge connect ground and trunk; hip, knee and ankle of each leg follow.
@@ -118,7 +118,7 @@ def walkable(
     lean: float | None = None,
 ) -> WalkableGait:
     """
-    Find the nearest gait whose feet do not move on the ground.
+    Find the nearest gait without sliding feet.
 
     Parameters
     ----------
@@ -211,7 +211,7 @@ class _Curves:
 
 
 def _hanging(angle: FloatArray) -> FloatArray:
-    """Return unit vectors down, turned forward, shape (N, 2)."""
+    """Return downward unit vectors, rotated forward by angles, shape (N, 2)."""
     return np.column_stack([np.sin(angle), -np.cos(angle)])
 
 
@@ -278,7 +278,7 @@ def walker(robot: Robot) -> Robot:
         (FLOATING[2], trunk, '0 1 0', 'stance_hip'),
     ):
         body = None if of is None else robot.model.inertias[robot.index(f'{prefix}_{of}') + 1]
-        parts.append(_hung(f'{prefix}_{joint}', parent, child, axis, body))
+        parts.append(_joint_urdf(f'{prefix}_{joint}', parent, child, axis, body))
         parent = child
     lengths = leg_length(robot)
     for side in SIDES:
@@ -287,7 +287,7 @@ def walker(robot: Robot) -> Robot:
         for joint, link, axis, end in zip(_LEG, _LINKS, _AXES, ends, strict=True):
             child = f'{prefix}_{side}_{link}'
             body = robot.model.inertias[robot.index(f'{prefix}_swing_{joint}') + 1]
-            parts.append(_hung(f'{prefix}_{side}_{joint}', parent, child, axis, body, end))
+            parts.append(_joint_urdf(f'{prefix}_{side}_{joint}', parent, child, axis, body, end))
             parent = child
     return robot_from_urdf(''.join([*parts, '</robot>']), source=robot.name)
 
@@ -343,10 +343,10 @@ def contacts(robot: Robot) -> tuple[list[str], FloatArray]:
     return ankles, np.tile([[0.0, 0.0, 0.0], [leg_length(robot).foot, 0.0, 0.0]], (2, 1))
 
 
-def _hung(
+def _joint_urdf(
     joint: str, parent: str, child: str, axis: str, body: pin.Inertia | None, up: float = 0.0
 ) -> str:
-    """Return the URDF of a joint and the link that it moves; one without a body slides."""
+    """Return the URDF of a joint and its link; a joint to a link without a body is a slide."""
     kind, far, inside = 'prismatic', '1000', ''
     if body is not None:
         kind, far = 'revolute', '3.2'

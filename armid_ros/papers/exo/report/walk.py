@@ -136,7 +136,7 @@ class Walk(Section):
         machines += [d.right.motion.select(rows // 2) for d in self.driven]
         geometry = cycle.pair.geometry(machines[0], wearer)
         start = geometry.other_position[..., [0, 2]]
-        end = start + 4.0 * geometry.way[..., [0, 2]]  # magnified four times, to be visible
+        end = start + 4.0 * geometry.way[..., [0, 2]]  # magnified four times for visibility
         arrows = []  # points and forces of ground contact: feet of the wearer, then of the machine
         for robot, motion, ground in (
             (cycle.pair.other, wearer, cycle.other_ground),
