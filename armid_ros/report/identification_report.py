@@ -123,13 +123,12 @@ def identification_report(
     if grade is None:
         grade = graded(result, description, recordings, validation, validation_recordings)
     judgement = judge(result, validation, [*recordings, *validation_recordings], verification)
+    is_urdf = assessment.reference == 'description'
+    unlike = _contradictions(result, description) if is_urdf else []
     read = [
         *((one, 'training', training.get(one.source, ())) for one in recordings),
         *((one, 'held-out', validation.get(one.source, ())) for one in validation_recordings),
     ]
-    unlike = []
-    if assessment.reference == 'description':
-        unlike = _unlike_description(not_as_described(result, description))
     forward, noise = (verification.forward, verification.noise) if verification else ((), None)
     sections: list[Section] = [
         VerdictSection(
@@ -167,8 +166,9 @@ def identification_report(
     return Page(f'Identification of {described.name}', subtitle, sections, names=names).html()
 
 
-def _unlike_description(counts: Mapping[str, tuple[int, int]]) -> list[str]:
+def _contradictions(result: Identification, description: ArmModel) -> list[str]:
     """Return a sentence on rigid-body parameters that contradict the URDF, or none."""
+    counts = not_as_described(result, description)
     joints = [joint for joint, (differ, _) in counts.items() if differ]
     differ, count = (sum(numbers) for numbers in zip(*counts.values(), strict=True))
     return [
