@@ -141,7 +141,7 @@ def fit(
     source = options.kept_source(robot_source, robot, staged.folder)
     save_model(staged.folder / 'model.yaml', found.model(), source)
     document = fit_document(found, known, link_error, external)
-    step = f'armid diagnose RUN --robot {robot_source} --model {out / "model.yaml"}'
+    step = f'armid identify RECORDING --robot {robot_source}, which also finds friction in motion'
     summary = None if as_json else fit_summary(found, document, step)
     options.deliver_document(staged, 'zero', document, summary, 'model.yaml')
 

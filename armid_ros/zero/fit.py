@@ -363,7 +363,7 @@ def fit_summary(found: ZeroFit, document: dict[str, Any], step: str) -> Summary:
     determined = sum(not one.reason for one in found.quantities)
     title = ', '.join(parts) or f'{determined} of {len(found.quantities)} quantities'
     lines = [
-        f'{found.rests} rests in {found.poses} poses; {found.outliers} outliers left out; '
+        f'{found.rests} rests in {found.poses} poses; outliers left out: {found.outliers}; '
         f'held known: {", ".join(document["held"])}'
     ]
     undetermined: dict[str, list[str]] = {}

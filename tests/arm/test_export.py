@@ -46,6 +46,14 @@ def test_mujoco_has_a_place_for_rotor_inertia(arm):
     assert {line.split(':')[0] for line in exported.without_place} == {'torque_offset'}
 
 
+def test_dry_friction_in_mujoco_acts_in_slow_motion(arm):
+    model = mujoco.MjModel.from_xml_string(arm_mjcf(arm).text)
+    data = mujoco.MjData(model)
+    data.qvel[:] = 0.5
+    mujoco.mj_forward(model, data)
+    np.testing.assert_allclose(data.qfrc_constraint, -0.2, rtol=1e-3)
+
+
 def test_a_payload_is_part_of_its_link(arm):
     payload = np.concatenate([0.5 * np.array([1.0, 0.0, 0.0, 0.03]), [1e-3, 0, 1e-3, 0, 0, 1e-3]])
     loaded = arm.with_effect(make_effect('payload', arm.robot), payload)

@@ -96,7 +96,7 @@ def test_a_fit_finds_what_is_hidden_and_writes_it(tmp_path, robot, recorded, sec
     assert rows['tilt', '']['value'] == pytest.approx(np.degrees(np.hypot(*secret.tilt)), abs=0.3)
     lines = said.strip().splitlines()
     assert lines[0].split(':')[0] in ('DETERMINED', 'IN PART') and 'tilted by' in lines[0]
-    assert lines[-1].startswith('next: armid diagnose')
+    assert lines[-1].startswith('next: armid identify')
     arm = ar.load_model(tmp_path / 'zeros' / 'model.yaml')
     values = {effect.name: v for effect, v in zip(arm.effects, arm.values, strict=True)}
     assert values['payload'][0] == rows['mass', '']['value']
