@@ -171,7 +171,7 @@ def test_environment_file_is_read(tmp_path):
         ('- {name: floor, kind: plane, position: [0, 0]}', 'position.* 3'),
         ('- {name: rock, kind: mesh}', 'file'),
         ('- [', 'cell.yaml'),
-        ('- {name: 3, kind: plane}', 'texts'),
+        ('- {name: 3, kind: plane}', 'strings'),
         ('- {name: floor, kind: plane, ignore: 3}', 'obstacle 1'),
     ],
 )

@@ -43,5 +43,5 @@ def test_a_joint_that_stands_is_refused(runs) -> None:
         motor = replace(run.motor, dq=run.motor.dq * stop)
         link = replace(run.link, dq=run.link.dq * stop, ddq=run.link.ddq * stop)
         still.append(replace(run, motor=motor, link=link))
-    with pytest.raises(IdentificationError, match='stands'):
+    with pytest.raises(IdentificationError, match='rests'):
         fit_rigid(still)
