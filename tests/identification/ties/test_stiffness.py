@@ -115,7 +115,7 @@ def test_data_that_cannot_tell_are_refused(pair, poses) -> None:
     same = replace(poses.own, q=poses.other.q)
     one = TiedMachines(pair.robot, pair.other, pair.ties[:1])
     problem = interaction_problem(one, same, poses.other)
-    with pytest.raises(IdentificationError, match='nothing shows'):
+    with pytest.raises(IdentificationError, match='not identifiable'):
         identify_interaction(problem)
     with pytest.raises(IdentificationError, match='no torques'):
         interaction_problem(pair, poses.own.with_torque(None), poses.other)
