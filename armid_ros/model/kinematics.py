@@ -103,10 +103,7 @@ class LinkFrames:
             If the robot has no such joint.
 
         """
-        ends = [
-            robot.index(joint) if robot.mechanism is None else robot.moving.index(joint)
-            for joint in joints or robot.moving
-        ]
+        ends = [robot.tree.index(joint) for joint in joints or robot.moving]
         frames: dict[int, _Frame] = {}
         lines, turns = np.zeros((2, len(robot.moving), 3, len(q)))
         coupling = None

@@ -13,6 +13,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
+from functools import cached_property
 from itertools import pairwise
 
 from armid_ros.arm import ArmModel
@@ -153,13 +154,13 @@ class LoopModel:
     robot: Robot
     compensated: bool = False
 
-    @property
+    @cached_property
     def bare(self) -> ArmModel:
         """Return the described arm with the effects of the fit, all zero."""
         names = 'rotor_inertia', 'viscous_friction', 'coulomb_friction', 'payload'
         return ArmModel.of(self.robot, effects=names)
 
-    @property
+    @cached_property
     def parameters(self) -> tuple[ParameterName, ...]:
         """Return the parameters: delay, gains of the joints, effects, place of the payload."""
         robot = self.robot

@@ -73,11 +73,10 @@ def unlisted_laws(explanation: Explanation, settings: DiagnosisSettings) -> list
     for law in _laws([linear.arm.link_motion(part.at_rows) for part in rows.data], joints):
         joint = joints.index(law.joints[0])
         columns = [law.columns(part.at_rows, linear.arm) for part in rows.data]
-        fits = []
+        unit = np.full(len(law.knots), misfit[joint])
+        cause, fits = cause_of(linear, SelectedEffect(law, ()), columns, unit), []
         for size in (_USUAL, *_NEW):
-            unit = np.full(len(law.knots), size * misfit[joint])
-            cause = cause_of(linear, SelectedEffect(law, ()), columns, unit)
-            with_law = linear.and_cause(cause, 1.0)
+            with_law = linear.and_cause(cause, size)
             under = with_law.marginal(problem.setting, problem.recordings)
             fits.append(under.evidence)
         odds = np.logaddexp.reduce(fits[1:]) - np.log(len(_NEW)) - fits[0]
