@@ -17,7 +17,7 @@ import mujoco
 import numpy as np
 import pytest
 
-from tests.mechanisms.machines import compiled, load, MACHINES, RATE, recorded
+from tests.mechanisms.machines import compiled, MACHINES, RATE, recorded
 
 VISCOUS, COULOMB = 0.4, 0.3  # N m s/rad, N m
 CARRIED = {
@@ -42,16 +42,6 @@ def desired(robot, seconds, seed=0):
             )
     middle = np.clip(0.0, robot.lower, robot.upper)
     return Motion(robot.joints, t, middle + states[0], states[1], states[2])
-
-
-@pytest.fixture(scope='module', params=MACHINES)
-def name(request):
-    return request.param
-
-
-@pytest.fixture(scope='module')
-def robot(name, tmp_path_factory):
-    return load(name, tmp_path_factory.mktemp('machine'))
 
 
 @pytest.fixture(scope='module')

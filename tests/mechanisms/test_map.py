@@ -20,16 +20,6 @@ from tests.mechanisms.machines import load, MACHINES
 STEP = 1e-5
 
 
-@pytest.fixture(scope='module', params=MACHINES)
-def name(request):
-    return request.param
-
-
-@pytest.fixture(scope='module')
-def robot(name, tmp_path_factory):
-    return load(name, tmp_path_factory.mktemp('machine'))
-
-
 @pytest.fixture(scope='module')
 def motion(robot):
     return random_motion(robot, np.random.default_rng(0), 20)

@@ -2,21 +2,22 @@
 # SPDX-License-Identifier: Apache-2.0
 """`armid positions`: what it reads, writes and refuses."""
 
+from functools import partial
 import json
 
 import armid_ros as ar
-from armid_ros.errors import ArmidError, RecordingError, RobotError
+from armid_ros.errors import RecordingError, RobotError
 from armid_ros.positions.command import gains_of, positions
 from armid_ros.positions.commands import read_commands
 from armid_ros.recording import read_recording
 from armid_ros.recording.joint_state.encoder import write_joint_states
 from armid_ros.recording.writer import whole_bag
-from click.testing import CliRunner
 import numpy as np
 import pytest
 from rosbags.typesys import get_types_from_msg, get_typestore, Stores
 
 from docsite.schemas import faults
+from tests.command import run_command
 from tests.positions.machine import play, random_chain, Secret
 
 #: Part of the message that a joint_trajectory_controller publishes.
@@ -27,13 +28,7 @@ trajectory_msgs/JointTrajectoryPoint reference
 """
 
 
-def run(*arguments):
-    """Run the command; return its output, or raise what it refuses."""
-    done = CliRunner().invoke(positions, [str(part) for part in arguments])
-    if isinstance(done.exception, ArmidError):
-        raise done.exception
-    assert done.exit_code == 0, done.output
-    return done.stdout
+run = partial(run_command, positions)
 
 
 @pytest.fixture(scope='module')

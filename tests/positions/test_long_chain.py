@@ -9,7 +9,7 @@ from armid_ros.positions.loop import CommandedMotion, LoopModel
 import numpy as np
 import pytest
 
-from tests.positions.machine import play, random_chain, Secret
+from tests.positions.machine import play, random_chain
 
 pytestmark = pytest.mark.long
 SECONDS = 12.0
@@ -18,13 +18,6 @@ SECONDS = 12.0
 @pytest.fixture(scope='module')
 def robot():
     return random_chain(np.random.default_rng(3))
-
-
-@pytest.fixture(scope='module')
-def secret(robot):
-    drawn = Secret.draw(robot, np.random.default_rng(4))
-    center = np.array([0.02, -0.03, 0.1])
-    return replace(drawn, delay=0.012, mass=0.5, center=center, noise=5e-5, velocities=True)
 
 
 @pytest.fixture(scope='module')

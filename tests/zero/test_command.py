@@ -3,10 +3,11 @@
 """`armid zero`: plan, rests of what plays it, and what the commands write and refuse."""
 
 from dataclasses import replace
+from functools import partial
 import json
 
 import armid_ros as ar
-from armid_ros.errors import ArmidError, IdentificationError
+from armid_ros.errors import IdentificationError
 from armid_ros.excitation import load_excitation
 from armid_ros.identification.known_payload import parse_payload, with_payload
 from armid_ros.nodes.parameters.excitation import checked, make_planner, PUBLISHER_PARAMETERS
@@ -14,22 +15,15 @@ from armid_ros.recording import write_recording
 from armid_ros.robots import load_robot
 from armid_ros.zero.command import zero
 from armid_ros.zero.rests import find_rests
-from click.testing import CliRunner
 import numpy as np
 import pinocchio as pin
 import pytest
 
 from docsite.schemas import faults
+from tests.command import run_command
 from tests.zero.machine import play, Secret
 
-
-def run(*arguments):
-    """Run the command; return its output, or raise what it refuses."""
-    done = CliRunner().invoke(zero, [str(part) for part in arguments])
-    if isinstance(done.exception, ArmidError):
-        raise done.exception
-    assert done.exit_code == 0, done.output
-    return done.stdout
+run = partial(run_command, zero)
 
 
 @pytest.fixture(scope='module')
