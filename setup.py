@@ -65,10 +65,8 @@ setup(
     license='Apache-2.0',
     packages=find_packages(include=[NAME, f'{NAME}.*']),
     package_data={NAME: package_data()},
-    # without a compiler the simulator takes all steps in Python
-    ext_modules=[
-        Extension(f'{NAME}.simulation._kernel', [f'{NAME}/simulation/kernel.c'], optional=True)
-    ],
+    # without a compiler, Pinocchio and Python compute the same, more slowly
+    ext_modules=[Extension(f'{NAME}.model._kernel', [f'{NAME}/model/kernel.c'], optional=True)],
     data_files=[
         ('share/ament_index/resource_index/packages', [f'resource/{NAME}']),
         (f'share/{NAME}', ['package.xml']),

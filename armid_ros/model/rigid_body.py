@@ -4,6 +4,7 @@
 Rigid-body quantities over whole motions.
 
 Only this module loops over samples, as Pinocchio's algorithms take one configuration at a time.
+The compiled kernel computes torques and regressors where it was compiled.
 All its quantities are linear in the gravity vector and in the inertial parameters of the robot.
 
 """
@@ -15,6 +16,7 @@ import threading
 from weakref import WeakKeyDictionary
 
 from armid_ros.estimate import ParameterName
+from armid_ros.model.compiled import BodyOfKernel, kernel_body
 from armid_ros.motion import FloatArray, Motion
 from armid_ros.robots import Robot
 import numpy as np
@@ -50,20 +52,26 @@ def link_unit(name: str) -> tuple[str, ...]:
     return () if unit is None else (unit,)
 
 
-class _Scratch(threading.local):
-    """Work space of Pinocchio, cached per robot and thread, as its construction is slow."""
+class _Prepared(threading.local):
+    """Work space of Pinocchio and body of the kernel, cached per robot and thread."""
 
     def __init__(self) -> None:
-        self._of: WeakKeyDictionary[Robot, pin.Data] = WeakKeyDictionary()
+        self.data: WeakKeyDictionary[Robot, pin.Data] = WeakKeyDictionary()
+        self.bodies: WeakKeyDictionary[Robot, BodyOfKernel | None] = WeakKeyDictionary()
 
-    def of(self, robot: Robot) -> pin.Data:
-        data = self._of.get(robot)
+    def data_of(self, robot: Robot) -> pin.Data:
+        data = self.data.get(robot)
         if data is None:
-            data = self._of[robot] = robot.model.createData()
+            data = self.data[robot] = robot.model.createData()
         return data
 
+    def body_of(self, robot: Robot) -> BodyOfKernel | None:
+        if robot not in self.bodies:
+            self.bodies[robot] = kernel_body(robot)
+        return self.bodies[robot]
 
-_SCRATCH = _Scratch()
+
+_PREPARED = _Prepared()
 
 
 def inverse_dynamics(robot: Robot, motion: Motion) -> FloatArray:
@@ -79,8 +87,12 @@ def inverse_dynamics(robot: Robot, motion: Motion) -> FloatArray:
     if robot.mechanism is not None:
         motion, jacobian = robot.mechanism.along(motion)
         return _projected(jacobian, inverse_dynamics(robot.tree, motion))
-    model, data = robot.model, _SCRATCH.of(robot)
     tau = np.empty((len(motion), robot.n_joints))
+    body = _PREPARED.body_of(robot)
+    if body is not None:
+        body.along(motion, 'torques', tau)
+        return tau
+    model, data = robot.model, _PREPARED.data_of(robot)
     for k, (q, dq, ddq) in enumerate(zip(motion.q, motion.dq, motion.ddq, strict=True)):
         tau[k] = pin.rnea(model, data, q, dq, ddq)
     return tau
@@ -127,7 +139,7 @@ def inverse_dynamics_derivatives(
         )
         by_q, by_dq, by_ddq = (whole - added for whole, added in pairs)
         return by_q, by_dq, by_ddq
-    model, data = robot.model, _SCRATCH.of(robot)
+    model, data = robot.model, _PREPARED.data_of(robot)
     n = robot.n_joints
     by_q, by_dq, by_ddq = np.empty((3, len(motion), n, n))
     for k, (q, dq, ddq) in enumerate(zip(motion.q, motion.dq, motion.ddq, strict=True)):
@@ -189,9 +201,13 @@ def regressor(robot: Robot, motion: Motion) -> FloatArray:
     if robot.mechanism is not None:
         motion, jacobian = robot.mechanism.along(motion)
         return _projected(jacobian, regressor(robot.tree, motion))
-    model, data = robot.model, _SCRATCH.of(robot)
     n = robot.n_joints
-    y = np.empty((len(motion), n, len(LINK_PARAMETERS) * n))
+    y = np.zeros((len(motion), n, len(LINK_PARAMETERS) * n))
+    body = _PREPARED.body_of(robot)
+    if body is not None:
+        body.along(motion, 'regressors', y)
+        return y
+    model, data = robot.model, _PREPARED.data_of(robot)
     for k, (q, dq, ddq) in enumerate(zip(motion.q, motion.dq, motion.ddq, strict=True)):
         y[k] = pin.computeJointTorqueRegressor(model, data, q, dq, ddq)
     return y

@@ -13,12 +13,18 @@ from __future__ import annotations
 
 from collections.abc import Callable
 import ctypes
-from functools import cache
-from importlib.util import find_spec
 from typing import Any, NamedTuple
 
+from armid_ros.model.compiled import (
+    ADDRESS,
+    BodyOfKernel,
+    COUNT,
+    kernel,
+    kernel_body,
+    REAL,
+    Structure,
+)
 from armid_ros.motion import FloatArray, Motion
-from armid_ros.robots import Robot
 from armid_ros.simulation.contacts import SPEED_TOLERANCE
 from armid_ros.simulation.controller import Controller, LinearFeedback
 from armid_ros.simulation.integrator import step
@@ -26,113 +32,38 @@ from armid_ros.simulation.plant import Plant, State
 import numpy as np
 import numpy.typing as npt
 
-_JOINT = np.dtype(
-    [
-        ('parent', np.int64),
-        ('slide', float, 3),
-        ('turn', float, 3),
-        ('origin', float, 3),
-        ('sliding', float, 3),
-        ('turning', float, (9, 3)),
-        ('mass', float),
-        ('first_moment', float, 3),
-        ('inertia', float, 9),
-    ]
-)
 _TORQUE_LAW = ctypes.CFUNCTYPE(ctypes.c_int)
-_ADDRESS, _REAL, _COUNT = ctypes.c_void_p, ctypes.c_double, ctypes.c_int64
 
 
-class _Structure(ctypes.Structure):
-    """Base of the C structures of the kernel, with references to the arrays that they use."""
-
-    arrays: tuple[npt.NDArray[Any], ...]
-
-    @property
-    def address(self) -> int:
-        return ctypes.addressof(self)
-
-
-class _Arm(_Structure):
+class _Controller(Structure):
     _fields_ = (
-        ('n', _COUNT),
-        ('gravity', _REAL * 3),
-        ('joints', _ADDRESS),
-        ('added_inertia', _ADDRESS),
+        ('arm', BodyOfKernel),
+        ('bandwidth', REAL),
+        ('follows', REAL),
+        ('stiffness', ADDRESS),
+        ('damping', ADDRESS),
     )
 
 
-class _Controller(_Structure):
+class _Plant(Structure):
     _fields_ = (
-        ('arm', _Arm),
-        ('bandwidth', _REAL),
-        ('follows', _REAL),
-        ('stiffness', _ADDRESS),
-        ('damping', _ADDRESS),
-    )
-
-
-class _Plant(_Structure):
-    _fields_ = (
-        ('arm', _Arm),
-        ('dt', _REAL),
-        ('speed_tolerance', _REAL),
-        ('damping', _ADDRESS),
-        ('constant', _ADDRESS),
-        ('lower', _ADDRESS),
-        ('upper', _ADDRESS),
-        ('lowest_torque', _ADDRESS),
-        ('highest_torque', _ADDRESS),
-        ('n_elements', _COUNT),
-        ('element_joint', _ADDRESS),
-        ('element_lower', _ADDRESS),
-        ('element_upper', _ADDRESS),
-        ('law_input', _ADDRESS),
-        ('law_torque', _ADDRESS),
+        ('arm', BodyOfKernel),
+        ('dt', REAL),
+        ('speed_tolerance', REAL),
+        ('damping', ADDRESS),
+        ('constant', ADDRESS),
+        ('lower', ADDRESS),
+        ('upper', ADDRESS),
+        ('lowest_torque', ADDRESS),
+        ('highest_torque', ADDRESS),
+        ('n_elements', COUNT),
+        ('element_joint', ADDRESS),
+        ('element_lower', ADDRESS),
+        ('element_upper', ADDRESS),
+        ('law_input', ADDRESS),
+        ('law_torque', ADDRESS),
         ('torque_law', _TORQUE_LAW),
     )
-
-
-@cache
-def kernel() -> ctypes.CDLL | None:
-    """Return the compiled kernel; None if it was not compiled."""
-    found = find_spec('armid_ros.simulation._kernel')
-    if found is None or found.origin is None:
-        return None
-    library = ctypes.CDLL(found.origin)
-    library.advance.restype = _COUNT
-    library.advance.argtypes = [*3 * [_ADDRESS], _REAL, _COUNT, _COUNT, *8 * [_ADDRESS]]
-    library.dynamics.argtypes = 6 * [_ADDRESS]
-    return library
-
-
-def rigid_body(robot: Robot, added_inertia: FloatArray, weighs: bool = True) -> _Arm:
-    """
-    Return a rigid-body model in the format of the kernel.
-
-    Parameters
-    ----------
-    robot : Robot
-        Robot of n joints.
-    added_inertia : ndarray, shape (n, n)
-        Inertia added to the inertia matrix of the robot [kg m^2].
-    weighs : bool
-        Whether gravity acts on the robot.
-
-    """
-    rows = [
-        (
-            *(joint.parent, joint.slide, joint.turn, joint.origin, joint.sliding),
-            joint.turning.reshape(9, 3),
-            *(body.mass, body.mass * body.lever, body.matrix()[3:, 3:].ravel()),
-        )
-        for joint, body in zip(robot.geometry, robot.model.inertias[1:], strict=True)
-    ]
-    joints, added = np.array(rows, _JOINT), np.ascontiguousarray(added_inertia)
-    gravity = (_REAL * 3)(*(weighs * robot.gravity))
-    arm = _Arm(len(joints), gravity, joints.ctypes.data, added.ctypes.data)
-    arm.arrays = joints, added
-    return arm
 
 
 class CompiledLoop:
@@ -145,13 +76,15 @@ class CompiledLoop:
         Plant of rigid joints without drives, hysteresis, load-dependent or coupled dry friction.
     feedback : LinearFeedback
         The feedback law of its controller.
+    body, nominal : BodyOfKernel
+        Rigid bodies of the plant and of the feedback law.
 
     """
 
-    def __init__(self, plant: Plant, feedback: LinearFeedback) -> None:
+    def __init__(
+        self, plant: Plant, feedback: LinearFeedback, body: BodyOfKernel, nominal: BodyOfKernel
+    ) -> None:
         robot, dry, n = plant.robot, plant.contacts, plant.robot.n_joints
-        body = rigid_body(robot, plant.added_inertia)
-        nominal = rigid_body(feedback.robot, feedback.added_inertia, feedback.weighs)
         far = np.full(n, np.inf)
         lower, upper = (robot.lower, robot.upper) if plant.hard_stops else (-far, far)
         self._law_input, self._law_torque = np.empty(1 + 2 * n), np.empty(n)
@@ -195,11 +128,12 @@ class CompiledLoop:
         usual = plant.springs is None and action.drive is None and action.hysteresis is None
         usual = usual and plant.robot.mechanism is None
         of_joints = dry.friction is None and dry.of_single_joints
-        feedback, library = controller.feedback, kernel()
-        if not (usual and of_joints) or feedback is None or library is None:
+        feedback = controller.feedback
+        if not (usual and of_joints) or feedback is None:
             return None
-        most = _COUNT.in_dll(library, 'most_joints').value
-        return cls(plant, feedback) if plant.robot.n_joints <= most else None
+        body = kernel_body(plant.robot, plant.added_inertia)
+        nominal = kernel_body(feedback.robot, feedback.added_inertia, feedback.weighs)
+        return None if body is None or nominal is None else cls(plant, feedback, body, nominal)
 
     def over(
         self, targets: Motion, rows: range, moved: FloatArray, tau: FloatArray

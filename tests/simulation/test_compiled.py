@@ -4,9 +4,11 @@
 
 from armid_ros.arm import ArmModel
 from armid_ros.effects import make_effect
+from armid_ros.model.compiled import kernel, kernel_body
+from armid_ros.motion import Motion
 from armid_ros.robots import load_robot, robot_from_urdf
 from armid_ros.simulation import ComputedTorque, GravityPD, Plant, Reference, simulate
-from armid_ros.simulation.closed_loop import CompiledLoop, kernel, rigid_body
+from armid_ros.simulation.closed_loop import CompiledLoop
 from armid_ros.simulation.controller import LinearFeedback
 import numpy as np
 import pinocchio as pin
@@ -65,15 +67,22 @@ def swinging(body, seconds=0.8):
 @pytest.mark.parametrize('source', ROBOTS)
 def test_body_is_that_of_pinocchio(source):
     body, rng = robot(source), np.random.default_rng(3)
-    added = np.diag(rng.uniform(0.0, 0.1, body.n_joints))
-    data, structure = body.model.createData(), rigid_body(body, added)
-    for q, dq, ddq in rng.uniform(-2.0, 2.0, (20, 3, body.n_joints)):
-        tau, inertia = np.empty_like(q), np.empty_like(added)
-        kernel().dynamics(
-            structure.address, *(array.ctypes.data for array in (q, dq, ddq, tau, inertia))
-        )
+    n = body.n_joints
+    added = np.diag(rng.uniform(0.0, 0.1, n))
+    data, structure = body.model.createData(), kernel_body(body, added)
+    motion = Motion(body.joints, 0.1 * np.arange(20), *rng.uniform(-2.0, 2.0, (3, 20, n)))
+    torques, regressors = np.zeros((20, n)), np.zeros((20, n, 10 * n))
+    structure.along(motion, 'torques', torques)
+    structure.along(motion, 'regressors', regressors)
+    inertia = np.empty((n, n))
+    for k, (q, dq, ddq) in enumerate(zip(motion.q, motion.dq, motion.ddq, strict=True)):
         expected = pin.rnea(body.model, data, q, dq, ddq)
-        np.testing.assert_allclose(tau, expected, rtol=0, atol=1e-13 * np.abs(expected).max())
+        largest = np.abs(expected).max()
+        np.testing.assert_allclose(torques[k], expected, rtol=0, atol=1e-13 * largest)
+        expected = pin.computeJointTorqueRegressor(body.model, data, q, dq, ddq)
+        largest = np.abs(expected).max()
+        np.testing.assert_allclose(regressors[k], expected, rtol=0, atol=1e-13 * largest)
+        kernel().inertia_matrix(structure.address, q.ctypes.data, inertia.ctypes.data)
         expected = pin.crba(body.model, data, q) + added
         np.testing.assert_allclose(inertia, expected, rtol=0, atol=1e-14 * expected.max())
 

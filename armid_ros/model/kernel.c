@@ -1,9 +1,11 @@
 /* Copyright 2026 The armid_ros developers
  * SPDX-License-Identifier: Apache-2.0
  *
- * Steps of a rigid arm under a feedback controller, for as int64_t as every friction element keeps
- * slipping or sticking as it does and no joint reaches a stop. `compiled.py` calls `advance`;
- * `integrator.py` is the same step in Python and takes the steps at which something changes.
+ * Inverse dynamics and regressor of a rigid arm along a motion, and its steps under a feedback
+ * controller, for as long as every friction element keeps slipping or sticking as it does and no
+ * joint reaches a stop. `rigid_body.py` calls `torques` and `regressors`, `closed_loop.py` calls
+ * `advance`. `integrator.py` is the same step in Python and takes the steps at which something
+ * changes.
  *
  * Vectors of 6 are motions or forces of a link in its own frame, the angular part first.
  * Algorithms: recursive Newton-Euler and composite rigid body, Featherstone 2008, chapters 5 and 6.
@@ -131,15 +133,14 @@ static void poses_of(const Arm *arm, const double *q, Pose *poses)
     for (int64_t i = 0; i < arm->n; i++) pose_of(&arm->joints[i], q[i], &poses[i]);
 }
 
-/* Torques of the rigid body, without what is added to the inertia of the joints. */
-static void inverse_dynamics(
-    const Arm *arm, const Pose *poses, const double *dq, const double *ddq, double *tau)
+/* Velocity and acceleration of each link; gravity is an acceleration of the base. */
+static void motions_of(const Arm *arm, const Pose *poses, const double *dq, const double *ddq,
+                       double v[][6], double a[][6])
 {
-    double v[MOST_JOINTS][6], a[MOST_JOINTS][6], f[MOST_JOINTS][6];
     const double still[6] = {0}, base[6] = {0, 0, 0, -arm->gravity[0], -arm->gravity[1], -arm->gravity[2]};
     for (int64_t i = 0; i < arm->n; i++) {
         const Joint *joint = &arm->joints[i];
-        double own[6], moved[6];
+        double own[6];
         motion_to_link(&poses[i], joint->parent < 0 ? still : v[joint->parent], v[i]);
         motion_to_link(&poses[i], joint->parent < 0 ? base : a[joint->parent], a[i]);
         for (int k = 0; k < 3; k++) {
@@ -154,6 +155,18 @@ static void inverse_dynamics(
             a[i][k] += joint->turn[k] * ddq[i];
             a[i][3 + k] += joint->slide[k] * ddq[i];
         }
+    }
+}
+
+/* Torques of the rigid body, without what is added to the inertia of the joints. */
+static void inverse_dynamics(
+    const Arm *arm, const Pose *poses, const double *dq, const double *ddq, double *tau)
+{
+    double v[MOST_JOINTS][6], a[MOST_JOINTS][6], f[MOST_JOINTS][6];
+    motions_of(arm, poses, dq, ddq, v, a);
+    for (int64_t i = 0; i < arm->n; i++) {
+        const Joint *joint = &arm->joints[i];
+        double moved[6];
         momentum(joint->mass, joint->first_moment, joint->inertia, v[i], moved);
         momentum(joint->mass, joint->first_moment, joint->inertia, a[i], f[i]);
         add_cross(v[i], moved, f[i]);
@@ -164,6 +177,50 @@ static void inverse_dynamics(
         const Joint *joint = &arm->joints[i];
         tau[i] = dot(joint->turn, f[i]) + dot(joint->slide, f[i] + 3);
         if (joint->parent >= 0) add_force_to_parent(&poses[i], f[i], f[joint->parent]);
+    }
+}
+
+/* Force on a link per unit of its mass, first moments and inertia about its origin: 10 columns. */
+static void force_per_parameter(const double v[6], const double a[6], double columns[10][6])
+{
+    double point[3] = {a[3], a[4], a[5]}; /* acceleration of the origin */
+    add_cross(v, v + 3, point);
+    memset(columns, 0, 10 * sizeof *columns);
+    memcpy(columns[0] + 3, point, sizeof point);
+    for (int k = 0; k < 3; k++) {
+        double unit[3] = {0}, turned[3];
+        unit[k] = 1.0;
+        cross(unit, point, columns[1 + k]);
+        cross(a, unit, columns[1 + k] + 3);
+        cross(v, unit, turned);
+        add_cross(v, turned, columns[1 + k] + 3);
+    }
+    for (int column = 0, row = 0; row < 3; row++)
+        for (int k = 0; k <= row; k++, column++) { /* Ixx, Ixy, Iyy, Ixz, Iyz, Izz */
+            double spin[3] = {0}, *moment = columns[4 + column];
+            moment[row] = a[k];
+            moment[k] = a[row];
+            spin[row] = v[k];
+            spin[k] = v[row];
+            add_cross(v, spin, moment);
+        }
+}
+
+/* Regressor of the torques, (n, 10 n), of which only the entries that may differ from zero are written. */
+static void regressor(const Arm *arm, const Pose *poses, const double *dq, const double *ddq, double *y)
+{
+    double v[MOST_JOINTS][6], a[MOST_JOINTS][6], axes[MOST_JOINTS][MOST_JOINTS][6];
+    motions_of(arm, poses, dq, ddq, v, a);
+    for (int64_t link = 0; link < arm->n; link++) {
+        double columns[10][6];
+        force_per_parameter(v[link], a[link], columns);
+        memcpy(axes[link][link], arm->joints[link].turn, 3 * sizeof(double));
+        memcpy(axes[link][link] + 3, arm->joints[link].slide, 3 * sizeof(double));
+        for (int64_t joint = link; joint >= 0; joint = arm->joints[joint].parent) {
+            double *axis = axes[link][joint], *row = y + 10 * (arm->n * joint + link);
+            if (joint != link) motion_to_link(&poses[link], axes[arm->joints[link].parent][joint], axis);
+            for (int k = 0; k < 10; k++) row[k] = dot(axis, columns[k]) + dot(axis + 3, columns[k] + 3);
+        }
     }
 }
 
@@ -347,12 +404,31 @@ int64_t advance(const Plant *plant, const Controller *controller, const int64_t 
     return k;
 }
 
-/* Inverse dynamics and inertia matrix at one pose, for the tests against Pinocchio. */
-void dynamics(const Arm *arm, const double *q, const double *dq, const double *ddq, double *tau, double *matrix)
+/* Torques, (samples, n), along a motion of q, dq and ddq, each (samples, n). */
+void torques(const Arm *arm, int64_t samples, const double *q, const double *dq, const double *ddq, double *tau)
+{
+    Pose poses[MOST_JOINTS];
+    for (int64_t row = 0; row < samples * arm->n; row += arm->n) {
+        poses_of(arm, q + row, poses);
+        inverse_dynamics(arm, poses, dq + row, ddq + row, tau + row);
+    }
+}
+
+/* Regressors, (samples, n, 10 n), along a motion; `y` is zero at first. */
+void regressors(const Arm *arm, int64_t samples, const double *q, const double *dq, const double *ddq, double *y)
+{
+    Pose poses[MOST_JOINTS];
+    for (int64_t row = 0; row < samples * arm->n; row += arm->n) {
+        poses_of(arm, q + row, poses);
+        regressor(arm, poses, dq + row, ddq + row, y + 10 * arm->n * row);
+    }
+}
+
+/* Inertia matrix at one pose, for the tests against Pinocchio. */
+void inertia_matrix(const Arm *arm, const double *q, double *matrix)
 {
     Pose poses[MOST_JOINTS];
     poses_of(arm, q, poses);
-    inverse_dynamics(arm, poses, dq, ddq, tau);
     mass_matrix(arm, poses, matrix);
 }
 

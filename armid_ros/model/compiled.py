@@ -1,0 +1,142 @@
+# Copyright 2026 The armid_ros developers
+# SPDX-License-Identifier: Apache-2.0
+"""
+The compiled kernel, `kernel.c`, and rigid bodies in its format.
+
+The kernel computes torques and regressors over whole motions, and steps of the simulation. It is
+compiled at installation. Without a compiler, Pinocchio and Python compute the same numbers.
+
+"""
+
+from __future__ import annotations
+
+import ctypes
+from functools import cache
+from importlib.util import find_spec
+from typing import Any
+
+from armid_ros.motion import FloatArray, Motion
+from armid_ros.robots import Robot
+import numpy as np
+import numpy.typing as npt
+
+ADDRESS, REAL, COUNT = ctypes.c_void_p, ctypes.c_double, ctypes.c_int64
+
+_JOINT = np.dtype(
+    [
+        ('parent', np.int64),
+        ('slide', float, 3),
+        ('turn', float, 3),
+        ('origin', float, 3),
+        ('sliding', float, 3),
+        ('turning', float, (9, 3)),
+        ('mass', float),
+        ('first_moment', float, 3),
+        ('inertia', float, 9),
+    ]
+)
+
+
+class Structure(ctypes.Structure):
+    """
+    Base of the C structures of the kernel.
+
+    Attributes
+    ----------
+    arrays : tuple of ndarray
+        Arrays whose addresses the structure has; they live as long as it does.
+    address : int
+        Address of the structure.
+
+    """
+
+    arrays: tuple[npt.NDArray[Any], ...]
+
+    @property
+    def address(self) -> int:
+        """Return the address of the structure."""
+        return ctypes.addressof(self)
+
+
+class BodyOfKernel(Structure):
+    """A rigid body of n joints in the format of the kernel."""
+
+    _fields_ = (
+        ('n', COUNT),
+        ('gravity', REAL * 3),
+        ('joints', ADDRESS),
+        ('added_inertia', ADDRESS),
+    )
+
+    def along(self, motion: Motion, quantity: str, out: FloatArray) -> None:
+        """
+        Compute a quantity of the rigid body along a motion.
+
+        Parameters
+        ----------
+        motion : Motion
+            N samples of the n joints.
+        quantity : str
+            'torques', (N, n), or 'regressors', (N, n, 10 n).
+        out : ndarray
+            The result; zero before.
+
+        """
+        arrays = [np.ascontiguousarray(x) for x in (motion.q, motion.dq, motion.ddq)]
+        addresses = [x.ctypes.data for x in (*arrays, out)]
+        getattr(kernel(), quantity)(self.address, len(motion), *addresses)
+
+
+@cache
+def kernel() -> ctypes.CDLL | None:
+    """Return the compiled kernel; None if it was not compiled."""
+    found = find_spec('armid_ros.model._kernel')
+    if found is None or found.origin is None:
+        return None
+    library = ctypes.CDLL(found.origin)
+    library.advance.restype = COUNT
+    library.advance.argtypes = [*3 * [ADDRESS], REAL, COUNT, COUNT, *8 * [ADDRESS]]
+    for function in (library.torques, library.regressors):
+        function.argtypes = [ADDRESS, COUNT, *4 * [ADDRESS]]
+    library.inertia_matrix.argtypes = 3 * [ADDRESS]
+    return library
+
+
+def kernel_body(
+    robot: Robot, added_inertia: FloatArray | None = None, weighs: bool = True
+) -> BodyOfKernel | None:
+    """
+    Return a rigid-body model in the format of the kernel.
+
+    Parameters
+    ----------
+    robot : Robot
+        Robot of n joints without a mechanism.
+    added_inertia : ndarray, shape (n, n), optional
+        Inertia added to the inertia matrix of the robot [kg m^2]; by default none.
+    weighs : bool
+        Whether gravity acts on the robot.
+
+    Returns
+    -------
+    BodyOfKernel or None
+        None if the kernel was not compiled or has no room for as many joints.
+
+    """
+    library, n = kernel(), robot.n_joints
+    if library is None or n > COUNT.in_dll(library, 'most_joints').value:
+        return None
+    rows = [
+        (
+            *(joint.parent, joint.slide, joint.turn, joint.origin, joint.sliding),
+            joint.turning.reshape(9, 3),
+            *(body.mass, body.mass * body.lever, body.matrix()[3:, 3:].ravel()),
+        )
+        for joint, body in zip(robot.geometry, robot.model.inertias[1:], strict=True)
+    ]
+    joints = np.array(rows, _JOINT)
+    added = np.zeros((n, n)) if added_inertia is None else np.ascontiguousarray(added_inertia)
+    gravity = (REAL * 3)(*(weighs * robot.gravity))
+    body = BodyOfKernel(n, gravity, joints.ctypes.data, added.ctypes.data)
+    body.arrays = joints, added
+    return body
