@@ -296,42 +296,46 @@ def filtered_columns(
         for effect, values in zip(arm.effects, arm.values, strict=True)
     ]
     # functions of a part of the motion, with the indices of their columns there and in the result
-    local: list[tuple[_Columns, Samples, npt.NDArray[np.intp]]] = []
+    local: list[tuple[_Columns, Samples, Samples]] = []
     first = 0
     for function, size, instantaneous in parts:
         outer = np.flatnonzero((columns >= first) & (columns < first + size))
-        own = columns[outer] - first
-        # a slice copies nothing
-        inner: Samples = slice(None) if np.array_equal(own, np.arange(size)) else own
+        inner, there = _as_slice(columns[outer] - first), _as_slice(outer)
         if len(outer) and instantaneous:
-            local.append((function, inner, outer))
+            local.append((function, inner, there))
         elif len(outer):
             whole = bridged(function(motion)[:, :, inner], unsure)
-            result[:, :, outer] = decimate(whole, used)
+            result[:, :, there] = decimate(whole, used)
         first += size
     margin = arm.neighbours(1.0 / used.rate_hz)
     stride = used.smooth_stride if margin == 0 else 1
     sure = ~np.pad(unsure, ((1, 1), (0, 0)))
     longest = max(int(np.diff(np.flatnonzero(column)).max()) - 1 for column in sure.T)
     margin, overlap, row = max(margin, longest), len(used.taps) - 1, 0
-    # samples whose regressor is in memory at once; 7 joints of 70 columns are 80 MB
-    step = max(used.decimation, 20_000 // used.decimation * used.decimation)
+    # samples whose regressor is in memory at once; more do not fit into the cache
+    step = max(used.decimation, 10_000 // used.decimation * used.decimation)
     for start in range(0, max(1, len(motion) - overlap), step):
         stop, before = min(len(motion), start + step + overlap), max(0, start - margin)
         around, inside = slice(before, stop + margin), slice(start - before, stop - before)
         rows = slice(row, row + len(decimated_samples(stop - start, used)))
         piece = motion.select(around)
-        for function, inner, outer in local:
+        for function, inner, there in local:
             if function == arm.rigid_columns and stride > 1:
                 # smooth columns need no interpolation and fewer samples
                 block = function(motion.select(slice(start, stop, stride)))[:, :, inner]
-                result[rows, :, outer] = decimate(block, used, stride)
+                result[rows, :, there] = decimate(block, used, stride)
             else:
                 block = function(piece)[:, :, inner]
-                result[rows, :, outer] = decimate(bridged(block, unsure[around])[inside], used)
+                result[rows, :, there] = decimate(bridged(block, unsure[around])[inside], used)
         row = rows.stop
     result.setflags(write=False)  # a read-only array is frozen without a copy
     return result
+
+
+def _as_slice(indices: npt.NDArray[np.intp]) -> Samples:
+    """Return adjacent indices as a slice, which copies nothing."""
+    adjacent = len(indices) and np.array_equal(indices, indices[0] + np.arange(len(indices)))
+    return slice(int(indices[0]), int(indices[-1]) + 1) if adjacent else indices
 
 
 def held_samples(

@@ -312,10 +312,10 @@ def decimate(values: FloatArray, used: Conditioning, stride: int = 1) -> FloatAr
     taps = taps / taps.sum()
     count = len(range(len(taps) // 2, len(values) - len(taps) // 2, factor))
     flat = values.reshape(len(values), -1)
-    result = np.zeros((count, flat.shape[1]))
     # half are zero, as links have no torque in later joints
     active = np.flatnonzero(flat.any(axis=0))
-    flat = np.ascontiguousarray(flat[:, active] if len(active) < flat.shape[1] else flat)
+    some = flat.take(active, axis=1) if len(active) < flat.shape[1] else flat
+    filtered = np.empty((count, len(active)))
     size = 16  # output samples of one matrix product; larger ones multiply more zeros of the band
     band = np.zeros((size, (size - 1) * factor + len(taps)))
     for row in range(size):
@@ -323,9 +323,13 @@ def decimate(values: FloatArray, used: Conditioning, stride: int = 1) -> FloatAr
     for start in range(0, count, size):
         rows = min(size, count - start)
         width = (rows - 1) * factor + len(taps)
-        window = flat[start * factor : start * factor + width]
-        result[start : start + rows, active] = band[:rows, :width] @ window
-    return result.reshape((count, *values.shape[1:]))
+        window = some[start * factor : start * factor + width]
+        np.matmul(band[:rows, :width], window, out=filtered[start : start + rows])
+    if len(active) < flat.shape[1]:
+        result = np.zeros((count, flat.shape[1]))
+        result[:, active] = filtered
+        filtered = result
+    return filtered.reshape((count, *values.shape[1:]))
 
 
 def decimated_samples(n_samples: int, used: Conditioning) -> range:
@@ -365,7 +369,9 @@ def _differentiated(
     inner = slice(edge, len(t) - edge)
     # differences of two samples damp the cut-off by sinc(1 / 20), 0.4 %
     few = max(1, int(used.rate_hz / (20.0 * used.cutoff_hz)))
-    bands = [(smooth[::few, :n], used.cutoff_hz)]
+    sparse = smooth[::few, :n]
+    # a length without large prime factors, a few samples shorter, is transformed faster
+    bands = [(sparse[: 1 + fft.prev_fast_len(len(sparse) - 1)], used.cutoff_hz)]
     band = _CURVATURE_BANDS * _motion_band(bands, used.rate_hz / few)
     points = None
     if recording.partner is not None:
