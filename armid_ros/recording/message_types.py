@@ -24,6 +24,8 @@ from rosbags.typesys.base import TypesysError
 from rosbags.typesys.store import Typestore
 
 JOINT_STATE = 'sensor_msgs/msg/JointState'
+#: Type hash of JointState in ROS 2 (REP-2016); independent of comments in the definition.
+JOINT_STATE_HASH = 'RIHS01_a13ee3a330e346c9d87b5aa18d24e11690752bd33a0350f11c5882bc9179260e'
 JOINT_TRAJECTORY = 'trajectory_msgs/msg/JointTrajectory'
 STRING = 'std_msgs/msg/String'
 #: Arrays of a JointState.
@@ -101,8 +103,9 @@ def store_for(described: MessageType) -> Typestore:
 
 def _register(store: Typestore, name: str, definition: str | None) -> None:
     """Register a type and, recursively, the types it contains."""
-    known = get_typestore(Stores.ROS2_JAZZY).fielddefs
-    if definition is None and name in known:
+    # the types of the distribution take 0.1 s to load, and few bags lack a definition
+    known = {} if definition is not None else get_typestore(Stores.ROS2_JAZZY).fielddefs
+    if name in known:
         types = {name: known[name]}
     else:
         text = definition if definition is not None else _installed(name)

@@ -6,7 +6,7 @@ from armid_ros.errors import RecordingError
 from armid_ros.recording import read_recording
 from armid_ros.recording.copying import copy_bag
 from armid_ros.recording.joint_state.encoder import joint_state_cdr
-from armid_ros.recording.message_types import JOINT_STATE, message_type
+from armid_ros.recording.message_types import JOINT_STATE, JOINT_STATE_HASH, message_type
 from armid_ros.recording.reader import bag_contents
 from mcap.writer import Writer as McapFileWriter
 import numpy as np
@@ -103,6 +103,10 @@ def test_what_holds_a_joint_state_is_read(made, swinging, stamps, tmp_path, asse
     assert_same(read, swinging)
     assert read.report.clean
     assert any(topic.joints == JOINTS for topic in bag_contents(path))
+
+
+def test_the_type_hash_is_that_of_ros():
+    assert message_type(JOINT_STATE).type_hash == JOINT_STATE_HASH
 
 
 def test_another_schema_of_joint_states_is_refused(swinging, stamps, tmp_path):

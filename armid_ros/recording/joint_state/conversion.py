@@ -10,9 +10,13 @@ import re
 
 from armid_ros.errors import RecordingError
 from armid_ros.recording.bag import Bag
-from armid_ros.recording.message_types import JOINT_STATE, MessageType, store_for
+from armid_ros.recording.message_types import (
+    JOINT_STATE,
+    JOINT_STATE_HASH,
+    MessageType,
+    store_for,
+)
 from armid_ros.recording.source import MessageBlock, Topic
-from rosbags.typesys import get_typestore, Stores
 
 _INSIDE = re.compile(r'^\s*sensor_msgs/(?:msg/)?JointState\s+(\w+)', re.MULTILINE)
 
@@ -77,5 +81,4 @@ def _standard(described: MessageType) -> bool:
     """Return whether a bag defines JointState as ROS 2 does."""
     if not described.definition:
         return True
-    standard, store = get_typestore(Stores.ROS2_JAZZY), store_for(described)
-    return store.hash_rihs01(JOINT_STATE) == standard.hash_rihs01(JOINT_STATE)
+    return bool(store_for(described).hash_rihs01(JOINT_STATE) == JOINT_STATE_HASH)
