@@ -385,10 +385,12 @@ def bridged(values: FloatArray, unsure: npt.NDArray[np.bool_]) -> FloatArray:
 
     """
     result = values
-    for joint in np.flatnonzero(unsure.any(axis=0) & ~unsure.all(axis=0)):
+    for joint in range(values.shape[1]):
+        own, gaps = values[:, joint], np.flatnonzero(unsure[:, joint])
+        if not 0 < len(gaps) < len(own):
+            continue
         if result is values:
             result = values.copy()
-        own, gaps = values[:, joint], np.flatnonzero(unsure[:, joint])
         sure = np.flatnonzero(~unsure[:, joint])
         after = np.searchsorted(sure, gaps)
         left = sure[np.maximum(after - 1, 0)]
