@@ -78,10 +78,10 @@ def file_name(arm: str) -> str:
 
 def find_bags(patterns: Sequence[str], arm_pattern: str | None = None) -> list[BagFile]:
     """
-    List the bags that match URLs with wildcards.
+    List the bags whose URLs match patterns with wildcards.
 
     The arm of a bag is the part of the path that the first wildcard matches. If this part is the
-    bag itself, the arm is the folder of the bag.
+    bag itself, the folder of the bag names the arm.
 
     Parameters
     ----------

@@ -88,8 +88,8 @@ def _local(count: int) -> Iterator[Client]:
                 ) as cluster,
                 Client(cluster) as client,
             ):
-                # Dask restarts a worker that ends, but not if it ends or is slow during its start.
-                # Without workers, tasks would wait for ever, so the number of workers is adapted.
+                # Dask restarts a worker that ends, but not one that ends or is slow while it
+                # starts. Tasks would then wait for ever, so the number of workers is adapted.
                 cluster.adapt(minimum=count, maximum=count, interval='2s')
                 yield client
     finally:

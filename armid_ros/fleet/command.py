@@ -90,7 +90,7 @@ def _results(out: str, doing: str) -> Iterator[tuple[Store, Callable[..., None]]
 
 
 def _print_shown(lines: Sequence[str], rest: str) -> None:
-    """Print the first lines, and the location of the others."""
+    """Print the first lines, and the file that has the others."""
     most = 8  # the results contain all of them
     for line in lines[:most]:
         say(line)
@@ -131,12 +131,12 @@ def _print_json(name: str, **document: Any) -> None:
     type=click.Choice(['ols', 'wls']),
     default='wls',
     show_default=True,
-    help='Least squares: all joints alike (ols), or weighted by their noise (wls).',
+    help='Least squares with equal weights (ols), or with joints weighted by their noise (wls).',
 )
 @click.option(
     '--cutoff', type=float, help='Position filter cut-off [Hz]; default: from a few bags.'
 )
-@click.option('--decimation', type=int, help='Keep one sample of this many.')
+@click.option('--decimation', type=int, help='Keep one of so many samples, after a filter.')
 @options.topic
 @options.gravity
 @options.joints

@@ -1,7 +1,7 @@
 # Copyright 2026 The armid_ros developers
 # SPDX-License-Identifier: Apache-2.0
 """
-From bags to estimates: a summary of each bag, sums of normal equations, a fit, its deviations.
+From bags to estimates: summaries of bags, sums of normal equations, fits, standard deviations.
 
 Standard deviations follow from the spectrum of the residuals, which normal equations do not
 contain. A second pass over the bags therefore computes the noise products at the estimate of the
@@ -325,7 +325,7 @@ def _prepared(bag: BagFile, path: str, job: Job, budget: int) -> BagSummary:
     stamped = datetime.datetime.fromtimestamp(start_ns * 1e-9, datetime.UTC)
     day = bag.day or stamped.date().isoformat()
     apart = datetime.date.fromisoformat(day) - stamped.date()
-    # the clock counts from its start; a difference of one day is due to the time zone
+    # stamps may count from the start of a computer; a time zone makes one day of difference
     if abs(apart.days) > 1:
         start_ns += apart.days * DAY_NS
     held = None if kept is None else tuple(kept)

@@ -61,8 +61,9 @@ def _overview(found: Watch, diagnoses: Diagnoses) -> str:
     heads = ('Arm', 'Health', 'What', 'Bags', 'Refused', 'Error')
     rows = [_arm_row(arm, diagnoses.get(arm.arm)) for arm in found.arms]
     hint = (
-        'Small curves: the parameter that changed over time, at least six deviations high; a '
-        'dashed line is where it changed. Error: median of 100 |residual torque| / |torque| '
+        'Small curves: the changed parameter over time. The axis spans at least six standard '
+        'deviations; a dashed line marks the change. Error: median of 100 |residual torque| / '
+        '|torque| '
         'over the bags of an arm, each fitted by itself.'
     )
     sections: list[Section] = [
@@ -90,7 +91,7 @@ def _arm_page(found: Watch, arm: WatchedArm, diagnoses: Diagnoses) -> str:
     diagnosis = diagnoses.get(arm.arm)
     diagnosed = _diagnosed(arm, diagnosis)
     tone = {'changed': 'bad', 'healthy': 'fair' if diagnosed else 'good'}.get(arm.health, 'fair')
-    quiet = 'No parameter has changed more than noise and other bags explain.'
+    quiet = 'No parameter has changed by more than noise and the scatter between bags.'
     if diagnosis is not None and diagnosed:
         quiet = pretty(diagnosis['summary'])
     sentences = [f'{text[0].upper()}{text[1:]}.' for text in texts[:1]] or [quiet]
@@ -113,9 +114,9 @@ def _arm_page(found: Watch, arm: WatchedArm, diagnoses: Diagnoses) -> str:
     shown.sort(key=lambda one: order.get(one.parameter, len(order)))
     cut = sum(one.parameter in order for one in shown)
     said = (
-        'Every point is a bag with its 95 % interval, the first one on the left; it leads to the '
-        'bag below. The dashed line is the change. Numbers after a name: range of the vertical '
-        'axis.'
+        'Every point is a bag with its 95 % interval, in order of time, with a link to the bag '
+        'below. A dashed line marks the change. Numbers after a name are the range of the '
+        'vertical axis.'
     )
     first, rest = ([_curve(arm, one) for one in part] for part in (shown[:cut], shown[cut:]))
     curves: list[Templated] = [SmallMultiples(first)] if first else []
@@ -134,8 +135,8 @@ def _arm_page(found: Watch, arm: WatchedArm, diagnoses: Diagnoses) -> str:
             )
         )
     hint = (
-        'Slope of a straight line through all bags with its 95 % interval, each by itself. An '
-        'interval that includes 0 shows no wear.'
+        'Slope of a straight line through all bags with its 95 % interval, fitted separately. '
+        'An interval that includes 0 shows no wear.'
     )
     sections += [
         _table('Wear', ('Parameter', 'Trend'), rows, (1,), hint),

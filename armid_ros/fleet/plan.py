@@ -154,7 +154,7 @@ class Job:
 
     @property
     def samples(self) -> int:
-        """Return the number of samples of a bag that are in memory at once."""
+        """Return the number of samples of a bag that are held in memory together."""
         joints = self.arm.robot.n_joints
         rows = 16_000_000 // (joints * self.theory.rank)  # larger columns are read in pieces
         return min(rows * self.filters.decimation, 1_400_000 // joints)

@@ -30,19 +30,19 @@ import pyarrow as pa
 _NUMBERS = pa.list_(pa.float64())
 _STAMP = pa.timestamp('us', tz='UTC')
 
-#: One row a bag.
+#: One row per bag.
 BAGS = pa.schema(
     [
         ('bag', pa.string()),  # URL
-        ('version', pa.string()),  # changes when the bag does
-        ('settings', pa.string()),  # changes when model or filters do
-        ('run', pa.string()),  # that made it
-        ('start', _STAMP),  # first stamp
+        ('version', pa.string()),  # changes with the content of the bag
+        ('settings', pa.string()),  # changes with the model and the filters
+        ('run', pa.string()),  # run that wrote this row
+        ('start', _STAMP),  # time of the first sample
         ('start_ns', pa.int64()),
         ('seconds', pa.float64()),
         ('samples', pa.int64()),
         ('bytes', pa.int64()),
-        ('relative_error_percent', pa.float64()),  # of the bag's own fit
+        ('relative_error_percent', pa.float64()),  # of the fit to this bag alone
         ('condition_number', pa.float64()),
         ('joints', pa.list_(pa.string())),
         ('residual_std', _NUMBERS),  # of each joint [N m]
@@ -60,13 +60,13 @@ _PARAMETER = [
     ('value', pa.float64()),
     ('std', pa.float64()),  # standard deviation
 ]
-#: One row a parameter of a bag.
+#: One row per parameter of a bag.
 PARAMETERS = pa.schema([('bag', pa.string()), ('start', _STAMP), *_PARAMETER])
-#: One row a parameter of an arm.
+#: One row per parameter of an arm.
 ARMS = pa.schema(
     [
         ('settings', pa.string()),
-        ('versions', pa.string()),  # changes when a bag does
+        ('versions', pa.string()),  # changes with the content of any bag
         ('bags', pa.int64()),
         ('seconds', pa.float64()),
         ('relative_error_percent', pa.float64()),
@@ -74,7 +74,7 @@ ARMS = pa.schema(
         *_PARAMETER,
     ]
 )
-#: One row a bag that is not used.
+#: One row per bag that is not used.
 REFUSED = pa.schema(
     [
         ('bag', pa.string()),

@@ -129,7 +129,7 @@ def fit(groups: Sequence[MergedBags], job: Job) -> Fitted:
 
 
 def noise(taken: Sequence[BagSummary | Refused], fitted: Fitted, job: Job) -> FloatArray | None:
-    """Task: compute the noise products of a group at the values of its arm."""
+    """Task: compute the noise products of a group at the estimate of its arm."""
     known, found = fitted[1], None
     for one in taken:
         if known is not None and isinstance(one, BagSummary):
@@ -207,7 +207,7 @@ def identify_fleet(
 
 @dataclass(frozen=True)
 class _Waiting:
-    """Arm without submitted tasks: its bags, and the bags that failed."""
+    """Arm whose tasks are not submitted yet: its bags, and the bags that failed."""
 
     arm: str
     groups: tuple[Group, ...]
@@ -316,7 +316,7 @@ class _Run:
         return _UnderWay(arm, prepared, fitted, products, last)
 
     def _begin_again(self, tasks: _UnderWay) -> None:
-        """Repeat a failed arm without the bags that caused the failure."""
+        """Submit a failed arm again without the bags that caused the failure."""
         # A failed group is divided into single bags, to find the bag that fails. Tasks that depend
         # on a failed task fail too, so the noise tasks are checked only if all bags were read. If
         # another bag may have killed the worker, the bag is read once more alone.
