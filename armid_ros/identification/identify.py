@@ -54,7 +54,7 @@ from armid_ros.recording import Recording
 import numpy as np
 
 #: Largest increase of the torque error, as a share, for which physically consistent links are
-#: preferred: simulators need them, and a model that lacks an effect costs more.
+#: preferred: simulators need such links, and a missing effect increases the error by more.
 _CHEAP = 0.1
 
 
@@ -95,12 +95,12 @@ class IdentificationSettings:
 
     @property
     def least_squares(self) -> Method:
-        """Return the method itself, or for 'iv' the least-squares method that it starts from."""
+        """Return the method itself, or for 'iv' the least-squares method of its initial fit."""
         return 'wls' if self.method == 'iv' else self.method
 
     @property
     def holds_description(self) -> bool:
-        """Whether parameters stay at the description if it is more certain."""
+        """Whether parameters keep described values that are more certain than the data."""
         return self.physical is None and self.method != 'iv'
 
 
@@ -282,7 +282,7 @@ def _among_bodies(
     settings: IdentificationSettings,
     rng: np.random.Generator,
 ) -> tuple[IdentificationSettings, BaseParameters, FittedValues, PhysicalCertificate] | None:
-    """Fit physically consistent links; None if not requested, or optional and impossible."""
+    """Fit physically consistent links; None if not requested, or if optional and impossible."""
     if settings.method == 'iv' or not (settings.physical or settings.prefers_bodies):
         return None
     known = settings.physical or PhysicalSettings()
@@ -304,7 +304,7 @@ def _fitted(
     settings: IdentificationSettings,
     rng: np.random.Generator,
 ) -> tuple[BaseParameters, FittedValues]:
-    """Fit parameters that data determine better than the description; return theory and fit."""
+    """Fit parameters that data determine better than the description; return grouping and fit."""
     base, problem, recordings, used = data
     method = settings.least_squares
 
@@ -319,7 +319,8 @@ def _fitted(
     rigid = len(arm.robot.rigid_parameters)
     if np.all(np.any(theory.grouping[:, rigid:], axis=0)):
         return theory, fit
-    # fit again with effects that the described arm does not show, such as unreached saturation
+    # fit again with effects that do not act in the described arm, such as saturation that it does
+    # not reach
     now = fit.arm.base_parameters(rng)
     if now.rank <= theory.rank:
         return theory, fit
@@ -358,10 +359,10 @@ def _remarks(fit: FittedValues, theory: BaseParameters) -> tuple[str, ...]:
             'the others are grouped, or stay as described'
         )
     if fit.solution.outliers:
-        remarks.append(f'{fit.solution.outliers} torque samples were weighted down as outliers')
+        remarks.append(f'{fit.solution.outliers} outliers of torque have reduced weight')
     if not fit.settled:
         remarks.append(
-            f'the fit has not settled after {fit.passes} linearisations: the effects '
+            f'the fit has not converged after {fit.passes} linearisations: the effects '
             'affect each other too much in these data; leave some out, or record more'
         )
     return tuple(remarks)

@@ -3,10 +3,10 @@
 """
 Estimation of drive gains from a known payload.
 
-A common factor of all efforts cannot be distinguished from the same factor of all masses. A body
-of known mass in some of the recordings distinguishes them. Each joint measures k (Y pi + p), where
-p is the torque of the known body. So the gain k is the coefficient of p in the regression of its
-effort on its columns and p.
+A common factor of all efforts cannot be distinguished from the same factor of all masses. A
+payload of known mass in some recordings makes both identifiable. Each joint measures k (Y pi + p),
+where p is the torque of the payload. The gain k is therefore the coefficient of p in the
+regression of the effort on the columns of Y and p.
 
 """
 
@@ -32,7 +32,7 @@ import numpy as np
 import pinocchio as pin
 from scipy.stats import t as student
 
-#: Largest relative standard deviation of a gain that is determined.
+#: Largest relative standard deviation of an identified gain.
 _SURE = 0.05
 
 
@@ -94,7 +94,7 @@ def payloads_of(
     texts: Sequence[str], recordings: Sequence[Recording], robot: Robot
 ) -> Mapping[str, Robot]:
     """
-    Return the robot with its payload, by source, for each recording with a payload.
+    Return the robot with its payload for each recording with a payload, by source.
 
     Raises
     ------
@@ -206,7 +206,7 @@ def drive_gains(
         np.concatenate([getattr(part, name) for part in rows])
         for name in ('columns', 'tau', 'informative')
     )
-    # blocks that count as independent, twenty of each stretch
+    # twenty blocks of each stretch, taken as independent
     counts = [len(part.tau) for part in rows]
     blocks = np.concatenate([20 * k + np.arange(n) * 20 // n for k, n in enumerate(counts)])
     gains = [
@@ -228,10 +228,11 @@ def _gain(
     """Return the coefficient of the known torque, its std, and the 95 % half-width."""
     scale = np.linalg.norm(columns, axis=0)
     columns = columns[:, scale > 0.0] / scale[scale > 0.0]
-    # The coefficient of a column is that of its residual after the other columns (Frisch, Waugh).
+    # The coefficient is that of the column's residual after a fit of the other columns (Frisch,
+    # Waugh).
     rest = known - columns @ np.linalg.lstsq(columns, known, rcond=1e-10)[0]
     size = float(rest @ rest)
-    # the columns of the joint explain the torque of the payload
+    # the joint's own columns explain the torque of the payload
     if size <= 1e-8 * float(known @ known):
         return 1.0, np.inf, np.inf
     gain = float(rest @ tau) / size

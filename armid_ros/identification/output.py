@@ -1,10 +1,10 @@
 # Copyright 2026 The armid_ros developers
 # SPDX-License-Identifier: Apache-2.0
 """
-Document of an identification in the file identification.json, and the recordings that it names.
+The document identification.json, and the recordings that it names.
 
-These recordings are the baseline of a diagnosis. The file has the size and a digest of each, as
-another recording may have replaced it at the same path.
+These recordings are the baseline of a diagnosis. The file has the size and a digest of each
+recording, as another one may later have the same path.
 
 """
 
@@ -30,7 +30,7 @@ from armid_ros.robots import Robot
 import numpy as np
 
 SCHEMA = 'armid/identification/1'
-#: File that tools may rewrite without a change of the data; it is not part of the digest.
+#: File that is not part of the digest, as tools rewrite it without a change of the data.
 _NOT_DATA = 'metadata.yaml'
 
 
@@ -186,8 +186,8 @@ def require_as_identified(path: str | Path) -> None:
     for place, known in _found(Path(path)).items():
         if known is not None and _content(place) != known:
             raise ModelError(
-                f'{place}: is no longer the recording that {path} was identified from: its '
-                'content is another. Give the baseline (--baseline), diagnose without one '
+                f'{place}: has changed since {path} was identified from it. Give the baseline '
+                f'(--baseline), diagnose without one '
                 '(--no-baseline), or identify the arm again'
             )
 
@@ -196,7 +196,7 @@ def _content(path: Path) -> dict[str, Any]:
     """Return size of a file or folder [bytes], and SHA-256 of the ends of its files."""
     inside = sorted(path.rglob('*')) if path.is_dir() else [path]
     digest, total = hashlib.sha256(), 0
-    end = 1 << 20  # bytes, enough for time stamps at the begin and the index at the end
+    end = 1 << 20  # bytes; enough for the time stamps at the beginning and the index at the end
     for file in inside:
         if not file.is_file() or file.name == _NOT_DATA:
             continue

@@ -27,7 +27,7 @@ from armid_ros.robots import load_robot
 import numpy as np
 import yaml
 
-#: Relative remainder below which a grouping is a linear combination of others.
+#: Relative residual below which a base parameter is a linear combination of others.
 _SAME_GROUPING = 1e-6
 _SCHEMAS = (SCHEMA, MODEL)
 
@@ -35,7 +35,7 @@ _SCHEMAS = (SCHEMA, MODEL)
 @dataclass(frozen=True)
 class KnownFit:
     """
-    Torque error and grade of a model, as its file states them.
+    Torque error and grade of a model, from its file.
 
     Attributes
     ----------
@@ -75,7 +75,7 @@ class KnownFit:
 @dataclass(frozen=True)
 class ParameterFile:
     """
-    Parameters of an arm as a file states them.
+    Parameters of an arm, from a file.
 
     Attributes
     ----------
@@ -169,8 +169,8 @@ class ParameterFile:
         """
         Return the values, and the values of another grouping that follow from them.
 
-        A motion that identifies less groups more parameters; its values are combinations of those
-        of a richer motion.
+        A motion with less excitation groups more parameters. Its values are combinations of the
+        values of a richer motion.
 
         """
         names = [name for name in other.terms if name not in self.values]
@@ -251,8 +251,8 @@ def read_parameters(path: str | Path) -> ParameterFile:
 
 def _identification_of(path: Path, model: Mapping[str, Any]) -> ParameterFile | None:
     """Read the identification.json in the folder of a model.yaml if it belongs to it."""
-    # identification.json has the parameter groups of the model and their covariance. It belongs to
-    # the model if the values of the model reproduce the value of every group.
+    # identification.json has the base parameters of the model and their covariance. It belongs
+    # to the model if the model reproduces the value of every base parameter.
     file = path.with_name('identification.json')
     if not is_file(file):
         return None
@@ -376,7 +376,7 @@ def _covariance(rows: list[list[float]] | None, size: int) -> FloatArray | None:
     if rows is None:
         return None
     if [len(row) for row in rows] != list(range(1, size + 1)):
-        raise ValueError(f'covariance: it has to be a triangle of {size} rows')
+        raise ValueError(f'covariance: it has to be a lower triangle with {size} rows')
     matrix = np.zeros((size, size))
     for index, row in enumerate(rows):
         matrix[index, : index + 1] = matrix[: index + 1, index] = row
@@ -384,7 +384,7 @@ def _covariance(rows: list[list[float]] | None, size: int) -> FloatArray | None:
         raise ValueError('a covariance with a number that is not finite')
     deviations = np.sqrt(np.maximum(np.diag(matrix), 0.0))
     largest = np.outer(deviations, deviations)
-    # the file has 16 digits
+    # numbers in the file have 16 digits
     if (np.diag(matrix) < 0.0).any() or (np.abs(matrix) > largest * (1.0 + 1e-9)).any():
         raise ValueError('a covariance with a negative variance or a correlation beyond one')
     return matrix

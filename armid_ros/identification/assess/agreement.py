@@ -1,6 +1,6 @@
 # Copyright 2026 The armid_ros developers
 # SPDX-License-Identifier: Apache-2.0
-"""Agreement of an estimate with known true values, within its covariance."""
+"""Test whether an estimate agrees with known true values, given its covariance."""
 
 from __future__ import annotations
 
@@ -14,10 +14,11 @@ import scipy.stats
 
 #: Half width of the interval around the true value, in standard deviations.
 WIDTH = 2.0
-#: Degrees of freedom of an estimated covariance. It follows the spectrum of the residual in the
-#: band of the motion, of which a run of 20 s contains little. In 23 simulations of the demo, the
-#: distance of 56 parameters had mean 56 and deviation 17, as with this number. A known covariance
-#: would have deviation 11 and reject five simulations in place of one.
+#: Degrees of freedom of an estimated covariance. The covariance comes from the spectrum of the
+#: residual in the band of the motion. A run of 20 s has few samples of it. In 23 simulations of
+#: the demo, the distance of 56 parameters had mean 56 and deviation 17, as with this number. With
+#: a known covariance, the deviation would be 11, and five simulations would be rejected instead of
+#: one.
 FREEDOM = 40.0
 
 
@@ -26,9 +27,9 @@ class Agreement:
     """
     Comparison of an estimate with the true values.
 
-    Errors of correlated parameters occur together, so the number of large errors is not
-    informative. The squared distance of all parameters, in the metric of their covariance, has a
-    known distribution: Fisher's F times their number, if the covariance is estimated.
+    Errors of correlated parameters occur together, so the number of large errors is no test. The
+    squared distance of all parameters, in the metric of their covariance, has a known
+    distribution: Fisher's F times their number, if the covariance is estimated.
 
     Attributes
     ----------
@@ -52,7 +53,8 @@ class Agreement:
         """
         Compare an estimate of P parameters with the truth, shape (P,).
 
-        The covariance has `freedom` degrees of freedom; infinitely many if it is known exactly.
+        The covariance has `freedom` degrees of freedom; infinity for a covariance that is known
+        exactly.
 
         """
         scaled = (estimate.values - truth) / estimate.std

@@ -9,16 +9,16 @@ contains no false one.
 
 A model has errors in every motion, and other motions give other values. The scatter of values
 between recordings widens the deviations of each joint, if the files contain it. Few recordings
-determine it badly, so tests use Student's distribution, and Fisher's for groups.
+determine the scatter badly, so tests use Student's distribution, and Fisher's for groups.
 
 If both files have a covariance, the effects of each joint and the links are tested as groups too:
-strongly correlated parameters can differ significantly together and none of them alone. The
-residuals of the two models in each joint are compared (Fisher's F), as a change that neither
-model describes is in no parameter.
+strongly correlated parameters can differ significantly as a group although no single one does. The
+residuals of the two models in each joint are compared (Fisher's F), because a change that
+neither model describes appears in no parameter.
 
 A body that is fixed to link k adds its ten parameters p to those of the link. Base parameters then
-change by G_k p, with the factors G_k of the parameters of link k in them. Ten numbers p that
-explain dozens of changes, to their uncertainty, are a load; its mass is the first of them.
+change by G_k p, with the factors G_k of the parameters of link k in them. If ten numbers p
+explain dozens of changes within their uncertainty, they are a load; the first number is its mass.
 
 """
 
@@ -50,10 +50,11 @@ import scipy.linalg
 
 #: Probability that the list of changes contains a false change.
 CHANCE = 0.05
-#: Eigenvalues of a scaled covariance below this share of the largest are rounding errors, as are
-#: differences of a value below this share of it.
+#: Eigenvalues of a scaled covariance below this share of the largest are rounding errors. The
+#: same holds for differences below this share of a value.
 _ROUNDING = 1e-10
-#: Residual of a joint, as a share of its torque, below which filters rather than the arm cause it.
+#: Residual of a joint, as a share of its torque, below which it is due to filters and not to the
+#: arm.
 _LEAST_RESIDUAL = 1e-3
 #: Name of a link parameter in the terms of base parameters, with the number of the link.
 _NUMBERED = re.compile(r'(?:m[xyz]?|I[xyz]{2})(\d+)$')
@@ -170,12 +171,13 @@ class _Side:
     """Values, standard deviations and scatter of the shared parameters in one result."""
 
     values: FloatArray  # (p,)
-    #: Standard deviations by noise, times the ratio of scatter between recordings to noise of each
-    #: joint, if this ratio is above 1.
+    #: Standard deviations due to noise. If the scatter between recordings exceeds the noise of a
+    #: joint, they are multiplied by the ratio.
     std: FloatArray
     scatter: FloatArray  # changes of the values without each recording, (K, p)
-    #: Degrees of freedom of each deviation: a mean square of n values with correlations R has
-    #: those of one value times n^2 over the sum of R^2 (Satterthwaite). Infinite for noise.
+    #: Degrees of freedom of each standard deviation, infinite for noise. A mean square of n
+    #: values with correlations R has n^2 / sum(R^2) times the degrees of one value
+    #: (Satterthwaite).
     freedoms: FloatArray
 
     @classmethod
@@ -244,8 +246,8 @@ def _squares(rows: FloatArray, covariance: FloatArray) -> tuple[float, int]:
 def _find_load(
     terms: Sequence[Mapping[str, float]], difference: FloatArray, covariance: FloatArray
 ) -> LoadChange | None:
-    """Return the load that explains the changes, on the outermost such link; None without."""
-    # arms hold loads at the outermost link; a mass that may be zero is not a load
+    """Return the load that explains the changes, on the outermost possible link, or None."""
+    # arms hold loads at the outermost link; a mass not different from zero is no load
     std = np.sqrt(np.diag(covariance))
     if not len(std) or not np.all(std > 0.0):
         return None
@@ -266,7 +268,7 @@ def _find_load(
 
 
 def _load(link: int, columns: FloatArray, white: FloatArray) -> LoadChange | None:
-    """Fit the load of one link to whitened changes of base parameters; None if rejected."""
+    """Fit a load on one link to whitened changes of base parameters; None if it is rejected."""
     lengths = np.linalg.norm(columns, axis=0)
     scale = np.where(lengths > 0.0, lengths, 1.0)
     left, sizes, right = np.linalg.svd(columns / scale, full_matrices=False)
@@ -294,8 +296,8 @@ def residual_changes(
     Compare the residuals of two models for each joint.
 
     Empty if the residuals are not comparable: the misfit of model.yaml and the residual of
-    identification.json come from different rows. Model errors vary slowly, so a recording has
-    few independent values of them, however many rows.
+    identification.json come from different rows. Model errors vary slowly, so even many rows
+    contain few independent values of them.
 
     """
     if before is None or after is None or before.as_diagnosed != after.as_diagnosed:

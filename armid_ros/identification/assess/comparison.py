@@ -1,6 +1,6 @@
 # Copyright 2026 The armid_ros developers
 # SPDX-License-Identifier: Apache-2.0
-"""Result of a comparison of two identifications: changes, and parameters that only one has."""
+"""Result of a comparison of two identifications: changes, and parameters of one result only."""
 
 from __future__ import annotations
 
@@ -208,7 +208,8 @@ class Comparison:
         Return the factor, after over before, of each joint, if one factor fits nearly all values.
 
         No load and no wear multiplies masses and friction of all joints by several times: the
-        torques of one result are in another unit, or are currents. Empty if no factor is found.
+        torques of one result are in another unit, or they are currents. Empty if no factor is
+        found.
 
         """
         clear = [

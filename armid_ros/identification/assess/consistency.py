@@ -1,13 +1,13 @@
 # Copyright 2026 The armid_ros developers
 # SPDX-License-Identifier: Apache-2.0
 """
-Test whether encoder noise biases an identification, and estimate of the bias.
+Test whether encoder noise biases an identification, and estimate the bias.
 
 Least squares takes the regressor as known, but it is computed from noisy positions. Two checks:
 
 - The Durbin-Wu-Hausman test compares the fit with one by instruments, which is unbiased if the
   instruments do not share the regressor's noise. They are the regressor of the same motion,
-  smoothed to a fifth of the band, where a three-thousandth of the accelerations' noise remains.
+  smoothed to a fifth of the band, which leaves 1/3000 of the noise of accelerations.
 - The bias itself comes from a simulation: the arm follows the smoothed motion, noise as in the
   recorded positions is added to its positions, and it is identified again.
 
@@ -36,10 +36,11 @@ from scipy.stats import chi2
 
 #: Share of the sampling rate above which the spectrum of positions is noise.
 _NOISE_ABOVE = 0.3
-#: Negligible difference between the two fits, in standard deviations. Without it, the test is too
-#: sensitive: two fits of the same data are distinguishable to a thousandth.
+#: Negligible difference between the two fits, in standard deviations. Without this margin, the
+#: test is too sensitive: it distinguishes two fits of the same data that differ by 0.1 %.
 NEGLIGIBLE = 0.1
-#: Smallest bias that matters, in standard deviations: it reduces 95 % intervals to 94 %.
+#: Smallest relevant bias, in standard deviations: it reduces the coverage of 95 % intervals to 94
+#: %.
 BIAS_LIMIT = 0.25
 #: Significance of the test.
 SIGNIFICANCE = 0.05
@@ -100,7 +101,7 @@ class NoiseCheck:
         Return a sentence per finding, and whether the finding is satisfactory.
 
         If the test is significant and the bias by noise is negligible, the two fits differ for
-        another reason: an effect that the model lacks affects them differently.
+        another reason: a missing effect of the model changes them differently.
 
         """
         found = 'no sign' if self.consistent else 'a sign'
@@ -115,7 +116,7 @@ class NoiseCheck:
         leader = name.name.split(' ')[0]
         where = f'{leader} of {name.joint}' if name.joint else leader
         low, high = self.position_noise.min(), self.position_noise.max()
-        verdict = 'negligible' if self.harmless else 'the intervals are off by the bias'
+        verdict = 'negligible' if self.harmless else 'the intervals are shifted by the bias'
         return (
             (
                 f'Durbin-Wu-Hausman test: {found} (statistic {self.statistic:.1f}, '
@@ -172,8 +173,9 @@ def check_noise(
     freedom = max(float(np.sum(sizes.clip(0.0) * counted)), 1.0)  # expected value of the statistic
 
     # A fit with noisy columns V to the torque W beta of exact columns yields M beta, M = V^+ W.
-    # The estimate beta_hat is M times the truth, so its bias is beta_hat - M^-1 beta_hat. That is
-    # M^-1 V^+ times the difference of its torques along the exact and the noisy motion.
+    # The estimate beta_hat is M times the truth, so its bias is beta_hat - M^-1 beta_hat. This
+    # bias is M^-1 V^+ times the difference of the arm's torques along the exact and the noisy
+    # motion.
     noise = np.sqrt(np.mean([position_noise(r) ** 2 for r in recordings], axis=0))
     values, std = result.estimate.values, result.estimate.std
     scale = np.where(std > 0.0, std, 1.0)
@@ -201,7 +203,8 @@ def position_noise(recording: Recording) -> FloatArray:
     """
     Return the standard deviation of white position noise, shape (n,) [rad or m].
 
-    It is the upper end of the spectrum of stretches without a gap; jumps across gaps are no noise.
+    It follows from the upper end of the spectrum. Stretches end at gaps, as jumps across gaps are
+    no noise.
 
     """
     rate = 1.0 / recording.period

@@ -1,10 +1,11 @@
 # Copyright 2026 The armid_ros developers
 # SPDX-License-Identifier: Apache-2.0
 """
-Checks for faults of the data, before a residual is explained by physics.
+Checks for faults of the data, before physical causes of a residual are searched.
 
 The checks cover time base, units, signs, order of joints, delay and clipped readings: a fault of
-the data explains any gap. Names, signs and units are checked as in identification; see `mistakes`.
+the data takes precedence over any effect. Names, signs and units are checked as in identification;
+see `mistakes`.
 
 """
 
@@ -38,9 +39,10 @@ from armid_ros.robots import Robot
 import numpy as np
 import numpy.typing as npt
 
-#: Median factor of torques from which the unit is another; loads cause smaller factors.
+#: Median factor of torques from which their unit is wrong; loads cause smaller factors.
 _GAINS = 4.0
-#: Largest ratio of a factor since a baseline to the factor of a unit of force: masses cancel.
+#: Largest ratio of a factor since a baseline to the factor of a unit of force; masses cancel
+#: there.
 _NEAR_SINCE = 1.05
 #: Ratio of a torque to the drive limit above which a note is given.
 _BEYOND = 1.5
@@ -94,7 +96,7 @@ def check_data(
         for part in data
         for law in laws_of_controllers(arm.body, part.motion, part.informative)
     ]
-    if alone and not faults:  # an arm that is tied to another machine may be driven by it
+    if alone and not faults:  # another machine that is tied to the arm may drive it
         driven = driven_by_friction(arm.robot, [part.motion for part in data])
         faults += [driven] if driven else []
     notes = [note for one in recordings for note in _extremes(arm.robot, one)]
@@ -114,10 +116,10 @@ def _mistaken(
     before: Sequence[Motion],
 ) -> list[str]:
     """Return the mistake that all recordings share, or otherwise joints in a wrong unit."""
-    # with a baseline, the factor of all torques is found by comparison with it
+    # with a baseline, the comparison with it gives the factor of all torques
     since = bool(before) and bool(np.any(_factors_since(arm, motions, before) > 0.0))
     for one, sources in shared_mistakes(arm.body, recordings, used):
-        # with a baseline, a mistake that needs a fitted body is a change of the arm instead
+        # with a baseline, a mistake that appears only with fitted links is a change of the arm
         known = before and (one.fitted or (since and one.hypotheses[0].of_masses))
         if len(sources) == len(recordings) and one.of_data and not known:
             return [one.text]
@@ -158,9 +160,9 @@ def unit_faults(
     """
     Return notes on the unit of torques, by a model with friction or by a baseline.
 
-    A joint whose torque is mostly friction, such as a wrist, fits as well in any unit, as its
-    friction is fitted; see `mistakes`. A model with its friction, or a baseline, reveals the unit.
-    Wrong masses of a model are wrong in a baseline as well and cancel.
+    If the torque of a joint is mostly friction, as in a wrist, the fitted friction hides a wrong
+    unit; see `mistakes`. A model with known friction, or a baseline, reveals the unit.
+    Errors of the model's masses are the same in the baseline and cancel.
 
     Parameters
     ----------
@@ -203,17 +205,17 @@ def unit_faults(
 def _factors_since(
     arm: ArmModel, motions: Sequence[Motion], before: Sequence[Motion]
 ) -> FloatArray:
-    """Return measured over modelled torques relative to a baseline, (n,); zero if not clear."""
+    """Return measured over modelled torques relative to a baseline, (n,); zero if undetermined."""
     best, factors = np.full((2, arm.robot.n_joints), 0.0)
     if not motions:
         return factors
-    # first the body, with friction and offset fitted; then the model with its own friction
+    # first the rigid body, with fitted friction and offset; then the model with its own friction
     for model in (ArmModel(arm.body), arm):
         slope, correlation = torque_factors(model, motions)
         if before:
             then, follows = torque_factors(model, before)
-            # a baseline that does not determine the model has an error larger than the torque
-            # itself; rows at rest count, as friction holds a joint with no more torque
+            # the error of an undetermined model exceeds the baseline's torque; rows at rest are
+            # included, as friction holds a joint with no more torque
             whole = joined(before)
             assert whole.tau is not None
             speed, expected = np.abs(whole.dq), np.concatenate([model.torque(x) for x in before])

@@ -4,9 +4,9 @@
 Grade of an identification, with reasons.
 
 The grade follows from the torque error on held-out data of the joint that is predicted worst, and
-from faults of the recordings. Errors of joints are shares of their own torque, as newtons of a
-slide and newton metres of a wrist have no common unit. No model predicts white noise of a torque,
-or the dry friction of a joint at rest.
+from faults of the recordings. The error of a joint is a share of its own torque, as forces of a
+slide [N] and torques of a wrist [N m] have no common unit. No model can predict white torque
+noise, or the dry friction of a joint at rest.
 
 """
 
@@ -99,7 +99,7 @@ def grade(
     every = [*recordings, *held_out]
     fits = [*result.training, *(fit for part in validation.values() for fit in part)]
     sensors = list(sensor_faults(description, every, fits, result.used))
-    # other apparent mistakes of a recording with a dead sensor are consequences of it
+    # a dead sensor causes other apparent mistakes in its recording
     blind = {fault.source for fault in sensors if fault.word == 'unusable'}
     seeing = [one for one in every if one.source not in blind]
     mistakes = _mistakes(result, description, seeing)
@@ -136,7 +136,7 @@ def _worst_first(reasons: Sequence[Fault]) -> list[Fault]:
 def _mistakes(
     result: Identification, description: ArmModel, recordings: Sequence[Recording]
 ) -> list[Fault]:
-    """Return mistakes in the recordings: names, signs, units, zeros, delays, gravity."""
+    """Return mistakes in recordings: names, signs, units, encoder zeros, delays, gravity."""
     repaired, _ = without_damage(recordings, result.used)
     faults = []
     for worst, sources in shared_mistakes(description.body, repaired, result.used):
@@ -152,7 +152,7 @@ def _mistakes(
 def _errors(
     result: Identification, worst: Mapping[str | None, _Worst], held_out: Sequence[Fit]
 ) -> Iterator[Fault]:
-    """Yield the reason of the worst joint, and joints whose torque is hardly predicted."""
+    """Yield the error of the worst joint, and the joints whose torque is hardly predicted."""
     use = {
         'good': '',
         'poor': ', too large to compute torques',
@@ -175,7 +175,7 @@ def _errors(
         named = ', '.join(
             f'{result.arm.robot.joints[j]} ({every[j]:.0f} %)' for j in np.flatnonzero(noisy)
         )
-        text = f'torque of mostly noise or friction at rest, hardly predicted: {named}'
+        text = f'torque is mostly noise or friction at rest, hardly predicted: {named}'
         yield Fault(text, 'good')
 
 
@@ -222,7 +222,7 @@ def _halves(result: Identification, word: Word, error: str) -> Fault:
 
 
 def _resting(result: Identification, validation: Mapping[str, Sequence[Fit]]) -> Iterator[Fault]:
-    """Yield faults of joints that do not move: not identified, or not checked."""
+    """Yield the joints that do not move, and are therefore not identified or not validated."""
     fitted = moving(fit.motion for fit in result.training)
     held_out = [fit.motion for part in validation.values() for fit in part]
     checked = moving(held_out) if held_out else fitted
@@ -243,9 +243,9 @@ def beyond_noise(errors: FloatArray, fits: Sequence[Fit], used: Conditioning) ->
     """
     Return the relative torque errors of joints, corrected for torque noise.
 
-    Noise counts twice: in a row, and in its prediction if that is as uncertain as a measurement
-    (leverage of one, Hoaglin and Welsch 1978). An error as large as that of a sensor is not an
-    error of the model.
+    Noise enters twice: in a row, and in its prediction, which is as uncertain as a measurement
+    at a leverage of one (Hoaglin and Welsch 1978). An error as large as the sensor's is no error
+    of the model.
 
     Parameters
     ----------
@@ -276,7 +276,7 @@ def torque_noise(fits: Sequence[Fit], used: Conditioning) -> FloatArray:
     Return the standard deviation of the white noise in rows of measured torque, (n,) [N m].
 
     The noise is computed from the median of second differences (Gasser, Sroka and Jennen-Steinmetz
-    1986): the torque of the motion changes little from row to row, and friction steps in few rows.
+    1986): torques of motion change little from row to row, and friction jumps in few rows only.
 
     """
     differences = np.concatenate([np.abs(np.diff(fit.tau, 2, axis=0)) for fit in fits])

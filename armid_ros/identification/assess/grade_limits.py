@@ -9,10 +9,10 @@ from typing import Literal
 
 #: Grade of an identification, with reasons.
 Word = Literal['good', 'poor', 'unusable']
-#: Independent values of a residual in one recording. Ten unchanged simulated arms had different
-#: motions each day. The logarithm of the ratio of two residuals of a joint had a deviation of 0.35
-#: with one recording per day and 0.19 with three; 8 independent values make 0.38 and 0.21. One of
-#: the twenty pairs is reported to differ.
+#: Number of independent values of a residual in one recording. Ten unchanged simulated arms made
+#: other motions each day. The logarithm of the ratio of two residuals of a joint had a deviation
+#: of 0.35 with one recording per day and 0.19 with three; 8 independent values correspond to 0.38
+#: and 0.21. One of the twenty pairs is reported as different.
 FREEDOM = 8
 
 

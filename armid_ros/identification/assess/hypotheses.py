@@ -28,11 +28,11 @@ from armid_ros.motion import FloatArray, Motion
 from armid_ros.robots import GRAVITIES, Robot
 import numpy as np
 
-#: Possible errors of the zero of a joint [degrees]: of an encoder, an axis or a drawing.
+#: Possible zero errors of a joint [degrees], by its encoder, its axis or the description.
 TURNS = (-135.0, -90.0, -45.0, 45.0, 90.0, 135.0, 180.0)
 #: Largest distance of a gravity vector from the known vector that replaces it, over its length.
 _KNOWN = 0.3
-#: Smallest correlation for a reliable factor of a joint: the residual is below 15 % of torque.
+#: Smallest correlation for a reliable factor of a joint: its residual is below 15 % of its torque.
 _CLEAR = 0.989
 
 Quantity = Literal['position', 'torque', 'position and torque']
@@ -74,7 +74,7 @@ class Hypothesis:
 
     @property
     def of_masses(self) -> bool:
-        """Whether a common factor of all masses explains the data as well."""
+        """Whether a common factor of all masses would explain the data equally well."""
         return self.kind in ('gravity', 'scale', 'units')
 
     @property
@@ -83,8 +83,9 @@ class Hypothesis:
         return self.kind in ('units', 'unit', 'degrees', 'sign', 'exchange')
 
 
-AS_RECORDED = Hypothesis('nothing', 'the data are as they should be', values=0)
-#: Hypothesis of a description without inertia: friction and drives explain the torques alone.
+AS_RECORDED = Hypothesis('nothing', 'the data have no mistake', values=0)
+#: Hypothesis that the described links explain nothing: friction and drives alone explain the
+#: torques.
 WITHOUT_BODY = Hypothesis(
     'body',
     'the description does not explain the torques',
@@ -97,7 +98,7 @@ def hypotheses(robot: Robot, motions: Sequence[Motion]) -> Iterator[Hypothesis]:
     """
     Yield the possible mistakes in recorded motions of an arm, except delays.
 
-    Only values beyond 2 pi are tested for degrees: even small angles in degrees exceed it.
+    Only values beyond 2 pi are tested for degrees: even small angles in degrees exceed this.
 
     """
     turned = np.max([np.abs(one.q).max(axis=0) for one in motions], axis=0) > 2.0 * np.pi
@@ -154,7 +155,7 @@ def delayed(seconds: float, half_width: float) -> Hypothesis:
     return Hypothesis(
         'delay',
         f'the torque seems to come about {1e3 * abs(seconds):.0f} ms {side} than the '
-        f'position (± {np.ceil(1e3 * half_width):.0f} ms): stamp both alike',
+        f'position (± {np.ceil(1e3 * half_width):.0f} ms): give both the same time stamps',
         lambda motion: shifted(motion, seconds),
     )
 
@@ -179,7 +180,7 @@ def other_gravity(robot: Robot, vector: FloatArray) -> Hypothesis | None:
     """
     Return the hypothesis of another gravity vector, replaced by a nearby known vector.
 
-    Known vectors include the described magnitude along any axis.
+    Known vectors have the described magnitude along an axis, for example.
 
     Parameters
     ----------
@@ -228,7 +229,7 @@ def other_gravity(robot: Robot, vector: FloatArray) -> Hypothesis | None:
 
 
 def _other_scale(robot: Robot, factor: float, motions: Sequence[Motion]) -> Hypothesis:
-    """Return the hypothesis that efforts differ from N m by a factor: a unit, or currents."""
+    """Return the hypothesis that efforts are in another unit than N m, or are currents."""
     factors, correlation = torque_factors(ArmModel(robot), motions)
     known = (correlation > _CLEAR) & (factors > 0.0)
     unit = unit_of(factor, factors[known].tolist())
@@ -242,8 +243,8 @@ def _other_scale(robot: Robot, factor: float, motions: Sequence[Motion]) -> Hypo
         shown = zip(factors, known, strict=True)
         gains = ','.join(f'{1.0 / one:.3g}' if clear else '?' for one, clear in shown)
         hidden = ', '.join(robot.joints[k] for k in np.flatnonzero(~known))
-        text += f'; for currents give --current-gain {gains}, as accurate as those masses'
-        text += f'; that of {hidden} is not determined' if hidden else ''
+        text += f'; for currents give --current-gain {gains}, no more accurate than those masses'
+        text += f'; the factor of {hidden} is not determined' if hidden else ''
     scaled = _times(robot, 'torque', slice(None), 1.0 / factor)
     return Hypothesis('units' if unit else 'scale', text, scaled)
 
@@ -294,7 +295,7 @@ def _in_degrees(robot: Robot, joint: int | None = None) -> Hypothesis:
 
 
 def _beyond_masses(factor: float) -> bool:
-    """Whether a factor is too large or too small for a common error of all masses."""
+    """Whether a factor is too far from 1 to be a common error of all masses."""
     return not 1.0 / LIMITS.torque_factor < factor < LIMITS.torque_factor
 
 

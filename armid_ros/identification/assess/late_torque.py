@@ -5,10 +5,10 @@ Delay between torques and positions of a recording, with a confidence interval.
 
 A delay shifts the whole torque in time. Presliding friction delays only the friction: after a
 reversal it grows with the distance that the joint has travelled (Dahl 1968), which takes tens of
-milliseconds at low speed. So a delay is estimated from weight and inertia: its column is the rate
-of the body's torque, and friction with several presliding lengths is fitted as well. If a motion
-runs backwards, the torque of a body is the same and its rate, like friction, is opposite. An error
-of the described body therefore does not look like a delay.
+milliseconds at low speed. A delay is therefore estimated from weight and inertia. Its column is
+the rate of the rigid-body torque; friction with several presliding lengths is a nuisance. In a
+reversed motion, the rigid-body torque is the same, but its rate and friction have the opposite
+sign. Errors of described masses therefore do not look like a delay.
 
 """
 
@@ -33,12 +33,12 @@ from armid_ros.recording import Recording
 from armid_ros.robots import Robot
 import numpy as np
 
-#: Presliding lengths of friction [rad or m], as in gears of arms, in steps of three to cover all
-#: lengths between. On 63 recordings with lengths of 1 to 3 mrad, the delay errs by -1 to 6 ms (5
-#: to 95 %). Lengths of 1 and 3 mrad alone err by 0 to 6 ms, 0.1 to 30 mrad by -3 to 6 ms. Without
-#: lengths, the error is -24 to 17 ms, with a six times wider interval.
+#: Presliding lengths of friction [rad or m], as in gears of arms. Steps of a factor of three
+#: cover all lengths between. On 63 recordings with lengths of 1 to 3 mrad, the delay errs by -1 to
+#: 6 ms (5 to 95 %). Lengths of 1 and 3 mrad alone err by 0 to 6 ms, 0.1 to 30 mrad by -3 to 6 ms.
+#: Without lengths, the error is -24 to 17 ms, with a six times wider interval.
 _LENGTHS = (0.0003, 0.001, 0.003, 0.01)
-#: Longest delay that is tested [s].
+#: Largest delay that is tested [s].
 _LONGEST = 0.3
 
 
@@ -84,10 +84,10 @@ def late_torque(robot: Robot, recording: Recording, used: Conditioning) -> Delay
 
 
 def _rows(robot: Robot, motion: Motion, used: Conditioning) -> tuple[FloatArray, ...]:
-    """Return columns of each joint, of bodies, of a delay and the rest, (n, M, k), and torques."""
-    # own columns: offset, viscous friction, drive inertia, and dry friction without and with
-    # presliding, constant and in proportion to the load; it is filtered as the torque is, as it
-    # steps within a sample
+    """Return columns of rigid bodies, of a delay and of other terms, (n, M, k), and torques."""
+    # columns of one joint: offset, viscous friction, drive inertia, and dry friction without and
+    # with presliding, constant and proportional to the load. Friction steps within a sample, so
+    # it passes the filter of the torque
     assert motion.tau is not None
     n, kept = motion.n_joints, np.array(decimated_samples(len(motion), used), dtype=np.intp)
     slow = motion.select(kept)

@@ -3,10 +3,10 @@
 """
 Search for a mistake in a recording: hypotheses by their likelihood ratio.
 
-Each hypothesis is compared with the data as recorded. Errors of the described links are a more
-common cause, so the body is fitted with the prior of the description in both cases. A mistake is
-accepted if it explains more than such a body does. This prior allows one wrong factor of all
-masses; a factor of all torques is therefore judged with the body as described, too.
+Each hypothesis is compared with the data as recorded. Errors of the described links are more
+common. Both fits therefore include the link parameters, with the description as prior. A mistake
+is accepted if it explains more than fitted links do. This prior allows one wrong factor of all
+masses; a factor of all torques is therefore also tested with the links as described.
 
 """
 
@@ -100,7 +100,7 @@ def shared_mistakes(
     robot: Robot, recordings: Sequence[Recording], used: Conditioning
 ) -> list[tuple[Mistake, tuple[str, ...]]]:
     """
-    Find the mistakes in recordings, grouped by kind and place.
+    Find the mistakes in recordings, grouped by kind and joint.
 
     Parameters
     ----------
@@ -133,7 +133,7 @@ def shared_mistakes(
 
 
 class _Row(NamedTuple):
-    """Hypothesis with its errors, and its likelihood ratios over their limits."""
+    """Hypothesis with its prediction errors, and its likelihood ratios divided by their limits."""
 
     hypothesis: Hypothesis
     described: PredictionError
@@ -169,14 +169,14 @@ def find_mistake(robot: Robot, recording: Recording, used: Conditioning) -> Mist
     if near is None or described is None or bare is None:
         return None
     without = replace(described, joints=np.minimum(described.joints, bare.joints))
-    # whether the residual with a fitted body alone is large enough to reveal a mistake
+    # whether the residual with fitted links alone is large enough to reveal a mistake
     alone = bool(100.0 * near.joints.max() >= LIMITS.poor)
     exact = PredictionError(np.zeros(robot.n_joints), without.torque)
     if without.gain(exact) < LIMITS.gain and not alone:
         return None
 
     def rows(some: Sequence[Hypothesis]) -> list[_Row]:
-        """Evaluate hypotheses; fit the body, too, where its error may decide."""
+        """Evaluate hypotheses; fit the links as well if their errors may decide."""
         found = []
         for one in some:
             after = _error(robot, slow, one, near=False)
@@ -184,7 +184,7 @@ def find_mistake(robot: Robot, recording: Recording, used: Conditioning) -> Mist
                 continue
             price, fitted = LIMITS.gain**one.values, near
             ratio = without.gain(after) / price
-            # a fitted body can explain any factor of a torque
+            # fitted links can explain any factor of a torque
             if ratio >= 1.0 or (alone and one.kind != 'unit' and not one.of_masses):
                 fitted = _error(robot, slow, one, near=True) or near
             found.append(_Row(one, after, ratio, fitted, near.gain(fitted) / price))
@@ -194,7 +194,7 @@ def find_mistake(robot: Robot, recording: Recording, used: Conditioning) -> Mist
     tried = rows([*hypotheses(robot, slow), *([] if late is None else [delayed(*late)])])
     for ratio in ('as_described', 'as_fitted'):
         tried += rows(max(tried, key=attrgetter(ratio)).hypothesis.nearby())
-    # prefer hypotheses that explain more than any body near the description
+    # prefer hypotheses that explain more than any links near the description
     sure = [row for row in tried if _predicts(robot, row) and row.as_described >= 1.0]
     both = [row for row in sure if row.as_fitted >= 1.0]
     if both:
@@ -225,7 +225,7 @@ def _error(
     robot: Robot, slow: Sequence[Motion], one: Hypothesis, *, near: bool
 ) -> PredictionError | None:
     """Return the prediction error of a hypothesis; None if too few samples remain."""
-    # 200 samples: twenty for every value of a link
+    # 200 samples: twenty for each of the ten parameters of a link
     motion = thinned([one.motion(motion) for motion in slow], 200)
     if motion is None or len(motion) < _FEWEST:
         return None

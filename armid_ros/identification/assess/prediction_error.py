@@ -3,8 +3,8 @@
 """
 Error of an arm's torque prediction for a recording.
 
-Friction, offset and drive inertia of every joint are fitted. The body is that of the description,
-or the most likely body near it.
+Friction, offset and drive inertia of every joint are fitted. The links have the described
+parameters, or the most likely ones near them.
 
 """
 
@@ -23,9 +23,10 @@ from armid_ros.robots import Robot
 import numpy as np
 from scipy.stats import t as student
 
-#: Number of own columns of each joint: offset, viscous and Coulomb friction, drive inertia.
+#: Number of columns of each joint: offset, viscous and Coulomb friction, drive inertia.
 _OWN = 4
-#: Number of blocks of a recording whose scores give the deviation; nine degrees of freedom.
+#: Number of blocks of a recording whose scores give the standard deviation; nine degrees of
+#: freedom.
 _BLOCKS = 10
 
 
@@ -62,14 +63,14 @@ class PredictionError:
         """
         Return the likelihood ratio of another prediction, per independent sample.
 
-        It is the likelihood ratio of models with unknown noise, times the ratio of their priors of
-        the body. Errors are limited to the range from the floor to the torque itself.
+        The likelihood ratio of models with unknown noise is multiplied by the ratio of the
+        priors of their links. Errors are limited to the range from the floor to the torque itself.
 
         """
         return self.of_data(better) * float(np.exp((self.off - better.off) / (2.0 * FREEDOM)))
 
     def of_data(self, better: PredictionError) -> float:
-        """Return the likelihood ratio without the prior of the bodies."""
+        """Return the likelihood ratio without the priors of the links."""
         before, after = (np.clip(x.joints, LIMITS.floor, 1.0) for x in (self, better))
         return float(np.prod(before / after))
 
@@ -87,7 +88,7 @@ def prediction_error(robot: Robot, motion: Motion, *, near: bool) -> PredictionE
     """
     Fit friction, offset and drive inertia of every joint; return the prediction error.
 
-    Friction and drive inertia are bounded below by zero, so they explain no torque of the
+    Friction and drive inertia are bounded below by zero, so they cannot explain a torque of the
     opposite sign.
 
     Parameters
@@ -161,12 +162,12 @@ def shared_values(
     own: FloatArray, shared: FloatArray, near: FloatArray | None = None
 ) -> tuple[FloatArray, FloatArray]:
     """
-    Fit values that all joints share, with own values of each joint and bodies as nuisance.
+    Fit values that all joints share, with parameters of joints and links as nuisance.
 
-    Own columns are projected out (Frisch and Waugh 1933). Joints are weighted by their residuals,
-    down to the floor. The interval allows for residuals that are correlated in time or within a
-    joint (Liang and Zeger 1986): scores are summed over blocks of the recording, or over joints,
-    whichever sums vary more.
+    Columns of single joints are projected out (Frisch and Waugh 1933). Joints are weighted by
+    their residuals, down to the floor. The interval allows for residuals that are correlated in
+    time or within a joint (Liang and Zeger 1986): scores are summed over blocks of the recording
+    or over joints; the sums with the larger variance are used.
 
     Parameters
     ----------
@@ -191,7 +192,7 @@ def shared_values(
     prior = np.diag((np.arange(both.shape[2] - 1) < bodies) * rows / FREEDOM)
     values, inverse, size = np.empty(0), prior, np.ones(n)
     columns, left = both[:, :, :-1], both[:, :, -1]
-    # residuals of a pass give the weights of the next one
+    # the residuals of one pass give the weights of the next
     for _ in range(4):
         columns, target = (one / size[:, None, None] for one in (both[:, :, :-1], both[:, :, -1:]))
         stacked = columns.reshape(n * rows, -1)
@@ -201,7 +202,7 @@ def shared_values(
         size = np.maximum(size * np.sqrt(np.mean(left**2, axis=1)), LIMITS.floor)
     scores = (columns * left[:, :, np.newaxis]) @ inverse
     blocks = np.stack([part.sum(axis=(0, 1)) for part in np.array_split(scores, _BLOCKS, axis=1)])
-    # standard deviation of the total of several sums; zero if there is only one
+    # standard deviation of the total of several sums; zero for a single sum
     spreads = [
         np.sqrt(np.sum(sums**2, axis=0) * len(sums) / max(len(sums) - 1, 1))
         for sums in (blocks, scores.sum(axis=1))
@@ -217,16 +218,16 @@ def root_mean_square(columns: FloatArray) -> FloatArray:
 
 
 def _own_columns(motion: Motion) -> FloatArray:
-    """Return the own columns of each joint, of mean square one, shape (N, n, 4)."""
+    """Return the columns of each joint, scaled to mean square one, shape (N, n, 4)."""
     dq, ddq = motion.dq, motion.ddq
     columns = np.stack([np.ones_like(dq), dq, np.sign(dq), ddq], axis=-1)
     return columns / root_mean_square(columns)
 
 
 def _weight(motion: Motion) -> FloatArray:
-    """Return weights of rows, shape (N, n), of mean square one."""
-    # They are zero where a joint rests or reverses. Dry friction is arbitrary there: presliding
-    # looks like a delayed torque.
+    """Return weights of rows, scaled to mean square one, shape (N, n)."""
+    # Weights are zero where a joint rests or reverses: dry friction is arbitrary there, and
+    # presliding looks like a delayed torque.
     speed = np.abs(motion.dq)
     moves = speed > SLOW * speed.max(axis=0)
     moves[:, ~moves.any(axis=0)] = True

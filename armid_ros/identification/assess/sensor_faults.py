@@ -1,12 +1,12 @@
 # Copyright 2026 The armid_ros developers
 # SPDX-License-Identifier: Apache-2.0
 """
-Faults visible in the readings: dead sensors, velocities, clocks, joints held elsewhere.
+Faults visible in the readings: dead sensors, wrong velocities or clocks, misplaced joints.
 
-The reading of a locked joint is constant and its velocity is zero. A constant reading is dead
-only if the recorded velocity is not zero. A passive joint and a drive at its limit have a constant
-torque, too. The model predicts hardly any torque for the passive joint, and the drive at its limit
-has its largest torque.
+The reading of a locked joint is constant and its velocity is zero. A constant position is a dead
+sensor only if the recorded velocity is not zero. A passive joint and a drive at its limit have a
+constant torque, too. They are recognised: the model predicts hardly any torque for a passive
+joint, and a saturated drive has its largest torque.
 
 """
 
@@ -30,33 +30,34 @@ from armid_ros.robots import described_at, held_joints, HeldJoint, Robot
 import numpy as np
 from scipy.integrate import cumulative_trapezoid
 
-#: A step is no motion if its velocity is this multiple of the limit and of this percentile
-#: of all steps. A step that reverts within so many samples is repaired (`damage`).
+#: A step is no motion if its velocity is this multiple of the limit and of this percentile of
+#: all steps. A step that reverts within this number of samples is repaired (`damage`).
 _IMPOSSIBLE, _USUAL, _BRIDGED = 10.0, 99.0, 10
 #: Range of a Brownian bridge over its scale with a probability of 1e-6 (Kuiper 1960).
 _WALK = 3.0
-#: Largest error of the integral of a constant speed, as a share of the distance. Errors of clocks
-#: and units are smaller, and a reversal of the joint makes half of the distance.
+#: Largest error of the integral of a constant speed, as a share of the distance. Errors of
+#: clocks and units are smaller. A reversal of the joint changes half of the distance.
 _WAY = 0.1
 #: Least time [s], and least share of the joint's range, over which a constant channel is dead.
-#: Least change of its load over weight or inertia, which cancel in a passive joint.
+#: Least change of its load, as a share of weight or inertia, which cancel in a passive joint.
 _LONG, _FAR, _TAKEN = 1.0, 0.2, 0.5
 #: Longest piece over which velocities are integrated [s], above a usual period: integrated noise
 #: is a random walk. Largest RMS distance of a position from a line at constant speed [rad or m].
 _PIECE, _STEADY = 10.0, 0.1 * REST_RANGE
-#: Correlation from which a ratio is a plain factor: a low-pass that removes a twentieth of a
-#: velocity delays it by a phase whose cosine is 0.95. Largest relative difference of the ratios of
+#: Correlation from which a ratio is a plain factor: a low-pass that reduces a velocity by 5 %
+#: delays it by a phase with cosine 0.95. Largest relative difference of the ratios of
 #: joints with a common factor.
 _PLAIN, _ALIKE = 0.98, 0.02
-#: Smallest deviation of a common factor from 1 that is a fault. A twentieth of the time is a tenth
-#: of the torque of inertia; errors of encoders, clocks and the integral are a hundredth at most.
+#: Smallest deviation of a common factor from 1 that is a fault. An error of time by 5 % changes
+#: the torque of inertia by 10 %. Errors of encoders, clocks and the integral are at most 1 %.
 _TOLERANCE = 0.05
-#: Smallest correlation of a velocity with that of its position, and largest ratio to the factor of
-#: a unit, for a velocity in that unit: half of its power is explained, and other units are far.
+#: A velocity is in another unit if its correlation with the rate of the position is at least
+#: this, which explains half of its power, and the factor differs from that of the unit by less
+#: than this ratio.
 _FOLLOWS, _NEAR = 0.7, 1.25
 #: Ratio of the median reading of a joint to the limit of its drive from which it is in another
-#: unit. The smallest factor of a unit is a hundred, of which this is half in the logarithm, and no
-#: drive gives as much.
+#: unit. The smallest factor of a unit is 100. This ratio is its square root, and no drive
+#: exceeds its limit as much.
 _BEYOND_DRIVE = 10.0
 _DEGREE = float(np.deg2rad(1.0))
 #: Ratios of velocities to those of the positions, and the fault that each indicates.
@@ -137,7 +138,7 @@ def sensor_faults(
 
 
 def _jumps(robot: Robot, recording: Recording) -> Iterator[Fault]:
-    """Yield the first impossible position jump that does not revert."""
+    """Yield the first impossible jump of a position that is not reverted."""
     if len(recording) < 2:
         return
     time = np.maximum(np.diff(recording.t), recording.period)[:, np.newaxis]
@@ -151,8 +152,8 @@ def _jumps(robot: Robot, recording: Recording) -> Iterator[Fault]:
         if abs(later[-1] - recording.q[row, joint]) > 0.5 * abs(step):
             yield Fault(
                 f'the position of {robot.joints[joint]} jumps by {step:.3g} '
-                f'{robot.position_units[joint]} at {recording.t[row + 1]:.3f} s: leave out what '
-                'is faulty, or record again',
+                f'{robot.position_units[joint]} at {recording.t[row + 1]:.3f} s: leave out the '
+                'faulty part, or record again',
                 'poor',
                 recording.source,
             )
@@ -168,10 +169,10 @@ def encoder_faults(recording: Recording, units: Sequence[str] | None) -> Iterato
     # A wheel or a turntable may have constant speed, whose integral is its distance.
     way = np.ptp(recording.q - recording.dq * (t - t[0])[:, np.newaxis], axis=0)
     changes = np.ptp(recording.dq, axis=0) > 0.0
-    measured = bool(np.any((moved > REST_RANGE) & changes))  # or velocities are absent
+    measured = bool(np.any((moved > REST_RANGE) & changes))  # or there are no velocities
     for j, unit in enumerate(units):
         start, stop = _longest_same(recording.q[:, j])
-        # range of a joint at rest, plus a step of the encoder
+        # range of positions at rest, plus one step of the encoder
         steps = np.abs(np.diff(recording.q[:, j]))
         hidden = REST_RANGE + (float(steps[steps > 0.0].min()) if steps.any() else 0.0)
         goes = _distance(t[start:stop], recording.dq[start:stop, j])
@@ -189,7 +190,7 @@ def encoder_faults(recording: Recording, units: Sequence[str] | None) -> Iterato
 def torque_faults(
     arm: ArmModel, recording: Recording, motions: Sequence[Motion]
 ) -> Iterator[Fault]:
-    """Yield torque channels that are constant while the joint needs another torque."""
+    """Yield torque channels that are constant while the motion needs a varying torque."""
     assert recording.tau is not None
     if np.all(np.ptp(recording.tau, axis=0) < NOTHING):
         yield Fault(SILENT, 'unusable', recording.source)
@@ -222,8 +223,8 @@ def units_beyond_drives(
     """
     Yield notes on torques in another unit, by the limits of the drives.
 
-    No note is given if most joints are beyond their limits, or if the described body needs as
-    much: then the limits of the description are wrong.
+    There is no note if most joints exceed their limits, or if the described links need as much
+    torque: then the described limits are wrong.
 
     Parameters
     ----------
@@ -248,7 +249,7 @@ def units_beyond_drives(
         limit, unit = robot.torque_limit[joint], robot.torque_units[joint]
         yield (
             f'the torque of {robot.joints[joint]} seems to be in another unit than {unit}: '
-            f'half of its readings are beyond {usual[joint]:.3g}, its drive gives '
+            f'half of its readings exceed {usual[joint]:.3g}; the limit of its drive is '
             f'{limit:.4g} {unit}. Convert it, or correct the limit in the description'
         )
 
@@ -262,11 +263,11 @@ def _stays(
     why: str,
     always: str,
 ) -> Fault:
-    """Return the fault of a channel that is constant for a time, and a remedy if always."""
+    """Return the fault of a channel that is constant for some time, or throughout."""
     when, remedy = 'throughout', always
     if run != (0, len(recording)):
         first, last = recording.t[run[0]], recording.t[run[1] - 1]
-        when, remedy = f'from {first:.3f} s to {last:.3f} s', 'leave that time out'
+        when, remedy = f'from {first:.3f} s to {last:.3f} s', 'leave out that time'
     text = f'the {what} of {recording.joints[joint]} stays at {value} {when}{why}; {remedy}'
     return Fault(text, 'unusable', recording.source)
 
@@ -280,12 +281,13 @@ def _longest_same(reading: FloatArray, step: float = 0.0) -> tuple[int, int]:
 
 
 def _distance(t: FloatArray, dq: FloatArray) -> float:
-    """Return the distance that a recorded velocity covers beyond its mean [rad or m]."""
+    """Return the range of the integral of a recorded velocity minus its mean [rad or m]."""
     if len(t) < 3:
         return 0.0
     way = cumulative_trapezoid(dq, t, initial=0.0)
     way -= (t - t[0]) * way[-1] / (t[-1] - t[0])
-    # white noise, by its second differences of six times the variance, adds up to a random walk
+    # integrated white noise is a random walk; second differences of white noise have six times its
+    # variance
     noise = float(np.mean(np.diff(dq, 2) ** 2)) / 6.0
     return max(float(np.ptp(way)) - _WALK * float(np.sqrt(noise * np.sum(np.diff(t) ** 2))), 0.0)
 
@@ -309,7 +311,7 @@ def velocity_ratio(recording: Recording) -> tuple[FloatArray, FloatArray]:
     nothing = np.full(recording.n_joints, np.nan), np.zeros(recording.n_joints)
     if recording.dq is None:
         return nothing
-    # positions and integrated velocities of unbroken pieces, both without their linear trend
+    # positions and integrated velocities of unbroken pieces, both without linear trend
     pairs = []
     for stretch in unbroken(recording, 1.0 / recording.period):
         duration = recording.t[stretch[-1]] - recording.t[stretch[0]]
@@ -323,7 +325,7 @@ def velocity_ratio(recording: Recording) -> tuple[FloatArray, FloatArray]:
         return nothing
     moved, made = (np.concatenate(parts) for parts in zip(*pairs, strict=True))
     product, own, other = np.sum(moved * made, 0), np.sum(moved**2, 0), np.sum(made**2, 0)
-    # A joint of constant speed has only a linear trend and noise.
+    # A joint with constant speed has only a linear trend and noise.
     rests = (np.ptp(recording.q, axis=0) < REST_RANGE) | (own < len(moved) * _STEADY**2)
     size = np.sqrt(own * other)
     return (
@@ -366,7 +368,7 @@ def held_elsewhere(
     robot: Robot, recordings: Sequence[Recording], motions: Sequence[Motion]
 ) -> Iterator[Fault]:
     """
-    Yield undriven joints at another position than described, if the torque error is relevant.
+    Yield undriven joints off their described position, if the torque error is relevant.
 
     If such a joint moves, or carries driven joints at another position, the arm differs from the
     model. The size of this error is the change of the described torque along the recorded motion,
@@ -389,9 +391,8 @@ def held_elsewhere(
         lowest, highest = min(one.lowest for one in seen), max(one.highest for one in seen)
         moves = highest - lowest > REST_RANGE
         if not (moves or joint.carries):
-            continue  # a fixed part of the body that carries it
-        # largest relative change of the described torque between positions of the joint; several
-        # positions, as weight and inertia may be equal at both ends of the range
+            continue  # largest relative change of the described torque between positions of the
+        # joint; several positions, as weight and inertia may be equal at both ends of the range
         places = [*np.linspace(lowest, highest, 7 if moves else 1), joint.position]
         robots = [described_at(robot, {joint.name: place}) for place in places]
         described = [np.concatenate([inverse_dynamics(r, m) for m in motions]) for r in robots]

@@ -4,10 +4,10 @@
 Further tests of an identification, in addition to its torque error.
 
 Bias by encoder noise is tested on the training data. The description and the identified arm are
-simulated in closed loop along held-out data. Tests that are impossible are listed with reasons.
+simulated in closed loop along held-out data. Tests that cannot be made are listed with reasons.
 
-In a forward validation, a model is driven by recorded torques, and its positions are compared with
-the recorded ones. Errors of an integrated torque grow without bounds, so feedback holds the model
+Forward validation: recorded torques drive a model, and its positions are compared with the
+recorded positions. Errors of an integrated torque grow without bounds, so feedback holds the model
 near the recorded motion: tau = tau_recorded + M (omega^2 e + 2 omega de). A torque error d of a
 joint makes a position error of about d / (M omega^2). The feedback has the same inertia matrix for
 every model, so that errors are comparable.
@@ -31,11 +31,11 @@ from armid_ros.simulation import Controller, Plant, simulate
 from armid_ros.simulation.controller import BANDWIDTH, LinearFeedback
 import numpy as np
 
-#: Total simulated motion of all held-out recordings, and of one recording at most [s]. Simulation
-#: takes a tenth of that time.
+#: Largest simulated time of all held-out recordings, and of one recording [s]. The computation
+#: takes a tenth of this time.
 _SIMULATED, _LONGEST = 60.0, 30.0
-#: Growth of an error that counts as worse, as a share of it and of the largest error of joints of
-#: the same unit; reversals of friction vary by less between models.
+#: Smallest relevant growth of an error, as a share of it and of the largest error of joints with
+#: the same unit. Reversals of friction vary by less between models.
 _WORSE = 0.05
 
 Progress = Callable[[float, str], None]
@@ -151,8 +151,8 @@ def forward_validation(
         raise IdentificationError(f'{recording.source}: no stretch is long enough to be filtered')
     motion = motion.select(motion.t <= motion.t[0] + duration)
     reference = replace(motion, t=motion.t - motion.t[0])
-    # With a slower feedback, a light joint depends on its friction, whose change of sign at a
-    # reversal no model predicts to the millisecond.
+    # With slower feedback, the friction of a light joint dominates. No model predicts to the
+    # millisecond when it changes its sign.
     feedback = LinearFeedback.of(nominal, bandwidth=BANDWIDTH, weighs=False)
     controller = _RecordedTorque(reference, feedback)
     along = arm.along(reference)
@@ -215,8 +215,8 @@ class ForwardValidation:
         return tuple(name for name, more in zip(self.after.joints, grown, strict=True) if more)
 
     def comment(self) -> str:
-        """Return a sentence on joints that became worse; '' if none did."""
-        return f'it is worse than before in {", ".join(self.worse)}' if self.worse else ''
+        """Return a sentence on joints whose error increased; '' if there are none."""
+        return f'the error increased in {", ".join(self.worse)}' if self.worse else ''
 
     def document(self) -> dict[str, Any]:
         """Return the errors as a document."""

@@ -5,8 +5,8 @@ Sandwich covariances, bread middle bread', of estimates whose errors are not whi
 
 The bread is the inverse of the products of the columns. The middle is the covariance of the
 products of columns and noise; it follows from the spectrum of the residuals (`noise_products`) or
-from neighbouring scores (`score_products`). Model errors differ between motions: `scatter`
-measures this by leaving out recordings.
+from neighbouring scores (`score_products`). Model errors differ between motions; `scatter`
+measures this difference by the jackknife over recordings.
 
 """
 
@@ -22,9 +22,9 @@ import numpy.typing as npt
 from scipy import fft
 import scipy.linalg
 
-#: Order of the autoregression that whitens residuals: enough for drift and one resonance.
+#: Order of the autoregression that whitens residuals; it describes drift and one resonance.
 AR_ORDER = 3
-#: Lower bound of the share of the noise that remains in the residual of a band.
+#: Lower bound of the share of noise in a band that remains in the residual.
 LEAST_LEFT = 0.1
 
 
@@ -83,9 +83,9 @@ def noise_products(
     Return the covariance of the products of columns and noise, W' n.
 
     The noise of each joint is coloured, with a spectrum Phi that is estimated from its residual.
-    Noise is taken as independent between joints and between stretches. A fit removes noise where
-    the regressor has its power. At a frequency of a joint, it removes the share x^H H^-1 x, the
-    leverage, where x is the transform of the joint's rows.
+    Noise is taken as independent between joints and between stretches. A fit removes noise at
+    frequencies at which the regressor has power. At a frequency of a joint, it removes the share
+    x^H H^-1 x, the leverage, where x is the transform of the joint's rows.
 
     Parameters
     ----------
@@ -115,7 +115,7 @@ def noise_products(
             columns = np.concatenate([part.columns[:, joint], more[:, joint]], axis=1)
             active = np.flatnonzero(columns.any(axis=0))
             weighted = columns.T[active] * weight[:, joint]
-            # one row a column: real and imaginary parts side by side make real products of it
+            # one row per column; real and imaginary parts next to each other give real products
             transformed = fft.rfft(weighted, length).view(float)
             fitted = active < rank
             taken = inverse[active[fitted]].T @ transformed[fitted]
@@ -134,8 +134,8 @@ def _noise_spectrum(
 ) -> FloatArray:
     """Estimate the power of noise (K,) on the K bins of the leverage from a residual (M,)."""
     count, size = len(residual), 2 * (len(leverage) - 1)
-    # the autocovariance of the informative samples, over the number of their pairs (Parzen
-    # 1963), without the negative power that gaps may cause
+    # the autocovariance of the informative samples is divided by the number of their pairs
+    # (Parzen 1963); negative power due to gaps is removed
     sums, pairs = (
         np.fft.irfft(np.abs(np.fft.rfft(signal, size)) ** 2)[:count]
         for signal in (residual, informative.astype(float))
@@ -155,11 +155,11 @@ def _noise_spectrum(
         filtered = np.fft.rfft(np.concatenate([[1.0], -coefficients]), size)
         whitening = np.abs(filtered) ** 2
     lags = np.fft.irfft(power * whitening, size)[: count // 2]
-    # number of relevant lags: four times the first lag at which the correlation is noise
+    # number of lags: four times the first lag at which the correlation is only noise
     quiet = np.abs(lags) < 2.0 / np.sqrt(count) * max(lags[0], 1e-300)
     first = int(np.argmax(quiet)) if np.any(quiet) else len(lags)
     reach = int(np.clip(4 * first, min(10, len(lags)), len(lags)))
-    # the share that the fit removed is corrected in the same band
+    # the noise that the fit removed from a band is added again
     left = _smoothed(1.0 - leverage, reach).clip(LEAST_LEFT)
     return np.asarray(_smoothed(power * whitening, reach).clip(0.0) / left / whitening)
 
@@ -181,8 +181,9 @@ def scatter(problem: Sequence[Regression], weights: FloatArray, values: FloatArr
     Return the jackknife changes of each value; the squared changes sum to its variance.
 
     The weight of a change is the precision with which the other recordings determine the value.
-    For white noise, the sum of squares is then the variance of least squares, also if one
-    recording determines most of a value. A value that the others do not determine has no change.
+    For white noise, the sum of squares then equals the variance of least squares, even if one
+    recording determines most of a value. The change is zero for a value that the other recordings
+    do not determine.
 
     Parameters
     ----------

@@ -4,9 +4,10 @@
 Parameters that given data determine, and their bounds.
 
 Parameters that a motion does not separate are grouped. Parameters that the data determine worse
-than the description keep their described values: the mean squared error of an unbiased estimate is
-its variance, and that of the description its largest expected error squared. If joints move one
-after the other, coupling columns are small but independent, so their values would fit noise.
+than the description keep their described values: the mean squared error of an unbiased estimate
+is its variance; the mean squared error of the description is its largest expected error squared.
+If joints move one after the other, columns of coupling are small but independent. Their parameters
+would be fitted to noise.
 
 """
 
@@ -25,8 +26,8 @@ from armid_ros.motion import FloatArray
 from armid_ros.robots import Robot
 import numpy as np
 
-#: Share of a column that is independent of the others, below which its parameter is grouped with
-#: them: 1e-4 of the length of a column is far below the noise.
+#: Independent share of a column below which its parameter is grouped with others. 1e-4 of the
+#: length of a column is far below the noise.
 EXCITATION_TOLERANCE = 1e-4
 
 
@@ -156,7 +157,7 @@ def base_spread(arm: ArmModel, base: BaseParameters) -> FloatArray:
     """
     Return the largest expected errors of described base parameters, shape (r,).
 
-    Infinite for parameters with an effect of unknown size, and where no link has a mass.
+    The error is infinite for an effect of unknown size, and if no link has a mass.
 
     """
     effects = [effect.spread(arm.robot) for effect in arm.effects]

@@ -3,12 +3,12 @@
 """
 Cross-validation: errors of predicting parts of the data from a fit to other parts.
 
-If a motion is too short or too poor, parameters are fitted to noise. Each half of the data then
-yields different parameters and predicts the other half badly.
+If a motion is too short or excites too little, parameters are fitted to noise. The two halves of
+the data then yield different parameters, and each predicts the other half badly.
 
-A spectrum of positions above white noise may still not be motion that needs torque. Jitter of
-stamps, steps of an encoder and slack in a gear look like motion, multiplied by the square of their
-frequency in the acceleration. Torques distinguish them: the cut-off is chosen by the prediction of
+A spectrum of positions above white noise need not be motion. Jitter of stamps, encoder steps and
+backlash of gears look like motion, and differentiation amplifies them by the square of their
+frequency. Torques distinguish motion from them, so the cut-off is chosen by the prediction of
 held-out torques.
 
 """
@@ -32,14 +32,15 @@ import numpy.typing as npt
 #: parameter of seven joints.
 _OF_HALVES, _OF_CUTOFFS = 4000, 6000
 #: Number of evenly spread windows for the comparison of cut-offs on longer data. Together they
-#: have twice as many rows; at 1 kHz, a filter of 1 Hz loses a tenth of each at its ends.
+#: have twice as many rows; at 1 kHz, a filter of 1 Hz removes a tenth of each window at its ends.
 _WINDOWS = 8
-#: Smallest share of rows remaining with a cut-off; with less, it is too low for the stretches.
+#: Smallest share of rows that remain with a cut-off; with fewer rows, the cut-off is too low for
+#: the stretches.
 _KEPT = 0.8
 #: Number of folds (stretches); their losses give the standard error of the mean.
 _STRETCHES = 16
-#: Smallest gain, as a share of the error, for which a cut-off is lowered. Jitter and slack raise
-#: the error by a third or more on every tested machine.
+#: Smallest gain, as a share of the error, for which a cut-off is lowered. Jitter and backlash
+#: increase the error by a third or more on every tested machine.
 _NEAR = 0.1
 
 
@@ -94,10 +95,10 @@ def halves_error(
     halves = slice(0, middle), slice(middle, None)
     left = np.zeros_like(tau)
     for fitted, predicted in (halves, halves[::-1]):
-        # a Bayesian estimate in units of the residual. Its prior allows changes as large as the
-        # expected errors of the description, or as the torque. Without a prior, parameters that
-        # a half does not determine would be arbitrary. With a residual near zero, these
-        # parameters stay as described
+        # Bayesian estimate in units of the residual. The prior deviation is the expected error
+        # of the description, or the size of the torque. Without it, parameters that a half does
+        # not determine would be arbitrary. With a residual near zero, they keep the described
+        # values
         own = weight[fitted]
         size = np.sqrt(np.mean((columns[fitted] * own[:, :, np.newaxis]) ** 2, axis=(0, 1)))
         torque = np.sqrt(np.mean((tau[fitted] * own) ** 2))
@@ -121,9 +122,9 @@ def cutoff_of_torques(
     """
     Lower the cut-off of the position filter while held-out torques are predicted better.
 
-    The chosen cut-off is the highest with a held-out loss within a tenth, or one standard error,
-    of the least. Thus the cut-off of clean data does not change. Source of the standard error:
-    Breiman et al., Classification and Regression Trees, 1984.
+    The result is the highest cut-off whose held-out loss is within a tenth, or one standard
+    error, of the smallest loss. The cut-off of clean data therefore does not change. Source of the
+    standard error: Breiman et al., Classification and Regression Trees, 1984.
 
     Parameters
     ----------
@@ -185,7 +186,7 @@ def _shared(
     problem: Sequence[Sequence[Regression]], shorter: Sequence[Sequence[Regression]]
 ) -> list[Regression]:
     """Return the rows of each recording that remain with a lower cut-off."""
-    # A lower cut-off removes more rows at the ends, where the arm starts and stops.
+    # A lower cut-off removes more rows at the ends, while the arm starts and stops.
     result = []
     for parts, others in zip(problem, shorter, strict=True):
         for part in parts:
@@ -206,9 +207,9 @@ def _as_good(losses: FloatArray, best: FloatArray) -> bool:
 
 def _losses(problem: Sequence[Regression]) -> FloatArray:
     """Return the held-out loss of each stretch, the mean log rms error of its joints, (S,)."""
-    # odd stretches are predicted from even ones, and vice versa. Every joint counts by the ratio
-    # of its errors: a light joint, whose torque is mostly noise, gains by a low cut-off and must
-    # not hide that a heavy one loses
+    # odd stretches are predicted from even ones, and vice versa. Joints have equal weight, by
+    # the ratio of their errors. Otherwise a light joint, whose torque is mostly noise, could gain
+    # by a low cut-off and hide the loss of a heavy joint
     x, _, y, informative = _some_rows(problem, _OF_CUTOFFS)
     stretch = np.arange(len(y)) * _STRETCHES // len(y)
     left = np.zeros_like(y)

@@ -12,7 +12,7 @@ from armid_ros.model import BaseParameters
 import numpy as np
 import numpy.typing as npt
 
-#: Reason of a parameter without a value if the joint has to move more.
+#: Reason for a parameter without a value that more motion of the joint would give.
 NOT_SHOWN: Literal['this motion does not show it'] = 'this motion does not show it'
 
 #: Half width of a 95 % interval in standard deviations.

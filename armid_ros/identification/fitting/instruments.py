@@ -3,9 +3,9 @@
 """
 Instrumental variables: the regressor of a smoothed motion, which has hardly any encoder noise.
 
-Least squares with noisy columns W is biased, as W' W contains the square of the noise. With
+Least squares with noisy columns W is biased, because W' W contains the squared noise. With
 columns Z of a motion without encoder noise, the solution of Z' (tau - W theta) = 0 is unbiased.
-That motion is the recorded one, smoothed far below the band of the regressor.
+The motion without noise is the recorded motion, smoothed to far below the band of the regressor.
 Source: Young 2011; Janot, Vandanjon and Gautier 2014 for robots, with instruments of a simulation.
 
 """
@@ -36,7 +36,8 @@ import numpy as np
 from scipy import signal
 import scipy.linalg
 
-#: Band of the instruments over that of the regressor, which is ten times the band of the motion.
+#: Band of the instruments, divided by the band of the regressor, which is ten times that of the
+#: motion.
 _SHARE = 0.2
 
 
@@ -165,7 +166,7 @@ def smoothed(recordings: Sequence[Recording], used: Conditioning) -> list[Record
         sections = signal.butter(4, min(0.9, cutoff), output='sos')
         q = recording.q.copy()
         for part in unbroken(recording, 1.0 / recording.period):
-            # three times the length of the filter of two sections of second order, as scipy pads
+            # padding of scipy: three times the length of the filter of two second-order sections
             edge = min(15, len(part) - 1)
             q[part] = signal.sosfiltfilt(sections, recording.q[part], axis=0, padlen=edge)
         calm.append(replace(recording, q=q, dq=None))

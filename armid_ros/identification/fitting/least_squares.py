@@ -3,9 +3,9 @@
 """
 Linear least squares with joint weights, outliers and coloured residuals.
 
-The standard deviations come from the spectrum of the actual residuals. With filtered, over-sampled
-or badly modelled torque, neighbouring residuals are correlated, and counting samples would make
-the deviations far too small.
+The standard deviations come from the spectrum of the actual residuals. With filtered,
+over-sampled or badly modelled torque, neighbouring residuals are correlated. Standard deviations
+for independent samples would be far too small.
 
 """
 
@@ -43,7 +43,8 @@ IN_WORDS: dict[Estimator, str] = {
     'iv': 'instrumental variables from the smoothed motion',
 }
 
-#: Residuals beyond this many robust standard deviations lose weight (Huber 1981: 95 % efficiency).
+#: Residuals above this number of robust standard deviations lose weight (Huber 1981: 95 %
+#: efficiency).
 _HUBER = 1.345
 
 
@@ -123,7 +124,7 @@ def solve(
 def _robust(
     problem: Sequence[Regression], used: npt.NDArray[np.bool_], fit: WeightedFit
 ) -> tuple[WeightedFit, FloatArray]:
-    """Weight outliers down; return the fit and the unscaled row factors, (N, n)."""
+    """Reduce the weight of outliers; return the fit and the unscaled row factors, (N, n)."""
     relative: FloatArray = used.astype(float)
     for _ in range(ROUNDS):
         before = (fit.scale, relative)

@@ -4,9 +4,10 @@
 Least squares by Gauss-Newton for an arm whose torque may be nonlinear in its parameters.
 
 Friction in proportion to the load, gains of torque sensors, zeros of encoders, gravity and
-elasticity change the columns of all other parameters. So a fit with the columns of the description
-is only the first step. The arm is linearised again at the fitted values until the torque of the
-linear model agrees with that of the arm. Steps that worsen the fit are damped (Marquardt 1963).
+elasticity change the columns of all other parameters. A fit with the columns of the description
+is therefore only the first step. The arm is linearised again at the fitted values until the
+linear model and the arm have the same torque. Steps that worsen the fit are damped (Marquardt
+1963).
 
 """
 
@@ -33,23 +34,24 @@ from armid_ros.robots import NO_MASS
 import numpy as np
 import scipy.linalg
 
-#: Linear model and arm agree where they differ by less than this share of the residual ...
+#: Linear model and arm agree if their torques differ by less than this share of the residual.
 AGREED = 1e-4
-#: ... or of the torque, where there is no noise.
+#: The same as a share of the torque, for data without noise.
 _EXACT = 1e-8
-#: Largest number of linearisations; converging fits take three to eight.
+#: Largest number of linearisations; fits that converge take three to eight.
 MOST_PASSES = 20
 #: Decrease of the cost that corresponds to one standard deviation of one parameter.
 _NOTHING = 1.0
 #: Decrease of the cost by a step below which the iteration ends.
 _LITTLE = 0.1
-#: Largest unattained decrease of the cost, as a share of it, with which a fit counts as converged.
+#: A fit has converged if the predicted further decrease of the cost is below this share of the
+#: cost.
 _STUCK = 0.5
 #: Damping factors of a step, relative to the squared columns.
 _DAMPINGS = tuple(10.0 ** np.arange(-8.0, 3.0))
 #: Largest ratio of the cost of an undamped step to the cost that the linear model predicts.
 _KEPT = 2.0
-#: Negligible deviation due to inertia, over the standard deviation of the fit.
+#: Largest negligible deviation due to inertia, divided by the standard deviation of the fit.
 _NEGLIGIBLE = 0.1
 
 Torques = tuple[FloatArray, ...]
@@ -92,7 +94,7 @@ class FittedValues:
 
     @property
     def fits(self) -> tuple[Fit, ...]:
-        """Return the predictions of the training data."""
+        """Return the predicted torques of the training data."""
         return tuple(
             Fit(part.source, part.motion, part.informative, torque)
             for part, torque in zip(self.problem, self.predicted, strict=True)
@@ -142,7 +144,8 @@ def fit_values(
         problem, _ = linearised(arm, base, recordings, used)
     elif not curved(arm, reached, motions):
         predicted = tuple(part.torque(solution.values) for part in problem)
-        # parameters nearest to the description, if they have the fitted torque along this motion
+        # use the parameters nearest to the description if their torque along this motion is the
+        # fitted one
         nearest = arm.with_theta(base.lift(solution.values, arm.theta))
         rigid = _rigid(arm)
         if free is None and (
@@ -185,7 +188,7 @@ def moved(arm: ArmModel, base: BaseParameters, values: FloatArray, free: FloatAr
     Return the arm with new values of its base parameters.
 
     In unidentifiable directions, effects keep their values and rigid parameters change as little
-    as possible: directions of rigid parameters alone are unidentifiable for any effects.
+    as possible: an unidentifiable direction of rigid parameters is so with any effects.
 
     Parameters
     ----------
@@ -207,8 +210,8 @@ def moved(arm: ArmModel, base: BaseParameters, values: FloatArray, free: FloatAr
     links = theta[:rigid].reshape(-1, len(LINK_PARAMETERS))
     lacking = (np.abs(links[:, 0]) < NO_MASS) & np.any(np.abs(links[:, 1:4]) >= NO_MASS, axis=1)
     if np.any(lacking):
-        # the fit gave a first moment to a link without described mass, whose mass is not
-        # identifiable: with suitable changes of previous links, it changes no torque
+        # the fit gave a first moment to a link without described mass. The mass of this link is
+        # not identifiable: with suitable changes of previous links, it changes no torque
         mass = np.zeros_like(links)
         # the centre of mass of such a link is assumed 0.2 m away
         mass[lacking, 0] = np.linalg.norm(links[lacking, 1:4], axis=1) / 0.2
@@ -281,7 +284,7 @@ def _iterate(
             break
         trial: _State | None = None
         vain = 0.0
-        # the undamped step if its cost is near the predicted one, otherwise the best damped step
+        # take the undamped step if its cost is near the prediction, otherwise the best damped step
         for damping in (0.0, *_DAMPINGS):
             values = now.damped(damping, limits) if damping else solution.values
             if damping:
@@ -355,8 +358,8 @@ def with_uncertain_inertia(
     """
     Add the uncertainty of the described inertia to the covariance of a fit of slow motions.
 
-    Weight is fitted, and inertia is taken from the description. Even in slow motion, the torque of
-    inertia varies with position as the weight does, and an error of the description biases it.
+    Weight is fitted, and inertia has the described values. Even in slow motion, the torque of
+    inertia varies with position as weight does, so errors of the description bias the weight.
 
     Parameters
     ----------
@@ -379,7 +382,7 @@ def with_uncertain_inertia(
     """
     rigid = len(description.robot.rigid_parameters)
     everything = regressions(fit.arm, np.arange(rigid), recordings, used)
-    # base parameters that the weighted fit gives for each column of the body
+    # base parameters that a weighted fit of each rigid column gives
     rows, body = (
         weighted_rows(part, fit.solution.weights)[0] for part in (fit.problem, everything)
     )
@@ -396,7 +399,7 @@ def with_uncertain_inertia(
         # the torque of inertia grows with the square of the speed
         speed = float(np.sqrt(_NEGLIGIBLE / ratio))
         slower = (
-            'no speed is slow enough for torques as free of noise as these'
+            'these torques have so little noise that inertia matters at any speed'
             if speed < 0.02
             else f'at {speed:.2g} times the speed it would not matter'
         )

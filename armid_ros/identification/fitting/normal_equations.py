@@ -4,7 +4,7 @@
 Normal equations of a regression, joint by joint, and their weighted least squares.
 
 Their size does not grow with the rows, and they add up over stretches, recordings and workers.
-Joints are kept apart, as their weights are known only after all rows.
+Joints are summed separately, because their weights are known only after all rows.
 
 """
 
@@ -20,10 +20,10 @@ import numpy.typing as npt
 import scipy.linalg
 import scipy.optimize
 
-#: Largest number of rounds of reweighting; the weights converge in three to ten.
+#: Largest number of iterations of reweighting; the weights converge in three to ten.
 ROUNDS = 20
 #: Share of the largest eigenvalue of normalised columns below which a direction is not
-#: identifiable: products of columns have no more digits.
+#: identifiable, given the digits of products of columns.
 UNINFORMATIVE = 1e-10
 
 
@@ -74,7 +74,8 @@ class NormalEquations:
             counts += part.informative.sum(axis=0)
             for joint in range(n_joints):
                 rows = np.column_stack([part.columns[:, joint], target[:, joint]])
-                active = np.flatnonzero(rows.any(axis=0))  # proximal links: zero columns
+                # torques do not depend on links nearer to the base
+                active = np.flatnonzero(rows.any(axis=0))
                 rows = rows[:, active] * weight[:, joint, np.newaxis]
                 products[joint][np.ix_(active, active)] += rows.T @ rows
         return cls(products, counts)
@@ -106,7 +107,7 @@ class NormalEquations:
     def squares(self, values: FloatArray) -> FloatArray:
         """Return the sum of the squared residuals of each joint, shape (n,) [(N m)^2]."""
         ends = np.append(values, -1.0)
-        # smaller residuals are rounding errors of products
+        # smaller values are rounding errors of the products
         return np.asarray(np.maximum(self.products @ ends @ ends, 1e-12 * self.target_squares))
 
     def joint_std(self, values: FloatArray) -> FloatArray:
@@ -260,8 +261,8 @@ def informative_basis(products: FloatArray) -> FloatArray:
     lower, failed = scipy.linalg.lapack.dpotrf(scaled, lower=True)
     if not failed and len(scaled):
         inverse, _ = scipy.linalg.lapack.dtrtri(lower, lower=True)
-        # the smallest eigenvalue is at least one over the trace of the inverse, and the largest
-        # at most the trace of the products: every direction is determined
+        # every direction is determined: the smallest eigenvalue is at least 1 / trace(inverse),
+        # and the largest is at most trace(products)
         if np.sum(inverse**2) * np.trace(scaled) * UNINFORMATIVE <= 1.0:
             return np.asarray(scale[:, np.newaxis] * inverse.T)
     values, vectors = np.linalg.eigh(scaled)
@@ -291,7 +292,7 @@ def informative_solution(products: FloatArray, aim: FloatArray) -> FloatArray:
 
 def scaled_inverse(matrix: FloatArray) -> FloatArray:
     """
-    Invert a covariance or a precision, (p, p), whose values may be of any units.
+    Invert a covariance or a precision, (p, p), with values of any units.
 
     Eigenvalues below the rounding error are raised to it.
 

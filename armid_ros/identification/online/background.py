@@ -1,10 +1,10 @@
 # Copyright 2026 The armid_ros developers
 # SPDX-License-Identifier: Apache-2.0
 """
-Background computation between the samples of a stream, in pieces.
+Background computations in small pieces, between the samples of a stream.
 
 A stream must not wait. Computations that take longer than one sample are therefore generators,
-which yield after every piece of bounded size. Each sample runs a few pieces, in an order that
+which yield after every piece of bounded size. With each sample, a few pieces run. Their order
 depends on the samples alone. The results therefore do not depend on the speed of the computer.
 
 """

@@ -1,6 +1,6 @@
 # Copyright 2026 The armid_ros developers
 # SPDX-License-Identifier: Apache-2.0
-"""Candidate changes of an arm at work, as directions in its base parameters."""
+"""Possible changes of a working arm, as directions in its base parameters."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ _INDEPENDENT = 1e-6
 @dataclass(frozen=True, eq=False)
 class ChangeCandidate:
     """
-    A change of the arm that may be detected.
+    A change of the arm that the search can detect.
 
     Attributes
     ----------
@@ -100,7 +100,7 @@ class Change:
         sizes = ', '.join(
             f'{p.name} by {value:+.3g} {p.unit} ({lower:.3g} to {upper:.3g})'
             if 0.0 < upper - lower < np.inf
-            else f'{p.name} by an amount that is not known until it moves'
+            else f'{p.name} by an amount that is unknown until the joint moves'
             for p, value, (lower, upper) in zip(
                 self.size.parameters, self.size.values, self.size.interval(), strict=True
             )
@@ -150,7 +150,7 @@ def _candidate(
 ) -> ChangeCandidate:
     """Return the candidate of an effect, or of a body that adds to the parameters of a link."""
     columns = base.grouping[:, added_to]
-    # a maximal set of independent columns, in order
+    # a maximal set of linearly independent columns, in their order
     lengths = np.linalg.norm(columns, axis=0)
     unit = columns / np.where(lengths > 0.0, lengths, 1.0)
     ranks = [np.linalg.matrix_rank(unit[:, :k], _INDEPENDENT) for k in range(len(lengths) + 1)]

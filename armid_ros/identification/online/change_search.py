@@ -4,7 +4,7 @@
 Search the last blocks of rows for a change, its onset and its cause.
 
 After each block, the windows of 0.5, 1 and 2 s that end with it are tested. After a positive test,
-all possible onsets are compared. The change is named as soon as no rival explains the torques as
+all possible onsets are compared. The change is named when no rival explains the torques equally
 well, or after `_LATEST` blocks. The test is the likelihood ratio of a change in the window.
 
 The estimate before a window is theta0, with the information A = R^T R. The rows W of the window,
@@ -14,11 +14,11 @@ window, with theta0 as uncertain as before, has
     S = D^T A (A + M)^-1 M D    and    s = D^T A (A + M)^-1 (c - M theta0)
 
 as information on delta and its score. The estimate of delta is S^-1 s, and s^T S^-1 s is twice
-the logarithm of the likelihood ratio. A change is not detectable where A D is zero.
+the logarithm of the likelihood ratio. A change with A D = 0 is not detectable.
 Source: Willsky and Jones 1976, the generalised likelihood ratio test.
 
-This statistic is chi-square of p degrees only if noise is white and the model right. Its actual
-null distribution is measured while nothing changes (``null_calibration``).
+This statistic is chi-square with p degrees of freedom if noise is white and the model is exact.
+Its true null distribution is measured while nothing changes (``null_calibration``).
 
 """
 
@@ -41,9 +41,9 @@ from scipy.linalg import lapack
 
 #: Lengths of the tested windows, in blocks.
 _LENGTHS = (2, 4, 8)
-#: Number of blocks with torque of the change after which it is named despite rivals.
+#: Number of blocks with torque of a change after which the change is named despite rivals.
 _LATEST = 6
-#: Difference of log-likelihoods above which one explanation is clearly better than another.
+#: Difference of log-likelihoods from which one explanation is clearly better.
 _CLEAR = 5.0
 #: Eigenvalues of an information matrix below this share of the largest count as zero [-].
 _NOTHING = 1e-9
@@ -116,7 +116,7 @@ class ScoreStatistics:
         """
         Return the estimate of some changes and its covariance in white noise.
 
-        The variance of a change is infinite where the window does not determine it by itself.
+        The variance of a change is infinite if this window alone does not determine the change.
 
         """
         information = self.information[some, some]
@@ -289,7 +289,7 @@ class ChangeSearch:
                 self.interrupt()
                 return found
         self._waiting.append(statistics)
-        if len(self._waiting) > _LENGTHS[-1]:  # a change would be named by now
+        if len(self._waiting) > _LENGTHS[-1]:  # a change would have been named before
             for m, values in self._waiting.popleft().items():
                 self._work.begin(self._calibrations[m].update(*values))
         return None
@@ -323,7 +323,7 @@ class ChangeSearch:
         return ratios
 
     def _judge(self, residual_scale: float) -> Pieces[FoundChange | None]:
-        """Return onset and cause of the change, or None if they are still ambiguous."""
+        """Return onset and cause of the change; None if they are still ambiguous."""
         rows = []
         for k in range(len(self._blocks) - 1):
             window = yield from self._window(k, residual_scale)
@@ -336,20 +336,20 @@ class ChangeSearch:
         likelihood = np.array(rows) / (2.0 * usual) - 0.5 * self._sizes * np.log(observations)
         at = likelihood.max(axis=0)
         best = int(np.argmax(at))
-        # Soon after a change there are too few data to distinguish onsets, and every onset before
-        # the change fits. The last onset is taken whose log-likelihood is lower by less than 4.
+        # Soon after a change, the data cannot distinguish onsets: every onset before the change
+        # fits. The choice is the last onset whose log-likelihood is less than 4 below the best.
         first = int(np.flatnonzero(likelihood[:, best] > at[best] - 4.0)[-1])
         # Number of blocks since the onset that contain the torque of the candidate: at least 5 %
-        # of the squared torque of the largest block. Blocks at rest have no friction torque, so an
-        # arm that stops, with the largest errors in its last slow motion, raises no alarm.
+        # of the squared torque of the largest block. Blocks at rest have no friction torque. An
+        # arm that stops has its largest errors in the last slow motion, and these raise no alarm.
         some = self._slices[best]
         directions = self.directions[:, some]
         moved = [one.moved[:, some] for one in self._blocks]
         strength = np.array([np.einsum('pq,pq->q', directions, one) for one in moved])
         shows = np.any(strength > 0.05 * strength.max(axis=0), axis=1)
         seen = int(np.count_nonzero(shows[first:]))
-        # The size of a change is learned for 10 s. In this time another change needs 0.3 times the
-        # log-likelihood of the first one; otherwise it is a correction of the size.
+        # The size of a change is learned for 10 s. During this time, another change needs 0.3
+        # times the log-likelihood of the first change. With less, it is a correction of the size.
         t, before = self._latest_change
         least = max(_CLEAR, 0.3 * before) if self._blocks[-1].end - t < 10.0 else _CLEAR
         if not (at[best] > least and seen >= 4):

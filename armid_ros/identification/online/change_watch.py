@@ -4,11 +4,11 @@
 Detection of changes during online estimation, such as a load or more friction.
 
 Rows are summed up in blocks of a quarter of a second, which are searched (``change_search``).
-When a change is named, the estimator returns to its state before the change. It forgets only the
-directions that may have changed, and learns the rows since then again.
+When a change is named, the estimator returns to its state before the change. It removes the
+information on the directions that may have changed, and processes the rows since then again.
 
-All but the update of the estimator runs in the background, so a change is named some samples
-after the block that made it clear. Until the later rows are learned again, the estimator goes on
+Only the update of the estimator runs at once. A change is therefore named some samples after the
+block that made it significant. Until the later rows are processed again, the estimator continues
 as if nothing had changed.
 
 """
@@ -34,11 +34,11 @@ import numpy as np
 
 #: Length of a block [s].
 BLOCK = 0.25
-#: Smallest residual scale where only the ratios of the noise between joints are known: 0.01 of the
+#: Smallest residual scale if only the ratios of noise between joints are known: 0.01 of the
 #: assumed noise, which is 1e-4 of the torque limit [-].
 _LEAST_NOISE = 0.01
-#: Samples learned in one piece of work: together, or one by one with forgetting. Fewer samples
-#: arrive in the meantime, so that the backlog shrinks.
+#: Samples processed in one piece of work: together, or one by one with forgetting. Fewer samples
+#: arrive meanwhile, so the backlog decreases.
 _TOGETHER, _ONE_BY_ONE = 10, 4
 Item = TypeVar('Item')
 
@@ -77,9 +77,10 @@ class NuisanceRows:
     Filtered regressor columns of friction that the model lacks, as nuisance parameters.
 
     Such friction biases the identified parameters, and the bias varies with the motion. A search
-    for changes would mistake this for a change, or for a part of its size. The friction law does
-    not vary, so it is estimated too: viscous and Coulomb friction, if the model lacks them, and
-    friction in proportion to the load. A sum of humps at low velocities is a curve over velocity.
+    for changes would attribute this variation to a change. The friction law itself does not vary,
+    so it is estimated as well: viscous and Coulomb friction, if the model lacks them, and
+    friction in proportion to the load. Bell-shaped functions at low velocities describe a curve
+    over velocity.
 
     Parameters
     ----------
@@ -333,7 +334,7 @@ class ChangeWatch:
         )
 
     def _name(self, found: FoundChange) -> Job:
-        """Restore the state before a change, forget the changed parameters, report the change."""
+        """Restore the state before a change, reset the changed parameters, report the change."""
         change, size, reopened = found.change, found.change.size, found.change.reopened
         again = copy(self._estimator)
         for estimator, known, directions in (
@@ -349,8 +350,8 @@ class ChangeWatch:
             yield from self._learn_both(again, (yield from self._widened(rows)))
         at_once(self._learn_both(again, at_once(self._widened(rows))))
         self._estimator.restore(again)
-        # A change causes unusual motion, for which the parameters were not learned. The covariance
-        # is therefore multiplied by the ratio of squared residuals to usual squared residuals.
+        # A change causes unusual motion that no earlier row contains. The covariance is
+        # therefore multiplied by the ratio of squared residuals to usual squared residuals.
         squares = count = 0.0
         for block in found.after:
             columns, tau, weights = (np.stack(part) for part in zip(*block.samples, strict=True))

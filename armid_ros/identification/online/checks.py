@@ -1,6 +1,6 @@
 # Copyright 2026 The armid_ros developers
 # SPDX-License-Identifier: Apache-2.0
-"""Conditions of identification from a stream; `rows.checks` has those of a recording."""
+"""Conditions for identification from a stream; `rows.checks` has those for a recording."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ import numpy as np
 
 class StreamChecks:
     """
-    Check whether a stream is identifiable, by the ranges of its undamaged samples.
+    Check by the ranges of undamaged samples whether a stream allows an identification.
 
     Parameters
     ----------
@@ -69,7 +69,7 @@ class MissingSamples:
     """
     Count of missing samples by the timestamps.
 
-    A late sample that is followed by early ones is not missing.
+    A delayed sample that is followed by early samples is not missing.
 
     Attributes
     ----------
@@ -90,12 +90,12 @@ class MissingSamples:
     def take(self, t: float, period: float | None) -> None:
         """Add a timestamp [s], with the sampling period if known."""
         last = self._last
-        # a timestamp that is more than 1 s back belongs to a restarted clock
+        # a timestamp more than 1 s before the last one belongs to a restarted clock
         if last is not None and last - 1.0 < t <= last:
             self._subtract_late()
             return
         self._last = t
-        # a silence of 10 s is a stopped stream without missing samples
+        # after 10 s without samples, the stream was stopped and no sample is missing
         if last is None or period is None or not 0.0 < t - last < 10.0:
             self._doubtful = 0
             return

@@ -4,8 +4,8 @@
 Online identification: an estimate that is updated with one joint state at a time.
 
 A row is processed in two steps. Its prediction by the previous estimate is computed at once. The
-update with the row is delayed to the next sample, which usually has no row, so that no sample
-needs both steps. Reading the estimate runs a pending update first.
+update with the row waits for the next sample, which usually has no row. No sample therefore needs
+both steps. Reading the estimate runs a pending update first.
 
 """
 
@@ -48,13 +48,15 @@ import pinocchio as pin
 
 __all__ = ['OnlineIdentifier', 'OnlineSample', 'OnlineSettings']
 
-#: Time constants of the row filter until the effect of its start, or a joint's rest, is 3e-3.
+#: Time constants of the row filter after which the effect of its start, or of a joint at rest, is
+#: 3e-3.
 _FORGOTTEN = 10.0
-#: A joint below this velocity [rad/s or m/s] for longer than this time [s] is at rest; a reversal
-#: is shorter. Dry friction may hold a joint at rest with any torque, so its torque is not used.
+#: A joint below this velocity [rad/s or m/s] for longer than this time [s] is at rest; a
+#: reversal is shorter. Dry friction may hold such a joint with any torque, so its torque is not
+#: used.
 _REST_VELOCITY, _REST_TIME = 0.01, 0.1
-#: Samples per row from which the update with a row has a sample to itself. With fewer samples, the
-#: update shares its sample with pieces of background work.
+#: Samples per row from which no background work runs in the sample of an update. With fewer
+#: samples per row, both share a sample.
 _SPARE = 4.0
 #: Length of the windows for the spectrum of the errors [s], beyond their correlation time.
 _WINDOW = 4.0
@@ -117,7 +119,7 @@ class OnlineIdentifier:
         past = [effect.name for effect in arm.effects if not effect.instantaneous]
         if past:
             raise IdentificationError(
-                f'{past[0]} depends on earlier motion, which single samples do not contain; '
+                f'{past[0]} depends on earlier motion, which a single sample does not contain; '
                 'identify it from a recording'
             )
         self.arm, self.settings = arm, settings
@@ -132,7 +134,7 @@ class OnlineIdentifier:
             robot.prismatic,
             'qvt' if settings.measured_velocity else 'qt',
             torque_limit=robot.torque_limit,
-            max_gap=10,  # successive damaged samples; a longer deviation is real
+            max_gap=10,  # number of successive damaged samples; a longer deviation is real
             false_alarm_time=settings.false_alarm_time or FALSE_ALARM_TIME,
         )
         self._checks = StreamChecks(robot, self._gate)
@@ -216,7 +218,7 @@ class OnlineIdentifier:
             good = self._gate.take(t, signal, self._negligible_error)
             found = [self._process(sample) for sample in good]
             self.latest = tuple(one for one in found if one is not None)
-        # background work runs with samples that bring no other work, if there are any
+        # background work runs with samples that need no other work, if there are any
         period = self._filter.period or 0.0
         if self.latest:
             busy = not self._had_row
@@ -224,7 +226,7 @@ class OnlineIdentifier:
             busy = added and _SPARE * period <= self._row_period
         if not busy:
             self._add_pending_row()
-            # pieces per second, at least
+            # smallest number of pieces per second
             self._work.advance(max(1, round(400.0 * period)))
         self._had_row = bool(self.latest)
         return self.latest[-1] if self.latest else None
@@ -385,7 +387,7 @@ class OnlineIdentifier:
             )
         else:
             rigid = regressor(robot, one)
-        rigid = rigid.reshape(robot.n_joints, -1)  # a vector for a single joint
+        rigid = rigid.reshape(robot.n_joints, -1)  # one joint has a vector
         columns = np.concatenate([rigid, self.arm.effect_columns(one)[0]], axis=1)
         stacked = np.column_stack([motion.tau, columns.take(self.base.independent, axis=1)])
         filtered = self._row_filter.update(step, stacked.reshape(-1))[2].reshape(stacked.shape)
@@ -424,7 +426,7 @@ class OnlineIdentifier:
 
     @property
     def _negligible_error(self) -> FloatArray:
-        """Return the largest negligible error of one sample; 0 for all but torques."""
+        """Return the largest negligible error of one sample: 0 except for torques."""
         n = self.arm.robot.n_joints
         floor = np.zeros((3 if self.settings.measured_velocity else 2) * n)
         if self._filter.pole is not None:

@@ -1,6 +1,6 @@
 # Copyright 2026 The armid_ros developers
 # SPDX-License-Identifier: Apache-2.0
-"""Parameters that a motion does not identify, and the motion that identifies them."""
+"""Parameters that a motion does not identify, and the additional motion that they need."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ import numpy as np
 _WAIT = 10.0
 #: Largest number of joints in the message.
 _NAMED = 3
-#: Unit of a kind of rigid parameter, its name, and the motion that identifies it.
+#: Unit of a kind of rigid parameter, its name, and the motion that it needs.
 _OF_BODY = {
     'kg m^2': ('inertia', 'accelerate it harder'),
     'kg m': ('balance', 'move it through more of its range'),
@@ -47,7 +47,7 @@ class Unlearned:
     uncertainty: float
 
     def __str__(self) -> str:
-        """Return the unidentified quantities, and the motion that identifies them."""
+        """Return the unidentified quantities, and the motion that they need."""
         friction = {
             'viscous_coefficient': 'viscous friction',
             'coulomb_torque': 'Coulomb friction',
@@ -107,17 +107,17 @@ class LearningProgress:
             self._past.popleft()
         if self._past[0][0] > t - _WAIT:
             return ()
-        # the usual torque of a joint: that of the described links, and that of the effects (mainly
-        # friction) as far as their estimates exceed two standard deviations
+        # the usual torque of a joint is that of the described links and of the effects (mainly
+        # friction) whose estimates exceed two standard deviations
         known = np.maximum(np.abs(estimate.values) - 2.0 * estimate.std, 0.0)
         effects = self._size * np.where(self._of_effects, known, 0.0)
         usual = np.sqrt(self._rigid**2 + np.sum(effects**2, axis=1))
         share = self._size / np.maximum(usual, 1e-3 * usual.max())[:, np.newaxis]
         unknown = share.max(axis=0) * estimate.std
-        # A parameter is identified if a torque is uncertain by less than a tenth of the usual one.
-        # It makes progress if its standard deviation falls to 0.9 of its value. With a torque
-        # uncertain by 100 times the usual one, the deviation depends on the noise alone and has to
-        # fall to 0.5.
+        # A parameter is identified if it makes the torque uncertain by less than a tenth of the
+        # usual torque. It makes progress if its standard deviation falls to 0.9 of its value.
+        # Above 100 times the usual torque, the deviation depends on noise alone and has to fall
+        # to 0.5.
         progress = np.where(unknown > 100.0, 0.5, 0.9)
         stuck = (unknown > 0.1) & (estimate.std > progress * self._past[0][1])
         by_joint: dict[str, list[int]] = {}

@@ -3,10 +3,10 @@
 """
 Null distribution of likelihood ratios and residuals, and the critical values that follow.
 
-Twice the log-likelihood ratio is chi-square of p degrees only if noise is white and the model
-right. Coloured noise and model discrepancy multiply it by a factor of at least 1, which is
-measured for every candidate while nothing changes. The statistic over its factor then has
-Fisher's F distribution, whose second degrees of freedom grow with the measured windows.
+Twice the log-likelihood ratio is chi-square with p degrees of freedom if noise is white and the
+model is exact. Coloured noise and model discrepancy multiply it by a factor of at least 1, which
+is measured for every candidate while nothing changes. The statistic over its factor then has
+Fisher's F distribution, whose second degrees of freedom increase with the number of windows.
 
 """
 
@@ -22,7 +22,7 @@ from scipy import stats
 
 #: Number of windows kept: ten minutes at four windows per second.
 _MEMORY = 2400
-#: Tail probability of the quantile to which larger statistics are limited in the mean.
+#: Tail probability of the quantile that limits large statistics in a mean.
 _TAIL = 0.05
 #: Tail probability of the quantile that shows whether large statistics are too frequent.
 _RARE = 0.01
@@ -70,12 +70,13 @@ class NullCalibration:
     """
     Calibration of test statistics by factors over their size in white noise.
 
-    The factor of a statistic is its mean over that in white noise, with the largest 5 % limited to
-    their quantile. The mean covers the later three quarters of at most ten minutes, so that early
-    windows, or those before a late detection, soon drop out. Few windows determine a factor only
-    roughly. The factors of one arm are similar, so each uncertain factor is shrunk towards their
-    mean (Efron and Morris 1975). If large statistics are more frequent than the mean suggests, as
-    with discrepancies at reversals, the 99 % quantile of all statistics raises the limits.
+    The factor of a statistic is the ratio of its mean to its mean in white noise; the largest 5
+    % are limited to their quantile. The mean covers the last three quarters of at most ten
+    minutes, so early windows soon lose their influence. Few windows determine a factor only
+    roughly. The factors of one arm are similar, so uncertain factors are shrunk towards the mean
+    of all (Efron and Morris 1975). If large statistics are more frequent than expected from the
+    mean, as with model discrepancy at reversals, the 99 % quantile of all statistics raises the
+    limits.
 
     Parameters
     ----------
@@ -148,14 +149,15 @@ class NullCalibration:
         single = np.full(len(self._sizes), np.nan)
         for columns in _in_pieces(later):
             some = np.arange(len(single))[columns][judged[columns]]
-            # factors that bring the means of the limited statistics to their values in white noise
+            # factors for which the means of the limited statistics have their values in white
+            # noise
             seen, most, mean = later[:, some], self._most[some], self._mean[some] * counts[some]
             factor = np.sum(seen, axis=0) / (self._sizes[some] * counts[some])
             for _ in range(8):  # until both converge
                 factor = factor * np.sum(np.minimum(seen / factor, most), axis=0) / mean
             single[some] = np.log(factor)
             yield
-        # shrunk towards their mean as far as they are uncertain
+        # shrunk towards their mean according to their uncertainty
         value, variance = single[judged], self._variance[judged] / independent[judged]
         middle = float(np.average(value, weights=1.0 / variance))
         apart = float(np.average((value - middle) ** 2 - variance, weights=1.0 / variance))
@@ -166,7 +168,8 @@ class NullCalibration:
         factors = np.full(len(self._sizes), np.nan)
         factors[judged] = np.exp(value + drawn * (middle - value)).clip(1.0)
         yield
-        # 99 % quantile of the statistics, each over its quantile in white noise; zeros are no data
+        # 99 % quantile of the statistics, each divided by its quantile in white noise; zero means
+        # no data
         relative = (later[:, judged] / (factors * self._rare)[judged]).ravel()
         count = np.count_nonzero(relative)
         place = len(relative) - count + (1.0 - _RARE) * (count - 1)
@@ -198,7 +201,7 @@ class NullCalibration:
         result = np.zeros(len(self._sizes))
         relative = strength / self._strength.clip(1e-100)
         stronger = np.maximum.reduceat(relative, self._first).clip(1.0)
-        # the next motion may have 1.3 times the model discrepancy of the motions before
+        # the next motion may have 1.3 times the model discrepancy of earlier motions
         usual = 1.0 + (1.3 * self._tail * self.factors[judged] - 1.0) * stronger[judged]
         result[judged] = ratios[judged] / (usual * self._limits[1])
         return result
@@ -216,7 +219,7 @@ class ResidualScale:
     Standard deviation of autocorrelated residuals per joint, over the assumed noise.
 
     Residuals are summed over a block, in which fast errors cancel. The scale is the median over
-    blocks, which neither the first blocks nor a change that is not yet detected disturb.
+    blocks, so first blocks and a change that is not yet detected hardly affect it.
 
     Parameters
     ----------

@@ -30,9 +30,9 @@ def onset(arm: ArmModel, recording: Recording) -> float | None:
     """
     Find when the residual of a model changed.
 
-    The logarithm of the residual power of short blocks has one mean before a change and another
-    one after it; the time of the largest F ratio is tested against chance, corrected for all
-    times and joints (change of a mean: Hinkley 1970).
+    The logarithm of the residual power of short blocks has different means before and after a
+    change. The largest F ratio over time is tested for significance, corrected for all times and
+    joints (change of a mean: Hinkley 1970).
 
     Parameters
     ----------
@@ -61,12 +61,12 @@ def onset(arm: ArmModel, recording: Recording) -> float | None:
     best = int(np.argmax(ratios))
     if tail(ratios[best], 1, count - 2) * len(ratios) * logs.shape[1] >= _ERROR_RATE:
         return None
-    edge = recording.duration - (times[-1] + _BLOCK)  # time that the filter cuts off at the end
+    edge = recording.duration - (times[-1] + _BLOCK)  # time that the filter removes at the end
     return float(times[_FEWEST + best] + _BLOCK + edge)
 
 
 def _block_powers(arm: ArmModel, recording: Recording) -> FloatArray:
-    """Return begin [s] and mean squared residuals of short blocks, shape (B, 1 + n)."""
+    """Return the start [s] and the mean squared residuals of short blocks, shape (B, 1 + n)."""
     # the last block ends with the motion
     used = conditioning([recording], SignalSettings())
     rows = [np.empty((0, 1 + len(arm.robot.joints)))]

@@ -8,10 +8,10 @@ Without forgetting, the estimate equals the batch solution at any number of samp
 R^-1 R^-T cannot lose its symmetry or become negative (Bierman 1977, chapter V): Householder
 reflections add rows and keep R^T R exact.
 
-Forgetting is directional (Kulhavy and Karny 1984): old information is given up only where a new
-sample brings information, and never more than the sample brings. So the covariance never grows,
-and a direction without excitation is neither forgotten nor moved: an arm may rest for hours. The
-price is that weak motion forgets the information of an earlier, stronger motion slowly.
+Forgetting is directional (Kulhavy and Karny 1984): old information is removed only in directions
+of the new sample, and at most as much as the sample adds. The covariance therefore never grows. A
+direction without excitation keeps its value and its information, even if an arm rests for hours.
+As a disadvantage, weak motion replaces the information of an earlier, stronger motion slowly.
 
 """
 
@@ -134,7 +134,7 @@ class RecursiveLeastSquares:
         root = np.asfortranarray(np.eye(len(self._start)) / PRIOR_STD)
         self._take(root, self._start)
         self._squares = 0.0
-        # the first P observations fit exactly and do not show the noise
+        # the first P observations are fitted exactly and contain no information on noise
         self._freedom = -float(len(self._start))
 
     def update(
@@ -269,7 +269,7 @@ class RecursiveLeastSquares:
         """
         Variance of the weighted residuals: 1 when the noise is as given.
 
-        It is 1 as well until there are more observations than parameters.
+        It is also 1 while there are no more observations than parameters.
 
         """
         return self._squares / self._freedom if self._freedom >= 1.0 else 1.0
@@ -311,11 +311,11 @@ def replaced(root: FloatArray, rows: FloatArray, forgetting: float) -> FloatArra
     """
     whitened, _ = lapack.dtrtrs(root, rows.T, trans=1)
     gains, directions = np.linalg.eigh(whitened.T @ whitened)
-    # Twice the loss of exponential forgetting, as samples with little information lose less. Steps
-    # of the Coulomb friction of a moving 7-joint arm are then followed as with exponential
-    # forgetting: 63 % in 8 s and 90 % in 28 s with a memory of 10 s.
+    # Twice the loss of exponential forgetting, as samples with little information lose less. With
+    # this factor, the estimate follows steps of Coulomb friction of a moving 7-joint arm as with
+    # exponential forgetting: 63 % in 8 s and 90 % in 28 s with a memory of 10 s.
     budget = 2.0 * (1.0 - forgetting) * len(root)
-    # the level at which the gains, ascending and limited to it, add up to the budget
+    # the level for which the gains, limited to this level, add up to the budget
     some = np.maximum(gains, 0.0)
     levels = (budget - np.append(0.0, np.cumsum(some[:-1]))) / np.arange(len(some), 0, -1)
     above = some >= levels

@@ -7,9 +7,9 @@ The covariance of least squares, R^-1 R^-T, takes errors of different rows as in
 of coloured noise or of model discrepancy are autocorrelated and add up. Let phi_jb be the noise
 density of joint j in frequency band b, and M_jb = W^H W the products of its rows there. The scores
 W^T r have the covariance J = sum of phi_jb M_jb in place of M = sum of M_jb, and the values have
-M^-1 J M^-1. Rows are transformed window by window and their products summed up, so the memory does
-not grow. The torques are among the columns, so the residual power in a band is always that of the
-present estimate, however wrong earlier estimates were.
+M^-1 J M^-1. Rows are transformed window by window, and their products are summed, so the memory
+does not grow. The torque is one of the columns. The residual power in a band is therefore always
+that of the present estimate, not of earlier ones.
 Source: Newey and West 1987, with bands of frequencies in place of lags.
 
 """
@@ -28,7 +28,8 @@ from scipy import linalg, stats
 
 #: Number of columns transformed in one piece of work.
 _COLUMNS = 24
-#: Ridge that keeps the information invertible in directions that were never excited [-].
+#: Regularisation (ridge) for directions without excitation, which keeps the information invertible
+#: [-].
 _RIDGE = 1e-9
 #: Lower bound of a divisor.
 _SMALLEST = 1e-100
@@ -173,8 +174,8 @@ class RobustCovariance:
         """
         Return the covariance of an estimate, shape (P, P); None before the second window.
 
-        Few windows determine the noise only roughly. The deviations are widened such that normal
-        intervals are as wide as Student's.
+        Few windows determine the noise only roughly. The standard deviations are increased so
+        that normal intervals are as wide as Student's.
 
         Parameters
         ----------
@@ -238,7 +239,7 @@ def _shape(bands: _Bands, values: FloatArray) -> Pieces[tuple[FloatArray, FloatA
     root = inverse / size[:, np.newaxis]
     covariance = root @ root.T
     yield
-    # degrees of freedom that the fit takes, and squares of its residuals, each (m, B)
+    # degrees of freedom of the fit, and squares of its residuals, each (m, B)
     ends, parts = np.append(values, -1.0), []
     for products in bands.products:
         absorbed = np.tensordot(products[:, :-1, :-1], covariance, axes=2)

@@ -3,8 +3,8 @@
 """
 Least squares of torques, constrained to physically consistent parameters.
 
-The constraints are part of the fit. A projection of an unconstrained estimate on the nearest body
-would increase the torque error, which the distance in parameters does not measure. Parameters that
+The constraints are part of the fit. A projection of an unconstrained estimate on the nearest
+consistent parameters would increase the torque error. Parameters that
 the data do not determine come from the description. Its weight is chosen by cross-validation with
 blocks of the training data.
 
@@ -43,7 +43,7 @@ HEAVY = 3.0
 BLOCKS = 5
 #: Weights of the divergence that are compared. The fit term is a mean square of about one.
 WEIGHTS = tuple(float(w) for w in 10.0 ** np.arange(-7.0, 0.5))
-#: Tolerance of the held-out error over the least one: the largest weight within it is chosen.
+#: Tolerance of the held-out error above the smallest one; the largest weight within it is chosen.
 TOLERANCE = 1e-3
 
 
@@ -160,7 +160,8 @@ def _bodies(
     least = max(least, TORQUE_RESOLUTION * float(np.sqrt(whole[-1, -1])))
     counted = np.array_split(np.count_nonzero(weights, axis=1), BLOCKS)
     share = np.array([part.sum() for part in counted], dtype=float)
-    counts = share / share.sum() * least**2  # so that the unconstrained fit's mean square is one
+    # scaled to a mean square of one in the unconstrained fit
+    counts = share / share.sum() * least**2
 
     tried = _held_out_errors(program, blocks, counts)
     best = min(error for _, error in tried)
@@ -244,8 +245,9 @@ def bodily_prior(arm: ArmModel) -> tuple[FloatArray, tuple[str, ...]]:
     """
     Return standard parameters of the description, with physical values for impossible links.
 
-    A link without mass becomes a ball of the mean mass of the others. A link that is a point, or
-    whose moments are impossible, is given the smallest second moments of a body of that mass.
+    A link without mass becomes a ball with the mean mass of the other links. If a link is a
+    point or has impossible moments, the prior has the smallest possible second moments for its
+    mass.
 
     Returns
     -------
@@ -275,7 +277,7 @@ def bodily_prior(arm: ArmModel) -> tuple[FloatArray, tuple[str, ...]]:
         center = matrix[:3, 3] / mass
         second = matrix[:3, :3] - mass * np.outer(center, center)
         values, axes = np.linalg.eigh(second)
-        # smallest radius of gyration [m], for descriptions that give points for links
+        # smallest radius of gyration [m], for descriptions with point masses as links
         floor = mass * 0.005**2
         if values[0] < 1e-3 * floor or values[0] < 1e-4 * values[2]:
             least = max(floor, 1e-2 * values[2])

@@ -13,8 +13,9 @@ from armid_ros.model.pseudo_inertia import Consistency
 from armid_ros.motion import FloatArray
 import numpy as np
 
-#: Smallest size of a pseudo-inertia in any direction, over the described one, that is not at the
-#: limit of physical consistency; distance to a wall of a box, over its width, that counts as zero.
+#: Smallest size of a pseudo-inertia in any direction, relative to the described one, that is off
+#: the limit of physical consistency. Largest distance to a wall of a box, relative to its width,
+#: that is zero.
 ACTIVE_SHARE = 1e-3
 #: Held-out torque error, relative to an unconstrained fit, above which the constraints do not fit
 #: the arm.
@@ -69,12 +70,12 @@ class PhysicalCertificate:
 
     @property
     def held_out_ratio(self) -> float:
-        """Error on blocks left out with the chosen weight, relative to unconstrained fits'."""
+        """Error on held-out blocks with the chosen weight, relative to unconstrained fits."""
         return dict(self.tried)[self.weight]
 
     @property
     def cost(self) -> float:
-        """Relative increase of the torque error by the constraints, the larger of both."""
+        """Relative increase of training or held-out error by the constraints, the larger one."""
         return max(self.misfit_ratio, self.held_out_ratio) - 1.0
 
     @property

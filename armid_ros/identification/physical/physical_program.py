@@ -12,7 +12,7 @@ log-determinant,
     D(P || P0) = log det P0 - log det P + tr(P0^-1 P) - 4,
 
 which is convex in the parameters and grows without bounds towards impossible inertias. It does not
-depend on frames or units, so kilograms need not be weighed against kilogram metres squared.
+depend on frames or units, so masses and moments of inertia need no relative weights.
 Source: Lee, Wensing and Park 2020, section IV; the pseudo-inertia, Wensing, Kim and Slotine 2018.
 The solver is an interior-point method in coordinates in which every P0 is the identity.
 
@@ -35,7 +35,8 @@ import clarabel
 import numpy as np
 from scipy import sparse
 
-#: Weight c of the prior of a mass: a mass three times as large must reduce the squares by 0.2 %.
+#: Weight c of the prior of a mass: a mass three times as large has to reduce the squared residuals
+#: by 0.2 %.
 _MASS = 1e-3
 #: Numbers of variables of a log-determinant: a triangle, then the logarithms of its diagonal.
 _TRIANGLE, _DIAGONAL = 10, 4
@@ -228,10 +229,10 @@ class PhysicalProgram:
 
 def box_conditions(box: Box) -> FloatArray:
     """
-    Return rows whose products with the parameters are positive inside a box.
+    Return rows whose products with the parameters are positive for a link inside a box.
 
-    The centre of mass is between the corners, and so is all mass: along every axis, the integral
-    of (x - lower) (upper - x) dm is not negative.
+    The centre of mass and all mass are between the corners: along every axis, the integral of (x
+    - lower) (upper - x) dm is not negative.
 
     Returns
     -------

@@ -27,19 +27,19 @@ import numpy as np
 import numpy.typing as npt
 from scipy import signal as signals
 
-#: Cut-off frequency (-3 dB) of three equal lags in series, over the cut-off of a single lag.
+#: Cut-off frequency (-3 dB) of three equal lags in series, divided by that of a single lag.
 _CUTOFF_OF_POLE = float(np.sqrt(2.0 ** (1.0 / 3.0) - 1.0))
 #: G is faster than F by this factor, where the sampling rate allows it.
 MOTION_FILTER_RATIO = 4.0
-#: Rate of regressor rows over the cut-off frequency of F. It is high enough for the steps of
-#: sign(dq), and aliases of the output of G fall outside the band of F.
+#: Rate of regressor rows over the cut-off frequency of F. The rate resolves the steps of
+#: sign(dq), and aliases of the output of G are outside the band of F.
 ROW_RATE_RATIO = 40.0
 #: Interval between two samples, in periods, above which samples are missing.
 _GAP = 1.5
 #: Default noise of a torque sensor, over the torque limit of its joint. Only the ratios between
-#: joints matter, as the size of the noise then follows from the residuals.
+#: joints matter; the residuals then give the size of the noise.
 _NOISE_OF_LIMIT = 0.01
-#: Largest valid position or torque [SI units]; squares of larger numbers dominate the rest.
+#: Largest valid position or torque [SI units]; squares of larger numbers would dominate all sums.
 LARGEST = 1e6
 
 
@@ -53,8 +53,8 @@ class TripleLag:
     """
     Three equal first-order lags in series, 1 / (1 + s / pole)^3, for a stack of signals.
 
-    The response is exact for a signal that is linear between its samples, at any intervals. So
-    the stages give exact derivatives of the output, and jitter of the stamps is accounted for.
+    The response is exact for a signal that is linear between its samples, at any intervals. The
+    stages therefore give exact derivatives of the output, also with jitter of the stamps.
     The delay is 3 / pole.
 
     Parameters
@@ -68,7 +68,7 @@ class TripleLag:
         self.pole = 2.0 * np.pi * cutoff / _CUTOFF_OF_POLE
         self._dt = 0.0
         self._step = np.zeros((3, 5))
-        #: Three stages, the signal of the sample before, and how far it has moved since.
+        #: States of the three stages, the previous sample of the signal, and its last change.
         self._state: FloatArray | None = None
 
     @property
@@ -118,7 +118,7 @@ class TripleLag:
         step[2, 0] = 0.5 * x * x * decay
         kept = ending = 0.0
         for stage, share in enumerate((decay, x * decay, 0.5 * x * x * decay)):
-            kept += share  # share that remains of an offset common to all stages
+            kept += share  # remaining share of an offset that all stages have
             ending += kept
             step[stage, 3] = 1.0 - kept
             step[stage, 4] = 1.0 - (stage + 1.0 - ending) / x
@@ -150,8 +150,8 @@ class CausalFilter:
 
     The sampling period is the median of the first intervals, learned again after every restart.
     A sample with a wrong length, or with a number that is not finite or above LARGEST, is left
-    out and counted; the signal is interpolated across it. A gap, or a stamp that is no later than
-    the last one, restarts the filter, which has no output until it has settled again. A
+    out and counted; the signal is interpolated across it. A gap, or a stamp that does not
+    increase, restarts the filter. Until it has settled again, it has no output. A
     `SpikeGate` removes full turns of positions beforehand.
 
     Parameters
@@ -281,7 +281,7 @@ class CausalFilter:
         for value in (*missing, signal):
             stages = self._lag.update(dt / (len(missing) + 1), value)
         self._recent.append((t, signal))
-        # the effect of the start of G at rest decays to 1e-6 in 20 time constants
+        # the effect of the initial state of G decays to 1e-6 in 20 time constants
         if t - self._start < 20.0 / self._lag.pole:
             return None
         n = self._n_joints
@@ -293,9 +293,9 @@ class CausalFilter:
 
     def _missing(self, t: float, dt: float, signal: FloatArray) -> list[FloatArray]:
         """Return interpolated samples for a gap before a sample."""
-        # A straight line has no acceleration, so the rows would lack the acceleration in the gap.
-        # A cubic goes through the sample after the gap and three before it. Their distances equal
-        # the gap, so that the cubic has hardly more noise than the samples.
+        # A straight line would have no acceleration in the gap. A cubic goes through the sample
+        # after the gap and three samples before it. Their distances equal the gap, so the cubic
+        # has hardly more noise than the samples.
         assert self.period is not None
         count = round(dt / self.period) if dt > _GAP * self.period else 1
         if count < 2 or not self._recent:
@@ -316,13 +316,13 @@ class CausalFilter:
         if len(self._intervals) < 20:  # too few for a median
             return
         self.period = period = float(np.median(self._intervals))
-        # with a faster pole, the signal between samples matters
+        # with a faster pole, the signal between samples would be relevant
         fastest = 1.0 / period * _CUTOFF_OF_POLE / (2.0 * np.pi)
         self._lag = TripleLag(min(MOTION_FILTER_RATIO * self._cutoff, fastest))
         pole = self._lag.pole
         # Gain of the lag for a second derivative of 1. The signal is straight between samples, so
-        # its curvature is at the samples. The output has the sum of the impulse response
-        # p^3 t^2 / 2 exp(-p t) in place of its integral.
+        # its curvature is at the samples. The output therefore has the sum of the impulse
+        # response p^3 t^2 / 2 exp(-p t) instead of its integral.
         decay, relative = math.exp(-pole * period), pole * period
         gain = 0.5 * relative**3 * decay * (1.0 + decay) / (1.0 - decay) ** 3
         curvature = pole * pole / gain

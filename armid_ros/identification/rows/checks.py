@@ -1,6 +1,6 @@
 # Copyright 2026 The armid_ros developers
 # SPDX-License-Identifier: Apache-2.0
-"""Required conditions on recordings for an identification, with remedies."""
+"""Conditions that recordings have to meet for an identification, with remedies."""
 
 from __future__ import annotations
 
@@ -22,23 +22,23 @@ import numpy.typing as npt
 
 #: A joint that stays within this range is at rest [rad or m].
 REST_RANGE = 1e-3
-#: Largest excess of positions over the limits that is no wrong unit: two turns of a joint that a
-#: controller lets spin [rad], or one metre [m].
+#: Largest excess of positions over the limits that is not due to a wrong unit: two turns of a
+#: joint without a stop [rad], or one metre [m].
 LIMIT_EXCESS_TURNING, LIMIT_EXCESS_SLIDING = 4.0 * np.pi, 1.0
-#: Excess of a position over a limit that is no fault, as a share of the range: a stop gives way,
-#: and an encoder has noise.
+#: Largest harmless excess of a position over a limit, as a share of the range: stops are
+#: elastic, and encoders have noise.
 _LIMIT_SLACK = 0.01
 #: Shortest recording with a movement [s].
 SHORTEST = 1.0
-#: Correlation with the direction of motion above which a torque is friction alone.
+#: Correlation with the direction of motion above which a torque is only friction.
 _CLEAR = 0.8
 #: Correlation of measured and described torque above which their ratio is meaningful: four fifths
 #: of the power are explained.
 FOLLOWS = 0.9
 #: Units of torque that are mistaken for N m, with their number per N m.
 TORQUE_UNITS = {'N mm': 1e3, 'N cm': 1e2, 'kN m': 1e-3}
-#: The same and degrees for radians; units of a force on a lever, which apply to all joints at
-#: once, as a torque of a single joint that is ten times as large may be due to a load.
+#: The same, with degrees for radians and units of force on a lever. These two are tested for all
+#: joints at once, as a load may increase the torque of one joint tenfold.
 _UNITS_OF_ALL = {
     **TORQUE_UNITS,
     'N m times 57.3 (degrees against radians)': float(np.rad2deg(1.0)),
@@ -50,11 +50,11 @@ _UNITS_OF_ALL = {
 #: are wrong by less.
 NEAR = 1.5
 #: The same ratio for units of force, which are near gains of currents: 10 N m/A is 1.02 kgf m/A.
-#: Wrong masses of a description change the factor of one joint about as much.
+#: Wrong masses of a description change the factor of one joint by as much.
 _NEAR_FORCE = 1.2
 #: Unit of force of a prismatic joint that corresponds to each unit of torque.
 _FORCE_UNITS = {'N m': 'N', 'N mm': 'mN', 'N cm': 'cN', 'kN m': 'kN'}
-#: Share of its top speed below which a joint may be held by friction with any torque.
+#: Share of its top speed below which friction may hold a joint with any torque.
 SLOW = 0.05
 #: Message on missing torques.
 SILENT = 'the torque of every joint is constant; fill in effort'
@@ -101,7 +101,7 @@ def check_held_out(robot: Robot, held_out: Sequence[Recording]) -> None:
 
 
 def too_short_to_tell(recordings: Sequence[Recording]) -> tuple[str, ...]:
-    """Return a note if the recordings are short in total."""
+    """Return a note if the total time of recordings is short."""
     duration = sum(recording.duration for recording in recordings)
     return (f'{duration:.2g} s is short; record 20 s or more',) if duration < 5.0 else ()
 
@@ -121,7 +121,7 @@ def moving(motions: Iterable[Motion]) -> npt.NDArray[np.bool_]:
 
 
 def resting(robot: Robot, source: str, ranges: FloatArray) -> tuple[str, ...]:
-    """Return a note on resting joints by their ranges, (n,); raise if all rest."""
+    """Return a note on joints at rest, by their ranges, (n,); raise an error if all rest."""
     names = [name for name, size in zip(robot.joints, ranges, strict=True) if size < REST_RANGE]
     if len(names) == robot.n_joints:
         raise IdentificationError(
@@ -141,8 +141,8 @@ def check_torque(
     """
     Raise an error for absent torques, wrong signs or units, or torques of a controller.
 
-    Sign and unit show against the rigid body of the description, if all the joints that follow it
-    agree; the sign of the others shows in their friction.
+    Comparison with described links reveals sign and unit, if all comparable joints agree.
+    Friction reveals the sign of the other joints.
 
     Raises
     ------
@@ -191,8 +191,8 @@ def driven_by_friction(robot: Robot, motions: Sequence[Motion]) -> str:
     """
     Return an error on joints whose torque clearly has the opposite sign of friction, or ''.
 
-    Described torque, weight and inertia are fitted per joint and subtracted. The residual of a
-    wrist is friction, which alone reveals the sign of its torque.
+    The described torque, weight and inertia are fitted per joint and subtracted. The residual of
+    a wrist is friction, the only evidence for the sign of its torque.
 
     Parameters
     ----------
@@ -229,14 +229,14 @@ def check_positions(robot: Robot, source: str, lowest: FloatArray, highest: Floa
 
 
 def position_problem(robot: Robot, lowest: FloatArray, highest: FloatArray) -> str:
-    """Return an error on the joint farthest out of limits, by ranges (n,); empty if none."""
+    """Return an error on the joint that exceeds its limits most, by ranges (n,), or ''."""
     excess = np.maximum(robot.lower - lowest, highest - robot.upper)
     allowed = np.where(robot.prismatic, LIMIT_EXCESS_SLIDING, LIMIT_EXCESS_TURNING)
     worst = int(np.argmax(excess / allowed))
     if not excess[worst] > allowed[worst]:
         return ''
     reach = max(abs(lowest[worst]), abs(highest[worst]))
-    # joints whose positions would be within the limits if they were in degrees
+    # joints whose positions, taken as degrees, are within the limits
     slack = _LIMIT_SLACK * (robot.upper - robot.lower)
     degrees = np.deg2rad(lowest) > robot.lower - slack
     degrees &= ~robot.prismatic & (np.deg2rad(highest) < robot.upper + slack) & (excess > allowed)
@@ -260,7 +260,7 @@ def effort_unit(robot: Robot, joint: int, unit: str) -> str:
 
 
 def beyond_limits(robot: Robot, recordings: Sequence[Recording]) -> tuple[str, ...]:
-    """Return a note on joints beyond the limits of the description, with position and limit."""
+    """Return a note on joints that exceed described limits, with position and limit."""
     slack = _LIMIT_SLACK * (robot.upper - robot.lower)
     found = []
     for way, limits, ends in (
@@ -284,7 +284,7 @@ def torque_factors(arm: ArmModel, motions: Sequence[Motion]) -> tuple[FloatArray
     Regress measured torques on those of a model, after an offset is removed.
 
     If the model has no effects, friction is removed as well. Otherwise only samples in motion
-    count, as friction holds a joint at rest with any torque.
+    are used, as friction holds a joint at rest with any torque.
 
     Parameters
     ----------
@@ -330,7 +330,7 @@ def unit_of(
     factor: float, of_joints: Sequence[float] = (), near_force: float = _NEAR_FORCE
 ) -> str:
     """
-    Return the units that explain torques too large by a factor, joined by 'or'; '' if none.
+    Return the units that explain a factor of torques, joined by 'or'; '' if there are none.
 
     Parameters
     ----------

@@ -16,7 +16,7 @@ import numpy as np
 
 #: Noise of a torque over the spread of that torque, assumed before any fit.
 _NOISE_OF_TORQUE = 0.01
-#: Number of damaged samples that a note names.
+#: Largest number of damaged samples in a note.
 _NAMED = 3
 
 
@@ -26,8 +26,8 @@ def without_damage(
     """
     Interpolate across damaged samples.
 
-    A torque sample is damaged if it alone moves a filtered row by more than noise does. Before
-    any fit, the noise is taken as a share of the spread of the torque.
+    A torque sample is damaged if it changes a filtered row by more than noise does. Before any
+    fit, the noise is assumed as a share of the spread of the torque.
 
     Returns
     -------
@@ -79,8 +79,8 @@ def impossible_excursions(
     """
     Return the physically impossible excursions of a recording, as found by a gate.
 
-    Usual errors and ranges are those of the whole recording. The gate processes only samples too
-    far off their prediction, and the samples after them.
+    Usual errors and ranges are those of the whole recording. The gate processes only samples
+    that differ too much from their prediction, and the samples after them.
 
     Parameters
     ----------

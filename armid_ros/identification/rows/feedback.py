@@ -5,8 +5,8 @@ Torques that follow a control law instead of the dynamics of the arm.
 
 Gravity compensation outputs the weight of the arm while a hand moves it; energy shaping outputs a
 constant torque in the direction of motion. Such a torque is a function of position and direction
-alone and does not contain the torque of inertia. A fit then blames friction, or finds an arm
-without mass.
+alone and does not contain the torque of inertia. A fit then attributes everything to friction,
+or finds an arm without mass.
 
 """
 
@@ -20,14 +20,14 @@ import numpy as np
 import numpy.typing as npt
 from scipy.ndimage import maximum_filter1d
 
-#: Largest residual of a law, over the torque that the model needs in addition to the law: no model
-#: has an inertia that is ten times too large.
+#: Largest residual of a law, over the torque that the model needs in addition to the law: no
+#: model overestimates inertia tenfold.
 _WITHOUT_INERTIA = 0.1
 #: Largest residual of a law as a share of the torque. Friction of a real joint depends on speed,
-#: so it differs by more from a law without speed.
+#: so it differs more from a law without speed.
 _FOLLOWS = 0.03
-#: Smallest torque of a driven joint as a share of the torque of the model. With less, the joint
-#: swings freely, or the model is wrong.
+#: Smallest torque of a driven joint as a share of the torque of the model. With less torque, the
+#: joint swings freely, or the model is wrong.
 _DRIVEN = 0.5
 
 
@@ -37,8 +37,8 @@ def laws_of_controllers(
     """
     Return messages if the torque of every driven joint is a law of position and direction alone.
 
-    If only some joints obey such a law, the model lacks their inertia instead. If the motion is
-    too short to test most joints, the other joints are no evidence of a controller.
+    If only some joints follow such a law, the model lacks their inertia instead. There is no
+    result if the motion is too short to test most joints.
 
     Parameters
     ----------

@@ -9,8 +9,8 @@ import numpy as np
 
 #: Positions of two periods agree within this share of the range of motion.
 _SAME = 0.02
-#: Smallest range of some joint in a period, in units of `_SAME`: slower motion agrees with itself
-#: after any lag. Of 108 recordings of 17 arms, 30 % more or less changes none.
+#: Smallest range of some joint in a period, in units of `_SAME`: slower motion resembles itself
+#: at any lag. A change by 30 % changes the result of none of 108 recordings of 17 arms.
 _FARTHER = 3.0
 
 

@@ -4,10 +4,10 @@
 The linear problem of an identification: decimated torques and base columns, joint by joint.
 
 Where a joint reverses between two samples, the time at which its dry friction changed sign is
-unknown. If the joint stopped for a moment, the friction is any value between its limits. A wrong
-sign opposes the acceleration at every reversal, so it does not average out and reduces the
+unknown. While the joint stops, friction has any value between its limits. An error of the sign
+opposes the acceleration at every reversal, so it does not average out and reduces the estimated
 inertia. Torques and columns are therefore both interpolated across these samples before the
-filters, which keeps their equation valid.
+filters, so that their equation remains valid.
 
 """
 
@@ -29,9 +29,9 @@ from armid_ros.recording import Recording
 import numpy as np
 import numpy.typing as npt
 
-#: A joint is at rest while it is slower than this share of its top speed ...
+#: A joint is at rest if its speed stays below this share of its top speed ...
 REST_SPEED = 0.02
-#: ... for at least this long [s]; a reversal of direction is shorter.
+#: ... for at least this time [s]; a reversal is shorter.
 REST_TIME = 0.2
 
 _Columns = Callable[[Motion], FloatArray]
@@ -67,7 +67,7 @@ class Stretch:
 @dataclass(frozen=True)
 class Regression(Stretch):
     """
-    A stretch as a linear problem, filtered alike on both sides.
+    Linear problem of a stretch, with the same filters on both sides.
 
     Attributes
     ----------
@@ -312,7 +312,7 @@ def filtered_columns(
     sure = ~np.pad(unsure, ((1, 1), (0, 0)))
     longest = max(int(np.diff(np.flatnonzero(column)).max()) - 1 for column in sure.T)
     margin, overlap, row = max(margin, longest), len(used.taps) - 1, 0
-    # samples whose regressor is in memory at once; more do not fit into the cache
+    # number of samples whose regressor is computed together; more do not fit into the cache
     step = max(used.decimation, 10_000 // used.decimation * used.decimation)
     for start in range(0, max(1, len(motion) - overlap), step):
         stop, before = min(len(motion), start + step + overlap), max(0, start - margin)
@@ -342,7 +342,7 @@ def held_samples(
     arm: ArmModel, motion: Motion
 ) -> tuple[npt.NDArray[np.bool_], npt.NDArray[np.bool_]]:
     """
-    Return the samples of joints with dry friction in which the friction is unknown.
+    Return the samples of joints with dry friction whose friction is unknown.
 
     Returns
     -------
@@ -370,7 +370,7 @@ def held_samples(
 
 def bridged(values: FloatArray, unsure: npt.NDArray[np.bool_]) -> FloatArray:
     """
-    Interpolate values of each joint linearly across its unsure samples.
+    Interpolate values of each joint linearly across its samples with unknown friction.
 
     Parameters
     ----------

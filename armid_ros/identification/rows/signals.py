@@ -34,27 +34,28 @@ from scipy.ndimage import correlate1d
 SLOWEST = 2.0
 #: Rates at which arms are recorded [Hz].
 USUAL_RATES = (20.0, 20_000.0)
-#: Band of torque and regressor over the band of the motion, with room for steps of friction.
+#: Band of torque and regressor, divided by that of the motion; it includes harmonics of friction
+#: steps.
 MODEL_BANDS = 10.0
-#: Largest cut-off of positions over the band of the rows. The Butterworth filter, run both ways,
-#: damps that band by 5^-8 or less, which is below TORQUE_RESOLUTION.
+#: Largest cut-off of positions, divided by the band of the rows. The Butterworth filter, applied
+#: in both directions, changes that band by at most 5^-8, which is below TORQUE_RESOLUTION.
 _POSITION_BANDS = 5.0
 #: Samples per period of the cut-off that describe a smooth function of the filtered positions.
 _SMOOTH_SAMPLES = 5.0
-#: Ratio of a spectrum of positions to its noise below which it counts as noise.
+#: Ratio of a spectrum of positions to its noise below which it is only noise.
 NOISE_MARGIN = 3.0
 #: Periods of the cut-off that are removed at both ends, where the filter lacks neighbours.
 EDGE_PERIODS = 4.0
-#: Shortest stretch in periods of the cut-off, without the edges of the decimation: the periods
-#: removed at both ends, and two more.
+#: Shortest stretch in periods of the cut-off: the periods removed at both ends, and two more.
+#: The edges of the decimation are extra.
 _CUTOFF_PERIODS = 2.0 * EDGE_PERIODS + 2.0
-#: Best resolution of a drive, as a share of its torque: 13 bits. Errors of differentiation in a
-#: simulation without noise are smaller.
+#: Best resolution of a drive, as a share of its torque: 13 bits. In a simulation without noise,
+#: errors of differentiation are smaller.
 TORQUE_RESOLUTION = 1e-4
 #: Half length of the decimation filter in output samples; its edges are cut off.
 _HALF_TAPS = 4
-#: Band of second derivatives of torques (fourth of positions), over that of the motion. From two
-#: to five, elasticity is found as well; at ten, there is only noise.
+#: Band of second derivatives of torques (fourth of positions), over that of the motion. From 2
+#: to 5, elasticity is detected equally well; at 10, there is only noise.
 _CURVATURE_BANDS = 2.0
 #: Smallest number of samples of a stretch for a spectrum.
 _LEAST_SAMPLES = 4
@@ -116,7 +117,7 @@ class Conditioning:
 
     @cached_property
     def taps(self) -> FloatArray:
-        """Symmetric decimation filter; a single 1 where nothing is decimated."""
+        """Symmetric decimation filter; a single 1 without decimation."""
         if self.decimation == 1:
             return read_only(np.ones(1))
         count = 2 * _HALF_TAPS * self.decimation + 1
@@ -128,8 +129,9 @@ class Conditioning:
         """
         Largest stride for smooth functions of the filtered positions, in samples.
 
-        The spectrum of the positions ends at the cut-off, and that of smooth functions soon after.
-        Five samples per period of the cut-off are enough for the pass band of the decimation.
+        The spectrum of the positions ends at the cut-off, and the spectrum of smooth functions
+        slightly above. Five samples per period of the cut-off are enough for the pass band of the
+        decimation.
 
         """
         widest = self.rate_hz / (_SMOOTH_SAMPLES * self.cutoff_hz)
@@ -141,18 +143,19 @@ def conditioning(recordings: Sequence[Recording], settings: SignalSettings) -> C
     """
     Choose the cut-off and the decimation for recordings of one kind.
 
-    The cut-off of positions is where their spectrum meets their noise. It is at most a fifth of
-    the rate, as derivatives above it are only noise. It is at most five times the band of torque
-    and regressor, which hardly depend on higher frequencies.
-    The band of the motion contains 99 % of the velocities' power. Torque and regressor keep ten
-    times this band, and are decimated to 2.5 samples per period of the upper end.
+    The cut-off of positions is the frequency at which their spectrum falls to their noise. It is
+    at most a fifth of the sampling rate, as derivatives above are only noise. It is also at most
+    five times the band of torque and regressor, which hardly depend on higher frequencies.
+    The band of the motion contains 99 % of the velocities' power. Torque and regressor have ten
+    times this band, and are decimated to 2.5 samples per period of its upper end.
 
     """
     check_recordings(recordings)
     rate = float(np.median([1.0 / recording.period for recording in recordings]))
     cutoff, decimation = settings.cutoff_hz, settings.decimation
     if cutoff is None or decimation is None:
-        # where the spectrum of each position meets its noise, which is white at the sensor
+        # frequency at which the spectrum of each position falls to its noise, which is white at
+        # the sensor
         crossings = []
         for recording in recordings:
             frequency, power, floor = _position_spectrum(recording)
@@ -185,7 +188,7 @@ def velocity_error(recording: Recording, used: Conditioning) -> FloatArray:
     Return the error of velocities that are computed from filtered positions.
 
     One part is white noise of the positions up to the cut-off, times the square of its frequency.
-    The other part is the motion above the cut-off, which the filter removes.
+    The other part is motion above the cut-off, which the filter removes.
 
     Returns
     -------
@@ -312,11 +315,11 @@ def decimate(values: FloatArray, used: Conditioning, stride: int = 1) -> FloatAr
     taps = taps / taps.sum()
     count = len(range(len(taps) // 2, len(values) - len(taps) // 2, factor))
     flat = values.reshape(len(values), -1)
-    # half are zero, as links have no torque in later joints
+    # half of the columns are zero, as torques do not depend on links nearer to the base
     active = np.flatnonzero(flat.any(axis=0))
     some = flat.take(active, axis=1) if len(active) < flat.shape[1] else flat
     filtered = np.empty((count, len(active)))
-    size = 16  # output samples of one matrix product; larger ones multiply more zeros of the band
+    size = 16  # number of output samples per matrix product; larger products multiply more zeros
     band = np.zeros((size, (size - 1) * factor + len(taps)))
     for row in range(size):
         band[row, row * factor : row * factor + len(taps)] = taps
@@ -341,7 +344,7 @@ def decimated_samples(n_samples: int, used: Conditioning) -> range:
 def _even(t: FloatArray, period: float, *signals: FloatArray) -> tuple[FloatArray, ...]:
     """Return equidistant times and the signals at them, by cubic splines if stamps jitter."""
     grid = np.linspace(t[0], t[-1], round((t[-1] - t[0]) / period) + 1)
-    # stamps within a twentieth of a period are taken as even
+    # stamps that differ by less than a twentieth of a period are even
     if len(grid) == len(t) and np.max(np.abs(grid - t)) < 0.05 * period:
         return grid, *signals
     return grid, *(CubicSpline(t, one)(grid) for one in signals)
@@ -370,7 +373,8 @@ def _differentiated(
     # differences of two samples damp the cut-off by sinc(1 / 20), 0.4 %
     few = max(1, int(used.rate_hz / (20.0 * used.cutoff_hz)))
     sparse = smooth[::few, :n]
-    # a length without large prime factors, a few samples shorter, is transformed faster
+    # the transform is faster for a length without large prime factors, so a few samples are
+    # dropped
     bands = [(sparse[: 1 + fft.prev_fast_len(len(sparse) - 1)], used.cutoff_hz)]
     band = _CURVATURE_BANDS * _motion_band(bands, used.rate_hz / few)
     points = None
@@ -390,7 +394,7 @@ def _differentiated(
 
 
 def _central_difference(x: FloatArray, step: float) -> FloatArray:
-    """Differentiate along the first axis: five points, error of the fourth order in the step."""
+    """Differentiate along the first axis by five points, with an error of fourth order."""
     weights = np.array([1.0, -8.0, 0.0, 8.0, -1.0]) / (12.0 * step)
     return np.asarray(correlate1d(x, weights, axis=0, mode='nearest'))
 
@@ -402,10 +406,10 @@ def _unbroken_positions(recording: Recording, rate: float) -> list[FloatArray]:
 
 
 def _motion_band(stretches: Sequence[tuple[FloatArray, npt.ArrayLike]], rate: float) -> float:
-    """Return the frequency below which 99 % of the velocities' power lies [Hz], fastest joint."""
+    """Return the frequency below which the fastest joint has 99 % of its velocity's power [Hz]."""
     # Each stretch has positions and the frequency above which they, or those of each joint, are
-    # noise. Power above it does not count, as a joint that hardly moves has only noise where
-    # another joint moves. All stretches count together, for the same reason.
+    # noise. Power above this frequency is ignored, as a joint that hardly moves has only noise
+    # there. For the same reason, the power is summed over all stretches.
     band = rate / max(len(q) for q, _ in stretches)
     for joint in range(stretches[0][0].shape[1]):
         spectra = []
@@ -427,5 +431,5 @@ def _position_spectrum(recording: Recording) -> tuple[FloatArray, FloatArray, Fl
     """Return frequencies (K,) and power (K, n) of positions, and their white noise (n,) per Hz."""
     rate = 1.0 / recording.period
     frequency, power = mean_spectrum(_unbroken_positions(recording, rate), rate)
-    upper = frequency > 0.3 * rate  # the upper two fifths of the spectrum have no motion
+    upper = frequency > 0.3 * rate  # the upper 40 % of the spectrum contain no motion
     return frequency, power, np.median(power[upper], axis=0)

@@ -11,21 +11,22 @@ import numpy as np
 #: Share of uneven time steps above which stamps are uneven. A step is uneven if it differs by half
 #: of the median or more, or is less than half of the mean.
 _UNEVEN = 0.05
-#: Harmless error by jitter of stamps, as a share of a signal at the upper end of the band.
+#: Largest harmless error due to jitter, as a share of a signal at the upper end of the band.
 _BLURRED = 0.1
-#: Samples over which stamps are compared with an even grid: jitter is visible over them, and slow
-#: drift of the clock is not.
+#: Number of samples over which stamps are compared with an even grid. It shows jitter, but no
+#: slow drift of the clock.
 _WINDOW = 50
 #: Step between two messages below which a joint may be at rest with noise [rad or m].
 _LEAST_STEP = 1e-3
 #: Smallest ratio of a message's distance from its neighbours to that between the neighbours.
 _CLOSER = 5.0
-#: Number of contradicted messages, and their share, below which they are faulty samples.
+#: Number and share of contradicted messages below which these are faulty samples.
 _FEWEST, _SHARE_OF_MESSAGES = 20, 0.01
-#: Smallest ratio of the jump between two senders to the steps of one sender.
+#: Smallest ratio of a jump between two senders to the steps of one sender.
 _TRACK = 3.0
-#: With less than this share of the messages, a second sender adds messages between the others. If
-#: gaps of so many periods remain without the messages, they are faults of an encoder instead.
+#: A second sender with less than this share of the messages sends between those of the first. If
+#: gaps of this number of periods remain without them, the messages are faults of an encoder
+#: instead.
 _FEW, _REPLACED = 0.2, 1.5
 
 
@@ -60,9 +61,9 @@ def uneven_stamps(recording: Recording, cutoff_hz: float, band_hz: float) -> str
 
 def rounded_stamps(recording: Recording) -> str:
     """
-    Return a message on rounded time stamps that samples share; empty otherwise.
+    Return a message if samples have equal, rounded time stamps; empty otherwise.
 
-    One of several samples with equal stamps is kept; stamps are wrong by up to half of the step.
+    Of samples with equal stamps, one is kept. Its stamp is wrong by up to half of the step.
 
     """
     report, steps = recording.report, np.diff(recording.t)
@@ -81,8 +82,8 @@ def rounded_stamps(recording: Recording) -> str:
 
 def _wander(t: FloatArray) -> float:
     """Return the RMS deviation of stamps from an even grid [s]; zero without short steps."""
-    # lost samples make steps longer and none shorter; stamps with varying delays make short
-    # steps too, and the steps alone do not determine the error of the stamps
+    # lost samples only make steps longer; varying delays of stamps make short steps too. Steps
+    # alone do not determine the error of the stamps
     steps = np.diff(t)
     if len(t) < _WINDOW or np.mean(steps < 0.5 * np.mean(steps)) <= _UNEVEN:
         return 0.0
@@ -104,8 +105,8 @@ def two_senders(recording: Recording) -> str:
     if len(t) < 2 * _FEWEST:
         return ''
     fewest = max(_FEWEST, _SHARE_OF_MESSAGES * len(t))
-    # rows of each joint whose message is far from both neighbours in one direction, with the step
-    # and its sign; the arrays of one joint fit into the cache
+    # rows of each joint whose message is far from both neighbours in the same direction, with
+    # the step and its sign; joint by joint, as the arrays of one fit into the cache
     found = []
     for joint in range(recording.n_joints):
         steps = np.diff(q[:, joint])
@@ -116,7 +117,7 @@ def two_senders(recording: Recording) -> str:
         found.append((rows, step[rows], before[rows] > 0.0))
     if sum(len(rows) for rows, *_ in found) < fewest:
         return ''
-    # the speed that each joint seldom exceeds, from recorded velocities if there are any
+    # a speed that each joint seldom exceeds, from recorded velocities if available
     time = t[2:] - t[:-2]
     usual = np.median(np.abs(q[2:] - q[:-2]) / time[:, np.newaxis], axis=0)
     if recording.dq is not None and np.any(recording.dq):

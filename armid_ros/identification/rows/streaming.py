@@ -4,9 +4,9 @@
 Rows of a recording that may be larger than the memory, in pieces.
 
 Pieces overlap, so that effects of the filters at their ends have decayed. A piece begins at the
-time of a row of the previous piece, so the rows are those of the whole recording. Each row comes
-from one piece. Two things differ per piece: the even time base of jittering stamps, and the top
-speed by which a joint counts as at rest.
+time of a row of the previous piece, so all rows equal those of the whole recording. Each row comes
+from one piece. Two values differ between pieces: the even time base of jittering stamps, and the
+top speed that defines a joint at rest.
 
 """
 
@@ -31,7 +31,7 @@ import numpy.typing as npt
 
 
 def _cuts(piece: Recording, used: Conditioning) -> tuple[int, int]:
-    """Return the stamp of the first sample of the next piece, and that of its first row [ns]."""
+    """Return the stamps of the first sample and of the first row of the next piece [ns]."""
     # after 16 periods, the start of a filter of order 4 has decayed to exp(-38)
     periods = (EDGE_PERIODS + 16.0) * used.rate_hz / used.cutoff_hz
     margin = int(np.ceil(periods)) + len(used.taps)

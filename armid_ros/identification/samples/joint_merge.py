@@ -13,7 +13,7 @@ from armid_ros.motion import FloatArray
 import numpy as np
 import numpy.typing as npt
 
-#: Longest gap of a sender that is interpolated across, in its periods.
+#: Longest gap of a sender that is interpolated, in its periods.
 _LONGEST = 10.0
 
 Moment = tuple[float, FloatArray]
@@ -21,7 +21,7 @@ Moment = tuple[float, FloatArray]
 
 @dataclass
 class _Part:
-    """Joints of a sender, and its samples of shape (s, k) that are still needed."""
+    """Joints of a sender, and those of its samples that are still needed, shape (s, k)."""
 
     joints: tuple[int, ...]
     samples: deque[Moment] = field(default_factory=lambda: deque(maxlen=1000))
@@ -84,7 +84,7 @@ class JointMerger:
 
     def take(self, joints: tuple[int, ...], t: float, values: FloatArray) -> list[Moment]:
         """
-        Add a sample of some joints, and return the samples of all joints that it completes.
+        Add a sample of some joints; return the samples of all joints that are complete with it.
 
         Parameters
         ----------
@@ -104,7 +104,7 @@ class JointMerger:
         self._parts.setdefault(joints, _Part(joints)).take(t, values)
         if self.missing:
             return []
-        # senders with a joint that no earlier sender has
+        # only senders with a joint that no earlier sender has
         found: list[_Part] = []
         known: set[int] = set()
         for part in self._parts.values():

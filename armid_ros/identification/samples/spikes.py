@@ -3,26 +3,27 @@
 """
 Detection of damaged samples in a stream of joint states.
 
-One damaged sample of a torque or an encoder biases an estimate as much as thousands of good ones
-correct. Every sample is predicted by the straight line through the two before it; for a smooth
-signal, the prediction keeps the curvature. A sample too far from the prediction is held until the
-next ones arrive. If these return to the line and do not continue from the sample, it is damaged
-and left out. Otherwise the motion has changed, and all samples are used. So only damaged samples
-are lost, and no change, however large.
+One damaged sample of a torque or an encoder can bias an estimate more than thousands of good
+samples correct. Every sample is predicted by the straight line through the two before it; for a
+smooth signal, the prediction includes the curvature. A sample too far from the prediction is held
+until the next ones arrive. If the next samples return to the line and do not continue from the
+held sample, the held sample is damaged and left out. Otherwise the motion has changed, and all
+samples are used. A real change is therefore never lost, however large it is.
 
 Positions are continuous. A position that steps and continues from there means that a clock was set
 or an encoder zeroed, and a new stretch begins (``StreamSample.begins``). A torque may jump and
-return, for example when free play is crossed. Such pulses differ from damage by the range of the
-torque otherwise. In a stream they are left out and not called damage, as the range is known too
-late; in a recording they are kept.
+return, for example when free play is crossed. The usual range of the torque distinguishes such
+pulses from damage. A stream leaves them out without a report of damage, as the range is known too
+late. A recording keeps them.
 
-The largest allowed error is the largest of three. The noise: the usual prediction error in the
-noisiest part of the last minute, as an arm at rest must not forget its motion. It is multiplied by
-the normal quantile for one false alarm in `false_alarm_time`. The resolution, the smallest step of
-a signal, multiplied by the same. The negligible error (``floor``): the error of one sample that
-moves an estimate as much as noise does. Across a gap, errors are larger: those of an acceleration
-grow with the square of time, those of noise hardly. The errors of a signal reveal which of the two
-dominates: successive errors of white noise have the correlation -2/3, those of an acceleration 1.
+The largest allowed error is the largest of three. The first is the usual prediction error in the
+noisiest part of the last minute, so that rest does not reduce it. It is multiplied by the normal
+quantile for one false alarm in `false_alarm_time`. The second is the resolution, the smallest
+step of a signal, times the same quantile. The third is the negligible error (``floor``): the
+error of one sample that changes an estimate as much as noise does. Across a gap, errors are
+larger: those of an acceleration grow with the square of time, those of noise hardly. The errors of
+a signal reveal which of the two dominates: successive errors of white noise have the correlation
+-2/3, those of an acceleration 1.
 
 """
 
@@ -50,15 +51,15 @@ import numpy as np
 import numpy.typing as npt
 from scipy import stats
 
-#: Number of samples from which noise and period are learned before the first sample is judged.
+#: Number of samples from which noise and period are measured before the first check.
 FIRST = 20
-#: Largest error of a sample against held samples that it continues, over that against the line.
+#: Largest ratio of a sample's error from continued held samples to its error from the line.
 _NEARER = 0.5
-#: Gap in periods after which a sample is held until the next one, which may contradict its stamp.
+#: Gap in periods after which a sample is held until the next one, which may prove its stamp wrong.
 _LEAP = 1.5
 #: Best resolution of a position [rad or m], of a velocity (per second), and of a torque as a share
 #: of its limit: an encoder of 22 bits, a torque sensor of 17. A simulation without noise and an
-#: arm at rest have less noise, and a limit by that noise would leave out sound data.
+#: arm at rest have less noise; limits from that noise would reject valid data.
 _FINEST = {'q': 1e-6, 'v': 1e-5, 't': 1e-5}
 #: Second derivative of each signal when an arm at rest begins to move, in these units per second
 #: squared: 2 rad/s^2, a jerk of 50 rad/s^3, and a torque at its limit that oscillates at 1 Hz.
@@ -166,7 +167,7 @@ class SpikeGate:
         return good + self._take(StreamSample(t, x))
 
     def _take(self, sample: StreamSample) -> list[StreamSample]:
-        """Process a sample whose stamp is not contradicted by the next one."""
+        """Process a sample whose stamp agrees with the next one."""
         if self._known:
             self._last = self._known[1].x
         if self._last is not None:
@@ -293,7 +294,7 @@ class SpikeGate:
 
     def _judge(self, sample: StreamSample) -> list[StreamSample]:
         """Classify another sample; return the samples that are now known to be good."""
-        if self._first is not None:  # the samples before were erratic
+        if self._first is not None:  # the earlier samples were erratic
             self._first.append(sample)
             return []
         missed = missed_by(self._known, sample, self._period)
@@ -362,8 +363,8 @@ class SpikeGate:
 
     def _stepped(self) -> bool:
         """Return whether a continuous signal has stepped between known and held samples."""
-        # The lines before and behind a step do not intersect in between; those of a sudden turn,
-        # as in a collision, do.
+        # The lines before and after a step do not intersect in between. The lines before and
+        # after a collision do.
         ahead = missed_by(self._known, self._held[0], self._period)
         back = missed_by((self._held[1], self._held[0]), self._known[1], self._period)
         far = np.minimum(self._off_by(ahead), self._off_by(back))

@@ -3,9 +3,9 @@
 """
 Prediction of a sample of a stream by the straight line through the two before it.
 
-The usual prediction errors are the noise of a stream and the resolution of its signals. Every
-window of errors takes the same computing time, whether it is the second or the thousandth. One
-sample in a hundred completes a window, and a stream must not wait.
+The usual prediction errors are the noise of a stream and the resolution of its signals. One
+sample in a hundred completes a window of errors. All windows take the same computing time, as a
+stream must not wait.
 
 """
 
@@ -29,11 +29,12 @@ _HALF_A_TURN = np.pi
 _WINDOW = 100
 #: Number of windows kept: one minute at 1 kHz.
 _REMEMBERED = 600
-#: Share of predictions that define the usual error. Others may be steps of friction, or damage.
+#: Share of predictions that define the usual error. The others may be steps of friction, or
+#: damage.
 _SHARE = 0.95
 #: Share for the first few samples, where one damaged sample spoils three predictions.
 _SHARE_FIRST = 0.75
-#: Number of occurrences of a step from which it is a step of the signal itself.
+#: Number of occurrences from which a step is the resolution of the signal.
 _SEEN = 3
 
 
@@ -117,8 +118,8 @@ class Usual:
     @cached_property
     def _shares(self) -> tuple[FloatArray, FloatArray]:
         """Return deviation of noise, and largest error by acceleration, over `size`, (m,)."""
-        # the hardest acceleration of an arm is twice that of 95 % of the time, which is 1.96
-        # standard deviations of a normal variable
+        # the largest acceleration of an arm is twice its 95 % quantile, which is 1.96 standard
+        # deviations of a normal variable
         return np.sqrt(self.noisy), np.sqrt(1.0 - self.noisy) * (2.0 * 1.96)
 
     def limits(self, quantile: float, noise: Factor, bend: Factor) -> FloatArray:
@@ -155,7 +156,7 @@ class Missed(NamedTuple):
 
 
 def growth_over(step: Time, ahead: Time, period: float) -> tuple[Time, Time]:
-    """Return the growth of errors by noise and by acceleration, a time after two samples."""
+    """Return the growth of errors by noise and by acceleration over a time after two samples."""
     ratio = ahead / step
     noise: Time = ((1.0 + (1.0 + ratio) ** 2 + ratio**2) / 6.0) ** 0.5
     return noise, 0.5 * ahead * (ahead + step) / period**2
@@ -302,7 +303,7 @@ class NoiseLevel:
 
     def _least(self, period: float) -> FloatArray:
         """Return the smallest step of every signal, at least the finest and that of an onset."""
-        # A fast signal has no small steps, but its resolution moves it off any line.
+        # A fast signal has no small steps, but its resolution causes prediction errors.
         step = np.where(np.isfinite(self._steps[-1]), self._steps[-1], 0.0)
         least = np.maximum(self._finest, self._onset * period**2)
         return np.maximum(np.minimum(self._most, step), least)

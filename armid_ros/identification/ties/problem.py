@@ -28,7 +28,7 @@ import numpy.typing as npt
 from scipy import signal
 import scipy.linalg
 
-#: Remainder of a column, as a share of it, below which it is a combination of the others.
+#: Residual share of a column below which it is a linear combination of the others.
 _RANK_TOLERANCE = 1e-6
 #: Step of the central differences of rigid columns [rad or m].
 _STEP = 1e-5

@@ -4,9 +4,9 @@
 Stiffness of springs between two machines, from torques of one and joint angles of both.
 
 tau = Y pi + sum_s k_s J_s^T D_s is linear in k, but D, the vector between the ends of a spring,
-is a small difference of measured angles. Noise in the angles makes J^T D too long on average and k
-too small, by several per cent at 0.1 deg. The noise x of a motion changes the torque by G x, where
-G is the derivative of the model by the motion. Residuals then have the covariance
+is a small difference of measured angles. Noise of the angles makes J^T D too long on average, so
+k is too small, by several per cent at 0.1 deg. The noise x of a motion changes the torque by G x,
+where G is the derivative of the model by the motion. Residuals then have the covariance
 S = var(tau) + G var(x) G^T, which also depends on k. The k that minimises sum r^T S^-1 r is
 consistent (generalised total least squares). The columns are computed at the most likely motion,
 given the residuals.
@@ -29,9 +29,9 @@ from scipy.optimize import minimize
 
 #: Largest gradient, in standard deviations, at the end of the iteration.
 _CONVERGED = 1e-3
-#: Assumed share of torque noise in the mean square of residuals if no noise was measured.
+#: Assumed share of torque noise in the mean squared residual, if no noise was measured.
 _LEAST_SHARE = 0.01
-#: Smallest z-score of an existing stiffness: a false one has a probability of 3e-5.
+#: Smallest z-score of a real stiffness; a false one has a probability of 3e-5.
 LEAST_Z = 4.0
 
 
@@ -89,7 +89,7 @@ class Interaction:
 
 def identify_interaction(problem: InteractionProblem) -> Interaction:
     """
-    Estimate stiffnesses and free inertias without the bias of noisy angles.
+    Estimate stiffnesses and unknown inertias without the bias due to noise of the angles.
 
     Parameters
     ----------
@@ -104,7 +104,7 @@ def identify_interaction(problem: InteractionProblem) -> Interaction:
 
     """
     uncorrected = _least_squares(problem, problem.columns)
-    # the start is one stiffness for all springs by least squares, which noise affects little
+    # initial value: one stiffness for all springs by least squares, which noise affects little
     count = len(problem.segments)
     together = problem.columns[:, :, :count].sum(axis=2, keepdims=True)
     columns = np.concatenate([together, problem.columns[:, :, count:]], axis=2)
@@ -134,9 +134,9 @@ def _most_likely(
     problem: InteractionProblem, theta: FloatArray, variance: FloatArray
 ) -> FloatArray:
     """Return the most likely theta, from a start near it, by a quasi-Newton method (BFGS)."""
-    # where noise dominates a column, the loss is much flatter than by the information, and
-    # Gauss-Newton steps oscillate; BFGS learns the curvature from the gradients, beginning with
-    # the information
+    # if noise dominates a column, the loss is much flatter than the information predicts, and
+    # Gauss-Newton steps oscillate. BFGS starts with the information and corrects the curvature by
+    # gradients
     information = _gauss_newton(problem, theta, variance).information
     size = np.sqrt(np.diag(information))
     root = np.linalg.cholesky(information / np.outer(size, size))
@@ -168,7 +168,7 @@ def _least_squares(problem: InteractionProblem, columns: FloatArray) -> FloatArr
     w = columns.reshape(-1, columns.shape[2])
     scale = np.linalg.norm(w, axis=0)
     springs = scale[: columns.shape[2] - len(problem.rigid)]
-    # with a smaller RMS torque per stiffness [m^2], the spring is not extended
+    # the spring is not extended if its RMS torque per stiffness [m^2] is smaller
     if not np.all(springs > 1e-9 * np.sqrt(len(w))):
         name = problem.segments[int(np.argmin(springs))]
         raise IdentificationError(f'{name}: its spring is never extended: not identifiable')
@@ -215,9 +215,9 @@ def _covariance(
     excess: float,
 ) -> FloatArray:
     """Return the covariance of the parameters at the solution, H^-1 B H^-1."""
-    # B is the covariance of the scores. Filters correlate neighbours by a known amount; if the
-    # scores vary more, as with noise that was not white, deviations are widened. Independent
-    # poses have B = H.
+    # B is the covariance of the scores. Filters correlate neighbouring samples by a known
+    # amount. If scores vary more, as with coloured noise, standard deviations are increased.
+    # Independent poses have B = H.
     information = step.information
     size = np.sqrt(np.diag(information))
     scaled = np.linalg.inv(information / np.outer(size, size))
