@@ -51,18 +51,18 @@ _ASSUMED = (
     'noise of recordings without two equal periods is estimated from differences between '
     'neighbouring samples'
 )
-#: Note if a cause acts part of the time and its span in held-out data is unknown.
+#: Note if a cause acts temporarily and its time span in held-out data is unknown.
 _NOT_TIMED = (
     'held-out recordings are not used: without a baseline, the seconds in which the cause acts in '
     'them are not determined'
 )
-#: Fault where the residual of the baseline is larger than its torque.
+#: Fault if the residual of the baseline is larger than its torque.
 _NO_MODEL = (
     'the residual of the model is {:.3g} times the torque of the baseline, so it is worse than no '
     'model. It belongs to another arm, or has other units. Identify the arm from the baseline, '
     'and give that model'
 )
-#: Time by which the beginning and the end of a span are uncertain [s].
+#: Uncertainty of the start and the end of a time span [s].
 _UNSURE = 0.25
 
 
@@ -164,7 +164,7 @@ def diagnose(
 
 
 def _hardly_explained(result: Diagnosis, settings: DiagnosisSettings) -> bool:
-    """Return whether the verdict leaves a gap, or no named cause explains half of the gap."""
+    """Return whether a gap remains, or no named cause explains half of the gap."""
     largest = max((one.share for one in result.findings), default=0.0)
     return result.verdict in OPEN or largest <= settings.thresholds.open_share
 
@@ -236,7 +236,7 @@ def _each_alone(
 def _with_unfitted_joints(
     arm: ArmModel, day: Sequence[Recording], used: Conditioning
 ) -> Iterator[tuple[Recording, npt.NDArray[np.bool_]]]:
-    """Yield recordings with joints whose torque the model fits in the other recordings only."""
+    """Yield recordings with joints whose torque the model fits only in the other recordings."""
     unit = np.ones(arm.robot.n_joints)
     bad, sound = np.zeros((2, len(day), len(unit)), dtype=bool)
     for k, one in enumerate(day):
@@ -317,7 +317,7 @@ def _not_visible(
     """Return the effects that are not visible on any joint, in the order of the catalogue."""
     hidden = set() if explanation.survey is None else explanation.survey.hidden
     hidden -= {finding.name for finding in found}
-    if explainer.baseline is None:  # what is fitted with every cause is seen in its own values
+    if explainer.baseline is None:  # effects fitted with every cause have their own values
         hidden -= {one.name for one in with_friction(explainer.arm, explainer.settings.library)[1]}
     return tuple(kind.name for kind in explainer.settings.kinds if kind.name in hidden)
 
@@ -330,7 +330,7 @@ def _remarks(
     doubt: str,
     explainer: Explainer,
 ) -> list[str]:
-    """Return remarks: why the model is not patched or in doubt, and which joints are unchecked."""
+    """Return remarks: why the model is doubtful or not patched, and which joints are unchecked."""
     still = ', '.join(not_shown(explainer.prepared.data, explainer.arm.robot.joints))
     names = ' and '.join(name_in_words(one.name) for one in found)
     remarks = {

@@ -1,6 +1,6 @@
 # Copyright 2026 The armid_ros developers
 # SPDX-License-Identifier: Apache-2.0
-"""Doubt that a model belongs to the arm: its residual in the baseline is too large."""
+"""Doubts whether a model belongs to the arm, because its residual in the baseline is too large."""
 
 from __future__ import annotations
 
@@ -63,8 +63,8 @@ def doubt_of_names(findings: Sequence[Finding]) -> str:
         if one.name in CATALOGUE and CATALOGUE[one.name].traits.corrects:
             return (
                 'Links do not change between two days. Unless the link of '
-                f'{" and ".join(one.joints)} was exchanged or something was bolted to it, a cause '
-                'outside of the catalogue resembles this change.'
+                f'{" and ".join(one.joints)} was exchanged or carries a new part, the true '
+                'cause is not in the catalogue and resembles this change.'
             )
     return ''
 
@@ -84,7 +84,9 @@ def _changed(
         return times, times / most
 
     times, beyond = compared(baseline)
-    if misfit.filters is not None and beyond.max() > 1.0:  # the misfit had other filters
+    if (
+        misfit.filters is not None and beyond.max() > 1.0
+    ):  # misfit with other filters
         try:
             parts = trajectories(recordings, Conditioning(*misfit.filters), arm)
         except IdentificationError:  # too short for these filters, or sampled more slowly

@@ -22,11 +22,12 @@ from armid_ros.motion import FloatArray
 from armid_ros.recording import given_twice, Recording
 import numpy as np
 
-#: Kept band over the band of the motion. An identification keeps ten times the band, but the upper
-#: part is mostly noise, which would hide a gap.
+#: Band of the rows, divided by the band of the motion. An identification uses a factor of ten,
+#: but the upper part is mostly noise, which would hide a gap.
 _BANDS = 6.0
-#: Pass band over the band in which the motion exceeds the noise of angles, with a partner. Noise
-#: dominates beyond it, and a fit would reduce inertias to fit the noise of accelerations.
+#: Pass band, with a partner, divided by the band in which the motion exceeds the noise of
+#: angles. Above, noise dominates, and a fit would reduce inertias to fit the noise of
+#: accelerations.
 _NARROW = 1.25
 
 
@@ -110,9 +111,9 @@ def prepare(
     """
     Measure the noise of data, and which of their rows are informative.
 
-    Rows next to reversals are informative if their noise exceeds the error of dry friction. With a
-    misfit as unit they are not informative: dry friction is the largest error of a model, and it
-    differs from motion to motion.
+    Rows next to reversals are informative if their noise exceeds the error of dry friction. If a
+    misfit is the unit, these rows are not informative: dry friction is the largest error of a
+    model, and it differs between motions.
 
     """
     whole = arm.base_parameters(rng)
@@ -128,7 +129,7 @@ def prepare(
 
 
 def with_friction(arm: ArmModel, library: Sequence[str]) -> tuple[ArmModel, tuple[Effect, ...]]:
-    """Add the friction and offsets that any joint may have; return arm and added effects."""
+    """Add usual friction and offsets to every joint; return the arm and the added effects."""
     there = {(effect.name, joint) for effect in arm.effects for joint in effect.joints}
     added: list[Effect] = []
     fuller = arm

@@ -1,6 +1,6 @@
 # Copyright 2026 The armid_ros developers
 # SPDX-License-Identifier: Apache-2.0
-"""Settings of a diagnosis, and every threshold that decides a name."""
+"""Settings of a diagnosis, and all thresholds of its decisions."""
 
 from __future__ import annotations
 

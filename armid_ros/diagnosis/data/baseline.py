@@ -3,10 +3,10 @@
 """
 Prior knowledge of an arm: from recordings of a baseline, and from its description.
 
-The misfit is the residual of a model in recordings from when it was right: no real arm agrees
-with its model to within the noise. The residual is smaller in recordings that the model was
-identified from, so each fold is also predicted with parameters fitted to the other folds. The
-description is their prior, for parameters that the other folds do not determine: a joint may have
+The misfit is the residual of a model in recordings from a time when it was right. No model
+describes a real arm to within the noise. The residual is smaller in the recordings of the
+identification. Each fold is therefore also predicted with parameters fitted to the other folds.
+The description is the prior of parameters that the other folds do not determine: a joint may have
 moved in one recording only.
 
 """
@@ -34,7 +34,7 @@ from armid_ros.recording import Recording
 import numpy as np
 import scipy.linalg
 
-#: Share of its length below which the part of a column beyond the other columns counts as zero.
+#: Share of its length below which the part of a column that is independent of the others is zero.
 EXCITED = 1e-4
 
 
@@ -63,10 +63,10 @@ def described_precision(
     """
     Return the prior precision of the base parameters by the description, shape (r, r).
 
-    The prior standard deviation is about the described value: data decide what they determine, and
-    the rest keeps values that predict other motions well. An effect with a value of zero has its
-    largest expected value as standard deviation. A parameter of infinite variance gives zero
-    precision along its column of the grouping.
+    The prior standard deviation is about the described value: data change the parameters that
+    they determine; the others keep values that predict other motions well. The standard
+    deviation of an effect with value zero is its largest expected value. A parameter of infinite
+    variance gives zero precision along its column of the grouping.
 
     Parameters
     ----------
@@ -117,7 +117,7 @@ def _described_spread(arm: ArmModel) -> FloatArray:
 @dataclass(frozen=True)
 class Baseline:
     """
-    Recordings from when the model was right.
+    Recordings from a time when the model was right.
 
     Attributes
     ----------
@@ -148,7 +148,9 @@ class Baseline:
         informative = np.concatenate([part.informative for part in data])
         rest = np.concatenate(residual)
         w = np.concatenate(columns)
-        informative[:, ~informative.any(axis=0)] = True  # use all rows of a joint that never moved
+        informative[:, ~informative.any(axis=0)] = (
+            True  # all rows of a joint that never moved
+        )
         scale = np.sqrt(np.mean(rest**2, axis=0, where=informative))
         weight = informative / np.maximum(scale, 1e-12)
         rows = w * weight[:, :, np.newaxis]
@@ -179,7 +181,7 @@ class Baseline:
         """
         Return the relative rms error of the model: of the whole arm, and of each joint, (n,).
 
-        Only rows in which a joint moves count: at rest, friction can have any torque.
+        Only rows in which a joint moves are used: at rest, friction can have any torque.
 
         """
         rows = Evidence.over_noise(self.data, [np.ones_like(self.misfit)] * len(self.data))
@@ -198,8 +200,8 @@ def known_misfit(
     """
     Measure the misfit of a model in recordings in which nothing is wrong, for later diagnoses.
 
-    Rows in which a joint rests or reverses do not count: friction there is the largest error of a
-    model, and a diagnosis does not use it.
+    Rows in which a joint rests or reverses are not used, as in a diagnosis: friction there is
+    the largest error of a model.
 
     Parameters
     ----------

@@ -1,6 +1,6 @@
 # Copyright 2026 The armid_ros developers
 # SPDX-License-Identifier: Apache-2.0
-"""Recordings of the baseline (first day) and of the diagnosed day, in weighted rows."""
+"""Weighted rows of the recordings of the baseline (first day) and of the diagnosed day."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from armid_ros.motion import FloatArray
 import numpy as np
 import numpy.typing as npt
 
-#: Smallest unit of the rows of a joint, over its rms torque.
+#: Smallest unit of the rows of a joint, as a share of its rms torque.
 _LEAST = 1e-4
 
 

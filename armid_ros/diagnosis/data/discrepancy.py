@@ -5,9 +5,10 @@ Model discrepancy: the part of a misfit that is the same in every motion.
 
 Measured torque is the sum of the torque of the model, a function of the state that the model
 lacks, and noise (Kennedy and O'Hagan, Bayesian calibration of computer models, 2001). The function
-belongs to the arm and does not change. Other motions visit other states, so their misfit differs
-although nothing has changed. In each joint it is a function of position, plus one of velocity,
-plus load-dependent friction, fitted to the recordings of both days together with each cause.
+belongs to the arm and does not change. Other motions visit other states, so the misfit differs
+between motions although nothing has changed. In each joint it is a function of position, plus one
+of velocity, plus load-dependent friction, fitted to the recordings of both days together with each
+cause.
 
 """
 
@@ -23,8 +24,8 @@ import numpy as np
 
 #: Knots of the function of position, evenly over the range of motion.
 _POSITIONS = 4
-#: Knots of the function of velocity on each side, over the top speed: friction changes most where
-#: a joint is slow.
+#: Knots of the function of velocity on each side, as shares of the top speed: friction changes
+#: most at low speed.
 _SPEEDS = (0.03, 0.25, 1.0)
 
 

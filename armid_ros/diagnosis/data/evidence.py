@@ -5,8 +5,9 @@ Data in units of the noise, or of the misfit of the model.
 
 The noise is the difference between the residuals of two equal periods of one trajectory. Each
 residual is evaluated at the positions measured in its period, so the difference includes encoder
-noise as it propagates through the model. Torques that depend on the motion alone cancel. Without
-equal periods the noise is assumed from differences between neighbouring rows, and reported so.
+noise that propagates through the model. Torques that depend on the motion alone cancel. Without
+equal periods, the noise is assumed from differences between neighbouring rows, and the result
+states this.
 
 """
 
@@ -30,10 +31,10 @@ _LAGS = 20
 #: Smallest number of informative rows; with fewer, all rows are used.
 _FEW = 20
 #: Ratio of the noise of torques, which is coloured, to white noise with the same second
-#: differences: at most this in 95 % of the joints of 48 recordings with two equal periods.
+#: differences: at most this value in 95 % of the joints of 48 recordings with two equal periods.
 _COLOUR = 1.4
-#: Upper frequency of disturbances by people, loose parts and nearby machines [Hz]; a band in which
-#: noise of torques is as strong, and noise of positions stronger [Hz]; window of spectra [s].
+#: Upper frequency of disturbances by people, loose parts and nearby machines [Hz]; a band with
+#: equal noise of torques and more noise of positions [Hz]; window of spectra [s].
 _SLOW_HZ, _FAST_HZ, _WINDOW = 4.0, (6.0, 12.0), 2.5
 
 
@@ -87,7 +88,7 @@ class Evidence:
         return self.power([rows / s for rows, s in zip(residual, self.sigma, strict=True)])
 
     def relative_errors(self, residual: Sequence[FloatArray]) -> FloatArray:
-        """Return a residual, each (M, n), over the torque of each joint, both rms, (n,)."""
+        """Return rms residuals, each (M, n), divided by the rms torque of each joint, (n,)."""
         torque = np.maximum(self.torque_rms**2, 1e-300)
         return np.asarray(np.sqrt(self.power(residual) / torque))
 
@@ -110,16 +111,16 @@ class Evidence:
 
     @property
     def assumed(self) -> bool:
-        """Whether the noise is assumed for some trajectory, because no period repeats in it."""
+        """Whether the noise of some trajectory is assumed, because it has no repeated period."""
         return any(part.period is None for part in self.data)
 
     def limits(self, residual: Sequence[FloatArray], settings: DiagnosisSettings) -> FloatArray:
         """
-        Return the largest loss of each joint that counts as no gap, shape (n,).
+        Return the largest mean squared weighted residual of each joint without a gap, shape (n,).
 
         The noise and the residual each have one degree of freedom per independent row, so the
         ratio of their squares has an F distribution. A misfit, or assumed noise, may be larger by
-        the factor `same_fit` from motion to motion. The loss that is not material is added.
+        the factor `same_fit` from motion to motion. The loss of an immaterial residual is added.
 
         """
         thresholds = settings.thresholds
@@ -132,7 +133,7 @@ class Evidence:
         return np.where(misfit, self.as_good(settings), noise) + self.matters(settings)
 
     def as_good(self, settings: DiagnosisSettings) -> FloatArray:
-        """Return the largest loss of each joint that the misfit of another motion has, (n,)."""
+        """Return the largest loss of each joint by the misfit in another motion, (n,)."""
         varies = np.ones_like(self.count) if self.varies is None else self.varies
         return np.asarray(settings.thresholds.same_fit * np.maximum(varies, 1.0))
 
@@ -242,7 +243,7 @@ def _difference(
     """
     Return the difference of two equal periods in one joint, and its informative samples.
 
-    A drift of the offset or of viscous friction over time is regressed out, as it is an effect and
+    A drift of offset or viscous friction over time is regressed out, because it is an effect and
     no noise.
 
     """
@@ -274,7 +275,7 @@ def _assumed(trajectory: Trajectory, smooth: FloatArray) -> FloatArray:
     Return an upper estimate of the noise from second differences of rows, shape (n,) [N m].
 
     The noise is taken as white in the band of the rows. The torque that a model lacks changes
-    little from row to row, except for friction at reversals; rows next to reversals do not count.
+    little from row to row, except for friction at reversals; rows next to reversals are not used.
 
     """
     rows, informative = smooth[trajectory.rows], trajectory.informative

@@ -1,7 +1,7 @@
 # Copyright 2026 The armid_ros developers
 # SPDX-License-Identifier: Apache-2.0
 """
-Recordings as rows: measured torques and columns of a model, filtered alike and decimated.
+Recordings as rows: measured torques and model columns with the same filter and decimation.
 
 A trajectory is one unbroken stretch of a recording. Columns are computed at the higher rate of its
 motion; torques and columns are compared in decimated rows.
@@ -35,20 +35,20 @@ import numpy as np
 import numpy.typing as npt
 from scipy import signal
 
-#: Rate of the columns over that of the rows: enough for signs of velocity and for hysteresis.
+#: Rate of the columns, divided by that of the rows; it resolves signs of velocity and hysteresis.
 _OVERSAMPLING = 8
 #: Share of its top speed below which a joint is at rest, and shortest time of a rest [s].
 _REST_SPEED, REST_TIME = 0.02, 0.2
-#: Share of the top speed, and standard deviations of its noise, below which the sign of a velocity
-#: is uncertain, and with it dry friction.
+#: The sign of a velocity, and with it dry friction, is uncertain below this share of the top
+#: speed, or this number of standard deviations of its noise.
 _REVERSAL_SPEED, _REVERSAL_NOISE = 0.004, 3.0
 #: Smallest limit of the share of an informative row with an uncertain sign of velocity; the three
 #: rows next to a reversal exceed it.
 UNSURE = 0.003
-#: Least number of folds of all data. Each recording has two or more, so that an effect that only
-#: one fast recording shows is fitted to one half of it and predicted in the other.
+#: Least number of folds of all data. Each recording has two or more, so an effect in a single
+#: fast recording is fitted to one half of it and predicted in the other.
 PARTS = 6
-#: Blocks of each fold, of a second or two, which is longer than any correlation of noise; least
+#: Number of blocks of a fold, each of 1 to 2 s, longer than any correlation of noise; smallest
 #: number of rows of a block.
 BLOCKS, _LEAST_ROWS = 6, 8
 
@@ -107,7 +107,7 @@ class Trajectory:
 
     @property
     def stretch(self) -> Stretch:
-        """Return the rows in the form that the checks of data take."""
+        """Return the rows in the form that the data checks need."""
         return Stretch(self.source, self.at_rows.with_torque(self.torque), self.informative)
 
     @cached_property
@@ -206,7 +206,8 @@ def thinnable(used: Conditioning) -> Conditioning:
     """
     Reduce the decimation of rows to a multiple of the decimation of columns.
 
-    Each row then spans a whole number of columns' samples; at most an eighth more rows are kept.
+    Each row then spans a whole number of samples of the columns. The number of rows grows by at
+    most an eighth.
 
     """
     widest = _widest(used)
@@ -292,7 +293,7 @@ def count_recordings(data: Sequence[Trajectory]) -> int:
 
 
 def not_shown(data: Sequence[Trajectory], joints: Sequence[str]) -> tuple[str, ...]:
-    """Return the joints that are at rest throughout, or have no informative row."""
+    """Return the joints that never move, or have no informative row."""
     if not data:
         return ()
     shown = moving(part.motion for part in data)

@@ -3,8 +3,8 @@
 """
 Isolability: effects that a planned motion makes detectable, and distinguishable.
 
-The model of the arm counts as known. Columns of effects are divided by the noise; two effects are
-distinguishable if the angle between their columns is large (Basseville and Nikiforov 1993).
+The model of the arm is taken as exact. Columns of effects are divided by the noise; two effects
+are distinguishable if the angle between their columns is large (Basseville and Nikiforov 1993).
 
 """
 
@@ -23,8 +23,8 @@ from armid_ros.motion import FloatArray, Motion
 import numpy as np
 import numpy.typing as npt
 
-#: Least share of the torque of an effect that a distinguishable other one cannot reproduce: the
-#: effect then has to be ten times its detectable size for the difference to be detectable.
+#: Smallest share of an effect's torque that a distinguishable effect cannot reproduce. The
+#: difference is then detectable if the effect has ten times its detectable size.
 DISTINCT = 0.1
 
 
@@ -51,7 +51,7 @@ class Isolability:
         return np.array([np.isfinite(one.size) for one in self.effects])
 
     def rivals(self, k: int) -> list[Detectable]:
-        """Return the visible effects that cannot be distinguished from this one, nearest first."""
+        """Return the visible effects that are indistinguishable from this one, most similar first."""
         order = np.argsort(self.apart[k])
         near = [j for j in order if j != k and self.seen[j] and self.apart[k, j] < DISTINCT]
         return [self.effects[j] for j in near]

@@ -8,8 +8,8 @@ effect, over the unit of the gap, that the rival, fitted jointly with the nuisan
 cannot explain.
 
 The motions are slow and fast motion of all joints, motion of single joints, reversals so small
-that dry friction does not break away, and shaking. Each is also tried with a known payload, which
-alone separates a gain of the drives from the masses.
+that dry friction does not break away, and shaking. Each motion is also tried with a known
+payload; only a payload separates a gain of the drives from the masses.
 
 """
 
@@ -40,7 +40,7 @@ import numpy as np
 EXPERIMENT_FILE = 'experiment.yaml'
 #: Sufficient separation in standard deviations; a motion that reaches it needs no payload.
 _SURE = 5.0
-#: Largest number of standard deviations that is stated: the noise is not known well enough.
+#: Largest reported number of standard deviations; the noise is not known well enough for more.
 _CERTAIN = 30.0
 #: Largest number of pairs of names in a sentence.
 _SAID = 3
@@ -198,7 +198,7 @@ class _Run:
 
 
 def _in_order(runs: Sequence[_Run]) -> list[_Run]:
-    """Sort runs, best first; runs with a payload come last if a motion alone separates as well."""
+    """Sort runs, best first; runs with a payload come last if some motion needs none."""
     most = np.max([[pair.z for pair in run.separations] for run in runs], axis=0, initial=0.0)
     wanted = np.where(most < NOTHING, 0.0, np.minimum(most, _SURE))
     plain = [run for run in runs if not run.template.loaded]

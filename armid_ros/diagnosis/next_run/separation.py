@@ -32,12 +32,12 @@ _RATE = 50.0
 _PERIODS = 2
 #: A joint slower than this share of its top speed is not informative: dry friction is arbitrary.
 _SLOW = 0.02
-#: Largest torque of a known payload over the usable torque of a joint: its limit, or twice its
-#: largest torque in the motion if that is smaller.
+#: Largest torque of a known payload, as a share of the usable torque of a joint. The usable
+#: torque is its limit, or twice its largest torque in the motion if smaller.
 _LOAD = 0.15
-#: Distance below which a frame counts as at the last joint [m].
+#: Distance below which a frame is at the last joint [m].
 _NEAR = 0.01
-#: Singular values of columns below this share of the largest count as zero.
+#: Singular values of columns below this share of the largest are zero.
 _DEPENDENT = 1e-7
 
 
@@ -196,8 +196,8 @@ def _weight(diagnosis: Diagnosis, motion: Motion) -> FloatArray:
     """
     Return the weight of each sample: sqrt(rows per sample) / sigma, shape (N, n).
 
-    The noise is white over rows: a higher rate of samples adds no information. The unit of the gap
-    is taken to be the same in the next run.
+    The noise is white over rows: a higher rate of samples adds no information. The unit of the
+    gap is assumed to be the same in the next run.
 
     """
     assert diagnosis.explanation is not None

@@ -98,7 +98,7 @@ def _use_of_model(diagnosis: Diagnosis, model: str, worse: Sequence[str]) -> lis
     if diagnosis.doubt or diagnosis.harmful:
         return ['Identify the arm anew before the model is used in simulation or control.']
     which = 'the patched model' if diagnosis.findings else 'a copy of the given model'
-    return [f'Use {model}, {which}, in simulation and control; keep these bags to compare with.']
+    return [f'Use {model}, {which}, for simulation and control; keep these bags as a baseline.']
 
 
 def _looks(finding: Finding, diagnosis: Diagnosis) -> list[str]:
@@ -137,8 +137,8 @@ def _look_at(name: str, diagnosis: Diagnosis) -> str:
     """
     Return the part of the robot to inspect for an effect of the catalogue or of a plug-in.
 
-    The text is empty for a usual effect that the given model lacks: friction of a joint without
-    a friction model is no fault of the robot.
+    The text is empty for a usual effect that the given model lacks: missing friction of a model
+    is no fault of the robot.
 
     """
     if name not in CATALOGUE:

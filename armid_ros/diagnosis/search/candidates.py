@@ -36,11 +36,11 @@ from scipy import optimize
 
 #: Largest number of combinations of start values of shapes.
 _MOST_SHAPES = 12
-#: Largest distance of side lobes from a peak of a spectrum, and half width of the peak [1/rev].
+#: Largest distance of side lobes from a spectral peak, and half width of the peak [1/rev].
 _LOBES, _PEAK = 3.0, 0.2
 #: Largest number of evaluations of one line search.
 _EVALUATIONS = 9
-#: Largest mass, first moments [m] and inertias [m^2] of a body, over its mass.
+#: Largest mass [1], first moments [m] and inertias [m^2] of a body, divided by its mass.
 _BODY = np.array([1.0, *3 * [0.1], *6 * [0.01]])
 
 
@@ -103,7 +103,8 @@ class Causes:
         """
         Yield a friction law on the joints that maximise its evidence, if at least two.
 
-        Values of joints are independent under a common prior; each number of joints is as likely.
+        Values of joints are independent under a common prior; each number of joints is equally
+        likely.
 
         """
         first, count = singles[0].effect, len(singles)
@@ -165,7 +166,7 @@ class Causes:
         return [part.columns(self.nuisance.arm, effect) for part in self._parts]
 
     def renewed(self, cause: Cause) -> Cause:
-        """Return a cause of another comparison with products of these nuisance columns."""
+        """Return a cause of another comparison with products for these nuisance columns."""
         columns = [x[:, :, list(cause.kept)] for x in self._columns(cause.effect)]
         return cause_of(
             self.nuisance,
@@ -218,14 +219,14 @@ def _torque_of(columns: Sequence[FloatArray], rows: Rows) -> FloatArray:
 
 
 def _unit(own: SelectedEffect, torque: FloatArray, rows: Rows, robot: Robot) -> FloatArray:
-    """Return values with the torque of the joint, at most the largest plausible values."""
+    """Return values whose torque equals that of the joint, limited to plausible values."""
     effect, kept = own.effect, list(own.kept)
     spread = effect.spread(robot)
     if len(spread) == len(effect.owners) * len(effect.quantities):
         most = [q.largest(owner, robot) for owner in effect.owners for q in effect.quantities]
         spread = np.where(np.isinf(spread), most, spread)
     spread = spread[kept]
-    if effect.adds_to(robot):  # a load and an error of a link have the same columns
+    if effect.adds_to(robot):  # a load and a link error have the same columns
         spread = (float(robot.rigid_parameters[::10].sum()) * _BODY)[kept]
     largest = 1.0 / np.maximum(np.max(torque / rows.torque[:, np.newaxis], axis=0), 1e-12)
     return np.asarray(np.minimum(largest, np.where(spread > 0.0, spread, np.inf)))
@@ -361,7 +362,7 @@ def shaped(
 def line_search(
     gain: Callable[[FloatArray], float], shape: FloatArray, index: int, kind: Shape
 ) -> FloatArray:
-    """Search one shape near its present value, over its logarithm if positive (Brent 1973)."""
+    """Search one shape near its present value; positive ones by their logarithm (Brent 1973)."""
     value = float(shape[index])
     positive = kind.lower > 0.0 and value > 0.0 and kind.near is None and kind.unit != '1/rev'
 
@@ -397,7 +398,7 @@ def without_measurement(part: Trajectory, arm: ArmModel) -> Trajectory:
     """
     Replace the measured torque of a trajectory by that of a model.
 
-    A prediction that contains the measurement explains anything.
+    A prediction that contains the measurement would explain everything.
 
     """
     return replace(part, motion=part.motion.with_torque(arm.torque(part.motion)))

@@ -61,13 +61,13 @@ class Cause:
         return self.effect.name, self.effect.joints, self.kept
 
     def whole(self, values: FloatArray, robot: Robot) -> FloatArray:
-        """Return all parameters of the effect from the fitted values; the others are zero."""
+        """Return all parameters of the effect: the fitted values, and zero for the others."""
         whole = np.zeros(len(self.effect.parameters(robot)))
         whole[list(self.kept)] = values
         return whole
 
     def among(self, effect: Effect, values: npt.NDArray[np.intp], shapes: int) -> Cause:
-        """Return the cause with a subset of its values, those of an effect on fewer joints."""
+        """Return the cause with a subset of its values, for an effect on fewer joints."""
         return replace(
             self,
             effect=effect,

@@ -1,7 +1,7 @@
 # Copyright 2026 The armid_ros developers
 # SPDX-License-Identifier: Apache-2.0
 """
-The explanation of a gap, with a baseline, with a stored misfit, or with the model alone.
+The explanation of a gap, given a baseline, a stored misfit, or only the model.
 
 The comparison of causes is the same in the three cases. They differ in the prior knowledge of
 discrepancy and noise.
@@ -48,21 +48,21 @@ from armid_ros.robots import GRAVITIES
 import numpy as np
 
 Progress = Callable[[float, str], None]
-#: Smallest share of a misfit that is not noise: the estimate of noise varies by 5 %. Of
-#: 20 effects that appeared in a running arm 20 were named, and 15 with a share of 1.
+#: Smallest share of a misfit that is not noise; the estimate of noise varies by 5 %. Of 20
+#: effects that appeared in a running arm, 20 were named, and only 15 with a share of 1.
 _LEAST_PART = 0.3
-#: Largest number of fits of gravity of another direction: torque is bilinear in gravity and body.
-#: With 2 fits, the number of mountings out of 20 within 1 degree and 2 % is the same.
+#: Largest number of fits for another direction of gravity, as torque is bilinear in gravity and
+#: masses. With 2 fits, the same number of 20 mountings is within 1 degree and 2 %.
 _MOST_TURNS = 5
 _KNOWN_GRAVITY = 'the magnitude of gravity is taken as that of the {}, {:g} m/s^2'
 OWN_MISFIT = 'the error of the model before'
 WRITTEN_MISFIT = 'the error of the model when it was identified'
 #: Note on a model without covariance of its identification.
 _AS_EXACT = (
-    'values of the model are taken as exact, for want of its identification.json: intervals do '
-    'not include their errors'
+    'the values of the model are taken as exact because its identification.json is missing: '
+    'intervals do not include their errors'
 )
-#: Recordings that separate a change from a misfit, if there is at most one a day.
+#: Advice on recordings that separate a change from a misfit, if there is at most one a day.
 _NO_BASELINE = (
     'Without a baseline, an error of the model in this motion is not excluded: give recordings '
     'from before (--baseline).'
@@ -163,7 +163,7 @@ class Explainer:
 
     def _magnitude(self, result: Result) -> tuple[float | None, tuple[str, ...]]:
         """
-        Return the magnitude of gravity of a celestial body unless data contradict, with a note.
+        Return the gravity of a celestial body unless the data contradict it, with a note.
 
         The odds of a magnitude are its posterior density over its prior density (Dickey 1971).
 
@@ -193,7 +193,7 @@ class Explainer:
         misfit = written.of(self.arm.robot, torque_rms(prepared.data))
         noise = _noise_within(misfit, prepared, misfit)
         evidence = Evidence(prepared.data, tuple(np.maximum(s, misfit) for s in noise), noise)
-        # a misfit contains noise, which no cause explains
+        # a misfit contains noise, which no cause can explain
         rest = misfit**2 - np.mean(np.square(noise), axis=0)
         part = np.maximum(rest, (_LEAST_PART * misfit) ** 2)
         amplitude = (np.sqrt(part),) * count_recordings(prepared.data)
@@ -304,10 +304,11 @@ def _noise_within(
     misfit: FloatArray, prepared: Prepared, contained: FloatArray
 ) -> tuple[FloatArray, ...]:
     """
-    Return the noise of each trajectory where the misfit contains some noise already, (n,).
+    Return the noise of each trajectory if the misfit already contains some noise, (n,).
 
-    An event in one of two periods increases their difference, and belongs to the gap. So the noise
-    is limited to the misfit plus the excess of row-to-row differences over those in the misfit.
+    An event in one of two periods increases their difference, but it belongs to the gap. The
+    noise is therefore limited to the misfit plus the excess of differences between rows over
+    those in the misfit.
 
     """
     more = [np.maximum(floor.rough**2 - contained**2, 0.0) for floor in prepared.floors]

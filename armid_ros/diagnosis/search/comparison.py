@@ -1,10 +1,10 @@
 # Copyright 2026 The armid_ros developers
 # SPDX-License-Identifier: Apache-2.0
 """
-The comparison of causes: the best cause is accepted, until no cause is significant.
+The comparison of causes: the best cause is accepted repeatedly, until no cause is significant.
 
 The spread of values between recordings decides whether a change is significant. The explained
-torque decides between causes. A difference of 2 % does not count, as laws are inexact.
+torque decides between causes. Differences below 2 % are ignored, as laws are inexact.
 
 """
 
@@ -39,8 +39,8 @@ _SHARED, _OWN = (0.1, 0.2, 0.4, 0.8, 1.6, 3.2, 6.4), (0.2, 0.4, 0.8)
 _NOISE = (0.15, 0.3, 0.5, 0.8, 1.1)
 #: Candidate amplitudes of d0 and d_k without a baseline, over the torque; log prior odds.
 _SHARES = ((0.0, 0.0), (0.02, -1.0), (0.06, -2.0), (0.15, -3.0))
-#: Candidate errors of the described body without a baseline, over the largest expected errors:
-#: exact, a tenth (masses off by 10 %, centres of mass by a centimetre), and all.
+#: Candidate errors of the described links without a baseline, as shares of the largest expected
+#: errors: none, a tenth (masses off by 10 %, centres of mass by 1 cm), and all.
 _BODIES = (0.0, 0.1, 1.0)
 #: Amplitudes of the noise without a baseline, over that of two equal periods; log prior odds.
 _FACTORS = ((1.0, 0.0), (1.3, -1.0), (2.0, -3.0), (4.0, -5.0))
@@ -132,7 +132,7 @@ class CauseComparison:
         return usual_spread(self._causes_of(self.nuisance)[::_SAMPLED], self.nuisance, under)
 
     def first(self) -> Result:
-        """Compare all causes without accepting any."""
+        """Compare all causes, but accept none."""
         look = self.look(self.nuisance)
         effects = tuple(self.catalogue.effects)
         return Result((), self.nuisance, look.under, look, effects)
@@ -180,7 +180,7 @@ class CauseComparison:
     def _exchanged(
         self, accepted: list[Accepted], nuisance: Nuisance
     ) -> tuple[list[Accepted], Nuisance]:
-        """Replace a cause that resembles several others, if they explain more without it."""
+        """Replace a cause that resembles several others if these explain more without it."""
         for k, one in enumerate(accepted if len(accepted) > 1 else ()):
             look = self.look(nuisance.without(k))
             others = [*accepted[:k], *accepted[k + 1 :]]
@@ -211,7 +211,7 @@ class CauseComparison:
             return None
         winner = min(able, key=lambda one: able[0].ahead(one, levels))
         others = [one for one in able if one is not winner]
-        # A cause with larger evidence and lower total odds counts as likely as the winner at most.
+        # A rival with larger evidence but lower total odds is at most as likely as the winner.
         behind = np.array([min(-winner.ahead(one, levels), 0.0) for one in others])
         total = np.logaddexp.reduce(np.append(behind, 0.0)) + np.logaddexp(0.0, -winner.odds)
         total -= np.log1p(-UNLISTED)
@@ -343,14 +343,14 @@ def settings_alone() -> tuple[Setting, ...]:
 
 
 def settings_of_misfit(body: float) -> tuple[Setting, ...]:
-    """Return the settings to compare where only the size of the misfit is known."""
+    """Return the settings to compare if only the size of the misfit is known."""
     return tuple(
         Setting(body, share, share, noise, LASTING) for share, noise in product(_OWN, (0.5, 1.1))
     )
 
 
 def _leading_settings(settings: Sequence[Marginal]) -> list[Marginal]:
-    """Return the best setting and the one of noise alone, for each size of errors of the body."""
+    """Return the best setting, and the one with noise only, for each size of link errors."""
     found = []
     for body in dict.fromkeys(one.setting.body for one in settings):
         own = [one for one in settings if one.setting.body == body]

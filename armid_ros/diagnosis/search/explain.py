@@ -1,6 +1,6 @@
 # Copyright 2026 The armid_ros developers
 # SPDX-License-Identifier: Apache-2.0
-"""From a comparison of causes to an explanation: the material causes, fitted in an arm."""
+"""From a comparison of causes to an explanation: the arm with the fitted material causes."""
 
 from __future__ import annotations
 
@@ -68,7 +68,7 @@ def explain(
         steps.append(trial)
     there = [trial for trial in _open(result, unknown, settings) if trial.odds > alarm]
     large = {t.effect.name for t in there if np.any(np.abs(t.values) >= t.least)}
-    for trial in there:  # in all joints, or its torque biases other values
+    for trial in there:  # fit it in all joints, or its torque biases other values
         if trial.effect.name in large:
             named.append(trial.named)
             values.append(trial.values)

@@ -84,12 +84,12 @@ class Explanation:
         return replace(self, fitted=fitted, steps=tuple(self.steps[k] for k in keep))
 
     def with_nothing_named(self) -> Explanation:
-        """Return the explanation with all of its causes as minor ones."""
+        """Return the explanation with all of its causes moved to the minor ones."""
         minor = *self.steps, *self.minor
         return replace(self, fitted=self.reference, steps=(), minor=minor)
 
     def forgetting(self) -> Explanation:
-        """Return the explanation without the data and caches of its computation."""
+        """Return the explanation without the data and caches from its computation."""
         return replace(
             self,
             given=plain_arm(self.given),
@@ -172,8 +172,8 @@ def as_bodies(explanation: Explanation) -> tuple[Explanation, tuple[str, ...]]:
         if np.all(bodily.chi2_per_row <= np.maximum(_ALIKE * explanation.chi2_per_row, 1.0)):
             return bodily, ()
     return explanation, (
-        'no physically consistent links explain the data as well: the inertias hold a part of the '
-        'cause, and the patched model may not be simulable',
+        'no physically consistent links explain the data as well: the fitted inertias contain a '
+        'part of the cause, and a simulation with the patched model may fail',
     )
 
 

@@ -9,8 +9,8 @@ For recording k, in weighted rows, in each joint
 
 with the body b (prior: the description), the discrepancy d0 that all recordings share and d_k of
 one motion (Kennedy and O'Hagan, Bayesian calibration of computer models, 2001), and the values g
-of a cause. All is Gaussian given the amplitudes of d0, d_k and e_k, so that each d_k is integrated
-out of the normal equations of its recording.
+of a cause. For given amplitudes of d0, d_k and e_k, all variables are Gaussian. Each d_k is
+therefore integrated out of the normal equations of its recording.
 
 """
 
@@ -37,7 +37,7 @@ _HELD = 1e-12
 #: Relative prior error of a described value of an effect, or of a torque in unvisited states.
 #: Errors of values in the laboratory reach 0.1, and friction of an arm changes by 0.2 in a day.
 _DESCRIBED = 0.25
-#: Fewest rows for a correlation, correlation that counts as zero, and largest lag [rows].
+#: Smallest number of rows for a correlation, negligible correlation, and largest lag [rows].
 _FEW, _UNCORRELATED, _LAGS = 60, 0.05, 20
 
 
@@ -241,8 +241,8 @@ class Nuisance:
         """
         Return the factor of the discrepancy in states that the first day did not visit, (n, f).
 
-        The misfit limits the discrepancy in visited states only. In others it may be a share of
-        the torque.
+        The misfit limits the discrepancy in visited states only. In other states, the
+        discrepancy may be a share of the torque.
 
         """
         before = self.rows.before
@@ -382,7 +382,7 @@ class Nuisance:
         return rest
 
     def unexplained(self, values: FloatArray, setting: Setting, k: int) -> FloatArray:
-        """Return the weighted residual of a recording, its fitted d_k subtracted, (n, M)."""
+        """Return the weighted residual of a recording minus its fitted d_k, (n, M)."""
         rest = self.rest(values, k)
         if not setting.own:
             return rest

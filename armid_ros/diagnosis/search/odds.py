@@ -3,9 +3,10 @@
 """
 The odds of one cause: the likelihood ratio of the data with and without it.
 
-A cause may have acted before the change (g0), and its values differ between recordings (u_k), as
-they follow the misfit. The spread of these differences is that of the cause, shrunk towards that
-of all causes in the baseline (Smyth, Linear models and empirical Bayes methods, 2004).
+A cause may have acted before the change (g0). Its values differ between recordings (u_k),
+because they depend on the misfit. The spread of u_k is estimated for the cause and shrunk
+towards the spread of all causes in the baseline (Smyth, Linear models and empirical Bayes methods,
+2004).
 
 """
 
@@ -29,11 +30,12 @@ from scipy import special
 EQUAL = np.zeros(1)
 OWN_SPREADS = np.array([0.0, 1.0, 3.0, 10.0, 30.0, 100.0])
 _USUAL_SPREADS = np.array([0.0, 0.5, 1.0, 2.0, 4.0, 8.0, 16.0, 32.0, 64.0, 128.0])
-#: Usual spread with fewer than two recordings in the baseline: the median of 72 arms.
+#: Usual spread if the baseline has fewer than two recordings: the median of 72 arms.
 POPULATION_SPREAD = 1.0
 #: Log odds of physically impossible values.
 IMPOSSIBLE = -1e6
-#: Relative rounding error of the squares of a column, added to the part beyond nuisance columns.
+#: Relative rounding error of the squares of a column, added to its part outside the nuisance
+#: columns.
 _ROUNDING = 1e-7
 
 
@@ -224,7 +226,7 @@ def odds(
                 0.5 * np.sum(along / wide, axis=1),
             )
     assert best is not None
-    # All values of a cause vary with one misfit, so only recordings are independent.
+    # All values of a cause depend on the same misfit, so only recordings are independent.
     weight = prior + (changed - prior) / p
     weight -= np.logaddexp.reduce(weight)
     factor = -float(np.logaddexp.reduce(weight + nothing - changed))
@@ -239,7 +241,7 @@ def odds(
 
 
 def _unseen(cause: Cause, nuisance: Nuisance) -> FloatArray:
-    """Return the largest values within a misfit of known size, over their unit, (p,)."""
+    """Return the largest values that a misfit of known size allows, in their unit, (p,)."""
     torque = cause.torque[list(cause.joints)] * cause.unit
     misfit = nuisance.rows.amplitude[-1][list(cause.joints), np.newaxis]
     return np.asarray(THERE * np.min(misfit / np.maximum(torque, 1e-300), axis=0))

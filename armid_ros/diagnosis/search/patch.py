@@ -17,7 +17,7 @@ from armid_ros.estimate import ParameterName
 from armid_ros.motion import FloatArray, Motion
 import numpy as np
 
-#: Largest relative change of a shape in one step: the search has refined it already.
+#: Largest relative change of a shape in one step; the search has already refined it.
 _SHAPE_STEP = 0.1
 #: Relative step of finite differences with respect to a shape.
 _STEP = 1e-3
@@ -145,7 +145,7 @@ def _shape_columns(model: ArmModel, position: int, motion: Motion) -> FloatArray
 
 
 def _torque_with(model: ArmModel, position: int, effect: Effect, motion: Motion) -> FloatArray:
-    """Return a torque with another shape of an effect, up to a part independent of the shape."""
+    """Return the torque for another shape of an effect, up to a part independent of the shape."""
     if effect.linear and not isinstance(effect, TorqueReading):
         return np.asarray(model.columns_of(effect, motion) @ model.values[position])
     effects = (*model.effects[:position], effect, *model.effects[position + 1 :])

@@ -5,7 +5,7 @@ Values of the named effects: the mean and the covariance of their posterior.
 
 The model is that of the comparison of causes (`Nuisance`), with body, friction, discrepancy and
 earlier values of the cause integrated out. Encoder offsets, delays, elasticities and shapes are
-linear to first order only: the columns are recomputed at each mean (Gauss-Newton), and values
+linear only to first order: the columns are recomputed at each mean (Gauss-Newton), and values
 stay within their physical bounds.
 
 """
@@ -37,13 +37,13 @@ _MOST_ROUNDS = 4
 _SHARES = (1.0, 0.5, 0.2)
 #: Relative change of the loss at which the fit has converged.
 _SETTLED = 1e-4
-#: Prior standard deviation of a shape over its value, small as the comparison has refined it.
+#: Relative prior standard deviation of a shape; it is small as the comparison refined the shape.
 _SHAPE = 0.3
 #: Size of a shape without a default, such as a rest position [rad or m].
 _NO_DEFAULT = 0.1
-#: Least prior standard deviation of an earlier value, over its unit.
+#: Smallest prior standard deviation of a value before the change, as a multiple of its unit.
 _LEAST = 1e-3
-#: Share by which data have to reduce the prior variance of a value that counts as determined.
+#: Share by which data have to reduce the prior variance of a determined value.
 _DETERMINED = 0.5
 
 
@@ -264,7 +264,7 @@ class JointFit:
 
     def _moved(self, linear: Nuisance, means: FloatArray) -> FloatArray:
         """
-        Return the change of the values if the cause acted on the first day as well.
+        Return the change of the values for a cause that also acted on the first day.
 
         The prior of a value on the first day has zero mean, and the present value as standard
         deviation.

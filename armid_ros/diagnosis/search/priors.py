@@ -1,6 +1,6 @@
 # Copyright 2026 The armid_ros developers
 # SPDX-License-Identifier: Apache-2.0
-"""Prior knowledge of causes: how often they happen, and how large they are."""
+"""Prior knowledge of causes: their frequencies and sizes."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ import numpy as np
 
 #: Log odds by frequency of an effect, which the user may set, relative to the default odds.
 HOW_OFTEN = {'often': 2.0, 'usual': 0.0, 'seldom': -3.0, 'never': -30.0}
-#: Log odds of a changed link between two days, which practically never happens.
+#: Log odds of a change of a link between two days, which is extremely rare.
 NEVER = -5.0
 #: Log odds of a load on an inner link, between two days.
 INNER = -2.0
@@ -20,7 +20,7 @@ ELSEWHERE = -1.5
 OUTSIDE = -4.0
 #: Log odds per position in the catalogue, whose order is from common to rare effects.
 RARER = -0.05
-#: Probability that a law outside of the catalogue acts and resembles the best cause: 6 of 70
+#: Probability that the true cause is not in the catalogue and resembles the best cause: 6 of 70
 #: names of development arms.
 UNLISTED = 0.09
 #: Log odds per fitted shape parameter.

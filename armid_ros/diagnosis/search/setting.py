@@ -10,7 +10,7 @@ from armid_ros.motion import FloatArray
 import numpy as np
 import numpy.typing as npt
 
-#: Correlated rows that count as one independent row, without a baseline.
+#: Number of correlated rows that equal one independent row, without a baseline.
 LASTING = 2.0
 
 

@@ -1,10 +1,10 @@
 # Copyright 2026 The armid_ros developers
 # SPDX-License-Identifier: Apache-2.0
 """
-Time spans in which a cause acts: a payload that is picked up and put down, a hose that pulls.
+Time spans in which a cause acts, such as a payload that is picked up and put down.
 
-Every cause is fitted with columns that are zero outside a span of each recording. The span with
-the largest evidence is found over pairs of change points, one recording after the other.
+Every cause is fitted with columns that are zero outside a span of each recording. In one
+recording after the other, the pair of change points with the largest evidence is searched.
 
 """
 
@@ -114,14 +114,15 @@ class _Timed:
             if b - a < count - 1:
                 tried += float(np.log(0.5 * count * (count - 1)))
         timed: Cause = replace(cause, products=tuple(products), own=tuple(own), aim=tuple(aim))
-        # Earlier values act throughout, so that all spans are compared with the same null model.
+        # Values before the change act all the time, so all spans are compared with the same null
+        # model.
         known = CauseInformation.of(timed, nuisance, self.ranked.under, by_day=True)
         fit = odds(timed, nuisance, known.of_day(today=True))
         return replace(self.ranked, cause=timed, fit=fit, data=fit.factor - tried)
 
     @cached_property
     def throughout(self) -> Ranked:
-        """The cause that acts throughout."""
+        """The cause that acts all the time."""
         return self.within(self._whole)
 
     @property

@@ -126,8 +126,8 @@ class Ranked:
         Return the log odds over another cause; positive if this one is likelier.
 
         As torque laws are inexact, differences below the share `inexact` of the explained part, or
-        below the share `same_fit` - 1 of the smaller residual, are ignored. Then the number of
-        values and the prior odds decide.
+        below the share `same_fit` - 1 of the smaller residual, are ignored. If the difference is
+        ignored, the number of values and the prior odds decide.
 
         """
         lead = self.fit.explained - other.fit.explained
@@ -239,5 +239,5 @@ class Survey:
 
     @property
     def hidden(self) -> set[str]:
-        """Names of effects that are not visible on any joint."""
+        """Names of effects that no joint's data would show."""
         return {name for name, _ in self.unseen} - {one.effect.said_as for one in self.ranking}

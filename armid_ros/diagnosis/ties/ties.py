@@ -3,9 +3,9 @@
 """
 Diagnosis of an arm tied to another moving machine: the ties first, then other causes.
 
-The places of possible ties are known. All are identified at once, as by ``armid exo``, which
-models the noise of angles. One by one, ties resemble each other and half of the catalogue, and
-least squares underestimate their stiffness. Other causes are searched in the remaining residual.
+The places of possible ties are known. All ties are identified together, with a model of the
+noise of angles, as by ``armid exo``. A single tie resembles other ties and half of the catalogue,
+and least squares underestimate its stiffness. Other causes are searched in the remaining residual.
 
 """
 
@@ -38,8 +38,8 @@ import numpy as np
 
 #: Smallest reduction of chi-squared for a significant slack: z > 5.
 _LEAST_GAIN = 25.0
-#: Reduction of chi-squared per fitted inertia above which the description is rejected. Its
-#: expected value is one, or two if filters correlate neighbouring rows.
+#: Reduction of chi-squared per fitted inertia above which the description is rejected. The
+#: expected reduction is one, or two if filters correlate neighbouring rows.
 _TOLD = 5.0
 
 
@@ -109,7 +109,7 @@ class _Ties:
     partner: Partner
 
     def significant(self) -> tuple[list[SelectedEffect], list[FloatArray]]:
-        """Return the significant ties with their values; as straps if they share a slack."""
+        """Return significant ties with their values; ties with a common slack become straps."""
         arm = self.explainer.arm
         tried: list[tuple[float, InteractionProblem, Interaction]] = []
         for slack in (0.0, *TiedSlack.shapes[0].grid):
@@ -143,7 +143,7 @@ class _Ties:
         """
         Replace the springs of an explanation by those of the unbiased regression.
 
-        The described body is kept if it explains the torques as well as a fitted one.
+        The described links are kept if they explain the torques as well as fitted links.
 
         """
         named = [own.effect for own in found.fitted.named]

@@ -24,7 +24,8 @@ from armid_ros.diagnosis.settings import DiagnosisSettings
 from armid_ros.motion import FloatArray
 import numpy as np
 
-#: Resamplings of the blocks: enough for ends of a 95 % interval accurate to a tenth of its width.
+#: Number of bootstrap samples of the blocks: the ends of a 95 % interval are then accurate to a
+#: tenth of its width.
 _RESAMPLINGS = 500
 
 
@@ -99,7 +100,7 @@ def predicted(
     """
     Return the gain of each cause on held-out data; causes are added in a given order.
 
-    A cause that makes the prediction of these data worse is listed as minor.
+    A cause that increases the prediction error of these data is minor.
 
     """
     fewer = [explanation.only(order[:count]) for count in range(1, len(order))]

@@ -28,11 +28,12 @@ SCHEMA = 'armid/diagnosis/1'
 #: Largest number of listed candidates.
 _MOST_CANDIDATES = 20
 #: Detectable size of a value, in its standard deviations. On a two-link arm, effects of one to
-#: four times this size were named, and none of half of it.
+#: four times this size were named, and effects of half this size were not.
 SHOWS = 5.0
-#: Least resolution of an identifiable value; of two inseparable values, both are at most 0.5.
+#: Smallest resolution of an identifiable value; two inseparable values have at most 0.5 each.
 _IDENTIFIABLE = 0.9
-#: Largest detectable size over the largest typical value; beyond, the torque is rounding error.
+#: Largest detectable size over the largest typical value; with a larger one, the torque is only
+#: rounding error.
 _ROUNDING = 1e-6
 
 
@@ -212,7 +213,8 @@ def smallest_size(trial: Trial, robot: Robot) -> tuple[int, float]:
     """
     Return the first identifiable parameter of a cause, and its smallest detectable size.
 
-    A detectable size is significant and material. It is inf if the parameter cannot be so large.
+    A detectable size is significant and material. It is inf if the parameter cannot reach that
+    size.
 
     """
     return next(_sizes(trial, robot), (trial.named.kept[0], float('inf')))

@@ -135,8 +135,8 @@ class Finding:
         best = '. Or record '.join(dict.fromkeys(shown or [Effect.traits.shown_by]))
         if one_body:
             return (
-                f'No motion separates {names}, as they move as one body. Weigh what the link '
-                f'carries, or record {best}.'
+                f'No motion separates {names}, as they move as one body. Weigh the load of the '
+                f'link, or record {best}.'
             )
         return f'To separate {names}, record {best}.'
 

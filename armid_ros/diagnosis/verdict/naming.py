@@ -22,7 +22,7 @@ from armid_ros.model.spring_ties import Tie
 from armid_ros.motion import FloatArray
 import numpy as np
 
-#: Slope above which a translated value depends on a fitted value that data do not determine.
+#: Slope above which a translated value depends on an undetermined fitted value.
 _ALONG = 1e-6
 #: Largest number of listed rivals of a cause: longer lists do not help.
 _RIVALS = 2
@@ -47,7 +47,7 @@ def findings(
     """
     Return the findings, one for each name of an effect, the largest share of the gap first.
 
-    Findings of the same cause get the common share of all their causes.
+    Findings of the same cause have the common share of all their causes.
 
     """
     said = _in_words(explanation, arm)
@@ -108,7 +108,7 @@ def _rows(parts: Sequence[_NamedEffect]) -> list[tuple[ParameterName, float, flo
 
 def small_print(explanation: Explanation) -> tuple[Finding, ...]:
     """
-    Return findings of significant causes that are not material, the likeliest first.
+    Return findings of significant but immaterial causes, the likeliest first.
 
     Causes with a significant value beyond its bound, which a comparison permits within noise, are
     left out.

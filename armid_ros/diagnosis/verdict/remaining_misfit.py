@@ -3,9 +3,9 @@
 """
 The posterior predictive check: residual with the named effects over its largest usual value.
 
-The usual value is larger in other motions, as a misfit varies. At rest and in a reversal, dry
-friction can have any torque up to its limit, so these rows are checked separately: a residual
-beyond friction comes from a stop, a brake, or a contact.
+The usual value is larger in other motions, as the misfit varies between motions. At rest and in a
+reversal, dry friction can have any torque up to its limit, so these rows are checked separately: a
+residual beyond friction comes from a stop, a brake, or a contact.
 
 """
 
@@ -26,10 +26,10 @@ from armid_ros.motion import FloatArray
 import numpy as np
 from scipy.ndimage import uniform_filter1d
 
-#: Relative increase of the squared residual of a joint that does not count as worse.
+#: Largest negligible relative increase of the squared residual of a joint.
 _SLIGHTLY = 0.05
-#: Largest residual at rest over dry friction in motion: breakaway friction is twice as large, and
-#: the friction of the model, whose direction is arbitrary at rest, adds one.
+#: Largest residual at rest, divided by dry friction in motion. Breakaway friction adds two, and
+#: the model's friction, whose direction is arbitrary at rest, adds one.
 _HELD = 3.0
 #: Texts on a blocked joint: for a table, within a sentence, and at its end.
 _WHERE = 'at rest or turning round, and more than friction: a stop, a brake or a contact'
@@ -68,7 +68,7 @@ class RemainingMisfit:
         Return the excess of the residual with the named causes, for each set of data.
 
         If the model is kept as given, body, friction and discrepancy fitted to both days are
-        subtracted: another motion visits other states, in which a model has another misfit.
+        subtracted: in other motions the arm visits other states, where the misfit differs.
 
         """
         problem, parts = explanation.problem, self._parts(explanation)
@@ -179,10 +179,10 @@ def standing(
     Return the squared ratio of the residual at rest and in reversals to friction, (n,).
 
     `surely` units of noise and misfit are added to friction, scaled by the predicted torque over
-    its rms: the error of a model grows with its torque, which is large in a reversal. The residual
-    is averaged over the response time of the position filter, whose response to a jerk cancels,
-    and at least over `REST_TIME`, as shorter peaks may be chance. The ratio is zero where friction
-    is not exceeded, or no dry friction is known.
+    its rms: the error of a model grows with its torque, which is large in a reversal. The
+    residual is averaged over the response time of the position filter, so that its response to a
+    jerk cancels. The time is at least `REST_TIME`, as shorter peaks may be random. The ratio is
+    zero if the residual is below friction, or if dry friction is unknown.
 
     """
     friction = arm.action().dry_friction

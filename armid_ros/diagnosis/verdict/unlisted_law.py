@@ -3,8 +3,8 @@
 """
 Laws that the catalogue lacks: a new torque of one joint over its velocity or position.
 
-The discrepancy of a model differs between motions by its usual size. A law that is new on the
-diagnosed day is a several times larger discrepancy, the same in all recordings of that day. The
+The discrepancy of a model differs between motions by its usual size. A new law on the diagnosed
+day is a discrepancy of several times that size, equal in all recordings of the day. The
 log odds of the larger size are compared with the alarm odds, while the named causes, the body and
 the usual discrepancy are fitted as well.
 
@@ -27,10 +27,11 @@ from armid_ros.effects.base import Arm
 from armid_ros.motion import FloatArray, Motion
 import numpy as np
 
-#: Size of the usual discrepancy, and sizes of a new law, over the misfit of the joint. Of 40 arms
+#: Sizes of the usual discrepancy and of a new law, as multiples of the joint's misfit. Of 40 arms
 #: with a right name or without a change, one has log odds above 3 (6.4, of a smaller torque).
 _USUAL, _NEW = 1.0, (3.0, 10.0)
-#: Knots over the range of positions, and of velocities on each side over the top speed.
+#: Knots of positions, as shares of their range, and of velocities in each direction, as shares of
+#: the top speed.
 _POSITIONS, _SPEEDS = 12, np.array([0.03, 0.1, 0.25, 0.5, 0.75, 1.0])
 
 

@@ -20,7 +20,7 @@ import numpy.typing as npt
 _BINS = 16
 #: Smallest share of the mean square residual that the bin means of a named quantity explain.
 _TELLING = 0.15
-#: Relative squared deviation of the means up to which they count as constant, or proportional.
+#: Largest relative squared deviation of means that are constant, or proportional.
 _CURVED = 0.15
 
 
@@ -219,7 +219,7 @@ def _in_words(axes: Sequence[Axis], unit: str, residual: FloatArray) -> str:
     best = axes[0]
     if best.share < _TELLING:
         rms = float(np.sqrt(np.mean(residual**2)))
-        return f'a torque of {rms:.2g} {unit} rms that follows no single quantity of the joint'
+        return f'a torque of {rms:.2g} {unit} rms that depends on no single quantity of the joint'
     name = 'load times direction of motion' if ' ' in best.name else best.name
     largest = int(np.argmax(np.abs(best.means)))
     most = f'{abs(best.means[largest]):.2g} {unit}'

@@ -20,7 +20,7 @@ import numpy as np
 Word = Literal[
     'consistent', 'named', 'ambiguous', 'partial', 'unknown', 'not_repeatable', 'bad_data'
 ]
-#: Largest number of joints that a sentence lists; more are only counted.
+#: Largest number of joints in the list of a sentence; further joints are only counted.
 _JOINTS_SAID = 3
 
 
@@ -135,13 +135,13 @@ def sentence(finding: Finding, of: str = 'the gap') -> str:
 
 
 def share_interval_in_words(finding: Finding) -> str:
-    """Return the 95 % interval of a share in brackets; empty if both ends have the same text."""
+    """Return the 95 % interval of a share in brackets; empty if both ends are written alike."""
     low, high = (percent(end) for end in finding.share_interval)
     return f' ({low} to {high})' if low != high else ''
 
 
 def share_in_words(finding: Finding) -> str:
-    """Return the share of the gap that a cause takes, with its 95 % interval."""
+    """Return the share of the gap that a cause explains, with its 95 % interval."""
     return f'{percent(finding.share)} of the gap{share_interval_in_words(finding)}'
 
 
@@ -208,8 +208,8 @@ def _values(finding: Finding) -> Iterator[str]:
     """
     Yield the formatted values of a cause; repeated parameter names are left out.
 
-    Values whose interval includes zero are left out, unless all do. So are values of the given
-    model that are smaller than the interval.
+    Values whose interval includes zero are left out, unless all do. Values of the given model
+    that are smaller than the interval are left out as well.
 
     """
     before = ''
@@ -241,8 +241,9 @@ def _with_degrees(value: float, std: float, unit: str) -> str:
 
 def _strange(joints: Sequence[str], findings: Sequence[Finding]) -> str:
     text = (
-        f'Equal periods differ in {", ".join(joints)} by more than noise, and not with time or '
-        'velocity. Something acts that does not repeat, such as contact or a person. '
+        f'Equal periods differ in {", ".join(joints)} by more than noise, and the difference '
+        'does not depend on time or velocity. Something acts that does not repeat, such as '
+        'contact or a person. '
     )
     if findings:
         names = ', '.join(name_in_words(finding.name) for finding in findings)
@@ -251,7 +252,7 @@ def _strange(joints: Sequence[str], findings: Sequence[Finding]) -> str:
 
 
 def _alternatives(finding: Finding) -> str:
-    """List a name and its rivals with probabilities, and with joints that are not the same."""
+    """List a name and its rivals with probabilities, and with joints if these differ."""
     every = (Rival(finding.name, finding.joints, finding.probability), *finding.rivals)
     elsewhere = len({frozenset(one.joints) for one in every}) > 1
     words = ' or '.join(
@@ -264,7 +265,7 @@ def _alternatives(finding: Finding) -> str:
 
 
 def as_sure(value: float, std: float) -> str:
-    """Format a value with the half-width of its 95 % interval, to two digits of the latter."""
+    """Format a value with the half-width of its 95 % interval, to two digits of the half-width."""
     wide = HALF_WIDTH * std
     if not 0.0 < wide < np.inf:
         return f'{value:.4g}'
