@@ -3,10 +3,10 @@
 """
 Tests for steps and trends in series of estimates, with control of false discoveries in a fleet.
 
-A change that all siblings share on a day is no change of an arm and is subtracted. Other scatter
-between bags is learned from all arms (`scatter`). A bag further from the median of its neighbours
-than noise is an outlier, not a change. It is moved to the edge of the noise (the identifier of
-Hampel 1974). In a lasting change, neighbours agree.
+A change on a day that all arms of a kind share is no change of one arm and is subtracted. Other
+scatter between bags is estimated from all arms (`scatter`). A bag that differs from the median
+of its neighbours by more than noise is an outlier, not a change. Its value is limited to the
+range of the noise (Hampel 1974). After a lasting change, neighbours agree.
 
 The largest step and the trend of every series of an arm are tested, with Bonferroni's factor for
 the number of tests. Over arms, the false discovery rate is controlled (Benjamini and Hochberg
@@ -136,11 +136,11 @@ def named(judged: Judged, alpha: float) -> tuple[HistoryChange, ...]:
 
 
 def largest_change(series: ParameterHistory, spread: Spread) -> HistoryChange:
-    """Return the largest step of a series, or its trend if that explains it as well."""
+    """Return the largest step of a series, or its trend if the trend explains it equally well."""
     cut, count = splits(series, spread), len(series.values)
     scores, trend = cut.scores / spread.steps, cut.trend / spread.trends
     at = int(np.argmax(scores))
-    # the position of a step was searched for, which costs log(count); a trend has no position
+    # the search for the position of a step costs log(count); a trend has no position
     if trend**2 + np.log(count) >= scores[at] ** 2:
         p = _p(trend, cut.freedom, count)
         std = cut.slope_std * spread.trends * MONTH

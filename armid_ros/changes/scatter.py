@@ -1,21 +1,22 @@
 # Copyright 2026 The armid_ros developers
 # SPDX-License-Identifier: Apache-2.0
 """
-Scatter of estimates of healthy arms between bags, learned from all arms of a kind.
+Scatter of estimates of healthy arms between bags, estimated from all arms of a kind.
 
-A value of a series is theta + c + e. The effect of the day, c, is shared by all siblings, for
-example by the temperature of a hall; it is estimated by a median polish (Tukey 1977). The part e
-has the variance s^2 + t^2: s is the deviation stated in the bag, t the scatter between bags beyond
-that. The scatter follows from the median of squared differences of neighbours, which a step or
-slow trend does not change.
-Three further properties are learned as well:
+A value of a series is theta + c + e. The effect of the day, c, is the same for all arms of a
+kind, for example by the temperature of a hall. It is estimated by median polish (Tukey 1977). The
+part e has the variance s^2 + t^2: s is the standard deviation of the bag's estimate, and t the
+additional scatter between bags. The scatter follows from the median of squared differences of
+neighbours, which a step or slow trend does not change.
+Three further properties are estimated:
 
-- Arms differ in their scatter. The variance of an arm is shrunk towards that of all arms as far
-  as these agree (Smyth 2004).
-- Scatter is correlated over days. Steps and trends of healthy arms then exceed what differences
-  of neighbours predict. Their factor is the median of their squares over that of chi squared
+- Arms differ in their scatter. The variance of an arm is shrunk towards that of all arms, the
+  more these agree (Smyth 2004).
+- Scatter is correlated over days. Steps and trends of healthy arms then exceed the prediction
+  from differences of neighbours. Their factor is the median of their squares, divided by that of
+  chi-squared
   (genomic control; Devlin and Roeder 1999), which only needs most arms to be healthy.
-- Few series determine these factors only roughly; they are then shrunk towards one.
+- Few series determine these factors only roughly; uncertain factors are shrunk towards one.
 
 """
 
@@ -35,7 +36,7 @@ from scipy import optimize, special
 FEWEST = 4
 #: Number of neighbouring bags for the median, itself included, and z-score of an outlier.
 _WINDOW, _ODD = 5, 3.0
-#: Smallest number of siblings with a bag on a day for an effect of that day.
+#: Smallest number of arms of a kind with a bag on a day for an effect of that day.
 _SIBLINGS = 8
 #: Prior degrees of freedom of the variances of arms if these do not differ.
 _ALIKE = 1e6
@@ -246,8 +247,8 @@ def _prior_freedom(
     Return the prior degrees of freedom of the variances of arms (empirical Bayes).
 
     The logarithms of variance ratios have the variance trigamma(d_a / 2) + trigamma(d_0 / 2). The
-    degrees d_a are those of one series, and the equation is solved for d_0. Arms differ only by
-    the scatter beyond one standard error.
+    degrees d_a are those of one series, and the equation is solved for d_0. Only scatter beyond
+    one standard error is a difference between arms.
 
     """
     tested = [one for one in group if len(one.values) >= FEWEST]
