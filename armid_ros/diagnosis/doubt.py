@@ -84,9 +84,7 @@ def _changed(
         return times, times / most
 
     times, beyond = compared(baseline)
-    if (
-        misfit.filters is not None and beyond.max() > 1.0
-    ):  # misfit with other filters
+    if misfit.filters is not None and beyond.max() > 1.0:  # misfit with other filters
         try:
             parts = trajectories(recordings, Conditioning(*misfit.filters), arm)
         except IdentificationError:  # too short for these filters, or sampled more slowly

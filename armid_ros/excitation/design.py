@@ -21,7 +21,7 @@ from armid_ros.motion import FloatArray
 from armid_ros.robots import CollisionModel
 import numpy as np
 
-#: Number of points of the period at which a run may enter the trajectory.
+#: Number of points of the period at which a run can enter the trajectory.
 _ENTRIES = 48
 
 
@@ -182,8 +182,8 @@ def placed(problem: DesignProblem, trajectory: FourierTrajectory) -> Excitation:
     """
     Return a run from rest to rest along a trajectory, within all limits.
 
-    The run enters the trajectory at the point where the run-in uses the smallest share of the
-    limits. The run-in is made longer until all limits are kept.
+    The run enters the trajectory at the point with the smallest use of limits in the run-in. The
+    run-in is extended until it keeps all limits.
 
     Raises
     ------

@@ -3,8 +3,8 @@
 """
 Feasible trajectories: check, random trajectories, and motion templates.
 
-Position, velocity, acceleration and torque are sampled densely. A bound on the increase of a curve
-between two samples is added. The clearance is proven on every interval.
+Position, velocity, acceleration and torque are sampled densely. A bound on the increase between
+two samples is added. The clearance is proven for every interval.
 
 """
 
@@ -28,7 +28,7 @@ _DENSITY = 200
 
 
 class Faults(tuple[Violation | Approach, ...]):
-    """Reasons not to run a trajectory: exceeded limits, and bodies too close to each other."""
+    """Reasons against a trajectory: exceeded limits, and bodies too close to each other."""
 
     __slots__ = ()
 
@@ -62,7 +62,7 @@ def trajectory_faults(
     violations = _violations(arm, limits, motion, periodic=True)
     if clearance is None:
         return Faults(violations)
-    # intervals at the beginning of the proof
+    # initial number of intervals of the proof
     times = np.linspace(0.0, trajectory.period, 20 * trajectory.harmonics + 1)
     _, acceleration, _ = trajectory.bounds()
     approach = clearance.first_fault(trajectory.motion, acceleration, times)
@@ -99,8 +99,8 @@ def _violations(
 
 def _outward(values: FloatArray, periodic: bool) -> FloatArray:
     """Enlarge samples about their mean by a bound on the error between two samples."""
-    # the bound is h^2 M / 8 for second derivatives below M, estimated from second differences;
-    # nothing is added where dry friction makes the second differences jump
+    # the bound is h^2 M / 8 for second derivatives below M, estimated from second differences.
+    # Nothing is added where dry friction makes the second differences jump
     if periodic:
         bend = np.roll(values, -1, axis=0) - 2.0 * values + np.roll(values, 1, axis=0)
     else:
@@ -266,7 +266,7 @@ def _shrunk(
         return bool(clearance.smallest(q, clearance.margin + 1e-6).min() > clearance.margin)
 
     for _ in range(shrinks):
-        # most trajectories that collide do so in a few samples
+        # most colliding trajectories collide already in a few samples
         coarse = trajectory.one_period(_SAMPLES * trajectory.harmonics).q
         if clear(trajectory.q0[np.newaxis]) and clear(coarse):
             if not trajectory_faults(arm, limits, trajectory, clearance):
@@ -275,7 +275,7 @@ def _shrunk(
     return None
 
 
-#: Clearance between links [m], as excitations keep it.
+#: Clearance between links that excitations keep [m].
 CLEARANCE = 0.01
 
 
@@ -342,7 +342,7 @@ class Template:
         raise TrajectoryError(f'{self.name}: {faults}')
 
 
-#: Motions of all joints, slow to fast, and as fast as the accelerations allow.
+#: Motions of all joints: slow, medium, fast, and with the largest accelerations.
 _WHOLE = (
     Template('slow motion of all joints', 0.1, 12.0, 3),
     Template('motion of all joints at medium speed', 0.4, 10.0, 5),

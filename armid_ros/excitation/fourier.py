@@ -139,14 +139,14 @@ class FourierTrajectory:
         return self.motion(np.arange(-MARGIN, n_samples + MARGIN) * step)
 
     def shifted(self, time: float) -> FourierTrajectory:
-        """Return the same orbit, begun later by a time [s]."""
+        """Return the same orbit with a later start, by a time [s]."""
         angle = self.angular_frequency * time * np.arange(1, self.harmonics + 1)
         cosine, sine = np.cos(angle), np.sin(angle)
         a = self.a * cosine + self.b * sine
         return replace(self, a=a, b=self.b * cosine - self.a * sine)
 
     def scaled(self, factor: npt.ArrayLike) -> FourierTrajectory:
-        """Return the trajectory with the amplitudes times a factor per joint, shape (n,)."""
+        """Return the trajectory with amplitudes multiplied by a factor per joint, shape (n,)."""
         factors = np.broadcast_to(np.asarray(factor, dtype=float), (self.n_joints,))[:, np.newaxis]
         return replace(self, a=self.a * factors, b=self.b * factors)
 

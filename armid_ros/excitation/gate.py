@@ -1,6 +1,6 @@
 # Copyright 2026 The armid_ros developers
 # SPDX-License-Identifier: Apache-2.0
-"""The check of every motion before it is sent to an arm, and the supervision of its end."""
+"""Checks of every motion before it is sent to an arm, and supervision of the end of a run."""
 
 from __future__ import annotations
 
@@ -17,8 +17,8 @@ from armid_ros.excitation.transfer import TransferPlanner
 from armid_ros.motion import FloatArray, Motion
 import numpy as np
 
-#: Factor on the duration of a stop that exceeds an acceleration limit, and the largest duration as
-#: a multiple of the desired one, or of that of a stop at the acceleration limit if it is longer.
+#: Factor by which a stop is extended while it exceeds an acceleration limit. Largest duration,
+#: as a multiple of the desired one, or of that of a stop at the acceleration limit if longer.
 _LONGER, _LONGEST = 1.25, 4.8
 
 
@@ -48,7 +48,7 @@ class MotionGate:
     @classmethod
     def of(cls, run: Run, planner: TransferPlanner) -> MotionGate:
         """
-        Check a run at all its samples, and return the gate for later motions.
+        Check a run at all of its samples; return the gate for later motions.
 
         Parameters
         ----------
@@ -78,7 +78,7 @@ class MotionGate:
             near = planner.clearance.first_fault(run.at, 1.5 * peak, times)
             if near is not None:
                 raise TrajectoryError(f'the run is not sent: {near}')
-        # a joint may need a tenth of its limit for its dry friction
+        # dry friction of a joint may need a tenth of its limit
         room = np.where(np.isfinite(robot.torque_limit), 0.1 * robot.torque_limit, 0.0)
         return cls(run, limits, planner.clearance, np.maximum(np.abs(torque).max(axis=0), room))
 
@@ -107,8 +107,8 @@ class MotionGate:
         """
         phase = float(np.clip(phase, 0.0, self.run.duration))
         path = self.run.at([phase])
-        # half a cosine takes pi / 2 times as long as a constant deceleration; the duration of a
-        # run within its limits is enough for a stop
+        # half a cosine takes pi / 2 times as long as constant deceleration; the duration of a
+        # run within its limits suffices for a stop
         needed = float((np.abs(path.dq[0]) / self.limits.acceleration).max()) * np.pi / 2.0
         longest = _LONGEST * max(duration, min(needed, self.run.duration))
         motion = slowed(self.run, phase, duration, self.run.rate)
@@ -162,7 +162,7 @@ class MotionGate:
 
     def overload(self, effort: FloatArray, factor: float) -> str:
         """
-        Return a message if a joint exceeds its predicted effort; otherwise an empty string.
+        Return a message if a joint exceeds its predicted effort; otherwise empty.
 
         Parameters
         ----------
@@ -187,21 +187,20 @@ class MotionGate:
         velocity = np.where(np.isfinite(self.limits.velocity), self.limits.velocity, SLOW_VELOCITY)
         stopping = speed / self.limits.acceleration
         slowest = stopping + np.sqrt(stopping**2 + step / self.limits.acceleration)
-        # time of a small step, in units of its time at the velocity limit, and of the root of the
-        # step over the acceleration limit: 1.875 and 2.4 for a quintic from rest to rest. A
-        # quintic that begins with a speed needs 3.94 times the speed over the acceleration limit:
-        # at most 6 are taken.
+        # duration of a small step, relative to its time at the velocity limit, and to sqrt(step
+        # / acceleration limit): 1.875 and 2.4 for a quintic from rest to rest. A quintic with an
+        # initial speed needs up to 3.94 times speed / acceleration limit; 6 is a safe value
         return 3.0 * float(max((step / velocity).max(), slowest.max()))
 
 
-#: Time for which an arm has to be measured at rest [s].
+#: Time for which the measured arm has to be at rest [s].
 _REST = 0.1
 
 
 @dataclass(frozen=True)
 class Ending:
     """
-    State of a run that ended, until the arm is measured at rest.
+    State of an ended run, until measurements show the arm at rest.
 
     Attributes
     ----------
@@ -280,7 +279,7 @@ class Ending:
 
         """
         if self.last is not None and self.blocked and monitor.unsteady(_REST) == '':
-            # the arm is stopped at its position if the step of the set point is allowed
+            # hold the arm at its measured position if this step of the set point is allowed
             ending, measured = replace(self, blocked=False), monitor.pose.q
             row = int(np.searchsorted(self.last.t, now - self.sent))
             row = min(row, len(self.last.t) - 1)

@@ -17,15 +17,15 @@ from armid_ros.robots import Robot
 import numpy as np
 import numpy.typing as npt
 
-#: URDF has no acceleration limit. By default, a joint may reach its top speed in this time [s],
-#: which is 8.7 rad/s^2 for the first joint of a Panda (its data sheet says 15).
+#: URDF has no acceleration limit. By default, a joint may reach its top speed in this time [s].
+#: For the first joint of a Panda this gives 8.7 rad/s^2; its data sheet has 15.
 TIME_TO_TOP_SPEED = 0.25
 
-#: Velocity limit of a joint without a velocity limit, or with the limit 0 [rad/s or m/s]: half a
-#: metre per second at the end of an arm of a metre.
+#: Velocity limit of a joint without a velocity limit, or with the limit 0 [rad/s or m/s]: 0.5
+#: m/s at the end of an arm of 1 m.
 SLOW_VELOCITY = 0.5
 
-#: Share of the velocity and acceleration limits that a run of each speed class may use.
+#: Largest share of the velocity and acceleration limits in a run of each speed class.
 SPEED_CLASSES = {'slow': 0.15, 'medium': 0.4, 'fast': 0.9}
 
 #: Relative tolerance of the comparison of positions and rates with limits.
@@ -252,7 +252,7 @@ def require_radians(robot: Robot) -> None:
         robot.joints, robot.lower, robot.upper, robot.prismatic, strict=True
     ):
         ends = [abs(end) for end in (lower, upper) if math.isfinite(end)]
-        # two turns; larger limits may be degrees
+        # two turns; larger limits are probably in degrees
         if not slides and max(ends, default=0.0) > 1.01 * 4.0 * math.pi:
             raise TrajectoryError(
                 f'{robot.name}: joint {joint} has position limits {lower:g} and {upper:g} rad, '

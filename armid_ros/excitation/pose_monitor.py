@@ -14,12 +14,11 @@ from armid_ros.robots import Robot
 import numpy as np
 import numpy.typing as npt
 
-#: Number of joint states that have to agree before a position outside the expected range is
-#: accepted.
+#: Number of joint states that have to agree before an unexpected position is accepted.
 AGREEING = 5
 #: Velocity below which a joint is at rest [rad/s or m/s].
 AT_REST = 0.02
-#: Time for which a rejected position is counted [s].
+#: Time window in which rejected positions are counted [s].
 _WINDOW = 0.5
 #: Largest valid position of a joint without position limits [rad or m].
 _FARTHEST = 1e4
@@ -153,7 +152,7 @@ class PoseMonitor:
         self.pose = self.pose.updated(q, state.stamp_ns, state.arrived)
 
     def contradiction(self, now: float, count: int = AGREEING) -> str:
-        """Return why many positions of the last 0.5 s were rejected; empty if few were."""
+        """Return why many positions of the last 0.5 s were rejected; empty if only few were."""
         recent = [fault for arrived, fault in self._rejections if now - arrived <= _WINDOW]
         return recent[-1] if len(recent) >= count else ''
 
@@ -224,7 +223,7 @@ class PoseMonitor:
         )
 
     def _unreachable(self, source: _Source, state: _State, last: _State) -> str:
-        """Return a message if a position is unreachable from the last, or a stamp is older."""
+        """Return a message if a position is unreachable from the last, or its stamp is older."""
         if state.stamp_ns and state.stamp_ns <= last.stamp_ns:
             back = (last.stamp_ns - state.stamp_ns) * 1e-9
             return (
@@ -234,8 +233,7 @@ class PoseMonitor:
         passed = state.arrived - last.arrived
         if state.stamp_ns and last.stamp_ns:
             between = (state.stamp_ns - last.stamp_ns) * 1e-9
-            # transport delay: the difference of stamps may exceed that of arrivals by this time
-            # [s]
+            # transport delay: stamps may differ by this time more than arrivals [s]
             passed = max(passed, min(between, passed + 0.1))
         step = np.abs(state.q - last.q)
         # encoder noise, added to the change of position that the velocity limit allows [rad or m]

@@ -22,8 +22,8 @@ import numpy.typing as npt
 #: Target parameter sets of a design.
 TARGETS = {
     'all': 'all base parameters of the rigid body, and those of the effects',
-    'gravity': 'masses and first moments as an arm moving slowly shows them, and the effects',
-    'effects': 'those of the effects alone, the rigid body being known',
+    'gravity': 'masses and first moments, as identified from slow motion, and the effects',
+    'effects': 'parameters of the effects only; the rigid body is known',
 }
 
 
@@ -139,7 +139,7 @@ class DesignSettings:
 
 def whole_period(duration: float, n_periods: int, run_in: float, rate: float) -> float:
     """
-    Return the period of a run of given duration, a whole number of samples long [s].
+    Return the period of a run with a given duration, as a whole number of samples [s].
 
     Parameters
     ----------
@@ -253,13 +253,13 @@ class DesignProblem:
         return problem
 
     def _require_visible(self, matrix: FloatArray) -> None:
-        """Raise a TrajectoryError if random motions carry no information on the target."""
+        """Raise a TrajectoryError if random motions have no information on the target."""
         criterion = self.criterion
         if criterion.name != 'T':
             if not criterion.wanted.any():
                 raise TrajectoryError(
                     f'focus: no motion distinguishes {", ".join(self.settings.focus)} from the '
-                    "rigid body; take target 'effects', where the rigid body counts as known"
+                    "rigid body; take target 'effects', where the rigid body is taken as known"
                 )
         elif not np.isfinite(criterion.cost(matrix)):
             names = ', '.join(effect.name for effect in self.arm.effects) or 'nothing'
@@ -275,7 +275,7 @@ class DesignProblem:
 
     def recorded(self, trajectory: FourierTrajectory, n_periods: int) -> Information:
         """Return the information of a recording of some periods on the base parameters."""
-        # number of samples for the information, per sample of the search
+        # number of samples per sample of the search, for the information
         count, margin = 6 * self.settings.samples, MARGIN * trajectory.n_joints
         columns = self.columns(trajectory.with_margins(count))[margin:-margin]
         weight = self.settings.rate * trajectory.period * n_periods / count

@@ -18,7 +18,7 @@ from armid_ros.robots.reference import Reference
 import numpy as np
 import numpy.typing as npt
 
-#: Largest distance of the curve through the waypoints from the path that was checked [rad or m].
+#: Largest distance between the curve through the waypoints and the checked path [rad or m].
 _OFF_PATH = 0.001
 
 
@@ -90,7 +90,7 @@ class Run:
         states = np.empty((3, len(time), len(self.joints)))
         for k, (path, elapsed) in enumerate(parts):
             some = choice == k
-            if some.any():  # a moving arm at a single time is in one part of the run
+            if some.any():  # at a single time, the arm is in one part of the run
                 motion = path.at(elapsed[some])
                 states[:, some] = motion.q, motion.dq, motion.ddq
         return Motion(self.joints, time, *states)
@@ -104,13 +104,13 @@ class Run:
         """
         Raise a TrajectoryError if a controller leaves the path between the samples of `motion`.
 
-        A controller interpolates between its waypoints with quintic polynomials. Only the path
-        itself is checked for limits and collisions. A polynomial through samples of a sine exceeds
-        its velocity and acceleration by less than 0.2 %, so only positions are compared.
+        A controller interpolates between its waypoints with quintic polynomials. Limits and
+        collisions are checked only on the path itself. A polynomial through samples of a sine
+        exceeds its velocity and acceleration by less than 0.2 %, so only positions are compared.
 
         """
         motion = self.motion()
-        # the distance is largest in the middle, except that a harmonic of the rate is zero there
+        # the distance is largest in the middle, but zero there for a harmonic of the rate
         between = motion.t[:-1] + 0.4 / self.rate
         away = np.abs(Reference.of(motion).sample(between).q - self.at(between).q).max(axis=0)
         j = int(np.argmax(away))
@@ -170,7 +170,7 @@ def plan_run(
 def _unwound(
     excitation: Excitation, arm: ArmModel, limits: Limits, start: FloatArray
 ) -> Excitation:
-    """Return the excitation shifted by whole turns, as close to a start pose as limits allow."""
+    """Return the excitation shifted by whole turns to be as near a start pose as limits allow."""
     # A joint with a range of two turns reaches most poses at two positions. The path to one of the
     # two is often blocked, as the shoulder would hit the floor.
     trajectory = excitation.trajectory
@@ -187,7 +187,7 @@ def _unwound(
         return excitation
     moved = replace(trajectory, q0=trajectory.q0 + turn * turns)
     before, after = (arm.joint_torque(path.one_period(samples)) for path in (trajectory, moved))
-    # torques that change with whole turns, as with springs, are not equal up to rounding
+    # springs make torques that differ after whole turns by more than rounding
     if np.abs(after - before).max() > 1e-6 * np.abs(before).max():
         return excitation
     return replace(excitation, trajectory=moved)

@@ -212,7 +212,7 @@ class Fitness:
         return sentence
 
     def sentences(self) -> list[str]:
-        """Return a sentence on limits and unchecked items and one on distances, worse first."""
+        """Return sentences on limits and unchecked items, and on distances, the worse first."""
         limits = 'No limit violated'
         if self.unchecked:
             limits += f'; not checked: {"; ".join(self.unchecked)}'
@@ -221,7 +221,7 @@ class Fitness:
         return found[::-1] if self.word == UNFIT else found
 
     def distances(self) -> list[str]:
-        """Return phrases on the smallest clearance and on the lowest point, where known."""
+        """Return phrases on the smallest clearance and on the lowest point, if known."""
         parts = []
         if self.nearest is not None:
             parts.append(

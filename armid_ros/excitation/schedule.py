@@ -4,7 +4,7 @@
 A complete excitation run: run-in from rest, periodic trajectory, and run-out to rest.
 
 The arm accelerates and decelerates along the path of the trajectory. Run-in and run-out therefore
-visit only poses of the periods. The way from another pose is a `Transfer`.
+visit only poses of the periods. A `Transfer` leads there from other poses.
 
 A run is written as YAML, and read from it. A CSV file, for spreadsheets, has one row per joint and
 coefficient of the trajectory; comment lines contain the run.
@@ -27,7 +27,7 @@ import numpy as np
 import numpy.typing as npt
 import yaml
 
-#: Largest difference of period * rate from a whole number for identical periods.
+#: Largest difference between period * rate and a whole number, for identical periods.
 _WHOLE_SAMPLES = 1e-6
 #: The longest run [s]. Its samples are kept in memory, 1 GB for six joints at 50 Hz.
 MAX_DURATION = 86400.0
@@ -193,7 +193,7 @@ class Excitation:
 
 
 def _step(x: FloatArray) -> FloatArray:
-    """Rise from 0 to 1 with zero slope and curvature at both ends (quintic)."""
+    """Evaluate the quintic from 0 to 1 with zero slope and curvature at both ends."""
     return np.asarray(x**3 * (10.0 - 15.0 * x + 6.0 * x**2))
 
 
@@ -255,7 +255,7 @@ def read_excitation(text: str, source: str) -> Excitation:
         content: Any = load_yaml(text)
         if not isinstance(content, dict) or content.get('schema') != SCHEMA:
             raise TrajectoryError(f'not an excitation: it has to contain schema: {SCHEMA}')
-        if content.get('start') is not None:  # an ignored start pose would change the motion
+        if content.get('start') is not None:  # it changes the motion
             raise TrajectoryError(
                 'an excitation cannot contain a start pose; remove it, and give it with --start'
             )

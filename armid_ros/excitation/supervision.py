@@ -158,7 +158,7 @@ def jump_fault(
 
 def slowed(path: Path, phase: float, duration: float, rate: float) -> Motion:
     """
-    Return a stop along a path from a given time on the path.
+    Return a stop along a path that starts at a given time of the path.
 
     Parameters
     ----------
@@ -250,8 +250,8 @@ class Rehearsal:
             limit = robot.torque_limit[j]
             room = max(predicted[j], 0.05 * limit if np.isfinite(limit) else 0.0)
             # largest accepted ratio of a measured torque to the largest predicted torque. The
-            # ratio is large because a description has no friction, and friction dominates the
-            # torque of a slow arm.
+            # ratio is large because descriptions lack friction, which dominates the torque of a
+            # slow arm.
             if self.torque[j] > 3.0 * room > 0.0:
                 surprises.append(
                     f'the torque of {joint} was {self.torque[j]:.3g} {robot.torque_units[j]}, '

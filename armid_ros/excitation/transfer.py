@@ -21,7 +21,7 @@ import numpy.typing as npt
 
 @dataclass(frozen=True, eq=False)
 class Transfer(Reference):
-    """Straight lines in joint space from pose to pose, with a stop at each."""
+    """Straight lines in joint space from pose to pose, with a stop at each pose."""
 
     def __post_init__(self) -> None:
         """Set velocity and acceleration of every pose to zero."""
@@ -106,7 +106,7 @@ class TransferPlanner:
             lambda q: not self._overload(q),
             np.random.default_rng(seed),
         )
-        # a path with the duration that the limits require
+        # the path with the duration that the limits require
         way = np.abs(np.diff(poses, axis=0))
         velocity = np.where(np.isfinite(limits.velocity), limits.velocity, SLOW_VELOCITY)
         # largest velocity and acceleration of a quintic from 0 to 1 in unit time
@@ -165,7 +165,8 @@ class TransferPlanner:
                 if not self.fault(q):
                     return self._simplified(q, zero)
         raise TrajectoryError(
-            f'the zero of {self.arm.robot.name} is not free, nor is a pose about it: {reason}; '
+            f'the zero of {self.arm.robot.name} is not free, and no pose around it is free: '
+            f'{reason}; '
             'give a pose to start from, --start'
         )
 

@@ -148,9 +148,7 @@ class Baseline:
         informative = np.concatenate([part.informative for part in data])
         rest = np.concatenate(residual)
         w = np.concatenate(columns)
-        informative[:, ~informative.any(axis=0)] = (
-            True  # all rows of a joint that never moved
-        )
+        informative[:, ~informative.any(axis=0)] = True  # all rows of a joint that never moved
         scale = np.sqrt(np.mean(rest**2, axis=0, where=informative))
         weight = informative / np.maximum(scale, 1e-12)
         rows = w * weight[:, :, np.newaxis]

@@ -51,7 +51,7 @@ class Isolability:
         return np.array([np.isfinite(one.size) for one in self.effects])
 
     def rivals(self, k: int) -> list[Detectable]:
-        """Return the visible effects that are indistinguishable from this one, most similar first."""
+        """Return the visible effects that resemble this one too much, most similar first."""
         order = np.argsort(self.apart[k])
         near = [j for j in order if j != k and self.seen[j] and self.apart[k, j] < DISTINCT]
         return [self.effects[j] for j in near]

@@ -1,7 +1,7 @@
 # Copyright 2026 The armid_ros developers
 # SPDX-License-Identifier: Apache-2.0
 """
-Clearance between bodies: distances, their derivatives, and a proof for a whole path.
+Clearance between bodies: distances, their derivatives, and a proof for whole paths.
 
 Bounding spheres exclude distant pairs; coal computes the distances of the other pairs.
 
@@ -214,7 +214,7 @@ class ClearanceModel:
         times: FloatArray,
     ) -> Approach | None:
         """
-        Prove that all pairs keep the margin on a path, or return an approach that violates it.
+        Prove that all pairs keep the margin on a path, or return an approach below the margin.
 
         On an interval, the distance of a pair is at least the mean of the distances at both ends,
         minus half the distance that the joints between the bodies can move them. An interval for
@@ -263,8 +263,8 @@ class ClearanceModel:
                 )
             ends = distance[slot]
             bound = 0.5 * (ends[: len(left)] + ends[len(left) :] - travel)
-            # shortest interval of the proof of clearance [s]; in this time a body moves by less
-            # than the extra clearance of a design
+            # shortest interval of the proof [s]; in it, a body moves by less than the additional
+            # clearance of a design
             open_ = (bound < self.margin) & (duration > 1e-4)
             middle = 0.5 * (left + right)[open_]
             left, right, pair = (

@@ -4,9 +4,9 @@
 Obstacles around the arm, also from files: boxes, spheres, cylinders, meshes and planes.
 
 A file is a list of obstacles or a planning scene of MoveIt, as printed by `ros2 topic echo --once
---full-length` (moveit_msgs/PlanningScene, PlanningSceneWorld or CollisionObject). A cone is
-replaced by its enclosing cylinder, and a mesh by its enclosing box in the frame of its object.
-Objects attached to the arm are not read.
+--full-length` (moveit_msgs/PlanningScene, PlanningSceneWorld or CollisionObject). A cone becomes
+its enclosing cylinder, and a mesh its enclosing box in the frame of its object. Objects attached
+to the arm are ignored.
 
 """
 
@@ -25,7 +25,7 @@ import coal
 import numpy as np
 import pinocchio as pin
 
-#: Kinds of obstacle, each with the names of the numbers in its size.
+#: Kinds of obstacles, each with the names of its dimensions.
 KINDS: Mapping[str, tuple[str, ...]] = {
     'box': ('x', 'y', 'z'),
     'sphere': ('radius',),
@@ -155,7 +155,7 @@ def with_obstacles(collision: CollisionModel, obstacles: Sequence[Obstacle]) -> 
         if unknown:
             raise TrajectoryError(
                 f"obstacle '{obstacle.name}' ignores link '{unknown[0]}', which has no body; "
-                f'those with one are {", ".join(dict.fromkeys(links))}'
+                f'links with a body are {", ".join(dict.fromkeys(links))}'
             )
         rotation = pin.rpy.rpyToMatrix(*obstacle.rpy)
         placement = pin.SE3(rotation, np.array(obstacle.position))
@@ -185,7 +185,7 @@ def body_name(collision: CollisionModel, number: int) -> str:
     return str(body.name) if frame == 0 else link
 
 
-#: Names of the world frame if a description has no frame of that name.
+#: Names of the world frame, for descriptions without a frame of that name.
 _WORLD = ('', 'world')
 #: Keys of a planning scene, of its world, and of a collision object.
 _SCENE = {'world', 'collision_objects', 'primitives'}
@@ -317,7 +317,7 @@ def _frame(name: str, robot: Robot | None) -> pin.SE3:
     moves = model.existFrame(name)
     why = 'moves with the arm' if moves else 'is not in the description'
     raise TrajectoryError(
-        f"a collision object is in the frame '{name}', which {why}; those that do not move are "
+        f"a collision object is in the frame '{name}', which {why}; fixed frames are "
         f'{", ".join(frame for frame in fixed if frame != "universe") or "world"}'
     )
 
@@ -328,9 +328,7 @@ def _pose(pose: Mapping[str, Any] | None) -> pin.SE3:
     place, turn = pose['position'], pose['orientation']
     quaternion = np.array([float(turn[axis]) for axis in 'xyzw'])
     if not np.linalg.norm(quaternion) > 0.0:
-        quaternion = np.array(
-            [0.0, 0.0, 0.0, 1.0]
-        )  # as in MoveIt for an orientation that is not set
+        quaternion = np.array([0.0, 0.0, 0.0, 1.0])  # as in MoveIt for a missing orientation
     quaternion /= np.linalg.norm(quaternion)
     position = np.array([float(place[axis]) for axis in 'xyz'])
     return pin.SE3(pin.Quaternion(quaternion).matrix(), position)

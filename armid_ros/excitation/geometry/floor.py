@@ -1,9 +1,9 @@
 # Copyright 2026 The armid_ros developers
 # SPDX-License-Identifier: Apache-2.0
 """
-Floor of an arm, which a URDF does not contain, and heights of the bodies above it.
+Floor of an arm, which a URDF does not contain, and heights of bodies above it.
 
-The height of the floor is given by the user or by a file beside the description. By default, the
+The user, or a file next to the description, gives the height of the floor. By default, the
 floor is the base plane of a standing arm. For an arm that hangs or reaches below its base, the
 height must be given.
 
@@ -246,8 +246,8 @@ def floor_obstacles(
     """
     Return the floor as an obstacle; empty without a floor.
 
-    The floor ignores links that have no clearance to it in any pose, such as a turret that turns
-    on the base.
+    Links that are below the clearance in every pose, such as a turret on the base, are not
+    checked against the floor.
 
     Parameters
     ----------
@@ -285,7 +285,7 @@ def floor_obstacles(
 
 
 def _why_not_standing(collision: CollisionModel, up: FloatArray) -> str:
-    """Return why the floor of an arm is not its base plane; empty if it is."""
+    """Return why the base plane of an arm is not its floor; empty if it is."""
     normal = np.array([0.0, 0.0, 1.0])
     if up[2] < np.cos(np.pi / 4.0):
         return 'gravity does not pull it onto its base plane'
@@ -305,9 +305,9 @@ def _why_not_standing(collision: CollisionModel, up: FloatArray) -> str:
     ]
     link, below, _ = min(heights, key=lambda entry: entry[1])
     above = max(high for _, _, high in heights)
-    # A standing arm at zero reaches above its base plane at least this many times as far as below
-    # it. The wrist of a stretched small industrial arm hangs a third of its shoulder's height
-    # below.
+    # With all joints at zero, a standing arm reaches at least this number of times as far above
+    # its base plane as below. The wrist of a stretched small industrial arm is a third of its
+    # shoulder's height below the base plane.
     if above > 0.0 and above >= -2.0 * below:
         return ''
     return (

@@ -1,9 +1,10 @@
 # Copyright 2026 The armid_ros developers
 # SPDX-License-Identifier: Apache-2.0
 """
-Collision-free paths in joint space: straight lines if possible.
+Collision-free paths in joint space.
 
-Otherwise, two trees of straight lines grow from both ends until they meet.
+A path is a straight line if possible. Otherwise, two trees of straight lines grow from the ends
+until they meet.
 Source: Kuffner and LaValle 2000, RRT-Connect.
 
 """
@@ -23,9 +24,9 @@ import numpy as np
 #: m].
 _STEP, _INTERVAL = 0.6, 0.1
 
-#: Callback that returns whether the static torque of poses, (N, n), is within the limits.
+#: Callback: is the static torque of poses, (N, n), within the limits?
 Held = Callable[[FloatArray], bool]
-#: Function that returns whether the straight line between two poses, shape (n,), is allowed.
+#: Callback: is the straight line between two poses, shape (n,), allowed?
 _Free = Callable[[FloatArray, FloatArray], bool]
 
 
@@ -75,7 +76,7 @@ def find_path(
     lower = np.maximum(limits[0], np.minimum(start, goal) - UNLIMITED_HALF_RANGE)
     upper = np.minimum(limits[1], np.maximum(start, goal) + UNLIMITED_HALF_RANGE)
     near, far = _Tree([start], free), _Tree([goal], free)
-    # number of poses drawn before a TrajectoryError is raised
+    # number of random poses before a TrajectoryError
     for number in range(800):
         reached = near.grow(rng.uniform(lower, upper))
         joined = None if reached is None else far.connect(near.poses[reached])
@@ -135,7 +136,7 @@ class _Tree:
         return len(self.poses) - 1
 
     def connect(self, target: FloatArray) -> int | None:
-        """Step towards a pose while possible; return the index of the pose if it is reached."""
+        """Step towards a pose while possible; return the index of its node if it is reached."""
         while (reached := self.grow(target)) is not None:
             if np.array_equal(self.poses[reached], target):
                 return reached

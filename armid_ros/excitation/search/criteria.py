@@ -3,10 +3,10 @@
 """
 Information of a motion on the parameters, and optimality criteria.
 
-With W the regressor of the base parameters, every row divided by the standard deviation of its
-joint's torque noise, the information matrix is W' W and its inverse the covariance of the weighted
-least-squares estimate. Every criterion is a cost to minimise, and has a gradient by the
-information matrix.
+W is the regressor of the base parameters, with every row divided by the standard deviation of
+its joint's torque noise. The information matrix is W' W. Its inverse is the covariance of the
+weighted least-squares estimate. Every criterion is a cost to minimise, with a gradient with
+respect to the information matrix.
 
 """
 
@@ -24,8 +24,8 @@ import numpy.typing as npt
 #: Optimality criteria, each with its meaning.
 CRITERIA = {
     'D': 'volume of the confidence ellipsoid, log det of the information',
-    'A': 'mean variance of the parameters, each scaled to the torque it makes',
-    'E': 'variance along the worst direction, parameters scaled to the torque they make',
+    'A': 'mean variance of the parameters, each scaled to its torque',
+    'E': 'variance along the worst direction, with parameters scaled to their torque',
     'condition': 'condition number of the weighted regressor',
     'T': 'torque that a rival model cannot explain',
 }
@@ -99,8 +99,8 @@ class Criterion:
     """
     Cost of an information matrix M, shape (r, r), to minimise.
 
-    Parameters that are not wanted are nuisance parameters, which are fitted too. The cost depends
-    on the Schur complement S = M_ww - M_wn M_nn^+ M_nw of their block.
+    All parameters outside the target are nuisance parameters, which are fitted too. The cost
+    depends on the Schur complement S = M_ww - M_wn M_nn^+ M_nw of their block.
 
     Attributes
     ----------
@@ -145,8 +145,8 @@ class Criterion:
 
         """
         # The largest and the smallest eigenvalue are not differentiable where two eigenvalues
-        # cross. A search uses a p-norm instead, which is larger by at most r^(1/p): 1.4 for 60
-        # parameters.
+        # cross. The search uses a p-norm instead, which is larger by a factor of at most r^(1/p):
+        # 1.4 for 60 parameters.
         return self._evaluated(matrix, 12.0)
 
     def _evaluated(self, matrix: FloatArray, norm: float) -> tuple[float, FloatArray]:
@@ -154,7 +154,7 @@ class Criterion:
         projection = np.eye(len(matrix))[wanted]  # S = P M P'
         if len(nuisance):
             block, reach = matrix[np.ix_(nuisance, nuisance)], matrix[np.ix_(nuisance, wanted)]
-            # least squares by the normal equations, also with linearly dependent columns
+            # least squares by the normal equations, which allows linearly dependent columns
             size = np.sqrt(np.maximum(np.diag(block), 0.0))
             unit = np.divide(1.0, size, out=np.zeros_like(size), where=size > 0.0)
             shares, axes = np.linalg.eigh(block * np.outer(unit, unit))

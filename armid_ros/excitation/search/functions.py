@@ -1,15 +1,15 @@
 # Copyright 2026 The armid_ros developers
 # SPDX-License-Identifier: Apache-2.0
 """
-Cost and limits of a trajectory as smooth functions of its Fourier coefficients, with gradients.
+Cost and limits of a trajectory as smooth functions of Fourier coefficients, with gradients.
 
 Columns that depend only on the state are differentiated by finite differences of the states of all
-samples at once. Columns that depend on the past of the motion are differentiated by differences of
-every coefficient.
+samples at once. Columns that depend on the past of the motion are differentiated by finite
+differences of every coefficient.
 
 Each limit of each joint is one constraint, c <= 0: the soft maximum (Kreisselmeier and Steinhauser
 1979) of its excess over all samples, relative to the limit. A soft maximum is never below the
-maximum, so that a trajectory that meets the constraints keeps the limits in every sample. It
+maximum, so a trajectory with c <= 0 keeps the limits in every sample. It
 exceeds the maximum by at most log(samples) / sharpness.
 
 """
@@ -54,7 +54,8 @@ class Objective:
         # the direction of motion is smoothed below 5 % of the velocity limit
         self.width = 0.05 * np.where(np.isfinite(velocity), velocity, 1.0)
         past = marked(problem.arm, lambda effect: not effect.instantaneous)
-        # indices of the standard parameters among the columns; columns of the past are last
+        # indices of the standard parameters among the columns; columns that depend on the past
+        # come last
         self._order = np.argsort(np.argsort(past, kind='stable'))
 
     def value(self, x: FloatArray) -> tuple[float, Callable[[], FloatArray]]:
@@ -113,7 +114,7 @@ class Objective:
         total = np.zeros((n, self.basis[0].shape[1]))
         state = np.array([motion.q, motion.dq, motion.ddq])
         for argument, basis in enumerate(self.basis):
-            # eight joints at once; limits the memory of their columns
+            # eight joints at once, to limit the memory of their columns
             for joints in np.array_split(np.arange(n), -(-n // 8)):
                 moved = np.tile(state, (1, len(joints), 1)).reshape(3, len(joints), count, n)
                 moved[argument, np.arange(len(joints)), :, joints] += _STEP
@@ -156,12 +157,12 @@ def _weighted(blocks: Sequence[FloatArray], weights: FloatArray) -> FloatArray:
 #: Change of the clearance that changes a constraint by one unit [m].
 _CLEARANCE_UNIT = 0.1
 
-#: Distance beyond the margin, in these units, above which bodies are ignored. At a sharpness of
-#: 60, their weight in the soft maximum is exp(-36).
+#: Distance beyond the margin, in units of the constant above, from which bodies are ignored. At a
+#: sharpness of 60, their weight in the soft maximum is exp(-36).
 _CLEARANCE_REACH = 0.6
 
-#: Number of stretches of the period, each with one clearance constraint, so that a solver step can
-#: avoid several close approaches at once.
+#: Number of parts of the period, each with one clearance constraint. A solver step can then
+#: avoid several close approaches together.
 _STRETCHES = 20
 
 

@@ -3,8 +3,8 @@
 """
 The search: local optimisation of the best random trajectories within all limits.
 
-Several searches start. After every second round, the worse half is stopped, so that most of the
-computing time is spent on the best searches. The solver is SLSQP of SciPy, sequential quadratic
+Several searches start. After every second round, the worse half ends, so the best searches get
+most of the computing time. The solver is SLSQP of SciPy, sequential quadratic
 programming; docs/excitation.md compares it with others. The solver works on samples. After each
 round the result is checked between the samples. The times of faults are added to the samples of
 the next round.
@@ -33,7 +33,7 @@ import scipy.optimize
 #: Reasons for the early end of a search.
 INTERRUPTED, OUT_OF_TIME = 'interrupted', 'time budget'
 
-#: Sharpness of the soft maximum: coarse while the cost improves, then fine.
+#: Sharpness of the soft maximum: low while the cost improves, then high.
 _SHARPNESS = (60.0, 300.0)
 
 #: Iterations of a round.
@@ -152,11 +152,11 @@ class Search:
     def _improve(self, starts: list[FourierTrajectory]) -> None:
         """Optimise several trajectories in rounds; drop the worse half after every `_ROUNDS`."""
         objective, watched = Objective(self.problem, self.prior), self.clearance
-        if watched is not None:  # without pairs of bodies that are far apart in many poses
+        if watched is not None:  # ignore pairs of bodies that are far apart in many poses
             limits = self.problem.limits
             lower, upper = position_range(limits.lower, limits.upper)
             # The solver ignores pairs of bodies that stay 1 cm beyond the margin in 1000 random
-            # poses, and keeps 1 mm on top of it; the proof of clearance checks all pairs.
+            # poses, and adds 1 mm to it. The proof of clearance checks all pairs.
             poses = self.rng.uniform(lower, upper, (1000, len(lower)))
             watched = watched.watched(poses, watched.margin + 0.01)
             watched = replace(watched, margin=watched.margin + 0.001)
@@ -180,7 +180,7 @@ class _Branch:
     cost: float = np.inf
 
     def __post_init__(self) -> None:
-        """Set the bounds of the coefficients, in units of the value that reaches a limit alone."""
+        """Set the bounds of coefficients, in units of the value that alone reaches a limit."""
         limits, settings = self.search.problem.limits, self.search.problem.settings
         low, high = position_range(limits.lower, limits.upper)
         half = 0.5 * (high - low)[:, np.newaxis]
@@ -201,7 +201,7 @@ class _Branch:
             return
         problem, clearance = self.search.problem, self.search.clearance
         settings = problem.settings
-        # the solver keeps 0.2 % of every limit free
+        # the solver keeps a reserve of 0.2 % to every limit
         constraints = Constraints(
             problem,
             self.watched,
@@ -280,7 +280,7 @@ class _Branch:
 def _made_feasible(
     problem: DesignProblem, clearance: ClearanceModel | None, trajectory: FourierTrajectory
 ) -> FourierTrajectory | None:
-    """Reduce the amplitudes of the joints beyond their limits, or of all joints if unknown."""
+    """Reduce amplitudes of joints that exceed limits, or of all joints if these are unknown."""
     for _ in range(12):  # reductions of the amplitudes
         faults = trajectory_faults(problem.arm, problem.limits, trajectory, clearance)
         if not faults:
