@@ -81,7 +81,7 @@ class ArmWatch:
         return np.array([known.get(joint, math.nan) for joint in self._joints])
 
     def now(self) -> float:
-        """Return a time without clock steps, steady or simulated, for the age of messages [s]."""
+        """Return the time of the steady or simulated clock, for the age of messages [s]."""
         clock = self._node.get_clock()
         if not clock.ros_time_is_active:
             return float(self._steady.now().nanoseconds * 1e-9)
@@ -128,7 +128,7 @@ class ArmWatch:
         if fault is None:
             fault = (
                 f'fewer than {AGREEING} new joint states, or less than {_REST:g} s of them, were '
-                'received: it is not known whether the arm is at rest'
+                'received: whether the arm is at rest is unknown'
             )
         if fault:
             return f'{topic}: {fault}'

@@ -96,12 +96,10 @@ class BagPlayerNode(ArmidNode):
     """
     Publishes the messages of a bag, with unchanged serialisation.
 
-    A JointTrajectory is sent only if no joint of the arm that publishes joint_states would jump.
-    If the bag itself has joint_states, its trajectories are sent only if no other node publishes
-    joint_states.
+    A JointTrajectory is sent only if no joint of the arm on joint_states would jump.
 
-    With use_sim_time the node follows /clock: the time since the first /clock message is the bag
-    time that is played.
+    If the bag also has joint_states, its trajectories are sent only if no other node publishes
+    them. With use_sim_time, the time since the first /clock message is the played bag time.
 
     Attributes
     ----------
@@ -194,7 +192,7 @@ class BagPlayerNode(ArmidNode):
 
     @property
     def finished(self) -> bool:
-        """Return whether all messages were played."""
+        """Return whether all messages have been played."""
         return self._next is None
 
     @property

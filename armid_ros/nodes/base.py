@@ -78,7 +78,7 @@ class ArmidNode(Node):
         self.add_post_set_parameters_callback(self._apply)
         self._diagnostics = self.create_publisher(DiagnosticArray, '/diagnostics', 10)
         self.create_timer(1.0, self.publish_diagnostics)
-        # time without /clock or awaited messages after which it is logged
+        # time without /clock or expected messages until a log entry
         self.look_every(5.0, self.look_for_trouble)
 
     def parameters(self) -> Sequence[NodeParameter]:
@@ -140,7 +140,7 @@ class ArmidNode(Node):
         return ''
 
     def look_for_trouble(self) -> None:
-        """Log once that simulated time is missing, or the problem in /diagnostics."""
+        """Log once that simulated time is missing, or the problem that /diagnostics has."""
         missing = self.missing_clock
         if missing and not self._clock_missed:  # the topic of /diagnostics
             self.get_logger().warning(f'{missing}; until then the node waits')
@@ -221,7 +221,7 @@ class ArmidNode(Node):
         """
 
     def close(self) -> None:
-        """Save results and stop motions at the end of the node."""
+        """Save results and stop motions when the node ends."""
 
     def tell(self, text: str) -> str:
         """Log a text unless the context is shut down, and return the text."""
@@ -230,7 +230,7 @@ class ArmidNode(Node):
         return text
 
     def value(self, parameter: str) -> Any:
-        """Return the value of a parameter, without the empty names of a list."""
+        """Return the value of a parameter; empty names of a list are removed."""
         value = self.get_parameter(parameter).value
         is_list = isinstance(value, list) and all(isinstance(one, str) for one in value)
         return tuple(filter(None, value)) if is_list else value

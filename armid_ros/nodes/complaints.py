@@ -1,6 +1,6 @@
 # Copyright 2026 The armid_ros developers
 # SPDX-License-Identifier: Apache-2.0
-"""Log unusable input once, and count every occurrence."""
+"""Log each kind of unusable input once, and count every occurrence."""
 
 from __future__ import annotations
 

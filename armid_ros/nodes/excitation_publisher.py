@@ -1,6 +1,6 @@
 # Copyright 2026 The armid_ros developers
 # SPDX-License-Identifier: Apache-2.0
-"""Excitation publisher node: sends an excitation to an arm, and watches and stops the arm."""
+"""Excitation publisher node: sends an excitation to an arm, supervises and stops the arm."""
 
 from __future__ import annotations
 
@@ -33,8 +33,8 @@ from armid_ros.nodes.trajectory_controller import TrajectoryController, write_tr
 import numpy as np
 from std_msgs.msg import String
 
-#: Largest distance between the measured position for which a run was planned and that at which it
-#: is sent [rad or m]. A controller covers it until the first waypoint, within `HANDOVER`.
+#: Largest distance between the measured positions at planning and at sending of a run [rad or
+#: m]. A controller covers it before the first waypoint, within `HANDOVER`.
 _MOVED = 0.01
 
 
@@ -45,10 +45,10 @@ class ExcitationPublisherNode(ArmidNode):
     The run is sent as a goal of the action follow_joint_trajectory if a controller offers the
     action, else as a message. The arm must be at rest at the start. It moves slowly from its
     measured position to the excitation, and avoids known obstacles. The arm is stopped on its path
-    by the service ~/stop and at the end of the node. It is also stopped if it does not follow, an
-    effort is too large, joint states are missing or contradictory, or the controller disappears.
-    Every motion passes one `MotionGate`. No message is latched, so that a controller that starts
-    later does not move the arm.
+    by the service ~/stop and at the end of the node. It is also stopped if it does not follow,
+    if an effort is too large, if joint states are missing or contradictory, or if the controller
+    disappears. Every motion passes one `MotionGate`. No message is latched, so a controller that
+    starts later does not move the arm.
 
     """
 
@@ -109,7 +109,8 @@ class ExcitationPublisherNode(ArmidNode):
         self._simulated = bool(self.value('simulation') or self.value('use_sim_time'))
         if not self._simulated:
             return table
-        # Simulations are exempt: they send no joint states while they check a long trajectory.
+        # Simulations are excepted, as they send no joint states while they check a long
+        # trajectory.
         lively = {'speed': 'fast', 'start': True, 'state_timeout': 5.0, 'effort_factor': 0.0}
         return [replace(p, default=lively.get(p.name, p.default)) for p in table]
 
@@ -133,9 +134,9 @@ class ExcitationPublisherNode(ArmidNode):
     @property
     def elapsed(self) -> float | None:
         """
-        Return the time since the begin of the approach [s]; None without a run.
+        Return the time since the start of the approach [s]; None without a run.
 
-        A goal counts as running until the controller reports its end.
+        A goal is under way until the controller reports its end.
 
         """
         if self._gate is None:
@@ -145,7 +146,7 @@ class ExcitationPublisherNode(ArmidNode):
         return elapsed if on_the_way else None
 
     def look(self) -> None:
-        """Start when controller and joint states are available; stop the arm if either is lost."""
+        """Start when controller and joint states are available; stop the arm if one is lost."""
         self._controller.look()
         now, patience = self._arm.now(), self.value('state_timeout')
         if self.elapsed is not None:
@@ -169,7 +170,7 @@ class ExcitationPublisherNode(ArmidNode):
         return self._start(self.value('speed_scaling'))
 
     def rehearse(self) -> str:
-        """Run the excitation slowly; then the status reports tracking errors and torques."""
+        """Run the excitation slowly; afterwards the status reports tracking errors and torques."""
         speed = min(self.value('rehearsal_speed'), self.value('speed_scaling'))
         text = self._start(speed)
         assert self._gate is not None
@@ -202,12 +203,12 @@ class ExcitationPublisherNode(ArmidNode):
         fault = self._arm.monitor.contradiction(self._arm.now(), 1)
         fault = fault or tracking_fault(pose.joints, units, begin, pose.q, _MOVED)
         if fault:
-            raise TrajectoryError(f'{fault}, while its way was planned; the arm is not started')
+            raise TrajectoryError(f'{fault}, during planning; the arm is not started')
         now = self.get_clock().now()
         if not self.value('zero_stamp'):
             message.header.stamp = now.to_msg()
         receiver = self._controller.begin(message)
-        # the controller begins when its own clock reaches the stamp
+        # the controller starts when its own clock reaches the stamp
         late = self._arm.stamps.late if not (self.value('zero_stamp') or self._simulated) else 0.0
         self._begun_ns, self._begun = now.nanoseconds, self._arm.now() + late
         self._gate, self._ending, self._rehearsal = gate, None, None
@@ -372,7 +373,7 @@ class ExcitationPublisherNode(ArmidNode):
         self._controller.bring_to_rest(write_trajectory(motion))
 
     def _released(self) -> Ending | None:
-        """Return the ended run, without a motion to send if another client moves the arm."""
+        """Return the ended run; it has no motion to send if another client moves the arm."""
         ending = self._ending
         if ending is not None and self._controller.taken:
             self._ending = replace(ending, last=None) if ending.reason else None

@@ -50,9 +50,9 @@ class IdentificationRunNode(ArmidNode):
 
     The node calls `recorder` and `excitation_publisher` for each run. After all runs it starts
     `armid identify` and `armid diagnose` on the recordings. The last of several runs is held out.
-    An error is logged and ends the node with code 2; recordings and results until then are kept.
-    Inputs are checked before the arm moves. At its end, the node stops the run and the recording
-    that it began.
+    An error is logged and ends the node with code 2; recordings and results so far are kept.
+    Inputs are checked before the arm moves. When it ends, the node stops the run and the
+    recording that it started.
 
     """
 
@@ -137,7 +137,7 @@ class IdentificationRunNode(ArmidNode):
 
     @property
     def failure(self) -> str:
-        """Return the error of the failed step; empty if none."""
+        """Return the error of the failed step; empty if none failed."""
         return self._failure
 
     def look(self) -> None:
@@ -168,7 +168,7 @@ class IdentificationRunNode(ArmidNode):
         """Stop the run, the recording and the program that this node started."""
         self._stop_all()
         for future in self._stops:
-            if self.executor is not None:  # the node that is stopped may have ended already
+            if self.executor is not None:  # the node to stop may have ended already
                 self.executor.spin_until_future_complete(future, timeout_sec=1.0)
         if self._program is not None and self._program.poll() is None:
             self._program.terminate()

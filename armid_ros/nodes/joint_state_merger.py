@@ -155,7 +155,7 @@ class JointStateMergerNode(ArmidNode):
         self._gains = per_joint(self.value('gains'), joints, "parameter 'gains'")
         self.joints = tuple(joints)
         self._effort_names = others or self.joints
-        self._merger = JointMerger(2 * len(joints))  # positions, and after them torques
+        self._merger = JointMerger(2 * len(joints))  # first positions, then torques
 
     def _on_positions(self, with_effort: bool, message: JointState) -> None:
         stamp = self._stamp(message.header.stamp)
@@ -216,7 +216,7 @@ class JointStateMergerNode(ArmidNode):
         self._take(tuple(n + k for k in some), stamp, np.vstack([torques, torques]))
 
     def _take(self, some: tuple[int, ...], stamp: int, values: FloatArray) -> None:
-        """Add values of some joints, and publish the samples that are complete."""
+        """Add values of some joints, and publish the samples that are now complete."""
         n = len(self.joints)
         # a float has too few digits for seconds since 1970
         self._epoch_ns = self._epoch_ns or stamp

@@ -98,7 +98,7 @@ class ListeningNode(ArmidNode):
         return DiagnosticStatus.STALE if self.freshness.stopped else super().level(troubled)
 
     def stream_trouble(self) -> str:
-        """Return why joint states are missing or their results have wrong stamps, or empty."""
+        """Return why joint states are missing, or results have wrong stamps; otherwise empty."""
         fresh = self.complaints.latest if self.complaints.fresh else ''
         if self.awaited:
             return self.awaited
@@ -108,7 +108,7 @@ class ListeningNode(ArmidNode):
 
     def report(self, reason: str, text: str = '') -> None:
         """
-        Report faulty joint states, with their publishers if two publishers can cause the fault.
+        Report faulty joint states, with the publishers if two of them can cause the fault.
 
         Parameters
         ----------

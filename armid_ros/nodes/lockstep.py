@@ -43,7 +43,7 @@ AnyNode = TypeVar('AnyNode', bound=ArmidNode)
 
 #: Timeout of a message [s]; discovery takes up to 3 s.
 PATIENCE = 20.0
-#: First time of the clock [ns]; zero would mean no stamp.
+#: First time of the clock [ns]; zero would mean a missing stamp.
 EPOCH_NS = 1_000 * 10**9
 #: Time for which the arm rests before the run, as the publisher requires [s].
 _SEEN = 0.26

@@ -103,7 +103,7 @@ class OnlineIdentifierNode(ListeningNode):
         self._keep_pace()
 
     def _keep_pace(self) -> None:
-        # a changed period of a timer takes effect only after the old one
+        # a new period of a timer takes effect only after the old one has passed
         if self._timer is not None:
             self.destroy_timer(self._timer)
         self._timer = self.create_timer(1.0 / self.value('estimate_rate'), self.publish_estimate)
@@ -287,7 +287,7 @@ class OnlineIdentifierNode(ListeningNode):
             self._publish_effort(self._residuals, learned.residual)
         for change in identifier.changes[self._told :]:
             self._told += 1
-            self._progress.reset()  # a new estimate gets the same time before a warning
+            self._progress.reset()  # a new estimate has the same time until a warning
             self.get_logger().warning(str(change))
             self._publish(self._changes, change.size, change.t)
 

@@ -18,7 +18,7 @@ from rosbags.interfaces import Qos, QosDurability, QosReliability
 STREAM = QoSProfile(depth=10)
 #: Latest value, also for late subscribers: descriptions, models, estimates.
 LATCHED = QoSProfile(depth=1, durability=DurabilityPolicy.TRANSIENT_LOCAL)
-#: Messages a subscription holds while its node is busy: 1 s at 1 kHz.
+#: Number of messages that a subscription holds while its node is busy: 1 s at 1 kHz.
 DEPTH = 1000
 #: Joint states, without losses. While a subscriber is not scheduled, shared memory
 #: holds 512 messages, half a second at 1 kHz. Later messages are sent again from the history of
@@ -71,7 +71,7 @@ class MatchedSubscription:
     Subscription that starts when its topic has a publisher, with the QoS of the publishers.
 
     A reliable subscription does not match a best-effort publisher. A best-effort subscription
-    loses messages that a reliable publisher would send again. The policy therefore depends on the
+    loses messages that a reliable publisher would send again. The QoS therefore depends on the
     publishers.
 
     Attributes

@@ -254,7 +254,7 @@ class RecorderNode(ArmidNode):
         if writer is None:
             return
         now = self.get_clock().now().nanoseconds
-        if now == 0:  # before the first /clock
+        if now == 0:  # before the first message on /clock
             if len(self._held) < 1000:
                 self._held.append((topic, stamped, data))
             else:
@@ -271,7 +271,7 @@ class RecorderNode(ArmidNode):
 
     def _write(self, writer: BagWriter, topic: str, stamped: bool, data: bytes, now: int) -> None:
         sent = header_stamp(data) if stamped else 0
-        # /clock has coarse steps, but no message is received before it was sent
+        # /clock has coarse steps, but no message is received before it is sent
         if self._simulated:
             now = max(now, sent)
         try:

@@ -150,7 +150,8 @@ class SimulatedArmNode(ArmidNode):
             arm = make_arm(self.value, self._bare, drives, self.get_logger().warn)
         self._arm = arm
         self._dt_ns = round(self._arm.plant.dt * 1e9)
-        self._stride = self._steps_at(self.value('rate'))  # refused before publishers are made
+        # refuse invalid parameters before publishers are made
+        self._stride = self._steps_at(self.value('rate'))
         self._follows = bool(self.value('use_sim_time'))
         self._origin_ns = start_ns
         if start_ns is None and not self._follows:
@@ -254,7 +255,7 @@ class SimulatedArmNode(ArmidNode):
     def follow(self) -> None:
         """Simulate until the present time of /clock."""
         now = self.get_clock().now().nanoseconds
-        # a larger step of the clock means that it was set; the arm does not catch up
+        # after a larger step, the clock was set, and the arm does not catch up
         if self._origin_ns is None or not 0 <= now - self.stamp_ns <= 60 * 10**9:
             self._origin_ns = now - self._arm.state.steps * self._dt_ns
         while self.stamp_ns + self._stride * self._dt_ns <= now:

@@ -148,7 +148,7 @@ class TrajectoryController:
 
     @property
     def error(self) -> float:
-        """Return the largest joint error that the controller reported [rad or m]; or NaN."""
+        """Return the largest joint error that the controller reported [rad or m], or NaN."""
         return self._error if self.under_way else math.nan
 
     def look(self) -> None:
@@ -168,7 +168,7 @@ class TrajectoryController:
         """
         self.look()
         if self.client is not None and self._offered:
-            deadline = time.monotonic() + 1.0  # the discovery of an action takes no longer
+            deadline = time.monotonic() + 1.0  # the discovery of an action takes at most this long
             while not self._ready and time.monotonic() < deadline:
                 time.sleep(0.005)
         if self.missing:

@@ -28,7 +28,7 @@ from armid_ros.excitation.schedule import excitation_text
 from armid_ros.nodes.live.request import Answer, answer, DiagnosisRequest
 import numpy as np
 
-#: One thread of linear algebra: the matrices are small, and other processes need the cores.
+#: One linear algebra thread, as matrices are small and other processes need the cores.
 _ONE_THREAD = dict.fromkeys(('OMP_NUM_THREADS', 'OPENBLAS_NUM_THREADS'), '1')
 
 
@@ -59,7 +59,7 @@ class Plan:
 @dataclass(frozen=True)
 class Done:
     """
-    Result of a job other than a diagnosis.
+    Result of a job that is no diagnosis.
 
     Attributes
     ----------

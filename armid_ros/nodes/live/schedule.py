@@ -3,8 +3,8 @@
 """
 Schedule the diagnoses of a moving arm, and combine their results.
 
-An effect is proposed if several diagnoses in a row name it, since one window may contain the
-moment of a change.
+An effect is proposed if several diagnoses in a row name it, because a single window may contain
+the time of a change.
 
 """
 
@@ -127,7 +127,7 @@ class LiveDiagnosis:
             self._begin, self._changed = -np.inf, False
             self._outdate()
         if self.learning and self._holds(self.settings.learning):
-            # keep the motion so far, from which the misfit of the model is computed
+            # keep the motion so far, as the misfit of the model is computed from it
             began = self.window.end - self.settings.learning
             motion = self.window.recording(began, 'the motion in which nothing was wrong')
             self._healthy, self.learning = (self.accepted, motion), False

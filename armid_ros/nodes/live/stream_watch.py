@@ -7,7 +7,7 @@ from __future__ import annotations
 from armid_ros.motion import FloatArray
 import numpy as np
 
-#: A longer step back in time is a jump of the clock, not a sample out of order [s].
+#: A longer step back in time is a jump of the clock, and not a late sample [s].
 _OUT_OF_ORDER = 0.1
 #: Time without a change of positions after which the arm is at rest [s].
 _STILL = 2.0
@@ -67,7 +67,7 @@ class StreamWatch:
                 self._seen.add('frozen')
 
     def news(self) -> frozenset[str]:
-        """Return the faults since the last call: jump_back, out_of_order, frozen."""
+        """Return the names of faults since the last call: jump_back, out_of_order, frozen."""
         seen, self._seen = frozenset(self._seen), set()
         return seen
 

@@ -1,6 +1,6 @@
 # Copyright 2026 The armid_ros developers
 # SPDX-License-Identifier: Apache-2.0
-"""Keep the latest samples of an arm in a memory of constant size."""
+"""Buffer of constant size for the latest samples of an arm."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ from armid_ros.recording import Recording
 import numpy as np
 import numpy.typing as npt
 
-#: Largest lead of a sample that counts as due, as a share of the period.
+#: Largest share of the period by which a due sample may be early.
 _EARLY = 0.25
 #: Velocity of all joints below which the arm is at rest [rad/s or m/s].
 _REST_VELOCITY = 0.01

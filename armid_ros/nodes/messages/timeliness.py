@@ -79,8 +79,8 @@ class StampDifference:
 
     def of_results(self, topic: str) -> str:
         """Return a message if the stamps of results are far from the clock; empty otherwise."""
-        # tf2 keeps ten seconds, so that RViz cannot draw older results; the messages that wait in
-        # the queue of a busy node, at most 1000, are younger
+        # tf2 keeps ten seconds, so RViz cannot draw older results; up to 1000 messages in the
+        # queue of a busy node are younger
         if abs(self._late) <= 10.0:
             return ''
         return (

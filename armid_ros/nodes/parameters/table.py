@@ -84,7 +84,8 @@ class NodeParameter:
         """
         Return a value with the type of the parameter.
 
-        An integer is accepted for a float, a single value for a list of one, and [] for no names.
+        An integer is accepted for a float, a single value for a list, and [] for an empty list of
+        names.
 
         Raises
         ------
@@ -104,7 +105,10 @@ class NodeParameter:
             return typed
         instead = f'use a value such as {str(default).lower() if kind is bool else default}'
         if kind is str:
-            instead = f'use a text; quote what is no text twice: -p {self.name}:="\'{value}\'"'
+            instead = (
+                'use a text; put a number or a truth value into two pairs of quotes: '
+                f'-p {self.name}:="\'{value}\'"'
+            )
         raise ParameterError(f"parameter '{self.name}' cannot be {value}; {instead}")
 
     def objection(self, value: object) -> str:

@@ -116,8 +116,8 @@ def node(
     with NamedTemporaryFile('w', prefix='armid_', suffix='.yaml', delete=False) as defaults:
         yaml.safe_dump({'/**': {'ros__parameters': {'end_with_parent': True, **usual}}}, defaults)
     clock = {k: given[k] for k in ('use_sim_time',) if k in given}
-    # Of two matching patterns in parameter files, the later one takes precedence. With
-    # name and namespace, launch writes the values under the full name, which comes last.
+    # Of two matching patterns in parameter files, the later one takes precedence. With name and
+    # namespace given, launch writes the values under the full name as the last pattern.
     return Node(
         package='armid_ros',
         executable=executable,

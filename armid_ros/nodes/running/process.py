@@ -38,9 +38,9 @@ def steady() -> Iterator[None]:
     """
     Use one linear algebra thread, and exclude existing objects from garbage collection.
 
-    For matrices of a hundred rows, synchronising threads takes longer than the computation: with a
-    busy second core 0.2 ms become 20 ms. A garbage collection of the objects of imported libraries
-    would stop the process for 70 ms.
+    For matrices of a hundred rows, the synchronisation of threads takes longer than the
+    computation: 20 ms instead of 0.2 ms if the second core is busy. A garbage collection of the
+    objects of imported libraries would stop the process for 70 ms.
 
     """
     gc.collect()
@@ -118,14 +118,14 @@ def run(make_node: Callable[[], ArmidNode], args: Sequence[str] | None = None) -
     try:
         with ending.at_once():
             node = _made(make_node, args)
-        # not the multi-threaded one, which delays topics above 100 Hz
+        # not the multi-threaded executor, which delays topics above 100 Hz
         kinds = {'events': EventsExecutor, 'single': SingleThreadedExecutor}
         executor = kinds[node.value('executor')]()
         executor.add_node(node)
         ending.with_parent = node.value('end_with_parent')
         with steady():
             while rclpy.ok() and not (node.finished or ending.due):
-                executor.spin_once(timeout_sec=0.1)  # otherwise the events executor hangs
+                executor.spin_once(timeout_sec=0.1)  # without this, the events executor hangs
     except (_EndedAtOnce, ExternalShutdownException):
         pass
     except RCLError:  # the context was shut down between the check and the wait
@@ -171,7 +171,7 @@ def _leave(node: ArmidNode | None) -> list[str]:
             node.close()
         except ArmidError as error:
             trouble.append(str(error))
-    # Fast DDS waits for other processes that hold shared memory, without end if one was killed.
+    # Fast DDS waits for other processes with shared memory, and never ends if one was killed.
     # The watchdog, a thread in C, prints the stack of the process and ends it.
     faulthandler.dump_traceback_later(LEAVING, exit=True, file=sys.__stderr__)
     if node is not None:
