@@ -127,7 +127,7 @@ class Bag(Source):
         fits: Callable[[Topic], bool] | None = None,
     ) -> Topic:
         """
-        Return the topic of a type or with a matching type: the named topic, or the only one.
+        Return a topic by name or by type: the named topic, or the only one of a matching type.
 
         Raises
         ------
@@ -175,7 +175,7 @@ class Bag(Source):
             )
 
     def messages(self) -> Iterator[RawMessage]:
-        """Yield all messages in the order of their log times, with few chunks in memory."""
+        """Yield all messages in the order of log times; only few chunks are in memory."""
         streams = [source.messages() for source in self._sources]
         with reading(self.path, RecordingError):
             for message in heapq.merge(*streams, key=lambda message: message.log_time_ns):
@@ -183,7 +183,7 @@ class Bag(Source):
                 yield message if cdr is message.cdr else message._replace(cdr=cdr)
 
     def _content(self, message: bytes) -> bytes:
-        """Decompress a message that is compressed, by the metadata or its first bytes."""
+        """Decompress a message if the metadata or its first bytes show a compression."""
         if not (self._by_message or message[:4] == ZSTD):
             return message
         return b''.join(unpacked(io.BytesIO(message), self._settings, 'a compressed message'))
@@ -191,7 +191,7 @@ class Bag(Source):
     def _open(self, file: Path) -> Source:
         """Open a storage file."""
         storage = _STORAGES.get(_storage_suffix(file))
-        if storage is None:  # this import takes as long as reading a bag
+        if storage is None:  # late import, as it takes as long as reading a bag
             from armid_ros.recording.ros1_source import Ros1Source
 
             storage = Ros1Source
@@ -213,12 +213,12 @@ class Bag(Source):
 
 
 def is_ros1(path: Path) -> bool:
-    """Return whether the name of a path is that of a ROS 1 bag."""
+    """Return whether a path has the name of a ROS 1 bag."""
     return path.suffix.lower() == '.bag'
 
 
 def _storage_suffix(file: Path) -> str:
-    """Return the suffix of a file, without that of its compression."""
+    """Return the suffix of a file, without the suffix of its compression."""
     return Path(file.stem).suffix if file.suffix in _COMPRESSED else file.suffix
 
 
@@ -228,7 +228,7 @@ def is_bag_file(path: Path) -> bool:
 
 
 def _files_of(path: Path) -> BagMetadata:
-    """Return the metadata of a bag; without metadata.yaml, only its files."""
+    """Return the metadata of a bag; only the list of files if metadata.yaml is missing."""
     if not os.path.lexists(path):
         raise RecordingError(f'{path}: there is no such bag')
     if not path.is_dir():
@@ -255,7 +255,7 @@ def _files_of(path: Path) -> BagMetadata:
         raise RecordingError(f'{path}: a directory without {FILE_NAME}, .mcap or .db3{hint}')
     if len({_storage_suffix(file) for file in found}) > 1:
         raise RecordingError(
-            f'{path}: holds both .mcap and .db3 files and no {FILE_NAME} that names those of '
+            f'{path}: has both .mcap and .db3 files, but no {FILE_NAME} that names the files of '
             f'the bag; give one of {", ".join(sorted(file.name for file in found))}'
         )
     # numeric order: BAG_2.mcap comes before BAG_10.mcap

@@ -1,6 +1,6 @@
 # Copyright 2026 The armid_ros developers
 # SPDX-License-Identifier: Apache-2.0
-"""Settings for the columns of a table: names, units, and motor or joint side."""
+"""Settings for the columns of a table: names, units, and motor side or joint side."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ import numpy as np
 Rules = Sequence[tuple[str, str]]
 #: Seconds in a unit of time.
 TIME_UNITS = {'s': 1.0, 'ms': 1e-3, 'us': 1e-6, 'ns': 1e-9}
-#: Settings for tables only, and settings for the meaning of numbers, for tables and bags.
+#: Settings for tables only, and settings of units and signs, for tables and bags.
 _WHERE = ('time', 'time_unit', 'rate_hz', 'position', 'velocity', 'effort', 'episode')
 _WHAT = ('degrees', 'position_scale', 'effort_scale', 'zero', 'gear')
 #: Command-line options whose name differs from that of the setting.
@@ -29,7 +29,7 @@ _OPTIONS = {'rate_hz': '--rate', 'effort_scale': '--effort-scale or --current-ga
 @dataclass(frozen=True)
 class ColumnSettings:
     """
-    Columns and units of the quantities; None for guessed ones.
+    Columns and units of the quantities; None if they are guessed.
 
     Attributes
     ----------
@@ -86,7 +86,7 @@ class ColumnSettings:
 
 
 def renamed(name: str, rules: Rules) -> str:
-    """Rename a joint by the first rule that matches the name, or else its beginning."""
+    """Rename a joint by the first rule that matches its name, or otherwise its beginning."""
     for old, new in sorted(rules, key=lambda rule: rule[0] != name):
         if name.startswith(old):
             return new + name[len(old) :]
@@ -158,7 +158,7 @@ def refuse_columns(path: str | Path, settings: ColumnSettings, *, copied: bool =
         'convert',
     )
     if copied:
-        reason = 'changes no bag that is copied; give it to the command that reads the bag'
+        reason = 'has no effect on a copied bag; give it to the command that reads the bag'
         reasons |= dict.fromkeys(_WHAT, reason)
     for name, reason in reasons.items():
         if getattr(settings, name) != getattr(ColumnSettings, name):  # unchanged default

@@ -3,8 +3,8 @@
 """
 Decompress data with a limit of the size.
 
-A few compressed bytes can expand to any size, so the stated size is the limit. Content of a
-different size is damaged; at most the stated size is decompressed.
+A few compressed bytes can expand to any size, so at most the stated size is decompressed.
+Content of a different size is damaged.
 
 """
 
@@ -90,7 +90,7 @@ def partly_decompressed(stored: _Buffer, compression: str, size: int) -> bytes:
     content, step = bytearray(), 1024  # bytes
     with suppress(*CORRUPT, EOFError):
         for at in range(0, len(stored), step):
-            # Each block that a compressor writes can be decompressed on its own.
+            # Each block of a compressor can be decompressed alone.
             content += decompressor.decompress(bytes(stored[at : at + step]))
             if len(content) >= size:
                 break
@@ -101,7 +101,7 @@ def unpacked(stream: BinaryIO, settings: ReadSettings, what: str) -> Iterator[by
     """
     Yield the content of a zstd file or message in pieces.
 
-    Not every writer states the size of the content in the frame, so that a limit is needed.
+    A limit is needed, as not every writer states the size of the content in the frame.
 
     Parameters
     ----------

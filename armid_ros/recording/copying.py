@@ -59,7 +59,7 @@ class Copied:
         return sum(topic.count for topic in self.topics)
 
     def describe(self) -> str:
-        """Format the report as a few sentences."""
+        """Return the report in a few sentences."""
         listed = ', '.join(f'{topic.name} ({topic.count})' for topic in self.topics)
         return (
             f'{self.source}: {self.damage or "the file is whole"}. {self.messages} messages over '

@@ -114,7 +114,7 @@ def _register(store: Typestore, name: str, definition: str | None) -> None:
         except (TypesysError, ValueError) as error:
             raise RecordingError(f'type {name}: no valid message definition: {error}') from error
         if name not in types:
-            raise RecordingError(f'type {name}: that is the definition of {", ".join(types)}')
+            raise RecordingError(f'type {name}: this is the definition of {", ".join(types)}')
     store.register(types)
     for _, fields in types.values():
         for _, description in fields:

@@ -27,7 +27,7 @@ FILE_NAME = 'metadata.yaml'
 #: Duration without a limit [s, ns].
 _INFINITE = QosTime(9223372036, 854775807)
 #: Reliable publisher that keeps no messages for late subscribers. History and depth are unknown,
-#: since the middleware does not report them to a recorder.
+#: because the middleware does not report them to a recorder.
 VOLATILE = Qos(
     QosHistory.UNKNOWN,
     0,

@@ -85,7 +85,7 @@ def assembled(
     decoder: JointStateDecoder,
     damage: str,
 ) -> Recording:
-    """Assemble a recording of joints that messages name, and free the memory of the messages."""
+    """Assemble the recording of joints in messages, and free the memory of the messages."""
     where = f'{path}: {topic}'
     if not decoder.messages:
         raise RecordingError(f'{where} has no messages')
@@ -294,6 +294,6 @@ def read_robot_description(path: str | Path, settings: ReadSettings = DEFAULT) -
     if len(set(texts.values())) > 1:
         raise RecordingError(
             f'{path}: holds the descriptions of several robots ({", ".join(texts)}); '
-            'save the description of this arm as a URDF file'
+            'save the description of the right arm as a URDF file'
         )
     return next(iter(texts.values()), None)

@@ -22,7 +22,7 @@ if TYPE_CHECKING:
 
 Clock = Literal['header', 'receive']
 
-#: A stretch without samples is a gap when it is longer than this many sampling periods.
+#: A time without samples is a gap if it is longer than this number of sampling periods.
 GAP_PERIODS = 5.0
 
 
@@ -152,7 +152,7 @@ class ReadReport:
 
     @property
     def clean(self) -> bool:
-        """Whether every message became a sample and nothing is missing."""
+        """Whether every message gave a sample and nothing is missing."""
         return self == ReadReport(messages=self.messages, samples=self.samples)
 
     @property
@@ -410,8 +410,8 @@ def given_twice(fitted: Sequence[Recording], held_out: Sequence[Recording] = ())
     """
     Return a message on recordings that are given twice; empty if there are none.
 
-    A recording that is fitted twice has twice the weight, and a fitted recording is not held out.
-    Two recordings are the same if positions and torques agree: two simulated runs may share their
+    A recording that is given twice has twice the weight, and a fitted recording cannot be held
+    out. Recordings are equal if positions and torques agree; two simulated runs may have equal
     positions.
 
     Parameters

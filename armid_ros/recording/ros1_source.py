@@ -35,7 +35,7 @@ class Ros1Source(Source):
     """Source for one .bag file; topics with types unknown to ROS 2 have no messages."""
 
     def __init__(self, path: Path, settings: ReadSettings = DEFAULT) -> None:
-        """Open a bag of ROS 1. One chunk at a time is in memory; chunks have no checksums."""
+        """Open a bag of ROS 1. Only one chunk is in memory at a time; chunks have no checksums."""
         super().__init__(path, settings)
         self._old = get_typestore(Stores.ROS1_NOETIC)
         self._new = get_typestore(Stores.ROS2_JAZZY)

@@ -25,12 +25,12 @@ import numpy as np
 import numpy.typing as npt
 from scipy.ndimage import median_filter
 
-# A backward step of the clock of more than this is a restart (a simulation reset, a bag played in
-# a loop), not a late message.
+# A larger backward step of the clock is a restart (a simulation reset, a bag played in a loop),
+# and no late message.
 RESTART_NS = 10**9
-# A torque with less variation is not a measurement but uninitialised memory [N m].
+# A torque with less variation is uninitialised memory and no measurement [N m].
 NOTHING = 1e-9
-#: Largest share of samples that may be not finite.
+#: Largest accepted share of samples that are not finite.
 MAX_NOT_FINITE = 0.2
 
 
@@ -65,7 +65,7 @@ def clock_problem(
         return ''
     repeated = steps == 0
     if position is not None and not zero and repeated.any():
-        # A message that was recorded twice repeats its values; the clock is not at fault.
+        # A message that was recorded twice has equal values; this is no fault of the clock.
         at = np.flatnonzero(repeated)
         repeated[at] = (position[at] != position[at + 1]).any(axis=1)
     if repeated.mean() > 0.5:
@@ -169,7 +169,7 @@ def _stacked(
 
 
 def _adjacent(arrays: Sequence[FloatArray]) -> FloatArray | None:
-    """Return the slice of one array that adjacent views form; None if they are not adjacent."""
+    """Return the slice of an array that consists of adjacent views; None if not adjacent."""
     whole = arrays[0].base
     if not isinstance(whole, np.ndarray) or whole.ndim != 2:
         return None
@@ -196,8 +196,8 @@ def longest_run(stamps: IntArray) -> slice | None:
     # The next message must also be earlier; otherwise a single message was late.
     down[:-1] &= stamps[2:] - stamps[:-2] < -RESTART_NS
     for back in np.flatnonzero((steps < 0) & ~down):
-        # Late messages fill a gap, so that their number matches the sampling rate. A clock that
-        # was set back gives twice as many messages.
+        # Late messages fill a gap, so that their number matches the sampling rate. After a clock
+        # is set back, there are twice as many messages.
         first, last = stamps[back + 1], stamps[back]
         before = int(np.count_nonzero(stamps[: back + 1] >= first))
         after = int(np.argmax(np.append(stamps[back + 1 :], last + 1) > last))
@@ -269,7 +269,7 @@ def _finite(
     bad, culprits = np.zeros(len(series), np.bool_), []
     most = 1e15  # uninitialised memory can hold any number
     for name, values in zip(QUANTITIES, quantities, strict=True):
-        # the extremes of an array are NaN if one of its values is
+        # extremes of an array are NaN if one of its values is NaN
         if values is None or (values.min(initial=0.0) > -most and values.max(initial=0.0) < most):
             continue
         wrong = ~(np.abs(values) < most)
@@ -290,7 +290,7 @@ def unwrapped(q: FloatArray) -> tuple[FloatArray, list[int]]:
     """
     Undo jumps by a whole turn.
 
-    A joint is wrapped if its positions stay within one turn and each step of more than half a turn
+    A joint is wrapped if its positions stay within one turn, and if each step above half a turn
     is about a whole turn. The tolerance depends on the other steps of the joint.
 
     Parameters

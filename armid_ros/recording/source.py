@@ -69,7 +69,7 @@ class ReadSettings:
         if size > self.memory_limit:
             raise RecordingError(
                 f'{what} takes {size_text(size)}, more than the memory_limit of '
-                f'{size_text(self.memory_limit)}; raise it if the file is to be trusted'
+                f'{size_text(self.memory_limit)}; raise the limit if you trust the file'
             )
 
 
@@ -160,7 +160,7 @@ class MessageBlock:
 
 
 class RawMessage(NamedTuple):
-    """One message as recorded; times in ns."""
+    """One recorded message; times in ns."""
 
     topic: str
     log_time_ns: int

@@ -43,8 +43,8 @@ class SqliteSource(Source):
     def __init__(self, path: Path, settings: ReadSettings = DEFAULT) -> None:
         """Open a file of rosbag2."""
         super().__init__(path, settings)
-        # After a crash, SQLite must replay the journal of the file, which 'immutable' ignores.
-        # Without a journal 'immutable' also works in a read-only folder.
+        # After a crash, SQLite has to replay the journal of the file, but 'immutable' ignores
+        # the journal. Without a journal, 'immutable' also works in a read-only folder.
         journal = any(is_file(path.with_name(path.name + end)) for end in _JOURNALS)
         mode = 'mode=ro' if journal else 'immutable=1'
         try:
@@ -164,7 +164,7 @@ class SqliteSource(Source):
             self._damage.add(f'{lost} rows of messages have no topic; they are left out')
 
     def _fetch(self, query: str, parameters: tuple[str, ...]) -> Iterator[list[tuple[Any, ...]]]:
-        """Yield rows in batches, up to the first damage of the database."""
+        """Yield rows in batches, until the first damage of the database."""
         rows: list[tuple[Any, ...]] = []
         size = 0
         try:

@@ -42,7 +42,7 @@ from rosbags.interfaces import Qos
 
 # For JointState at 3 kHz (1 MB/s) chunks are closed by age, not by size.
 DEFAULT_CHUNK_SIZE = 512 * 1024
-# Including the time of writing, a kill loses less than 0.3 s of messages.
+# Including the time of writing, a kill loses at most 0.3 s of messages.
 DEFAULT_CHUNK_AGE = 0.2
 
 
@@ -56,8 +56,8 @@ def whole_bag(
     """
     Write a complete bag; if the writing is interrupted, the bag is removed.
 
-    A recorder keeps an incomplete bag. An incomplete result could be mistaken for the whole
-    result.
+    An incomplete result could be mistaken for a complete one; a recorder, in contrast, keeps its
+    incomplete bag.
 
     Parameters
     ----------
@@ -324,7 +324,7 @@ class BagWriter:
         at_once = max(1, self._chunk_size // record.itemsize)
         for at in range(0, len(messages), at_once):
             some = messages[at : at + at_once]
-            # The sequence number, the field between them, is zero.
+            # The sequence number is between these fields and is zero.
             records = np.zeros(len(some), record)
             head = records['head']
             head['opcode'] = Opcode.MESSAGE
@@ -357,7 +357,7 @@ class BagWriter:
                 self.add_topic, topic.name, kept.name, qos=topic.qos, encoding=kept.encoding
             )
             text, digest = kept.definition, kept.type_hash
-            try:  # look up a definition or hash that the source lacks
+            try:  # find a definition or hash that the source lacks
                 add(definition=text or None, type_hash=digest or None)
             except RecordingError:
                 add(definition=text, type_hash=digest)
@@ -406,8 +406,8 @@ class BagWriter:
 
     def _open_records(self) -> list[bytes]:
         """Return the records of the next chunk."""
-        # flush() does not empty the list, since it may be interrupted after writing. Records carry
-        # the number of their chunk, and are dropped once that chunk is in the file.
+        # flush() does not empty the list, because it may be interrupted after writing. Records
+        # have the number of their chunk, and are removed when that chunk is in the file.
         if self._open[0] != self._mcap.committed.chunks:
             self._open = self._mcap.committed.chunks, []
         return self._open[1]
@@ -434,14 +434,12 @@ class BagWriter:
         if channel is None or self._closed:
             self._check_open()
             known = ', '.join(self._topics) or 'none'
-            raise RecordingError(
-                f"{self.path}: topic '{topic}' was not announced; there are {known}"
-            )
+            raise RecordingError(f"{self.path}: topic '{topic}' was not added; topics are {known}")
         return channel
 
 
 def _joined(records: list[bytes]) -> tuple[bytes, IntArray]:
-    """Join records, and return the begin of each message among them."""
+    """Join records, and return the start of each message among them."""
     lengths = np.array([len(record) for record in records], np.int64)
     is_message = np.array([record[0] == Opcode.MESSAGE for record in records], np.bool_)
     return b''.join(records), (np.cumsum(lengths) - lengths)[is_message]

@@ -49,7 +49,7 @@ def joint_state_blocks(bag: Bag, topic: Topic) -> Iterator[MessageBlock]:
                 message = store.deserialize_cdr(block.message(at), described.name)
                 state = getattr(message, inside)
                 messages.append(bytes(store.serialize_cdr(state, JOINT_STATE)))
-            except Exception:  # the decoder counts such messages as malformed
+            except Exception:  # the decoder will count such messages as malformed
                 messages.append(bytes(4))
         yield MessageBlock.joined(messages, block.log_time, block.publish_time)
 
@@ -70,7 +70,7 @@ def require_standard(bag: Bag, topic: Topic) -> None:
 
 
 def _inside(described: MessageType) -> str:
-    """Return the JointState field of a type; of several fields, the measured one; '' if none."""
+    """Return the JointState field of a type, the measured one of several; '' if there is none."""
     own = described.definition.split('\n===', 1)[0]
     found = _INSIDE.findall(own)
     return next((name for name in found if 'measured' in name), found[0] if found else '')

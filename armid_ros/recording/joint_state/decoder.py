@@ -136,7 +136,7 @@ class JointStateDecoder:
         while len(raw):
             plan = self._plan_for(raw[:1])
             if plan is None:
-                # Messages equal to an unreadable one are unreadable too.
+                # A message equal to an unreadable message is unreadable too.
                 other = raw != raw[0]
                 self.malformed += len(raw) - int(other.sum())
                 raw, numbers, receive = raw[other], numbers[other], receive[other]
@@ -179,7 +179,7 @@ class JointStateDecoder:
         """Return an array of shape (count, joints), adjacent to the previous one if possible."""
         free = self._free.get((name, joints))
         if free is None:
-            # counts in damaged files are unreliable: at most 1 GiB is reserved for a quantity
+            # counts in damaged files are unreliable, so at most 1 GiB is reserved for a quantity
             free = np.empty((min(self._expected, (1 << 30) // (8 * joints)), joints))
         if count > len(free):
             return np.empty((count, joints))
@@ -201,13 +201,13 @@ class JointStateDecoder:
             return None
         self._names.update(dict.fromkeys(layout.names))
         known.insert(0, plan)
-        del known[32:]  # layouts of one length that are kept
+        del known[32:]  # number of layouts of one length in the cache
         return plan
 
 
 @dataclass(frozen=True)
 class _Plan:
-    """Columns of requested joints, and of others by name, in messages of one layout."""
+    """Columns of requested joints, and of other joints by name, in messages of one layout."""
 
     layout: JointStateLayout
     dtype: np.dtype[np.void]

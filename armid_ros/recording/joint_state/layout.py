@@ -4,10 +4,10 @@
 Find the fields of a serialised sensor_msgs/JointState.
 
 CDR: four bytes of encapsulation, then fields aligned to their size counted from byte 4; a string
-is a 4-byte length with the terminating zero counted, a sequence a 4-byte count. Messages of one
-publisher have the same layout, so it is found once and thousands of messages are then read as one
-numpy record array. What a layout assumes of a message - lengths, counts, names - is compared for
-every message; bytes of padding are not, since writers leave rubbish in them.
+begins with a 4-byte length that includes the final zero, a sequence with a 4-byte count. Messages
+of one publisher have the same layout. The layout is found once, and thousands of messages are
+then read as one numpy record array. Lengths, counts and names are compared for every message.
+Padding bytes are not compared, because writers leave arbitrary values there.
 
 """
 
@@ -161,7 +161,7 @@ class JointStateLayout:
 
     @cached_property
     def fixed(self) -> tuple[npt.NDArray[np.void], npt.NDArray[np.void]]:
-        """Values that all messages of this layout share, and a mask of their bits, (1,)."""
+        """Values that are equal in all messages of this layout, and a mask of their bits, (1,)."""
         expected, mask = np.zeros((2, 1), self.record)
         numbers = {'encapsulation': int(self.order == '<'), 'frame_length': self.frame_length}
         numbers |= {f'n_{name}': n for name, n in zip(QUANTITIES, self.counts, strict=True)}
@@ -197,7 +197,7 @@ class JointStateLayout:
         fixed, mask = self.fixed
         expected, bits = fixed['names'][0], mask['names'][0]
         names = rows['names']
-        # Padding is usually equal in all rows, so a comparison with the first row is enough.
+        # Padding is usually equal in all rows, so a comparison with the first row suffices.
         reference = names[0]
         if np.array_equal(reference & bits, expected):
             equal = names == reference

@@ -1,6 +1,6 @@
 # Copyright 2026 The armid_ros developers
 # SPDX-License-Identifier: Apache-2.0
-"""Decompress chunks of an MCAP file, compare their checksums, and find messages in them."""
+"""Decompress chunks of an MCAP file, verify their checksums, and find their messages."""
 
 from __future__ import annotations
 
@@ -43,7 +43,7 @@ def read_chunks(
         A chunk takes more memory than the settings allow.
 
     """
-    # a writer adds checksums to all chunks or to none
+    # writers add checksums to all chunks or to none
     check = settings.check_crc and any(chunk.crc for chunk in found.chunks)
     settings = replace(settings, check_crc=check)
     chunks = list(chunks)
@@ -77,7 +77,7 @@ def _read_ahead(
     begun: deque[tuple[int, Future[tuple[Contents, list[str]]]]] = deque()
     # Decompression and checksums release the GIL.
     count = min(2, os.cpu_count() or 1)
-    most = 16 << 20  # limit of decompressed data ahead [bytes]; a larger group is read alone
+    most = 16 << 20  # largest size of data read ahead [bytes]; a larger group is read alone
     with ThreadPoolExecutor(count) as threads:
         for group in groups:
             size = sum(chunk.size for chunk in group)
@@ -91,7 +91,7 @@ def _read_ahead(
 def _read_group(
     found: FileMap, group: Sequence[Chunk], settings: ReadSettings
 ) -> tuple[Contents, list[str]]:
-    """Return the contents of chunks without damage, and the damage of the others."""
+    """Return the contents of undamaged chunks, and the damage of the others."""
     packed = any(chunk.compression for chunk in group)
     contents: list[bytes | memoryview] = []
     parts: list[tuple[Chunk, int, int]] = []
@@ -157,7 +157,7 @@ def message_block(data: bytes | mmap.mmap, offsets: IntArray) -> MessageBlock:
 
 
 def messages_in(found: FileMap, contents: Contents) -> tuple[IntArray, npt.NDArray[np.void]]:
-    """Return begin and heads of the messages of some chunks, by the index if it is correct."""
+    """Return starts and heads of the messages of some chunks, from the index if it is correct."""
     data, parts = contents
     ranges = np.array([(begin, end) for _, begin, end in parts], np.int64)
     if all(chunk.indexes and chunk.whole for chunk, _, _ in parts):

@@ -3,10 +3,10 @@
 """
 Find the records of an MCAP file without its index.
 
-An MCAP file is a sequence of records, each an opcode, a length and a content; messages are as a
-rule inside chunks, and after each chunk come the offsets of its messages. A walk from the start
-finds all records, even if the writer was killed before it wrote the summary. Statements of the
-file are checked if possible. Specification: https://mcap.dev/spec
+An MCAP file is a sequence of records, each with opcode, length and content. Messages are usually
+inside chunks, and the offsets of its messages follow each chunk. A walk from the start
+finds all records, even if the writer was killed before it wrote the summary. Checksums and
+counts of the file are checked if possible. Specification: https://mcap.dev/spec
 
 """
 
@@ -167,7 +167,7 @@ def map_file(data: bytes | mmap.mmap, path: Path, *, check: bool = True) -> File
     ):
         (crc,) = struct.unpack_from('<I', data, data_end + RECORD_HEADER)
         if crc and zlib.crc32(memoryview(data)[:data_end]) != crc:
-            found.damage.add('the checksum of the file is wrong: any of its messages may be')
+            found.damage.add('the checksum of the file is wrong: any of its messages may be wrong')
     return found
 
 
@@ -225,7 +225,7 @@ def add_definition(found: FileMap, opcode: int, content: bytes) -> None:
         found.damage.add(f'a record of the file is damaged: {error}')
         return
     if not same:
-        found.damage.add('the file describes one of its channels in two ways; the first is used')
+        found.damage.add('the file has two descriptions of one channel; the first is used')
 
 
 def _add_chunk(found: FileMap, begin: int, end: int, *, whole: bool = True) -> None:
@@ -260,7 +260,7 @@ def _add_index(found: FileMap, begin: int, end: int) -> None:
 def _add_loose(found: FileMap, begin: int, end: int) -> None:
     """Note a message outside chunks."""
     if end - begin < MESSAGE_HEADER:
-        found.damage.add(f'the message at byte {begin} is too short for one')
+        found.damage.add(f'the message at byte {begin} is too short for a message')
         return
     found.loose.append(begin - RECORD_HEADER)
 

@@ -3,8 +3,8 @@
 """
 Read messages of an MCAP file, with or without index, chunks and compression.
 
-Checksums, indexes and counts are compared with the messages. A damaged chunk is skipped
-completely, since its undamaged messages cannot be recognised.
+Checksums, indexes and counts are compared with the messages. A damaged chunk is skipped as a
+whole, because its undamaged messages cannot be recognised.
 
 """
 
@@ -91,7 +91,7 @@ class McapSource(Source):
         self._survey()
         found = self._found
         wanted = sorted(c.id for c in found.channels.values() if c.topic == topic)
-        # The message count reveals a damaged index; unfinished files have no count.
+        # The message count reveals a damaged index; incomplete files have no count.
         counted = found.finished and found.statistics
         chunks = [
             chunk
@@ -166,14 +166,14 @@ class McapSource(Source):
         return self._counts
 
     def _possible(self, offsets: IntArray, rows: _Rows, wanted: Sequence[int]) -> IntArray:
-        """Return the messages that are of some channels and have a valid time."""
+        """Return the messages of some channels with a valid time."""
         channels = rows['channel']
         chosen = np.isin(channels, wanted) if len(wanted) != 1 else channels == wanted[0]
         late = (rows['log_time'] < 0) | (rows['publish_time'] < 0)
         if late.any():
             self._found.damage.add(
-                f'{int((late & chosen).sum())} messages are left out, for their time is after the '
-                'year 2262'
+                f'{int((late & chosen).sum())} messages are left out, as their time is after '
+                'the year 2262'
             )
             chosen &= ~late
         return offsets if chosen.all() else offsets[chosen]

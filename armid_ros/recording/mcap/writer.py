@@ -3,7 +3,7 @@
 """
 Write MCAP files, one system call per chunk.
 
-Unlike the writer of the package mcap, this writer may be interrupted anywhere, as by
+Unlike the writer of the package mcap, this writer can be interrupted at any point, as by
 KeyboardInterrupt. Each step commits its result in one assignment at its end. The next step first
 truncates the file to the committed size. Thousands of messages can be written at once.
 Specification: https://mcap.dev/spec
@@ -283,8 +283,8 @@ class McapWriter:
             while len(rest):
                 rest = rest[self._stream.write(rest) :]
         except OSError as error:
-            # If the disk is full, partially written data are truncated, so that the file ends with
-            # a complete step.
+            # If the disk is full, partially written data are removed, so the file ends with a
+            # complete step.
             with suppress(OSError):
                 self._stream.truncate(position)
             raise RecordingError(f'{self._path}: cannot be written: {error.strerror}') from error

@@ -64,15 +64,15 @@ def read_matlab(path: Path) -> Table:
     arrays = dict(_flattened(content, ''))
     if not arrays:
         raise RecordingError(
-            f'{path}: there is no array in it; tables and timeseries are objects that only '
-            'MATLAB reads: save their columns as arrays'
+            f'{path}: it has no array; only MATLAB can read tables and timeseries: save their '
+            f'columns as arrays'
         )
     return table_of_arrays(str(path), arrays, 'MATLAB arrays')
 
 
 def read_hdf5(path: Path) -> Table:
     """Read an HDF5 file, such as a .mat file of version 7.3."""
-    h5py = imported('h5py', path, 'HDF5, which MAT files of version 7.3 are,')
+    h5py = imported('h5py', path, 'HDF5, the format of MAT files of version 7.3,')
     arrays: Arrays = {}
 
     def visit(name: str, item: Any) -> None:

@@ -42,7 +42,7 @@ TIMES = dict.fromkeys(('time', 't', 'timestamp', 'timestamps'), 3.0) | dict.from
 )
 #: Words for the time of measurement, preferred to the time of reception.
 TIMES |= {'stamp': 3.5}
-#: Words that qualify a quantity, and the weights that they add to its score.
+#: Words next to a quantity in a column name, and the weights that they add to its score.
 _QUALIFIERS = (
     ('meas measured act actual fb feedback observation', 1.0),
     ('filt filtered est estimated se disc mot motor', -0.3),  # processed
@@ -94,7 +94,7 @@ class QuantityColumns:
     factor: FloatArray = field(default_factory=lambda: np.ones(1))
 
     def joints(self, rename: Rules = ()) -> tuple[str, ...]:
-        """Return the joint names in the column names; otherwise joint_1 and so on."""
+        """Return the joint names in the column names, or joint_1, joint_2 and so on."""
         if all(label.isdigit() for label in self.labels):
             return tuple(f'joint_{k + 1}' for k in range(len(self.labels)))
         return tuple(renamed(label, rename) for label in self.labels)
@@ -174,7 +174,7 @@ def guess(
     table: Table, quantity: QuantityName, joints: Sequence[str] | None, rename: Rules = ()
 ) -> tuple[QuantityColumns | None, tuple[str, tuple[str, ...]]]:
     """
-    Return the most likely columns of a quantity, and the most similar columns that lack joints.
+    Return the likeliest columns of a quantity, and the most similar ones that lack joints.
 
     Parameters
     ----------
@@ -220,7 +220,7 @@ def guess(
 
 
 def guess_time(table: Table) -> TableColumn | None:
-    """Return the column that is named as a time and increases, or else decreases."""
+    """Return a column with the name of a time that increases, or otherwise decreases."""
     for way in (1.0, -1.0):
         scores = {}
         for column in table.columns:
@@ -242,7 +242,7 @@ def _family(
     joints: Sequence[str] | None,
     rename: Rules,
 ) -> QuantityColumns | None:
-    """Return columns in the order of the joints: by name, else by number; None if none fit."""
+    """Return columns in the order of the joints, by name or by number; None if none fit."""
     labels = list(members)
     numbered = all(label.isdigit() for label in labels)
     if numbered:
@@ -347,7 +347,7 @@ def _score(pattern: str, quantity: QuantityName) -> float:
 
 
 def words_of(name: str) -> list[str]:
-    """Return the words of a name in small letters: 'actualQ_{}' is actual, q."""
+    """Return the words of a name in small letters: 'actualQ_{}' gives actual and q."""
     apart = re.sub(r'(?<=[a-z])(?=[A-Z])', ' ', name)
     apart = re.sub(r'\d+', ' ', apart)
     return [word.lower() for word in re.split(r'[^A-Za-z0-9]+', apart) if word]

@@ -1,6 +1,6 @@
 # Copyright 2026 The armid_ros developers
 # SPDX-License-Identifier: Apache-2.0
-"""Find the reader of a table file."""
+"""Choose the reader for a table file."""
 
 from __future__ import annotations
 

@@ -197,7 +197,7 @@ def _source(
     settings: ColumnSettings,
     joints: Sequence[str] | None,
 ) -> QuantityColumns | tuple[str, tuple[str, ...]]:
-    """Return the given or guessed source of a quantity, or the joints that it lacks."""
+    """Return the given or guessed columns of a quantity, or the joints without a column."""
     asked = getattr(settings, quantity)
     if asked is not None and asked.lower() == 'none':
         return '', ()
@@ -259,7 +259,7 @@ def _far(
     if position.unit != 'rad' or settings.gear or settings.position_scale:
         return
     reach = np.fmax.reduce(np.abs(position.values()))
-    far = reach > 4.5 * np.pi  # the unit is probably not rad or m
+    far = reach > 4.5 * np.pi  # the unit is probably neither rad nor m
     turned, slid = far & ~slides, far & slides
     if turned.any() and not settings.degrees:
         yield f'positions reach {reach[turned].max():.4g}: --degrees, or motor angles (--gear)?'
@@ -302,7 +302,7 @@ def _time_unit(table: Table, column: TableColumn, said: str | None) -> str:
     if len(steps) and np.mean(steps < 0.0) > 0.5:  # sorting would reverse the motion
         raise RecordingError(
             f'{where} runs backwards, from {column.values[0]:.6g} to {column.values[-1]:.6g}. '
-            'Reverse the rows if the last was measured first, or leave the column out with '
+            'Reverse the rows if the last row was measured first, or leave the column out with '
             '--time none --rate HZ if they are in order'
         )
     if said or column.unit in TIME_UNITS:
@@ -346,7 +346,7 @@ def measured(plan: TablePlan) -> Recording:
                 )
     if np.mean(~stamped) > MAX_NOT_FINITE:
         raise RecordingError(
-            f'{table.source}: {np.sum(~stamped)} of {len(table)} rows have a time that is no '
+            f'{table.source}: {np.sum(~stamped)} of {len(table)} rows have a time that is not a '
             'number'
         )
     read = {source.quantity: source.values()[stamped] for source in plan.sources}
@@ -394,7 +394,7 @@ def _times(plan: TablePlan) -> tuple[FloatArray, int]:
         assert plan.rate_hz is not None
         return np.arange(len(plan.table)) / plan.rate_hz, 10**9
     scale = TIME_UNITS[plan.time_unit]
-    # no stamp is later: nanoseconds beyond the year 2255 do not fit into 64 bits
+    # latest stamp: nanoseconds after the year 2255 do not fit into 64 bits
     values = np.where(np.abs(plan.time.values * scale) < 9e9, plan.time.values, np.nan)
     stamped = np.flatnonzero(np.isfinite(values) & (values != 0.0))  # noqa: RUF069 - as it is written
     if len(stamped) and np.count_nonzero(values[: stamped[0]] == 0.0) > 1:  # noqa: RUF069 - as it is written

@@ -65,7 +65,7 @@ class TableColumn:
     filled: bool = field(init=False)
 
     def __post_init__(self) -> None:
-        """Freeze the values, and take a missing unit from the name."""
+        """Freeze the values, and read a missing unit from the name."""
         object.__setattr__(self, 'filled', bool(np.isfinite(self.values).any()))
         with np.errstate(invalid='ignore'):  # ignore warnings for signalling NaN
             values = np.where(np.abs(self.values) <= LARGEST, self.values, np.nan)
@@ -206,7 +206,7 @@ def table_of_arrays(
     source: str, arrays: Mapping[str, npt.NDArray[np.generic]], described: str
 ) -> Table:
     """
-    Make a table of named arrays; the most common axis length is that of samples.
+    Make a table of named arrays; the most common axis length is the number of samples.
 
     Parameters
     ----------

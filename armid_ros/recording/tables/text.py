@@ -77,7 +77,7 @@ def _lines(path: Path) -> list[str]:
         text = raw.decode('latin-1')
     if '\0' in text:
         raise RecordingError(
-            f'{path}: is no text, but binary; name the file with the ending of its kind '
+            f'{path}: is a binary file, not text; give it the ending of its format '
             '(.npz, .mat, .parquet, .mcap), or save it as CSV in UTF-8'
         )
     return text.rstrip().splitlines()
@@ -100,8 +100,8 @@ def _heading(path: Path, lines: list[str]) -> tuple[int, str, str]:
         elif bare:
             words.append(line)
     raise RecordingError(
-        f'{path}: no line of numbers in {len(lines)} lines; a table has one row a line, values '
-        'with commas, semicolons, tabs or blanks between them'
+        f'{path}: no line of numbers in {len(lines)} lines; a table has one row per line, with '
+        'commas, semicolons, tabs or blanks between values'
     )
 
 
@@ -124,7 +124,7 @@ def _as_many(header: str, row: str) -> bool:
 
 
 def _separator(lines: list[str]) -> str:
-    """Return the separator of values: the first kind that occurs in every line."""
+    """Return the separator of values: the first character that occurs in every line."""
     there = [line for line in lines if line.strip()]
     return next((s for s in _SEPARATORS if all(s in line for line in there)), ' ')
 
@@ -174,7 +174,7 @@ def _numbers(
             if not cells or line.lstrip().startswith(_COMMENTS):
                 continue
             if k == len(rows) - 1:
-                notes.append(f'{where} is cut off and left out')
+                notes.append(f'{where} is incomplete and left out')
                 values = values[:k]
                 break
             raise RecordingError(
