@@ -26,8 +26,8 @@ if TYPE_CHECKING:
 @click.option(
     '--gains',
     metavar='KP,KD',
-    help='Known gains of the position control [N m/rad, N m s/rad], of all joints; or KP of each '
-    'joint and then KD of each joint. Fitted by default.',
+    help='Known gains of the position control [N m/rad, N m s/rad]: one pair for all joints, or '
+    'KP of each joint and then KD of each joint. By default they are fitted.',
 )
 @click.option(
     '--commands',

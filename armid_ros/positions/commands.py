@@ -20,8 +20,8 @@ from armid_ros.recording.source import DEFAULT, listed, Topic
 from armid_ros.robots import Robot
 import numpy as np
 
-#: Ending of the types of messages of a joint_trajectory_controller: fields joint_names, and
-#: reference (desired before Jazzy), a JointTrajectoryPoint.
+#: Ending of the message types of a joint_trajectory_controller. Their fields are joint_names,
+#: and the JointTrajectoryPoint reference (desired before Jazzy).
 _STATE = 'JointTrajectoryControllerState'
 
 
@@ -125,7 +125,7 @@ def _controller_state(path: Path, robot: Robot, topic: Topic, settings: ReadSett
         raise RecordingError(f'{where} has no messages with positions')
     stamps, index = np.unique([row[0] for row in rows], return_index=True)
     sampled = 1e-9 * (stamps - stamps[0])
-    t = np.arange(0.0, sampled[-1], 1e-3)  # the controller interpolates faster than it reports
+    t = np.arange(0.0, sampled[-1], 1e-3)  # the controller interpolates, too
     q, dq = (
         np.column_stack(
             [np.interp(t, sampled, x) for x in np.array([rows[k][part] for k in index]).T]

@@ -5,8 +5,8 @@ Drives, friction, delay and tool from commanded and measured positions: output e
 
 The simulated loop of `LoopModel` is fitted to the measured positions by Gauss-Newton iterations
 with a trust region. The described links are taken as exact. Sensitivities are differences of
-simulations. Weak priors about the start keep parameters finite that the data do not determine.
-The standard error of such a parameter is infinite, and other values fit as well. Standard errors
+simulations. Weak priors around the start values keep undetermined parameters finite. The
+standard error of such a parameter is infinite, as other values fit equally well. Standard errors
 hold for residuals that are correlated within blocks of time.
 
 """
@@ -28,23 +28,23 @@ import numpy as np
 import numpy.typing as npt
 from scipy.optimize import least_squares, nnls
 
-#: Delays from which the best start is taken [s], and limits of the fitted delay [s]; it is
+#: Candidate start values of the delay [s], and limits of the fitted delay [s]. A delay is
 #: negative if the clocks of commands and positions differ.
 _DELAYS, _DELAY_RANGE = np.arange(0.0, 0.1, 0.002), (-0.05, 0.3)
-#: Standard deviation of the prior over the size of a parameter that alone explains the torque,
-#: and share of it above which the standard error of a parameter is infinite.
+#: Prior standard deviation of a parameter, relative to the size with which it alone explains the
+#: torque. Share of it from which a standard error is reported as infinite.
 _PRIOR, _SEEN = 3.0, 0.3
-#: Step of a difference over that size.
+#: Step of a finite difference, relative to the same size.
 _DIFFERENCE = 1e-3
 #: Sizes of the delay [s], of the centre of a tool and of its radius of gyration [m].
 _OF_DELAY, _OF_CENTER, _OF_RADIUS = 0.03, 0.1, 0.02
 #: Duration of the blocks within which residuals are correlated [s].
 _BLOCK = 0.5
-#: Smallest torque of a joint at the start over that of the strongest joint.
+#: Smallest initial torque of a joint, relative to that of the strongest joint.
 _LIGHTEST = 0.03
 #: Largest number of samples of a recording for the start values.
 _THINNED = 2000
-#: Rounds of the fit with newly estimated noise of the joints.
+#: Number of fits, each with a new estimate of the noise of the joints.
 _ROUNDS = 3
 
 #: A recording and its commands.
@@ -131,11 +131,11 @@ def start_values(
     model: LoopModel, runs: Sequence[Run], gains: FloatArray | None
 ) -> tuple[FloatArray, FloatArray]:
     """
-    Return values to start from, and the size of each that alone explains the torque, (P,) each.
+    Return start values, and sizes with which each value alone explains the torque, (P,) each.
 
     The torque balance of each joint is linear in gains, rotor inertia and friction. It is solved
-    with values that are not negative for several delays, and the delay with the smallest residual
-    is taken.
+    for nonnegative values and several delays. The result has the delay with the smallest
+    residual.
 
     """
     robot, n = model.robot, model.robot.n_joints
@@ -172,14 +172,14 @@ def start_values(
     speed, rate, effort, error = (
         np.sqrt(np.mean(x**2, axis=0)) + 1e-6 for x in (dq, ddq, effort, behind)
     )
-    if gains is None:  # the described load of a light last link determines no scale
+    if gains is None:  # the described load of a light last link gives no scale
         more = np.maximum(_LIGHTEST * effort.max() / effort, 1.0)
         values, effort = more * values, more * effort
     mass = float(robot.rigid_parameters[::10].sum())
     sizes = np.array([effort / error, effort / speed, effort / rate, effort / speed, effort])
     size = np.concatenate([[_OF_DELAY], sizes.ravel(), [mass / _PRIOR]])
     size = np.concatenate([size, 3 * [_OF_CENTER], [_OF_RADIUS]])
-    # start values inside the limits, as the solver hardly leaves a limit
+    # move start values off the limits, as the solver hardly leaves a limit
     values[free] = np.maximum(values, 0.02 * sizes)[free]
     return np.concatenate([[best], values.ravel(), [0.01 * mass, 0.0, 0.0, 0.0, _OF_RADIUS]]), size
 
@@ -200,13 +200,13 @@ class _Problem:
         return np.concatenate(simulated) - np.concatenate(measured)
 
     def slopes(self, x: FloatArray, places: npt.NDArray[np.intp]) -> FloatArray:
-        """Differentiate the positions by some parameters over their size, (M, n, places)."""
+        """Differentiate positions by some parameters, relative to their sizes, (M, n, places)."""
         now, steps = self.apart(x), _DIFFERENCE * np.diag(self.size)[places]
         columns = [(self.apart(x + step) - now) / _DIFFERENCE for step in steps]
         return np.stack(columns, axis=-1)
 
     def solved(self, free: npt.NDArray[np.bool_]) -> FloatArray:
-        """Fit the free parameters, with noise of the joints that is estimated in rounds."""
+        """Fit the free parameters, with repeated estimates of the noise of the joints."""
         x, places = self.start.copy(), np.flatnonzero(free)
         lower, upper = np.zeros(len(x)), np.full(len(x), np.inf)
         lower[0], upper[0] = _DELAY_RANGE
@@ -259,7 +259,7 @@ def _judged(problem: _Problem, x: FloatArray, free: npt.NDArray[np.bool_]) -> Po
     information = np.einsum('mjp,mjr->pr', weighted, weighted)
 
     def errors(some: npt.NDArray[np.intp]) -> tuple[FloatArray, FloatArray]:
-        """Return covariance and standard errors of some parameters over their sizes."""
+        """Return covariance and standard errors of some parameters, relative to their sizes."""
         inside = information[np.ix_(some, some)] + np.eye(len(some)) / _PRIOR**2
         covariance = np.linalg.inv(inside)
         blocks = len(scores)
@@ -285,7 +285,7 @@ def _judged(problem: _Problem, x: FloatArray, free: npt.NDArray[np.bool_]) -> Po
             mixed += '; give --gains, or record commanded velocities'
         reasons[place] = mixed if alone < _SEEN * _PRIOR else 'the motion does not depend on it'
     ratio, ratio_std = np.ones(n), np.zeros(n)
-    if not free[1]:  # one Gauss-Newton step with kp free as well
+    if not free[1]:  # a Gauss-Newton step in which kp is also free
         more = np.flatnonzero(free | (np.arange(count) <= n))
         covariance, spread = errors(more)
         step = -covariance @ pulls.sum(axis=0)[more]

@@ -3,9 +3,10 @@
 """
 An arm in a closed loop of position control, simulated in windows of a recording.
 
-tau = kp (u(t - delay) - q) + kd (du(t - delay) - dq), where u is the commanded position and du the
-commanded velocity, zero if none is commanded. The loop is evaluated at the middle of each step of
-the plant, with kd in the implicit damping. It is thus of second order in the step at any gain.
+tau = kp (u(t - delay) - q) + kd (du(t - delay) - dq), where u is the commanded position, and du
+is the commanded velocity or zero. The loop is evaluated at the middle of each step of
+the plant, with kd in the implicit damping. The error is thus of second order in the step for any
+gain.
 
 """
 
@@ -34,9 +35,9 @@ STEP = 1e-3
 #: Duration of a window, and of the simulation before it, in which errors of the initial state
 #: decay [s].
 WINDOW, LEAD = 5.0, 0.5
-#: Half of the time in which a parabola through the positions determines an initial state [s].
+#: Half width of the time window whose positions determine an initial state by a parabola [s].
 _AROUND = 0.03
-#: Most samples per second that are compared [Hz]; faster ones repeat the same dynamics.
+#: Largest rate of compared samples [Hz]; a higher rate has no more information.
 _RATE = 250.0
 #: Largest position error of a simulation that is used [rad or m]; it bounds unstable loops.
 _FAR = 3.0
@@ -109,7 +110,7 @@ class Window:
 
 
 def windows_of(recording: Recording, commands: CommandedMotion) -> Iterator[Window]:
-    """Yield the windows of the stretches of a recording without gaps, while commands last."""
+    """Yield windows without gaps in a recording, as long as there are commands."""
     t = recording.t
     known = (t >= commands.t[0]) & (t <= commands.t[-1] + _HELD)
     breaks = np.diff(t) > GAP_PERIODS * recording.period
@@ -132,7 +133,7 @@ def windows_of(recording: Recording, commands: CommandedMotion) -> Iterator[Wind
 
 @dataclass(frozen=True, eq=False)
 class _PositionControl(Controller):
-    """Controller defined by its feedback law."""
+    """Controller that is defined by its feedback law."""
 
     feedback: LinearFeedback
 
@@ -162,7 +163,7 @@ class LoopModel:
 
     @cached_property
     def parameters(self) -> tuple[ParameterName, ...]:
-        """Return the parameters: delay, gains of the joints, effects, place of the payload."""
+        """Return the parameters: delay, gains of the joints, effects, centre of the payload."""
         robot = self.robot
         units = list(zip(robot.torque_units, robot.position_units, strict=True))
         gains = [
@@ -180,7 +181,7 @@ class LoopModel:
         )
 
     def arm(self, x: FloatArray) -> ArmModel:
-        """Return the arm with the effects of parameters, shape (P,); the tool is a ball."""
+        """Return the arm with the effects of the parameters, shape (P,); the tool is a ball."""
         n, (mass, *center, radius) = self.robot.n_joints, x[-5:]
         tool = pin.Inertia(mass, np.array(center), mass * radius**2 * np.eye(3))
         values = (*np.split(x[2 * n + 1 : -5], 3), tool.toDynamicParameters())

@@ -14,7 +14,7 @@ import numpy as np
 SCHEMA = 'armid/positions/1'
 #: Residual over tracking error of a joint, above which the fit is reported as poor.
 _POOR = 0.3
-#: Given gains differ from the data beyond this number of standard errors, and this share.
+#: Given gains contradict the data above this number of standard errors and this share.
 _DIFFERS, _SHARE = 3.0, 0.02
 #: Quantities of the joints in the table, and their headings.
 _COLUMNS = {
