@@ -4,8 +4,8 @@
 Torque zeros and gains, gravity, tool and dry friction from an arm at rest.
 
 The reading of a joint is gain (weight + offset + friction against the approach), as in `ArmModel`.
-The weight is that of the described links and of a tool. The fit is generalised least squares
-with a variance of each joint that is estimated from the residuals. Weak priors keep confounded
+The weight is that of the described links and of a tool. The fit is generalised least squares;
+the variance of each joint comes from its residuals. Weak priors keep confounded
 parameters finite. A quantity with a wide interval is not determined.
 
 """
@@ -29,17 +29,18 @@ import pinocchio as pin
 from scipy.stats import t as student
 
 SCHEMA = 'armid/zero/1'
-#: Quantities that may be fixed, and the effects that are then not fitted.
+#: Quantities that the user may fix, each with the effects that are then not fitted.
 KNOWN = {'gain': 'torque_gain', 'tilt': 'base_tilt', 'tool': 'payload'}
 #: Quantity of each effect; if it is not determined, the effect is not in the model.
 _OF = {'torque_gain': 'gain', 'torque_offset': 'zero', 'base_tilt': 'tilt', 'payload': 'mass'}
-#: Largest half of a 95 % interval of a determined quantity: of zeros and friction as a share of
-#: the largest reading of the joint, of gravity [m/s^2], tilt [deg], mass as a share of that of the
-#: arm, and centre [m].
+#: Largest half-width of a 95 % interval of a determined quantity: zeros and friction as shares
+#: of the largest reading of the joint, gravity [m/s^2], tilt [deg], mass as a share of the mass
+#: of the arm, and centre [m].
 _USEFUL = {'zero': 0.2, 'friction': 0.2, 'gain': 0.1, 'gravity': 0.4, 'tilt': 2.0, 'mass': 0.04}
 _USEFUL['center'] = 0.1
-#: Standard deviation of the prior of each parameter, ten times what is useful: torques as a share
-#: of the largest reading of the joint, payload as one of the mass of the arm, others in SI units.
+#: Prior standard deviation of each parameter, ten times a useful accuracy: torques as shares of
+#: the largest reading of the joint, payload as a share of the mass of the arm, others in SI
+#: units.
 _PRIORS = {'torque_offset': 1.0, 'coulomb_torque': 1.0, 'gain_error': 0.5, 'payload_m': 0.3}
 _PRIORS |= {'tilt_x': 0.3, 'tilt_y': 0.3, 'gravity_difference': 2.0}
 _PRIORS |= dict.fromkeys(('payload_mx', 'payload_my', 'payload_mz'), 0.1)
@@ -50,7 +51,7 @@ MORE = 'record a run of armid zero plan'
 @dataclass(frozen=True)
 class FittedQuantity:
     """
-    Fitted quantity with half of its 95 % interval; 0 for a fixed quantity.
+    Fitted quantity with the half-width of its 95 % interval, 0 for a fixed quantity.
 
     The joint is empty for a quantity of the whole arm. The reason why the quantity is not
     determined ends with a remedy; it is empty for a determined one.
@@ -113,7 +114,7 @@ class ZeroFit:
 
 
 def arm_at_rest(robot: Robot, known: Collection[str] = ()) -> ArmModel:
-    """Return an arm at rest with the effects to fit; with known gains the size of gravity too."""
+    """Return an arm at rest with the effects to fit; known gains add the size of gravity."""
     names = ['payload', 'base_tilt', 'coulomb_friction', 'torque_offset', 'torque_gain']
     if 'gain' in known and 'tilt' not in known:
         names.append('gravity_magnitude')
@@ -213,7 +214,7 @@ def _predicted(
 
 
 def _sided(rests: Sequence[Motion]) -> npt.NDArray[np.bool_]:
-    """Mark readings after an approach; without an approach, dry friction is only bounded."""
+    """Mark readings after an approach; in others, dry friction is known only to its bounds."""
     return np.concatenate([one.dq for one in rests]).astype(bool)
 
 
@@ -221,9 +222,9 @@ class _Solution(NamedTuple):
     """
     Change x of all parameters (P,), and numbers of the F free ones.
 
-    Covariances (F, F) from the variances of joints and from the scatter of the rests, information
-    (F, F) without the prior, readings that count (K, n), and the smallest number of redundant
-    readings of a joint.
+    Covariances (F, F) from the variances of joints and from the scatter of the rests,
+    information (F, F) without the prior, used readings (K, n), and the smallest number of
+    redundant readings of a joint.
 
     """
 
@@ -296,7 +297,7 @@ def _quantities(
 
 
 def _reason(arm: ArmModel, solved: _Solution, slope: FloatArray, limit: float) -> str:
-    """Return why a quantity is not determined, from its derivatives by the free parameters."""
+    """Return why a quantity is undetermined, from its derivatives by the free parameters."""
     std = np.sqrt(np.diag(solved.covariance))
     most = int(np.argmax(np.abs(slope) * std))
     correlation = np.abs(solved.covariance[most]) / std
@@ -326,7 +327,7 @@ def fit_document(
     verdict = 'in part' if any(one.reason for one in found.quantities) else 'determined'
     if all(one.reason for one in found.quantities if one.name == 'zero'):
         verdict = 'not determined'
-    # readings are explained to a tenth of the largest reading of the joint
+    # a residual is acceptable up to a tenth of the largest reading of the joint
     if np.any(found.residual > 0.1 * found.largest) or min(gains, default=1.0) < 0.0:
         verdict = 'not explained'
     rms = zip(found.arm.robot.joints, found.before, found.residual, strict=True)

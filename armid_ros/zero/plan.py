@@ -3,9 +3,10 @@
 """
 Static poses that determine zeros, gains, gravity and tool, and a closed tour through them.
 
-The tour has for each pose a transfer, a rest, a short motion onwards and back, and another rest.
-So the arm comes to each pose from both sides. A Gaussian filter smooths the tour, which keeps all
-limits. The tour is a Fourier series, so the publisher checks and plays it as any `Excitation`.
+For each pose, the tour has a transfer, a rest, a short motion beyond the pose and back, and
+another rest. The arm thus reaches each pose from both sides. A Gaussian filter smooths the tour,
+so it keeps all limits. The tour is a Fourier series, so the publisher checks and plays it like
+any `Excitation`.
 
 """
 

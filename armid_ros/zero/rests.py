@@ -11,8 +11,8 @@ from armid_ros.recording import Recording
 import numpy as np
 from scipy.ndimage import maximum_filter1d, median_filter, minimum_filter1d, uniform_filter1d
 
-#: Time in which a joint at rest stays within `REST_RANGE` [s]; half of it at either end of a rest
-#: is left out. Time in which the torque then settles, and shortest rest after that time [s].
+#: Time in which a joint at rest stays within `REST_RANGE` [s]; half of this time is cut off at
+#: both ends of a rest. Time in which the torque then settles, and shortest rest after it [s].
 WINDOW, SETTLING, SHORTEST = 1.0, 0.5, 0.5
 
 
@@ -20,8 +20,8 @@ def find_rests(recording: Recording) -> Motion:
     """
     Return the K rests of a recording as samples, with their start times.
 
-    Position and torque are means over a rest. The velocity is the direction of the approach of
-    a joint, 1 or -1; it is 0 if the joint hardly moved since the rest before.
+    Position and torque are means over a rest. The velocity is the direction of the approach of a
+    joint, 1 or -1, or 0 if the joint hardly moved since the previous rest.
     IdentificationError: efforts are missing or constant, or the arm is never at rest.
 
     """
@@ -32,7 +32,7 @@ def find_rests(recording: Recording) -> Motion:
             'torque with --topic or --effort'
         )
     size = max(round(WINDOW / max(recording.period, 1e-6)), 3)
-    # outliers and noise of an encoder do not end a rest
+    # outliers and encoder noise do not end a rest
     q = median_filter(recording.q, (5, 1), mode='nearest')
     q = uniform_filter1d(q, max(size // 5, 1), axis=0, mode='nearest')
     spread = maximum_filter1d(q, size, axis=0) - minimum_filter1d(q, size, axis=0)
@@ -52,7 +52,7 @@ def find_rests(recording: Recording) -> Motion:
         first = int(np.searchsorted(t, t[begin] + SETTLING))
         pose, came = q[first:end].mean(axis=0), np.zeros(q.shape[1])
         for j, way in enumerate((pose - q[before:begin]).T):
-            # distance after which dry friction is opposed to the motion [rad or m]
+            # distance after which dry friction opposes the motion [rad or m]
             apart = np.flatnonzero(np.abs(way) > 0.03)
             came[j] = np.sign(way[apart[-1]]) if len(apart) else 0.0
         rests.append((t[begin], pose, came, tau[first:end].mean(axis=0)))
