@@ -46,7 +46,7 @@ class ArmModel:
     """
     A rigid body plus effects: tau = Y pi + sum over effects of tau_e(motion; theta_e).
 
-    Motions are those of a recording; the model includes the effects of the sensors.
+    Motions are recorded motions; the model includes the effects of the sensors.
 
     Attributes
     ----------
@@ -242,7 +242,7 @@ class ArmModel:
         return gravity_sensitivity(self.body, self.link_motion(motion).q)
 
     def smoothed(self, motion: Motion) -> Motion:
-        """Return a recorded motion without frequencies beyond its band."""
+        """Return a recorded motion without frequencies above its band."""
         return smoothed(motion)
 
     def load_derivatives(self, motion: Motion) -> tuple[FloatArray, FloatArray, FloatArray]:
@@ -379,7 +379,7 @@ class ArmModel:
         action = self._acting
         if action.displacement is None and action.reading_memory == 0.0:  # noqa: RUF069 - of laws, never computed
             return 0
-        # four more samples on either side, for second derivatives by finite differences
+        # four more samples on either side for second derivatives by finite differences
         return int(np.ceil(action.reading_memory / period)) + 4
 
     @cached_property
@@ -390,7 +390,7 @@ class ArmModel:
     def _as_read(
         self, motion: Motion, columns: FloatArray, after: Effect | None = None
     ) -> FloatArray:
-        """Apply the sensor effects to columns: all, or those after an effect."""
+        """Apply all sensor effects to columns, or only those after a given effect."""
         readings = self._readings
         if isinstance(after, TorqueReading):
             known = [own for own, _ in readings]
@@ -417,7 +417,7 @@ class ArmModel:
         return np.asarray(columns + along @ (gain[:, :, np.newaxis] * (along.T @ columns)))
 
     def felt(self, motion: Motion) -> Motion:
-        """Return the link motion for the rigid body: the positions at rest if quasi-static."""
+        """Return the link motion for the rigid body; if quasi-static, its positions at rest."""
         return motion.at_rest() if self.quasi_static else motion
 
     def base_parameters(

@@ -62,7 +62,7 @@ def arm_urdf(arm: ArmModel) -> Exported:
     found, missing = place_values(arm, lambda effect: effect.traits.urdf_attribute)
     text = export_urdf(arm.body, found, _remarks('a URDF', missing))
     left_out = ('ros2_control',) if '<ros2_control' in arm.robot.urdf else ()
-    robot = arm.robot.tree  # friction that was not identified keeps its described values
+    robot = arm.robot.tree  # friction without identified values keeps the described ones
     described = {'damping': robot.urdf_damping, 'friction': robot.urdf_friction}
     values = {
         key: dict(zip(robot.joints, own.tolist(), strict=True)) | found.get(key, {})
@@ -93,8 +93,8 @@ def place_values(
     """
     Return values by attribute and joint, and a line for each value that a format cannot contain.
 
-    The attribute names the place of an effect, and is empty if there is none. Effects that change
-    the body are part of it, and in neither.
+    The attribute names the place of an effect, and is empty if there is none. Effects that
+    change the rigid body are part of it, and appear in neither.
 
     """
     found: dict[str, dict[str, float]] = {}

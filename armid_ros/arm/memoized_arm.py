@@ -59,14 +59,14 @@ class _Memoized(ArmModel):
         return self._once('frames', motion, super().link_frames)
 
     def regressor(self, motion: Motion) -> _Regressor | None:
-        """Return the cached regressor; None if links move otherwise, or memory is exhausted."""
+        """Return the cached regressor; None for another link motion, or if memory is exhausted."""
         if self.action().displacement is not None:
             return None
         places = (array.ctypes.data for array in (motion.q, motion.dq, motion.ddq))
         key = *places, len(motion), tuple(self.body.gravity.tolist()), self.quasi_static
         if key not in self.regressors:
             used = sum(one.columns.nbytes for one in self.regressors.values())
-            # memory of the cached regressors [bytes]; regressors beyond it are not kept
+            # memory of the cached regressors [bytes]; further regressors are not kept
             if used + 10 * motion.q.nbytes * motion.n_joints > 1_000_000_000:
                 return None
             self.regressors[key] = _Regressor(motion, regressor(self.body, self.felt(motion)))
@@ -86,7 +86,7 @@ class _Memoized(ArmModel):
         return self._once('gravity', motion, super().gravity_columns)
 
     def smoothed(self, motion: Motion) -> Motion:
-        """Return a recorded motion without frequencies beyond its band."""
+        """Return a recorded motion without frequencies above its band."""
         return self._once('smooth', motion, super().smoothed)
 
     def load_derivatives(self, motion: Motion) -> tuple[FloatArray, FloatArray, FloatArray]:

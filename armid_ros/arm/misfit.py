@@ -1,13 +1,13 @@
 # Copyright 2026 The armid_ros developers
 # SPDX-License-Identifier: Apache-2.0
 """
-The misfit of a model: its residual in the recordings of its identification, kept in model.yaml.
+The misfit of a model: its residual in the recordings of its identification, in model.yaml.
 
 The residual of a real arm exceeds the noise, so a diagnosis measures changes in units of the
 misfit. The block ``misfit`` of model.yaml has ``unit``, ``data`` (held-out or training), ``rms``
-of the residual by joint, and ``relative_error_percent`` of the torque. As a misfit grows with the
-torque, ``torque_rms`` has the torque of these recordings. As it includes noise, ``filters`` has
-the filters behind which it was measured.
+of the residual by joint, and ``relative_error_percent`` of the torque. A misfit grows with the
+torque, so ``torque_rms`` has the torque of these recordings. A misfit includes noise, so
+``filters`` has the filters of its rows.
 
 """
 
@@ -116,7 +116,7 @@ class Misfit:
 
 
 def louder(now: FloatArray, before: FloatArray) -> FloatArray:
-    """Return the ratio of the present rms torque to the earlier rms torque, at least 1, (n,)."""
+    """Return the ratio of present to earlier rms torque, at least 1, (n,)."""
     return np.asarray(np.maximum(now / np.maximum(before, 1e-12), 1.0))
 
 

@@ -5,7 +5,7 @@ model.yaml: an arm model as a file for people and simulators.
 
 Schema armid/model/1: ``robot`` (shipped name or path of the description), ``gravity`` [m/s^2],
 ``rigid_parameters`` and ``effects``, each a list of parameters with name, joint, value, std, unit.
-A std of null means that the data did not determine the parameter on its own. An effect with
+A std of null means that the data did not determine the parameter by itself. An effect with
 nonlinear parameters also has ``shapes``. An effect that ties the arm to another machine also has
 ``partner`` and ``ties``: points of both machines, in the frames of their joints [m]. An identified
 model also has ``misfit``; see `Misfit`.
@@ -268,7 +268,7 @@ def with_named(arm: ArmModel, effect: Effect, values: FloatArray) -> ArmModel:
 
 
 def place_in(arm: ArmModel, effect: Effect) -> tuple[int, list[int]] | None:
-    """Return the index of an effect and rows of its parameters; None if any is missing."""
+    """Return the index of an effect and the rows of its parameters; None if one is missing."""
     wanted = [(p.name, p.joint) for p in effect.parameters(arm.robot)]
     for position, own in enumerate(arm.effects):
         if isinstance(effect, type(own)) and not own.shapes and not own.points:
@@ -282,8 +282,8 @@ def in_words(arm: ArmModel) -> ArmModel:
     """
     Return the arm with its effects translated into those of the catalogue.
 
-    Effects that only a search uses are converted: a gravity vector becomes a base tilt and the
-    magnitude of gravity.
+    Effects for searches only are converted: a gravity vector becomes base tilt and gravity
+    magnitude.
 
     """
     said = replace(arm, effects=(), values=())
@@ -330,7 +330,7 @@ def checked_model(text: str) -> dict[str, Any]:
 
 
 def _wrong_unit(row: Mapping[str, Any], units: Collection[str]) -> str:
-    """Return the error on a wrong unit of a parameter; empty if right or not given."""
+    """Return the error on a wrong unit of a parameter; empty if correct or missing."""
     if not units or row.get('unit', next(iter(units))) in units:
         return ''
     expected = ' or '.join(f"'{unit}'" for unit in units)
@@ -357,7 +357,7 @@ def _rows(
 
 
 def _fault(row: Any, units: tuple[str, ...]) -> tuple[str, str]:
-    """Return the key and error of a wrong parameter; the error is empty if it is right."""
+    """Return key and error of a wrong parameter; the error is empty for a correct one."""
     if not isinstance(row, dict):
         keys = ', '.join(_KEYS_OF_PARAMETER)
         return '', f'a parameter has {keys}; here is {str(row)[:40]!r}'
@@ -417,7 +417,7 @@ def _arm(document: dict[str, Any], robot: Robot) -> ArmModel:
 
 
 def _values(rows: Sequence[dict[str, Any]], names: Sequence[ParameterName]) -> FloatArray:
-    """Return the values of parameters; each must be given once, in its unit."""
+    """Return the values of parameters; each has to be given once, in its unit."""
     table: dict[tuple[str, str], dict[str, Any]] = {}
     units = {(name.name, name.joint): [name.unit] for name in names}
     for row in rows:

@@ -18,8 +18,8 @@ class TorqueSlope:
     """
     Derivatives of the torque of an arm, ``ArmModel.joint_torque``, along a motion.
 
-    The direction of motion in dry friction, and the twist between motors and links, count as
-    constant.
+    The direction of motion in dry friction, and the twist between motors and links, are
+    constants.
 
     Attributes
     ----------
