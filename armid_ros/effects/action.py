@@ -25,7 +25,7 @@ TorqueLaw = Callable[[FloatArray, FloatArray, FloatArray], FloatArray]
 
 #: Step of the finite differences of a torque law [rad or m, rad/s or m/s].
 _STEP = 1e-6
-#: Dry friction [N m], or a share of the load [-], below this counts as zero.
+#: Dry friction [N m], or a share of the load [-], below this is zero.
 NO_FRICTION = 1e-12
 
 
@@ -92,7 +92,7 @@ class BlurredMotion(Motion):
     """
     Motion whose direction is smoothed at reversals, as tanh(dq / width).
 
-    The sign of a velocity has no useful gradient for the search for a trajectory.
+    The sign of a velocity has no useful gradient for a search for trajectories.
 
     Attributes
     ----------
@@ -254,8 +254,8 @@ def merge_actions(robot: Robot, actions: Sequence[Action]) -> Action:
     """
     Join the actions of several effects on one robot.
 
-    Matrices and torques add up; dry friction along one direction becomes one element; actions on
-    the recording are applied in the given order.
+    Matrices and torques are summed. Dry friction along one direction becomes one element.
+    Actions on readings are applied in the given order.
 
     """
     zero = np.zeros((robot.n_joints, robot.n_joints))
@@ -337,7 +337,7 @@ def _merge_hysteresis(elements: list[Hysteresis]) -> Hysteresis | None:
 
 
 def _merge_transmissions(parts: list[Transmission]) -> Transmission | None:
-    """Put transmissions in series: compliances and gaps add up."""
+    """Put transmissions in series: compliances and gaps are summed."""
     if not parts:
         return None
     compliance = np.sum([1.0 / part.stiffness for part in parts], axis=0)

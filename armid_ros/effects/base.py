@@ -8,9 +8,9 @@ on its parameters (``columns``). The diagnosis checks whether this dependence ex
 An effect on joints has its quantities once per joint. An effect on the whole arm has no joints,
 and has its quantities once.
 
-Quantities are amplitudes: the torque is linear in them, or nearly so. Nonlinear parameters, such
-as a Stribeck velocity, are shapes. The shape values are attributes of the effect, and the columns
-depend on them.
+Quantities are amplitudes: the torque is linear or nearly linear in them. Nonlinear parameters,
+such as a Stribeck velocity, are shapes. The shape values are attributes of the effect, and the
+columns depend on them.
 
 """
 
@@ -79,7 +79,7 @@ class Effect(ABC):
     instantaneous: ClassVar[bool] = True
     #: Whether the effect changes the rigid body or its gravity.
     changes_body: ClassVar[bool] = False
-    #: Whether the effect is learned from the residual, and so has no physical cause.
+    #: Whether the effect is learned from the residual and has no physical cause.
     learned: ClassVar[bool] = False
     #: Whether the torque changes smoothly with position and velocity.
     smooth: ClassVar[bool] = False
@@ -160,7 +160,7 @@ class Effect(ABC):
 
     @classmethod
     def as_change(cls) -> type[Effect]:
-        """Return the class for a change between two days, as the effect may exist before."""
+        """Return the class for a change between two days, as the effect may exist already."""
         return cls
 
     def particulars(self) -> dict[str, Any]:
@@ -336,8 +336,8 @@ class Effect(ABC):
         """
         Return whether values within the bounds are plausible for this effect.
 
-        ``std``, shape (P,), are standard deviations for white noise. The arm does not contain the
-        effect.
+        ``std``, shape (P,), has standard deviations for white noise. The arm does not contain
+        the effect.
 
         """
         return True

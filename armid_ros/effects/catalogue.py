@@ -182,7 +182,7 @@ class Catalogue(Mapping[str, type[Effect]]):
             self._kinds.pop(name, None)
 
     def _complete_once(self) -> None:
-        """Load the effects of all packages, the first time."""
+        """Load the effects of all packages at the first call."""
         if self._complete:
             return
         self._complete = True

@@ -19,7 +19,7 @@ import numpy as np
 @dataclass(frozen=True)
 class RotorInertia(Effect):
     """
-    Inertia of the rotor and gear, seen at the joint, tau = Ia ddq.
+    Inertia of the rotor and gear, as it acts at the joint, tau = Ia ddq.
 
     Ia is the rotor's inertia times the gear ratio squared; gyroscopic coupling is neglected, as is
     usual for geared arms. For the first joint, it is exactly collinear with Izz of the link.
@@ -73,10 +73,10 @@ class TorqueRipple(Effect):
     )
 
     def shape_starts(self, unexplained: Unexplained, arm: Arm) -> tuple[FloatArray, ...]:
-        """Return the orders at which waves over the angle explain most of the residual."""
+        """Return the orders of waves over the angle that explain most of the residual."""
         robot = arm.robot
         # Range of ripple orders in a search [1/rad, 1/m]. Gravity and springs cause lower orders;
-        # filters remove higher orders. Screws and racks have a tooth or turn every 4 to 60 mm.
+        # filters remove higher orders. Screws and racks have a turn or tooth every 4 to 60 mm.
         orders = [
             wave_orders(
                 unexplained, joint, (100.0, 1600.0) if robot.prismatic[joint] else (3.0, 80.0)
@@ -86,7 +86,7 @@ class TorqueRipple(Effect):
         return (np.array(orders),)
 
     def plausible(self, values: FloatArray, std: FloatArray, arm: Arm) -> bool:
-        """Return whether the order exceeds the lowest order, which other causes explain."""
+        """Return whether the order is above the range that other causes explain."""
         return bool(np.all(self.shape_values > 1.05 * _SLOWEST))
 
     def columns(self, motion: Motion, arm: Arm) -> FloatArray:
@@ -171,9 +171,9 @@ class ActuatorSaturation(TorqueReading):
     where the drive reports the commanded torque and supplies tau = reported - lost e(reported). A
     value of lost = 1 is a hard torque limit; a smaller value is a motor constant that decreases at
     high current. A value of clipped = 1 is a report that is limited to L. The column of ``lost``
-    is computed from the measured torque, if it was recorded: it is linear there, and explains only
-    torque beyond L. Confounded with quadratic_friction where high torque means high speed, with
-    torque_gain if L is low; a sweep of amplitudes distinguishes them.
+    is computed from the measured torque, if it was recorded: the torque is linear in it, and it
+    explains only torque beyond L. Confounded with quadratic_friction where high torque means high
+    speed, with torque_gain if L is low; a sweep of amplitudes distinguishes them.
 
     """
 
@@ -183,7 +183,8 @@ class ActuatorSaturation(TorqueReading):
         Quantity('lost_share', '', lower=0.0, upper=1.0, typical=(0.05, 1.0)),
         Quantity('clipped_share', '', lower=0.0, upper=1.0, typical=(0.05, 1.0)),
     )
-    #: Start values near the highest measured torque; lower values would replace the whole torque.
+    #: Start values near the highest measured torque; with lower values, the effect would replace
+    #: the whole torque.
     shapes = (
         Shape('saturation_torque', 'N m', 1e-6, 1e6, 10.0, (0.3, 1.0, 3.0, 10.0, 30.0), near=0.08),
     )
@@ -242,8 +243,8 @@ class ActuatorSaturation(TorqueReading):
         spread[:2, columns] = values.reshape(-1, 2).T
         spread[2, columns] = self.shape_values[:, 0]
         if motion.tau is None:
-            # Largest lost share of the excess. If the commanded torque was not recorded, a share
-            # of 1 cannot be represented, because no torque beyond the level is measured.
+            # Largest lost share of the excess. Without the commanded torque, a share of 1 cannot
+            # be represented, because no torque beyond the level is measured.
             spread[0] = np.minimum(spread[0], 0.99)
         return spread[0], spread[1], spread[2]
 

@@ -114,10 +114,10 @@ class QuadraticFriction(Effect):
     """
     Friction torque that grows with the square of the joint velocity, tau = Fq dq |dq|.
 
-    A positive Fq is drag of air or oil. A negative Fq, with viscous friction, is the flattening at
-    high speed that grease in strain-wave gears shows. Confounded with stribeck_friction, whose
-    curvature lies at low speed, and with saturation of the drive; a wider range of speeds
-    distinguishes them.
+    A positive Fq is drag of air or oil. A negative Fq, together with viscous friction, describes
+    friction of grease in strain-wave gears, which flattens at high speed. Confounded with
+    stribeck_friction, whose curvature lies at low speed, and with saturation of the drive; a wider
+    range of speeds distinguishes them.
     Source: Armstrong-Helouvry, Dupont and Canudas de Wit 1994, section 3.
 
     """
@@ -146,9 +146,9 @@ class StribeckFriction(Effect):
     Friction in addition to Coulomb friction that decreases with velocity by lubrication.
 
     tau = dFs exp(-|dq / vs|^d) sign(dq), where dFs = Fs - Fc is the breakaway torque beyond the
-    Coulomb torque. The hump lies below 3 vs. Confounded with presliding_hysteresis, with the
-    curvature of quadratic_friction, and with a velocity that was filtered too much at reversals;
-    constant velocities from 0.01 to 2 rad/s in both directions distinguish them.
+    Coulomb torque. The additional friction is below 3 vs. Confounded with presliding_hysteresis,
+    with the curvature of quadratic_friction, and with a velocity that was filtered too much at
+    reversals; constant velocities from 0.01 to 2 rad/s in both directions distinguish them.
     Source: Bo and Pavelescu 1982; Armstrong-Helouvry, Dupont and Canudas de Wit 1994.
 
     """
@@ -177,7 +177,7 @@ class StribeckFriction(Effect):
         return Action(dry_friction=dry, torque=torque)
 
     def _left(self, dq: FloatArray, arm: Arm) -> FloatArray:
-        """Return the share of the breakaway torque that remains at a velocity."""
+        """Return the remaining share of the breakaway torque at a velocity."""
         velocity, exponent = self.shape_over_joints(arm.robot)
         return np.asarray(np.exp(-(np.abs(dq / velocity) ** exponent)))
 
@@ -187,10 +187,10 @@ class ThermalFriction(Effect):
     """
     Viscous friction that changes while the joint warms up, tau = dFv (1 - exp(-t / T)) dq.
 
-    Time counts from the beginning of the recording; dFv is negative if the grease gets thin, by 20
-    to 60 % of the cold coefficient. The effect makes two equal periods different, unlike effects
-    that depend on velocity only. torque_drift does so too, but does not depend on velocity.
-    Source: Bittencourt, Wernholt, Sander-Tavallaey and Brogardh 2010, in the form of one time
+    Time counts from the beginning of the recording. dFv is negative if the grease gets thinner,
+    by 20 to 60 % of the cold coefficient. The effect makes two equal periods different, unlike
+    effects that depend on velocity only. torque_drift does the same, but does not depend on
+    velocity. Source: Bittencourt, Wernholt, Sander-Tavallaey and Brogardh 2010, with one time
     constant.
 
     """
@@ -230,8 +230,8 @@ class ThermalChange(ThermalFriction):
     """
     Change of viscous friction, from the beginning and while the joint warms up.
 
-    tau = (c + dFv (1 - exp(-t / T))) dq. A joint that starts colder has more friction at first and
-    the same friction in the end. Reported as thermal_friction and viscous_friction.
+    tau = (c + dFv (1 - exp(-t / T))) dq. A joint that starts colder has more friction at first,
+    and the same friction when warm. Reported as thermal_friction and viscous_friction.
 
     """
 

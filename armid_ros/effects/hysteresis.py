@@ -49,12 +49,12 @@ class PreslidingHysteresis(Effect):
     """
     Friction that increases over a short distance after each reversal, tau = F h.
 
-    dh = (1 - h sign(dq)) |dq| / s: asperities bend before they slip. The torque depends on the
-    travel since the last reversal, not on velocity. The hysteresis loops are the same at any rate,
-    and even slow motion dissipates energy. Far from reversals it equals coulomb_friction. If a
-    model contains both, F is the part that builds up gradually. Confounded with stribeck_friction,
-    backlash and a velocity that was filtered too much; triangles of less than 0.02 rad at two
-    rates distinguish them.
+    dh = (1 - h sign(dq)) |dq| / s: asperities of the surfaces bend before they slip. The torque
+    depends on the travel since the last reversal, not on velocity. The hysteresis loops are the
+    same at any rate, and even slow motion dissipates energy. Far from reversals it equals
+    coulomb_friction. If a model contains both, F is the part that builds up gradually. Confounded
+    with stribeck_friction, backlash and a velocity that was filtered too much; triangles of less
+    than 0.02 rad at two rates distinguish them.
     Source: Dahl 1968.
 
     """

@@ -28,8 +28,9 @@ import numpy as np
 #: Positions and velocities of all k anchors [m, m/s] at times of shape (N,), each (N or 1, k, 3).
 Anchor = Callable[[FloatArray], tuple[FloatArray, FloatArray]]
 
-#: Candidate anchors of straps: distances from the mean position of the attachment, over the spread
-#: of its positions, in all directions of a cube. Slacks are quantiles of the length.
+#: Candidate anchors of straps: distances from the mean position of the attachment, relative to
+#: the spread of its positions, in all directions of a cube. Slacks are quantiles of the strap
+#: length.
 _DISTANCES, _SLACKS = (0.0, 0.7, 1.5, 3.0), (0.0, 0.2, 0.4, 0.6, 0.8)
 
 _AXES = ('x', 'y', 'z')
@@ -47,7 +48,7 @@ class Attached(Effect):
         return robot.moving
 
     def _default_shape(self, robot: Robot) -> FloatArray:
-        """Attach to the centres of mass, at most one reach of the arm from the joint."""
+        """Attach to the centres of mass, at most the reach of the arm away from the joint."""
         values, model = self.shape_values, robot.model
         reach = max(float(np.linalg.norm(place.translation)) for place in model.jointPlacements)
         for row, joint in zip(values, self.joints, strict=True):
@@ -58,7 +59,7 @@ class Attached(Effect):
         return values
 
     def shape_starts(self, unexplained: Unexplained, arm: Arm) -> tuple[FloatArray, ...]:
-        """Return the present geometry; other shapes have their grids."""
+        """Return the present geometry as start value; other shapes have grids."""
         return tuple(
             self.shape_values[:, [index]]
             if shape.unit == 'm' and shape.lower < 0.0
@@ -110,7 +111,7 @@ class HumanInteraction(Attached):
     three linear parameters. Confounded with joint_spring on a single moving joint and with the
     weight of the limb; the sum of the torques of a pair does not contain the spring, their
     difference does.
-    Source: the human-exoskeleton leg pair, springs between segments of equal number.
+    Source: the human-exoskeleton leg pair, springs between corresponding segments.
 
     """
 
@@ -197,7 +198,7 @@ class InterfaceSlack(Attached):
             columns = rest(straps)
             own, aim = np.sum(columns**2, axis=0), columns.T @ target
             gain = np.maximum(aim, 0.0) ** 2 / np.maximum(own, max(1e-12 * own.max(), 1e-300))
-            best = np.argsort(-gain)[:2]  # both become candidate causes
+            best = np.argsort(-gain)[:2]  # both kinds become candidate causes
             starts.append([(*shape[:3], *anchors[k], slacks[k]) for k in best])
         return tuple(np.array(starts).transpose(2, 0, 1))
 

@@ -40,8 +40,8 @@ class TorqueMap:
     The posterior of a Gaussian process over position, velocity and load of one joint.
 
     k(x, x') = s^2 exp(-sum of ((u_i - u_i') / l_i)^2 / 2); the mean is the sum of a_m k(x, x_m) /
-    s^2. The velocity counts as u = v asinh(dq / v): proportional below the knee v and logarithmic
-    beyond it, because friction changes most at low velocity.
+    s^2. The velocity is scaled as u = v asinh(dq / v): proportional below the knee v and
+    logarithmic above, because friction changes most at low velocity.
     Source: Rasmussen and Williams 2006, eqs. 2.25 and 2.26.
 
     Attributes

@@ -1,6 +1,6 @@
 # Copyright 2026 The armid_ros developers
 # SPDX-License-Identifier: Apache-2.0
-"""Effects on bodies: payloads, and links that differ from the description."""
+"""Changes of rigid bodies: payloads, and links that differ from the description."""
 
 from __future__ import annotations
 
@@ -59,8 +59,8 @@ def described_spread(robot: Robot) -> FloatArray:
     """
     Return the largest expected errors of the described rigid parameters, shape (m, 10).
 
-    A described value may be wrong by about its own size. For a missing value, a tenth of a mean
-    link is assumed.
+    A described value may be wrong by as much as its own size. For a missing value, a tenth of a
+    mean link is assumed.
 
     """
     body = np.abs(robot.rigid_parameters.reshape(-1, len(LINK_PARAMETERS)))
@@ -145,7 +145,7 @@ class PayloadChange(Payload):
     """
     Change of the payload of a link, which may be negative.
 
-    A negative mass is a payload that was put down, which the model contains in its link.
+    A negative mass is a payload that was put down. The model contains it in the link.
 
     """
 

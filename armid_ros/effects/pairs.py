@@ -47,7 +47,7 @@ class _Pairs(Effect):
         return tuple(chain.from_iterable(pairwise(robot.joints)))
 
     def in_usual_place(self, robot: Robot) -> bool:
-        """Return True, as no pair of joints is more likely than others."""
+        """Return True, as all pairs of joints are equally likely."""
         return True
 
     @classmethod

@@ -3,8 +3,8 @@
 """
 Base classes of effects on the recording: on positions, or on torque readings.
 
-A recording contains the motion of an arm as measured by position sensors, and its torque as
-measured by torque sensors. The torque that a model predicts for a recorded motion is
+A recording contains the readings of position sensors and of torque sensors. The torque that a
+model predicts for a recorded motion is
 
     reading(torque(motion + displacement)),
 

@@ -84,9 +84,10 @@ class TorqueDrift(TorqueReading):
     """
     Torque readings that drift while sensor or electronics warm up, d (1 - exp(-t / T)).
 
-    Time counts from the beginning of the recording. Independent of the motion, unlike
-    thermal_friction; equal periods differ by it. Confounded with torque_offset if the recording
-    begins long after the warming and, in one short recording, with a payload that slips.
+    Time counts from the beginning of the recording. The drift does not depend on the motion,
+    unlike thermal_friction. Equal periods differ by it. Confounded with torque_offset if the
+    recording begins when the sensor is warm. In one short recording, also confounded with a
+    payload that slips.
 
     """
 
@@ -96,7 +97,7 @@ class TorqueDrift(TorqueReading):
     shapes = (Shape('drift_time', 's', 0.1, 1e5, 600.0, (10.0, 60.0, 300.0, 1000.0, 3000.0)),)
 
     def shape_starts(self, unexplained: Unexplained, arm: Arm) -> tuple[FloatArray, ...]:
-        """Return distinguishable times; beyond three recording lengths, a drift is a line."""
+        """Return distinguishable times; above three recording lengths, a drift is a line."""
         # time constants of a drift in a search, over the length of a recording; a faster drift is
         # an offset
         times = np.maximum(
@@ -126,10 +127,10 @@ class EncoderOffset(Displacing):
     """
     Offset of the zero of an encoder, q = reading + offset.
 
-    The first order is dtau/dq times the offset, the same offset at all loads. Confounded with
-    base_tilt (exactly, for the first joint of a planar arm), and with the direction of the link's
-    first moment: free rigid parameters of a planar arm absorb the second joint's offset exactly.
-    Hard stops, or centres of mass known from drawings, distinguish them.
+    To first order, the torque changes by dtau/dq times the offset, which is the same at all loads.
+    Confounded with base_tilt (exactly, for the first joint of a planar arm), and with the
+    direction of the link's first moment: free rigid parameters of a planar arm absorb the second
+    joint's offset exactly. Hard stops, or centres of mass known from drawings, distinguish them.
 
     """
 

@@ -13,7 +13,7 @@ import numpy as np
 @dataclass(frozen=True)
 class Hysteresis:
     """
-    Friction that grows with the travel since the last reversal: m slipping springs.
+    Friction of m slipping springs, which grows with the travel since the last reversal.
 
     The state h of an element, from -1 to 1, follows dh = (1 - h sign(dx)) |dx| / distance along
     its travel x, at any speed. Its torque is level * h.
@@ -91,7 +91,7 @@ class Hysteresis:
         by_way = np.zeros_like(way)
         for element in np.flatnonzero(by_state.any(axis=0)):
             path, state, distance = way[:, element], states[:, element], self.distance[element]
-            # backwards, as the initial state of a stretch is the final state of the previous one
+            # backwards, because a stretch starts in the final state of the previous one
             for first, last, end in reversed(_stretches(path)):
                 own = slice(first + 1, last + 1)
                 decay = np.exp(-np.abs(path[own] - path[first]) / distance)

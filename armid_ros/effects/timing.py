@@ -21,7 +21,7 @@ from scipy.signal import butter, lfilter, sosfiltfilt
 
 @dataclass(frozen=True)
 class LateReading(TorqueReading):
-    """Late torque reading; its error is proportional to the rate of the torque."""
+    """Late torque reading, with an error proportional to the rate of the torque."""
 
     @abstractmethod
     def _late(self, values: FloatArray, motion: Motion, x: FloatArray) -> FloatArray:
@@ -64,11 +64,11 @@ class TimeDelay(LateReading):
     Torque readings that are delayed relative to the positions, reading(t) = tau(t - delay).
 
     The torque is cubic between samples, with the slopes of `rate_of_change` (Hermite's spline).
-    By default, the whole arm has one delay, as with one late clock or bus; named joints have one
-    delay each. The first order is -dtau/dt. At low frequency it looks like viscous friction of a
-    loaded joint, at high frequency like negative viscous friction. Confounded with torque_lag,
-    which attenuates as well, with joint_elasticity and with clocks that differ. Two frequencies,
-    or the slope of the phase, distinguish them.
+    By default, the whole arm has one delay, as of a late clock or bus; named joints have one
+    delay each. To first order, the reading changes by -dtau/dt per delay. At low frequency it
+    looks like viscous friction of a loaded joint, at high frequency like negative viscous
+    friction. Confounded with torque_lag, which attenuates as well, with joint_elasticity and with
+    clocks that differ. Two frequencies, or the slope of the phase, distinguish them.
 
     """
 
@@ -107,9 +107,9 @@ class TorqueLag(LateReading):
     """
     Torque readings filtered by a first-order low-pass, T dreading/dt + reading = tau.
 
-    The cause is a current loop or the filter of a sensor. The first order is -dtau/dt, as for
-    time_delay. In addition the lag attenuates by 1 / sqrt(1 + (omega T)^2), which is visible in
-    motion up to half the bandwidth of the filter.
+    The cause is a current loop or the filter of a sensor. To first order, the reading changes by
+    -dtau/dt, as for time_delay. In addition the lag attenuates by 1 / sqrt(1 + (omega T)^2), which
+    is visible in motion up to half the bandwidth of the filter.
 
     """
 
@@ -154,7 +154,7 @@ def rate_of_change(t: FloatArray, x: FloatArray) -> FloatArray:
 
 def within_band(motion: Motion, x: FloatArray) -> FloatArray:
     """
-    Remove frequencies beyond the band of a motion from a signal computed from it.
+    Remove frequencies above the band of a motion from a signal computed from it.
 
     The second derivative of a torque contains the fourth derivative of the positions, in which
     noise dominates at high frequency. The filter runs forwards and backwards, without a time
@@ -170,7 +170,7 @@ def within_band(motion: Motion, x: FloatArray) -> FloatArray:
 
 
 def smoothed(motion: Motion) -> Motion:
-    """Remove frequencies beyond the band of a motion from q, dq and ddq."""
+    """Remove frequencies above the band of a motion from q, dq and ddq."""
     q, dq, ddq = (within_band(motion, x) for x in (motion.q, motion.dq, motion.ddq))
     return replace(motion, q=q, dq=dq, ddq=ddq)
 

@@ -29,11 +29,11 @@ class JointElasticity(Displacing):
     """
     Elastic transmission, q_link = q_motor - tau / K, with K = 1 / compliance.
 
-    The first order of the torque is -(dtau/dq tau + dtau/ddq dtau/dt + M d^2tau/dt^2) / K, summed
-    over the elastic joints. A damper D beside the spring makes the twist follow the torque with
-    the retardation time D / K. Confounded with time_delay and torque_lag at low frequency, with an
-    elastic base; a sweep through antiresonance and resonance, or an encoder at the link,
-    distinguishes them.
+    To first order, the torque changes by -(dtau/dq tau + dtau/ddq dtau/dt + M d^2tau/dt^2) / K,
+    summed over the elastic joints. With a damper D parallel to the spring, the twist follows the
+    torque with the retardation time D / K. Confounded with time_delay and torque_lag at low
+    frequency, and with an elastic base; a sweep through antiresonance and resonance, or an encoder
+    at the link, distinguishes them.
     Source: Spong 1987.
 
     """
@@ -74,9 +74,9 @@ class Backlash(Displacing):
     Free play of a gear, q_link = q_motor - b / 2 on the loaded flank.
 
     When the load changes its sign, the link leaves its flank and crosses to the other flank, with
-    the acceleration load / M_jj relative to the motor, and lands without a bounce. The width of
-    the gap determines two things: the size of the torque, which is linear in the play, and the
-    duration of a crossing, which is the shape. Both are equal for a real gap. Confounded with
+    the acceleration load / M_jj relative to the motor, and lands without a bounce. The
+    torque is linear in the quantity ``backlash``; the shape ``crossing_width`` determines the
+    duration of a crossing. Both are equal for a real gap. Confounded with
     presliding_hysteresis and with a hardening spring; reversals with and without load, or an
     encoder at the link, distinguish them.
     Source: Nordin and Gutman 2002.
@@ -91,7 +91,7 @@ class Backlash(Displacing):
     instantaneous = False
 
     def displacements(self, motion: Motion, arm: Arm) -> Displacement:
-        """Return the negative motor position in the gap over its width, and its derivatives."""
+        """Return minus the motor position in the gap, as a share, and its derivatives."""
         (width,) = self.shape_over_joints(arm.robot)
         load = arm.load(motion)
         inertia = np.diagonal(arm.load_derivatives(motion)[2], axis1=1, axis2=2)
@@ -113,7 +113,7 @@ class Backlash(Displacing):
 
 
 def place_in_gap(t: FloatArray, pull: FloatArray, width: float) -> FloatArray:
-    """Return the position between two stops of a body under an acceleration, shape (N,)."""
+    """Return the position of an accelerated body between two stops, shape (N,)."""
     speed = cumulative_trapezoid(pull, t, initial=0.0)
     way = cumulative_trapezoid(speed, t, initial=0.0)
     times, speeds, ways = t.tolist(), speed.tolist(), way.tolist()
