@@ -1,3 +1,3 @@
 # Copyright 2026 The armid_ros developers
 # SPDX-License-Identifier: Apache-2.0
-"""Elastic joints after the source of the shipped two-link arm: identified and reported."""
+"""Elastic joints, as in the paper on the two-link arm: identification and report."""

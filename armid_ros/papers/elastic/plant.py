@@ -84,7 +84,7 @@ def run_elastic(plant: Plant, loop: VelocityLoop, experiment: Experiment) -> Ela
     """
     Run one experiment from rest, one row per step, and return the true motion.
 
-    The loop sees the true velocity of the motors; the torque is held within the limits of the
+    The loop uses the true velocity of the motors, and the torque stays within the limits of the
     robot. Accelerations of the motors are not measured, and set to zero.
 
     Raises
@@ -132,8 +132,8 @@ def resonance_experiments(
     Return experiments that excite all joints through their resonances, in many poses.
 
     The motors follow a slow sine of velocity under a loop of low gain, so that friction rarely
-    changes its sign. A multisine of torque is added. Poses are random, around the stretched arm,
-    in which the interaction of the joints is largest.
+    changes its sign. A multisine of torque is added. Poses are random around the stretched arm,
+    where the interaction of the joints is largest.
 
     Parameters
     ----------

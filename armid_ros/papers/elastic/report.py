@@ -43,7 +43,7 @@ from armid_ros.robots.two_link import TwoLinkParameters
 import numpy as np
 import numpy.typing as npt
 
-#: Largest difference of measured decoupled response and model for a good grade [dB rms].
+#: Largest rms difference between measured decoupled response and model for a good grade [dB].
 _CLOSE_DB = 0.5
 
 
@@ -118,7 +118,7 @@ def verdict(result: TwoInertiaIdentification) -> VerdictSection:
             'rms by tuning, noise included.'
         )
         beware.append(
-            'Viscous friction of link and motor are known as a sum; their shares are not.'
+            'Only the sum of the viscous friction of link and motor is known, not the shares.'
         )
     if poor:
         step = f'Look at the frequency responses of {", ".join(poor)}.'
@@ -336,7 +336,7 @@ def steps_section(tuning: Tuning) -> ContentSection:
 
 
 SCHEMA = 'armid/elastic/1'
-#: Parameters that step responses determine well; friction and spring damping are less certain.
+#: Parameters that step responses determine well, unlike friction and spring damping.
 MAIN = ('alpha', 'beta', 'gamma', 'mm', 'kg')
 
 

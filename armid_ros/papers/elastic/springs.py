@@ -82,7 +82,7 @@ def verdict(found: Sequence[SpringEstimate]) -> VerdictSection:
     if lost:
         beware.append(f'{", ".join(lost)}: the twist does not depend on the load.')
     if not known:
-        shown = ['No joint shows a spring.']
+        shown = ['No spring was identified.']
         return VerdictSection('not identifiable', 'bad', shown, beware, step=step)
     softest = min(known, key=lambda one: one.transmission.stiffness[0])
     value, low, high = softest.transmission.stiffness

@@ -3,9 +3,10 @@
 """
 Springs between two machines: online identification, and slack of the straps.
 
-A strap with slack pulls with k (|D| - slack) along D if |D| exceeds the slack, and not otherwise.
-The torque is nonlinear in the slack, so the stiffness is fitted at several slacks. A parabola
-through the best fit and its neighbours gives the slack, and its curvature the standard deviation.
+A strap with slack pulls with k (|D| - slack) along D if |D| exceeds the slack; otherwise the force
+is zero. The torque is nonlinear in the slack, so the stiffness is fitted at several slacks. A
+parabola through the best fit and its neighbours gives the slack; its curvature gives the standard
+deviation.
 
 """
 
@@ -56,7 +57,7 @@ class Slack:
 
 def find_slack(problem: Callable[[float], InteractionProblem]) -> Slack:
     """
-    Fit the slack that all ties share, and their stiffnesses with it.
+    Fit one slack of all ties, together with their stiffnesses.
 
     Parameters
     ----------
@@ -74,7 +75,7 @@ def find_slack(problem: Callable[[float], InteractionProblem]) -> Slack:
     # [m]; largest plausible slack of a strap
     best = min((0.0, 0.001, 0.002, 0.004, 0.006), key=misfit)
     bend = np.inf
-    # steps on either side of the best slack [m]
+    # steps below and above the best slack [m]
     for step in (5e-4, 2e-4):
         centre = max(best, step)
         lower, middle, upper = (misfit(centre + k * step) for k in (-1, 0, 1))
@@ -169,8 +170,8 @@ class OnlineInteraction:
     ) -> None:
         if not (memory >= 3.0 and 0.0 < period <= memory and slack_period > 0.0):
             raise IdentificationError(
-                f'a memory of {memory:g} s and estimates every {period:g} s: the memory has to be '
-                'at least 3 s, and no shorter than the time between estimates'
+                f'a memory of {memory:g} s and estimates every {period:g} s: the memory has to '
+                'be at least 3 s and at least the time between estimates'
             )
         self.machines, self._inertias = machines, inertias
         self._memory, self._period, self._slack_period = memory, period, slack_period

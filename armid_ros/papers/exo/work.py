@@ -57,7 +57,7 @@ def record(
 
 
 def walk(pair: TiedPair, gait: Gait, stiffness: float | None, tick: Tick) -> SimulatedWalk:
-    """Simulate the walking pair, with joints driven by torque."""
+    """Simulate the walking pair, and its torque-driven joints."""
     tick(0.6, 'walking a whole cycle')
     walkers = walking_pair(stiffness)
     cycle, rate = gait_cycle(walkers, gait), read_assumptions()['torque_rate'].value
@@ -106,7 +106,7 @@ def single_support(pair: TiedPair, gait: Gait) -> tuple[PairMotion, FloatArray, 
 def recorded_motions(
     pair: TiedPair, machine: Recording, wearer: Recording
 ) -> tuple[PairMotion, FloatArray, str]:
-    """Return the recorded motion; only its positions are shown."""
+    """Return the recorded motion; the report uses only its positions."""
     both = recorded_together(machine, wearer, pair.other)
     assert both.partner is not None
     motions = PairMotion(
@@ -121,7 +121,7 @@ def recorded_motions(
 def exo_document(
     found: list[Interaction], walked: SimulatedWalk | None, source: str
 ) -> dict[str, Any]:
-    """Return springs, and the cycle of simulated data, as the document of exo.json."""
+    """Return springs, and for simulated data the gait cycle, as the document of exo.json."""
     rows = [
         {
             'segment': segment,

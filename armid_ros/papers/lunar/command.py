@@ -10,7 +10,7 @@ from statistics import fmean
 from armid_ros.cli import parameters
 import click
 
-#: Columns of the tables in the terminal, and the keys of the document.
+#: Columns of the tables in the terminal, with the keys of the document.
 _HEADS = {
     'paper': 'paper',
     'against noise': 'against_noise',

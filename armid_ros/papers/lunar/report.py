@@ -1,6 +1,6 @@
 # Copyright 2026 The armid_ros developers
 # SPDX-License-Identifier: Apache-2.0
-"""The report and the document of the lunar paper, repeated."""
+"""The report and the document of the reproduction of the lunar paper."""
 
 from __future__ import annotations
 
@@ -93,7 +93,7 @@ def _load(found: Reproduction) -> str:
 def tables_section(repeated: Sequence[Repeated]) -> ContentSection:
     """Return a section with the tables of paper and reproduction, joint by joint."""
     text = (
-        'Peak: as the paper prints it, and the largest gravity torque of the joint. Errors are '
+        'Peak: from the paper, and the largest gravity torque of the joint. Errors are '
         'those of held-out trajectories against the true torque; noisy: against the noisy torque '
         "of the run, as the paper may have it. Gravity: the gravity model, the paper's method. "
         'Dynamics: the full dynamics.'

@@ -9,8 +9,8 @@ real arm on Earth. The torque columns are peaks; the percentage is the RMSE as a
 The arm of the paper's Table 2 runs one designed trajectory, slowly, with torque noise as large as
 the paper's errors. The arm is identified with gravity torques alone, as in the paper, and with the
 full dynamics. The description has masses that are 20 % too small. Errors are relative to the true
-torque along held-out trajectories. Errors against the noisy torque of the run are given as well,
-as the paper may have used them.
+torque along held-out trajectories. Errors relative to the noisy torque of the run are given as
+well, as the paper may have used these.
 
 """
 
@@ -184,7 +184,7 @@ class Repeated:
 @dataclass(frozen=True)
 class Composite:
     """
-    One of the minimal gravity parameters.
+    One minimal gravity parameter.
 
     Attributes
     ----------

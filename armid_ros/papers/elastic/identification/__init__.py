@@ -3,8 +3,9 @@
 """
 Identification of two links with elastic transmissions, in three steps.
 
-Rigid least squares; subspaces of each joint on its own, with computed interaction torques as
-inputs; physical parameters, tuned to closed-loop step responses. ``identify_two_inertia`` runs all
+Step 1 is rigid least squares. Step 2 is subspace identification of each single joint, with
+computed interaction torques as inputs. Step 3 gives physical parameters and tunes them to
+closed-loop step responses. ``identify_two_inertia`` runs all
 three steps. Source: Oaki and Adachi 2008.
 
 """

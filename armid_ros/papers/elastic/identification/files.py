@@ -3,11 +3,11 @@
 """
 Experiments with a two-link arm as bags.
 
-/joint_states (or /motor/joint_states) has positions, velocities and torques of the motors as seen
-at the joints, /link/joint_states positions and velocities of the links, /reference/joint_states
-the reference velocities of the loops. An Imu topic per link has the accelerometer on the axis of
-the link, x outwards and y sideways. An experiment is a stretch with nonzero reference velocity;
-rest or a pause in the timestamps ends it.
+/joint_states (or /motor/joint_states) has positions, velocities and torques of the motors,
+converted to the joint side. /link/joint_states has positions and velocities of the links, and
+/reference/joint_states the reference velocities of the loops. An Imu topic per link has the
+accelerometer on the axis of the link, x outwards and y sideways. An experiment has nonzero
+reference velocity; rest or a pause in the timestamps ends it.
 
 """
 
@@ -154,7 +154,7 @@ def _motor_topic(path: str | Path, settings: ReadSettings) -> str:
 def _experiments(
     t: FloatArray, moving: npt.NDArray[np.bool_], period: float
 ) -> list[tuple[int, int, int]]:
-    """Return stretches of motion: last sample at rest, first sample of motion, and end."""
+    """Return parts with motion: last sample at rest, first sample of motion, and end."""
     # time of rest between two experiments [s]
     pause, shortest = round(0.1 / period), round(_SHORTEST / period)
     found = []
@@ -175,7 +175,7 @@ def _common(
 ) -> npt.NDArray[np.int64]:
     """Return the timestamps that all topics share [us]; some messages may be lost."""
     common: npt.NDArray[np.int64] = reduce(np.intersect1d, stamps)
-    # least share of samples with a common timestamp on all topics
+    # smallest share of samples with a common timestamp on all topics
     if len(common) < 0.9 * max(map(len, stamps)):
         counts = ', '.join(f'{name} ({len(s)})' for name, s in zip(names, stamps, strict=True))
         raise RecordingError(

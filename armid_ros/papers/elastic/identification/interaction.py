@@ -3,15 +3,15 @@
 """
 Steps 2 and 3a: single joints, with the interaction torque of the other link as input.
 
-Keep alpha for link 1 and beta for link 2 and call the rest of the link equations interaction
-torques ti; then alpha v1' + dl1 v1 = tau_g1 - ti1 and beta v2' + dl2 v2 = tau_g2 - ti2, which are
-two independent one-link systems with two inertias each.
+The inertia of link 1 is alpha, that of link 2 is beta; all other terms of the link equations are
+interaction torques ti. Then alpha v1' + dl1 v1 = tau_g1 - ti1 and beta v2' + dl2 v2 = tau_g2 -
+ti2, which are two independent one-link systems with two inertias each.
 
 Their physical parameters follow from the identified frequency responses. The initial value comes
 from the antiresonance and the resonance of the motor's velocity and from its slope below them:
 wa^2 = kg / J, wr^2 = kg (1 / J + 1 / Jm), v_m / tau -> 1 / ((Jm + J) s). Least squares on the
-logarithms of the responses to both inputs follow. The interaction torque has a free gain, so that
-an error of its scale does not bias the parameters of the joint.
+logarithms of the responses to both inputs follow. The interaction torque has a free gain, so an
+error of its scale does not bias the joint's parameters.
 
 """
 
@@ -34,9 +34,10 @@ import numpy.typing as npt
 from scipy.optimize import least_squares
 from scipy.signal import csd
 
-#: States of a motor and a link on a spring, seen by their velocities.
+#: Number of states of motor, spring and link that the velocities determine.
 ORDER = 3
-_HOLD: tuple[Hold, Hold] = ('zero', 'first')  # drives hold their torque, links move smoothly
+#: Drives hold their torque between samples, and links move smoothly.
+_HOLD: tuple[Hold, Hold] = ('zero', 'first')
 
 
 def link_columns(q: FloatArray, dq: FloatArray, ddq: FloatArray) -> FloatArray:
@@ -152,8 +153,8 @@ def measured_response(
     """
     Estimate the frequency response from all inputs to all outputs by averaged spectra (H1).
 
-    The estimate needs no model and no order. The first input is held between samples; its response
-    is that to the continuous, held signal.
+    The estimate needs neither model nor order. The first input is held between samples; its
+    response is the response to the continuous held signal.
 
     Parameters
     ----------
@@ -198,7 +199,7 @@ def coupled_response(
     parameters: TwoLinkParameters, angles: npt.ArrayLike, frequency: npt.ArrayLike
 ) -> npt.NDArray[np.complex128]:
     """
-    Return the response of each motor velocity to its own motor torque, joints coupled.
+    Return the response of each motor velocity to its own motor torque, with coupled joints.
 
     Parameters
     ----------
@@ -228,7 +229,7 @@ def coupled_response(
 
 
 def decibel_error(found: npt.NDArray[np.complex128], wanted: npt.NDArray[np.complex128]) -> float:
-    """Return the root mean square difference of the magnitudes of two responses [dB]."""
+    """Return the rms difference of the magnitudes of two responses [dB]."""
     difference = 20.0 * np.log10(np.abs(found) / np.abs(wanted))
     return float(np.sqrt(np.mean(difference**2)))
 

@@ -3,9 +3,9 @@
 """
 Springs of any arm, joint by joint, from encoders on both sides of its transmissions.
 
-The twist of motor against link is compliance times the torque in the transmission, plus half the
-backlash to the side of the flank that carries the load. A part of the twist in proportion to the
-velocity is fitted as well, for a delay between the encoders.
+The twist between motor and link is compliance times transmission torque, plus half the backlash
+towards the loaded flank. A twist proportional to the velocity is fitted as well, for a delay
+between the encoders.
 
 The torque of a spring is that of inverse dynamics along the motion of the links. The rest of the
 motor torque is rotor inertia, viscous and Coulomb friction. Both models are linear, and slow
@@ -99,7 +99,7 @@ def fit_transmission(records: Sequence[TwoEncoders], rng: np.random.Generator) -
     # number of draws of bootstrap blocks
     draws = [rng.choice(len(blocks), len(blocks)) for _ in range(400)]
     backlash, correlation = (np.nan, -np.inf, np.inf), np.nan
-    # least number of flank changes for an estimate of free play
+    # smallest number of flank changes for an estimate of free play
     if reversals < 4:
         table[:, 1] = 0.0
     found, spread = _drawn(table, twist, blocks, draws)
@@ -107,7 +107,7 @@ def fit_transmission(records: Sequence[TwoEncoders], rng: np.random.Generator) -
         backlash = _interval(2.0 * found[1], 2.0 * spread[:, 1])
         correlation = float(np.corrcoef(spread[:, 0], spread[:, 1])[0, 1])
     left = twist - table @ found
-    # the interval of a stiffness has no end if that of the compliance contains zero
+    # the interval of the stiffness is unbounded if that of the compliance contains zero
     compliance, lower, upper = _interval(found[0], spread[:, 0])
     stiffness = [1.0 / c if c > 0.0 else np.inf for c in (compliance, upper, lower)]
     return TransmissionFit(
@@ -142,7 +142,7 @@ def _columns(record: TwoEncoders) -> tuple[FloatArray, FloatArray, FloatArray, i
 def _stacked_recordings(
     pieces: Sequence[tuple[FloatArray, FloatArray, FloatArray, int]],
 ) -> tuple[FloatArray, FloatArray, list[IntArray]]:
-    """Stack recordings, with one slope and offset per recording, and cut them into blocks."""
+    """Stack recordings, with own slope and offset of each, and cut them into blocks."""
     rows = sum(len(twist) for _, twist, _, _ in pieces)
     shared, count = pieces[0][0].shape[1] - 2, len(pieces)
     table = np.zeros((rows, shared + 2 * count))
@@ -184,7 +184,7 @@ def _interval(value: float, spread: FloatArray) -> tuple[float, float, float]:
     return float(value), float(lower), float(upper)
 
 
-#: Shortest stretch without a pause that is used [s].
+#: Shortest used stretch without a pause [s].
 _SHORTEST = 2.0
 
 
@@ -216,7 +216,7 @@ class SpringEstimate:
     def informative(self) -> bool:
         """Whether the twist follows the load, so that the stiffness is identifiable."""
         fit = self.transmission
-        # least R^2 of the twist for an estimate of stiffness
+        # smallest R^2 of the twist for an estimate of stiffness
         return fit.explained > 0.9 and bool(np.isfinite(fit.stiffness).all())
 
     @property

@@ -4,10 +4,10 @@
 Closed-loop velocity responses of the two-link arm, with exact derivatives by its parameters.
 
 All runs are integrated together, as arrays. Derivatives are computed by the complex step, f(x +
-ih) = f + ih f', through the whole integration, friction included: the real part decides which
-joints slip or stick. The scheme is the plant's: the Pade approximation (2, 2) of the exponential
-for motors, springs and links, the middle of the step for what is not linear. Squire and Trapp 1998
-for the complex step. The thirteen parameters that are tuned are a vector with names.
+ih) = f + ih f', through the whole integration with friction. The real part decides which joints
+slip or stick. The integration is that of the plant: the Pade approximation (2, 2) of the
+exponential for motors, springs and links, and the middle of the step for nonlinear torques. Squire
+and Trapp 1998 for the complex step. The thirteen tuned parameters are a vector with names.
 
 """
 
@@ -24,7 +24,7 @@ from armid_ros.simulation.controller import VelocityLoop
 import numpy as np
 import numpy.typing as npt
 
-#: Quantities that every joint has, in the order of the vector, with name and unit.
+#: Quantities of each joint, in the order of the vector, with name and unit.
 PER_JOINT = (
     ('motor_inertia', 'mm', 'kg m^2'),
     ('stiffness', 'kg', 'N m/rad'),
@@ -59,7 +59,7 @@ def parameter_names(joints: tuple[str, ...]) -> tuple[ParameterName, ...]:
 
 #: Real values, or complex values whose imaginary part is an infinitesimal change.
 DualArray = npt.NDArray[Any]
-#: Imaginary step: its square is lost in rounding, so the derivative has no truncation error.
+#: Imaginary step; its square is below the rounding error, so derivatives have no truncation error.
 _STEP = 1e-30
 #: Number of integration steps per sample.
 _SUBSTEPS = 2
@@ -162,7 +162,7 @@ def _point(parameters: TwoLinkParameters) -> FloatArray:
 def _simulate(
     steps: Steps, values: DualArray, gear: FloatArray, rest: DualArray | None = None
 ) -> DualArray:
-    """Run E experiments with D parameter vectors and initial states each; (N, E, D, 4)."""
+    """Simulate E experiments with D parameter vectors and initial states each; (N, E, D, 4)."""
     experiments, sets = len(steps.q), len(values)
     arm = _Arm(np.tile(values, (experiments, 1)), gear, steps.dt / _SUBSTEPS)
     size = experiments * sets
@@ -271,8 +271,8 @@ def _friction(
     response: DualArray, free: DualArray, level: DualArray, modes: npt.NDArray[np.int_]
 ) -> tuple[DualArray, npt.NDArray[np.int_]]:
     """Return friction torques, (B, 2): Coulomb torque if slipping, holding torque if sticking."""
-    # response: change of velocity at the end of the step per torque; free: what that velocity is
-    # without friction; modes, a first guess: 1 slips forwards, -1 backwards, 0 sticks
+    # response: change of the final velocity per torque; free: final velocity without friction;
+    # modes: initial guess, 1 slips forwards, -1 slips backwards, 0 sticks
     modes = modes.copy()
     for _ in range(16):
         stuck = modes == 0

@@ -3,9 +3,10 @@
 """
 Step 1: the arm with rigid joints, at frequencies far below its resonances.
 
-tau = (M + diag(mm gear^2)) q'' + h + (dl + dm gear^2) q' + fm gear sgn(q'). Identifiable are alpha
-+ mm1 gear^2, beta, gamma, mm2 gear^2, the sums of friction and the Coulomb torques. Motor and link
-inertia of joint 1 are not identifiable apart, nor are motor and link friction of any joint.
+tau = (M + diag(mm gear^2)) q'' + h + (dl + dm gear^2) q' + fm gear sgn(q'). alpha + mm1 gear^2,
+beta, gamma, mm2 gear^2, the sums of friction and the Coulomb torques are identifiable. Of motor
+and link inertia of joint 1, and of motor and link friction of any joint, only the sum is
+identifiable.
 
 """
 
@@ -27,7 +28,7 @@ from scipy.signal import butter, sosfiltfilt
 
 #: Cut-off of the signals [Hz]: about a tenth of the lowest resonance of such arms.
 CUTOFF = 2.5
-#: Length of the ends in which the filter has not settled [s].
+#: Time at both ends in which the filter has not settled [s].
 _ENDS = 0.4
 #: Rows per period of the cut-off frequency.
 _KEPT = 10
@@ -87,7 +88,7 @@ def fit_rigid(runs: Sequence[ElasticRun]) -> RigidFit:
     if not np.all(scale > 0.0):
         raise IdentificationError('the rigid fit needs motion of both joints; one rests')
     sizes = np.linalg.eigvalsh(products / np.outer(scale, scale))
-    # least singular value relative to the largest for identifiable columns
+    # smallest singular value of identifiable columns, relative to the largest
     if sizes[0] < 1e-6**2 * sizes[-1]:
         raise IdentificationError(
             'the slow motion does not make the rigid parameters identifiable; let both joints '
@@ -103,7 +104,7 @@ def fit_rigid(runs: Sequence[ElasticRun]) -> RigidFit:
         *(ParameterName('dl + dm gear^2', joint, 'N m s/rad') for joint in joints),
         *(ParameterName('fm gear', joint, 'N m') for joint in joints),
     )
-    # errors of neighbouring rows are correlated by the filter
+    # the filter correlates errors of neighbouring rows
     rows, target = weighted_rows(problem, solution.weights)
     scores = rows * (target - rows @ solution.values)[:, np.newaxis]
     scores = scores.reshape(-1, len(joints), rows.shape[1]).sum(axis=1)

@@ -1,13 +1,13 @@
 # Copyright 2026 The armid_ros developers
 # SPDX-License-Identifier: Apache-2.0
 """
-Multivariable subspace identification: PO-MOESP, of many experiments at once.
+Multivariable subspace identification (PO-MOESP) from many experiments together.
 
-Poles and output matrix come from the column space of the projection of future on past (Verhaegen
-1994, past inputs and outputs as instruments, `ordinary MOESP` of Verhaegen and Dewilde 1992 with
-past outputs added); the input matrix then follows from a linear regression on whole simulated
-experiments, with free initial states. This implementation supports many experiments, each with its
-initial state, and inputs that vary within a sample, such as interaction torques.
+Poles and output matrix come from the column space of the projection of future on past data. Past
+inputs and outputs are the instruments (Verhaegen 1994; without past outputs, the ordinary MOESP
+of Verhaegen and Dewilde 1992). The input matrix follows from a linear regression on whole
+simulated experiments with free initial states. Each experiment has its own initial state; inputs
+may vary within a sample, as interaction torques do.
 
 """
 
@@ -26,14 +26,14 @@ from scipy.signal import lfilter
 ComplexArray = npt.NDArray[np.complex128]
 #: Interpolation of an input between samples: constant ('zero') or linear ('first').
 Hold = Literal['zero', 'first']
-#: Number of samples of the past, and of the future.
+#: Number of past samples, and of future samples.
 _HORIZON = 24
 
 
 @dataclass(frozen=True, eq=False)
 class StateSpace:
     """
-    A continuous linear system x' = a x + b u, y = c x in its modes.
+    A continuous linear system x' = a x + b u, y = c x in modal coordinates.
 
     Attributes
     ----------
@@ -188,7 +188,7 @@ def _inputs(
         else:
             b[k] = solution[place] + 1j * solution[place + 1]
             twin = int(np.argmin(np.abs(poles - poles[k].conj())))
-            # The eigenvectors of the pair are conjugate, and so are the inputs.
+            # The eigenvectors of a pair of poles are conjugate, and so are their input gains.
             b[twin] = b[k].conj()
             place += 2
     return b

@@ -4,11 +4,12 @@
 The three steps in order, from measured experiments to physical parameters, and step 3b.
 
 Step 3b fits simulated velocity responses to the measured ones: nonlinear least squares in the
-logarithms of the parameters, which are therefore positive. The data determine the sum of the
-viscous frictions of motor and link, dl + dm gear^2, but hardly their ratio. A free ratio makes the
-fit diverge, and a fixed one biases the stiffness. The ratio therefore has a prior with a standard
-deviation of a factor of two. Coulomb torques start from step 1 and are nuisance parameters. An arm
-at rest still vibrates: these initial vibrations are treated as correlated noise of the velocities.
+logarithms of the parameters, which are therefore positive. The data determine the sum of viscous
+friction of motor and link, dl + dm gear^2, but hardly the ratio. With a free ratio the fit
+diverges; a fixed ratio biases the stiffness. The ratio therefore has a prior with a standard
+deviation of a factor of two. Coulomb torques start from step 1 and are nuisance parameters. An
+arm at rest still vibrates. Its initial vibrations are treated as correlated noise of the
+velocities.
 
 """
 
@@ -151,7 +152,8 @@ def tune(
     after = arm(factors)
     found = unpack(after)
     rows, left = jacobian(factors), residual(factors)
-    # residuals are correlated: sum the scores over the channels of a sample, without the prior
+    # residuals are correlated, so scores are summed over the channels of a sample, without the
+    # prior
     white_noise, data = _covariance(rows), len(left) - len(prior)
     scores = (rows * left[:, np.newaxis])[:data].reshape(*measured.shape, -1).sum(axis=2)
     lags = max(1, count // 10)  # residuals are correlated over at most a tenth of an experiment
@@ -211,7 +213,7 @@ def _covariance(jacobian: FloatArray) -> FloatArray:
 @dataclass(frozen=True, eq=False)
 class MeasuredJoint:
     """
-    Frequency responses of one joint as measured: from its motor torque to motor and link velocity.
+    Measured frequency responses of one joint, from its motor torque to motor and link velocity.
 
     Attributes
     ----------

@@ -30,7 +30,7 @@ import numpy as np
 from sensor_msgs.msg import JointState
 
 _TOPICS = ('exo/joint_states', 'human/joint_states')
-#: Fields that are used of the messages of each machine.
+#: Used fields of the messages of each machine.
 _FIELDS = (('position', 'effort'), ('position',))
 #: Warning about joint states that are left out.
 _DAMAGED = DISTURBANCES | {
@@ -53,12 +53,15 @@ class InteractionIdentifierNode(ArmidNode):
     """
 
     table = (
-        NodeParameter('memory', 10.0, 'How much of the past counts.', 's', limits=(3.0, 600.0)),
+        NodeParameter(
+            'memory', 10.0, 'Length of the past that estimates use.', 's', limits=(3.0, 600.0)
+        ),
         NodeParameter('period', 2.0, 'Time between estimates.', 's', limits=(0.1, 600.0)),
         NodeParameter(
             'slack_period',
             30.0,
-            'Between looks for slack, where springs without do not explain the torques.',
+            'Time between fits of slack, made if springs without slack do not explain the '
+            'torques.',
             's',
             limits=(1.0, 3600.0),
         ),
@@ -152,7 +155,7 @@ class InteractionIdentifierNode(ArmidNode):
         for sample in self._signals(machine, message):
             if sample.begins:
                 self.identifier.interrupt()
-                what = f'{topic}: positions step; what was before them is left behind'
+                what = f'{topic}: positions step; earlier samples are discarded'
                 self.complaints.say(f'{topic} step', what)
             q, tau = sample.x[:n], sample.x[n:]
             try:

@@ -1,10 +1,10 @@
 # Copyright 2026 The armid_ros developers
 # SPDX-License-Identifier: Apache-2.0
 """
-The leg pair that is free to walk: gaits, ground, whole cycles, torque-driven joints.
+The walking leg pair: gaits, ground contact, whole cycles, torque-driven joints.
 
-`walking_pair` hangs both bodies from their hips, `walkable` finds the nearest gait without
-slipping feet, `gait_cycle` simulates the pair with this gait, `check_cycle` drives a joint by its
+`walking_pair` gives both bodies floating hips. `walkable` finds the nearest gait without
+slipping feet. `gait_cycle` simulates the pair with this gait. `check_cycle` drives a joint by its
 torque.
 
 """

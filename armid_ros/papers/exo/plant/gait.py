@@ -3,7 +3,7 @@
 """
 Walking: hip, knee and ankle over a gait cycle, and the joint motion of both legs from it.
 
-The values that the source of the shipped leg pair does not give are assumptions with reasons.
+Values that are missing in the source of the leg pair are assumptions with reasons.
 
 The phase of a leg is 0 at heel strike; the other leg is half a cycle later. The stance foot stays
 flat and the trunk upright, so that the stance ankle is knee - hip.
@@ -24,7 +24,7 @@ from armid_ros.files import load_yaml, read_text
 from armid_ros.motion import FloatArray, freeze, Motion
 import numpy as np
 
-#: Number of harmonics of a gait; higher ones are negligible in walking.
+#: Number of harmonics of a gait; higher harmonics are negligible in walking.
 _HARMONICS = 6
 _COLUMNS = ['phase', 'hip_deg', 'knee_deg', 'ankle_deg']
 
@@ -136,7 +136,7 @@ def read_gait(path: Path | None = None) -> Gait:
 
 def stance_motion(gait: Gait, joints: tuple[str, ...], t: FloatArray, phase: FloatArray) -> Motion:
     """
-    Return the motion of a seven-link body on one foot.
+    Return the motion of a seven-link body that stands on one foot.
 
     Parameters
     ----------

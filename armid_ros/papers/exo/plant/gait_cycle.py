@@ -4,14 +4,14 @@
 The whole gait cycle: single and double support of both machines, and ground forces.
 
 Joint motion is prescribed by a walkable gait, and the lean of the trunks is constant. The hips
-move by the forces: weight, springs, and the ground at both heels and toes, (27). Foot contact
-follows from the simulation and is not prescribed. Torques come from Newton and Euler with all
-forces. No force remains on the hips; the moment that remains on the trunk is an external moment
-that prevents a fall.
+move under the forces of weight, springs, and the ground at both heels and toes, equation (27).
+Foot contact follows from the simulation and is not prescribed. Torques come from Newton and Euler
+with all forces. The force on the hips is zero.
 
-The source determines the forces on two feet by a rule, (20) to (22): it splits the trunk between
-the legs by the distances of the thighs from it. A foot then bears weight and inertial force of its
-leg and its share of the trunk, less the spring forces. A single foot bears the total.
+The remaining moment on the trunk is an external moment that prevents a fall. The source
+determines the forces on two feet by equations (20) to (22): the distances of the thighs from the
+trunk divide the trunk between the legs. A foot then bears weight and inertial force of its leg
+and of its share of the trunk, minus the spring forces. A single foot bears the total.
 
 """
 
@@ -91,7 +91,7 @@ class GaitCycle:
     def support(self, *, other: bool = False) -> npt.NDArray[np.int_]:
         """Return the number of feet that bear weight, shape (N,)."""
         robot = self.pair.other if other else self.pair.robot
-        # smallest considered load of a foot
+        # smallest load of a supporting foot
         return np.asarray(np.sum(self.feet(other=other)[:, :, 1] > 0.01 * weight(robot), axis=1))
 
 
@@ -238,7 +238,7 @@ def _course(pair: TiedPair, motion: Motion, other: bool) -> _Course:
 def _walk(
     pair: TiedPair, courses: tuple[_Course, _Course], start: FloatArray, cycle: float
 ) -> tuple[FloatArray, FloatArray]:
-    """Integrate both hips (Runge-Kutta 4); returns states and their rates of the last cycle."""
+    """Integrate both hips (Runge-Kutta 4); return states and their rates in the last cycle."""
     own, far = courses
     masses = np.array([own.mass, own.mass, far.mass, far.mass])
 
@@ -293,8 +293,8 @@ def check_cycle(
     """
     Simulate a cycle in which one joint of the machine is driven by its torque.
 
-    The source applies computed torques in another simulator and reports the errors of hip and
-    knee. The hips are free, and the feet touch the ground.
+    The source does this check in another simulator and gives the errors of hip and knee. The hips
+    are free, and the feet touch the ground.
 
     Parameters
     ----------
@@ -361,7 +361,7 @@ def feet_by_shares(cycle: GaitCycle, *, other: bool = False) -> FloatArray:
     place, taken = place[..., _PLANE], taken[..., _PLANE]
     trunk = floating(robot)[2]
     legs = [columns(robot, side) for side in SIDES]
-    # shares of the trunk, (20) to (22): the leg whose thigh is nearer carries more
+    # shares of the trunk, (20) to (22): the leg with the nearer thigh carries more
     far = np.linalg.norm(place[:, [leg[0] for leg in legs]] - place[:, [trunk]], axis=-1)
     shares = far[:, ::-1] / far.sum(axis=1, keepdims=True)
     springs = cycle.torques.forces[..., _PLANE] * (1.0 if not other else -1.0)
@@ -382,7 +382,7 @@ def ground_by_shares(cycle: GaitCycle) -> FloatArray:
     """
     Return the forces by (20) to (22) on heels and toes of the machine, (N, 4, 2) [N].
 
-    The rule does not give the centre of pressure; that of the simulated ground is used.
+    The equations do not give the centre of pressure, so that of the simulated ground is used.
 
     """
     feet = feet_by_shares(cycle)

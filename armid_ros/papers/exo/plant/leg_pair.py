@@ -6,9 +6,9 @@ Two machines tied by springs: joint torques, spring forces, and motions on one f
 A pair is any two robots with a common base frame. The shipped pair is a man with an exoskeleton,
 tied at both thighs and both shanks.
 
-The exercises of a person for an identification are sums of a few sines of hip and knee of both
-legs; the stance foot is flat and the trunk upright. The machine follows its wearer with less
-amplitude, late, and with joints that are not quite aligned, as assumed.
+Exercises for an identification are sums of a few sines of hips and knees; the stance foot is
+flat and the trunk upright. By assumption, the machine follows its wearer with less amplitude,
+with a delay, and with slightly misaligned joints.
 
 """
 
@@ -83,11 +83,11 @@ class TiedPair(TiedMachines):
         return replace(self, stiffness=np.asarray(stiffness, dtype=float))
 
     def with_slack(self, slack: npt.ArrayLike) -> TiedPair:
-        """Return the pair with looser ties, one number or one for each [m]."""
+        """Return the pair with other slacks of the ties, one number or one for each [m]."""
         return replace(self, slack=np.asarray(slack, dtype=float))
 
     def geometry(self, motion: Motion, other_motion: Motion) -> TieGeometry:
-        """Return the ties along the motions of both."""
+        """Return the geometry of the ties along the motions of both machines."""
         return tie_geometry(self.robot, motion.q, self.other, other_motion.q, self.ties)
 
     def forces(self, way: FloatArray) -> FloatArray:
@@ -194,7 +194,7 @@ def leg_pair(
 
 def walking(pair: TiedPair, gait: Gait, t: FloatArray) -> PairMotion:
     """
-    Return the motion of the walking pair: the wearer follows the gait, the exoskeleton nearly.
+    Return the motion of the walking pair: the wearer follows the gait, the machine nearly does.
 
     At t = 0 single support begins.
 
@@ -278,7 +278,7 @@ EXERCISES = {
     'quick_step': ((0.0,) * 4, (0.0,) * 4, 0.9),
     'swing': ((2.0, 5.0, 10.0, 25.0), (0.0, 0.0, 30.0, 20.0), 1.2),
     'lift': ((2.0, 5.0, 40.0, 50.0), (0.0, 0.0, 35.0, 45.0), 1.2),
-    # with the second foot on a force plate
+    # the second foot is on a force plate
     'squat': ((20.0, 35.0, 20.0, 35.0), (18.0, 30.0, 18.0, 30.0), 1.6),
     'rock': ((0.0, 8.0, 5.0, 15.0), (12.0, 6.0, 12.0, 6.0), 0.9),
 }

@@ -5,7 +5,7 @@ Hybrid dynamics of a tied pair: some joints follow torques, all others a prescri
 
 The source checks its torques in this way: one joint is driven by its torque, and all others are
 prescribed. If all joints are driven by torques alone, the pair is an inverted pendulum and falls.
-The simulated pair steps to and fro in either way.
+The simulated pair steps forward and back in both cases.
 
 """
 
@@ -184,7 +184,7 @@ def _forward_dynamics(
 @dataclass(frozen=True)
 class GaitCheck:
     """
-    Result for one joint driven by its torque, against the prescribed motion.
+    Motion of one torque-driven joint, compared with the prescribed motion.
 
     Attributes
     ----------

@@ -3,18 +3,18 @@
 """
 Walking leg pair: floating hips, ground contact, and gaits without sliding feet.
 
-The root of a description moves from the foot to the trunk, so that either foot can be on the
+The root of the description becomes the trunk instead of a foot, so each foot can be on the
 ground. Two slides and a hinge connect ground and trunk; hip, knee and ankle of each leg follow.
 Bodies, inertias and anatomical angles do not change.
 
-Ground under a foot: F = max(0, k d^e + c d'), with the depth d of a point below the ground; across
-it friction of at most mu F, by a smooth law of the sliding speed. It is the contact that the
-source gives in its Table 3 (IMPACT of ADAMS): k = 100 N/mm^1.5, e = 1.5, c = 1 N s/mm, the damper
-at work as soon as there is contact (penetration depth 0), mu = 0.3.
+Ground under a foot: F = max(0, k d^e + c d'), with the depth d of a point below the ground;
+tangential friction is at most mu F, a smooth function of the sliding speed. This contact is from
+Table 3 of the source (IMPACT of ADAMS): k = 100 N/mm^1.5, e = 1.5, c = 1 N s/mm, mu = 0.3. The
+damper acts from the first contact (penetration depth 0).
 
-Published curves of hip, knee and ankle do not fit segments of given lengths: feet on the ground
-would slide and sink by centimetres. Least squares find the nearest curves without this error,
-together with the path of the hips.
+Published curves of hip, knee and ankle do not fit segments of given lengths, as feet on the
+ground would slide and sink by centimetres. Least squares find the nearest curves without this
+error, and the path of the hips.
 
 """
 
@@ -33,7 +33,7 @@ import numpy.typing as npt
 import pinocchio as pin
 from scipy.optimize import least_squares
 
-#: Harmonics of the curves; the hips have only even ones, because both legs move alike.
+#: Harmonics of the curves; hips have only even ones, because both legs make the same motion.
 _HARMONICS = 8
 _SAMPLES = 100
 #: Intervals with heel and toe on the ground, in cycles since heel strike.
@@ -237,8 +237,8 @@ def ground_force(height: FloatArray, rising: FloatArray, sliding: FloatArray) ->
     depth = np.maximum(-height, 0.0)
     pressed = 100.0 * 1e3**1.5 * depth**1.5 - 1000.0 * rising
     up = np.where(height < 0.0, np.maximum(pressed, 0.0), 0.0)
-    # sliding speed at three quarters of the largest friction; the source does not describe the
-    # transition from rest to sliding
+    # sliding speed at 3/4 of the largest friction; the source does not describe the transition
+    # from rest to sliding
     creep = read_assumptions()['ground_creep'].value
     return np.stack([-0.3 * up * np.tanh(sliding / creep), up], axis=-1)
 
@@ -249,7 +249,7 @@ FLOATING = ('forward', 'up', 'lean')
 _LEG = ('hip', 'knee', 'ankle')
 #: Links of a leg and their axes: flexion and dorsiflexion are positive.
 _LINKS, _AXES = ('thigh', 'shank', 'foot'), ('0 -1 0', '0 1 0', '0 -1 0')
-#: Springs of a walking pair, as many as there are thighs and shanks.
+#: Number of springs of a walking pair: one per thigh and shank.
 SEGMENTS = tuple(f'{side}_{link}' for side in SIDES for link in ('shank', 'thigh'))
 
 

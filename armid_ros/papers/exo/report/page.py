@@ -28,7 +28,7 @@ from armid_ros.report.page import Page, Section
 from armid_ros.report.provenance import Provenance
 import numpy as np
 
-#: Intervals wider than this share of the value are called poor.
+#: Share of the value above which the width of its interval is poor.
 _NARROW = 0.1
 
 
@@ -96,7 +96,7 @@ def verdict(found: Sequence[Interaction], walked: SimulatedWalk | None) -> Verdi
         [f'{", ".join(weak)}: the extension is too small for an accuracy of 10 %.'] if weak else []
     )
     if k - reach <= 0.0:
-        return VerdictSection('no interaction', 'fair', ['No interaction is seen.'], beware)
+        return VerdictSection('no interaction', 'fair', ['No interaction was identified.'], beware)
     sure = reach < _NARROW * k
     return VerdictSection(
         'found' if sure else 'uncertain', 'good' if sure else 'fair', sentences, beware
@@ -141,7 +141,7 @@ def _range(values: FloatArray) -> str:
 def forces_section(
     pair: TiedPair, motions: PairMotion, abscissa: FloatArray, name: str
 ) -> ContentSection:
-    """Return a section with the spring forces, and their part of the torques."""
+    """Return a section with the spring forces, and their contributions to the torques."""
     torques = pair_torques(pair, *motions)
     alone = pair_torques(pair.with_stiffness(0.0), *motions)
     size = np.linalg.norm(torques.forces, axis=2)

@@ -57,7 +57,7 @@ class Driven:
 @dataclass(frozen=True)
 class SimulatedWalk:
     """
-    Truth of a simulated pair.
+    True values of a simulated pair.
 
     Attributes
     ----------
@@ -166,7 +166,7 @@ class Walk(Section):
 
 
 def feet_section(cycle: GaitCycle) -> ContentSection:
-    """Return a section with forces on the feet, simulated and by the source's rule."""
+    """Return a section with forces on the feet, from the simulation and from the source's rule."""
     text = (
         "Forces of the ground on the feet, by the contact law of the source's Table 3 "
         '(100 N/mm^1.5, 1 N s/mm, friction 0.3). Vertical lines: changes between one and two feet '
