@@ -3,6 +3,6 @@
 """
 Reports of results, for a person to read.
 
-A `page.Page` of `page.Section`s is the frame of every report; a module `*_report` makes each.
+Every report is a `page.Page` of `page.Section`s, made by a module `*_report`.
 
 """

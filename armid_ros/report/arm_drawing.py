@@ -3,8 +3,8 @@
 """
 Drawings of an arm with gravity downwards: outlines of its collision bodies, far bodies first.
 
-An arm without bodies is drawn as bars from each joint to the joints that it carries; the last bar
-ends beyond its centre of mass.
+An arm without bodies is drawn as bars from each joint to the next joints. The last bar ends
+beyond its centre of mass.
 
 """
 
@@ -30,7 +30,7 @@ _MARGIN = 0.03
 _ROUND = 16
 #: Colour of obstacles.
 OBSTACLE = 'var(--line)'
-#: Smaller bodies represent links without a body, and are not drawn [m].
+#: Largest size of the bodies that represent links without a body; they are not drawn [m].
 _POINT = 1e-3
 #: Height of a line of text [px].
 _LINE = 16.0
@@ -42,9 +42,9 @@ def _view(azimuth: float, elevation: float) -> FloatArray:
     return np.array([[-sa, ca, 0.0], [-ca * se, -sa * se, ce], [ca * ce, sa * ce, se]])
 
 
-#: From the left, x to the right and z up.
+#: View from the left: x to the right, z up.
 SIDE = _view(-np.pi / 2.0, 0.0)
-#: From the front right and above.
+#: View from the front right and above.
 CORNER = _view(np.radians(-55.0), np.radians(18.0))
 
 

@@ -252,7 +252,7 @@ class Legend(Templated):
 @dataclass(frozen=True)
 class SmallMultiples(Templated):
     """
-    Small pictures of one kind, as many in a row as there is room for.
+    Small pictures of one kind; the width of the page determines their number in a row.
 
     Attributes
     ----------

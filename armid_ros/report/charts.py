@@ -176,7 +176,7 @@ def joined(parts: Sequence[FloatArray]) -> FloatArray:
 
 
 def joined_time(parts: Sequence[FloatArray]) -> FloatArray:
-    """Return times to go with ``joined`` values; at a break, the time of the sample before."""
+    """Return the times of ``joined`` values; at a break, the time of the previous sample."""
     pieces = [part for stretch in parts for part in (stretch, stretch[-1:])]
     return read_only(np.concatenate(pieces[:-1]))
 
@@ -186,7 +186,7 @@ def rounded(values: npt.ArrayLike) -> list[float | None]:
     array = np.asarray(values, dtype=float)
     finite = array[np.isfinite(array)]
     span = float(np.ptp(finite)) if len(finite) else 0.0
-    # values are written with this share of their range as the last digit, a tenth of a pixel
+    # resolution of written values as a share of their range, a tenth of a pixel
     step = 2e-5 * (span or (abs(float(finite[0])) if len(finite) else 1.0) or 1.0)
     decimals = int(np.ceil(-np.log10(step)))
     return [round(value, decimals) if np.isfinite(value) else None for value in array.tolist()]

@@ -29,9 +29,9 @@ from armid_ros.report.provenance import ResultOrigin
 #: Columns of the table of changes.
 HEADS = ('parameter', 'before', 'after', 'difference, 95 %')
 _WHY = {
-    'motion': 'the motion of the {other} does not show {them}',
+    'motion': 'the motion of the {other} does not identify {them}',
     'effect': 'the model of the {other} does not have {them}',
-    'deviation': 'the {other} has no standard deviations to make those of {them} from',
+    'deviation': 'the {other} lacks the standard deviations that {them} need',
     'grouping': 'the data of the {other} group parameters differently',
 }
 
@@ -117,7 +117,7 @@ def tell(comparison: Comparison) -> tuple[str, ...]:
         before, after = comparison.before.source, comparison.after.source
         named = ', '.join(f'{joint} {factor:.3g}' for joint, factor in comparison.factors.items())
         lines.append(
-            f'Inertia and friction of {after} are those of {before} times one factor a joint '
+            f'Inertia and friction of {after} are those of {before} times one factor per joint '
             f'({named}). Torques of one of the two are in another unit, or are currents, as '
             'drivers change with their version. Convert them with --current-gain, and identify '
             'again.'
@@ -136,7 +136,7 @@ def tell(comparison: Comparison) -> tuple[str, ...]:
     rigid = [c for c in changed if c.parameter.rigid]
     if comparison.load is None and len(rigid) >= 3 and len(rigid) > len(changed) - len(rigid):
         lines.append(
-            f'Mostly inertial parameters changed, most clearly at {rigid[0].parameter.joint}: a '
+            f'Mainly inertial parameters changed, most clearly at {rigid[0].parameter.joint}: a '
             'tool or load was added or removed, or gravity or mounting differ.'
         )
     if not comparison.anything:
@@ -256,12 +256,12 @@ def _beware(comparison: Comparison) -> tuple[str, ...]:
         if given.covariance is None:
             lines.append(
                 f'{given.source} has standard deviations without covariance. Parameters are '
-                'compared one by one, so joint changes of several are missed.'
+                'compared one by one, so changes of several parameters together are missed.'
             )
     fits = comparison.before.fit, comparison.after.fit
     if all(fits) and not comparison.residuals:
         lines.append(
-            'Residuals are not compared: the files have them of other rows, or not by joint.'
+            'Residuals are not compared: those of the files are of other rows, or not by joint.'
         )
     known = comparison.before.kinematics and comparison.after.kinematics  # one robot, then
     if not known and comparison.before.robot != comparison.after.robot:

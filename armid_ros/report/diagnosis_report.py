@@ -1,6 +1,6 @@
 # Copyright 2026 The armid_ros developers
 # SPDX-License-Identifier: Apache-2.0
-"""The report of a diagnosis: the story first, then the evidence, then the data."""
+"""The report of a diagnosis: first the summary, then the evidence, then the data."""
 
 from __future__ import annotations
 
@@ -56,7 +56,7 @@ import numpy as np
 
 #: Colour of each verdict; the others are bad.
 _TONES = {'consistent': 'good', 'named': 'good', 'ambiguous': 'fair', 'partial': 'fair'}
-#: Joints of the gap that are listed one by one.
+#: Largest number of joints with a gap that are listed one by one.
 _JOINTS = 2
 
 
@@ -402,7 +402,7 @@ def _of_recording(gap: Gap, shown: Overlay, joint: int) -> tuple[FloatArray, ...
 
 def whole_overlays(diagnosis: Diagnosis, recordings: Sequence[Recording]) -> Gap | None:
     """
-    Return the gap with curves of whole recordings if a cause acts part of the time.
+    Return the gap with curves of whole recordings if a cause acts only for some time.
 
     Parameters
     ----------

@@ -144,7 +144,7 @@ def _verdict(
     checked: Fitness,
     notes: Sequence[str],
 ) -> VerdictSection:
-    """Return the verdict: parameters seen, the worst known one, and clearance."""
+    """Return the verdict: identifiable parameters, the least accurate one, and clearance."""
     settings, links = design.settings, robot.links
     unseen = [
         full_label(name, links)

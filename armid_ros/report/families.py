@@ -29,7 +29,7 @@ import numpy as np
 
 #: A parameter of a rigid body, and the number of its link.
 _SYMBOL = re.compile(r'\b(m[xyz]?|I[xyz]{2})(\d+)\b')
-#: Heads of the columns of friction, and the parameters in them.
+#: Heads of the columns of friction, and the parameters in the columns.
 _FRICTION = {'viscous': 'viscous_coefficient', 'Coulomb': 'coulomb_torque'}
 
 

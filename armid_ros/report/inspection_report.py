@@ -114,7 +114,7 @@ def headline(remarks: Sequence[Remark], found: LinkCheck | None) -> tuple[str, .
         first = f'The recording cannot check the links: {found.fault.rstrip(".")}.'
     elif found.agrees:
         first = 'The links of the URDF agree with the recording.'
-    elif found.explained < 0.9:  # share of the difference below which links are not the cause
+    elif found.explained < 0.9:  # with a smaller share, links are not the cause
         first = 'The URDF differs from the recording in more than three links.'
     else:
         known = [text for k in found.wrong if (text := _wrong_mass(found, k))]
@@ -321,7 +321,7 @@ def joint_rows(found: Inspection) -> list[tuple[str, ...]]:
     rows = []
     for joint, unit in zip(found.joints, found.units, strict=True):
         step = f'{joint.step:.2g}' if joint.step else '-'
-        if 0.0 < joint.step < 1e-7:  # [rad or m]; no encoder of an arm resolves less
+        if 0.0 < joint.step < 1e-7:  # [rad or m]; smaller than the step of any encoder of an arm
             step = '< 1e-7'
         efforts = (joint.effort_rms, joint.effort_largest)
         rows.append(

@@ -17,8 +17,8 @@ from armid_ros.report.notation import counted, digits, plain
 from armid_ros.report.statistics import explained_shares, TELLING_SHARE, Whiteness
 import numpy as np
 
-#: Condition numbers below which an excitation is good, as is the usual advice (Presse and Gautier
-#: 1993), and from which on it is weak.
+#: Condition numbers: an excitation is good below the first (Presse and Gautier 1993), and weak
+#: above the second.
 GOOD_CONDITION, WEAK_CONDITION = 100.0, 1000.0
 
 
@@ -127,15 +127,15 @@ def _of_errors(
     if held_out is None:
         yield '', 'Record another motion of armid excite, and test the model on it: --validate.'
     else:
-        # the same residual is a larger share of a weaker torque
+        # the same residual is a larger share of a smaller torque
         stronger = np.linalg.norm(held_out.torque_rms) / np.linalg.norm(training.torque_rms)
         ratio = held_out.relative_error_percent / max(training.relative_error_percent, 1e-9)
         ratio *= min(float(stronger), 1.0)
         if ratio > 1.3:  # the model is fitted to the noise
             yield (
                 f'The held-out residual is {digits(ratio)} times the training residual, in N m '
-                'and relative to the torque: the model overfits, the held-out motion leaves its '
-                'range, or the arm has changed.',
+                'and relative to the torque: the model overfits, the held-out motion leaves the '
+                'range of the training data, or the arm has changed.',
                 'Train on more recordings, over all poses and speeds that matter. If the arm '
                 'may have changed, run armid diagnose.',
             )

@@ -21,10 +21,11 @@ DASH = '\N{EN DASH}'
 _NO_NUMBER = 1e12
 #: Terms with a tooltip.
 TERMS = {
-    'floor': 'Error that a perfect model would have: noise, or what the model before had.',
+    'floor': 'Error that a perfect model would have: noise, or the error of the previous model.',
     'gap': 'Squared torque error of the given model, each joint in units of its floor.',
     'held out': 'Not used to fit the model.',
-    'condition number': 'How unevenly the motion shows the parameters; below 100 is good.',
+    'condition number': 'Ratio of the best to the worst excited direction of parameters; below '
+    '100 is good.',
 }
 
 
@@ -49,7 +50,7 @@ def plain(value: float, count: int = 3) -> str:
 
 
 def measured(value: float, reach: float) -> tuple[str, str]:
-    """Format a value and the half-width of its interval with as many digits as are significant."""
+    """Format a value and the half-width of its interval with their significant digits."""
     if not (math.isfinite(reach) and reach > 0.0):
         return f'{value:.4g}', '0'
     decimals = max(0, 1 - math.floor(math.log10(reach)))
@@ -151,7 +152,7 @@ def common_prefix(names: Sequence[str]) -> str:
     """
     first = names[0] if len(names) > 1 else ''
     ends = [first[: found.end()] for found in re.finditer(r'[_/.:-]', first)]
-    # shortest prefix of names that is omitted [letters]
+    # shortest prefix that is omitted from names [letters]
     rests = {end: [name.removeprefix(end) for name in names] for end in ends if len(end) > 5}
     shared = [end for end in rests if all(name.startswith(end) for name in names)]
     return max((end for end in shared if all(r[:1].isalpha() for r in rests[end])), default='')

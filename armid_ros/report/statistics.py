@@ -109,11 +109,11 @@ def torque_reach(result: Identification, fits: Sequence[Fit]) -> FloatArray:
     """
     Return the 95 % half-width of the torque due to uncertain parameters, shape (n,).
 
-    Half widths of 95 % intervals, root mean square over a motion [N m].
+    The half-widths are root mean squares over a motion [N m].
 
     """
     motion = max(fits, key=lambda fit: len(fit.motion)).motion
-    # samples of the longest stretch that the variance of the torque is averaged over
+    # number of samples of the longest stretch for the mean variance of the torque
     chosen = np.unique(np.linspace(0, len(motion) - 1, 300).astype(np.intp))
     columns = result.arm.columns(motion.select(chosen))[:, :, result.base.independent]
     variance = np.sum((columns @ result.estimate.covariance) * columns, axis=2)
@@ -214,8 +214,8 @@ def whiteness_section(robot: Robot, fits: Sequence[Fit], role: str) -> ContentSe
         )
         panels.append((name, f'{100 * found.outside:.0f} % of the lags outside', [chart]))
     text = (
-        f'Autocorrelation of the {role} residual. Of white noise 1 % of the lags lie outside the '
-        'band; the filters colour the first lag or two.'
+        f'Autocorrelation of the {role} residual. For white noise, 1 % of the lags are outside '
+        'the band; the filters correlate the first one or two lags.'
     )
     return ContentSection('Whiteness', [Paragraph(text), Panels(panels, three=True)])
 
@@ -237,7 +237,7 @@ def residual_by_variable(
 def explained_shares(fits: Sequence[Fit], joint: int) -> dict[str, float]:
     """Return the shares of a joint's residual explained by speed, position and load."""
     residual, axes = residual_by_variable(fits, joint)
-    # fewer samples of a residual show no trend
+    # smallest number of samples for a trend
     if len(residual) < 20:
         return {}
     return {name: Trend.of(x, residual).share for name, x in axes.items()}

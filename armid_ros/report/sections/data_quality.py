@@ -97,7 +97,7 @@ def _repeatability(
                     joint,
                     f'{digits(varying[k])} {unit}',
                     f'{digits(residual[k])} {unit}',
-                    # with half of the residual or more, the model can be improved
+                    # from half of the residual on, the model can be improved
                     TableCell(f'{shares[k]:.0f} %', 'telling' if shares[k] > 50.0 else ''),
                 )
             )
@@ -126,9 +126,9 @@ def repeatability(fits: Sequence[Fit]) -> tuple[float, FloatArray, FloatArray] |
     """
     Return the period of a motion, the part that does not repeat, and the residual.
 
-    Two periods are compared in the longest stretch of a recording; None where nothing repeats. The
-    difference is of the residual, in which each period has its own positions. Torque that depends
-    on the motion alone cancels, modelled or not.
+    Two periods are compared in the longest stretch of a recording; None if no motion repeats. The
+    residuals are compared, each at the positions of its own period. Torque that depends only on
+    the motion cancels, whether it is modelled or not.
 
     Returns
     -------

@@ -207,7 +207,7 @@ def detectable_section(sizes: Sequence[Detectable]) -> ContentSection:
 
 
 def isolability_section(isolability: Isolability) -> ContentSection:
-    """Return from which size effects are detectable, and which are not distinguishable."""
+    """Return the detectable sizes of effects, and the effects that are not distinguishable."""
     kinds, apart = isolability.of_kinds()
     near = (apart < DISTINCT) & ~np.eye(len(kinds), dtype=bool)
     names = [name_in_words(kind) for kind in kinds]
@@ -231,13 +231,14 @@ def isolability_section(isolability: Isolability) -> ContentSection:
         'Isolability',
         [
             Paragraph(
-                'Effects that this run shows of an arm with a known model, at the assumed torque '
-                'noise. An effect is detectable at five standard deviations of its value. It is '
+                'Effects that this run makes detectable, for an arm with a known model and the '
+                'assumed torque noise. An effect is detectable at five standard deviations of '
+                'its value. It is '
                 'not distinguishable from an effect that reproduces its torque to 10 % (rms).'
             ),
             DataTable(heads, rows, tuple(range(len(heads)))),
             Paragraph(
-                'How much alike two effects are, by number: the darker, the more alike. "=" marks '
+                'Similarity of two effects, by number: the darker, the more similar. "=" marks '
                 'an effect in a row that the effect in the column can reproduce.'
             ),
             DataTable(('Effect', *(str(k + 1) for k in range(len(kinds)))), shares),

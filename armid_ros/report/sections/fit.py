@@ -95,7 +95,7 @@ def fit_section(
         for fits in group.values()
         for fit in fits
     )
-    still = ' Grey residual: static friction holds the joint, and the sample does not count.'
+    still = ' Grey residual: static friction holds the joint, and the sample is not used.'
     hint = Paragraph(ZOOM + still * rests, 'hint')
     for role, group in groups.items():
         if not group:
@@ -133,7 +133,7 @@ def fit_section(
 
 
 def _worst_first(score: Score) -> list[int]:
-    """Return the joints by falling relative error."""
+    """Return the joints by decreasing relative error."""
     return [int(joint) for joint in np.argsort(-score.joint_relative_error_percent)]
 
 
