@@ -1,6 +1,6 @@
 # Copyright 2026 The armid_ros developers
 # SPDX-License-Identifier: Apache-2.0
-"""Coupling of a robot: which joints move, the map from the driven ones, and their limits."""
+"""Coupling of the joints of a robot: moving joints, their map from the driven joints, limits."""
 
 from __future__ import annotations
 
@@ -22,8 +22,8 @@ def moving_joints(description: Description, driven: Sequence[str]) -> tuple[str,
     """
     Return the joints that move a body when some joints are driven, in the order of the file.
 
-    A driven joint that other joints follow is a motor without a body if its link and all
-    links that it carries have no inertia.
+    A driven joint that others follow is a motor without a body if neither its link nor the links
+    that it carries have inertia.
 
     """
     free, bodies = (
@@ -163,7 +163,7 @@ def _narrowed_limits(
             lower[acts] = np.maximum(lower, middle - room)[acts]
             upper[acts] = np.minimum(upper, middle + room)[acts]
     if np.any(lower >= upper):
-        raise RobotError('the limits of coupled joints leave no range to their driven joints')
+        raise RobotError('the limits of coupled joints leave no range for their driven joints')
     return lower, upper
 
 
@@ -173,7 +173,7 @@ def _closing_range(
     """
     Narrow the range of driven joints so that loops close and passive joints keep their limits.
 
-    Both conditions are satisfied a tenth beyond the result, because motions may overshoot limits.
+    Both conditions hold up to a tenth beyond the result, because motions may overshoot limits.
 
     """
     start = mechanism.start[0]
@@ -205,7 +205,7 @@ def _closing_range(
     reach = np.array([np.full(len(start), -np.inf), np.full(len(start), np.inf)])
     reach[:, own] = box[:, own]
     largest = mechanism.largest.copy()
-    # J between the samples: half of what it changes over the range is a generous margin
+    # margin for J between the samples: half of its change over the range
     largest[moved] = (np.abs(jacobian).max(axis=0) + 0.5 * np.ptp(jacobian, axis=0))[moved]
     found = replace(mechanism, lower=reach[0], upper=reach[1], largest=read_only(largest))
     return found, within[0], within[1]

@@ -26,7 +26,7 @@ INERTIA = ('ixx', 'ixy', 'ixz', 'iyy', 'iyz', 'izz')
 
 @dataclass(frozen=True)
 class Inertial:
-    """Mass [kg], placement of the centroid frame [m, rad], inertia Ixx Ixy Ixz Iyy Iyz Izz."""
+    """Mass [kg], pose of the centroid frame [m, rad], inertia Ixx Ixy Ixz Iyy Iyz Izz [kg m^2]."""
 
     mass: float
     xyz: Vector
@@ -38,7 +38,7 @@ class Inertial:
         ixx, ixy, ixz, iyy, iyz, izz = self.inertia
         tensor = np.array([[ixx, ixy, ixz], [ixy, iyy, iyz], [ixz, iyz, izz]])
         moments = np.linalg.eigvalsh(tensor)
-        # descriptions print six digits; moments below 1e-12 kg m^2 are negligible
+        # descriptions have six digits; moments below 1e-12 kg m^2 are negligible
         tolerance = max(1e-6 * float(np.abs(moments).max()), 1e-12)
         said = ', '.join(f'{moment:.3g}' for moment in moments)
         if self.mass < 0.0 or moments[0] < -tolerance:
@@ -59,13 +59,13 @@ class Mimic:
 
     @property
     def joint(self) -> str:
-        """Return the joint that is followed, the first of several."""
+        """Return the joint that is followed, or the first of several."""
         return next(iter(self.multipliers))
 
 
 @dataclass(frozen=True)
 class Loop:
-    """Points of two links, in the frames of the links [m], that passive joints keep together."""
+    """Closed loop: points of two links, in their frames [m], that passive joints keep together."""
 
     links: tuple[str, str]
     points: tuple[Vector, Vector]
@@ -115,7 +115,7 @@ class Description:
 
     @property
     def passive(self) -> tuple[str, ...]:
-        """Return the joints that loops move."""
+        """Return the passive joints, which loops move."""
         return tuple(dict.fromkeys(joint for loop in self.loops for joint in loop.passive))
 
     def movable(self) -> tuple[Joint, ...]:
@@ -123,7 +123,7 @@ class Description:
         return tuple(joint for joint in self.joints if joint.movable)
 
     def inertia_doubts(self) -> tuple[str, ...]:
-        """Return one line for every link whose inertia no mass distribution has."""
+        """Return one line for every link whose inertia is impossible for any mass distribution."""
         doubts = {link: inertial.doubt() for link, inertial in self.links.items() if inertial}
         return tuple(f"link '{link}': {doubt}" for link, doubt in doubts.items() if doubt)
 
@@ -163,7 +163,7 @@ def parse_xml(text: str) -> ElementTree.Element:
     return root
 
 
-#: A parent link of this name means the ground in Drake, Bullet and Gazebo; it needs no <link>.
+#: Name of a parent link that means the ground in Drake, Bullet and Gazebo; it needs no <link>.
 GROUND = 'world'
 
 
@@ -268,7 +268,7 @@ def _check_tree(links: Iterable[str], joints: Iterable[Joint]) -> None:
         for below, name in enumerate(reversed(path), start=depth[link] + 1):
             depth[name] = below
     deepest = max(depth, key=depth.__getitem__)
-    most = 500  # Pinocchio's reader descends by recursion
+    most = 500  # the reader of Pinocchio is recursive
     if depth[deepest] > most:
         raise RobotError(
             f"link '{deepest}' is {depth[deepest]} joints from the base; the maximum is {most}"
@@ -304,8 +304,8 @@ def _inertial(link: ElementTree.Element, name: str) -> Inertial | None:
     )
     if inertial.mass < 0.0:
         raise RobotError(
-            f'{where} has a negative mass, {inertial.mass:g} kg; parameters '
-            'identified with --physical are those of a possible body'
+            f'{where} has a negative mass, {inertial.mass:g} kg; with --physical, identified '
+            'parameters are physically consistent'
         )
     return inertial
 
@@ -399,7 +399,7 @@ def _origin(element: ElementTree.Element, where: str) -> tuple[Vector, Vector]:
 
 
 def _vector(element: ElementTree.Element, name: str, where: str) -> Vector:
-    """Return three finite numbers of limited size; zeros if the attribute is missing."""
+    """Return three finite numbers of limited size, or zeros if the attribute is missing."""
     text = element.get(name, '0 0 0')
     said = f"{where}: {name}='{text}' of <{element.tag}> is"
     try:

@@ -22,7 +22,7 @@ import numpy as np
 import pinocchio as pin
 
 _Meshes = dict[tuple[Path, tuple[float, ...]], tuple[coal.CollisionGeometry, ...]]
-#: Attributes of each kind of shape, and the default of those that have one.
+#: Attributes of each kind of shape, with a default if there is one.
 _SIZES = {
     'box': ('size',),
     'sphere': ('radius',),
@@ -163,10 +163,10 @@ def collision_geometry(
 
 def sticks(model: pin.Model) -> list[tuple[int, FloatArray]]:
     """
-    Return lines from joints, each as the joint index and the end point in the joint frame.
+    Return lines that represent links: index of a joint, and end point in the joint frame.
 
-    A line ends at the next joint; the line of the last body ends beyond its centre of mass. Index
-    0 is the base.
+    A line ends at the next joint; the line of the last body ends beyond its centre of mass.
+    Index 0 is the base.
 
     """
     lines = []
@@ -174,7 +174,7 @@ def sticks(model: pin.Model) -> list[tuple[int, FloatArray]]:
         carried = [k for k in range(1, model.njoints) if int(model.parents[k]) == joint]
         ends = [np.array(model.jointPlacements[k].translation) for k in carried]
         if joint and not ends:
-            # without bodies, the last link is drawn to this many times the distance of its centre
+            # without bodies, the last link ends at this multiple of the distance of its centre
             # of mass
             ends = [2.0 * np.array(model.inertias[joint].lever)]
         lines += [(joint, end) for end in ends]
@@ -253,7 +253,7 @@ class CollisionModel:
 
     @property
     def pairs(self) -> tuple[tuple[str, str], ...]:
-        """Pairs of links that are checked, each once, in alphabetical order."""
+        """Checked pairs of links, each once, in alphabetical order."""
         numbers = range(len(self.geometry.collisionPairs))
         return tuple(sorted({_links(self.robot, self.geometry, number) for number in numbers}))
 
@@ -269,7 +269,7 @@ def collision_model(
     SRDF disables. The SRDF is searched in the folder of the URDF and in ../srdf: the file with the
     name of the URDF or of the robot, or the only file. Without an SRDF, pairs that touch at zero
     (or at the limits nearest to zero) are left out and noted, because their collision bodies are
-    drawn too large.
+    probably too large.
 
     Parameters
     ----------

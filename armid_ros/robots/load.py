@@ -1,6 +1,6 @@
 # Copyright 2026 The armid_ros developers
 # SPDX-License-Identifier: Apache-2.0
-"""Loading a robot: a shipped name, a URDF or xacro file, or the text of a URDF; its mounting."""
+"""Loading of a robot from a shipped name, a file or the text of a URDF, with its mounting."""
 
 from __future__ import annotations
 
@@ -144,8 +144,8 @@ def load_robot(
         )
     if path.is_dir():
         raise RobotError(
-            f'{source}: a folder; name the URDF, xacro or MJCF file of the robot, which comes '
-            'before recordings'
+            f'{source}: a folder; name the URDF, xacro or MJCF file of the robot; it comes '
+            'before the recordings'
         )
     text = read_text(path, RobotError)
     notes: tuple[str, ...] = ()
@@ -216,16 +216,16 @@ def robot_from_urdf(
         raise RobotError(
             f'{source}: masses, lengths or inertias are too large for floating-point numbers'
         )
-    # joints that move no mass in several poses cannot be simulated
+    # joints without inertia in several poses cannot be simulated
     generator, moved = np.random.default_rng(0), np.zeros(robot.n_joints)
     for _ in range(4):
         q = generator.uniform(-math.pi, math.pi, robot.n_joints)
         moved = np.maximum(moved, np.abs(np.diag(pin.crba(model, model.createData(), q))))
     light = (
-        f"link '{link}', moved by joint '{joint}', has no <inertial>, nor has any link beyond it. "
+        f"link '{link}', moved by joint '{joint}', has no <inertial>, nor has any link after it. "
         'Its inertia can be identified, but a simulation needs a rough one'
         for joint, link, inertia in zip(robot.joints, robot.links, moved, strict=True)
-        if inertia < 1e-12  # kg m^2 or kg; the smallest motor rotor is five orders above
+        if inertia < 1e-12  # kg m^2 or kg; the smallest motor rotor has 1e5 times as much
     )
     with reading(source, RobotError):
         return couple(replace(robot, notes=(*robot.notes, *light)), driven, {})
@@ -253,7 +253,7 @@ def _written_out(source: str | Path) -> tuple[str | Path, dict[str, str], dict[s
 
 def described_at(robot: Robot, positions: Mapping[str, float]) -> Robot:
     """
-    Return the robot of the description with joints that are not driven at given positions.
+    Return the robot of the description with given positions of the joints that are not driven.
 
     Parameters
     ----------

@@ -3,11 +3,11 @@
 """
 Coupled joints: the map q = f(u) from the n driven joints u to the m moving joints q.
 
-With J = df/du, the moving joints have dq = J du and ddq = J ddu + dJ/dt du, and the virtual work
-of the torques tau of the moving joints gives the torques J^T tau of the driven joints. Constraint
-forces do no work and do not appear. The map is affine for mimic joints and differentials. Passive
-joints of a loop are solved for: Newton's method closes the loop, and the implicit function theorem
-gives their derivatives (Featherstone 2008, chapter 8; Khalil and Dombre 2002, chapter 7).
+With J = df/du, the moving joints have dq = J du and ddq = J ddu + dJ/dt du. By virtual work,
+torques tau of the moving joints are torques J^T tau of the driven joints. Constraint forces do no
+work and do not appear. The map is affine for mimic joints and differentials. For passive joints,
+Newton's method closes the loop, and the implicit function theorem gives the derivatives
+(Featherstone 2008, chapter 8; Khalil and Dombre 2002, chapter 7).
 
 """
 
@@ -146,7 +146,7 @@ class Mechanism:
         work, inside = _SCRATCH.of(self), np.clip(u, self.lower, self.upper)
         data, (begin, p), _ = work
         far = np.abs(inside - begin).max()
-        if far > 0.5:  # continuation from the start keeps the assembly mode
+        if far > 0.5:  # continuation from the start pose keeps the assembly mode
             begin, p = self.start
             far = np.abs(inside - begin).max()
         for share in np.linspace(0.0, 1.0, int(far / 0.2) + 2)[1:] if far > 0.2 else (1.0,):
@@ -161,7 +161,7 @@ class Mechanism:
                 p = p - step
                 if np.abs(step).max() < 1e-12:
                     break
-        if not np.abs(gap).max() < 1e-4:  # m; descriptions have rounded lengths
+        if not np.abs(gap).max() < 1e-4:  # [m]; lengths of descriptions are rounded
             raise RobotError(
                 f'a loop does not close: its points are {np.abs(gap).max():.3g} m apart with the '
                 f'driven joints at {np.round(u, 3).tolist()}'
@@ -197,7 +197,7 @@ class Mechanism:
 
 
 class _Scratch(threading.local):
-    """Per mechanism and thread: work space, last solution, and solutions of whole motions."""
+    """Work space, last solution, and solutions of whole motions, for each mechanism and thread."""
 
     def __init__(self) -> None:
         self._of: WeakKeyDictionary[Mechanism, list[Any]] = WeakKeyDictionary()

@@ -1,6 +1,6 @@
 # Copyright 2026 The armid_ros developers
 # SPDX-License-Identifier: Apache-2.0
-"""Reading of NAME.mechanism.yaml: couplings of joints that a description does not have."""
+"""Reading of NAME.mechanism.yaml: couplings of joints that the URDF lacks."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ def with_mechanism(text: str, path: Path) -> str:
     """
     Return a URDF with the coupled joints of NAME.mechanism.yaml in its folder, if it exists.
 
-    The result has additional elements, which other readers of a URDF ignore.
+    The additional elements of the result are ignored by other readers of a URDF.
 
     Raises
     ------

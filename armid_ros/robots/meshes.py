@@ -3,11 +3,11 @@
 """
 Replacement of collision meshes by a few convex bodies.
 
-A distance between convex bodies takes microseconds, a distance between meshes milliseconds. But
-the convex hull of a forearm with a housing at each end fills the gap between the housings, and
-collides with a wrist that is free. Therefore a mesh is cut into slabs across the best of its axes.
-Each slab is replaced by its hull, and neighbours are joined while their common hull is not much
-larger. The bodies together contain the mesh, so that a clearance is never overestimated.
+A distance between convex bodies takes microseconds, and a distance between meshes milliseconds.
+However, the hull of a forearm with a housing at each end fills the gap between them, and would
+collide with a wrist there. A mesh is therefore cut into slabs across its best axis. Each slab is
+replaced by its hull; neighbours are merged while their common hull is not much larger. The bodies
+contain the whole mesh, so a clearance is never overestimated.
 
 """
 

@@ -3,8 +3,8 @@
 """
 Conversion of a MuJoCo model (MJCF) to a URDF.
 
-MuJoCo itself reads the file, so that defaults, includes, frames and inertias from shapes have the
-same values as in MuJoCo. A body with several joints becomes one link per joint. The frame of a
+MuJoCo itself reads the file, so defaults, includes, frames and inertias from shapes are as in
+MuJoCo. A body with several joints becomes one link per joint. The frame of a
 link is at its joint.
 
 """
@@ -25,7 +25,7 @@ from armid_ros.motion import FloatArray
 import numpy as np
 import pinocchio as pin
 
-#: Pattern of the text before the root element of an MJCF, and of the name of that element.
+#: Pattern of the text before the root element of an MJCF, and of the element's name.
 _ROOT = re.compile(r'(?:\s|<\?(?>.*?\?>)|<!--(?>.*?-->))*+<mujoco[\s/>]', re.DOTALL)
 
 
@@ -131,7 +131,7 @@ class _Writer:
                     )
                 continue
             anchors[body] = self._link(body, parent, list(joints), anchors[parent])
-        # add notes on elements of MuJoCo that do not exist in a URDF
+        # notes on elements of MuJoCo that a URDF cannot contain
         model, kinds = self.model, self.mujoco.mjtEq
         if not np.allclose(model.opt.gravity, (0.0, 0.0, -9.81), atol=0.01):
             gravity = ','.join(f'{value:g}' for value in model.opt.gravity)
@@ -272,7 +272,7 @@ class _Writer:
             ElementTree.SubElement(element, 'mimic', values | {'offset': _number(offset)})
 
     def _loop(self, equality: int, anchors: Mapping[int, FloatArray]) -> bool:
-        """Write a connect equality as a loop; return False for one without passive joints."""
+        """Write a connect equality as a loop; return False if it has no passive joints."""
         model, kinds = self.model, self.mujoco.mjtEq
         bodies = [int(model.eq_obj1id[equality]), int(model.eq_obj2id[equality])]
         of_bodies = model.eq_objtype[equality] == self.mujoco.mjtObj.mjOBJ_BODY

@@ -4,8 +4,8 @@
 The reference of an arm: waypoints in time, and the smooth curve through them.
 
 The curve equals that of ROS 2's joint_trajectory_controller for a JointTrajectory: linear between
-waypoints with positions only, cubic with velocities, quintic with accelerations. Before the first
-and after the last waypoint the arm holds still.
+waypoints with positions only, cubic with velocities, quintic with accelerations. Before the
+first and after the last waypoint, the arm is at rest.
 
 """
 
@@ -159,7 +159,7 @@ class Reference:
             if joint not in self.joints:
                 raise TrajectoryError(
                     f"trajectory: joint '{joint}' is missing; {robot.name} needs {listed}; "
-                    f'--joints {",".join(self.joints)} holds the others still'
+                    f'--joints {",".join(self.joints)} keeps the others at rest'
                 )
         return self if self.joints == robot.joints else self.of_joints(robot.joints)
 
@@ -172,8 +172,8 @@ class Reference:
         """
         Return the remaining reference when its start time is in the past.
 
-        Waypoints of the first 2 * late seconds are left out, so that the arm has time to catch up.
-        If no waypoint remains, the whole reference is returned.
+        Waypoints of the first 2 * late seconds are left out, so the arm has time to reach the
+        reference. If no waypoint remains, the whole reference is returned.
 
         Parameters
         ----------

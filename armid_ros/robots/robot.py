@@ -22,9 +22,8 @@ GRAVITIES = {'earth': (0.0, 0.0, -9.81), 'moon': (0.0, 0.0, -1.62)}
 #: Number of inertial parameters of a link.
 PER_LINK = 10
 
-#: A mass [kg] or a first moment [kg m] below this counts as zero. Each BLAS kernel rounds
-#: differently; a first moment of 1 kg m over more mass than this keeps the inertia about its
-#: centre to 1e-7.
+#: A mass [kg] or a first moment [kg m] below this is zero. BLAS kernels round differently; for a
+#: first moment of 1 kg m and a larger mass, the inertia about the centre is accurate to 1e-7.
 NO_MASS = 1e-9
 
 #: Half the range of a joint without position limits [rad or m].
@@ -37,8 +36,8 @@ class Robot:
     A fixed-base robot with n driven joints, each revolute or prismatic.
 
     The model is never changed; `with_gravity` and `with_inertias` return a robot with a copy of
-    it. Friction, damping and rotor inertia are not part of the model: they are effects with
-    separate parameters.
+    it. Friction, damping and rotor inertia are no part of the model, but effects with their own
+    parameters.
 
     Attributes
     ----------
@@ -160,7 +159,7 @@ class Robot:
         return bool(own.prismatic[own.index(joint)])
 
     def body_of(self, joint: str) -> int:
-        """Return the index of the body of a driven joint, or of the last that a motor moves."""
+        """Return the index of the body of a driven joint, or the last body that a motor moves."""
         if self.mechanism is None or joint in self.moving:
             return self.moving.index(joint)
         return int(np.flatnonzero(self.mechanism.driven[:, self.index(joint)])[-1])
@@ -363,7 +362,7 @@ class JointGeometry:
 
 
 def of_joints(joints: Sequence[Joint]) -> dict[str, Any]:
-    """Return the fields of a `Robot` for some joints of its description."""
+    """Return the fields of a `Robot` for some joints of a description."""
     return {
         'joints': tuple(joint.name for joint in joints),
         'lower': np.array([joint.lower for joint in joints]),

@@ -46,8 +46,8 @@ def driven_joints(description: Description, names: Sequence[str] | None) -> tupl
     Return the driven joints: the named joints, or all except those of a gripper.
 
     A joint that mimics others, or that a loop moves, is never driven. By default, a joint of a
-    gripper is not driven either: a joint that a mimic joint follows alone, or whose name contains
-    finger, gripper or jaw, if neither it nor a joint that follows it carries a joint of the arm.
+    gripper is not driven either: this is a joint with a single mimic joint, or with finger,
+    gripper or jaw in its name. Neither it nor its followers carry a joint of the arm.
 
     Raises
     ------
@@ -93,14 +93,14 @@ def several_arms(description: Description, driven: Sequence[str]) -> tuple[str, 
 
 
 def _arms(description: Description, joints: Sequence[str]) -> list[list[str]]:
-    """Return the arms among the driven joints: long enough chains from the last fork to a tip."""
+    """Return the arms among the driven joints: long chains from the last fork to a tip."""
     carriers = {name: _carriers(description, [name]) for name in joints}
     kept = list(joints)
     while kept:
         beyond = {j: {k for k in kept if j in carriers[k]} for j in kept}
         tips = {j for j in kept if not beyond[j]}
         limbs = {tip: [j for j in kept if (beyond[j] | {j}) & tips == {tip}] for tip in tips}
-        # a shorter branch, such as a head or a trunk, is not an arm
+        # a shorter branch, such as a head or a trunk, is no arm
         short = {j for limb in limbs.values() if len(limb) < 3 for j in limb}
         if not short:
             arms = [sorted(limb, key=lambda j: len(carriers[j])) for limb in limbs.values()]

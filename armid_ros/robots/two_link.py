@@ -151,7 +151,7 @@ class TwoLinkSet:
 
 
 def planar_pair(robot: Robot) -> bool:
-    """Return whether a robot is two links with parallel axes that gravity does not load."""
+    """Return whether a robot has two links with parallel axes and no gravity torque."""
     if robot.n_joints != 2 or np.any(robot.prismatic):
         return False
     data = robot.model.createData()

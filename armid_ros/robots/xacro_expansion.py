@@ -6,8 +6,8 @@ Expansion of xacro files in a separate process, and search for ROS packages with
 A xacro file is a program: it can include any readable file, read environment variables and loop
 without end. It is therefore expanded in a separate process with limits of time and memory, and
 only if a person names the file. A description from a topic or a bag is never expanded. This file
-is the program of that process too, so it imports nothing of the package on its own. The process
-reads its request from stdin and writes its answer to stdout, both in JSON.
+is also the program of that process, so it imports nothing from the package at its start. The
+process reads its request from stdin and writes its answer to stdout, both in JSON.
 
 """
 
@@ -26,7 +26,7 @@ import subprocess
 import sys
 from typing import Any
 
-#: Processor time that an expansion may take [s]; the largest descriptions take one or two.
+#: Largest processor time of an expansion [s]; the largest descriptions take 1 to 2 s.
 TIME_LIMIT = 20.0
 #: Largest elapsed time of an expansion [s]; this ends an expansion that waits for a file.
 PATIENCE = 300.0
@@ -194,7 +194,7 @@ def expanded(request: dict[str, Any]) -> dict[str, str]:
 
 def _find_packages(xacro: Any, request: dict[str, Any], missing: dict[str, str]) -> None:
     """Make xacro find packages without ROS and skip packages of drives and simulators."""
-    # a missing package is an error only if one of its files is read: drivers name paths
+    # a missing package is an error only if its files are read, because drivers only name paths
     arguments = xacro.substitution_args
     include_files, macro_call = xacro.get_include_files, xacro.handle_macro_call
 
