@@ -3,8 +3,8 @@
 """
 The loop of controller, drives and plant, one controller update per step, and its compiled steps.
 
-The kernel, `kernel.c`, computes the steps in which no friction element changes its mode and no
-joint reaches a stop, some fifty times as fast as `integrator.step`. `integrator.step` computes all
+The kernel, `kernel.c`, computes steps without a change of friction modes and without joint
+stops, about fifty times as fast as `integrator.step`. `integrator.step` computes all
 other steps, and every step if the package was installed without a compiler.
 
 """
@@ -139,7 +139,7 @@ class CompiledLoop:
         self, targets: Motion, rows: range, moved: FloatArray, tau: FloatArray
     ) -> Callable[[State, int], int]:
         """
-        Return a function that computes steps until a mode changes or a stop is reached.
+        Return a function that computes steps until a friction mode changes or a stop is reached.
 
         Parameters
         ----------
@@ -182,7 +182,7 @@ class CompiledLoop:
         assert self._torque is not None
         try:
             self._law_torque[:] = self._torque(t, q, dq)
-        except BaseException as error:  # Ctrl-C too: exceptions do not pass through C
+        except BaseException as error:  # exceptions, Ctrl-C included, do not pass through C
             self.failure.append(error)
             return 1
         return 0

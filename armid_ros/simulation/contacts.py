@@ -5,9 +5,8 @@ Dry friction and joint stops as complementarity conditions, and their exact solu
 
 An element is a source of dry friction, or a joint stop. It can hold a joint at rest. Over one
 step, the velocities of m elements are w = w_free - G f. G is symmetric and positive semidefinite:
-the Delassus matrix times the step. The torques f of the elements obey
-
-    w_i > 0 and f_i = upper_i,   or   w_i < 0 and f_i = lower_i,   or   w_i = 0 and f_i between.
+the Delassus matrix times the step. The torque f_i of an element is upper_i for w_i > 0, lower_i
+    for w_i < 0, and between them for w_i = 0.
 
 Source: block principal pivoting with Murty's rule as its safeguard, Judice and Pires 1994.
 
@@ -95,8 +94,8 @@ def solve_box_complementarity(
                 broken.append((k, -1))
         if not broken:
             break
-        # A typical step needs one round, in which all violating elements change at
-        # once. Some problems cycle; after 12 rounds only the first such element changes, which
+        # A typical step needs one iteration, in which all violating elements change together.
+        # Some problems cycle: after 12 iterations only the first such element changes, which
         # always terminates.
         for k, mode in broken if rounds < 12 else broken[:1]:
             found[k] = mode
@@ -164,7 +163,8 @@ def split_constant(friction: DryFriction | None, n_joints: int) -> tuple[DryFric
         worst = int(pushing[0])
         joint = int(np.argmax(friction.directions[worst] != 0.0)) + 1  # noqa: RUF069 - directions of single joints are exact
         raise ModelError(
-            f'dry friction of joint {joint} pushes: its torque forwards is less than backwards '
+            f'dry friction of joint {joint} is negative: its torque forwards is less than '
+            f'backwards '
             f'({friction.upper[worst]:g} against {friction.lower[worst]:g} N m); friction torques '
             'have to be positive'
         )

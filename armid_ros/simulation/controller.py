@@ -16,8 +16,8 @@ from armid_ros.simulation.plant import Plant
 import numpy as np
 import pinocchio as pin
 
-#: Natural frequency of the closed loop [rad/s]. 8 Hz is stiff for an arm. It is slow enough for
-#: control at 1 kHz of a joint with half the inertia of its model.
+#: Natural frequency of the closed loop [rad/s]. 8 Hz is stiff for an arm, and slow enough for 1
+#: kHz control of a joint with half the inertia of its model.
 BANDWIDTH = 50.0
 
 
@@ -110,7 +110,7 @@ class Controller:
     feedback: LinearFeedback | None = None
 
     def started(self) -> Controller:
-        """Return a controller in its initial state; without a state, itself."""
+        """Return a controller in its initial state; the same object if it has no state."""
         return self
 
     def targets(self, desired: Motion, asked: FloatArray | None = None) -> Motion:
@@ -118,7 +118,7 @@ class Controller:
         Return the desired motion of the motors, with the feedforward torque.
 
         The reference has one row per step. `asked` is the previously commanded position, shape
-        (n,), for the first row, if any.
+        (n,), if any, for the first row.
 
         """
         return desired.with_torque(self.feedforward(desired))
@@ -188,8 +188,8 @@ class GravityPD(Controller):
     A spring and a damper on every joint, plus the gravity torque of the nominal arm.
 
     tau = kp (q_d - q) + kd (dq_d - dq) + g(q).
-    Source: Siciliano et al. 2009, section 8.5.1. Each joint on its own, in the middle of the range
-    of motion, is critically damped at 50 rad/s.
+    Source: Siciliano et al. 2009, section 8.5.1. In the middle of the range of motion, each
+    joint by itself is critically damped at 50 rad/s.
 
     Attributes
     ----------
@@ -271,9 +271,9 @@ class MotorControl(Controller):
         """
         Return loops designed for an arm with elastic joints, with that arm as the model.
 
-        The velocity gain is the smallest of three values: the gain of a rigid joint for 8 Hz, the
-        gain sqrt(K M) that damps the link on its spring best, and the largest stable gain of a
-        sampled loop on a rotor. The position gain makes the joint critically damped.
+        The velocity gain is the smallest of three: the gain of a rigid joint for 8 Hz, the gain
+        sqrt(K M) with the best damping of the link on its spring, and the largest stable gain of
+        a sampled loop on a rotor. The position gain makes the joint critically damped.
 
         """
         robot, springs = plant.robot, plant.springs

@@ -94,9 +94,9 @@ def elastic_joints(arm: ArmModel) -> tuple[tuple[str, ...], tuple[str, ...]]:
 def no_rotor(joints: Sequence[str]) -> str:
     """Return a note on the simulation of springs whose motors have no inertia."""
     return (
-        f'{", ".join(joints)}: joint_elasticity without rotor_inertia, so that no motor moves on '
-        'its own. All joints are simulated as rigid ones whose encoders read the twist under '
-        'load; add rotor_inertia to have vibrations'
+        f'{", ".join(joints)}: joint_elasticity without rotor_inertia, so no motor moves '
+        'independently. All joints are simulated as rigid, with encoders that read the twist '
+        'under load; for vibrations, add rotor_inertia'
     )
 
 
@@ -160,7 +160,7 @@ _RATE = 500.0
 _STAND, _STEP = 1.0, 0.5
 #: Largest distance of a joint from its middle position [rad or m].
 _REACH = np.pi / 3.0
-#: Number of poses tried before a TrajectoryError is raised.
+#: Number of tried poses before a TrajectoryError.
 _TRIES = 1000
 
 #: Function that returns whether a path, shape (N, n), is allowed.
@@ -238,7 +238,7 @@ def multisine_course(
     samples = stand
     while True:
         there = _next_pose(robot, here, rng, clear, np.zeros(robot.n_joints))
-        # share of the velocity limits that a move to another pose uses during a multisine
+        # share of the velocity limits in a move to another pose during a multisine
         needed = float(np.max(1.875 * np.abs(there - here) / (0.25 * velocity)))
         # shortest duration of an experiment: 4 s
         count = round(max(4.0, needed) * _RATE)

@@ -7,13 +7,13 @@ For rigid joints, the rigid body and the smooth effects are evaluated at the mid
 half a step ahead of the state. The integration is therefore of second order in the step with one
 evaluation of the dynamics. The torque is constant over a step, like the torque of a drive. Damping
 is linearly implicit. Dry friction and joint stops are complementarity conditions on the velocity
-at the end of the step. A joint that sticks therefore has exactly zero velocity.
+at the end of the step. The velocity of a sticking joint is therefore exactly zero.
 
-Elastic joints are integrated in substeps. The present springs, dampers and inertias form a linear
-system, which is integrated with the Pade approximation (2, 2) of its matrix exponential. The
-approximation is A-stable, so that no spring is too stiff for the step. It is of fourth order: the
-error of a frequency is 0.005 % at ten steps a period. Nonlinear torques are evaluated at the
-middle of the substep.
+Elastic joints are integrated in substeps. Springs, dampers and inertias at the present state
+form a linear system, which is integrated with the Pade approximation (2, 2) of its matrix
+exponential. The approximation is A-stable, so no spring is too stiff for the step. It is of
+fourth order: the error of a frequency is 0.005 % at ten steps per period. Nonlinear torques are
+evaluated at the middle of the substep.
 
 """
 
@@ -155,7 +155,7 @@ def spring_substep(
     if springs.loose:
         pull, offset = springs.meshing(twist)
         force = force + springs.to_twists.T.dot(offset)
-    # accelerations: per twist and velocity, from the torques, and per dry friction torque
+    # accelerations per twist and velocity, due to the torques, and per dry friction torque
     right = np.concatenate([pull.T, force[np.newaxis], springs.friction]).T
     rates = np.asarray(dgesv(inertia, right, 0, 1)[2])
     after = _propagated(springs, rates, x)

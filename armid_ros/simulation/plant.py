@@ -1,6 +1,6 @@
 # Copyright 2026 The armid_ros developers
 # SPDX-License-Identifier: Apache-2.0
-"""The plant, an arm model prepared for integration, its state, and checks that it can move."""
+"""The plant: an arm model prepared for integration, its state, and checks before its motion."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ from scipy.linalg import eigh, LinAlgError
 
 
 class NoBodyError(ModelError):
-    """An arm cannot be simulated because some links are not physically possible bodies."""
+    """An arm cannot be simulated because some links are physically impossible."""
 
 
 def require_masses(robot: Robot) -> None:
@@ -226,8 +226,7 @@ class Plant:
         """
         Make a state, by default at rest.
 
-        Springs are twisted by the weight of their links, and motors have the velocity of their
-        links.
+        The weight of the links twists the springs, and motors have the velocity of their links.
 
         Raises
         ------
@@ -323,8 +322,8 @@ class Plant:
 
 def _damping_weight(robot: Robot, inertia: FloatArray, damping: FloatArray, dt: float) -> float:
     """Return the weight of the velocity at the end of a step in the damping torque."""
-    # 1/2 (second order) for weak damping, 1 (no overshoot) for stiff damping; between them the
-    # value that makes the fastest decay rate of the arm exact (Liniger and Willoughby 1970)
+    # 1/2 (second order) for weak damping, 1 (no overshoot) for stiff damping. In between, the
+    # value for which the fastest decay rate of the arm is exact (Liniger and Willoughby 1970)
     try:
         rates = eigh((damping + damping.T) / 2, inertia, eigvals_only=True)
     except LinAlgError:

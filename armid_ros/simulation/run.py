@@ -17,7 +17,7 @@ from armid_ros.simulation.sensors import readings, Sensors
 from armid_ros.simulation.simulated_arm import SimulatedArm
 import numpy as np
 
-#: Velocity beyond which a simulated joint is unstable [rad/s or m/s].
+#: Velocity from which a simulated joint is unstable [rad/s or m/s].
 _LOST = 1e6
 
 

@@ -156,7 +156,7 @@ def readings(
 
 class RecentPast:
     """
-    The latest samples of an arm, as many as its readings depend on.
+    The latest samples of an arm, on which its readings depend.
 
     Parameters
     ----------
@@ -187,8 +187,8 @@ class RecentPast:
         Add the samples of a trace.
 
         Torque is constant over a step. With rigid joints, the reading between two steps is the
-        mean of both, because the acceleration jumps with the torque. With elastic joints, the
-        reading is the torque of the next step.
+        mean of their torques, because the acceleration jumps with the torque. With elastic joints,
+        the reading is the torque of the next step.
 
         """
         rows = np.empty((5, len(trace.tau) - 1, trace.tau.shape[1]))

@@ -184,7 +184,7 @@ class SimulatedArm:
         """
         Replace the arm model and keep the state, for example when the arm picks up a load.
 
-        The controller is not changed, and therefore does not know the new model.
+        The controller keeps its model.
 
         Parameters
         ----------
@@ -246,7 +246,7 @@ class SimulatedArm:
         if curve.t[0] > 0.0:
             curve = curve.after(now.q[0], now.dq[0], now.ddq[0])
         else:
-            # largest distance of a due first point from the desired position [rad or m]
+            # largest distance of an immediate first point from the desired position [rad or m]
             advice = 'give its first point a later time, to get there'
             self._require_none('starts away by', curve.q[0] - now.q[0], 0.01, '', advice)
             if curve.dq is not None:
@@ -329,7 +329,7 @@ class SimulatedArm:
         self._torque = command(self.plant, self._acting, self._state, self._targets, 0)
 
     def _look_ahead(self, asked: FloatArray | None = None, steps: int = 1000) -> None:
-        """Evaluate the reference for the next steps, given the last commanded motor position."""
+        """Evaluate the reference for the next steps, from the last commanded motor position."""
         self._first = self._state.steps
         self._targets = self.controller.targets(self._desired(steps + 1), asked)
 

@@ -106,8 +106,8 @@ class ElasticJoints:
         """
         Return the elastic joints of an arm.
 
-        The arguments are the arm, the settings, the directions of the dry friction, (m, n), the
-        inertia matrix of the links in the middle of their ranges, (n, n) [kg m^2], and the step of
+        The arguments are the arm, the settings, the directions of dry friction, (m, n), the
+        inertia matrix of the links in the middle of the ranges, (n, n) [kg m^2], and the step of
         the plant [s].
 
         Raises
@@ -133,7 +133,7 @@ class ElasticJoints:
         # integration
         free, rate = 1.0 / np.diag(np.linalg.inv(mass)), 0.1 * elasticity.substeps / dt
         rub = np.diag(np.broadcast_to(np.asarray(elasticity.link_damping, dtype=float), (n,)))
-        # actions on the readings of the motors, which the springs do not change
+        # effects on the motor readings, which springs do not change
         kept = [
             (effect, values)
             for effect, values in zip(arm.effects, arm.values, strict=True)
