@@ -4,8 +4,8 @@
 Base parameters: the identifiable combinations of parameters.
 
 The columns of a regressor are linearly dependent. In a chosen order, each column in the span of
-the kept columns is dropped, and its parameter is grouped with theirs. The result are the
-groupings of Gautier (1991), such as 'Ixx2 - Iyy2'. This is a QR factorisation in which the
+the kept columns is dropped, and its parameter is grouped with their parameters. The results are
+the groupings of Gautier (1991), such as 'Ixx2 - Iyy2'. The method is a QR factorisation; the
 remaining length of each column reveals the rank.
 
 """
@@ -20,13 +20,13 @@ from armid_ros.robots import NO_MASS, Robot
 import numpy as np
 import numpy.typing as npt
 
-#: Part of a unit column beyond the kept columns, below which it is dependent. It is 1e-15 to 1e-13
-#: for dependent columns, by rounding, and rarely below 1e-5 for independent ones.
+#: Part of a unit column outside the span of the kept columns, below which it is dependent.
+#: Dependent columns have 1e-15 to 1e-13 by rounding; independent ones rarely have less than 1e-5.
 RANK_TOLERANCE = 1e-9
 
 
-#: Order in which the parameters of a link are kept: inertia first, mass last, so that masses are
-#: grouped with moments, and moments of later links with those of earlier ones.
+#: Order in which the parameters of a link are kept: inertia first, mass last. Masses are then
+#: grouped with moments, and moments of later links with those of earlier links.
 _KEEP_ORDER = ('Ixx', 'Ixy', 'Ixz', 'Iyy', 'Iyz', 'Izz', 'mx', 'my', 'mz', 'm')
 
 
@@ -71,7 +71,7 @@ class BaseParameters:
         self, standard: tuple[ParameterName, ...], columns: npt.NDArray[np.intp]
     ) -> BaseParameters:
         """
-        Return the parameters embedded in a longer list; they do not depend on the added ones.
+        Return the parameters in terms of a longer list; they do not depend on the added entries.
 
         Parameters
         ----------
@@ -92,7 +92,7 @@ class BaseParameters:
 
     def lift(self, beta: npt.ArrayLike, prior: npt.ArrayLike) -> FloatArray:
         """
-        Return the standard parameters nearest to a prior that have given base parameters.
+        Return the standard parameters with given base parameters that are nearest to a prior.
 
         Parameters
         ----------
@@ -109,7 +109,7 @@ class BaseParameters:
         """
         prior = np.array(prior, dtype=float)
         masses = [_symbol_of(parameter) == 'm' for parameter in self.standard]
-        # mass of a link that has none in the description, so that first moments are possible [kg]
+        # assumed mass of a link without described mass, so that first moments are possible [kg]
         prior[masses & (np.abs(prior) < NO_MASS)] = 1e-6
         correction = np.linalg.pinv(self.grouping) @ (np.asarray(beta) - self.values(prior))
         return np.asarray(prior + correction)
@@ -154,7 +154,7 @@ def group_columns(
     kept: list[int] = []
     for position in range(len(candidates)):
         rest = triangle[:, position]
-        for _ in range(2):  # two passes make it orthogonal within rounding (Kahan, Parlett)
+        for _ in range(2):  # two passes give orthogonality to rounding errors (Kahan, Parlett)
             rest = rest - basis @ (basis.T @ rest)
         length = np.linalg.norm(rest)
         if length > tolerance:
@@ -204,8 +204,8 @@ def levelled(robot: Robot) -> Robot:
     """
     Return the robot with gravity aligned to an axis of its first joint, if nearly aligned.
 
-    A base that hangs at a rounded angle of 3.1416 excites first moments by 7e-6 of their weight,
-    which no recording shows.
+    A hanging base with a rounded angle of 3.1416 excites first moments by 7e-6 of their weight,
+    which is far below noise.
 
     """
     turn = robot.model.jointPlacements[1].rotation
@@ -220,7 +220,7 @@ def _symbol_of(parameter: ParameterName) -> str:
 
 
 def symbol(parameter: ParameterName) -> str:
-    """Return the symbol of a parameter, with its joint unless the name ends with its number."""
+    """Return the symbol of a parameter, with its joint unless the name ends with a number."""
     numbered = parameter.name[-1:].isdigit() or not parameter.joint
     return parameter.name if numbered else f'{parameter.name}[{parameter.joint}]'
 

@@ -16,7 +16,7 @@ def points_motion(
     robot: Robot, joints: Sequence[str], offsets: FloatArray, q: FloatArray
 ) -> tuple[FloatArray, FloatArray]:
     """
-    Return positions and Jacobians of points of links.
+    Return the positions and Jacobians of points of links.
 
     Parameters
     ----------
@@ -61,7 +61,7 @@ class LinkFrames:
     """
     Frames of links along a motion.
 
-    Samples are the last axis of attributes, and the first axis of results.
+    Samples are on the last axis of attributes, and on the first axis of results.
 
     Attributes
     ----------

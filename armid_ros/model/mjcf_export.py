@@ -18,8 +18,8 @@ import pinocchio as pin
 
 #: File types of meshes that MuJoCo reads.
 _MESHES = ('.stl', '.obj', '.msh')
-#: Dry friction as stiff as the default time step of 2 ms allows. The default of MuJoCo is so soft
-#: that a slow joint of an arm has a tenth of its friction.
+#: Dry friction as stiff as the default time step of 2 ms allows. With the softer default of
+#: MuJoCo, a slow joint of an arm has a tenth of its friction.
 _DRY = {'solreffriction': '0.004 1', 'solimpfriction': '0.9999 0.9999 0.001 0.5 2'}
 #: Contact attributes: visuals have no contacts; collision shapes have contacts with the
 #: environment and not with each other, because neighbouring links overlap.

@@ -3,9 +3,9 @@
 """
 The pseudo-inertia of a link, and the physical consistency of its parameters.
 
-A body with positive mass density can have ten given inertial parameters exactly if the 4x4 matrix
-P = [[S, h], [h', m]] is positive definite. S is the second moment of the mass about the origin of
-the joint frame, h the first moment, m the mass. This condition includes positive mass, positive
+Ten inertial parameters belong to a body of positive density if and only if the 4x4 matrix P =
+[[S, h], [h', m]] is positive definite. S is the second moment of the mass about the origin of
+the joint frame, h the first moment, m the mass. This condition implies positive mass, positive
 principal moments and their triangle inequalities.
 Source: Wensing, Kim and Slotine 2018, eqs. 9 to 13.
 

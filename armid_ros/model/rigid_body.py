@@ -4,8 +4,8 @@
 Rigid-body quantities over whole motions.
 
 Only this module loops over samples, as Pinocchio's algorithms take one configuration at a time.
-The compiled kernel computes torques and regressors where it was compiled.
-All its quantities are linear in the gravity vector and in the inertial parameters of the robot.
+The kernel, if compiled, computes torques and regressors. All quantities are linear in the
+gravity vector and in the inertial parameters of the robot.
 
 """
 
@@ -253,7 +253,7 @@ def random_motion(robot: Robot, rng: np.random.Generator, n_samples: int | None 
     """
     n = robot.n_joints
     if n_samples is None:
-        # enough for an arm of any length: each state has a row for every joint
+        # enough for any number of joints, as each state has a row for every joint
         n_samples = min(40 * n, 560)
     return Motion(
         joints=robot.joints,

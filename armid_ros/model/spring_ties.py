@@ -1,11 +1,11 @@
 # Copyright 2026 The armid_ros developers
 # SPDX-License-Identifier: Apache-2.0
 """
-Two chains tied to each other by springs: geometry, forces, torques, derivatives.
+Springs between two machines: geometry, forces, torques, derivatives.
 
-A tie is between a point of a link of one machine and a point of a link of the other, such as a
-strap between a shank and the shank of an exoskeleton. With the vector D = p - r from the other
-machine's point r to the machine's own point p, a spring k pulls the machine with the force -k D
+A tie connects a point of a link of one machine with a point of a link of the other, such as a
+strap between a human and an exoskeleton shank. The vector D = p - r points from the point r of
+the other machine to the point p of this one. A spring k pulls this machine with the force -k D,
 and the other one with +k D. A relaxed spring has D = 0.
 Source: the human-exoskeleton leg pair, equations (16), (18), (23), (25), physical signs.
 
@@ -103,7 +103,7 @@ class TieGeometry(NamedTuple):
         return np.asarray(np.einsum('nsxj,nsx->njs', self.jacobian, self.way))
 
     def pulled(self, slack: float | FloatArray) -> FloatArray:
-        """Return the columns of springs that pull only beyond a slack [m], (N, n, S)."""
+        """Return the columns of springs that pull only if longer than a slack [m], (N, n, S)."""
         way = extension(self.way, slack)
         return np.asarray(np.einsum('nsxj,nsx->njs', self.jacobian, way))
 

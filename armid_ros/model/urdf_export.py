@@ -3,9 +3,9 @@
 """
 Export of a URDF with new inertial parameters, otherwise unchanged.
 
-A driven joint may move several links, on fixed joints or on joints that are not driven. The other
-links keep their inertials as far as physical consistency permits. The driven joint's own link gets
-the remainder, so that the file, when read again, has exactly the given parameters.
+A driven joint may move several links, on fixed joints or on joints that are not driven. The
+other links keep their inertials as far as physical consistency permits. The driven joint's own
+link has the remainder, so the sum is exactly the given parameters.
 
 """
 
@@ -28,7 +28,7 @@ import numpy as np
 import pinocchio as pin
 import scipy.linalg
 
-#: Least share of a body's pseudo-inertia, in any direction, that its own link keeps.
+#: Smallest share of a body's pseudo-inertia, in any direction, that its own link keeps.
 LEAST_SHARE = 0.05
 
 
@@ -116,7 +116,7 @@ def _children(parent: minidom.Element, name: str) -> Iterator[minidom.Element]:
 
 
 def _child(parent: minidom.Element, name: str) -> minidom.Element:
-    """Return the first child with a tag; it is added, indented as the others, if it is missing."""
+    """Return the first child with a tag; a missing child is added, indented as the others."""
     found = next(_children(parent, name), None)
     if found is None:
         document = minidom.Document()
@@ -151,7 +151,7 @@ def _without_inertials(urdf: str, links: Sequence[str]) -> str:
 
 
 def _share(body: FloatArray, others: FloatArray) -> float:
-    """Return the share of the other links' inertia that leaves a consistent own link, 0 to 1."""
+    """Return the share of the other links' inertia that keeps the own link consistent, 0 to 1."""
     if not np.any(others):
         return 1.0
     if not Consistency.of('', others).eigenvalues[0] > -1e-12:
