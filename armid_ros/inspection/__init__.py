@@ -3,7 +3,7 @@
 """
 Inspection of a recording: contents, faults, and whether a model can be fitted.
 
-Inspection does not change the data: the curves are those of the file.
+Inspection does not change the data; curves show the unchanged signals of the file.
 
 """
 

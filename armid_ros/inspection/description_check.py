@@ -4,9 +4,9 @@
 Checks of a robot description: implausible values, and links that a recording contradicts.
 
 A recording determines base parameters: combinations of masses, first moments and inertias of
-several links. A mass alone is determined under the hypothesis that few links are wrong. Forward
-selection adds wrong links one by one. The ten parameters of each link have a prior around the
-description. The parameters of effects are nuisance parameters.
+several links. A single mass is determined only under the hypothesis that few links are wrong.
+Forward selection adds wrong links one by one. The ten parameters of each link have a prior around
+the description. The parameters of effects are nuisance parameters.
 
 """
 
@@ -27,11 +27,11 @@ from armid_ros.robots.geometry import all_in_one, collision_geometry
 from armid_ros.robots.robot import PER_LINK
 import numpy as np
 
-#: A shape above this [m] has probably another unit.
+#: Size of a shape [m] above which its unit is probably wrong.
 _LONGEST = 10.0
-#: A fitted model whose torque error is smaller by less than this shows no wrong link [%].
+#: Smallest reduction of the torque error by fitted links that indicates a wrong link [%].
 _MATERIAL = 1.0
-#: Share of the residual that a further link has to explain; chi-squared per row that may remain.
+#: Smallest share of the residual for a further link, and largest remaining chi-squared per row.
 _FURTHER, _REMAINS = 0.5, 10.0
 
 
@@ -205,11 +205,10 @@ def check_links(found: Identification, described: ArmModel, grade: str, fault: s
     wrong = [] if error - fitted_error < _MATERIAL else _selected(rows, spread, total)
     changes, covariance, rest = _fit(rows, spread, wrong)
     freedom = max(1, len(rows) - nuisance.shape[1] - size * len(wrong))
-    covariance = covariance * max(
-        1.0, rest / freedom
-    )  # Birge ratio: accounts for the unexplained residual
+    # the Birge ratio accounts for the unexplained residual
+    covariance = covariance * max(1.0, rest / freedom)
     alone = [_fit(rows, spread, [k])[2] for k in range(len(robot.links))]
-    # if two links move alike, each of them explains the difference alone
+    # if two links have the same motion, each of them explains the difference alone
     most = max(rest / _FURTHER, _REMAINS * len(rows)) if len(wrong) == 1 else 0.0
     body = robot.rigid_parameters.reshape(-1, size)[:, :4]
     measured, std = np.full((2, len(robot.links), 4), np.nan)
@@ -264,7 +263,7 @@ def _selected(rows: FloatArray, spread: FloatArray, total: float) -> list[int]:
     every = range(len(spread) // PER_LINK)
     wrong: list[int] = []
     rest = total
-    # with more wrong links, the model itself may be wrong
+    # with more wrong links, the cause may be the model itself
     while len(wrong) < min(3, len(every)) and rest > _REMAINS * len(rows):
         left = {k: _fit(rows, spread, [*wrong, k])[2] for k in every if k not in wrong}
         best = min(left, key=left.__getitem__)

@@ -24,7 +24,7 @@ from armid_ros.robots import Robot
 import numpy as np
 from scipy.signal import savgol_filter
 
-#: A joint whose range is smaller than this is at rest [rad or m].
+#: Range of a joint below which it is at rest [rad or m].
 STILL = 1e-3
 
 

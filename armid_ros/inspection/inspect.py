@@ -81,7 +81,7 @@ class Inspection:
         """Return one sentence on whether the recording is suitable for identification."""
         if self.trial is None:
             if self.recording.tau is None:
-                return 'No efforts: motion alone, from which nothing can be identified.'
+                return 'No efforts: nothing can be identified from motion alone.'
             if any(remark.weight == 'bad' for remark in self.remarks):
                 return 'Not fit for identification as it is.'
             return 'No fault found; add --robot to check limits and try a fit.'
@@ -199,7 +199,7 @@ def _contains_any(text: str, others: Iterable[str]) -> bool:
 
 
 def _of_fit(trial: TrialFit, said: Sequence[str]) -> Iterator[Remark]:
-    """Yield the faults found by identify that no remark contains already."""
+    """Yield the faults found by identify that are in no remark yet."""
     weight: Weight = 'bad' if trial.grade == 'unusable' else 'doubt'
     others = [*said, *trial.elsewhere]
     yield from (
@@ -218,7 +218,7 @@ def _of_time(recording: Recording, sampling: Sampling) -> Iterator[Remark]:
     if report.damage:
         yield Remark('doubt', report.damage)
     if report.clock_note:
-        yield Remark('doubt', f'time is that of reception: header stamps {report.clock_note}')
+        yield Remark('doubt', f'time is the time of reception: header stamps {report.clock_note}')
     lost = report.duplicates + report.out_of_order + report.restarted + report.nan
     rounded = rounded_stamps(recording)
     if rounded:
@@ -262,7 +262,7 @@ def _of_units(
     ]
     if turned:
         named = ', '.join(f'{j.name} reaches {max(-j.lower, j.upper):.4g}' for j in turned[:3])
-        yield Remark('doubt', f'{named}: are positions in degrees, or those of motors?')
+        yield Remark('doubt', f'{named}: are these degrees, or motor positions?')
     if recording.dq is None:
         yield Remark('note', 'no velocities; they are not needed, positions are differentiated')
         return
