@@ -3,8 +3,8 @@
 """
 The residual of a diagnosis: learned as a map, and approximated by a law of few terms.
 
-``learn_residual`` returns an arm with the maps as an effect, the maps as a table for other
-programs, and the shares of the residual that maps and laws predict.
+``learn_residual`` returns an arm with the maps as an effect, a table of the maps for other
+programs, and the predicted shares of the residual.
 
 """
 

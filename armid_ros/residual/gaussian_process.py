@@ -115,16 +115,16 @@ def _fitted(cells: _Cells, knee: float) -> tuple[float, _Scales]:
     regressor = GaussianProcessRegressor(smooth + kernels.WhiteKernel(0.1, (1e-6, 2.0)))
     points = counted(cells.points, knee)
     span = _span(points)
-    # a hundred points are enough for the scales; the order of cells is arbitrary
+    # a hundred points suffice for the scales; the order of cells is arbitrary
     some = slice(None, None, max(1, len(points) // 100))
     with warnings.catch_warnings():
-        warnings.simplefilter('ignore')  # a length scale at its bound: an input is irrelevant
+        warnings.simplefilter('ignore')  # with a length scale at its bound, an input is irrelevant
         regressor.fit((points / span)[some], cells.torque[some] / size)
     found, white = regressor.kernel_.k1, regressor.kernel_.k2
     lengths = np.asarray(found.k2.length_scale, dtype=float)
     lengths = np.where(lengths > 0.9 * _LENGTHS[1], np.inf, lengths * span)
     amplitude = float(size * np.sqrt(found.k1.constant_value))
-    # normalised per cell, in units of torque, so that fits with different knees are comparable
+    # per cell and in units of torque, so fits with different knees are comparable
     evidence = float(regressor.log_marginal_likelihood_value_) / len(cells.torque[some])
     noise = float(size * np.sqrt(white.noise_level))
     return evidence - float(np.log(size)), _Scales(noise, lengths, amplitude, knee)

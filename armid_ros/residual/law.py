@@ -1,11 +1,11 @@
 # Copyright 2026 The armid_ros developers
 # SPDX-License-Identifier: Apache-2.0
 """
-Approximation of a residual by a law: few terms of a library, by sparse regression.
+Approximation of a residual by a law: sparse regression with few terms of a library.
 
 Orthogonal matching pursuit adds the term that correlates most with the remaining residual.
 Cross-validation selects the fewest terms whose error is within one standard deviation of the least
-error. The law is a suggestion for an effect of one's own. Source: Brunton, Proctor and Kutz 2016;
+error. The law is a suggestion for a user-defined effect. Source: Brunton, Proctor and Kutz 2016;
 Pati, Rezaiifar and Krishnaprasad 1993.
 
 """
@@ -97,7 +97,7 @@ def _library(
             for name, function in (('sin', np.sin), ('cos', np.cos)):
                 terms.append((f'{name}({angle})', force, function(k * q)))
                 terms.append((f'{name}({angle}) sign(dq)', force, function(k * q) * sign))
-    # shares of the range at which a one-sided force may begin
+    # shares of the range where a one-sided force may begin
     for place in low + np.array((0.2, 0.35, 0.5, 0.65, 0.8)) * (high - low):
         terms.append((f'max(q - {place:.3g}, 0)', f'{force}/{x}', np.maximum(q - place, 0.0)))
         terms.append((f'max({place:.3g} - q, 0)', f'{force}/{x}', np.maximum(place - q, 0.0)))
@@ -154,7 +154,7 @@ def _fit(x: FloatArray, residual: FloatArray, count: int) -> FloatArray:
     size = np.sqrt(np.mean(x**2, axis=0))
     scale = np.where(size > 0.0, size, 1.0)
     with warnings.catch_warnings():
-        warnings.simplefilter('ignore')  # of linearly dependent terms, the first is used
+        warnings.simplefilter('ignore')  # the first of several linearly dependent terms is used
         found = orthogonal_mp(x / scale, residual, n_nonzero_coefs=count)
     chosen = np.flatnonzero(found)
     factors = np.zeros(x.shape[1])

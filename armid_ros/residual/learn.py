@@ -111,7 +111,7 @@ class Residual:
             if one.held_out is not None:
                 alone = f' ({percent(one.held_out)} of held-out recordings)'
                 if one.held_out < 0.0:
-                    alone = ' (held-out recordings get worse: they go beyond its data)'
+                    alone = ' (held-out recordings get worse: they leave the range of its data)'
             like = 'no law of few terms'
             if one.law is not None:
                 like = f'{one.law.text} ({percent(one.law.share)})'
@@ -283,7 +283,7 @@ def learn_residual(diagnosis: Diagnosis, rng: np.random.Generator) -> Residual |
         validation = [overlay.trajectory for overlay in gap.overlays]
     every = joint_rows(base, diagnosis.data)
     unseen = joint_rows(base, validation) if validation else [None] * len(every)
-    # two threads would spend most of the time waiting, as each system has only a hundred rows
+    # a system has only a hundred rows, so two threads would mostly wait
     import sklearn.linear_model  # noqa: F401 - so that its threads are limited as well
     from threadpoolctl import threadpool_limits
 
@@ -316,8 +316,8 @@ def _learned(
     """
     Learn the map of one joint.
 
-    It is None if it does not predict held-out blocks beyond chance. It is also None if its torque
-    is less than a material torque [N m] and it predicts no held-out recording.
+    The map is None if it does not predict held-out blocks beyond chance. It is also None if its
+    torque is below a material torque [N m] and it predicts no held-out recording.
 
     """
     if len(rows) < _FEW:

@@ -14,7 +14,7 @@ from armid_ros.motion import FloatArray
 import numpy as np
 import numpy.typing as npt
 
-#: Number of blocks of the cross-validation: each is predicted from the others.
+#: Number of blocks of the cross-validation; each block is predicted from the others.
 BLOCKS = 10
 
 
