@@ -136,7 +136,7 @@ def _print_json(name: str, **document: Any) -> None:
 @click.option(
     '--cutoff', type=float, help='Position filter cut-off [Hz]; default: from a few bags.'
 )
-@click.option('--decimation', type=int, help='Keep one of so many samples, after a filter.')
+@click.option('--decimation', type=int, help='Keep one of this many samples.')
 @options.topic
 @options.gravity
 @options.joints
