@@ -29,10 +29,10 @@ RobotLike = Robot | ArmModel | str | Path
 RecordingLike = Recording | str | Path
 #: A random generator, or a seed.
 Rng = np.random.Generator | int
-#: Callback with the completed share of the work and, if it changes, the name of the step.
+#: Callback with the completed share of the work, and with the name of a new step.
 Progress = Callable[..., None]
 
-#: One number, one per joint, or the same as text: '1798/7, 50'.
+#: One number or one per joint, also as text: '1798/7, 50'.
 _Numbers = float | str | Sequence[float]
 
 #: Suffixes of robot description files.
@@ -72,7 +72,7 @@ def source_of(robot: Robot) -> str:
 
 
 def arm_of(arm: RobotLike, effects: str = USUAL) -> ArmModel:
-    """Return an arm model; a robot, name or path without a model gets the usual friction."""
+    """Return an arm model; without a model, a robot, name or path has the usual friction."""
     if isinstance(arm, ArmModel):
         return arm
     if not isinstance(arm, Robot) and is_model(arm):
@@ -122,7 +122,7 @@ def some_recordings_of(
     """Return a list of recordings, as `recordings_of`; RecordingError if it is empty."""
     found = recordings_of(recordings, robot)
     if not found:
-        raise RecordingError('no recordings: give one bag, table or Recording at least')
+        raise RecordingError('no recordings: give at least one bag, table or Recording')
     return found
 
 
@@ -132,7 +132,7 @@ def with_sources_apart(*groups: list[Recording]) -> tuple[list[Recording], ...]:
 
     def named(recording: Recording) -> Recording:
         source = recording.source or 'recording'
-        if Path(source).exists():  # a recording that is given twice is read once
+        if Path(source).exists():  # a recording that is given twice is read only once
             return recording
         taken[source] = count = taken.get(source, 0) + 1
         return replace(recording, source=source if count == 1 else f'{source} {count}')

@@ -52,7 +52,7 @@ class ComparisonResult(Shown):
 
     @property
     def load(self) -> float | None:
-        """Mass added to a link [kg]; None unless a load explains the changes of the body."""
+        """Mass added to a link [kg]; None if no load explains the changes of the rigid body."""
         return None if self.core.load is None else float(self.core.load.mass)
 
     def to_dataframe(self) -> pandas.DataFrame:

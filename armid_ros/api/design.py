@@ -59,7 +59,7 @@ def design_excitation(
     """
     Find a trajectory that makes the parameters identifiable, without collisions, inside limits.
 
-    The arm, its floor and its surroundings are checked as by ``armid excite``.
+    Arm, floor and surroundings are checked as by ``armid excite``.
 
     Parameters
     ----------
@@ -180,7 +180,7 @@ def _searched(
     """Check that a start pose is free, then search for the trajectory."""
     planner = TransferPlanner.of(model, scene, settings.speed)
     if start is None:
-        planner.free_start()  # raises before the search if no pose is free
+        planner.free_start()  # raises an error before the search if no pose is free
     elif fault := planner.fault(start):
         raise TrajectoryError(f'--start: {fault}')
     prior = None

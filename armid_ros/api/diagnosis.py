@@ -206,7 +206,7 @@ class DiagnosisResult(ShownModel):
 
     @property
     def files(self) -> list[str]:
-        """Return the names of the files of the result."""
+        """Return the file names of the result."""
         return [
             *('diagnosis.json', 'report.html', 'model.yaml'),
             *([] if self.residual is None else [self.residual.table_file]),
@@ -216,7 +216,7 @@ class DiagnosisResult(ShownModel):
     def with_residual(self, seed: int) -> DiagnosisResult:
         """Learn the unexplained residual as a map of the state, or add a note with the reason."""
         if self.verdict not in OPEN:
-            note = f'nothing is learned where the verdict is {self.verdict.replace("_", " ")}'
+            note = f'nothing is learned for the verdict {self.verdict.replace("_", " ")}'
             return replace(self, notes=(*self.notes, note))
 
         def learned() -> Residual | None:
@@ -269,13 +269,13 @@ class DiagnosisResult(ShownModel):
         lines += [] if self.residual is None else self.residual.sentences()
         lines += [pair.sentence() for pair in self.forward]
         if self.verdict == 'consistent':
-            lines.append('note: how large each effect has to be to be seen is in report.html')
+            lines.append('note: report.html has the detectable size of each effect')
         return [*lines, *(f'note: {note}' for note in (*self.core.notes, *self.notes))]
 
     def summary(self, model: str = MODEL, every: bool = True) -> Summary:
         """Return verdict, values that differ from zero, notes, and next steps for a model file."""
         rows: list[Sequence[str]] = [*named_rows(self.core.findings, certain=True)]
-        most = 6  # rows without --all
+        most = 6  # number of rows without --all
         if not every and len(rows) > most + 1:
             rows[most:] = [(f'... and {len(rows) - most} more: --all, or report.html',)]
         if self.verdict in ('bad_data', 'not_repeatable'):
@@ -283,7 +283,7 @@ class DiagnosisResult(ShownModel):
         elif self.verdict in OPEN and self.residual is None:
             then = 'diagnose'
         elif self.verdict == 'ambiguous' and self.next_run is None:
-            then = ''  # the user has to distinguish the named effects
+            then = ''  # the user has to decide between the named effects
         else:
             anew = self.core.doubt or self.core.harmful or self.verdict in OPEN
             then = 'identify' if anew else 'simulate'

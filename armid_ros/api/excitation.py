@@ -129,7 +129,7 @@ class ExcitationResult(Shown):
 
     @cached_property
     def start(self) -> FloatArray:
-        """Return the pose that the run leaves from and returns to, shape (n,) [rad or m]."""
+        """Return the pose in which the run starts and ends, shape (n,) [rad or m]."""
         return self.planner.free_start() if self.given_start is None else self.given_start
 
     @cached_property
@@ -140,7 +140,7 @@ class ExcitationResult(Shown):
 
     @cached_property
     def isolability(self) -> Isolability:
-        """Return which effects the trajectory shows, and which it cannot distinguish."""
+        """Return the effects that the trajectory makes detectable or cannot distinguish."""
         settings = self.core.settings
         noise, count = torque_noise(self.arm, settings), settings.rate * self.duration
         return isolability(self.arm, self.motion(), noise, count)
@@ -216,7 +216,8 @@ class ExcitationResult(Shown):
         """
         for name in ('excitation.yaml', 'excitation.csv'):
             save_excitation(self.core.excitation, folder / name)
-        for name in ('excitation.yaml', 'excitation.csv'):  # if a path to the trajectory is found
+        # with approach and return, if there is a path to the trajectory
+        for name in ('excitation.yaml', 'excitation.csv'):
             save_excitation(self.run.excitation, folder / name)
         robot = self.arm.robot
         write_joint_trajectory(folder / BAG, self.run.motion(), robot_description=robot.urdf)
@@ -225,7 +226,7 @@ class ExcitationResult(Shown):
         page = folder / 'report.html'
         try:
             write_file(page, self.page(origin))
-        except Exception as error:  # the written trajectory is valid after any error
+        except Exception as error:  # the written trajectory is valid despite any error
             sys.stderr.write(f'{settled(page)}: not written: {type(error).__name__}: {error}\n')
         return document
 
@@ -254,7 +255,7 @@ class ExcitationResult(Shown):
         try:
             run, fit = self.run, self.fitness
         except TrajectoryError as error:
-            found = f'There is no way to the trajectory: {error}.'
+            found = f'There is no path to the trajectory: {error}.'
             return NO_WAY, [found], 'Give another --start or --seed.'
         robot = self.arm.robot
         fault = '' if self.given_start is not None else self.planner.fault(robot.zero_pose)
@@ -266,5 +267,5 @@ class ExcitationResult(Shown):
             f'{run.approach.duration:.1f} s and back after {run.duration:.1f} s'
         )
         lines += [f'the zero of the description is not free: {fault}'] if fault else []
-        early = f'stopped early ({self.core.stopped}): not what the seed would give'
+        early = f'stopped early ({self.core.stopped}): another run with this seed may differ'
         return fit.word, [*lines, early] if self.core.stopped else lines, fit.remedy

@@ -109,7 +109,7 @@ class IdentificationResult(ShownModel):
 
     @property
     def files(self) -> list[str]:
-        """Return the names of the files of the result."""
+        """Return the file names of the result."""
         return ['identification.json', 'report.html', 'model.yaml', *self.exports]
 
     @property
@@ -146,12 +146,12 @@ class IdentificationResult(ShownModel):
 
     @property
     def error_percent(self) -> float:
-        """Error of the worst joint, 100 |tau - tau_hat| / |tau|, as the grade states it."""
+        """Error of the worst joint in the grade, 100 |tau - tau_hat| / |tau| [%]."""
         return self.graded.error_percent
 
     @property
     def misfit(self) -> Misfit:
-        """Return the residual of the model with the information on its parameters."""
+        """Return the residual of the model, with the information on its parameters."""
         known = parameters_of(self.arm.robot.name, self.document())
         information = known.information(self.arm.parameters)
         unusable = self.grade == 'unusable'
@@ -224,7 +224,7 @@ class IdentificationResult(ShownModel):
         return document
 
     def page(self, origin: ResultOrigin = DEFAULT_ORIGIN) -> str:
-        """Return report.html with all curves, numbers and doubts."""
+        """Return report.html with all curves, numbers and warnings."""
         without_place = {name: one.without_place for name, one in self.exports.items()}
         return identification_report(
             self.core,
@@ -254,7 +254,7 @@ class IdentificationResult(ShownModel):
         return document
 
     def summary(self, every: bool = False) -> Summary:
-        """Return errors and friction of each joint, doubts, and next step; `every`: all values."""
+        """Return errors and friction of joints, warnings, and next step; `every`: all values."""
         core, estimate, joints = self.core, self.estimate, self.arm.robot.joints
         others = self.graded.reasons[1:]
         shown = [fit for fits in self.validation.values() for fit in fits] or core.training
@@ -275,9 +275,9 @@ class IdentificationResult(ShownModel):
         bodies = []
         if core.bodies_cost is not None:
             grows = f'(torque error {100.0 * max(core.bodies_cost, 0.0):.2g} % larger)'
-            bodies = [f'no links that are bodies fit as well {grows}: --physical']
+            bodies = [f'no physically consistent links fit as well {grows}: --physical']
             if self.exports:
-                bodies = [f'links are bodies {grows}; {", ".join(self.exports)}']
+                bodies = [f'links are physically consistent {grows}; {", ".join(self.exports)}']
                 bodies += far_from_described(
                     self.description.robot, core.arm.robot.rigid_parameters[::10]
                 )

@@ -121,7 +121,7 @@ class InspectionResult(Shown):
                 *(f'{name}: {value}' for name, value in recording_facts(found)),
                 *topics,
             ),
-            steps=['Correct that, and inspect the recording again.'] if refused else (),
+            steps=['Correct these faults, and inspect the recording again.'] if refused else (),
             then='' if refused else 'identify' if good else again,
         )
 
@@ -239,7 +239,7 @@ class CheckResult(Shown):
         return description_check_report(self.remarks, self.links, self.stated(origin, self.robot))
 
     def summary(self) -> Summary:
-        """Return the finding and the links, with measured values if any are known."""
+        """Return the finding and the links, with measured values if there are any."""
         links = self.links
         wrong = links is not None and not np.isnan(links.measured_mass).all()
         columns = slice(None) if wrong else slice(0, 4, 2)

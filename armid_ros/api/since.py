@@ -1,6 +1,6 @@
 # Copyright 2026 The armid_ros developers
 # SPDX-License-Identifier: Apache-2.0
-"""Misfit and recordings of a model from its identification, and the model of a simulator."""
+"""Misfit and recordings of the identification of a model, and the model of a simulator."""
 
 from __future__ import annotations
 
@@ -30,7 +30,7 @@ def recordings_since(
     """
     Return the given baseline; by default the recordings of the identification.
 
-    The default baseline is empty if one of these recordings is diagnosed.
+    The default baseline is empty if one of its recordings is diagnosed.
 
     """
     if baseline is not None:
@@ -61,7 +61,7 @@ def model_in_question(
 
     The misfit is that of the model at its identification; None if it is unknown. The model of a
     simulator is identified from its recordings (`against`). Without given effects, it has the
-    usual effects and the effects that a MJCF can describe.
+    usual effects, and those that an MJCF can describe.
 
     """
     model = arm.arm if isinstance(arm, IdentificationResult) else arm_of(arm, effects)

@@ -58,7 +58,7 @@ class Summary:
     then: str = ''
 
     def text(self, *below: str) -> list[str]:
-        """Return the lines of the text; `below` comes before the next steps."""
+        """Return the lines of the text, with `below` before the next steps."""
         headline = f'{self.badge.upper()}: {self.title}' if self.badge else self.title
         steps = [f'next: {step}' for step in self.steps]
         table = aligned(self.heads, self.rows)
@@ -146,7 +146,7 @@ class Shown(ABC):
         """Show the report in a frame of the notebook; without a report, show the text."""
         try:
             page = self.page()
-        except ArmidError:  # a plan without a trajectory has no page
+        except ArmidError:  # a design without a trajectory has no page
             return f'<pre>{escape(repr(self))}</pre>'
         return f'<iframe srcdoc="{escape(page)}" width="100%" height="640"></iframe>'
 
@@ -189,7 +189,7 @@ class ShownModel(Shown):
 
 
 def aligned(heads: Sequence[str], rows: Sequence[Sequence[str]]) -> list[str]:
-    """Align names to the left and other columns to the right; single cells span the row."""
+    """Align names left and other columns right; a single cell spans the row."""
     if not heads:
         return []
     table = [tuple(heads), *(tuple(row) for row in rows)]
