@@ -1,6 +1,6 @@
 # Copyright 2026 The armid_ros developers
 # SPDX-License-Identifier: Apache-2.0
-"""`armid`: one file per job, one function per command; the packages compute."""
+"""The command line `armid`: one file per job, and one function per command."""
 
 from armid_ros.cli.commands import main
 

@@ -1,7 +1,7 @@
 # Copyright 2026 The armid_ros developers
 # SPDX-License-Identifier: Apache-2.0
 """
-Choices of options, copied from the packages: help shows them without an import.
+Choices of options, copied from the packages, so help needs no import.
 
 A test compares each with the package.
 
@@ -26,14 +26,14 @@ MAX_DURATION = 86400.0
 #: Criteria of a design, with their meaning; `armid_ros.excitation.CRITERIA`.
 CRITERIA = {
     'D': 'volume of the confidence ellipsoid, log det of the information',
-    'A': 'mean variance of the parameters, each scaled to the torque it makes',
-    'E': 'variance along the worst direction, parameters scaled to the torque they make',
+    'A': 'mean variance of the parameters, each scaled to its torque',
+    'E': 'variance along the worst direction, with parameters scaled to their torque',
     'condition': 'condition number of the weighted regressor',
     'T': 'torque that a rival model cannot explain',
 }
 #: Parameters in the criterion; `armid_ros.excitation.TARGETS`.
 TARGETS = {
     'all': 'all base parameters of the rigid body, and those of the effects',
-    'gravity': 'masses and first moments as an arm moving slowly shows them, and the effects',
-    'effects': 'those of the effects alone, the rigid body being known',
+    'gravity': 'masses and first moments, as identified from slow motion, and the effects',
+    'effects': 'parameters of the effects only; the rigid body is known',
 }

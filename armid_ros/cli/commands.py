@@ -1,6 +1,6 @@
 # Copyright 2026 The armid_ros developers
 # SPDX-License-Identifier: Apache-2.0
-"""The group of all commands, and the report of bad input."""
+"""The group of all commands, and the error message for bad input."""
 
 from __future__ import annotations
 
@@ -46,9 +46,9 @@ COMMANDS = {
 
 #: Defaults of options, in the current folder.
 FILE = 'armid.toml'
-#: Context key of notes that are printed on stderr after the work; an error is one line.
+#: Context key of notes that are printed on stderr after the work; errors have one line.
 NOTES = 'armid.notes'
-#: Context key of the typed arguments of the command.
+#: Context key of the arguments as typed.
 TYPED = 'armid.typed'
 
 
@@ -183,7 +183,7 @@ def project_options(
     """
     Return the defaults of a command from armid.toml, and print them on stderr.
 
-    A key outside of a table sets this option for all commands. A key in the table of a command
+    A key outside of a table sets an option of all commands. A key in the table of a command
     sets the option for that command only.
 
     Parameters

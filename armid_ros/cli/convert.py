@@ -44,15 +44,15 @@ def convert(
     Convert a CSV, NPZ, ... table or a ROS 1 bag into a ROS 2 bag.
 
     Tables are CSV (.tsv, .txt, .gz too), NPZ and NPY, MAT, HDF5, Parquet, and folders of LeRobot
-    datasets. Columns without an option are guessed, and shown. Several tables hold columns of the
-    same rows. Bags of ROS 1 and ROS 2 are copied; joints may be renamed.
+    datasets. Columns without an option are guessed and printed. Several tables have columns of
+    the same rows. Bags of ROS 1 and ROS 2 are copied; joints may be renamed.
 
     """
     from armid_ros.cli import options
     from armid_ros.recording.anything import is_table
 
     if out is None and not dry_run:
-        raise click.UsageError('give --out, the bag to write, or --dry-run to write none')
+        raise click.UsageError('give --out with the bag to write, or --dry-run to write nothing')
     robot = None
     if robot_source is not None:
         robot = options.open_robot(robot_source, 'earth', joints)
@@ -107,7 +107,7 @@ def _bag(path: Path, out: Path | None) -> None:
     if not is_ros1(path) and not settings.rename:
         topics(path)  # raises an error if the path is not a bag
         raise RecordingError(
-            f'{path}: nothing to do: a bag of ROS 2 stays as it is without --rename'
+            f'{path}: nothing to do: without --rename, a bag of ROS 2 does not change'
         )
     copied = copy_bag(path, out, settings.rename, options.read_settings())
     for topic in copied.topics:

@@ -52,8 +52,8 @@ def share_of_percent(
     multiple=True,
     type=click.Path(path_type=Path),
     metavar='BAG',
-    help='A bag from when the model was right, to find changes since then; may be given several '
-    'times. By default the bags that --model was identified from, if they exist.',
+    help='A bag recorded while the model was right, to find changes since; may be given several '
+    'times. By default the bags of the identification of --model, if they exist.',
 )
 @click.option(
     '--no-baseline',
@@ -123,7 +123,7 @@ def share_of_percent(
     multiple=True,
     metavar='JOINT=JOINT',
     help='Possible tie: a joint of the arm and a joint of the partner. JOINT@X,Y,Z sets '
-    'a point of the link [m]; the centroid by default. By default links of equal number.',
+    'a point of the link [m]; the centroid by default. By default links with equal indices.',
 )
 @parameters.setting
 @parameters.every
@@ -224,7 +224,7 @@ def _identified_from(model: Path, diagnosed: list[Path]) -> tuple[Path, ...]:
 
 
 def _model_of(path: Path, robot: Robot) -> ArmModel:
-    """Read a model; ArmidError if its description still exists and has other kinematics."""
+    """Read a model; ArmidError if its description exists and has other kinematics."""
     from armid_ros.arm import load_model
     from armid_ros.cli import options
     from armid_ros.identification.output import kinematics_digest
@@ -236,7 +236,7 @@ def _model_of(path: Path, robot: Robot) -> ArmModel:
         return arm
     if known.joints == robot.joints and kinematics_digest(known) != kinematics_digest(robot):
         raise ArmidError(
-            f'{path}: was made with a description with other joints than those of '
+            f'{path}: belongs to a description whose joints differ from those of '
             f'{robot.name}; give that description as --robot, or identify this arm'
         )
     return arm

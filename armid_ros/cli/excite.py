@@ -23,7 +23,7 @@ if TYPE_CHECKING:
 
 #: Kinds of trajectories for elastic joints.
 COURSES = ('multisine', 'steps')
-#: Options that designs and trajectories for elastic joints share; the latter also have --share.
+#: Common options of designs and of trajectories for elastic joints; the latter also have --share.
 _SHARED = {
     'robot_source', 'out', 'kind', 'duration', 'clearance', 'environment', 'floor', 'gravity',
     'joints', 'seed', 'force', 'crc', 'memory_limit',
@@ -67,7 +67,7 @@ class Speed(click.ParamType[str | float]):
     type=click.FloatRange(0.0, MAX_DURATION, min_open=True),
     default=44.0,
     show_default=True,
-    help='Length of the exciting part [s]; approach and return are added.',
+    help='Duration of the excitation [s], without approach and return.',
 )
 @click.option(
     '--periods',
@@ -116,13 +116,14 @@ class Speed(click.ParamType[str | float]):
     shell_complete=parameters.completed,
     multiple=True,
     metavar='NAME:k=v',
-    help='Effect of known size, which counts against torque limits. May be given several times.',
+    help='Effect of known size, which uses a part of the torque limits. May be given several '
+    'times.',
 )
 @click.option(
     '--rival',
     shell_complete=parameters.completed,
     metavar='E,...|none',
-    help='With --criterion T: effects that may be there in place of --effect.',
+    help='With --criterion T: effects that may act instead of --effect.',
 )
 @click.option(
     '--model', type=click.Path(path_type=Path), help='model.yaml of the arm with its effects.'
@@ -130,7 +131,7 @@ class Speed(click.ParamType[str | float]):
 @click.option(
     '--start',
     metavar='Q,...',
-    help='Pose that the trajectory leaves and returns to [rad or m]; zero by default.',
+    help='Pose in which the trajectory starts and ends [rad or m]; zero by default.',
 )
 @click.option(
     '--acceleration',
@@ -272,7 +273,7 @@ def excite(
         origin = options.origin(robot_source, read, seed)
         try:
             options.deliver(result, staged, origin, as_json)
-        except TrajectoryError as error:  # a design without a way to it is kept, in a new folder
+        except TrajectoryError as error:  # a design without a path to it is kept in a new folder
             held = f'{staged.out}: stays as it was'
             if staged.alone:
                 staged.keep()
@@ -286,7 +287,7 @@ def excite(
 
 
 def _refuse_other_options(context: click.Context, kind: str) -> None:
-    """Raise a UsageError for an option that does not go with the kind."""
+    """Raise a UsageError for an option that the kind does not have."""
     for option in context.command.params:
         name = str(option.name)
         fits = name in _SHARED or (name == 'share') == (kind in COURSES)

@@ -1,6 +1,6 @@
 # Copyright 2026 The armid_ros developers
 # SPDX-License-Identifier: Apache-2.0
-"""The next command after a command, with the same robot, bags and options of reading."""
+"""The next command after a command, with the same robot, bags and reading options."""
 
 from __future__ import annotations
 
@@ -104,7 +104,7 @@ def _subject(
 
 
 def _typed(context: click.Context, kept: Iterable[str]) -> Iterator[str]:
-    """Yield the typed values of the named options."""
+    """Yield the values of the named options as typed."""
     known = {
         text: one for one in context.command.params for text in (*one.opts, *one.secondary_opts)
     }

@@ -20,7 +20,7 @@ import click
 @click.option(
     '--out',
     type=parameters.OutPath(file_okay=False, path_type=Path),
-    help='Folder to put inspection.html, with all curves, and inspection.json into.',
+    help='Folder for inspection.html, with all curves, and inspection.json.',
 )
 @parameters.force
 @columns.recordings
@@ -87,10 +87,10 @@ def inspect(
 @click.option(
     '--out',
     type=parameters.OutPath(file_okay=False, path_type=Path),
-    help='Folder to put report.html and check.json into.',
+    help='Folder for report.html and check.json.',
 )
 @parameters.force
-@click.option('--strict', is_flag=True, help='End with code 3 if a value is found to be wrong.')
+@click.option('--strict', is_flag=True, help='End with code 3 if a value is wrong.')
 @parameters.effects
 @columns.recordings
 def check(
@@ -127,7 +127,7 @@ def check(
     described = first == '-' or (bool(first) and describes_robot(first))
     if first and not typed and (robot_source is None or described):
         if robot_source is not None:
-            click.echo(f'{first} is taken in place of that --robot', err=True)
+            click.echo(f'{first} is used instead of --robot', err=True)
         robot_source, *others = arguments
         arguments = tuple(others)
     if robot_source is None:

@@ -39,8 +39,8 @@ def lacking(error: ModuleNotFoundError) -> str | None:
     module = (error.name or '').partition('.')[0]
     if module == 'armid_msgs':
         return (
-            'the message package armid_msgs is missing; it is compiled and on no index: in a '
-            'clone `make`, or pip install --no-build-isolation ./msg_schemas, or `colcon build`'
+            'the message package armid_msgs is missing; it has to be compiled: run `make` in a '
+            'clone, or pip install --no-build-isolation ./msg_schemas, or `colcon build`'
         )
     if _ROS.fullmatch(module):
         return (

@@ -58,9 +58,9 @@ def stage(out: Path, schema: str, robot: str = '', also: Collection[str] = ()) -
     """
     Create and lock a folder for the results of this command; return the staging folder.
 
-    The folder gets no file unless the command keeps the staging folder. Other files of an earlier
-    result are then removed, except a description that --robot names. With --force, files that
-    are not replaced stay.
+    Only when the command keeps the staging folder, files appear in the folder. Other files of an
+    earlier result are then removed, except a description that --robot names. With --force, files
+    that are not replaced stay.
 
     Parameters
     ----------
@@ -90,7 +90,7 @@ def deliver(
     summary: Summary | None = None,
 ) -> None:
     """
-    Write a result to its folder, if any, and print it.
+    Write a result to its folder, if there is one, and print it.
 
     Parameters
     ----------
@@ -192,7 +192,7 @@ def origin(
     source: str = '',
     settings: Mapping[str, Any] | None = None,
 ) -> ResultOrigin:
-    """Return the origin of a result: --robot, how model.yaml names it, and the `provenance`."""
+    """Return the origin of a result: --robot, its name in model.yaml, and the `provenance`."""
     return ResultOrigin(robot, source, provenance(paths, settings, seed))
 
 
@@ -264,7 +264,7 @@ def model_of(path: Path, robot: Robot | None) -> ArmModel:
         typed, known = (','.join(f'{part:g}' for part in vector) for vector in (given, own))
         raise ModelError(
             f'{path}: its gravity is {known}, and --gravity is {typed}: leave --gravity out, or '
-            'write that gravity into the file if the arm stands there now'
+            'write this gravity into the file if the arm is there now'
         )
     return arm
 
@@ -311,7 +311,7 @@ def read(paths: Sequence[Path], robot: Robot, topic: str | None) -> list[Recordi
         shown.add(body)
 
     for path in paths if settings.rename else ():
-        if ':' in path.name and not path.exists():  # a second pair without --rename
+        if ':' in path.name and not path.exists():  # a second pair of names without --rename
             raise RecordingError(
                 f"there is no recording '{path}'; to rename several names, repeat the option: "
                 f"--rename '{settings.rename[-1][0]}:{settings.rename[-1][1]}' --rename '{path}'"

@@ -21,7 +21,7 @@ PACKAGES = 'armid.packages'
 
 
 def together(*options: Callable[[Any], Any]) -> Callable[[_Command], _Command]:
-    """Return a decorator that adds several options to a command, in this order of the help."""
+    """Return a decorator that adds several options to a command, in the order of the help."""
 
     def add(command: Any) -> Any:
         for option in reversed(options):
@@ -90,7 +90,7 @@ force = click.option(
     callback=lambda context, _, value: context.meta.update({FORCE: value}),
     help='Overwrite results of another kind or robot, and files of other programs.',
 )
-#: A folder of results, and permission to overwrite others.
+#: Options on the folder of results, and on overwriting.
 folder = together(
     click.option(
         '--out',

@@ -40,7 +40,7 @@ if TYPE_CHECKING:
     '--loop-gain',
     default=1.0,
     show_default=True,
-    help='Share of the gains of the velocity loops that drive elastic joints.',
+    help='Factor of the gains of the velocity loops that drive elastic joints.',
 )
 @click.option('--torque-noise', default=0.0, help='Torque noise (std) [N m or N]; default 0.')
 @click.option('--position-noise', default=0.0, help='Position noise (std) [rad or m]; default 0.')
@@ -131,7 +131,7 @@ def _of_some_size(text: str, robot: Robot) -> tuple[Effect, FloatArray]:
         shapes = ', '.join(f'{s.name} [{s.unit or "1"}]' for s in effect.shapes)
         first = effect.quantities[0].name
         raise ModelError(
-            f"--effect '{text}' has no size and would change nothing: it takes {sizes}"
+            f"--effect '{text}' has zero size and would change nothing: it takes {sizes}"
             + (f', and the shape {shapes}' if shapes else '')
             + f'; write {text.partition(":")[0]}:{first}=0.1'
         )
@@ -141,7 +141,7 @@ def _of_some_size(text: str, robot: Robot) -> tuple[Effect, FloatArray]:
 
 
 def _warn_impossible(text: str, values: FloatArray, robot: Robot) -> None:
-    """Warn of a payload that is physically inconsistent, or farther away than the arm is long."""
+    """Warn of a payload that is physically inconsistent, or out of reach of the arm."""
     from armid_ros.model.pseudo_inertia import Consistency
     from armid_ros.robots.robot import PER_LINK
     import numpy as np

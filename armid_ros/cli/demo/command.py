@@ -29,7 +29,7 @@ OUTPUTS = ('bag', 'excitation.yaml', 'model.yaml', 'identification.json', 'repor
     type=click.Choice(['moon', 'earth']),
     default='moon',
     show_default=True,
-    help='Gravity that the arm moves in.',
+    help='Gravity of the simulated arm.',
 )
 @click.option('--rate', default=200.0, show_default=True, help='Sample rate [Hz].')
 @click.option(
@@ -37,7 +37,7 @@ OUTPUTS = ('bag', 'excitation.yaml', 'model.yaml', 'identification.json', 'repor
     shell_complete=parameters.completed,
     default='',
     metavar='E@joint',
-    help='Effect that is hidden in the arm and has to be found; random by default.',
+    help='Effect to hide in the arm for the diagnosis; random by default.',
 )
 @parameters.folder
 @parameters.seed
@@ -124,7 +124,7 @@ def _page(
     history: list[tuple[float, Estimate]],
     target: FloatArray,
 ) -> str:
-    """Return report.html, with the truth and the convergence of the online estimate."""
+    """Return report.html with true values and the convergence of the online estimate."""
     from armid_ros.report.identification_report import (
         Assessment,
         convergence_section,

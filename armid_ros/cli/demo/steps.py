@@ -1,6 +1,6 @@
 # Copyright 2026 The armid_ros developers
 # SPDX-License-Identifier: Apache-2.0
-"""The arm of the demo: its truth, its sensors, its runs over topics, and a hidden change."""
+"""The arm of the demo: true values, sensors, runs over topics, and a hidden change."""
 
 from __future__ import annotations
 
@@ -40,7 +40,7 @@ def _facts() -> dict[str, Any]:
 
 
 def true_arm(robot: Robot) -> ArmModel:
-    """Return the arm to identify, with friction and other masses than described."""
+    """Return the arm to identify, with friction and with other masses than described."""
     true = _facts()
     factors = np.array(true['mass_factors'])[:, np.newaxis]
     parameters = robot.rigid_parameters.reshape(-1, 10) * factors
@@ -114,7 +114,7 @@ class HiddenChange:
         where = ', '.join(self.effect.joints) or 'the whole arm'
         hidden = f'{self.effect.name.replace("_", " ")} in {where} ({", ".join(shown[:4])})'
         rank = 'found it' if self.found_by(diagnosed) else 'did not rank it first'
-        return f'Hidden was: {hidden}. The diagnosis {rank}.'
+        return f'Hidden effect: {hidden}. The diagnosis {rank}.'
 
     def document(self, diagnosed: DiagnosisResult) -> dict[str, Any]:
         """Return the hidden effect, the verdict and whether it was found, for JSON."""

@@ -32,7 +32,7 @@ _KINDS_OF = {'joint': LOADS, 'frame': LOADS, 'spread': ('ranges',)}
 @click.option(
     '--out', required=True, type=parameters.OutPath(path_type=Path), help='File to write.'
 )
-@parameters.robot_described(help='Shipped name or path; that of the model by default.')
+@parameters.robot_described(help='Shipped name or path; by default the robot of the model.')
 @parameters.joints
 @click.option('--joint', help='Joint that moves the payload; needed if several have one.')
 @click.option(
@@ -77,7 +77,7 @@ def export(
     if robot_source is not None:
         robot = options.open_robot(robot_source, 'earth', joints)
     elif joints is not None:
-        raise click.UsageError('--joints needs the description of them: name it with --robot')
+        raise click.UsageError('--joints needs a description: name it with --robot')
     arm = options.model_of(model, robot)
     notes: tuple[str, ...] = ()
     if kind in ('cpp', 'python'):

@@ -20,7 +20,7 @@ import numpy.typing as npt
 _TABLES = {'damping': 'VISCOUS', 'frictionloss': 'COULOMB', 'armature': 'ROTOR', '': 'OFFSET'}
 #: Template of the torque law, brackets of a table, and comment prefix.
 _LANGUAGES = {'cpp': ('torque.hpp', '{}', '//'), 'python': ('torque.py.txt', '[]', '#')}
-#: Speed up to which there is no Coulomb friction [rad/s or m/s]: the noise of a velocity at rest.
+#: Largest speed without Coulomb friction [rad/s or m/s]: the noise of a velocity at rest.
 DEAD_BAND = 1e-3
 
 
@@ -66,7 +66,7 @@ def torque_code(arm: ArmModel, language: str, source: str) -> tuple[str, tuple[s
     Return code for the torque of an arm, and lines on parameters that it omits.
 
     The language is 'cpp', a C++17 header with torque(q, dq, ddq, tau), or 'python', a module with
-    torque(q, dq, ddq) that returns tau; neither needs more than its standard mathematics. A
+    torque(q, dq, ddq) that returns tau; neither needs more than the standard library. A
     comment names the source of the arm, and each parameter of an effect that is not in the code.
 
     """
@@ -91,7 +91,7 @@ def torque_code(arm: ArmModel, language: str, source: str) -> tuple[str, tuple[s
 
 
 def _nested(values: Any, brackets: str, apart: str = ' ') -> str:
-    """Write nested lists in the brackets of a language; `apart` is between the outermost rows."""
+    """Write nested lists with the brackets of a programming language, and outer separators."""
     if not isinstance(values, list):
         return repr(values)
     apart = apart if isinstance(values[0], list) else ' '

@@ -43,7 +43,7 @@ class CarriedLoad:
             key=lambda order: float(np.abs(np.diag(axes[:, order])).sum()),
         )
         axes = axes[:, order] * np.where(np.diag(axes[:, order]) < 0.0, -1.0, 1.0)
-        if np.linalg.det(axes) < 0.0:  # left-handed: flip the axis farthest from the frame's
+        if np.linalg.det(axes) < 0.0:  # left-handed: reverse one axis
             axes[:, np.argmin(np.diag(axes))] *= -1.0
         return moments[order], axes
 
@@ -179,8 +179,8 @@ def load_text(load: CarriedLoad, maker: str, source: str) -> tuple[str, tuple[st
     """
     Return the load data file of a manufacturer, a key of `MAKERS`, and its notes.
 
-    An inertia that no body can have is written as zero, a point mass. The source of the load is
-    for the comment.
+    A physically impossible inertia is written as zero, as of a point mass. The source of the load
+    is for the comment.
 
     """
     write, comment = MAKERS[maker]

@@ -16,8 +16,8 @@ import numpy as np
 import yaml
 
 _SIZE = len(LINK_PARAMETERS)
-#: Prior standard deviation of a parameter of an effect, as a share of its value or in its unit:
-#: so large that the recordings alone determine it.
+#: Prior standard deviation of a parameter of an effect, as a share of its value or in its unit.
+#: It is so large that only the recordings determine the parameter.
 _VAGUE = 1e3
 #: The recordings determine a parameter if they reduce its prior standard deviation to this share.
 _DETERMINED = 0.5
@@ -35,8 +35,8 @@ def ranges_text(arm: ArmModel, known: ParameterFile, spread: float, source: str)
 
     Rows are masses and centres of mass of links, in the frames of their joints, and the parameters
     of effects. The information comes from the recordings: combinations with a covariance, or
-    single values. The prior standard deviation of a link's parameters is the spread, a share of
-    what the description has. The source of the model is for the comment.
+    single values. The prior standard deviation of a link's parameters is `spread`, a share of
+    the described value. The source of the model is for the comment.
 
     """
     information = known.information(arm.parameters)
