@@ -6,12 +6,12 @@ from __future__ import annotations
 
 import re
 
-#: First characters of formulas and comments; an apostrophe is written before such a cell.
+#: First characters of formulas and comments; such a cell gets an apostrophe as prefix.
 _GUARDED = ('=', '+', '-', '@', '#', '\t', '\r', "'")
 
 
 def csv_cell(name: str) -> str:
-    """Format a name as a CSV cell: with an apostrophe before a formula, and quotes if needed."""
+    """Format a name as a CSV cell, with an apostrophe before a formula, and quotes if needed."""
     text = f"'{name}" if name.startswith(_GUARDED) else name
     if any(char in text for char in ',"\r\n'):
         text = '"' + text.replace('"', '""') + '"'

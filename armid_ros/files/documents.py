@@ -3,8 +3,8 @@
 """
 Documents in YAML and JSON with untrusted content.
 
-Documents that are deeper or larger than any of this package are rejected before they are parsed.
-Errors of a parser become one error of the package that names the file.
+Documents that are deeper or larger than those of this package are rejected before they are parsed.
+Errors of a parser become one error of this package with the name of the file.
 
 """
 
@@ -21,7 +21,8 @@ from typing import Any
 from armid_ros.errors import ArmidError
 import yaml
 
-#: Largest allowed number in a document. Quantities are smaller, and products of three are finite.
+#: Largest allowed number in a document. Quantities are smaller, and products of three numbers are
+#: finite.
 LARGEST = 1e100
 
 # The C parser, if installed, is ten times as fast.

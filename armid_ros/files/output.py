@@ -1,15 +1,15 @@
 # Copyright 2026 The armid_ros developers
 # SPDX-License-Identifier: Apache-2.0
 """
-Results as files: each is whole or absent, and results of other runs are not replaced by accident.
+Results as files: each is complete or absent, and replaces no result of another run by accident.
 
-A file is written under a temporary name and then moved, so a symbolic link in the folder is
-replaced and not followed. The folder is locked while a command works on it; the system releases
+A file is written under a temporary name and then renamed, so a symbolic link in the folder is
+replaced, not followed. The folder is locked while a command works on it; the system releases
 the lock when the process ends.
 
-Results of this package may be replaced. A document has its schema and a page its generator near
-the beginning; a layout has its schema in a comment or a variable. Other files have no mark: they
-are results if a document or a page is in the same folder.
+Results of this package may be replaced. Results have a mark: the schema of a document, the
+generator of a page, and the schema in a comment or variable of a layout. Files without a mark are
+results if a document or a page is in the same folder.
 
 """
 
@@ -30,10 +30,11 @@ from armid_ros.errors import OutputError
 from armid_ros.files.documents import load_yaml, reading
 from armid_ros.files.regular import open_regular, read_text
 
-#: Model file that may be in a folder without document, and schemas of results that replace it.
+#: Model file that may be in a folder without a document, and schemas of results that may replace
+#: it.
 _MODEL = 'model.yaml'
 _WITH_MODEL = ('armid/identification/1', 'armid/diagnosis/1')
-#: Files and folders of each kind of result, by schema; a document in JSON is first.
+#: Files and folders of each kind of result, by schema; the JSON document comes first.
 _WRITES = {
     'armid/identification/1': (
         'identification.json',
@@ -177,7 +178,7 @@ def result_folder(
                 refuse_foreign(path, schema, also)
             yield path
     finally:
-        with suppress(OSError):  # folders that are still empty after a failure are removed
+        with suppress(OSError):  # empty folders are removed after a failure
             for one in made:
                 one.rmdir()
 
@@ -207,7 +208,7 @@ def locked(path: Path) -> Iterator[None]:
         raise OutputError(
             f'{path}: another run is writing into it; wait for its end or name another folder'
         ) from error
-    except OSError:  # a file system without locks
+    except OSError:  # the file system has no locks
         pass
     try:
         yield
@@ -216,7 +217,7 @@ def locked(path: Path) -> Iterator[None]:
 
 
 def _refuse_other_results(path: Path, schema: str, robot: str) -> None:
-    """Refuse a folder with a document, or a model without one, of another kind or robot."""
+    """Refuse a folder with a document, or only a model, of another kind or robot."""
     there = [name for name in DOCUMENTS if os.path.lexists(path / name)]
     if not there and schema in _WITH_MODEL and os.path.lexists(path / _MODEL):
         there = [_MODEL]
@@ -290,8 +291,8 @@ def refuse_foreign(folder: Path, schema: str, also: Collection[str] = ()) -> Non
     for name in names:
         if not any(fnmatch(name.removeprefix('.').removesuffix('.part'), one) for one in writes):
             raise OutputError(
-                f'{folder}: holds {name}, which this command does not write; name another folder, '
-                'or use --force, which leaves it there'
+                f'{folder}: holds {name}, which this command does not write; name another '
+                'folder, or keep that file with --force'
             )
     for name in _foreign(folder, names):
         raise OutputError(
@@ -324,7 +325,7 @@ def refuse_replacing(folder: Path, names: Collection[str]) -> None:
 
 
 def _foreign(folder: Path, names: Sequence[str]) -> Iterator[str]:
-    """Return foreign files; files without a possible mark count only if no file can have one."""
+    """Return foreign files; those that cannot have a mark count only if there are no others."""
     known = [name for name in names if name.endswith(_MARKED)]
     return (name for name in known or names if not is_own(folder / name))
 

@@ -1,10 +1,10 @@
 # Copyright 2026 The armid_ros developers
 # SPDX-License-Identifier: Apache-2.0
 """
-Regular files, opened without waiting, and limits of their size.
+Opening of regular files without waiting, and limits of their size.
 
-Opening a FIFO waits for a writer, and reading a device may never end; neither is an input of this
-package, so both are refused at once.
+Opening a FIFO waits for a writer, and reading a device may never end, so both are refused at
+once.
 
 """
 

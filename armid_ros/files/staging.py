@@ -4,8 +4,8 @@
 Atomic replacement of a result that has several files.
 
 A run writes into a staging folder inside the folder of its results, so both are on the same file
-system. Once all files are written, the whole folder is exchanged. A run that fails, or is
-interrupted or killed, leaves the earlier result unchanged.
+system. Once all files are written, the whole folder is exchanged. If a run fails, or is
+interrupted or killed, the earlier result is unchanged.
 
 """
 
@@ -59,10 +59,10 @@ class Staged:
         """
         Commit the staged result with one rename of the folder.
 
-        Other files of the folder are linked into the new one, which then replaces the old one. If
-        the folder cannot be exchanged (the current one, a mount point, a file system without hard
-        links), the files are moved one by one. The document of the result is then removed first
-        and moved last, so a run that is killed in between leaves no document.
+        Other files of the folder are linked into the new folder, which then replaces the old
+        one. If an exchange is impossible (current folder, mount point, file system without hard
+        links), the files are moved one by one. The document is then removed first and moved last,
+        so a run killed in between leaves no document.
 
         Raises
         ------
@@ -83,7 +83,7 @@ class Staged:
             for name in names:
                 source, target = self.folder / name, self.out / name
                 if target.is_dir() and not target.is_symlink():
-                    aside = source.with_name(f'{name}.old')  # rename replaces no folder
+                    aside = source.with_name(f'{name}.old')  # rename cannot replace a folder
                     target.replace(aside)
                     source.replace(target)
                     shutil.rmtree(aside)
@@ -93,7 +93,7 @@ class Staged:
             raise OutputError(f'{self.out}: cannot be written: {error.strerror}') from error
 
     def _exchanged(self, names: Collection[str]) -> bool:
-        """Exchange the folder for one with the result and other files; False if impossible."""
+        """Replace the folder by one with the result and other files; False if impossible."""
         out = self.out.resolve()
         old, own = out.stat(), self.folder.stat()
         if Path.cwd().is_relative_to(out) or (old.st_uid, old.st_gid) != (own.st_uid, own.st_gid):
