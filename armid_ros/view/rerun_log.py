@@ -35,7 +35,7 @@ import numpy as np
 from scipy.spatial.transform import Rotation
 
 TIMELINE = 'time'
-#: Address of the viewer; the start function of rerun would bind it to all interfaces.
+#: Address of the viewer; by default, rerun would listen on all interfaces.
 _HOST, _PORT = '127.0.0.1', 9876
 _LINK, _MARKED = (175, 182, 190), (230, 60, 40)
 
@@ -54,7 +54,7 @@ def rerun() -> ModuleType:
         import rerun
     except ImportError:
         raise ArmidError(
-            'looking at recordings needs rerun-sdk, which is not installed; it comes with the '
+            'the view of recordings needs rerun-sdk, which is not installed; it comes with the '
             "extra 'view': pip install 'armid_ros[view]', or pip install rerun-sdk"
         ) from None
     module: ModuleType = rerun
@@ -140,7 +140,7 @@ def log_recording(
     curves = [('position/{}', recording.t, recording.q)]
     if recording.dq is not None:
         curves.append(('velocity/{}', recording.t, recording.dq))
-    if recording.tau is not None:  # measured and predicted torque, filtered alike
+    if recording.tau is not None:  # measured and predicted torque with the same filter
         fits = predictions(arm, [recording], conditioning([recording], SignalSettings()))
         times = np.concatenate([fit.motion.t for fit in fits])
         for entity, name in (
@@ -184,7 +184,7 @@ def poses(recording: Recording) -> tuple[FloatArray, FloatArray]:
 
 
 def _log_bodies(stream: Any, robot: Robot, marked: Sequence[str]) -> list[str]:
-    """Log the shapes of links: <visual>, or <collision> without it; bars without any shape."""
+    """Log the shapes of links: <visual>, or else <collision>, or else bars."""
     rr, drawn = rerun(), 0
     notes: list[str] = []
     absent: list[str] = []

@@ -25,7 +25,7 @@ from sensor_msgs.msg import JointState
 from std_msgs.msg import ColorRGBA
 from visualization_msgs.msg import Marker, MarkerArray
 
-#: Sizes as shares of the reach of the arm: full-scale arrow, shaft, letters.
+#: Sizes of longest arrow, shaft and letters, as shares of the reach of the arm.
 _ARROW, _SHAFT, _LETTER = 0.25, 0.015, 0.05
 
 
@@ -51,7 +51,7 @@ class ResidualMarkersNode(ListeningNode):
         NodeParameter(
             'full',
             0.2,
-            'Residual against torque, of both the root mean square, from which a joint is red.',
+            'Ratio of residual to torque (root mean squares) from which a joint is red.',
             limits=(0.001, 10.0),
             read_only=False,
         ),
@@ -95,7 +95,7 @@ class ResidualMarkersNode(ListeningNode):
         for number, marker in enumerate(markers):
             marker.header.frame_id, marker.header.stamp = self._frame, stamp
             marker.id = number
-            marker.lifetime = Duration(sec=2)  # s; markers disappear unless they are drawn again
+            marker.lifetime = Duration(sec=2)  # then markers disappear
         self._markers.publish(MarkerArray(markers=markers))
 
     def _of_joints(self, robot: Robot) -> Sequence[Marker]:
