@@ -12,7 +12,7 @@ from armid_ros.errors import ModelError
 from armid_ros.motion import FloatArray, read_only
 import numpy as np
 
-#: Name of a body parameter: its symbol, with a prefix for a load or a difference.
+#: Name of a rigid-body parameter: its symbol, with a prefix for a load or a difference.
 _OF_BODY = re.compile(r'(?:payload_)?(m[xyz]?|I[xyz]{2})(_difference)?')
 _RIGID = re.compile(r'(m[xyz]?|I[xyz]{2})\d+( |$)')
 

@@ -19,7 +19,7 @@ def read_only(values: npt.ArrayLike) -> FloatArray:
     """
     Return the values as a read-only contiguous float64 array.
 
-    An array that is already such a view of immutable memory is not copied.
+    An array that is already a read-only view of immutable memory is not copied.
 
     """
     array = np.ascontiguousarray(values, dtype=np.float64)

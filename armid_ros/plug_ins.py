@@ -1,7 +1,7 @@
 # Copyright 2026 The armid_ros developers
 # SPDX-License-Identifier: Apache-2.0
 """
-Entry points that add commands and nodes: of the fleet, of the papers and of other packages.
+Entry points of commands and nodes: of the fleet, of the papers and of other packages.
 
 A package names a click command in the group ``armid_ros.commands``, and the module of a node,
 which has a function ``main``, in the group ``armid_ros.nodes``. Effects have a separate group.
@@ -23,7 +23,7 @@ if TYPE_CHECKING:
 @cache
 def plug_ins(kind: str) -> dict[str, EntryPoint]:
     """
-    Return the installed plug-ins by name, without plug-ins whose module does not exist.
+    Return the installed plug-ins by name; plug-ins with a missing module are left out.
 
     Parameters
     ----------
@@ -39,7 +39,7 @@ def plug_ins(kind: str) -> dict[str, EntryPoint]:
             there = find_spec(entry.module) is not None
         except ModuleNotFoundError:
             there = False
-        except Exception:  # importing the parent package fails: load_plug_in reports the error
+        except Exception:  # load_plug_in reports this error
             there = True
         if there:
             found[entry.name] = entry
