@@ -1,3 +1,3 @@
 # Copyright 2026 The armid_ros developers
 # SPDX-License-Identifier: Apache-2.0
-"""What makes the documentation site from docs/ and from the code: `make docs`."""
+"""Generators of the documentation site from docs/ and from the code: `make docs`."""

@@ -1,6 +1,6 @@
 # Copyright 2026 The armid_ros developers
 # SPDX-License-Identifier: Apache-2.0
-"""The page that follows each job through the rooms, drawn from the calls in the code."""
+"""The page with a diagram of each job through the rooms, drawn from the calls in the code."""
 
 from __future__ import annotations
 
@@ -19,14 +19,15 @@ JOBS = {
     'excite': ('armid_ros.cli.excite', 'excite'),
     'compare': ('armid_ros.cli.compare', 'compare'),
 }
-#: Whose calls are listed as well: the workflow of a job, and the function that it is named for.
+#: Functions whose calls are listed as well: the workflow of a job, and the function of the same
+#: name.
 _OPENED = re.compile(r'api\.(?!arguments|table)|identification\.identify|diagnosis\.diagnose')
-#: What every job uses, and how a result is printed.
+#: Functions that every job uses, and those that print results.
 _EVERYWHERE = re.compile(
     r'errors|motion|files|estimate|cli|api\.(arguments|table)|recording\.(curves|twice)'
     r'|report\.(notation|families|judgement|compare_report)'
 )
-#: A row, the distance of two lanes, the width of a name, and that of the text [px].
+#: Height of a row, distance of two lanes, width of a name, and width of the text [px].
 _ROW, _LANE, _NAME, _TEXT = 18, 22, 240, 560
 _BEGINNING = """# Architecture
 
@@ -38,7 +39,7 @@ to the right is the first line of its docstring. Each function is shown once, wi
 
 @dataclass(frozen=True)
 class Step:
-    """A call: how deep it is, the room and the name of the function, and what it does."""
+    """A call: its depth, room and name of the function, and its purpose."""
 
     depth: int
     room: str
@@ -48,7 +49,7 @@ class Step:
 
 @dataclass(frozen=True)
 class Module:
-    """A parsed module: functions and classes by name, and whence the other names are."""
+    """A parsed module: functions and classes by name, and the origins of imported names."""
 
     defined: dict[str, ast.stmt]
     imported: dict[str, tuple[str, str]]
@@ -56,7 +57,7 @@ class Module:
 
 @cache
 def module(package: Path, dotted: str) -> Module | None:
-    """Parse a module of the package, or its folder; None where there is none."""
+    """Parse a module or a folder of the package; None if it does not exist."""
     place = package.parent.joinpath(*dotted.split('.'))
     path = place / '__init__.py' if place.is_dir() else place.with_suffix('.py')
     if not path.is_file():
@@ -73,7 +74,7 @@ def module(package: Path, dotted: str) -> Module | None:
 
 
 def found(package: Path, dotted: str, name: str) -> tuple[str, str] | None:
-    """Return the module in which a name is defined, however often it is passed on."""
+    """Return the module that defines a name, through any number of re-exports."""
     here = module(package, dotted)
     if here is None:
         return None
@@ -83,7 +84,7 @@ def found(package: Path, dotted: str, name: str) -> tuple[str, str] | None:
 
 
 def calls(body: ast.AST) -> Iterator[str]:
-    """Yield the names that are called, arguments before the call that takes them."""
+    """Yield the names of calls; those within arguments come before the call itself."""
     for child in ast.iter_child_nodes(body):
         yield from calls(child)
     if isinstance(body, ast.Call):
@@ -93,7 +94,7 @@ def calls(body: ast.AST) -> Iterator[str]:
 
 
 def steps(package: Path, dotted: str, name: str) -> list[Step]:
-    """Return the calls from room to room that a function leads to, each once, in its order."""
+    """Return the calls between rooms that a function makes, each once, in order."""
     seen: set[tuple[str, str]] = set()
 
     def follow(dotted: str, own: str, depth: int) -> Iterator[Step]:

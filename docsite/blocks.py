@@ -1,13 +1,13 @@
 # Copyright 2026 The armid_ros developers
 # SPDX-License-Identifier: Apache-2.0
 """
-Code blocks of pages, and a script that runs those of a page one after the other.
+Code blocks of pages, and a script that runs the blocks of a page in order.
 
-A block in `bash` or `python` is run. One that cannot be is marked in the line above it, with the
-reason: ``<!-- not run: needs a robot -->``. What a program prints, and formulas, are `text`.
+A block in `bash` or `python` is run. The line above a block that cannot run gives the reason:
+``<!-- not run: needs a robot -->``. Printed output and formulas are `text`.
 
-A page finds all files of the desk. One that makes some of them itself says in its first line what
-it starts with: ``<!-- starts with: my_arm.urdf -->``.
+A page finds all files of the desk. A page that makes some of them itself lists in its first line
+the files that it needs: ``<!-- starts with: my_arm.urdf -->``.
 
 """
 
@@ -17,9 +17,9 @@ from dataclasses import dataclass
 from pathlib import Path
 import re
 
-#: Languages of blocks that are run.
+#: Languages of executed blocks.
 RUN = ('bash', 'python')
-#: Languages of all blocks that a page may have.
+#: All permitted languages of blocks.
 LANGUAGES = (*RUN, 'text', 'yaml', 'json', 'xml', 'mermaid')
 
 _FENCE = re.compile(r'^```(\w*)$')
@@ -70,13 +70,13 @@ def blocks(path: Path) -> tuple[Block, ...]:
 
 
 def starts_with(path: Path) -> tuple[str, ...] | None:
-    """Return the files that a page starts with; None for all of the desk."""
+    """Return the files that a page needs at its start; None for all files of the desk."""
     said = _START.search(path.read_text(encoding='utf-8'))
     return None if said is None else tuple(said[1].split())
 
 
 def script(page: tuple[Block, ...]) -> str:
-    """Return a shell script that runs the blocks of a page that are run, and stops at an error."""
+    """Return a shell script that runs the executable blocks of a page, and stops at an error."""
     lines = ['set -eu -o pipefail']
     for block in page:
         if block.language not in RUN or block.excuse:

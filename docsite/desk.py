@@ -1,11 +1,11 @@
 # Copyright 2026 The armid_ros developers
 # SPDX-License-Identifier: Apache-2.0
 """
-The files that pages and docstrings talk about: an arm, its plan, and a week of recordings.
+The files in the examples of pages and docstrings: an arm, its plan, and a week of recordings.
 
-``my_arm.urdf`` is the arm of the examples. It has friction that no description says. On Monday and
-Tuesday it is as it should be; on Friday it holds 0.4 kg; today a spring pulls at its elbow.
-``bags`` are those of the repository.
+``my_arm.urdf`` is the arm of the examples. It has friction that its URDF lacks. On Monday and
+Tuesday nothing is wrong; on Friday it holds 0.4 kg; today a spring pulls at its elbow.
+``bags`` is the folder of the repository.
 
 """
 
@@ -24,12 +24,12 @@ LOAD = (
     'payload_Ixx=0.04,payload_Iyy=0.04,payload_Izz=0.001'
 )
 SPRING = 'joint_spring@elbow:spring_stiffness=2'
-#: Torque constant times gear of the motors whose currents log.csv has [N m/A].
+#: Torque constant times gear ratio of the motors, for the currents in log.csv [N m/A].
 GAIN = 4.0
 
 
 def lay_out(folder: Path) -> Path:
-    """Write all of them into a folder, and return it."""
+    """Write all files into a folder, and return the folder."""
     urdf = folder / 'my_arm.urdf'
     shutil.copy(ARM, urdf)
     shutil.copytree(ARM.parents[1] / 'bags', folder / 'bags')
@@ -54,7 +54,7 @@ def lay_out(folder: Path) -> Path:
 
 
 def write_log(path: Path, run: ar.Recording) -> None:
-    """Write what a logger would: milliseconds, degrees, currents."""
+    """Write a log as of a data logger: milliseconds, degrees, currents."""
     numbers = range(1, run.n_joints + 1)
     names = ['t_ms', *(f'angle_deg_{k}' for k in numbers), *(f'amps_{k}' for k in numbers)]
     rows = np.column_stack([1e3 * run.t, np.degrees(run.q), run.tau / GAIN])

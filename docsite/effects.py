@@ -1,6 +1,6 @@
 # Copyright 2026 The armid_ros developers
 # SPDX-License-Identifier: Apache-2.0
-"""The page of all effects that can be named, from the catalogue."""
+"""The page of all effects in the catalogue."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from docsite.markdown import cell, table
 
 
 def effects_page() -> str:
-    """Return the page: what each effect is, its formula and source, its parameters."""
+    """Return the page: description, formula, source and parameters of each effect."""
     lines = [
         '# Effects',
         '',

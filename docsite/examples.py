@@ -10,7 +10,7 @@ import re
 
 
 def examples_page(folder: Path) -> str:
-    """Return the page: what each example is about, and all of it."""
+    """Return the page: purpose and code of each example."""
     lines = [
         '# Examples',
         '',

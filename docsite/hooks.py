@@ -1,6 +1,6 @@
 # Copyright 2026 The armid_ros developers
 # SPDX-License-Identifier: Apache-2.0
-"""What mkdocs is given beside the files of docs/: pages that are made from the code."""
+"""Hook of mkdocs that adds pages made from the code to the files of docs/."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ from docsite.schemas import schemas_page
 from docsite.speed import speed_page
 
 ROOT = Path(__file__).parents[1]
-#: What explains gaps, finds faults of data and plans motions for a diagnosis, below armid_ros.
+#: Modules below armid_ros that explain gaps, find faults of data and plan motions for a diagnosis.
 BESIDE_THE_DIAGNOSIS = (
     'identification/assess/data_faults.py',
     'identification/assess/sensor_faults.py',
@@ -60,7 +60,7 @@ def on_files(files: Files, config: MkDocsConfig) -> Files:
 
 
 def _taken(files: Files, path: Path) -> str:
-    """Return the written beginning of a page; the whole page takes its place."""
+    """Return the hand-written beginning of a page, which the whole page replaces."""
     for file in list(files):
         if file.abs_src_path and Path(file.abs_src_path) == path:
             files.remove(file)

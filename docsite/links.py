@@ -1,6 +1,6 @@
 # Copyright 2026 The armid_ros developers
 # SPDX-License-Identifier: Apache-2.0
-"""Links of a built site: each has to lead somewhere, and nothing comes from elsewhere."""
+"""Links of a built site: each target has to exist, and no page loads external files."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ from html.parser import HTMLParser
 from pathlib import Path
 from urllib.parse import unquote, urlsplit
 
-#: Attributes that name another file.
+#: Attributes with the address of another file.
 _LINKS = ('href', 'src')
 
 
@@ -22,7 +22,7 @@ class _Page(HTMLParser):
         self.anchors: set[str] = set()
 
     def handle_starttag(self, tag: str, attrs: list[tuple[str, str | None]]) -> None:
-        """Keep what a tag names, and what it can be named by."""
+        """Store the links of a tag, and its anchors."""
         for name, value in attrs:
             if name in _LINKS and value:
                 self.links.append((tag, value))
@@ -38,14 +38,14 @@ def _read(path: Path) -> _Page:
 
 def broken_links(site: Path) -> Iterator[str]:
     """
-    Return links of all pages that lead nowhere, and what a page would load from a network.
+    Return links without a target on all pages, and files that a page would load from a network.
 
-    Addresses elsewhere that a reader may follow are not looked up.
+    Links to other sites are not checked.
 
     """
     pages = {path.resolve(): _read(path) for path in site.rglob('*.html')}
     for path, page in pages.items():
-        if path.name == '404.html':  # its links begin at the root of a server
+        if path.name == '404.html':  # links of this page begin at the root of a server
             continue
         for tag, link in page.links:
             there = urlsplit(link)

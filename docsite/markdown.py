@@ -11,17 +11,17 @@ _ESCAPES = str.maketrans({'|': '\\|', '<': '&lt;', '>': '&gt;', '*': '\\*', '_':
 
 
 def cell(text: str) -> str:
-    """Return a text as it stands in a table, whatever characters it has."""
+    """Return a text as a table cell, with special characters escaped."""
     return ' '.join(text.split()).translate(_ESCAPES)
 
 
 def prose(text: str) -> str:
-    """Return a docstring as paragraphs, in which no angle bracket is a tag."""
+    """Return a docstring as paragraphs, with escaped angle brackets."""
     return inspect.cleandoc(text).replace('<', '&lt;')
 
 
 def table(heads: Sequence[str], rows: Sequence[Sequence[str]]) -> Iterator[str]:
-    """Return the lines of a table, with a blank one below; cells are Markdown."""
+    """Return the lines of a table, followed by a blank line; cells are Markdown."""
     yield f'| {" | ".join(heads)} |'
     yield '|' + '---|' * len(heads)
     for row in rows:

@@ -1,6 +1,6 @@
 # Copyright 2026 The armid_ros developers
 # SPDX-License-Identifier: Apache-2.0
-"""The page of all nodes, with the tables that declare their parameters."""
+"""The page of all nodes, with the tables of their parameters."""
 
 from __future__ import annotations
 
@@ -37,7 +37,7 @@ NODES: dict[str, type[ArmidNode]] = {
 
 
 def nodes_page(introduction: str) -> str:
-    """Return the introduction, and below it what every node does and its parameters."""
+    """Return the introduction, and then purpose and parameters of every node."""
     lines = [introduction]
     for name, node in NODES.items():
         lines += [f'## {name}', '', _told(node), '']
@@ -47,7 +47,7 @@ def nodes_page(introduction: str) -> str:
 
 
 def _told(node: type[ArmidNode]) -> str:
-    """Return what the docstring says before its sections."""
+    """Return the part of a docstring before its sections."""
     return prose(node.__doc__ or '').split('\nAttributes\n')[0].strip()
 
 

@@ -1,6 +1,6 @@
 # Copyright 2026 The armid_ros developers
 # SPDX-License-Identifier: Apache-2.0
-"""Pages of notebooks, executed anew whenever the site is built."""
+"""Pages of notebooks, which are executed at every build of the site."""
 
 from __future__ import annotations
 
@@ -14,17 +14,17 @@ import jupytext
 from nbconvert import MarkdownExporter
 from nbconvert.preprocessors import ExecutePreprocessor
 
-#: What a cell may take [s]; a notebook that hangs has to end.
+#: Largest time of a cell [s], which ends a notebook that hangs.
 CELL_TIMEOUT = 600
 
 
 def executed(path: Path) -> tuple[str, dict[str, bytes]]:
     """
-    Return the page of a notebook with what its cells show, and files by their names on it.
+    Return the page of a notebook with the output of its cells, and its files by name.
 
     The files are its pictures, and the notebook itself as .ipynb.
 
-    It runs in its own folder, as an editor would run it.
+    It runs in its own folder, as in an editor.
 
     Parameters
     ----------
@@ -52,7 +52,7 @@ def executed(path: Path) -> tuple[str, dict[str, bytes]]:
 
 @contextmanager
 def _own_kernel() -> Iterator[None]:
-    """Let the kernel import this tree, and leave nothing in the home directory."""
+    """Make the kernel import this tree, and write nothing to the home directory."""
     before = dict(os.environ)
     folders = (str(Path(__file__).parents[1]), before.get('PYTHONPATH', ''))
     with TemporaryDirectory() as folder:

@@ -1,6 +1,6 @@
 # Copyright 2026 The armid_ros developers
 # SPDX-License-Identifier: Apache-2.0
-"""The page of all numbers of the diagnosis: what decides, and what is numerical, from the code."""
+"""The page of all numbers of the diagnosis, from the code: thresholds of decisions, and others."""
 
 from __future__ import annotations
 
@@ -64,7 +64,7 @@ def numbers_page(package: Path, more: Sequence[Path] = ()) -> str:
 
 
 def _others(package: Path, more: Sequence[Path]) -> Iterator[tuple[str, str, str, str]]:
-    """Yield files, names, values and comments of numbers that are no thresholds."""
+    """Yield files, names, values and comments of all numbers except thresholds."""
     root = package.parents[1]
     for folder, home in ((package, package), *((one, root) for one in more)):
         for path in _modules(folder):
@@ -75,7 +75,7 @@ def _others(package: Path, more: Sequence[Path]) -> Iterator[tuple[str, str, str
 
 
 def _meanings(docstring: str) -> dict[str, str]:
-    """Return what a numpydoc section says of each attribute."""
+    """Return the description of each attribute in a numpydoc section."""
     found: dict[str, str] = {}
     names: list[str] = []
     for line in docstring.splitlines():
@@ -89,7 +89,7 @@ def _meanings(docstring: str) -> dict[str, str]:
 
 
 def constants(source: str) -> Iterator[tuple[str, str, str]]:
-    """Yield names, values and the comment above of constants of a module that are numbers."""
+    """Yield names, values and preceding comments of the numeric constants of a module."""
     lines = source.splitlines()
     for node in ast.parse(source).body:
         if not isinstance(node, ast.Assign) or not _is_numbers(node.value):
@@ -102,12 +102,12 @@ def constants(source: str) -> Iterator[tuple[str, str, str]]:
 
 
 def _modules(place: Path) -> list[Path]:
-    """Return the modules of a folder, or the one that it is."""
+    """Return the modules of a folder, or the module itself."""
     return [place] if place.is_file() else sorted(place.rglob('*.py'))
 
 
 def _borrowed(packages: Sequence[Path], root: Path) -> Iterator[tuple[str, str, str, str]]:
-    """Yield files, names, values and comments of numbers that other packages have."""
+    """Yield files, names, values and comments of the numbers in other packages."""
     wanted: dict[str, set[str]] = {}
     for path in (path for package in packages for path in _modules(package)):
         for node in ast.walk(ast.parse(path.read_text(encoding='utf-8'))):

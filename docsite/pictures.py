@@ -1,9 +1,9 @@
 # Copyright 2026 The armid_ros developers
 # SPDX-License-Identifier: Apache-2.0
 """
-The pictures of the pages, drawn anew: ``python -m docsite.pictures``.
+Drawing of the pictures of the pages.
 
-Those of the demo are written by ``armid demo``.
+``python -m docsite.pictures``. ``armid demo`` draws those of the demo.
 
 """
 
@@ -42,23 +42,23 @@ from docsite.desk import FRICTION, GAIN, lay_out, LOAD
 
 IMAGES = Path(__file__).parents[1] / 'docs' / 'images'
 RESULTS = Path(__file__).parents[1] / 'benchmarks' / 'results'
-#: Text beside a point.
+#: Text next to a point.
 TEXT = {'textcoords': 'offset points', 'va': 'center', 'fontsize': 8}
 BLUE, ORANGE, GREY = '#0072b2', '#e69f00', '#8c9196'
-#: Fit to a column of text, and sharp on a screen of two dots per point.
+#: Size for a column of text, and resolution for a screen with two dots per point.
 WIDTH, DPI = 7.0, 120
-#: More would make the files larger, and nothing to see.
+#: More colours would only make the files larger.
 _COLOURS = 64
 
 _REPEATS = 60
-#: Time of motion that is shown of online identification [s].
+#: Time of motion in the picture of online identification [s].
 _LEARNED = 8.0
-#: Time that the noise of the torque lasts [s].
+#: Correlation time of the torque noise [s].
 _LASTING = 0.05
 
 
 def candidates() -> Figure:
-    """Draw the share of the gap that each cause takes alone, for the spring at the elbow."""
+    """Draw the share of the gap that each cause explains alone, for the spring at the elbow."""
     arm = ar.load_model('monday_result/model.yaml')
     found = ar.diagnose(arm, 'today_1', validate='today_2', baseline='monday')
     rows = found.document()['candidates'][:10][::-1]
@@ -74,7 +74,7 @@ def candidates() -> Figure:
 
 
 def deviations() -> Figure:
-    """Draw how far repeats are off, in stated deviations, with noise that lasts."""
+    """Draw the errors of repeats in stated standard deviations, with correlated noise."""
     truth = ar.ArmModel.of('my_arm.urdf', effects=FRICTION)
     clean = ar.simulate(truth, 'plan/excitation.yaml')
     true = {'viscous_coefficient': 0.3, 'coulomb_torque': 0.2, 'torque_offset': 0.0}
@@ -103,7 +103,7 @@ def deviations() -> Figure:
 
 
 def _noise(run: ar.Recording, seed: int) -> np.ndarray:
-    """Return torque noise that lasts, shape (N, n) [N m]."""
+    """Return correlated torque noise, shape (N, n) [N m]."""
     memory = np.exp(-run.t[1] / _LASTING)
     white = np.random.default_rng(seed).normal(0.0, 0.05, run.q.shape)
     return np.asarray(signal.lfilter([np.sqrt(1.0 - memory**2)], [1.0, -memory], white, axis=0))
@@ -178,7 +178,7 @@ def growth() -> Figure:
 
 
 def reliability() -> Figure:
-    """Draw how often first names of the diagnosis are right, over their probability."""
+    """Draw the share of right first names of the diagnosis over their stated probability."""
     found = json.loads((RESULTS / 'probabilities.json').read_text(encoding='utf-8'))
     figure = Figure(figsize=(WIDTH, 3.2), layout='constrained')
     axes = figure.subplots()
@@ -210,7 +210,7 @@ def recording() -> Figure:
 
 
 def currents() -> Figure:
-    """Draw a current of the log beside the torque that it is read as."""
+    """Draw a current of the log next to the torque that it is converted to."""
     log = np.genfromtxt('log.csv', delimiter=',', names=True)
     run = ar.read_recording('log.csv', 'my_arm.urdf', effort='amps_{}', effort_scale=GAIN)
     figure = Figure(figsize=(WIDTH, 3.0), layout='constrained')
@@ -223,7 +223,7 @@ def currents() -> Figure:
 
 
 def comparison() -> Figure:
-    """Draw the difference of each parameter in its standard deviations."""
+    """Draw the difference of each parameter in standard deviations."""
     found = ar.compare('monday_result', 'friday_result').core.changes
     size = [abs(one.deviations) for one in found]
     figure = Figure(figsize=(WIDTH, 4.2), layout='constrained')
@@ -299,7 +299,7 @@ def learned() -> Figure:
 
 
 def limits() -> Figure:
-    """Draw how much of its limits each joint uses in a plan."""
+    """Draw the share of its limits that each joint uses in a plan."""
     plan = ar.design_excitation('my_arm.urdf', duration=20.0)
     used = plan.core.limits_used(plan.arm)
     joints = plan.arm.robot.joints
@@ -319,7 +319,7 @@ def limits() -> Figure:
 
 
 def damaged() -> Figure:
-    """Draw what is printed of a bag that ends early."""
+    """Draw the output for a bag that ends early."""
     (bag,) = Path('monday').glob('*.mcap')
     Path('crashed.mcap').write_bytes(bag.read_bytes()[:300_000])
     command = ('identify', 'crashed.mcap', '--robot', 'my_arm.urdf', '--out', 'result')
@@ -327,7 +327,7 @@ def damaged() -> Figure:
 
 
 def springs() -> Figure:
-    """Draw the responses of two joints with springs, measured and of the parameters found."""
+    """Draw the responses of two joints with springs: measured, and with identified parameters."""
     shipped, rng = two_link_set('after'), np.random.default_rng(0)
     plant, loop = two_link_plant(shipped.parameters), two_link_loop(shipped, WEAK)
     plans = resonance_experiments(8, rms=EXCITATION_RMS, rng=rng)
@@ -355,7 +355,7 @@ def _decibel(values: np.ndarray) -> np.ndarray:
 
 
 def fleet() -> Figure:
-    """Draw what is printed of three arms, one of which holds a load from the fourth day on."""
+    """Draw the output for three arms, one of which holds a load from the fourth day on."""
     for arm in ('arm_1', 'arm_2', 'arm_3'):
         for day in range(1, 7):
             loaded = arm == 'arm_2' and day > 3
@@ -376,7 +376,7 @@ def fleet() -> Figure:
 
 
 def live() -> Figure:
-    """Draw the error of the elbow in windows of a stream, to which a spring comes."""
+    """Draw the error of the elbow in windows of a stream, during which a spring is added."""
     arm = ar.load_model('monday_result/model.yaml')
     parts = [ar.read_recording(name, 'my_arm.urdf') for name in ('tuesday', 'today_1')]
     stream, answers = LiveDiagnosis(arm, LiveSettings(learning=12.0)), []
@@ -408,7 +408,7 @@ def live() -> Figure:
 
 
 def online() -> Figure:
-    """Draw the friction of the elbow as it is learned from joint states, with its interval."""
+    """Draw the online estimate of the elbow friction with its interval."""
     run = ar.read_recording('monday', 'my_arm.urdf')
     arm = ar.ArmModel.of('my_arm.urdf', effects='viscous_friction,coulomb_friction')
     identifier, times, values = ar.OnlineIdentifier(arm, rng=np.random.default_rng(0)), [], []
@@ -443,13 +443,13 @@ def installed() -> Figure:
 
 
 def refused() -> Figure:
-    """Draw a message as it is to be searched for."""
+    """Draw an error message of the troubleshooting page."""
     command = ('inspect', 'monday', '--robot', 'bags/none.urdf')
     return _terminal([f'$ armid {" ".join(command)}', *_answer(*command)])
 
 
 def chain() -> Figure:
-    """Draw what a description goes through from the vendor to a plan."""
+    """Draw the steps of a description from the vendor to a plan."""
     return _boxes(
         [
             'arm.xacro\nwith arguments',
@@ -462,7 +462,7 @@ def chain() -> Figure:
 
 
 def control() -> Figure:
-    """Draw the nodes between a plan and a recording."""
+    """Draw the nodes from a plan to a recording."""
     return _boxes(
         [
             'excitation.yaml',
@@ -491,7 +491,7 @@ def _boxes(texts: list[str]) -> Figure:
 
 
 def _answer(*command: str) -> list[str]:
-    """Return the lines that a command prints, but for its progress."""
+    """Return the lines that a command prints, without progress."""
     run = [sys.executable, '-m', 'armid_ros.cli', *command]
     done = subprocess.run(run, capture_output=True, text=True, check=False)
     lines = (done.stdout + done.stderr).rstrip().splitlines()
@@ -517,7 +517,7 @@ def _plain(figure: Figure) -> Figure:
 
 
 def _sized(drawn: np.ndarray) -> Figure:
-    """Return the figure of axes that the package drew, as wide as a column of text."""
+    """Return the figure of the given axes, as wide as a column of text."""
     figure: Figure = drawn.flat[0].figure
     figure.set_size_inches(WIDTH, 1.1 * drawn.size + 0.5)
     return figure
@@ -551,7 +551,7 @@ PICTURES = {
 
 
 def main() -> None:
-    """Write the pictures that are named, or all."""
+    """Write the named pictures, or all."""
     with TemporaryDirectory() as folder:
         os.chdir(lay_out(Path(folder)))
         for name in sys.argv[1:] or PICTURES:

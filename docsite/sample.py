@@ -1,10 +1,10 @@
 # Copyright 2026 The armid_ros developers
 # SPDX-License-Identifier: Apache-2.0
 """
-A sample of the project's language, for a reader who has not written it.
+A sample of the project's language, for a reader who did not write it.
 
-``python -m docsite.sample [--seed 0] [--count 100]`` prints docstrings, messages and sentences of
-the pages, as many of each. The reader marks each item: clear, clear on second reading, or unclear.
+``python -m docsite.sample [--seed 0] [--count 100]`` prints docstrings, messages and sentences
+of pages in equal numbers. The reader marks each item: clear, clear on second reading, or unclear.
 
 """
 
@@ -25,7 +25,7 @@ _FEWEST = 4
 
 
 def docstrings(package: Path) -> Iterator[tuple[str, str]]:
-    """Yield where each function and class is, and the first paragraph of its docstring."""
+    """Yield the place of each function and class, and the first paragraph of its docstring."""
     for place, node in _nodes(package):
         if isinstance(node, ast.FunctionDef | ast.ClassDef):
             text = (ast.get_docstring(node) or '').partition('\n\n')[0]
@@ -34,7 +34,7 @@ def docstrings(package: Path) -> Iterator[tuple[str, str]]:
 
 
 def messages(package: Path) -> Iterator[tuple[str, str]]:
-    """Yield where errors are raised, and what they say; values are in braces."""
+    """Yield the places where errors are raised, and the messages with values in braces."""
     for place, node in _nodes(package):
         if isinstance(node, ast.Raise) and isinstance(node.exc, ast.Call):
             for given in node.exc.args:
@@ -62,7 +62,7 @@ def _nodes(package: Path) -> Iterator[tuple[str, ast.AST]]:
 
 
 def drawn(seed: int, count: int) -> list[tuple[str, str]]:
-    """Draw as many items of each kind, all together a number of them."""
+    """Draw a number of items, in equal parts of each kind."""
     rng = np.random.default_rng(seed)
     package = ROOT / 'armid_ros'
     kinds = [

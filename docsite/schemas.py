@@ -1,6 +1,6 @@
 # Copyright 2026 The armid_ros developers
 # SPDX-License-Identifier: Apache-2.0
-"""The page of all files that are written, from their JSON Schemas."""
+"""The page of all written files, from their JSON Schemas."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ SUFFIX = '.schema.json'
 
 
 def schemas_page(introduction: str) -> str:
-    """Return the introduction, and below it the keys of every kind of file."""
+    """Return the introduction, and then the keys of every kind of file."""
     lines = [introduction]
     for path in sorted(FOLDER.glob(f'*{SUFFIX}')):
         schema = json.loads(path.read_text(encoding='utf-8'))
@@ -32,7 +32,7 @@ def schemas_page(introduction: str) -> str:
 def _keys(
     whole: dict[str, Any], schema: dict[str, Any], prefix: str
 ) -> Iterator[tuple[str, str, str]]:
-    """Return path, type and description of every key, those inside others below them."""
+    """Return path, type and description of every key; nested keys follow their parent."""
     for name, found in schema.get('properties', {}).items():
         one = resolved(whole, found)
         key = f'{prefix}{name}'
@@ -50,7 +50,7 @@ def _keys(
 
 def faults(name: str, document: dict[str, Any]) -> list[str]:
     """
-    Return what is wrong with a document: where it is not as its schema says, and keys without one.
+    Return the faults of a document: violations of its schema, and keys without a schema.
 
     Parameters
     ----------
@@ -71,7 +71,7 @@ def faults(name: str, document: dict[str, Any]) -> list[str]:
 def _undescribed(
     whole: dict[str, Any], schema: dict[str, Any], document: Any, where: str
 ) -> Iterator[str]:
-    """Return the keys of a document that no property of its schema stands for."""
+    """Return the keys of a document that are not properties of its schema."""
     schema = resolved(whole, schema)
     for choice in schema.get('anyOf', ()):
         if choice.get('type') != 'null':
@@ -89,7 +89,7 @@ def _undescribed(
 
 
 def resolved(whole: dict[str, Any], schema: dict[str, Any]) -> dict[str, Any]:
-    """Return what a reference within a schema refers to."""
+    """Return the target of a reference within a schema."""
     reference = schema.get('$ref')
     if reference is None:
         return schema

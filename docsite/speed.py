@@ -1,6 +1,6 @@
 # Copyright 2026 The armid_ros developers
 # SPDX-License-Identifier: Apache-2.0
-"""The page of measured speeds, made from the last results that ``make bench`` wrote."""
+"""The page of measured speeds, from the last results of ``make bench``."""
 
 import json
 from pathlib import Path
