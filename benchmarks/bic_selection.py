@@ -3,8 +3,9 @@
 """
 Textbook model selection, for comparison with the diagnosis.
 
-Forward selection by the Bayesian information criterion uses all rows pooled, as if their errors
-were independent and identically distributed: no noise floor, no held-out data, no replication.
+Forward selection by the Bayesian information criterion pools all rows and takes their errors as
+independent and identically distributed. It uses no noise floor, no held-out data and no
+replication.
 Catalogue, filters, columns and free rigid parameters are those of the diagnosis.
 
 """
@@ -30,11 +31,11 @@ from armid_ros.recording import Recording
 import numpy as np
 import scipy.linalg
 
-#: Smallest share of its columns that a tried candidate has beyond the free parameters.
+#: Smallest share of a candidate's columns that is independent of the free parameters.
 _LEAST_VISIBLE = 0.02
 #: Share of the squares of a candidate below which a direction of its values stays zero.
 _DEPENDENT = 1e-6
-#: Prior standard deviation of the values, over their unit; so large that they are free.
+#: Prior standard deviation of the values in their unit; large enough that they are free.
 _FREE = 1e3
 
 

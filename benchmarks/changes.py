@@ -3,11 +3,11 @@
 """
 Changes of an arm at work: detection delay, named cause, intervals, and false alarms.
 
-The simulated humanoid arm is under a controller, with samples at 1 kHz, encoders of 17 bits, white
-torque noise and as much coloured noise (0.05 s). It has Stribeck friction and load-dependent
-friction that the model lacks, so residuals contain a model error. In the first part it moves for a
-minute and then changes during a motion. In the second part it works for half an hour without a
-change, with another slow or fast motion every minute, and rests.
+The simulated humanoid arm is under a controller, with samples at 1 kHz, encoders of 17 bits, and
+equal amounts of white and coloured torque noise (0.05 s). It has Stribeck friction and
+load-dependent friction that the model lacks, so residuals contain a model error. In the first
+part, the arm moves for a minute and then changes during a motion. In the second part, it works for
+half an hour without a change, with another slow or fast motion every minute, and rests.
 
     python -m benchmarks.changes [--draws 4] [--minutes 30] [--works 3]
 
@@ -113,7 +113,7 @@ class Tally:
 
 
 def arm_with(*effects: str) -> ArmModel:
-    """Return the humanoid arm with effects."""
+    """Return the humanoid arm with given effects."""
     return ArmModel.of('humanoid_arm', effects=effects)
 
 
@@ -188,7 +188,7 @@ def changing(
 
 
 def unchanging(minutes: int, seed: int, rate: float = RATE) -> Iterator[Sample]:
-    """Yield samples of a working arm: another motion every minute, every fifth one a rest."""
+    """Yield samples of a working arm: another motion each minute, a rest each fifth."""
     rng = np.random.default_rng(seed)
     plant = Plant(arm_with(*IDENTIFIED, *LACKING), dt=1.0 / rate)
     for minute in range(minutes):

@@ -4,7 +4,7 @@
 Coverage of 95 % intervals, over repeats with coloured torque noise and encoder noise.
 
 The arm is simulated, so the true base parameters, effects and torques along another motion are
-known. The intervals are those that an identification prints, from a recording and online. Two
+known. The intervals are those of an identification from a recording, and online. Two
 identifications from different motions are compared as well: of the unchanged arm, of one with a
 load, and of one with more friction in the elbow.
 
@@ -52,7 +52,7 @@ class Tally:
         self._values = defaultdict(list)
 
     def add(self, name, error, stated):
-        """Add a parameter of one repeat; one that is not excited is absent."""
+        """Add a parameter of one repeat; a parameter without excitation is absent."""
         self._values[name].append((error, stated))
 
     def line(self, what):

@@ -1,13 +1,13 @@
 # Copyright 2026 The armid_ros developers
 # SPDX-License-Identifier: Apache-2.0
 """
-Designed excitations against random ones.
+Comparison of designed with random excitations, in two tables.
 
-Two tables. The humanoid arm on the moon: 12 gravity parameters through the torque noise of the
-paper's Table 3, a designed trajectory against un-optimised ones that span 20 % of each joint's
-range (medians of 20), 3 harmonics in 20 s. The Panda and the UR10: all base parameters with
-viscous and Coulomb friction, 20 s, 5 harmonics, self-collision with 1 cm to spare, against the
-best of 1000 random feasible trajectories.
+The humanoid arm on the moon: 12 gravity parameters with the torque noise of the paper's Table 3. A
+designed trajectory is compared with un-optimised ones over 20 % of each joint's range (medians of
+20), with 3 harmonics in 20 s. The Panda and the UR10: all base parameters with viscous and Coulomb
+friction, 20 s, 5 harmonics, a clearance of 1 cm between links, compared with the best of 1000
+random feasible trajectories.
 
 """
 

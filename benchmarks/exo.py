@@ -42,7 +42,7 @@ from benchmarks.pair_in_mujoco import drive_in_mujoco, walk_in_mujoco
 
 STIFFNESS = 1e4
 PAIR = leg_pair(STIFFNESS)
-#: Duration of a step forward and back, for the steps from which poses are chosen [s].
+#: Durations of a step forward and back, for the choice of poses [s].
 SPEEDS = (1.8, 1.2, 0.9)
 
 

@@ -17,7 +17,7 @@ from armid_ros.motion import FloatArray
 import numpy as np
 import numpy.typing as npt
 
-#: Rounds of the multiplicative algorithm, after which weights are accurate to some per cent.
+#: Iterations of the multiplicative algorithm, after which weights are accurate to some per cent.
 _ROUNDS = 200
 
 

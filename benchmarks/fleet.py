@@ -4,8 +4,8 @@
 A simulated fleet with known changes, and the changes that `armid fleet` finds.
 
 Arms of one kind differ in mass and friction, and have a different motion in every bag, a bag per
-day. Friction varies with the temperature of the day. Some arms change: friction steps up, a load
-stays in the hand, a joint wears, or an effect acts that the model lacks. Some bags are damaged.
+day. Friction varies with the temperature of the day. Some arms change: a step of friction, a
+load in the hand, wear of a joint, or an effect that the model lacks. Some bags are damaged.
 
     python -m benchmarks.fleet [--arms N] [--bags M] [--changed K] [--damaged D]
 

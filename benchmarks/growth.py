@@ -31,7 +31,7 @@ from benchmarks.reference_loop import processor
 OUT = Path(__file__).parent / 'results' / 'growth.json'
 FRICTION = ('viscous_friction:viscous_coefficient=0.5', 'coulomb_friction:coulomb_torque=0.3')
 OFFSET = 'torque_offset:torque_offset=1'
-#: Job, varied quantity, and its values; otherwise 7 joints, one bag of 12 s, two effects.
+#: Job, varied quantity, and its values; the others are 7 joints, one bag of 12 s, two effects.
 POINTS = {
     ('read', 'samples'): (10**4, 10**5, 10**6, 3 * 10**6),
     ('identify', 'samples'): (10**4, 10**5, 10**6),
@@ -44,7 +44,7 @@ POINTS = {
     ('identify', 'effects'): (1, 2, 4, 8),
 }
 DEFAULTS = {'samples': 12_000, 'joints': 7, 'bags': 1, 'effects': 2}
-#: Samples of one of many bags.
+#: Number of samples of each of many bags.
 BAG = 2_000
 #: Effects in the order in which they are added.
 EFFECTS = (

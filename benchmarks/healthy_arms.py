@@ -4,10 +4,10 @@
 False alarms among a thousand healthy arms with realistic differences between days.
 
 Summaries of bags are drawn, not bags. Differences between days are not white noise of known size.
-Friction follows a temperature common to all arms, with seasons, and one of each arm; both are
-correlated over days, and arms differ in their sensitivity. Stated standard deviations are too
-small or too large, errors have heavy tails, and bags are missing. Some arms change, by steps or
-wear.
+Friction depends on a temperature common to all arms, with seasons, and on a temperature of each
+arm. Both are correlated over days, and arms differ in their sensitivity. Stated standard
+deviations are too small or too large, errors have heavy tails, and bags are missing. Some arms
+change, by steps or wear.
 
     python -m benchmarks.healthy_arms [--arms N] [--bags M] [--fleets F] [--seed S]
 
@@ -20,7 +20,7 @@ from armid_ros.changes.scatter import ParameterHistory, spreads, without_days
 import numpy as np
 
 JOINTS = ('waist', 'shoulder', 'elbow')
-#: Name, size, stated deviation, and share of it that friction has of the temperature.
+#: Name, size, stated standard deviation, and share of friction that depends on temperature.
 PARAMETERS = (
     ('viscous_coefficient', 0.6, 0.004, 1.0),
     ('coulomb_torque', 0.5, 0.004, 0.3),

@@ -100,13 +100,13 @@ class Judged:
 
     @property
     def findings(self) -> tuple[Named, ...]:
-        """Return the findings; a wrong link is left out if the nominal model has wrong links."""
+        """Return the findings, without link errors if the nominal model has wrong links."""
         honest = () if self.truth.exact else ('link_inertia',)
         return tuple(f for f in self.answer.headline if f.name not in honest)
 
     @property
     def false_alarm(self) -> bool:
-        """Whether the verdict is not `consistent`, link errors of the nominal model aside."""
+        """Whether the verdict is not `consistent`, apart from link errors of the nominal model."""
         only_bodies = bool(self.answer.headline) and not self.findings
         return self.answer.verdict != 'consistent' and not only_bodies
 
@@ -145,7 +145,7 @@ class Judged:
 
 
 def true_arm(case: Case) -> ArmModel:
-    """Return the true arm, with those hidden effects that the catalogue has."""
+    """Return the true arm, with the hidden effects that are in the catalogue."""
     arm = ArmModel(case.true_robot)
     for name, values in case.true_known.items():
         joints = tuple(j for j, value in zip(arm.robot.joints, values, strict=True) if value)
@@ -160,7 +160,7 @@ def true_arm(case: Case) -> ArmModel:
 def with_true_effect(
     arm: ArmModel, hidden: HiddenEffect | Cause, shape: Sequence[float] | None = None
 ) -> ArmModel:
-    """Return an arm with the effect of the catalogue that a hidden one is."""
+    """Return an arm with the catalogue's equivalent of a hidden effect."""
     true = {(p.name, p.joint): p.value for p in hidden.parameters}
     effect = CATALOGUE[hidden.name].on(arm.robot, hidden.joints or None)
     if shape is None:
@@ -185,7 +185,7 @@ def run_diagnosis(case: Case) -> Answer:
 
 
 def judge(spec: CaseSpec) -> Judged:
-    """Make a case and diagnose it; an exception counts as an outcome."""
+    """Make a case and diagnose it; an exception is an outcome as well."""
     case = make_case(spec)
     try:
         answer = run_diagnosis(case)

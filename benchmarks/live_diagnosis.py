@@ -4,15 +4,15 @@
 Effects that appear in a running arm: delay and correctness of the live diagnosis.
 
 The simulated humanoid arm and the node `live_diagnosis` run in one process, in lock step. Joint
-states at 200 Hz have torque noise of 0.05 N m and encoders of 18 bits. They are passed without
-topics, which would be late on a busy machine. The arm moves along random harmonics. In the first
+states at 200 Hz have torque noise of 0.05 N m and encoders of 18 bits. They are passed directly,
+because topics would be late on a busy machine. The arm moves along random harmonics. In the first
 16 s the node measures the misfit of the model. Then the parameter `effects` of the running arm
 gets one effect of the catalogue.
 
 A draw is right if the first name that the node proposes within 30 s is the effect on its joint. A
 name before the effect appears, or another first name, is wrong. During a diagnosis the arm moves
 on for its processor time, as with a separate process. An effect has a tenth of the torque of its
-joint, or the largest typical size. At last the arm moves for half an hour without a change.
+joint, or the largest typical size. Finally the arm moves for half an hour without a change.
 
     python -m benchmarks.live_diagnosis [--draws 40] [--seed 0] [--minutes 30]
 
@@ -54,9 +54,9 @@ BEFORE, WANTED = 20.0, 30.0
 LEARNING = 16.0
 #: Rms torque of an effect over that of its joint.
 SHARE = 0.1
-#: Least part of `SHARE` that an effect of the largest typical size has.
+#: Smallest part of `SHARE` for an effect of the largest typical size.
 LEAST = 1.0 / 3.0
-#: Number of joints that are tried to find one on which the size is typical.
+#: Number of tried joints to find one with a typical size.
 _TRIES = 50
 #: Effects that may appear, each with the quantity that is set.
 KINDS = (
@@ -83,7 +83,7 @@ class Draw:
 
 class Unhurried:
     """
-    Diagnoses in this process, whose answers are delayed by their processor time.
+    Diagnoses in this process, with answers delayed by their processor time.
 
     Attributes
     ----------
@@ -98,7 +98,7 @@ class Unhurried:
 
     @property
     def busy(self) -> bool:
-        """Return whether an answer was not taken so far."""
+        """Return whether an answer is pending."""
         return self._result is not None
 
     def ask(self, job: Job) -> None:
@@ -115,7 +115,7 @@ class Unhurried:
         return result
 
     def close(self) -> None:
-        """Do nothing: there is no process."""
+        """Do nothing, as there is no process."""
 
 
 def known_arm() -> ArmModel:

@@ -3,8 +3,8 @@
 """
 Rates of the diagnosis for arms that changed between two days.
 
-A model is identified on day 1. The diagnosis gets the recordings of day 2, with day 1 as baseline,
-and then those of day 1 itself, where nothing may be named. For the cases see
+A model is identified on day 1. The diagnosis gets the recordings of day 2, with day 1 as
+baseline. It then gets those of day 1 itself, in which nothing may be named. For the cases see
 tests/hidden/lived/README.md.
 
     python -m benchmarks.lived [KIND] [--cases FIRST:LAST] [--only CAUSE ...] [--no-again]

@@ -1,6 +1,6 @@
 # Copyright 2026 The armid_ros developers
 # SPDX-License-Identifier: Apache-2.0
-"""Comparison of answers about arms on two days with the truth, as rates with 95 % intervals."""
+"""Comparison of diagnoses of arms on two days with the truth, as rates with 95 % intervals."""
 
 from __future__ import annotations
 
@@ -204,7 +204,7 @@ class LivedJudged:
 
 
 def gravity_of(headline: Iterable[Named], described: FloatArray) -> FloatArray:
-    """Return the gravity by the values of a headline, shape (3,) [m/s^2]."""
+    """Return the gravity from the values of a headline, shape (3,) [m/s^2]."""
     values = {name: value for named in headline for name, _, value, _ in named.parameters}
     if 'gravity_x' in values:
         return np.array([values[f'gravity_{axis}'] for axis in 'xyz'])

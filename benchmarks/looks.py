@@ -3,9 +3,9 @@
 """
 Runs on sets of cases, and the record of those on locked sets: commit, time and result.
 
-A locked set that is used often becomes a development set. So a benchmark records each run by
-itself, at its beginning and again with its results, and rejects uncommitted code. The record has
-one JSON object per line; a run without results was interrupted.
+A locked set that is used often becomes a development set. A benchmark therefore records each run
+automatically, at its start and again with its results, and rejects uncommitted code. The record
+has one JSON object per line; a run without results was interrupted.
 
 """
 
@@ -60,7 +60,7 @@ def judge_all(
 
     """
     for variable in ('OMP_NUM_THREADS', 'OPENBLAS_NUM_THREADS'):
-        os.environ.setdefault(variable, '1')  # the processes share the cores as it is
+        os.environ.setdefault(variable, '1')  # one thread each, as the processes share the cores
     context = multiprocessing.get_context('spawn')
     judged = []
     with look(what) if 'locked' in what else nullcontext({}) as entry:

@@ -136,7 +136,7 @@ def at_one_kilohertz(seconds, folder):
     restarts = sum(identifier.restarts.values())
     print(f'1 kHz, {robot.n_joints} joints, {len(identifier.base.parameters)} parameters')
     absent = span - len(recording)
-    unsent = min(missing, absent)  # a state that two processes lack was not published
+    unsent = min(missing, absent)  # a state that both processes lack was not published
     print(f'  not published by the arm    {unsent} of {span}: it skips ahead where it comes late')
     print(f'  lost by the identifier      {missing - unsent} of {node.received} (wanted: 0)')
     print(f'  lost by the recorder        {absent - unsent} of {len(recording)} (wanted: 0)')
@@ -188,8 +188,9 @@ def in_lock_step(rate, folder):
     """
     Print the speed of all nodes in lock step over real time.
 
-    It is measured by the clock, which other processes slow down, and by processor time, as on an
-    idle machine. The speeds of the simulator alone and of the messages alone are printed as well.
+    The speed is measured by the clock, which includes delays by other processes, and by
+    processor time, as on an idle machine. The speeds of the simulator alone and of the
+    messages alone are printed as well.
 
     """
     robot = load_robot('humanoid_arm', gravity='moon')

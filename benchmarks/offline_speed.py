@@ -4,8 +4,8 @@
 Time to identify a 7-joint arm from ten minutes at 1 kHz, with standard deviations.
 
 This package reads a bag; figaroh (1.0.2) gets the same samples as arrays. Both use the same
-filter, decimation and parameters, and weighted least squares. Each runs in a separate process, one
-after the other; processor time is also valid on a busy machine.
+filter, decimation and parameters, and weighted least squares. Both run in separate processes,
+one after the other; processor time is also valid on a busy machine.
 
 """
 

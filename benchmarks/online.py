@@ -4,8 +4,9 @@
 Online identification: processor time of an update.
 
 The arm is the Panda of example-robot-data with 7 joints, all base parameters, viscous and Coulomb
-friction and torque offset. Samples at 1 kHz are processed without ROS. Times are of updates with a
-row of the regressor and of all updates, with the default rate of rows and a row per sample.
+friction and torque offset. Samples at 1 kHz are processed without ROS. Times are given for
+updates with a regressor row and for all updates, at the default rate of rows and at one row per
+sample.
 
     python -m benchmarks.online [--seconds 30]
 

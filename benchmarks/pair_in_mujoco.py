@@ -4,9 +4,10 @@
 The human-exoskeleton pair in MuJoCo: joints that follow torques, and a cycle on the ground.
 
 MuJoCo reads both descriptions itself; the springs are tendons. Prescribed joints follow the
-reference: their armature is so large that other torques do not move them, a torque accelerates
-it, and their state is reset to the reference after every step. The ground of the source's Table 3
-is implemented here independently, as a force on heels and toes at every stage of the integrator.
+reference. Their armature is so large that other torques do not move them, a torque accelerates
+the armature, and their state is reset to the reference after every step. The ground of the
+source's Table 3 is implemented here independently, as a force on heels and toes at every stage of
+the integrator.
 
 """
 
@@ -156,10 +157,10 @@ def _states(
 
 
 def _specification(pair: TiedPair) -> mujoco.MjSpec:
-    """Return both machines on the ground with their ties, which are given no stiffness."""
+    """Return both machines on the ground with their ties, which have no stiffness yet."""
     root = ElementTree.fromstring(side_by_side(pair.robot.urdf, pair.other.urdf))
     for link in root.findall('link'):
-        # MuJoCo rejects links without mass: they get 1 microgram
+        # MuJoCo rejects links without mass, so they get 1 microgram
         if not link.get('name').endswith('ground') and link.find('inertial') is None:
             parts = ElementTree.SubElement(link, 'inertial')
             ElementTree.SubElement(parts, 'mass', value='1e-9')

@@ -1,11 +1,11 @@
 # Copyright 2026 The armid_ros developers
 # SPDX-License-Identifier: Apache-2.0
 """
-Ten arms in MuJoCo under position control: how well positions alone determine their drives.
+Ten arms in MuJoCo under position control: accuracy of drives identified from positions alone.
 
-The first three arms have commands that were chosen for the fit: sums of waves, 200 Hz. Seven have
-random commands and rates. The second row of an arm is MuJoCo's own way: scipy's least squares over
-rollouts of its model with finite differences, from the same start.
+The commands of the first three arms are chosen for the fit: sums of sines at 200 Hz. Seven arms
+have random commands and rates. The second row of an arm is the usual method with MuJoCo: least
+squares of scipy over rollouts with finite differences, from the same start.
 
 python -m benchmarks.positions [NUMBER [FIRST]]
 
@@ -25,7 +25,7 @@ from tests.hidden.machines import load_machine
 from tests.positions.machine import chirps, compiled, moves, play, random_chain, Secret, waves
 
 ARMS = ('humanoid_earth', 'panda', 'ur10', 'chain', 'kinova', 'xarm7', 'chain', 'panda', 'ur10')
-#: Step of MuJoCo in its own way [s].
+#: Time step of MuJoCo in its rollouts [s].
 STEP = 1e-3
 
 
@@ -53,7 +53,7 @@ def own_way(robot, recording, commanded, start, size, gains):
     rows = np.rint(recording.t / STEP).astype(int)
     free = np.ones(len(start), dtype=bool)
     free[1 : 2 * n + 1] = gains is None
-    free[-1] = False  # the width of the tool is known here
+    free[-1] = False  # the radius of the tool is known here
 
     def apart(z):
         x = start.copy()
@@ -86,7 +86,7 @@ def own_way(robot, recording, commanded, start, size, gains):
 
 
 def shown(model, values, std, truth):
-    """Return errors of delay [ms] and, in per cent, of friction, and intervals that hold."""
+    """Return errors of delay [ms] and friction [%], and the number of intervals with the truth."""
     names = [one.name for one in model.parameters]
     wanted = np.array([truth[one.name, one.joint] for one in model.parameters])
     of = {name: np.array([one == name for one in names]) for name in set(names)}

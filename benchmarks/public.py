@@ -9,12 +9,12 @@ A public benchmark of diagnosis: recordings of arms on two days, and a score of 
 
 A case is a folder with `arm.urdf` (its masses are up to 6 % wrong), three bags of day 1, three of
 day 2, and one more of day 2 that may be used for validation. Between the days one thing changed,
-or nothing. `answers.json` has an object for each folder, with the keys of `diagnosis.json`:
+or nothing did. `answers.json` has an object for each folder, with the keys of `diagnosis.json`:
 
     {"case_00": {"verdict": "named", "effects": [{"name": "payload", "joints": ["joint_6"]}]}}
 
-Rules: an answer uses the folder alone; the method is fixed before the cases are made; one seed is
-scored once. Whoever makes the cases keeps the seed and the truth until the answers are given.
+Rules: an answer uses only the folder; the method is fixed before the cases are made; a seed is
+scored once. The maker of the cases keeps seed and truth secret until the answers are given.
 
 """
 
@@ -40,9 +40,9 @@ from benchmarks.two_days import Answer, answer_of, identification_of
 from tests.hidden.lived.cases import case_of
 from tests.hidden.lived.specification import LivedSpec, specify
 
-#: Standard errors of the difference of two values that count as a change.
+#: Number of standard errors from which a difference of two values is a change.
 SIGNIFICANT = 4.0
-#: Effects that one parameter of an identified model stands for; others are errors of a link.
+#: Effects that correspond to one parameter of an identified model; others are link errors.
 EFFECT_OF = {
     'viscous_coefficient': 'viscous_friction',
     'coulomb_torque': 'coulomb_friction',

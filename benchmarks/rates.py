@@ -5,8 +5,8 @@ The page of success rates, generated from the recorded results.
 
     python -m benchmarks.rates        writes benchmarks/rates.md
 
-`results/looks.jsonl` has each run on a locked set; `results/rates.json` has the questions that are
-shown of them, and the rates of other sets.
+`results/looks.jsonl` has each run on a locked set. `results/rates.json` has the reported
+questions of these sets, and the rates of other sets.
 
 """
 

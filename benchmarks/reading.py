@@ -10,7 +10,7 @@ with one topic of 7 joints, then with three alternating topics, of which one is 
     python benchmarks/reading.py [--messages 1000000]
 
 The time of this package is the median of five runs; the slower readers run once. Every reader
-has to unpack the chunks. This package also compares their checksums, in two threads.
+has to decompress the chunks. This package also verifies their checksums, in two threads.
 
 """
 
@@ -103,7 +103,7 @@ def read_mcap_ros2(path: Path) -> Arrays:
 
 
 def stacked(messages: Iterable[Any]) -> Arrays:
-    """Return arrays of decoded messages, one by one, as kept messages slow garbage collection."""
+    """Return arrays of messages decoded one by one, as stored messages slow garbage collection."""
     stamps, position, velocity, effort = [], [], [], []
     for message in messages:
         stamp = message.header.stamp

@@ -1,7 +1,7 @@
 # Copyright 2026 The armid_ros developers
 # SPDX-License-Identifier: Apache-2.0
 """
-Changes of real machines between two days, as the diagnosis names them.
+Changes of real machines between two days, and their diagnoses.
 
 A model is identified on day 1; the recordings of day 2 are diagnosed, and those of day 1 again.
 The true changes are known: see benchmarks/real_days.py.

@@ -146,7 +146,7 @@ def _swings(data: Path, what: str, after: Recording, wanted: str) -> RealDays:
 
 def fr3(data: Path, out: Path, first: Sequence[int] = (0, 1)) -> RealDays:
     """
-    Return four motions of a Franka FR3 between which nothing happened.
+    Return four motions of a Franka FR3 without a change between them.
 
     Parameters
     ----------

@@ -1,6 +1,6 @@
 # Copyright 2026 The armid_ros developers
 # SPDX-License-Identifier: Apache-2.0
-"""Duration of `make test` in seconds, and in units of a fixed loop for any computer."""
+"""Duration of `make test` in seconds, and in units of a fixed loop of the same computer."""
 
 import os
 import sys

@@ -1,11 +1,11 @@
 # Copyright 2026 The armid_ros developers
 # SPDX-License-Identifier: Apache-2.0
 """
-Speed of the simulated arm over real time, and the time of its parts.
+Speed of the simulated arm relative to real time, and the time of its parts.
 
 Every arm has rotor inertias, and viscous and Coulomb friction in each joint. It follows a smooth
 reference at 1 kHz by computed torque; sensors have noise, quantisation and a delay. The aim is 60
-times real time. Times are processor times, the least of many short repetitions, as on an idle
+times real time. Times are the smallest processor times of many short repetitions, as on an idle
 processor.
 
 """
@@ -101,7 +101,7 @@ def report(name: str, robot: Robot) -> None:
 
 
 def with_friction(robot: Robot) -> ArmModel:
-    """Return the robot with friction of a few per cent of its drives, and rotors."""
+    """Return the robot with friction of a few per cent of its drive torques, and with rotors."""
     drive = np.minimum(robot.torque_limit, 100.0)
     arm = ArmModel(robot).with_effect(make_effect('viscous_friction', robot), 0.02 * drive)
     arm = arm.with_effect(make_effect('coulomb_friction', robot), 0.03 * drive)

@@ -197,7 +197,7 @@ def ask(
 
 def true_share(gap: Gap, made: Sequence[tuple[FloatArray, FloatArray]]) -> float:
     """
-    Return the share of a gap that disappears if a torque is subtracted.
+    Return the share of a gap that disappears when a torque is subtracted.
 
     Parameters
     ----------
