@@ -262,7 +262,7 @@ def _of_units(
     ]
     if turned:
         named = ', '.join(f'{j.name} reaches {max(-j.lower, j.upper):.4g}' for j in turned[:3])
-        yield Remark('doubt', f'{named}: are these degrees, or motor positions?')
+        yield Remark('doubt', f'{named}: are positions in degrees, or of motors?')
     if recording.dq is None:
         yield Remark('note', 'no velocities; they are not needed, positions are differentiated')
         return

@@ -253,7 +253,7 @@ def test_by_how_much_is_not_said_where_it_is_not_known():
     size = Estimate(parameters, np.array([0.0, 0.2]), np.diag([np.inf, 1e-4]))
     candidate = ChangeCandidate('friction', 'elbow', parameters, np.eye(2), np.eye(2))
     unknown, known = str(Change(candidate, (), 1.0, size)).split(',')
-    assert 'elbow' in unknown and 'not known' in unknown
+    assert 'elbow' in unknown and 'unknown' in unknown
     assert '+0.2 N m' in known
 
 
