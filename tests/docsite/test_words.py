@@ -13,15 +13,15 @@ import pytest
 ROOT = Path(__file__).parents[2]
 #: Largest count in the package; a commit that lowers a count lowers it here.
 CEILING = {
-    'told': 83,
-    'said': 198,
-    'says': 2,
-    'tells': 1,
+    'told': 15,
+    'said': 74,
+    'says': 0,
+    'tells': 0,
     'asks': 0,
-    'asked': 90,
+    'asked': 69,
     'believes': 0,
-    'believed': 17,
-    'beside': 71,
+    'believed': 11,
+    'beside': 24,
     'knows': 0,
     'heard': 5,
 }
