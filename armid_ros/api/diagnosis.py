@@ -177,7 +177,7 @@ class DiagnosisResult(ShownModel):
         """Return report.html with verdict and evidence."""
         learned = self.residual
         return diagnosis_report(
-            self.core,
+            replace(self.core, notes=(*self.core.notes, *self.notes)),
             {
                 'training': self.recordings,
                 'held-out': self.held_out,
@@ -364,7 +364,7 @@ def diagnose(
     Returns
     -------
     DiagnosisResult
-        Prints its verdict; ``report``, ``save``, ``to_dataframe``, ``arm``.
+        Prints its verdict; ``plot``, ``report``, ``save``, ``to_dataframe``, ``arm``.
 
     Raises
     ------

@@ -18,10 +18,10 @@ from armid_ros.arm.memoized_arm import memoized_arm, plain_arm
 from armid_ros.diagnosis.data.baseline import Baseline
 from armid_ros.diagnosis.data.evidence import Evidence, noise_floor
 from armid_ros.diagnosis.data.trajectory import not_shown, trajectories, Trajectory
-from armid_ros.diagnosis.doubt import doubt_of, doubt_of_names
+from armid_ros.diagnosis.doubt import doubt_of, doubted
 from armid_ros.diagnosis.prepare import choose_filters, mended, prepare, with_friction
 from armid_ros.diagnosis.search.choice import Explainer
-from armid_ros.diagnosis.search.explanation import as_bodies, Chosen, Explanation, NOISE
+from armid_ros.diagnosis.search.explanation import Chosen, Explanation, NOISE
 from armid_ros.diagnosis.search.spans import acting_spans, Span
 from armid_ros.diagnosis.settings import DiagnosisSettings
 from armid_ros.diagnosis.ties.ties import diagnose_ties
@@ -30,6 +30,7 @@ from armid_ros.diagnosis.verdict.finding import Diagnosis, Finding
 from armid_ros.diagnosis.verdict.gap import measure_gap, not_repeating
 from armid_ros.diagnosis.verdict.naming import findings, small_print
 from armid_ros.diagnosis.verdict.remaining_misfit import places_held, RemainingMisfit
+from armid_ros.diagnosis.verdict.same_body import as_placed_bodies
 from armid_ros.diagnosis.verdict.where import where_it_is, where_left
 from armid_ros.diagnosis.verdict.words import decide, Verdict
 from armid_ros.errors import IdentificationError
@@ -158,6 +159,7 @@ def diagnose(
             return _as_diagnosis(tied, notes, explainer, doubt, given)
     chosen = explainer.chosen()
     result = _as_diagnosis(chosen, notes, explainer, doubt, given)
+    tell(1.0, result.verdict)
     return _diagnose_span(
         result, chosen, explainer, (recordings, validate, baseline)
     ) or _each_alone(result, ([*recordings, *validate], baseline), used, explainer)
@@ -255,8 +257,7 @@ def _as_diagnosis(
     """Return the diagnosis of an explanation; shares are measured on held-out data."""
     arm, settings, before = explainer.arm, explainer.settings, explainer.baseline
     explainer.tell(0.85, 'held-out gap')
-    explanation, said = as_bodies(chosen.explanation)
-    notes = [*notes, *chosen.notes, *(said if explanation.steps else ())]
+    explanation, said = as_placed_bodies(chosen.explanation)
     unseen = _held_out_evidence(explainer.unseen, explanation, chosen)
     least = 0.0 if chosen.measured else settings.thresholds.headline
     explanation, shares = headline(explanation, least, settings)
@@ -274,6 +275,9 @@ def _as_diagnosis(
     left, resting = measured.beside(explanation), measured.resting(explanation)
     laws = measured.laws(explanation)
     strange = not_repeating(floors, settings.thresholds, settings.material * evidence.torque_rms)
+    if not found:
+        explanation = replace(explanation, reference=explanation.fitted)
+    gap = measure_gap(explanation, unseen)
     word = decide(
         found,
         [arm.robot.joints[k] for k in strange] if chosen.measured else (),
@@ -282,14 +286,12 @@ def _as_diagnosis(
         NOISE if chosen.measured else chosen.floor_in_words,
         measured.as_it_is(explanation),
         minor,
+        gap,
     )
-    doubt = doubt or (doubt_of_names(found) if before else '')
-    if not found:
-        explanation = replace(explanation, reference=explanation.fitted)
+    word, doubt = doubted(word, doubt, found, given, before)
     open_in = measured.shown_in(left, explanation)
     new = np.max([np.zeros(arm.robot.n_joints), *(one.ratio for one in laws)], axis=0) > 1.0
     places = where_it_is(explanation, (unseen or evidence) if found else open_in, settings, new)
-    explainer.tell(1.0, word.word)
     remarks = _remarks(found, worse, chosen, word, doubt, explainer)
     return Diagnosis(
         verdict=word.word,
@@ -298,13 +300,13 @@ def _as_diagnosis(
         minor=minor,
         where=places or places_held(arm, resting),
         left=where_left(explanation, patched, open_in, settings, new),
-        gap=measure_gap(explanation, unseen),
+        gap=gap,
         explanation=explanation.forgetting(),
         arm=plain_arm(patched) if found and not worse else given,
         data=tuple(evidence.data),
         not_visible=_not_visible(explanation, found, explainer),
         refitted=explanation.refitted,
-        notes=tuple(note for note in notes if note not in remarks),
+        notes=tuple(x for x in (*notes, *chosen.notes, *said) if x not in remarks),
         baseline=chosen.floor_in_words,
         harmful=bool(found and worse),
         doubt=doubt,
@@ -336,7 +338,7 @@ def _remarks(
     remarks = {
         f'The model is not patched: {names} would make it worse in {", ".join(worse)}.': worse,
         chosen.untested: verdict.word == 'unknown',
-        doubt: True,
+        doubt: verdict.word != 'consistent',  # then it precedes the verdict
         f'Not checked: {still} did not move, or turned round all the time.': still,
     }
     return [text for text, told in remarks.items() if text and told]

@@ -5,6 +5,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import replace
 
 from armid_ros.arm import ArmModel, Misfit
 from armid_ros.diagnosis.data.baseline import Baseline
@@ -12,6 +13,7 @@ from armid_ros.diagnosis.data.evidence import torque_rms
 from armid_ros.diagnosis.data.trajectory import trajectories
 from armid_ros.diagnosis.settings import Thresholds
 from armid_ros.diagnosis.verdict.finding import Finding
+from armid_ros.diagnosis.verdict.words import Verdict
 from armid_ros.effects import CATALOGUE
 from armid_ros.errors import IdentificationError
 from armid_ros.identification.assess.grade_limits import LIMITS
@@ -55,6 +57,28 @@ def doubt_of(
         return unusable
     changed = '' if misfit is None else _changed(arm, baseline, recordings, misfit, thresholds)
     return changed or _poor(arm, baseline) or unusable
+
+
+def doubted(
+    verdict: Verdict,
+    doubt: str,
+    findings: Sequence[Finding],
+    arm: ArmModel,
+    baseline: Baseline | None,
+) -> tuple[Verdict, str]:
+    """
+    Return the verdict under a doubt of the model, and the doubt, which findings may add.
+
+    A model with a large residual in the baseline is consistent with any data: these are bad data.
+    With a smaller one, the doubt precedes the verdict.
+
+    """
+    if verdict.word != 'consistent':
+        return verdict, doubt or (doubt_of_names(findings) if baseline else '')
+    fault = _no_signal(arm, baseline) if baseline else ''
+    if fault:
+        return Verdict('bad_data', f'The data cannot be diagnosed: {fault}.'), ''
+    return replace(verdict, summary=f'{doubt} {verdict.summary}'.lstrip()), doubt
 
 
 def doubt_of_names(findings: Sequence[Finding]) -> str:
@@ -103,16 +127,32 @@ def _changed(
 def _poor(arm: ArmModel, baseline: Baseline) -> str:
     """Return a sentence if the baseline residual is a large share of the torque."""
     whole, each = baseline.errors
-    bad = [
-        f'{100.0 * error:.0f} % of the torque of {joint}'
-        for joint, error in zip(arm.robot.joints, each, strict=True)
+    bad = {
+        joint: error
+        for joint, error in zip(arm.robot.joints, each.tolist(), strict=True)
         if 100.0 * error > LIMITS.unusable
-    ]
+    }
     if 100.0 * whole > LIMITS.poor:
-        bad.insert(0, f'{100.0 * whole:.0f} % of the torque of the arm')
+        bad['the arm'] = whole
     if not bad:
         return ''
+    worst = max(bad, key=lambda place: bad[place])
+    first = 'the arm' if 'the arm' in bad else worst
+    peak = f', {100.0 * bad[worst]:.0f} % of that of {worst}' if worst != first else ''
     return (
-        f'In the baseline, the residual of the model is {", ".join(bad)}: is it the model of this '
-        'arm? Smaller changes are not detectable.'
+        f'In the baseline, the residual of the model is {100.0 * bad[first]:.0f} % of the torque '
+        f'of {first}{peak}: is it the model of this arm? Smaller changes are not detectable.'
+    )
+
+
+def _no_signal(arm: ArmModel, baseline: Baseline) -> str:
+    """Return a fault if the baseline residual hides changes of the arm; empty otherwise."""
+    whole, each = baseline.errors
+    worst = int(np.argmax(each))
+    if not 100.0 * whole > LIMITS.unusable:
+        return ''
+    return (
+        f'in the baseline, the residual of the model is {100.0 * whole:.0f} % of the torque of '
+        f'the arm ({100.0 * each[worst]:.0f} % in {arm.robot.joints[worst]}). Either the torque '
+        'carries too little signal, or it is the model of another arm'
     )

@@ -2,11 +2,21 @@
 # SPDX-License-Identifier: Apache-2.0
 """A payload on an arm that is described exactly."""
 
+from types import SimpleNamespace
+
+from armid_ros.arm import ArmModel
 from armid_ros.diagnosis import diagnose
+from armid_ros.diagnosis.search.cause import SelectedEffect
+from armid_ros.diagnosis.search.explanation import Explanation
+from armid_ros.diagnosis.search.trial import Trial
+from armid_ros.diagnosis.verdict.same_body import is_same_body, on_outer_link
+from armid_ros.effects.load import PayloadChange
 from armid_ros.identification import identify
 from armid_ros.model import inverse_dynamics
 import numpy as np
 import pytest
+
+from .conftest import JOINT, LINK, URDF
 
 MASS, HEIGHT = 0.6, 0.3
 
@@ -36,6 +46,39 @@ def test_a_payload_is_named_with_its_mass(request, arm, friction):
     assert payload.values[0] == pytest.approx(MASS, rel=0.05)
     others = {finding.name for finding in found.findings} - {'payload'}
     assert others <= {'viscous_friction', 'coulomb_friction'}
+
+
+def load_on(joint, first_moments, rivals=()):
+    """Return a cause: a payload of 0.7 kg on the link of a joint."""
+    values = np.array([0.7, *first_moments, *(6 * [0.01])])
+    effect = SelectedEffect(PayloadChange((joint,)), tuple(range(10)))
+    each = np.full(10, 1e-3)
+    return Trial(effect, values, each, each, each, 1.0, 9.0, 9.0, 1.0, 1, 0.45, rivals)
+
+
+@pytest.mark.parametrize(
+    ('joint', 'moments', 'outer', 'other', 'same'),
+    [
+        ('elbow', (0.0, 0.0, 0.3), 'roll', (1e-3, 1e-3, 0.1), True),
+        ('elbow', (0.0, 0.0, 0.3), 'roll', (0.02, 0.0, 0.1), False),  # beside the axis
+        ('shoulder', (0.0, 0.0, 0.3), 'roll', (0.0, 0.0, 0.1), False),  # two joints apart
+    ],
+)
+def test_a_load_on_the_axis_of_a_joint_is_assumed_on_the_outer_link(
+    joint, moments, outer, other, same
+):
+    roll = JOINT.format(name='roll', parent='lower', child='hand', height=0.3, axis='0 0 1')
+    hand = LINK.format(name='hand', mass=0.4, com=0.05)
+    arm = ArmModel.of(URDF.replace('</robot>', f'{hand}{roll}</robot>'))
+    rival = load_on(outer, other)
+    trial = load_on(joint, moments, (rival,))
+    assert is_same_body(trial, rival, arm.robot) == same
+    fitted = SimpleNamespace(named=(trial.named,), values=(trial.values,))
+    problem = SimpleNamespace(fit=lambda named, values: (named, values))
+    found = Explanation(arm, fitted, fitted, (trial,), None, None, problem=problem)
+    (step,) = on_outer_link(found).steps
+    assert step.effect.joints == ((outer,) if same else (joint,))
+    assert [one.effect.joints for one in step.rivals] == [(joint,) if same else (outer,)]
 
 
 @pytest.mark.slow

@@ -116,6 +116,15 @@ def test_a_rival_in_another_joint_is_stated_with_it(bench, rivals, stated):
     assert found.word == 'ambiguous' and stated in found.summary
 
 
+def test_the_same_body_on_another_link_is_no_ambiguity(bench):
+    same = Rival('payload', ('shoulder',), 0.4, same_body=True)
+    load = finding(bench, 0.9, 'payload', (0.7,), weighs=True, rivals=(same,))
+    found = verdict(bench, load)
+    assert found.word == 'named' and not load.experiment and not load.ambiguous_with
+    assert found.summary.startswith('Payload of 0.700 ± 0.020 kg on elbow')
+    assert 'link of shoulder may carry it instead' in found.summary
+
+
 @pytest.mark.parametrize(('ratio', 'word'), [(0.5, 'ambiguous'), (4.0, 'partial')])
 def test_rivals_of_every_name_are_stated_whatever_is_left(bench, ratio, word):
     first = finding(bench, 0.6, rivals=(Rival('payload', ('shoulder',)),))

@@ -72,7 +72,7 @@ def next_steps(
     motions += [
         one.experiment
         for one in findings
-        if one.rivals and (one.name, one.rivals[0].name) not in told
+        if one.other_causes and (one.name, one.other_causes[0].name) not in told
     ]
     motions += [f'{no_run[0].upper()}{no_run[1:]}.'] if no_run else []
     steps = [*motions, *steps] if verdict == 'ambiguous' else [*steps, *motions]
@@ -105,7 +105,7 @@ def _looks(finding: Finding, diagnosis: Diagnosis) -> list[str]:
     """Return sentences on parts to inspect, for a cause and for each of its rivals."""
     steps = []
     own = Rival(finding.name, finding.joints)
-    for one in (own, *finding.rivals):
+    for one in (own, *finding.other_causes):
         what = (finding.look_at if one is own else '') or _look_at(one.name, diagnosis)
         if not what:
             continue

@@ -98,7 +98,12 @@ def _finding(finding: Finding) -> dict[str, Any]:
         ],
         'ambiguous_with': list(finding.ambiguous_with),
         'rivals': [
-            {'name': r.name, 'joints': list(r.joints), 'probability': r.probability}
+            {
+                'name': r.name,
+                'joints': list(r.joints),
+                'probability': r.probability,
+                'same_body': r.same_body,
+            }
             for r in finding.rivals
         ],
         'experiment': finding.experiment,

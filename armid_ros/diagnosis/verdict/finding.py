@@ -31,11 +31,17 @@ SAID = 0.01
 
 @dataclass(frozen=True)
 class Rival:
-    """A competing cause that the data do not exclude, with joints and probability."""
+    """
+    A competing cause that the data do not exclude, with joints and probability.
+
+    The same body may be on the link before or after a joint; that is no other cause.
+
+    """
 
     name: str
     joints: tuple[str, ...]
     probability: float = 0.0
+    same_body: bool = False
 
 
 @dataclass(frozen=True)
@@ -106,9 +112,14 @@ class Finding:
         return self.added_to or (0.0,) * len(self.values)
 
     @property
+    def other_causes(self) -> tuple[Rival, ...]:
+        """Rivals without the same body on another link."""
+        return tuple(rival for rival in self.rivals if not rival.same_body)
+
+    @property
     def ambiguous_with(self) -> tuple[str, ...]:
-        """Names of the effects that are rivals."""
-        return tuple(rival.name for rival in self.rivals)
+        """Names of the effects that are other causes."""
+        return tuple(rival.name for rival in self.other_causes)
 
     @property
     def experiment(self) -> str:
@@ -118,9 +129,9 @@ class Finding:
         No motion separates a payload from the link that carries it: the payload has to be weighed.
 
         """
-        if not self.rivals:
+        if not self.other_causes:
             return ''
-        rival = self.rivals[0]
+        rival = self.other_causes[0]
         kinds = [CATALOGUE[one] for one in (self.name, rival.name) if one in CATALOGUE]
         carried = [kind for kind in kinds if kind.traits.weighs]
         bodies = len(kinds) == 2 and all(kind.changes_body for kind in kinds)

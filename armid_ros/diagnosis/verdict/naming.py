@@ -14,6 +14,7 @@ from armid_ros.diagnosis.search.patch import room
 from armid_ros.diagnosis.search.trial import Trial
 from armid_ros.diagnosis.verdict.attribution import Attribution
 from armid_ros.diagnosis.verdict.finding import Finding, Rival
+from armid_ros.diagnosis.verdict.same_body import is_same_body
 from armid_ros.effects import Effect
 from armid_ros.effects.tied import Tied
 from armid_ros.estimate import ParameterName
@@ -231,7 +232,12 @@ def _rivals(
             best.setdefault(name, []).append(here[name])
     likely = {name: max(trial.probability for trial in found) for name, found in best.items()}
     return tuple(
-        Rival(name, _joints([trial.effect.joints for trial in best[name]], arm), likely[name])
+        Rival(
+            name,
+            _joints([trial.effect.joints for trial in best[name]], arm),
+            likely[name],
+            all(any(is_same_body(own, one, arm.robot) for own in trials) for one in best[name]),
+        )
         for name in sorted(likely, key=lambda name: -likely[name])[:_RIVALS]
     )
 

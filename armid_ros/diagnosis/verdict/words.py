@@ -9,7 +9,7 @@ from dataclasses import dataclass
 from typing import Literal
 
 from armid_ros.arm import ArmModel
-from armid_ros.diagnosis.verdict.finding import Finding, Rival, SAID
+from armid_ros.diagnosis.verdict.finding import Finding, Gap, Rival, SAID
 from armid_ros.diagnosis.verdict.where import Excess
 from armid_ros.effects import CATALOGUE
 from armid_ros.estimate import name_in_words, ParameterName
@@ -22,6 +22,8 @@ Word = Literal[
 ]
 #: Largest number of joints in the list of a sentence; further joints are only counted.
 _JOINTS_SAID = 3
+#: Share of the gap below which the named causes explain only a part of it.
+_MOST = 0.5
 
 
 @dataclass(frozen=True)
@@ -50,6 +52,7 @@ def decide(
     floor_in_words: str,
     as_it_is: Excess | None = None,
     minor: Sequence[Finding] = (),
+    gap: Gap | None = None,
 ) -> Verdict:
     """
     Return the verdict: word and sentence.
@@ -70,6 +73,8 @@ def decide(
         Losses with the rigid body as given, if ``left`` is with a refitted one.
     minor : sequence of Finding
         Minor findings, the most important first.
+    gap : Gap, optional
+        Errors of the model with the findings, and their floor.
 
     """
     worst = max(left, key=lambda one: float(one.ratio.max()))
@@ -88,11 +93,18 @@ def decide(
             text = f'No effect in the catalogue explains {error}. It is {size}.'
             text += f' Best candidate: {small}' if small else ''
             return Verdict('unknown', f'{text} {refit}'.rstrip())
-        text = f'The model explains the recordings: the remaining error {no_larger}'
+        number = ''
+        if gap is not None:
+            largest = int(np.argmax(gap.after / np.maximum(gap.floor, 1e-12)))
+            unit = arm.robot.torque_units[largest]
+            number = f' ({gap.after[largest]:.2g} {unit} in {arm.robot.joints[largest]})'
+        text = f'The model explains the recordings: the remaining error{number} {no_larger}'
         text += f', or too small to matter. {small}' if small else '.'
         return Verdict('consistent', f'{refit}{text}')
     said, tied = _sentences(findings), _rivals_in_words(findings)
     if open_gap:
+        if sum(group[0].share for group in by_cause(findings)) < _MOST:
+            said = said.replace(' explains ', ' explains only ')
         first = f'{said} {tied}'.rstrip()
         return Verdict('partial', f'{first} {refit}There is more: {error} is {size}.')
     if tied:
@@ -105,7 +117,7 @@ def _rivals_in_words(findings: Sequence[Finding]) -> str:
     return ' '.join(
         f'Either {_alternatives(one)}: these data cannot separate them.'
         for one in findings
-        if one.rivals
+        if one.other_causes
     )
 
 
@@ -159,6 +171,13 @@ def _sentences(findings: Sequence[Finding]) -> str:
         names = ' and '.join([first, *(text[0].lower() + text[1:] for text in others)])
         explain = 'together explain' if others else 'explains'
         found.append(f'{names} {explain} {percent(group[0].share)} of the gap.')
+        found += [
+            f'The link of {" or ".join(rival.joints)} may carry it instead: the torques are the '
+            'same. The outer link is assumed.'
+            for one in group
+            for rival in one.rivals
+            if rival.same_body
+        ]
     return ' '.join(found)
 
 
@@ -191,7 +210,7 @@ def _subject(finding: Finding) -> str:
         rows = zip(finding.parameters, finding.values, finding.std, strict=True)
         mass, std = next(((m, s) for p, m, s in rows if p.unit == 'kg'), (0.0, 0.0))
         if not abs(mass) > HALF_WIDTH * std:
-            return f'{subject} of a mass that these data do not determine on {places[0]}'
+            return f'{subject} on {places[0]} (these data do not determine its mass)'
         gone = ' that was put down' if mass < 0.0 else ''
         return f'{subject} of {as_sure(abs(mass), std)} kg on {places[0]}{gone}'
     if len(places) > _JOINTS_SAID:
@@ -253,7 +272,7 @@ def _strange(joints: Sequence[str], findings: Sequence[Finding]) -> str:
 
 def _alternatives(finding: Finding) -> str:
     """List a name and its rivals with probabilities, and with joints if these differ."""
-    every = (Rival(finding.name, finding.joints, finding.probability), *finding.rivals)
+    every = (Rival(finding.name, finding.joints, finding.probability), *finding.other_causes)
     elsewhere = len({frozenset(one.joints) for one in every}) > 1
     words = ' or '.join(
         name_in_words(one.name)
