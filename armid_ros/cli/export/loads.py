@@ -65,7 +65,7 @@ def load_of(arm: ArmModel, joint: str | None = None, frame: str | None = None) -
     Raises
     ------
     ModelError
-        There is no such payload or frame, or the mass is not positive.
+        There is no such payload or frame, a joint moves behind it, or the mass is not positive.
 
     """
     payloads: dict[str, FloatArray] = {}
@@ -89,6 +89,13 @@ def load_of(arm: ArmModel, joint: str | None = None, frame: str | None = None) -
             'accepts: record again with and without the payload'
         )
     model, number = arm.robot.model, arm.robot.tree.index(joint) + 1
+    behind = [str(model.names[one]) for one in model.subtrees[number] if one != number]
+    if behind:
+        raise ModelError(
+            f"the payload of joint '{joint}' is not at the flange, as {', '.join(behind)} moves "
+            'behind it: load data belong to a body that the last joint moves. Put the payload '
+            'onto the last link, or leave out the joints of a gripper with --robot and --joints'
+        )
     frames = [f for f in model.frames if (f.parentJoint, f.type) == (number, pin.FrameType.BODY)]
     links = {str(one.name): one.placement for one in frames}
     # ROS-Industrial calls the frame of a flange tool0 or flange

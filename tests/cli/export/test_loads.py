@@ -94,6 +94,7 @@ def test_an_inertia_that_no_body_has_is_a_point_mass_and_a_note():
         ((('roll', HAND),), {'joint': 'shoulder'}, 'on roll: name the joint with --joint'),
         ((('roll', HAND), ('shoulder', HAND)), {}, 'on roll, shoulder: name the joint'),
         ((('roll', (-0.5, *HAND[1:])),), {}, '-0.5 kg'),
+        ((('shoulder', HAND),), {}, 'roll moves behind it'),
     ],
 )
 def test_a_load_that_cannot_be_written_is_an_error_with_the_answer(loads, asked, answer):
