@@ -102,6 +102,18 @@ def name_in_file(name: str, rules: Rules) -> str:
     return name
 
 
+def renaming(joints: Sequence[str], names: Sequence[str]) -> str:
+    """Return the rule OLD:NEW that makes names of a file those of all joints; '' without one."""
+    ends = [(name[:end], name[end:]) for name in names for end in range(len(name))]
+    # whole words of a name first
+    for old, rest in sorted(ends, key=lambda end: not end[0].endswith(('_', '/'))):
+        new = joints[0].removesuffix(rest)
+        made = {renamed(one, [(old, new)]) for one in names}
+        if joints[0].endswith(rest) and made.issuperset(joints):
+            return f'{old}:{new}'
+    return ''
+
+
 def number(text: str) -> float:
     """
     Parse a number, ratio or angle: '1798/7', '-pi/2', '2*pi', '0.5'.

@@ -13,6 +13,7 @@ import struct
 from armid_ros.errors import nearest, RecordingError
 from armid_ros.files import reading
 from armid_ros.recording.bag import Bag
+from armid_ros.recording.columns import renaming
 from armid_ros.recording.joint_state.conversion import holds_joint_state, joint_state_blocks
 from armid_ros.recording.joint_state.decoder import JointSamples, JointStateDecoder
 from armid_ros.recording.message_types import BYTE_ORDERS, JOINT_STATE, STRING
@@ -97,13 +98,17 @@ def assembled(
         )
     if missing:
         listed = ', '.join(f"'{name}'" for name in missing)
-        found = nearest(missing[0], [name for name in decoder.names_seen if name not in joints])
+        others = [name for name in decoder.names_seen if name not in joints]
+        found, rule = nearest(missing[0], others), renaming(missing, others)
         present = ','.join(name for name in joints if name in decoder.names_seen)
         hint = f'; --joints {present} reads the others' if present else ''
-        if found:
+        if rule:
+            hint = f'; if only the names differ, use --rename {rule}{hint}'
+        elif found:
             hint = f"; if '{found}' is '{missing[0]}', use --rename {found}:{missing[0]}{hint}"
+        ask = '' if present or rule else ': is it a recording of another robot?'
         raise RecordingError(
-            f'{where} does not name {"joint" if len(missing) == 1 else "joints"} {listed}; '
+            f'{where} does not name {"joint" if len(missing) == 1 else "joints"} {listed}{ask}; '
             f'its joints are {", ".join(decoder.names_seen)}{hint}'
         )
     if damage:

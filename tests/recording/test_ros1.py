@@ -84,8 +84,24 @@ def test_it_is_read_as_it_is_under_the_names_of_the_robot(bag, motion):
     assert recording.source == str(bag)
 
 
+@pytest.mark.parametrize(
+    ('joints', 'rule'),
+    [
+        (('panda_joint1', 'panda_joint2'), '--rename fer_:panda_'),
+        (('joint1', 'joint2'), '--rename fer_:'),
+        (('arm_fer_joint1', 'arm_fer_joint2'), '--rename fer_:arm_fer_'),
+        (('ferjoint1', 'ferjoint2'), '--rename fer_:fer'),
+    ],
+)
+def test_one_rule_renames_all_joints(bag, motion, joints, rule):
+    with pytest.raises(RecordingError, match=f'{rule}$'):
+        read_anything(bag, joints=joints)
+    said = ColumnSettings(rename=(tuple(rule.split(' ')[1].split(':')),))
+    np.testing.assert_array_equal(read_anything(bag, joints=joints, columns=said).q, motion[1])
+
+
 def test_a_joint_that_is_not_there_is_named_with_the_bag_and_not_with_a_copy(bag):
-    with pytest.raises(RecordingError, match=r'run\.bag: /joint_states.*elbow'):
+    with pytest.raises(RecordingError, match=r'run\.bag: /joint_states.*elbow.*another robot'):
         read_anything(bag, joints=('elbow',))
 
 
