@@ -6,6 +6,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
+import math
 import threading
 import time
 
@@ -38,9 +39,13 @@ def progress(what: str) -> Iterator[Tick]:
         shares, steps = [0.0], [what]
 
         def watch() -> None:
+            before = math.inf
             while not done.wait(10.0):
-                line = progress_line(steps[0], shares[0], time.monotonic() - start)
-                click.echo(line, err=True)
+                share, spent = shares[0], time.monotonic() - start
+                rest = spent * (1.0 / share - 1.0) if share else math.inf
+                # a share that does not grow with time predicts nothing
+                click.echo(progress_line(steps[0], share, spent, rest < before), err=True)
+                before = min(before, rest)
 
         def note(share: float, what: str | None = None) -> None:
             shares[0] = share
@@ -66,7 +71,8 @@ def progress(what: str) -> Iterator[Tick]:
         yield tick
 
 
-def progress_line(what: str, share: float, spent: float) -> str:
-    """Return progress as a line of text, for logs and pipes; time spent in s."""
-    rest = f', about {spent * (1.0 / share - 1.0):.0f} s to go' if 0.0 < share < 1.0 else ''
+def progress_line(what: str, share: float, spent: float, steady: bool = True) -> str:
+    """Return progress as a line of text, with the remaining time if steady; time spent in s."""
+    known = steady and 0.0 < share < 1.0
+    rest = f', about {spent * (1.0 / share - 1.0):.0f} s to go' if known else ''
     return f'{what}: {100.0 * share:.0f} %, {spent:.0f} s{rest}'

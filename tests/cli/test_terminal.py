@@ -18,6 +18,7 @@ def test_a_line_of_progress_has_share_time_and_time_to_go(share, numbers):
     line = progress_line('identifying', share, 10.0)
     assert line.startswith('identifying: ')
     assert tuple(map(int, re.findall(r'\d+', line))) == numbers
+    assert 'to go' not in progress_line('identifying', share, 10.0, steady=False)
 
 
 @pytest.mark.parametrize(
