@@ -365,7 +365,7 @@ def identify(
     Returns
     -------
     IdentificationResult
-        Prints as a table; ``report``, ``save``, ``to_dataframe``, ``urdf``.
+        Prints as a table; ``plot``, ``report``, ``save``, ``to_dataframe``, ``urdf``.
 
     Raises
     ------

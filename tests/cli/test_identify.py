@@ -80,7 +80,7 @@ def test_all_prints_every_parameter_and_without_checks_there_are_none(quick):
     assert text.count('±') >= len(document['parameters'])
     errors = document['training']['joint_halves_error_percent']
     assert document['error_percent'] == errors[document['worst_joint']]
-    assert f'{document["error_percent"]:.3g} %' in text.splitlines()[0]
+    assert f'{document["error_percent"]:.2g} %' in text.splitlines()[0]
     assert 'check:' not in text and 'verification' not in document
 
 

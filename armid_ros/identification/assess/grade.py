@@ -122,11 +122,15 @@ def grade(
     error, joint = max((one.measured, one.joint) for one in worst.values())
     return Grade(
         ordered[0].word,
-        tuple(f'{reason.text[0].upper()}{reason.text[1:]}.' for reason in ordered),
+        tuple(_sentence(reason.text) for reason in ordered),
         tuple(fault.text for fault in _worst_first(faults)),
         error,
         result.arm.robot.joints[joint],
     )
+
+
+def _sentence(text: str) -> str:
+    return f'{text[0].upper()}{text[1:]}{"" if text.endswith("?") else "."}'
 
 
 def _worst_first(reasons: Sequence[Fault]) -> list[Fault]:
@@ -158,12 +162,17 @@ def _errors(
         'poor': ', too large to compute torques',
         'unusable': ': the model does not describe this motion',
     }
+    training = Score.of(result.training).joint_relative_error_percent
+    fitted = beyond_noise(training, result.training, result.used)
     for bag, one in sorted(worst.items(), key=lambda item: -item[1].beyond):
         word = by_error(one.beyond)
+        # a body of the right robot follows the recordings that it is fitted to
+        wrong = word == by_error(float(fitted[one.joint])) == 'unusable'
+        ask = f': is {result.arm.robot.name} the right robot?' * wrong
         if bag is None:
-            yield _halves(result, word, one.text)
+            yield _halves(result, word, f'{one.text}{ask}')
         else:
-            yield Fault(f'torque error on {bag}, held out: {one.text}{use[word]}', word)
+            yield Fault(f'torque error on {bag}, held out: {one.text}{ask or use[word]}', word)
     # held-out data, or training data if there are none
     fits = held_out or result.training
     every = Score.of(fits).joint_relative_error_percent
@@ -198,7 +207,8 @@ def _worst(errors: FloatArray, fits: Sequence[Fit], result: Identification) -> _
     details = [f'{error:.3g} % without noise'] if word != by_error(measured) else []
     details += [f'worst joint: {joints[worst]}'] if len(joints) > 1 else []
     limit = LIMITS.unusable if word == 'unusable' else LIMITS.poor
-    text = f'{measured:.3g} % ({", ".join([*details, f"limit {limit:g} %"])})'
+    number = f'{measured:.0f}' if measured >= 99.5 else f'{measured:.2g}'
+    text = f'{number} % ({", ".join([*details, f"limit {limit:g} %"])})'
     return _Worst(worst, measured, error, text)
 
 

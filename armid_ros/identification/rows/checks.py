@@ -168,7 +168,8 @@ def check_torque(
         if np.all(factors < 0.0):
             raise IdentificationError(
                 f'{source}: torques of {joints} have the opposite sign of what the description '
-                'takes. Negate them (--effort-scale -1): positive is along the URDF joint axis'
+                'takes; positive is along the URDF joint axis. Negate them: --effort-scale -1, or '
+                'without that option if it is given'
             )
         for unit, factor in TORQUE_UNITS.items():
             if np.all((factors > 0.5 * factor) & (factors < 2.0 * factor)):
