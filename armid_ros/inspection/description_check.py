@@ -20,7 +20,8 @@ from armid_ros.arm import ArmModel
 from armid_ros.effects.load import described_spread
 from armid_ros.identification import Identification, Score
 from armid_ros.inspection.inspect import notes_on, Remark, worst_first
-from armid_ros.motion import FloatArray
+from armid_ros.model import inverse_dynamics
+from armid_ros.motion import FloatArray, Motion
 from armid_ros.robots import NO_MASS, Robot
 from armid_ros.robots.description import MOVABLE, parse_xml
 from armid_ros.robots.geometry import all_in_one, collision_geometry
@@ -31,6 +32,13 @@ import numpy as np
 _LONGEST = 10.0
 #: Smallest reduction of the torque error by fitted links that indicates a wrong link [%].
 _MATERIAL = 1.0
+#: Effort limit over the torque that holds the arm: arms have 1.3 to 7. Half of one and ten are
+#: doubtful. Limit of a joint over those of the others from which it is doubtful.
+_HOLDS, _TENFOLD, _APART = 0.5, 10.0, 4.0
+#: Speed of the last joint [m/s] that is doubtful, as is a hundredth of it; arms have 1 to 6.
+_FASTEST = 24.0
+#: Number of links that a note lists.
+_LISTED = 6
 #: Smallest share of the residual for a further link, and largest remaining chi-squared per row.
 _FURTHER, _REMAINS = 0.5, 10.0
 
@@ -103,7 +111,7 @@ def description_remarks(robot: Robot) -> tuple[Remark, ...]:
 
     """
     found = [Remark('bad', text) for text in robot.description.inertia_doubts()]
-    found += [*_of_joints(robot), *_of_shapes(robot)]
+    found += [*_of_joints(robot), *_of_sizes(robot), *_of_shapes(robot)]
     known = {remark.text for remark in found}
     others = [note for note in notes_on(robot) if note not in known]
     return worst_first([*found, *(Remark('note', note) for note in others)])
@@ -129,6 +137,50 @@ def _of_joints(robot: Robot) -> Iterator[Remark]:
             yield Remark(
                 'doubt', f"joint '{joint.get('name')}': its axis has length {length:.3g}, not 1"
             )
+
+
+def _of_sizes(robot: Robot) -> Iterator[Remark]:
+    """Compare the limits of effort and velocity with the weight, the reach and other joints."""
+    if robot.mechanism is not None:  # not every pose of the driven joints exists
+        return
+    weight, speeds, efforts = _largest_weight(robot), robot.velocity_limit, robot.torque_limit
+    turns = [k for k in range(robot.n_joints) if not robot.prismatic[k]]
+    for k in turns:
+        effort, speed = float(efforts[k]), float(speeds[k])
+        others = [j for j in turns if j != k]
+        most = max((float(efforts[j]) for j in others), default=np.inf)
+        usual = float(np.median(speeds[others])) if others else np.inf
+        heaviest = weight[k] == max(weight[turns])
+        limit = f'effort limit {effort:g} N m'
+        doubt = ''
+        if _HOLDS * weight[k] > effort:
+            doubt = f'{limit}, but holding the arm takes up to {weight[k]:.3g}'
+        elif heaviest and NO_MASS < _TENFOLD * weight[k] < effort < np.inf:
+            doubt = f'{limit}, but holding the arm takes at most {weight[k]:.3g}'
+        elif _APART * most < effort < np.inf:
+            doubt = f'{limit}, but other joints have at most {most:g}'
+        elif max(speed, usual) < np.inf and not usual / _APART < speed < usual * _APART:
+            doubt = f'velocity limit {speed:g} rad/s, but the median joint has {usual:g}'
+        if doubt:
+            yield Remark('doubt', f"joint '{robot.joints[k]}': {doubt}; is it off by ten?")
+    parents = list(robot.model.parents)
+    if turns and parents == [0, *range(len(parents) - 1)] and np.isfinite(speeds[turns]).all():
+        steps = np.array([np.linalg.norm(p.translation) for p in robot.model.jointPlacements])
+        tip = max(float(speeds[k] * steps[k + 2 :].sum()) for k in turns)
+        if tip > _FASTEST or 0.0 < tip < _FASTEST / 100.0:
+            yield Remark(
+                'doubt',
+                f'velocity limits move the last joint at {tip:.3g} m/s; are they off by ten?',
+            )
+
+
+def _largest_weight(robot: Robot) -> FloatArray:
+    """Return the largest torque of each joint that holds the arm in random poses, (n,) [N m]."""
+    low = np.where(np.isfinite(robot.lower), robot.lower, -np.pi)
+    high = np.where(np.isfinite(robot.upper), robot.upper, np.pi)
+    q = np.random.default_rng(0).uniform(low, high, (200, robot.n_joints))
+    still = Motion.of_states(robot.joints, q, 0.0, 0.0)
+    return np.asarray(np.abs(inverse_dynamics(robot, still)).max(axis=0))
 
 
 def _of_shapes(robot: Robot) -> Iterator[Remark]:
@@ -162,6 +214,18 @@ def _of_shapes(robot: Robot) -> Iterator[Remark]:
         elif mass < 30.0 * volume[link] and link != robot.base:
             yield Remark('doubt', f'{density}; foam has 30')
     yield from (Remark('note', text) for text in all_in_one([*missing.values()]))
+    shaped = {
+        link.get('name')
+        for link in parse_xml(robot.urdf).iter('link')
+        if link.find('collision') is not None
+    }
+    masses = {name: own.mass for name, own in robot.description.links.items() if own is not None}
+    least = 0.01 * sum(masses.values())  # smaller bodies are frames
+    bare = [name for name, mass in masses.items() if mass > least and name not in shaped]
+    if bare:
+        more = f' and {len(bare) - _LISTED} more' * (len(bare) > _LISTED)
+        text = f'no <collision> in {", ".join(bare[:_LISTED])}{more}'
+        yield Remark('note', f'{text}: armid excite checks only their joint origins')
 
 
 def _of_centre(link: str, centre: FloatArray, corners: Sequence[FloatArray]) -> Iterator[Remark]:

@@ -12,6 +12,8 @@ from armid_ros.identification.fitting.identifiability import HALF_WIDTH
 from armid_ros.inspection import Inspection, LinkCheck, Remark
 from armid_ros.motion import FloatArray
 from armid_ros.report.blocks import (
+    Bar,
+    BarChart,
     ContentSection,
     DataTable,
     FactList,
@@ -63,7 +65,7 @@ def inspection_report(found: Inspection, origin: ResultOrigin = DEFAULT_ORIGIN) 
     first = 1 if grade == 'ready' else 2
     texts = [remark.text for remark in found.remarks]
     texts.insert(first - 1, found.verdict)  # not worse than the worst remark
-    sentences = [text[0].upper() + text[1:].replace('`', '').rstrip('.') + '.' for text in texts]
+    sentences = [_ended(text[0].upper() + text[1:].replace('`', '')) for text in texts]
     sections: list[Section] = [
         VerdictSection(
             grade, _TONES[grade], sentences[:first], sentences[first:], step=origin.step
@@ -111,7 +113,7 @@ def headline(remarks: Sequence[Remark], found: LinkCheck | None) -> tuple[str, .
         f'{digits(found.fitted_error_percent)} % with fitted links.'
     )
     if found.fault:
-        first = f'The recording cannot check the links: {found.fault.rstrip(".")}.'
+        first = f'The recording cannot check the links: {_ended(found.fault)}'
     elif found.agrees:
         first = 'The links of the URDF agree with the recording.'
     elif found.explained < 0.9:  # with a smaller share, links are not the cause
@@ -126,6 +128,10 @@ def headline(remarks: Sequence[Remark], found: LinkCheck | None) -> tuple[str, .
     if found.wrong and not (count['doubt'] or count['bad']):
         return first, errors
     return first, errors, values
+
+
+def _ended(text: str) -> str:
+    return text if text.endswith('?') else f'{text.rstrip(".")}.'
 
 
 def _wrong_mass(found: LinkCheck, k: int) -> str:
@@ -168,8 +174,15 @@ def description_check_report(
     """Return the page of a check, one HTML file that loads nothing."""
     first, *others = headline(remarks, links)
     grade, texts = check_word(remarks, links), [one.text for one in remarks]
+    bars = None
+    if links is not None and not links.fault:
+        others = others[1:]  # the torque errors are bars
+        errors = links.error_percent, links.fitted_error_percent
+        before, after = (Bar(error, 'after', f'{digits(error)} %') for error in errors)
+        rows = [('with the links of the URDF', [before]), ('with fitted links', [after])]
+        bars = BarChart(rows, [('after', 'torque error, rms')])
     sections: list[Section] = [
-        VerdictSection(grade, _TONES[grade], [first, *others], texts, step=origin.step)
+        VerdictSection(grade, _TONES[grade], [first, *others], texts, bars, origin.step)
     ]
     if links is not None:
         hint = (

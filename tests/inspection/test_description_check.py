@@ -2,6 +2,8 @@
 # SPDX-License-Identifier: Apache-2.0
 """A description made wrong on purpose: impossible values and wrong links are found."""
 
+import re
+
 import armid_ros as ar
 import numpy as np
 import pytest
@@ -26,6 +28,12 @@ def with_box(edge):
         (URDF.replace('izz="0.002"', 'izz="2.0"'), 'bad', 'triangle inequality'),
         (URDF.replace('upper="2.4"', 'upper="137"'), 'bad', 'degrees'),
         (URDF.replace('velocity="3"', 'velocity="172"'), 'doubt', 'degrees per second'),
+        (URDF.replace('effort="60"', 'effort="600"'), 'doubt', 'takes at most 9.31'),
+        (URDF.replace('effort="60"', 'effort="4"'), 'doubt', 'takes up to 9.31'),
+        (URDF.replace('effort="30"', 'effort="300"'), 'doubt', 'other joints have at most 60'),
+        (URDF.replace('velocity="4"', 'velocity="40"'), 'doubt', 'median joint has 3'),
+        (re.sub('velocity="."', 'velocity="49"', URDF), 'doubt', 'the last joint at 24.5 m/s'),
+        (URDF, 'note', 'no <collision> in turret, upper_arm, forearm'),
         (with_box(0.04), 'bad', '1.56e+04 kg/m^3'),
         (with_box(0.5), 'doubt', '8 kg/m^3'),
         (with_box(300), 'bad', 'millimetres'),
@@ -38,6 +46,12 @@ def with_box(edge):
         'inertia',
         'limit',
         'velocity',
+        'effort too large',
+        'effort too small',
+        'effort of one joint',
+        'velocity of one joint',
+        'velocity of all joints',
+        'collision bodies',
         'metal',
         'feathers',
         'shape in millimetres',
