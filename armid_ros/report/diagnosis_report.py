@@ -45,6 +45,7 @@ from armid_ros.report.sections.diagnosed import (
     candidates_section,
     detectable_section,
     evidence_section,
+    gap_bars,
     gap_section,
     minor_section,
     named_section,
@@ -147,9 +148,12 @@ def diagnosis_report(
         sections += [
             overlay_section(diagnosis, curves, names),
             Story(diagnosis, gains or {}),
-            gap_section(diagnosis, diagnosis.gap),
-            *([named_section(diagnosis.findings)] if diagnosis.findings else []),
         ]
+        if diagnosis.findings:
+            sections += [
+                gap_section(diagnosis, diagnosis.gap),
+                named_section(diagnosis.findings),
+            ]
         if diagnosis.where:
             sections.append(evidence_section(diagnosis))
     if learned is not None:
@@ -208,8 +212,8 @@ def _verdict(
         )
     first, stop, more = pretty(with_names(diagnosis.summary, names)).partition('. ')
     badge, bars = diagnosis.verdict.replace('_', ' '), None
-    if diagnosis.gap is not None and diagnosis.findings:
-        bars = share_bars(diagnosis)
+    if diagnosis.gap is not None and diagnosis.verdict != 'bad_data':
+        bars = share_bars(diagnosis) if diagnosis.findings else gap_bars(diagnosis, diagnosis.gap)
     sentences = [first + stop.rstrip(), *filter(None, [more])]
     return VerdictSection(badge, tone, sentences, notes, bars, with_names(step, names))
 

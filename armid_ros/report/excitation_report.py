@@ -27,6 +27,8 @@ from armid_ros.excitation.scene import FIT, UNFIT
 from armid_ros.motion import FloatArray, Motion
 from armid_ros.report.arm_drawing import draw_poses, OBSTACLE
 from armid_ros.report.blocks import (
+    Bar,
+    BarChart,
     BulletList,
     Cells,
     ContentSection,
@@ -145,19 +147,21 @@ def _verdict(
     notes: Sequence[str],
 ) -> VerdictSection:
     """Return the verdict: identifiable parameters, the least accurate one, and clearance."""
-    settings, links = design.settings, robot.links
+    settings, links, joints = design.settings, robot.links, design.limits.joints
     unseen = [
         full_label(name, links)
         for name, s in zip(design.information.parameters, design.information.std, strict=True)
         if not np.isfinite(s)
     ]
-    quantity, share = max(shares.items(), key=lambda item: float(item[1].max()))
-    closest = (
-        f'The closest limit is the {quantity} of {design.limits.joints[int(share.argmax())]} at '
-        f'{100.0 * share.max():.0f} %.'
-    )
+    used = [max((float(x[j]), name) for name, x in shares.items()) for j in range(len(joints))]
+    rows = [
+        (joint, [Bar(share, 'after', f'{100.0 * share:.0f} % of the {quantity} limit')])
+        for joint, (share, quantity) in zip(joints, used, strict=True)
+    ]
+    rows.sort(key=lambda row: -row[1][0].value)
+    bars = BarChart(rows, [('after', 'largest share of a limit that the joint uses')], full=1.0)
     first, *others = checked.sentences()
-    sentences = [first, ' '.join([*others, closest]), ' '.join(identifiable(design, links))]
+    sentences = [first, *others, ' '.join(identifiable(design, links))]
     if unseen:
         sentences.insert(0, sentences.pop())
     beware = []
@@ -182,7 +186,7 @@ def _verdict(
         beware.append('Not all bodies were checked for collision; see Clearance.')
     tone = 'good' if checked.word == FIT and not design.stopped else 'fair'
     tone = 'bad' if unseen or checked.word == UNFIT else tone
-    return VerdictSection('blind' if unseen else checked.word, tone, sentences, beware)
+    return VerdictSection('blind' if unseen else checked.word, tone, sentences, beware, bars)
 
 
 def identifiable(design: Design, links: Sequence[str]) -> list[str]:

@@ -136,7 +136,7 @@ def identification_report(
             TONES[grade.word],
             (*grade.reasons, *unlike, *judgement.sentences),
             judgement.beware,
-            error_bars(described, training, validation),
+            error_bars(described, training, validation, result.halves.joints),
             ''.join(judgement.next_steps[:1]),
             origin.step,
         ),

@@ -324,7 +324,24 @@ def _candidate_value(diagnosis: Diagnosis, trial: Trial) -> str:
 
 def gap_section(diagnosis: Diagnosis, gap: Gap) -> ContentSection:
     """Return the errors of each joint before and after, in units of its noise floor."""
-    robot, floor, harmful = diagnosis.arm.robot, diagnosis.baseline, bool(diagnosis.harmful)
+    floor, harmful = diagnosis.baseline, bool(diagnosis.harmful)
+    where = 'recordings that were not used' if gap.predicted else gap.data
+    kept = ' "After" includes the named effect, which model.yaml does not have.' * harmful
+    return ContentSection(
+        'Gap',
+        [
+            Paragraph(
+                f'Root mean square error of each joint on {where}, the worst joint first. '
+                f"Each bar is in units of the joint's floor. The floor is {floor}.{kept}"
+            ),
+            gap_bars(diagnosis, gap),
+        ],
+    )
+
+
+def gap_bars(diagnosis: Diagnosis, gap: Gap) -> BarChart:
+    """Return the errors of each joint over its floor, the largest first."""
+    robot = diagnosis.arm.robot
     roles: list[tuple[Role, str, FloatArray]] = [
         ('before', 'before', gap.before),
         ('after', 'after', gap.after),
@@ -344,15 +361,4 @@ def gap_section(diagnosis: Diagnosis, gap: Gap) -> ContentSection:
             for role, _, errors in roles
         ]
         rows.append((name, bars))
-    where = 'recordings that were not used' if gap.predicted else gap.data
-    kept = ' "After" includes the named effect, which model.yaml does not have.' * harmful
-    return ContentSection(
-        'Gap',
-        [
-            Paragraph(
-                f'Root mean square error of each joint on {where}, the worst joint first. '
-                f"Each bar is in units of the joint's floor. The floor is {floor}.{kept}"
-            ),
-            BarChart(rows, [(role, label) for role, label, _ in roles]),
-        ],
-    )
+    return BarChart(rows, [(role, label) for role, label, _ in roles])

@@ -38,26 +38,29 @@ def by_recording(fits: Sequence[Fit]) -> dict[str, list[Fit]]:
     return found
 
 
-def error_bars(robot: Robot, training: Fits, validation: Fits) -> BarChart:
-    """Return the relative error of each joint, held-out and training, the worst joint first."""
-    groups: list[tuple[Role, Fits, str]] = [
-        ('after', validation, 'held-out'),
-        ('faint', training, 'training'),
-    ]
-    scores = [
-        (role, label, Score.of([fit for part in fits.values() for fit in part]))
-        for role, fits, label in groups
-        if fits
+def error_bars(robot: Robot, training: Fits, validation: Fits, halves: FloatArray) -> BarChart:
+    """
+    Return the relative error of each joint, held-out and training, the worst joint first.
+
+    Without held-out recordings the errors between the halves of the data (n,) [%] are shown.
+
+    """
+
+    def errors(fits: Fits) -> FloatArray:
+        every = [fit for part in fits.values() for fit in part]
+        return Score.of(every).joint_relative_error_percent
+
+    test, label = (errors(validation), 'held-out') if validation else (halves, 'cross-check')
+    shown: list[tuple[Role, str, FloatArray]] = [
+        ('after', label, test),
+        ('faint', 'training', errors(training)),
     ]
     rows = []
-    for joint in _worst_first(scores[0][2]):
-        errors = [float(score.joint_relative_error_percent[joint]) for _, _, score in scores]
-        bars = [
-            Bar(error, role, f'{digits(error)} %')
-            for error, (role, _, _) in zip(errors, scores, strict=True)
-        ]
+    for joint in np.argsort(-test):
+        pairs = [(role, float(each[joint])) for role, _, each in shown]
+        bars = [Bar(error, role, f'{digits(error)} %') for role, error in pairs]
         rows.append((robot.joints[joint], bars))
-    return BarChart(rows, [(role, f'{label} error of torque') for role, label, _ in scores])
+    return BarChart(rows, [(role, f'{label} error of torque') for role, label, _ in shown])
 
 
 def fit_section(
