@@ -124,7 +124,7 @@ def fit(
     from armid_ros.cli import options
     from armid_ros.identification.known_payload import payloads_of
     from armid_ros.zero.fit import fit_document, fit_rests, fit_summary, SCHEMA
-    from armid_ros.zero.rests import find_rests
+    from armid_ros.zero.rests import find_rests, reading_noise
     import numpy as np
 
     staged = options.stage(out, SCHEMA, robot_source)
@@ -142,7 +142,8 @@ def fit(
     save_model(staged.folder / 'model.yaml', found.model(), source)
     document = fit_document(found, known, link_error, external)
     step = f'armid identify RECORDING --robot {robot_source}, which also finds friction in motion'
-    summary = None if as_json else fit_summary(found, document, step)
+    noise = np.sqrt(np.mean([reading_noise(one) ** 2 for one in recordings], axis=0))
+    summary = None if as_json else fit_summary(found, document, step, noise)
     options.deliver_document(staged, 'zero', document, summary, 'model.yaml')
 
 

@@ -44,6 +44,8 @@ _USEFUL['center'] = 0.1
 _PRIORS = {'torque_offset': 1.0, 'coulomb_torque': 1.0, 'gain_error': 0.5, 'payload_m': 0.3}
 _PRIORS |= {'tilt_x': 0.3, 'tilt_y': 0.3, 'gravity_difference': 2.0}
 _PRIORS |= dict.fromkeys(('payload_mx', 'payload_my', 'payload_mz'), 0.1)
+#: Residual over the noise of a rest from which dry friction of unknown size is reported.
+STICKS = 5.0
 #: Remedy for most quantities that are not determined.
 MORE = 'record a run of armid zero plan'
 
@@ -345,8 +347,8 @@ def fit_document(
     }
 
 
-def fit_summary(found: ZeroFit, document: dict[str, Any], step: str) -> Summary:
-    """Return the summary of a fit; `step` is the next step after a good fit."""
+def fit_summary(found: ZeroFit, document: dict[str, Any], step: str, noise: FloatArray) -> Summary:
+    """Return the summary of a fit with its next step; `noise` of a reading at rest, shape (n,)."""
     names = ('zero', 'gain', 'friction')
     rows = [
         (joint, *(_cell(found.of(name, joint)) for name in names), f'{residual:.2g}')
@@ -367,6 +369,18 @@ def fit_summary(found: ZeroFit, document: dict[str, Any], step: str) -> Summary:
         f'{found.rests} rests in {found.poses} poses; outliers left out: {found.outliers}; '
         f'held known: {", ".join(document["held"])}'
     ]
+    sticking = [
+        joint
+        for joint, residual, least in zip(
+            found.arm.robot.joints, found.residual, noise, strict=True
+        )
+        if residual > STICKS * least
+    ]
+    if sticking:
+        lines.append(
+            f'dry friction holds {", ".join(sticking)} with another torque in each rest: zeros '
+            'and tool are less certain, and friction is a lower bound; record more poses'
+        )
     undetermined: dict[str, list[str]] = {}
     for one in found.quantities:
         if one.reason:

@@ -6,7 +6,7 @@ from __future__ import annotations
 
 from armid_ros.errors import IdentificationError
 from armid_ros.identification.rows.checks import REST_RANGE
-from armid_ros.motion import Motion
+from armid_ros.motion import FloatArray, Motion
 from armid_ros.recording import Recording
 import numpy as np
 from scipy.ndimage import maximum_filter1d, median_filter, minimum_filter1d, uniform_filter1d
@@ -14,6 +14,15 @@ from scipy.ndimage import maximum_filter1d, median_filter, minimum_filter1d, uni
 #: Time in which a joint at rest stays within `REST_RANGE` [s]; half of this time is cut off at
 #: both ends of a rest. Time in which the torque then settles, and shortest rest after it [s].
 WINDOW, SETTLING, SHORTEST = 1.0, 0.5, 0.5
+
+
+def reading_noise(recording: Recording) -> FloatArray:
+    """Return the noise of the mean torque of the shortest rest, if it is white, shape (n,)."""
+    assert recording.tau is not None
+    count = max(SHORTEST / max(recording.period, 1e-6), 1.0)
+    # the median leaves out steps of friction; 0.954 of a standard deviation for differences
+    steps = np.median(np.abs(np.diff(recording.tau, axis=0)), axis=0)
+    return np.asarray(steps / 0.954 / np.sqrt(count))
 
 
 def find_rests(recording: Recording) -> Motion:
