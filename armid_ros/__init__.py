@@ -8,9 +8,10 @@ An arm model is a rigid body plus a list of effects. With ``import armid_ros as 
     arm = ar.ArmModel.of('ur10.urdf', effects='viscous_friction,coulomb_friction,torque_offset')
     model = ar.identify(arm, ['monday.mcap', 'tuesday.csv'], validate='wednesday.mcap')
     print(model)
+    model.plot()  # axes of matplotlib
     found = ar.diagnose(model, 'today.mcap')
     print(found)
-    found.report('found.html')
+    found.save('found')  # a folder with the report and the model; ar.load_model reads it again
 
 Names are imported when they are used. The packages, from the ground up: ``robots`` (descriptions),
 ``model`` (rigid body), ``effects`` (friction and other torques), ``arm`` (rigid body with

@@ -123,9 +123,11 @@ class Effect(ABC):
         known = cls._possible_joints(robot)
         unknown = [name for name in chosen if name not in known]
         if unknown:
+            moved = dict(zip(robot.links, robot.moving, strict=True)).get(unknown[0])
+            named = f'; {moved} moves that link: {cls.name}@{moved}' if moved else ''
             raise ModelError(
                 f"{cls.name}: {robot.name} has no joint '{unknown[0]}'; "
-                f'its joints are {", ".join(known)}{meant(unknown[0], known)}'
+                f'its joints are {", ".join(known)}{named or meant(unknown[0], known)}'
             )
         effect = cls(tuple(chosen))
         return effect.with_shape(effect._default_shape(robot)) if cls.shapes else effect

@@ -302,7 +302,7 @@ def excitation_text(excitation: Excitation) -> str:
 def _to_csv(excitation: Excitation) -> str:
     trajectory = excitation.trajectory
     text = io.StringIO()
-    text.write(f'# {SCHEMA}\n')
+    text.write(f'# {SCHEMA}: Fourier coefficients of excitation.yaml, no samples of positions\n')
     text.write(f'# period [s],{trajectory.period!r}\n')
     text.write(f'# n_periods,{excitation.n_periods}\n')
     text.write(f'# run_in [s],{excitation.run_in!r}\n')

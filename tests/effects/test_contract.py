@@ -152,6 +152,7 @@ def test_impossible_shapes_are_named(robot, values, message):
     [
         ('stiction', 'viscous_friction, coulomb_friction'),
         ('viscous_friction@elbo', 'its joints are shoulder_pitch'),
+        ('payload@hand', 'payload@wrist_pitch'),
         ('coupled_joint_friction@elbow_pitch', 'pairs'),
         ('gravity_magnitude@elbow_pitch', 'whole arm'),
         ('torque_crosstalk@elbow_pitch+elbow_pitch', 'same joint'),
