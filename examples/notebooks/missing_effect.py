@@ -68,7 +68,7 @@ found.to_dataframe()
 # %% [markdown]
 # ## The patch
 #
-# `found.arm` is the model with what was named. Its residuals on the second recording of Friday,
+# `found.arm` is the model with the named effects. Its residuals on the second recording of Friday,
 # which was not fitted:
 
 # %%
