@@ -159,7 +159,6 @@ def diagnose(
             return _as_diagnosis(tied, notes, explainer, doubt, given)
     chosen = explainer.chosen()
     result = _as_diagnosis(chosen, notes, explainer, doubt, given)
-    tell(1.0, result.verdict)
     return _diagnose_span(
         result, chosen, explainer, (recordings, validate, baseline)
     ) or _each_alone(result, ([*recordings, *validate], baseline), used, explainer)
@@ -275,8 +274,7 @@ def _as_diagnosis(
     left, resting = measured.beside(explanation), measured.resting(explanation)
     laws = measured.laws(explanation)
     strange = not_repeating(floors, settings.thresholds, settings.material * evidence.torque_rms)
-    if not found:
-        explanation = replace(explanation, reference=explanation.fitted)
+    explanation = explanation if found else replace(explanation, reference=explanation.fitted)
     gap = measure_gap(explanation, unseen)
     word = decide(
         found,
@@ -292,6 +290,7 @@ def _as_diagnosis(
     open_in = measured.shown_in(left, explanation)
     new = np.max([np.zeros(arm.robot.n_joints), *(one.ratio for one in laws)], axis=0) > 1.0
     places = where_it_is(explanation, (unseen or evidence) if found else open_in, settings, new)
+    explainer.tell(1.0, word.word)
     remarks = _remarks(found, worse, chosen, word, doubt, explainer)
     return Diagnosis(
         verdict=word.word,

@@ -19,7 +19,7 @@ from armid_ros.report.blocks import (
     Paragraph,
 )
 from armid_ros.report.charts import Chart, joined, joined_time, Role, Series, thinned
-from armid_ros.report.notation import counted, digits
+from armid_ros.report.notation import counted, digits, plain
 from armid_ros.report.page import Templated
 from armid_ros.robots import Robot
 import numpy as np
@@ -217,7 +217,7 @@ def forward_section(
                 (
                     robot.joints[joint],
                     [
-                        Bar(error[joint], role, f'{digits(error[joint])} m{unit}')
+                        Bar(error[joint], role, f'{plain(error[joint])} m{unit}')
                         for error, (role, *_) in zip(errors, models, strict=True)
                     ],
                 )

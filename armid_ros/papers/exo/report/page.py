@@ -91,7 +91,7 @@ def verdict(found: Sequence[Interaction], walked: SimulatedWalk | None) -> Verdi
     ]
     if walked is not None:
         each = ', '.join(f'{d.joint} {d.right.most:.2g}°' for d in walked.driven)
-        sentences.append(f'Over a walking cycle, driven joints are off by at most: {each}.')
+        sentences.append(f'Largest position error of a driven joint over a walking cycle: {each}.')
     beware = (
         [f'{", ".join(weak)}: the extension is too small for an accuracy of 10 %.'] if weak else []
     )
