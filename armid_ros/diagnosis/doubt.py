@@ -75,9 +75,8 @@ def doubted(
     """
     if verdict.word != 'consistent':
         return verdict, doubt or (doubt_of_names(findings) if baseline else '')
-    fault = _no_signal(arm, baseline) if baseline else ''
-    if fault:
-        return Verdict('bad_data', f'The data cannot be diagnosed: {fault}.'), ''
+    if baseline and 100.0 * baseline.errors[0] > LIMITS.unusable:
+        return Verdict('bad_data', f'The data cannot be diagnosed. {_poor(arm, baseline)}'), ''
     return replace(verdict, summary=f'{doubt} {verdict.summary}'.lstrip()), doubt
 
 
@@ -127,32 +126,16 @@ def _changed(
 def _poor(arm: ArmModel, baseline: Baseline) -> str:
     """Return a sentence if the baseline residual is a large share of the torque."""
     whole, each = baseline.errors
-    bad = {
-        joint: error
-        for joint, error in zip(arm.robot.joints, each.tolist(), strict=True)
-        if 100.0 * error > LIMITS.unusable
-    }
-    if 100.0 * whole > LIMITS.poor:
-        bad['the arm'] = whole
+    errors = {'the arm': whole, **dict(zip(arm.robot.joints, each.tolist(), strict=True))}
+    limits = {place: LIMITS.poor if place == 'the arm' else LIMITS.unusable for place in errors}
+    bad = [
+        f'{100.0 * errors[place]:.0f} % of the torque of {place}'
+        for place in sorted(errors, key=lambda place: -errors[place])
+        if 100.0 * errors[place] > limits[place]
+    ]
     if not bad:
         return ''
-    worst = max(bad, key=lambda place: bad[place])
-    first = 'the arm' if 'the arm' in bad else worst
-    peak = f', {100.0 * bad[worst]:.0f} % of that of {worst}' if worst != first else ''
     return (
-        f'In the baseline, the residual of the model is {100.0 * bad[first]:.0f} % of the torque '
-        f'of {first}{peak}: is it the model of this arm? Smaller changes are not detectable.'
-    )
-
-
-def _no_signal(arm: ArmModel, baseline: Baseline) -> str:
-    """Return a fault if the baseline residual hides changes of the arm; empty otherwise."""
-    whole, each = baseline.errors
-    worst = int(np.argmax(each))
-    if not 100.0 * whole > LIMITS.unusable:
-        return ''
-    return (
-        f'in the baseline, the residual of the model is {100.0 * whole:.0f} % of the torque of '
-        f'the arm ({100.0 * each[worst]:.0f} % in {arm.robot.joints[worst]}). Either the torque '
-        'carries too little signal, or it is the model of another arm'
+        f'In the baseline, the residual of the model is {", ".join(bad[:2])}: is it the model of '
+        'this arm, and is the torque above its noise? Smaller changes are not detectable.'
     )
