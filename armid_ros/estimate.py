@@ -8,7 +8,7 @@ from dataclasses import dataclass, field
 import re
 from statistics import NormalDist
 
-from armid_ros.errors import ModelError
+from armid_ros.errors import meant, ModelError
 from armid_ros.motion import FloatArray, read_only
 import numpy as np
 
@@ -149,5 +149,7 @@ class Estimate:
         for position, parameter in enumerate(self.parameters):
             if parameter.name == name and parameter.joint == joint:
                 return position
-        known = ', '.join(f'{p.name} [{p.joint}]' if p.joint else p.name for p in self.parameters)
-        raise ModelError(f"no parameter '{name}' of joint '{joint}'; there are {known}")
+        own = [one for one in self.parameters if one.joint == joint] or self.parameters
+        known = ', '.join(f'{p.name} [{p.joint}]' if p.joint else p.name for p in own)
+        guess = meant(name, [one.name for one in own])
+        raise ModelError(f"no parameter '{name}' of joint '{joint}'; there are {known}{guess}")

@@ -10,7 +10,7 @@ from pathlib import Path
 
 from armid_ros.arm import ArmModel, load_model
 from armid_ros.effects import USUAL_EFFECTS
-from armid_ros.errors import RecordingError, TrajectoryError
+from armid_ros.errors import RecordingError, RobotError, TrajectoryError
 from armid_ros.identification import SignalSettings
 from armid_ros.identification.rows.signals import conditioning, no_stretch, segments
 from armid_ros.motion import Motion
@@ -52,6 +52,8 @@ def robot_of(robot: RobotLike) -> Robot:
 
 def is_model(path: str | Path) -> bool:
     """Return whether a path names a model.yaml rather than a description."""
+    if not isinstance(path, str | Path):
+        raise RobotError(f'a {type(path).__name__} is no robot; a robot comes before recordings')
     return Path(path).suffix in ('.yaml', '.yml')
 
 

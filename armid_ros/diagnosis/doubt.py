@@ -76,7 +76,8 @@ def doubted(
     if verdict.word != 'consistent':
         return verdict, doubt or (doubt_of_names(findings) if baseline else '')
     if baseline and 100.0 * baseline.errors[0] > LIMITS.unusable:
-        return Verdict('bad_data', f'The data cannot be diagnosed. {_poor(arm, baseline)}'), ''
+        lead = 'The data cannot be diagnosed: too little signal, or the model of another arm.'
+        return Verdict('bad_data', f'{lead} {_poor(arm, baseline)}'), ''
     return replace(verdict, summary=f'{doubt} {verdict.summary}'.lstrip()), doubt
 
 
@@ -137,5 +138,5 @@ def _poor(arm: ArmModel, baseline: Baseline) -> str:
         return ''
     return (
         f'In the baseline, the residual of the model is {", ".join(bad[:2])}: is it the model of '
-        'this arm, and is the torque above its noise? Smaller changes are not detectable.'
+        'this arm? Smaller changes are not detectable.'
     )

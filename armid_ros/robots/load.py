@@ -143,10 +143,9 @@ def load_robot(
             f'{", ".join(shipped_robots())}'
         )
     if path.is_dir():
-        raise RobotError(
-            f'{source}: a folder; name the URDF, xacro or MJCF file of the robot; it comes '
-            'before the recordings'
-        )
+        inside = path / 'model.yaml'
+        what = inside if inside.is_file() else 'the URDF, xacro or MJCF file of the robot'
+        raise RobotError(f'{source}: a folder; name {what}; it comes before the recordings')
     text = read_text(path, RobotError)
     notes: tuple[str, ...] = ()
     if is_mjcf(text) and not arguments:
