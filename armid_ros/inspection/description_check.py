@@ -37,8 +37,6 @@ _MATERIAL = 1.0
 _HOLDS, _TENFOLD, _APART = 0.5, 10.0, 4.0
 #: Speed of the last joint [m/s] that is doubtful, as is a hundredth of it; arms have 1 to 6.
 _FASTEST = 24.0
-#: Number of links that a note lists.
-_LISTED = 6
 #: Smallest share of the residual for a further link, and largest remaining chi-squared per row.
 _FURTHER, _REMAINS = 0.5, 10.0
 
@@ -223,8 +221,8 @@ def _of_shapes(robot: Robot) -> Iterator[Remark]:
     least = 0.01 * sum(masses.values())  # smaller bodies are frames
     bare = [name for name, mass in masses.items() if mass > least and name not in shaped]
     if bare:
-        more = f' and {len(bare) - _LISTED} more' * (len(bare) > _LISTED)
-        text = f'no <collision> in {", ".join(bare[:_LISTED])}{more}'
+        more = f' and {len(bare) - 6} more' * (len(bare) > 6)
+        text = f'no <collision> in {", ".join(bare[:6])}{more}'
         yield Remark('note', f'{text}: armid excite checks only their joint origins')
 
 

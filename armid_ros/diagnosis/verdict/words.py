@@ -22,8 +22,6 @@ Word = Literal[
 ]
 #: Largest number of joints in the list of a sentence; further joints are only counted.
 _JOINTS_SAID = 3
-#: Share of the gap below which the named causes explain only a part of it.
-_MOST = 0.5
 
 
 @dataclass(frozen=True)
@@ -103,7 +101,7 @@ def decide(
         return Verdict('consistent', f'{refit}{text}')
     said, tied = _sentences(findings), _rivals_in_words(findings)
     if open_gap:
-        if sum(group[0].share for group in by_cause(findings)) < _MOST:
+        if sum(group[0].share for group in by_cause(findings)) < 0.5:
             said = said.replace(' explains ', ' explains only ')
         first = f'{said} {tied}'.rstrip()
         return Verdict('partial', f'{first} {refit}There is more: {error} is {size}.')

@@ -122,15 +122,14 @@ def grade(
     error, joint = max((one.measured, one.joint) for one in worst.values())
     return Grade(
         ordered[0].word,
-        tuple(_sentence(reason.text) for reason in ordered),
+        tuple(
+            f'{text[0].upper()}{text[1:]}{"" if text.endswith("?") else "."}'
+            for text in (reason.text for reason in ordered)
+        ),
         tuple(fault.text for fault in _worst_first(faults)),
         error,
         result.arm.robot.joints[joint],
     )
-
-
-def _sentence(text: str) -> str:
-    return f'{text[0].upper()}{text[1:]}{"" if text.endswith("?") else "."}'
 
 
 def _worst_first(reasons: Sequence[Fault]) -> list[Fault]:
