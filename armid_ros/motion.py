@@ -74,6 +74,32 @@ class MovingPoints:
         return replace(self, position=self.position[samples], velocity=self.velocity[samples])
 
 
+@dataclass(frozen=True, eq=False)
+class Temperatures:
+    """
+    Measured temperatures of joints, or of their motors, at a few times.
+
+    Attributes
+    ----------
+    t : ndarray, shape (K,)
+        Time [s], strictly increasing, on the time base of the motion.
+    values : ndarray, shape (K, n)
+        Temperature of each joint [degC]; nan for a joint without a sensor.
+
+    """
+
+    t: FloatArray
+    values: FloatArray
+
+    def __post_init__(self) -> None:
+        """Freeze the arrays."""
+        freeze(self, 't', 'values')
+
+    def at(self, t: npt.ArrayLike) -> FloatArray:
+        """Return temperatures at other times (N,), constant beyond both ends, (N, n) [degC]."""
+        return np.column_stack([np.interp(np.ravel(t), self.t, one) for one in self.values.T])
+
+
 @dataclass(frozen=True)
 class Motion:
     """
@@ -95,6 +121,8 @@ class Motion:
         noise; infinite for a reference.
     partner : MovingPoints or None
         Points of a partner that were recorded with the arm.
+    temperature : Temperatures or None
+        Measured temperatures of the joints.
 
     Examples
     --------
@@ -116,6 +144,7 @@ class Motion:
     tau: FloatArray | None = None
     band_hz: float = field(default=np.inf, kw_only=True)
     partner: MovingPoints | None = field(default=None, kw_only=True)
+    temperature: Temperatures | None = field(default=None, kw_only=True)
 
     def __post_init__(self) -> None:
         """Freeze the arrays and check that their shapes agree."""

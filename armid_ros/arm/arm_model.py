@@ -205,7 +205,7 @@ class ArmModel:
         return self._acting.robot
 
     def along(self, motion: Motion) -> ArmModel:
-        """Return the arm with tied effects that follow the recorded motion of the partner."""
+        """Return the arm with effects that follow further signals of a recording."""
         effects = tuple(effect.along(motion) for effect in self.effects)
         known = all(new is old for new, old in zip(effects, self.effects, strict=True))
         return self if known else replace(self, effects=effects)

@@ -76,6 +76,12 @@ options = together(
         help='Columns of torques, forces or currents, written as for --position.',
     ),
     _option(
+        '--temperature',
+        metavar='C',
+        help="Columns of temperatures [degC], written as for --position; 'none' skips them, "
+        'for bags too.',
+    ),
+    _option(
         '--time-unit', type=click.Choice(TIME_UNITS), help='Unit of the time column of a table.'
     ),
     _option(

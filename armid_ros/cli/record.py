@@ -4,6 +4,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from pathlib import Path
 from typing import Any, TYPE_CHECKING
 
@@ -52,6 +53,12 @@ if TYPE_CHECKING:
     default=0.0,
     help='Noise (std) of accelerometers on links with springs [m/s^2].',
 )
+@click.option(
+    '--temperature',
+    metavar='T',
+    help='Temperature of the joints [degC], written to the bag: 25, or 20:45:600 for 20 to 45 '
+    'with a time constant of 600 s; with commas one for each joint.',
+)
 @click.option('--resolution', default=0.0, help='Encoder resolution [rad or m]; default 0, none.')
 @parameters.setting
 def simulate(
@@ -64,6 +71,7 @@ def simulate(
     trajectory: Path | None,
     rate: float,
     loop_gain: float,
+    temperature: str | None,
     seed: int,
     **noise: Any,
 ) -> None:
@@ -88,6 +96,7 @@ def simulate(
     )
     from armid_ros.simulation.plant import require_masses
     from armid_ros.simulation.run import record
+    from armid_ros.simulation.warm_up import at_temperature, temperature_course
     import numpy as np
 
     rng = np.random.default_rng(seed)
@@ -105,6 +114,10 @@ def simulate(
     sensors, sides = Sensors(**noise), ''
     with progress('designing a trajectory') as tick:
         reference = reference_of(robot, trajectory, rng, options.read_settings())
+        course = None
+        if temperature is not None:
+            course = temperature_course(temperature, robot.n_joints, reference.duration)
+            arm = at_temperature(arm, course)
         tick(0.0, 'simulating')
         if springs and not rotorless:
             elastic = make_elastic_arm(
@@ -116,6 +129,7 @@ def simulate(
             sides = ' on both sides'
         else:
             run = simulated(arm, reference, rng=rng, sensors=sensors, rate=rate, progress=tick)
+            run = replace(run, truth=replace(run.truth, temperature=course))
             write_recording(out, run, robot_description=robot.urdf)
     done = f'{len(run.t)} samples of {robot.n_joints} joints{sides}'
     say(f'{out}: {done}, {reference.duration:.1f} s')

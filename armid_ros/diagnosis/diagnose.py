@@ -31,6 +31,7 @@ from armid_ros.diagnosis.verdict.gap import measure_gap, not_repeating
 from armid_ros.diagnosis.verdict.naming import findings, small_print
 from armid_ros.diagnosis.verdict.remaining_misfit import places_held, RemainingMisfit
 from armid_ros.diagnosis.verdict.same_body import as_placed_bodies
+from armid_ros.diagnosis.verdict.temperature import temperature_remarks
 from armid_ros.diagnosis.verdict.where import where_it_is, where_left
 from armid_ros.diagnosis.verdict.words import decide, Verdict
 from armid_ros.errors import IdentificationError
@@ -292,6 +293,8 @@ def _as_diagnosis(
     places = where_it_is(explanation, (unseen or evidence) if found else open_in, settings, new)
     explainer.tell(1.0, word.word)
     remarks = _remarks(found, worse, chosen, word, doubt, explainer)
+    then = () if before is None else before.data
+    remarks += temperature_remarks(found, patched, evidence.data, then)
     return Diagnosis(
         verdict=word.word,
         summary=' '.join([word.summary, *remarks]),

@@ -83,6 +83,8 @@ class Effect(ABC):
     learned: ClassVar[bool] = False
     #: Whether the torque changes smoothly with position and velocity.
     smooth: ClassVar[bool] = False
+    #: Whether the law is the same on every day, as its input is measured.
+    lasting: ClassVar[bool] = False
 
     def __init_subclass__(cls) -> None:
         """Set the traits of a shipped effect."""
@@ -275,7 +277,11 @@ class Effect(ABC):
         return ()
 
     def along(self, motion: Motion) -> Self:
-        """Return the effect with the recorded motion of the other machine."""
+        """Return the effect with further signals of a recording, such as temperatures."""
+        return self
+
+    def referred_to(self, temperatures: Mapping[str, float]) -> Self:
+        """Return the effect with reference temperatures of joints [degC], if it has any."""
         return self
 
     @abstractmethod

@@ -26,6 +26,7 @@ from armid_ros.effects.friction import (
     CoulombFriction,
     QuadraticFriction,
     StribeckFriction,
+    TemperatureDependentFriction,
     ThermalFriction,
     ViscousFriction,
 )
@@ -82,6 +83,7 @@ _EFFECTS: tuple[type[Effect], ...] = (
     ActuatorSaturation,
     HumanInteraction,
     InterfaceSlack,
+    TemperatureDependentFriction,
     LearnedTorque,
 )
 

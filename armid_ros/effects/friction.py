@@ -4,15 +4,22 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
-from typing import ClassVar
+from collections.abc import Mapping
+from dataclasses import dataclass, field, replace
+from typing import Any, ClassVar, Self
 
 from armid_ros.effects.action import Action, direction, DryFriction, merge_actions
 from armid_ros.effects.base import Arm, Effect
 from armid_ros.effects.layout import joint_columns, scatter
 from armid_ros.effects.quantities import Quantity, Shape, SURELY
-from armid_ros.motion import FloatArray, Motion
+from armid_ros.files import finite
+from armid_ros.motion import FloatArray, Motion, Temperatures
 import numpy as np
+
+#: Largest change of friction over its size [1/K]; greases have 0.01 to 0.03.
+_STEEPEST = 0.05
+#: Reference temperature unless another one is given [degC].
+_REFERENCE = 25.0
 
 
 @dataclass(frozen=True)
@@ -259,3 +266,97 @@ class ThermalChange(ThermalFriction):
             (ThermalFriction(self.joints, self.shape), change),
             (ViscousFriction(self.joints), first),
         )
+
+
+@dataclass(frozen=True)
+class TemperatureDependentFriction(Effect):
+    """
+    Friction that changes with the measured temperature, tau = (T - T0) (a dq + b sign(dq)).
+
+    The viscous and the Coulomb coefficient of the model are those at the reference temperature T0.
+    Grease gets thinner with temperature, Fv exp(-k (T - T0)) with k from 0.01 to 0.03 1/K: the
+    slope a is the first order of this law, -k Fv. Without measured temperature, the joints are at
+    T0. Unlike thermal_friction, the effect is the same on a cold and on a warm day.
+    Source: Bittencourt and Axelsson 2014, in the form of first order.
+
+    Attributes
+    ----------
+    reference : tuple of (str, float)
+        Joints and their T0 [degC]; 25 degC for other joints.
+    course : Temperatures or None
+        Measured temperatures; see `along`.
+
+    """
+
+    reference: tuple[tuple[str, float], ...] = ()
+    course: Temperatures | None = field(default=None, compare=False, repr=False)
+
+    name = 'temperature_dependent_friction'
+    summary = 'friction that changes with the measured temperature of a joint'
+    quantities = (
+        Quantity('viscous_slope', 'N m s/(rad K)', typical=(0.00004, 0.3)),
+        Quantity('coulomb_slope', 'N m/K', typical=(0.00005, 0.3)),
+    )
+    holds_at_rest = True
+    lasting = True
+
+    def along(self, motion: Motion) -> Self:
+        """Return the effect with the temperatures that were measured with a motion."""
+        return replace(self, course=motion.temperature) if motion.temperature else self
+
+    def referred_to(self, temperatures: Mapping[str, float]) -> Self:
+        """Return the effect with other reference temperatures [degC], by joint."""
+        return replace(self, reference=tuple(temperatures.items()))
+
+    def particulars(self) -> dict[str, Any]:
+        """Return the reference temperature of each joint."""
+        pairs = zip(self.joints, self.at_reference(self.joints), strict=True)
+        return {'reference_temperature': dict(pairs)}
+
+    def with_particulars(self, entry: Mapping[str, Any]) -> Self:
+        """Return the effect with the reference temperatures of an entry of model.yaml."""
+        known = entry.get('reference_temperature', {})
+        return self.referred_to({joint: finite(t, f'{joint}: T0') for joint, t in known.items()})
+
+    def at_reference(self, joints: tuple[str, ...]) -> list[float]:
+        """Return the reference temperatures of joints [degC]."""
+        known = dict(self.reference)
+        return [known.get(joint, _REFERENCE) for joint in joints]
+
+    def plausible(self, values: FloatArray, std: FloatArray, arm: Arm) -> bool:
+        """Return whether viscous friction decreases, and both change by at most 5 % per K."""
+        action, n = arm.action(), arm.robot.n_joints
+        known = np.zeros((2, n))
+        if action.damping is not None:
+            known[0] = np.diag(action.damping)
+        if action.dry_friction is not None:
+            known[1] = action.dry_friction.largest(np.zeros(n))
+        known = np.where(known > 0.0, known, np.inf)
+        slopes, doubts = (scatter(self, each, arm.robot) for each in (values, SURELY * std))
+        steep = np.abs(slopes) > _STEEPEST * known + doubts
+        return not (steep.any() or np.any(slopes[0] > doubts[0]))
+
+    def columns(self, motion: Motion, arm: Arm) -> FloatArray:
+        """Return dtau/d(a, b) = (T - T0) (dq, sign(dq)), shape (N, n, P)."""
+        warmer = self.along(motion).warmer(motion.t, motion.joints)
+        return joint_columns(self, motion, warmer * motion.dq, warmer * direction(motion))
+
+    def action(self, values: FloatArray, arm: Arm) -> Action:
+        """Return dry friction of the extreme temperature, and its change at other ones."""
+        viscous, coulomb = scatter(self, values, arm.robot)
+        if self.course is None:
+            return Action()
+        change = self.warmer(self.course.t, arm.robot.joints) * coulomb
+        level = change.max(axis=0)  # a joint holds at rest up to the largest friction
+
+        def torque(t: FloatArray, q: FloatArray, dq: FloatArray) -> FloatArray:
+            warmer = self.warmer(t, arm.robot.joints).reshape(*np.shape(t), -1)
+            return np.asarray(warmer * viscous * dq + (warmer * coulomb - level) * np.sign(dq))
+
+        return Action(dry_friction=DryFriction(np.eye(len(level)), -level, level), torque=torque)
+
+    def warmer(self, t: FloatArray, joints: tuple[str, ...]) -> FloatArray:
+        """Return T - T0 of all joints, zero where not measured, shape (N, n) [K]."""
+        if self.course is None:
+            return np.zeros((np.size(t), len(joints)))
+        return np.nan_to_num(self.course.at(t) - self.at_reference(joints))

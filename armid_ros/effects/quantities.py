@@ -14,6 +14,8 @@ _PRISMATIC_UNITS = {
     'N m': 'N',
     'N m s/rad': 'N s/m',
     'N m s^2/rad^2': 'N s^2/m^2',
+    'N m s/(rad K)': 'N s/(m K)',
+    'N m/K': 'N/K',
     'N m/rad': 'N/m',
     'rad/(N m)': 'm/N',
     'kg m^2': 'kg',

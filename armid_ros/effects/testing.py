@@ -18,13 +18,13 @@ function of an ``EffectCase`` that raises AssertionError. ``CHECKS`` contains al
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 import pickle
 
 from armid_ros.arm import ArmModel
 from armid_ros.effects.base import Effect, Unexplained
 from armid_ros.effects.catalogue import check_kind
-from armid_ros.motion import FloatArray, Motion
+from armid_ros.motion import FloatArray, Motion, Temperatures
 from armid_ros.robots import load_robot, Robot
 import numpy as np
 import numpy.typing as npt
@@ -84,6 +84,8 @@ class EffectCase:
         effect, rng = kind.on(robot), np.random.default_rng(seed)
         motion = sines(robot)
         motion = motion.with_torque(rng.normal(scale=20.0, size=motion.q.shape))
+        warm_up = np.tile(np.linspace(20.0, 60.0, len(motion)), (motion.n_joints, 1)).T
+        motion = replace(motion, temperature=Temperatures(motion.t, warm_up))
         if size is None:
             # size of a quantity without a typical size
             size = [np.sqrt(np.prod(q.typical)) if q.typical else 0.1 for q in kind.quantities]

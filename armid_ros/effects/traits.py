@@ -149,6 +149,12 @@ TRAITS = {
         look_at='the temperature of the gear, and the time of work before the recording',
         friction=True,
     ),
+    'temperature_dependent_friction': Traits(
+        shown_by='the same motion cold and warm, with the temperature of each joint',
+        look_at='the time of work before the recording, the temperature of the hall, the cooling',
+        sign='friction per kelvin above the reference temperature',
+        friction=True,
+    ),
     'gravity_magnitude': Traits(
         shown_by='fast motion and static holds',
         look_at='the gravity in the settings, and the scale of all torques',

@@ -17,7 +17,7 @@ from weakref import WeakKeyDictionary
 
 from armid_ros.estimate import ParameterName
 from armid_ros.model.compiled import BodyOfKernel, kernel_body
-from armid_ros.motion import FloatArray, Motion
+from armid_ros.motion import FloatArray, Motion, Temperatures
 from armid_ros.robots import Robot
 import numpy as np
 import pinocchio as pin
@@ -247,18 +247,20 @@ def random_motion(robot: Robot, rng: np.random.Generator, n_samples: int | None 
     Draw independent random states that excite every identifiable parameter.
 
     Positions are uniform within the limits (one turn without limits), velocities and accelerations
-    are normal with a standard deviation of 1 rad/s and 1 rad/s^2 (or m). The default number of
-    states identifies all base parameters.
+    are normal with a standard deviation of 1 rad/s and 1 rad/s^2 (or m). Temperatures rise from
+    state to state. The default number of states identifies all base parameters.
 
     """
     n = robot.n_joints
     if n_samples is None:
         # enough for any number of joints, as each state has a row for every joint
         n_samples = min(40 * n, 560)
+    ends = np.array([0.0, n_samples])
     return Motion(
         joints=robot.joints,
         t=np.arange(n_samples, dtype=float),
         q=rng.uniform(*robot.position_range(), (n_samples, n)),
         dq=rng.normal(size=(n_samples, n)),
         ddq=rng.normal(size=(n_samples, n)),
+        temperature=Temperatures(ends, np.tile([[20.0], [60.0]], n)),
     )

@@ -132,6 +132,9 @@ def read_anything(
     columns = columns or ColumnSettings()
     if is_table(path):
         return read_tables([path], columns, joints, slides, show)
+    if columns.temperature == 'none':
+        columns = replace(columns, temperature=None)
+        settings = replace(settings, temperatures=False)
     refuse_columns(path, columns)
     if joints is None:
         topics = bag_contents(path, settings) if topics is None else topics

@@ -20,7 +20,16 @@ Rules = Sequence[tuple[str, str]]
 #: Seconds in a unit of time.
 TIME_UNITS = {'s': 1.0, 'ms': 1e-3, 'us': 1e-6, 'ns': 1e-9}
 #: Settings for tables only, and settings of units and signs, for tables and bags.
-_WHERE = ('time', 'time_unit', 'rate_hz', 'position', 'velocity', 'effort', 'episode')
+_WHERE = (
+    'time',
+    'time_unit',
+    'rate_hz',
+    'position',
+    'velocity',
+    'effort',
+    'temperature',
+    'episode',
+)
 _WHAT = ('degrees', 'position_scale', 'effort_scale', 'zero', 'gear')
 #: Command-line options whose name differs from that of the setting.
 _OPTIONS = {'rate_hz': '--rate', 'effort_scale': '--effort-scale or --current-gain'}
@@ -33,10 +42,10 @@ class ColumnSettings:
 
     Attributes
     ----------
-    time, position, velocity, effort : str or None
+    time, position, velocity, effort, temperature : str or None
         Columns: a name, the name of an array, names with commas, or a pattern in which '{}' stands
         for the joint's name or number and '{1..7}' for numbers. 'none' for a quantity that is
-        not to be read.
+        not to be read; of a bag, only temperatures may be 'none'.
     time_unit : str or None
         's', 'ms', 'us' or 'ns'.
     rate_hz : float or None
@@ -64,6 +73,7 @@ class ColumnSettings:
     position: str | None = None
     velocity: str | None = None
     effort: str | None = None
+    temperature: str | None = None
     time_unit: str | None = None
     rate_hz: float | None = None
     degrees: bool = False

@@ -20,6 +20,7 @@ from armid_ros.recording.message_types import BYTE_ORDERS, JOINT_STATE, STRING
 from armid_ros.recording.recording import PositionRange, Recording
 from armid_ros.recording.series import assemble
 from armid_ros.recording.source import DEFAULT, ReadSettings, Topic
+from armid_ros.recording.temperature import read_temperatures
 import numpy as np
 
 
@@ -74,8 +75,9 @@ def read_recording(
             size += piece.nbytes
             settings.require(size, f'{path}: {name}: the recording')
             pieces.append(piece)
-        damage = bag.damage
-    return assembled(path, name, joints, pieces, decoder, damage)
+        recording = assembled(path, name, joints, pieces, decoder, bag.damage)
+        measured = read_temperatures(bag, recording) if settings.temperatures else None
+    return replace(recording, temperature=measured) if measured else recording
 
 
 def assembled(

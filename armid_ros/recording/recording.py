@@ -10,7 +10,7 @@ from importlib import import_module
 from typing import Literal, TYPE_CHECKING
 
 from armid_ros.errors import RecordingError
-from armid_ros.motion import FloatArray, freeze, freeze_samples, Motion, Samples
+from armid_ros.motion import FloatArray, freeze, freeze_samples, Motion, Samples, Temperatures
 from armid_ros.recording.curves import draw_joints
 from armid_ros.robots import Robot
 import numpy as np
@@ -221,6 +221,8 @@ class Recording:
         Another machine that was recorded with the arm.
     others : tuple of PositionRange
         Position ranges of further joints in the same messages or columns.
+    temperature : Temperatures or None
+        Measured temperatures of the joints or their motors.
 
     Examples
     --------
@@ -250,11 +252,18 @@ class Recording:
     report: ReadReport = field(default_factory=ReadReport)
     partner: PartnerMotion | None = None
     others: tuple[PositionRange, ...] = ()
+    temperature: Temperatures | None = None
 
     def __post_init__(self) -> None:
         """Freeze the arrays and check their shapes."""
         object.__setattr__(self, 'joints', tuple(self.joints))
         freeze_samples(self.source or 'recording', self, 'q', 'dq', 'tau')
+        heat = self.temperature
+        if heat is not None and heat.values.shape != (len(heat.t), len(self.joints)):
+            raise RecordingError(
+                f'{self.source or "recording"}: temperatures have shape {heat.values.shape}, but '
+                f'their times and the joints need {(len(heat.t), len(self.joints))}'
+            )
         backwards = np.flatnonzero(np.diff(self.t) <= 0.0)
         if len(backwards):
             k = int(backwards[0]) + 1

@@ -38,11 +38,14 @@ class ReadSettings:
     memory_limit : int
         Memory limit for the messages of one bag, one chunk, or one unpacked file [bytes]; by
         default a quarter of the memory.
+    temperatures : bool
+        Whether temperatures of the joints are read from a bag.
 
     """
 
     check_crc: bool = True
     memory_limit: int = field(default_factory=default_memory_limit)
+    temperatures: bool = True
 
     def __post_init__(self) -> None:
         """Raise RecordingError unless the memory limit is positive."""

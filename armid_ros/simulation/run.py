@@ -9,7 +9,7 @@ from dataclasses import dataclass, replace
 
 from armid_ros.arm import ArmModel
 from armid_ros.errors import ModelError
-from armid_ros.motion import ElasticRun, FloatArray, freeze, Motion
+from armid_ros.motion import ElasticRun, FloatArray, freeze, Motion, Temperatures
 from armid_ros.robots.reference import Reference
 from armid_ros.simulation.controller import Controller
 from armid_ros.simulation.plant import Plant
@@ -58,6 +58,11 @@ class SimulatedRun:
     def __post_init__(self) -> None:
         """Freeze the arrays."""
         freeze(self, 't', 'q', 'dq', 'tau')
+
+    @property
+    def temperature(self) -> Temperatures | None:
+        """Return the temperatures of the joints; None if the simulation has none."""
+        return self.truth.temperature
 
 
 def simulate(

@@ -16,6 +16,7 @@ from dataclasses import dataclass, field, replace
 from functools import cached_property
 from itertools import pairwise, product
 from math import comb
+from types import MappingProxyType
 
 from armid_ros.arm import ArmModel
 from armid_ros.diagnosis.data.days import Rows
@@ -40,6 +41,8 @@ _MOST_SHAPES = 12
 _LOBES, _PEAK = 3.0, 0.2
 #: Largest number of evaluations of one line search.
 _EVALUATIONS = 9
+#: Reference temperatures where none is measured.
+_NO_REFERENCE: Mapping[str, float] = MappingProxyType({})
 #: Largest mass [1], first moments [m] and inertias [m^2] of a body, divided by its mass.
 _BODY = np.array([1.0, *3 * [0.1], *6 * [0.01]])
 
@@ -61,6 +64,8 @@ class Causes:
         Names and joints of the effects among the nuisance parameters.
     prior : mapping of str to str
         Frequency of effects, chosen by the user; see `HOW_OFTEN`.
+    reference : mapping of str to float
+        Reference temperatures of the joints [degC].
 
     """
 
@@ -69,6 +74,7 @@ class Causes:
     changed: bool
     fitted: frozenset[tuple[str, tuple[str, ...]]]
     prior: Mapping[str, str] = field(default_factory=dict)
+    reference: Mapping[str, float] = field(default_factory=dict)
     _known: dict[tuple[str, tuple[int, ...]], Cause | None] = field(
         default_factory=dict, compare=False
     )
@@ -80,7 +86,7 @@ class Causes:
         taken = {(one.name, place) for one in there for place in (one.joints, *zip(one.joints))}
         bodies = {one.adds_to(arm.robot) for one in there} - {()}
         unexplained = _unexplained(nuisance, under)
-        for whole, members in candidate_effects(arm.robot, self.kinds):
+        for whole, members in candidate_effects(arm.robot, self.kinds, self.reference):
             for effect, singles in shaped(whole, members, arm, unexplained):
                 singly = [
                     cause
@@ -91,7 +97,8 @@ class Causes:
                 result += singly
                 # One cause, such as temperature or grease, changes the friction of several joints
                 # (Bittencourt and Gunnarsson 2012).
-                if effect.traits.friction and effect.traits.usual and len(singly) > 1:
+                common = effect.traits.usual or effect.lasting
+                if effect.traits.friction and common and len(singly) > 1:
                     families += self._family(singly, nuisance, under)
         counts = Counter(cause.key for cause in result)
         result = [replace(cause, shapes=counts[cause.key]) for cause in result]
@@ -317,7 +324,7 @@ def _unexplained(nuisance: Nuisance, under: Marginal) -> Unexplained:
 
 
 def candidate_effects(
-    robot: Robot, kinds: Sequence[type[Effect]]
+    robot: Robot, kinds: Sequence[type[Effect]], reference: Mapping[str, float] = _NO_REFERENCE
 ) -> Iterator[tuple[Effect, list[Effect]]]:
     """Yield each effect on all joints, with its candidates on single joints."""
     for kind in with_exact_vector(kinds):
@@ -331,7 +338,9 @@ def candidate_effects(
                 effect = kind.on(robot, place)
                 yield effect, [effect]
         if single:
-            yield kind.on(robot, single), [kind.on(robot, (joint,)) for joint in single]
+            groups = (single, *((joint,) for joint in single))
+            whole, *members = (kind.on(robot, one).referred_to(reference) for one in groups)
+            yield whole, members
 
 
 def shaped(

@@ -60,6 +60,10 @@ class Cause:
         """Identity of the cause in any shape: name, joints and quantities."""
         return self.effect.name, self.effect.joints, self.kept
 
+    def acts(self, today: npt.NDArray[np.bool_]) -> npt.NDArray[np.bool_]:
+        """Return whether the cause acts in each recording or group: today, or on both days."""
+        return np.ones_like(today) if self.effect.lasting else today
+
     def whole(self, values: FloatArray, robot: Robot) -> FloatArray:
         """Return all parameters of the effect: the fitted values, and zero for the others."""
         whole = np.zeros(len(self.effect.parameters(robot)))

@@ -42,7 +42,9 @@ from armid_ros.diagnosis.search.nuisance import Nuisance
 from armid_ros.diagnosis.search.posterior import JointFit, SAME_GRAVITY
 from armid_ros.diagnosis.search.setting import Setting
 from armid_ros.diagnosis.settings import DiagnosisSettings
+from armid_ros.effects.friction import TemperatureDependentFriction, ThermalFriction
 from armid_ros.effects.gravity import GravityVector
+from armid_ros.identification.rows.temperature import mean_temperatures
 from armid_ros.motion import FloatArray
 from armid_ros.robots import GRAVITIES
 import numpy as np
@@ -285,13 +287,28 @@ class Explainer:
         fuller, unknown = with_friction(arm, settings.library)
         nuisance = Nuisance.of(rows, memoized_arm(fuller), self.rng, known, gravity=gravity)
         changed = self.baseline is not None or self.misfit is not None
-        kinds = list(settings.kinds)
+        kinds = [kind for kind in settings.kinds if not kind.lasting]
+        reference = self._reference()
+        if reference is not None:  # a measured temperature replaces the time of a warm-up
+            lasting = [kind for kind in settings.kinds if kind.lasting]
+            kinds = [kind for kind in kinds if not issubclass(kind, ThermalFriction)] + lasting
         if changed:
             kinds = [kind.as_change() for kind in kinds]
         fitted = () if changed else ((effect.name, effect.joints) for effect in unknown)
-        catalogue = Causes(tuple(kinds), nuisance, changed, frozenset(fitted), settings.prior)
+        named = frozenset(fitted)
+        catalogue = Causes(tuple(kinds), nuisance, changed, named, settings.prior, reference or {})
         used = settings_of_baseline(nuisance) if grid is None else tuple(grid)
         return CauseComparison(nuisance, catalogue, settings.thresholds, used)
+
+    def _reference(self) -> dict[str, float] | None:
+        """Return the reference temperatures; None if temperatures were not measured throughout."""
+        today = [part.motion for part in (*self.prepared.data, *self.unseen)]
+        before = [part.motion for part in self.baseline.data] if self.baseline else today
+        if mean_temperatures([*before, *today]) is None:
+            return None
+        given = (e for e in self.arm.effects if isinstance(e, TemperatureDependentFriction))
+        known = next(given, None)
+        return mean_temperatures(before) if known is None else dict(known.reference)
 
 
 def _speed(data: Sequence[Trajectory]) -> FloatArray:

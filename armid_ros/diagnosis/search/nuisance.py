@@ -213,8 +213,9 @@ class Nuisance:
         acts: npt.NDArray[np.bool_] | None = None,
         known: tuple[FloatArray, float, float] | None = None,
     ) -> Nuisance:
-        """Return the nuisance with one more cause, acting on the diagnosed day by default."""
-        term = CauseTerm(cause, size, self.rows.today if acts is None else acts, known)
+        """Return the nuisance with one more cause; by default, it acts where it may act."""
+        acts = cause.acts(self.rows.today) if acts is None else acts
+        term = CauseTerm(cause, size, acts, known)
         return replace(self, accepted=(*self.accepted, term))
 
     def without(self, name: int) -> Nuisance:

@@ -197,11 +197,11 @@ def odds(
     known = under
     if isinstance(known, Marginal):
         known = CauseInformation.of(cause, nuisance, known, by_day=not spreads.any())
-    p = known.size
-    there = [known.there()] if not np.all(known.today) else []
+    p, acts = known.size, cause.acts(known.today)
+    there = [known.there()] if not np.all(acts) else []
     if nuisance.rows.unseen:
         there = [np.tile(np.diag(_unseen(cause, nuisance)), (len(known.today), 1))]
-    asked = np.kron(known.today.astype(float)[:, np.newaxis], np.eye(p))
+    asked = np.kron(acts.astype(float)[:, np.newaxis], np.eye(p))
     prior = -0.5 * np.log((spreads + 1.0) / (usual + 1.0)) ** 2
     prior -= np.logaddexp.reduce(prior)
     nothing, changed = prior.copy(), prior.copy()

@@ -274,6 +274,8 @@ class JointFit:
         if not self.nuisance.rows.before:
             return np.zeros(len(means) - size)
         for one, span in zip(linear.accepted, linear.spans, strict=True):
+            if one.cause.effect.lasting:
+                continue
             unit = np.clip(np.abs(means[span]), _LEAST * one.cause.unit, one.cause.unit)
             before = replace(one.cause, unit=unit)
             both = both.and_cause(before, 1.0, np.ones_like(one.acts))

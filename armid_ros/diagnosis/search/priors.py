@@ -18,6 +18,8 @@ INNER = -2.0
 ELSEWHERE = -1.5
 #: Log odds of causes outside of the arm, which can pull in any direction.
 OUTSIDE = -4.0
+#: Log odds of friction that follows a measured temperature, as that of every gear does.
+FOLLOWS = 5.5
 #: Log odds per position in the catalogue, whose order is from common to rare effects.
 RARER = -0.05
 #: Probability that the true cause is not in the catalogue and resembles the best cause: 6 of 70
@@ -42,4 +44,5 @@ def log_prior(effect: Effect, robot: Robot, changed: bool) -> float:
     elif not effect.in_usual_place(robot):
         odds += INNER if changed and effect.changes_body else ELSEWHERE
     odds += OUTSIDE if effect.traits.external else 0.0
+    odds += FOLLOWS if effect.lasting else 0.0
     return odds - float(np.log(max(len(effect.places(robot)), 1)))

@@ -390,7 +390,10 @@ def _differentiated(
         velocity = np.einsum('nsxj,nj->nsx', jacobian, dq[inner, n:])
         points = MovingPoints(tuple(tie.name for tie in ties), position, velocity)
     parts = (part[inner] for part in (smooth[:, :n], dq[:, :n], ddq, tau))
-    return Motion(recording.joints, t[inner], *parts, band_hz=band, partner=points)
+    heat = recording.temperature
+    return Motion(
+        recording.joints, t[inner], *parts, band_hz=band, partner=points, temperature=heat
+    )
 
 
 def _central_difference(x: FloatArray, step: float) -> FloatArray:

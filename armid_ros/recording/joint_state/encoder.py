@@ -15,6 +15,7 @@ from armid_ros.recording.mcap.writer import Compression
 from armid_ros.recording.message_types import JOINT_STATE, QUANTITIES
 from armid_ros.recording.recording import Recording
 from armid_ros.recording.source import IntArray
+from armid_ros.recording.temperature import write_temperatures
 from armid_ros.recording.writer import BagWriter, DEFAULT_CHUNK_SIZE, whole_bag
 import numpy as np
 import numpy.typing as npt
@@ -93,7 +94,7 @@ def write_recording(
     chunk_size: int = DEFAULT_CHUNK_SIZE,
 ) -> None:
     """
-    Write a recording or a motion as a bag of JointState messages.
+    Write a recording or a motion as a bag of JointState messages, with its temperatures.
 
     Parameters
     ----------
@@ -145,6 +146,8 @@ def write_recording(
             first = int(stamps[0]) if len(stamps) else start_ns
             writer.write_description(robot_description, first)
         write_joint_states(writer, topic, joints, stamps, measured.q, measured.dq, measured.tau)
+        if measured.temperature is not None:
+            write_temperatures(writer, joints, measured.temperature, start_ns)
 
 
 def _encoded(

@@ -21,7 +21,7 @@ from armid_ros.recording.columns import renamed, Rules
 from armid_ros.recording.tables.table import Table, TableColumn
 import numpy as np
 
-QuantityName = Literal['position', 'velocity', 'effort']
+QuantityName = Literal['position', 'velocity', 'effort', 'temperature']
 
 #: Words for a motor current, which a gain converts to a torque.
 CURRENTS = ('current', 'currents', 'curr', 'cur', 'i', 'iq', 'amp', 'amps', 'ampere', 'amperes')
@@ -36,6 +36,8 @@ WORDS: dict[QuantityName, dict[str, float]] = {
     | dict.fromkeys(('trq', 'torq', 'eff', 'jtau', 'jeff'), 3.0)
     | dict.fromkeys(('tq', *CURRENTS), 2.5)
     | {'force': 2.0, 'load': 1.5, 'loads': 1.5, 'moment': 1.5, 'mom': 1.5},
+    # higher, as these words lower the score of other quantities
+    'temperature': dict.fromkeys(('temperature', 'temperatures', 'temp', 'temps'), 6.0),
 }
 TIMES = dict.fromkeys(('time', 't', 'timestamp', 'timestamps'), 3.0) | dict.fromkeys(
     ('secs', 'seconds', 'elapsed', 'date', 'datetime'), 2.0

@@ -9,7 +9,7 @@ from dataclasses import dataclass, replace
 import textwrap
 
 from armid_ros.errors import RecordingError
-from armid_ros.motion import FloatArray
+from armid_ros.motion import FloatArray, Temperatures
 from armid_ros.recording.columns import ColumnSettings, in_si, per_joint, renamed, TIME_UNITS
 from armid_ros.recording.joint_state.decoder import JointSamples
 from armid_ros.recording.recording import PositionRange, Recording
@@ -24,11 +24,12 @@ from armid_ros.recording.tables.families import (
     words_of,
 )
 from armid_ros.recording.tables.table import Table, TableColumn
+from armid_ros.recording.temperature import temperatures
 import numpy as np
 import numpy.typing as npt
 
-_OTHERS: tuple[QuantityName, ...] = ('velocity', 'effort')
-_SI = {'position': 'rad', 'velocity': 'rad/s', 'effort': 'N m'}
+_OTHERS: tuple[QuantityName, ...] = ('velocity', 'effort', 'temperature')
+_SI = {'position': 'rad', 'velocity': 'rad/s', 'effort': 'N m', 'temperature': 'degC'}
 #: Factors from units to SI.
 _FACTORS = {'deg': np.pi / 180, 'deg/s': np.pi / 180, 'mN m': 1e-3, 'N mm': 1e-3, 'mA': 1e-3}
 _FACTORS |= {'mrad': 1e-3, 'kN m': 1e3, 'rpm': 2 * np.pi / 60, 'mm': 1e-3, 'mm/s': 1e-3}
@@ -176,10 +177,10 @@ def plan(
             numbers = [str(k) for k in range(len(position.columns))]
             by_number = _source(table, quantity, settings, numbers)
             found = found if isinstance(by_number, tuple) else by_number
-        if isinstance(found, tuple):
-            missing[quantity] = found
-        else:
+        if not isinstance(found, tuple):
             sources.append(found)
+        elif quantity != 'temperature':
+            missing[quantity] = found
     time, unit, rate = _time(table, settings)
     effort = next((one for one in sources if one.quantity == 'effort'), None)
     notes = list(_far(position, settings, sliding))
@@ -214,6 +215,8 @@ def _source(
     unit = next((column.unit for column in chosen.columns if column.unit), '')
     if not unit and set(words_of(chosen.pattern)) & set(CURRENTS):
         unit = 'A'
+    if quantity == 'temperature':
+        return replace(chosen, unit=_SI[quantity])
     factor = np.full(len(chosen.columns), _FACTORS.get(unit, 1.0))
     return replace(chosen, unit=unit or _SI[quantity], factor=factor)
 
@@ -225,6 +228,8 @@ def _scaled(
     slides: npt.NDArray[np.bool_],
 ) -> QuantityColumns:
     """Apply unit settings of the user; degrees apply to revolute joints only."""
+    if source.quantity == 'temperature':
+        return source
     if source.quantity == 'effort':
         if not settings.effort_scale:
             return source
@@ -336,7 +341,7 @@ def measured(plan: TablePlan) -> Recording:
     t, start = _times(plan)
     stamped = np.isfinite(t)
     for source in plan.sources:
-        for column in source.columns:
+        for column in source.columns if source.quantity != 'temperature' else ():
             empty = np.flatnonzero(~np.isfinite(column.values))
             if len(empty) > MAX_NOT_FINITE * len(table):
                 raise RecordingError(
@@ -384,8 +389,24 @@ def measured(plan: TablePlan) -> Recording:
         topic=topic,
         others=tuple(others),
     )
+    recording = replace(recording, temperature=_temperatures(plan, recording, t, start))
     sides = replace(settings, degrees=False, position_scale=(), effort_scale=())
     return in_si(recording, sides)  # units are converted by the plan
+
+
+def _temperatures(
+    plan: TablePlan, recording: Recording, t: FloatArray, start: int
+) -> Temperatures | None:
+    """Return the temperatures of a table with times t after a stamp; None without columns."""
+    for source in plan.sources:
+        if source.quantity == 'temperature':
+            own = t + 1e-9 * (start - recording.start_ns)
+            order = np.argsort(own, kind='stable')
+            order = order[np.isfinite(own[order])]
+            where = [f'{plan.table.source}: column {column.name}' for column in source.columns]
+            values = source.values()[order].T
+            return temperatures(where, [own[order]] * len(values), list(values))
+    return None
 
 
 def _times(plan: TablePlan) -> tuple[FloatArray, int]:

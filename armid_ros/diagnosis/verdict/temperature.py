@@ -1,0 +1,106 @@
+# Copyright 2026 The armid_ros developers
+# SPDX-License-Identifier: Apache-2.0
+"""Remarks on measured temperatures: a cold start in degrees, and wear at equal temperature."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+
+from armid_ros.arm import ArmModel
+from armid_ros.diagnosis.data.trajectory import Trajectory
+from armid_ros.diagnosis.verdict.finding import Finding
+from armid_ros.effects import CATALOGUE
+from armid_ros.effects.friction import TemperatureDependentFriction
+from armid_ros.estimate import name_in_words
+from armid_ros.identification.rows.temperature import mean_temperatures
+import numpy as np
+
+#: Difference of temperature that counts as another temperature [K], and change of friction that
+#: is worth a remark, as a share.
+_OTHER, _WORTH = 2.0, 0.03
+
+
+def temperature_remarks(
+    found: Sequence[Finding], arm: ArmModel, now: Sequence[Trajectory], then: Sequence[Trajectory]
+) -> Iterator[str]:
+    """
+    Yield remarks on the temperatures of the diagnosed day.
+
+    Parameters
+    ----------
+    found : sequence of Finding
+        The findings.
+    arm : ArmModel
+        The model with the named effects.
+    now, then : sequence of Trajectory
+        Data of the diagnosed day, and of the baseline; without a baseline, the reference
+        temperatures of the model are compared.
+
+    """
+    laws = [own for own in arm.effects if isinstance(own, TemperatureDependentFriction)]
+    today = mean_temperatures([part.motion for part in now])
+    if today is None:
+        if laws:
+            yield (
+                f'The temperature was not recorded: {name_in_words(laws[0].name)} is taken at the '
+                'reference temperature.'
+            )
+        return
+    before = mean_temperatures([part.motion for part in then])
+    if before is None and laws:
+        known = laws[0].at_reference(arm.robot.joints)
+        before = dict(zip(arm.robot.joints, known, strict=True))
+    if before is None:
+        return
+    warmer = {joint: today[joint] - before[joint] for joint in today if joint in before}
+    of = 'in the baseline' if then else 'the reference temperature'
+    changes: dict[str, list[str]] = {'colder': [], 'warmer': []}
+    for joint, share in _changes(laws, arm, now, warmer).items():
+        if abs(warmer[joint]) >= _OTHER and abs(share) >= _WORTH:
+            changes['colder' if warmer[joint] < 0.0 else 'warmer'].append(
+                f'{joint} by {abs(warmer[joint]):.0f} degC (friction {100.0 * share:+.0f} %)'
+            )
+    of = 'in the baseline' if then else 'at the reference temperature of the model'
+    yield from (
+        f'{word.capitalize()} than {of}: {", ".join(joints)}.'
+        for word, joints in changes.items()
+        if joints
+    )
+    told = {joint for law in laws for joint in law.joints}
+    told |= {joint for joint, more in warmer.items() if abs(more) < _OTHER}
+    names, where = list[str](), dict[str, None]()
+    for one in found:
+        kinds = [CATALOGUE[name] for name in (one.name, *one.ambiguous_with) if name in CATALOGUE]
+        if kinds and kinds[0].traits.friction and not any(kind.lasting for kind in kinds):
+            names.append(name_in_words(one.name))
+            where |= dict.fromkeys(joint for joint in one.joints if joint in told)
+    if where:
+        text = f'{" and ".join(names)} of {", ".join(where)}'
+        yield (
+            f'{text[0].upper()}{text[1:]} changed at equal temperature: wear or another grease, '
+            'not a cold start.'
+        )
+
+
+def _changes(
+    laws: Sequence[TemperatureDependentFriction],
+    arm: ArmModel,
+    now: Sequence[Trajectory],
+    warmer: dict[str, float],
+) -> dict[str, float]:
+    """Return the relative change of friction by temperature of each joint, at its mean speed."""
+    action, joints = arm.action(), arm.robot.joints
+    speed = np.concatenate([np.abs(part.at_rows.dq) for part in now]).mean(axis=0)
+    size = np.zeros(len(joints))
+    if action.damping is not None:
+        size += np.diag(action.damping) * speed
+    if action.dry_friction is not None:
+        size += action.dry_friction.largest(np.zeros(len(joints)))
+    shares = dict.fromkeys(warmer, 0.0)
+    for law in laws:
+        for joint, slopes in zip(law.joints, arm.values_of(law).reshape(-1, 2), strict=True):
+            k = joints.index(joint)
+            if joint in warmer and size[k] > 0.0:
+                change = slopes[0] * speed[k] + slopes[1]
+                shares[joint] += warmer[joint] * float(change) / float(size[k])
+    return shares

@@ -1,0 +1,100 @@
+# Copyright 2026 The armid_ros developers
+# SPDX-License-Identifier: Apache-2.0
+"""Temperatures of recordings: their means, and friction per kelvin."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import replace
+
+from armid_ros.arm import ArmModel
+from armid_ros.effects.friction import TemperatureDependentFriction
+from armid_ros.errors import IdentificationError
+from armid_ros.estimate import Estimate
+from armid_ros.identification.fitting.identifiability import HALF_WIDTH
+from armid_ros.motion import FloatArray, Motion
+from armid_ros.recording import Recording
+import numpy as np
+from scipy.stats import t as student_t
+
+#: Slopes with temperature, and the coefficients that they change.
+_SIZES = {'viscous_slope': 'viscous_coefficient', 'coulomb_slope': 'coulomb_torque'}
+
+
+def mean_temperatures(parts: Sequence[Motion | Recording]) -> dict[str, float] | None:
+    """Return the mean temperature of each joint [degC]; None if any part has no temperatures."""
+    found = [part.temperature.at(part.t) for part in parts if part.temperature is not None]
+    if not found or len(found) < len(parts):
+        return None
+    means = np.concatenate(found).mean(axis=0)
+    known = zip(parts[0].joints, np.round(means, 1).tolist(), strict=True)
+    return {joint: mean for joint, mean in known if np.isfinite(mean)}
+
+
+def at_mean_temperature(arm: ArmModel, recordings: Sequence[Recording]) -> ArmModel:
+    """
+    Refer effects without values to the mean temperature of recordings.
+
+    Raises
+    ------
+    IdentificationError
+        If an effect needs temperatures, and a recording has none.
+
+    """
+    needing = [effect.name for effect in arm.effects if effect.lasting]
+    if not needing:
+        return arm
+    lacking = [one.source or 'a recording' for one in recordings if one.temperature is None]
+    means = mean_temperatures(recordings)
+    if means is None:
+        raise IdentificationError(
+            f'{lacking[0]}: {needing[0]} needs the temperature of each joint: record it as '
+            'sensor_msgs/Temperature with the joint as frame_id, or name the columns of a table '
+            'with --temperature'
+        )
+    pairs = zip(arm.effects, arm.values, strict=True)
+    effects = [one if values.any() else one.referred_to(means) for one, values in pairs]
+    return replace(arm, effects=tuple(effects))
+
+
+def friction_per_kelvin(arm: ArmModel, estimate: Estimate, scatter: FloatArray) -> tuple[str, ...]:
+    """
+    Return a note with the relative slopes of friction with temperature, if there are any.
+
+    The 95 % intervals are those of noise, or those of the differences between recordings if wider.
+
+    Parameters
+    ----------
+    arm : ArmModel
+        The identified model.
+    estimate : Estimate
+        Estimate of its parameters.
+    scatter : ndarray, shape (K, r)
+        Jackknife changes of the estimated values without each recording.
+
+    """
+    rows = {(name.name, name.joint): k for k, name in enumerate(estimate.parameters)}
+    said = []
+    for effect in arm.effects:
+        if not isinstance(effect, TemperatureDependentFriction):
+            continue
+        for joint, t0 in zip(effect.joints, effect.at_reference(effect.joints), strict=True):
+            parts = []
+            for slope, size in _SIZES.items():
+                pair = [rows.get((name, joint)) for name in (slope, size)]
+                if None in pair or estimate.values[pair[1]] <= 0.0:
+                    continue
+                change, known = estimate.values[pair]
+                ratio = change / known
+                by = np.array([1.0, -ratio]) / known
+                wide = HALF_WIDTH * float(
+                    np.sqrt(by @ estimate.covariance[np.ix_(pair, pair)] @ by)
+                )
+                if len(scatter) > 1:
+                    factor = student_t.ppf(0.975, len(scatter) - 1)
+                    wide = max(wide, factor * float(np.linalg.norm(scatter[:, pair] @ by)))
+                name = slope.partition('_')[0]
+                parts.append(f'{name} {100 * ratio:+.2f} ± {100 * wide:.2f} %/K')
+            if parts:
+                said.append(f'{joint} {", ".join(parts)} at {t0:g} degC')
+    return (f'friction over temperature: {"; ".join(said)}',) if said else ()

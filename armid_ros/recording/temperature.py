@@ -1,0 +1,183 @@
+# Copyright 2026 The armid_ros developers
+# SPDX-License-Identifier: Apache-2.0
+"""
+Read and write measured temperatures of joints or their motors.
+
+A bag has them in messages of sensor_msgs/Temperature, whose ``frame_id`` or topic names the joint,
+or as an interface of ros2_control in control_msgs/DynamicJointState.
+
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+import struct
+from typing import Any
+
+from armid_ros.errors import RecordingError
+from armid_ros.motion import FloatArray, Temperatures
+from armid_ros.recording.bag import Bag
+from armid_ros.recording.message_types import store_for
+from armid_ros.recording.recording import Recording
+from armid_ros.recording.source import Topic
+from armid_ros.recording.writer import BagWriter
+import numpy as np
+
+TEMPERATURE = 'sensor_msgs/msg/Temperature'
+_STATES = 'control_msgs/msg/DynamicJointState'
+#: Topic of temperatures in the bags that are written.
+TOPIC = '/joint_temperatures'
+#: Range of temperatures of a working joint [degC].
+_COLDEST, _HOTTEST = -40.0, 150.0
+#: Units of wrong temperatures, with factor and offset of their conversion to degC.
+_OTHER_UNITS = {
+    'kelvin': (1.0, -273.15),
+    'tenths of a degree': (0.1, 0.0),
+    'degrees Fahrenheit': (1.0 / 1.8, -32.0 / 1.8),
+}
+#: Shortest time between two temperatures of a joint that are kept [s].
+_APART = 0.1
+
+
+def temperatures(
+    where: Sequence[str], times: Sequence[FloatArray], values: Sequence[FloatArray]
+) -> Temperatures:
+    """
+    Join the temperatures of joints, each with times of its own.
+
+    Parameters
+    ----------
+    where : sequence of str
+        File, topic or column, and joint of each, for messages.
+    times : sequence of ndarray, each (K_j,)
+        Times [s]; empty for a joint without a sensor.
+    values : sequence of ndarray, each (K_j,)
+        Temperatures [degC]; nan where there is no reading.
+
+    Raises
+    ------
+    RecordingError
+        If no temperature of a joint is finite, or one is impossible; the message names its place.
+
+    """
+    kept = []
+    for name, t, value in zip(where, times, values, strict=True):
+        there = np.isfinite(value)
+        if len(value) and not there.any():
+            raise RecordingError(
+                f'{name}: no temperature is finite; leave temperatures out with --temperature none'
+            )
+        t, value = t[there], value[there]
+        strange = np.flatnonzero((value < _COLDEST) | (value > _HOTTEST))
+        if len(strange):
+            wrong = float(value[strange[0]])
+            units = [
+                f'{unit} ({factor * wrong + offset:.0f} degC)'
+                for unit, (factor, offset) in _OTHER_UNITS.items()
+                if _COLDEST <= factor * wrong + offset <= _HOTTEST
+            ]
+            seems = f'; it seems to be in {" or ".join(units)}' if units else ''
+            raise RecordingError(
+                f'{name}: the temperature at {t[strange[0]]:.3f} s is {wrong:g}, which has to be '
+                f'from {_COLDEST:g} to {_HOTTEST:g} degC{seems}. Write it in degC, or leave '
+                'temperatures out with --temperature none'
+            )
+        _, first = np.unique(np.floor(t / _APART), return_index=True)
+        kept.append((t[first], value[first]))
+    every = np.unique(np.concatenate([t for t, _ in kept]))
+    columns = [
+        np.interp(every, t, value) if len(t) else np.full(len(every), np.nan) for t, value in kept
+    ]
+    return Temperatures(every, np.column_stack(columns))
+
+
+def read_temperatures(bag: Bag, recording: Recording) -> Temperatures | None:
+    """
+    Read the temperatures of the joints of a recording from its bag.
+
+    Parameters
+    ----------
+    bag : Bag
+        The open bag.
+    recording : Recording
+        The recording, with the time base and the joints.
+
+    Returns
+    -------
+    Temperatures or None
+        None if no message has the temperature of one of the joints.
+
+    Raises
+    ------
+    RecordingError
+        If the temperatures of a joint are not finite or impossible; the message names topic and
+        joint.
+
+    """
+    found: dict[str, dict[int, float]] = {joint: {} for joint in recording.joints}
+    source = dict.fromkeys(recording.joints, '')
+    for topic in bag.topics():
+        if topic.type_name in (TEMPERATURE, _STATES):
+            for joint, stamp, value in _readings(bag, topic, recording):
+                found[joint].setdefault(stamp - recording.start_ns, value)
+                source[joint] = source[joint] or topic.name
+    if not any(found.values()):
+        return None
+    return temperatures(
+        [f'{bag.path}: {source[joint]}: {joint}' for joint in recording.joints],
+        [1e-9 * np.array(sorted(one)) for one in found.values()],
+        [np.array([one[k] for k in sorted(one)]) for one in found.values()],
+    )
+
+
+def _readings(bag: Bag, topic: Topic, recording: Recording) -> Iterator[tuple[str, int, float]]:
+    """Yield joint, stamp [ns] and temperature of the messages of a topic, at most ten a second."""
+    store, last = store_for(topic.message_type), dict[bytes, int]()
+    for block in bag.blocks(topic.name):
+        for index, received in enumerate(block.log_time.tolist()):
+            cdr = block.message(index)
+            length = int.from_bytes(cdr[12:16], 'little' if cdr[1] & 1 else 'big')
+            frame = cdr[16 : 16 + length]  # in the header
+            if received - last.get(frame, -(10**18)) < 1e9 * _APART:
+                continue
+            last[frame] = received
+            try:
+                message = store.deserialize_cdr(cdr, topic.type_name)
+            except Exception as error:  # of any kind, for damaged messages
+                raise RecordingError(
+                    f'{bag.path}: {topic.name}: message {index} is damaged: {error}'
+                ) from error
+            stamp = message.header.stamp.sec * 10**9 + message.header.stamp.nanosec
+            stamp = stamp if stamp and recording.clock == 'header' else received
+            for name, value in _named(message, topic, recording.joints):
+                yield name, stamp, value
+
+
+def _named(message: Any, topic: Topic, joints: Sequence[str]) -> Iterator[tuple[str, float]]:
+    """Yield the joints that a message names, with their temperatures."""
+    if topic.type_name == TEMPERATURE:
+        parts = (part.removesuffix('_temperature') for part in topic.name.split('/'))
+        names = [name for name in (message.header.frame_id, *parts) if name in joints]
+        yield from ((name, float(message.temperature)) for name in names[:1])
+        return
+    for joint, states in zip(message.joint_names, message.interface_values, strict=False):
+        pairs = zip(states.interface_names, states.values, strict=False)
+        own = [float(value) for name, value in pairs if 'temperature' in name]
+        if joint in joints and own:
+            yield joint, own[0]
+
+
+def write_temperatures(
+    writer: BagWriter, joints: Sequence[str], measured: Temperatures, start_ns: int
+) -> None:
+    """Write temperatures to a bag, one message per joint and time."""
+    writer.add_topic(TOPIC, TEMPERATURE)
+    for t, row in zip(measured.t.tolist(), measured.values.tolist(), strict=True):
+        stamp = start_ns + round(1e9 * t)
+        for joint, value in zip(joints, row, strict=True):
+            if np.isfinite(value):
+                frame = joint.encode() + b'\0'
+                head = struct.pack('<iII', *divmod(stamp, 10**9), len(frame)) + frame
+                head += bytes(-len(head) % 8)  # numbers begin at multiples of their size
+                cdr = b'\0\1\0\0' + head + struct.pack('<dd', value, 0.0)
+                writer.write(TOPIC, cdr, stamp)
