@@ -45,6 +45,12 @@ def freeze_samples(where: str, samples: Any, *names: str) -> None:
         if values is not None and values.shape != expected:
             said = f'{where}: {name} has shape {values.shape}'
             raise RecordingError(f'{said}, but the times and joints need {expected}')
+    heat = samples.temperature
+    if heat is not None and heat.values.shape != (len(heat.t), len(samples.joints)):
+        raise RecordingError(
+            f'{where}: temperatures have shape {heat.values.shape}, but their times and the '
+            f'joints need {(len(heat.t), len(samples.joints))}'
+        )
 
 
 @dataclass(frozen=True)

@@ -50,6 +50,7 @@ from armid_ros.identification.output import SCHEMA, with_contents
 from armid_ros.identification.parameters_file import parameters_of
 from armid_ros.identification.physical.fit_among_bodies import far_from_described
 from armid_ros.identification.rows.checks import check_held_out
+from armid_ros.identification.rows.temperature import friction_per_kelvin
 from armid_ros.recording import Recording, require_once
 from armid_ros.recording.curves import draw_joints
 from armid_ros.report.families import estimate_text, full_label, joint_columns
@@ -291,6 +292,7 @@ class IdentificationResult(ShownModel):
                 *others,
                 *residual_trends(joints, shown),
                 *(self.gains.sentences() if self.gains else ()),
+                *friction_per_kelvin(core.arm, estimate, core.scatter),
                 *(f'{one.source}: {one.report.describe()}' for one in damaged),
                 f'{count}; condition number {plain(core.condition_number)}',
                 *bodies,

@@ -16,7 +16,6 @@ from armid_ros.recording.source import DEFAULT
 from armid_ros.robots import collision_model, Robot
 from armid_ros.simulation import Reference, Sensors
 from armid_ros.simulation import simulate as run
-from armid_ros.simulation.warm_up import at_temperature, temperature_course
 import numpy as np
 
 
@@ -29,7 +28,6 @@ def simulate(
     position_noise: float = 0.0,
     velocity_noise: float = 0.0,
     resolution: float = 0.0,
-    temperature: str | None = None,
     rng: Rng = 0,
 ) -> Recording:
     """
@@ -48,9 +46,6 @@ def simulate(
         Standard deviations [N m, rad, rad/s].
     resolution : float
         Step of the encoders [rad].
-    temperature : str, optional
-        Temperature of the joints [degC]: '25', or '20:45:600' for a warm-up from 20 to 45 degC
-        with a time constant of 600 s; with commas one for each joint.
     rng : int or Generator
         Seed, or source of randomness.
 
@@ -81,10 +76,6 @@ def simulate(
         resolution=resolution,
     )
     reference = reference_of(model.robot, trajectory, source)
-    course = None
-    if temperature is not None:
-        course = temperature_course(temperature, model.robot.n_joints, reference.duration)
-        model = at_temperature(model, course)
     measured = run(model, reference, rng=source, sensors=sensors, rate=rate)
     return Recording(
         joints=measured.joints,
@@ -94,7 +85,6 @@ def simulate(
         tau=measured.tau,
         source='simulation',
         report=ReadReport(messages=len(measured.t), samples=len(measured.t)),
-        temperature=course,
     )
 
 

@@ -292,9 +292,7 @@ def _as_diagnosis(
     new = np.max([np.zeros(arm.robot.n_joints), *(one.ratio for one in laws)], axis=0) > 1.0
     places = where_it_is(explanation, (unseen or evidence) if found else open_in, settings, new)
     explainer.tell(1.0, word.word)
-    remarks = _remarks(found, worse, chosen, word, doubt, explainer)
-    then = () if before is None else before.data
-    remarks += temperature_remarks(found, patched, evidence.data, then)
+    remarks = _remarks((found, patched), worse, chosen, word, doubt, explainer)
     return Diagnosis(
         verdict=word.word,
         summary=' '.join([word.summary, *remarks]),
@@ -327,7 +325,7 @@ def _not_visible(
 
 
 def _remarks(
-    found: Sequence[Finding],
+    result: tuple[Sequence[Finding], ArmModel],
     worse: Sequence[str],
     chosen: Chosen,
     verdict: Verdict,
@@ -335,6 +333,7 @@ def _remarks(
     explainer: Explainer,
 ) -> list[str]:
     """Return remarks: why the model is doubtful or not patched, and which joints are unchecked."""
+    found, arm = result
     still = ', '.join(not_shown(explainer.prepared.data, explainer.arm.robot.joints))
     names = ' and '.join(name_in_words(one.name) for one in found)
     remarks = {
@@ -343,7 +342,9 @@ def _remarks(
         doubt: verdict.word != 'consistent',  # then it precedes the verdict
         f'Not checked: {still} did not move, or turned round all the time.': still,
     }
-    return [text for text, told in remarks.items() if text and told]
+    then = () if explainer.baseline is None else explainer.baseline.data
+    at_temperature = temperature_remarks(found, arm, explainer.prepared.data, then)
+    return [*(text for text, told in remarks.items() if text and told), *at_temperature]
 
 
 def _held_out_evidence(

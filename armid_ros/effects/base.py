@@ -19,16 +19,21 @@ from __future__ import annotations
 from abc import ABC, abstractmethod
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
-from functools import lru_cache
 from typing import Any, ClassVar, Protocol, Self
 
 from armid_ros.effects.action import Action, Displacement
-from armid_ros.effects.quantities import joint_unit, Quantity, Shape
+from armid_ros.effects.quantities import (
+    joint_unit,
+    places_among,
+    Quantity,
+    Shape,
+    spread_shape,
+)
 from armid_ros.effects.traits import TRAITS, Traits
 from armid_ros.errors import meant, ModelError
 from armid_ros.estimate import ParameterName
 from armid_ros.model import LinkFrames
-from armid_ros.motion import FloatArray, Motion, read_only
+from armid_ros.motion import FloatArray, Motion
 from armid_ros.robots import Robot
 import numpy as np
 import numpy.typing as npt
@@ -190,7 +195,7 @@ class Effect(ABC):
 
     def shape_over_joints(self, robot: Robot) -> FloatArray:
         """Return each shape parameter for all joints of a robot, with defaults, shape (S, n)."""
-        return _spread_shape(self.shapes, self.shape, self.joints, robot.joints)
+        return spread_shape(self.shapes, self.shape, self.joints, robot.joints)
 
     def with_shape(self, values: npt.ArrayLike) -> Effect:
         """
@@ -270,6 +275,11 @@ class Effect(ABC):
     def adds_to(self, robot: Robot) -> tuple[int, ...]:
         """Return the rigid-body parameter to which each parameter adds; empty for most effects."""
         return ()
+
+    @property
+    def reference_temperatures(self) -> dict[str, float]:
+        """Reference temperature of each joint [degC]; empty if the effect has none."""
+        return {}
 
     @property
     def points(self) -> tuple[str, ...]:
@@ -352,7 +362,7 @@ class Effect(ABC):
 
     def indices(self, motion_joints: tuple[str, ...]) -> list[int]:
         """Return the indices of the effect's joints among the joints of a motion or robot."""
-        return list(_places(self.joints, motion_joints))
+        return list(places_among(self.joints, motion_joints))
 
 
 @dataclass(frozen=True)
@@ -380,25 +390,6 @@ class Unexplained:
     residual: FloatArray
     weight: FloatArray
     beside: FloatArray
-
-
-@lru_cache(maxsize=1024)
-def _places(joints: tuple[str, ...], among: tuple[str, ...]) -> tuple[int, ...]:
-    """Return the indices of joints; cached, because streams repeat the call per sample."""
-    return tuple(among.index(joint) for joint in joints)
-
-
-@lru_cache(maxsize=1024)
-def _spread_shape(
-    shapes: tuple[Shape, ...],
-    values: tuple[float, ...],
-    joints: tuple[str, ...],
-    among: tuple[str, ...],
-) -> FloatArray:
-    """Return the shape parameters of all joints, defaults included, shape (S, n)."""
-    spread = np.tile([[s.default] for s in shapes], len(among))
-    spread[:, _places(joints, among)] = np.array(values).reshape(-1, len(shapes)).T
-    return read_only(spread)
 
 
 class Arm(Protocol):

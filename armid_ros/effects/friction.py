@@ -300,6 +300,12 @@ class TemperatureDependentFriction(Effect):
     holds_at_rest = True
     lasting = True
 
+    def __post_init__(self) -> None:
+        """Fill in the reference temperatures."""
+        super().__post_init__()
+        known = dict.fromkeys(self.joints, _REFERENCE) | dict(self.reference)
+        object.__setattr__(self, 'reference', tuple(known.items()))
+
     def along(self, motion: Motion) -> Self:
         """Return the effect with the temperatures that were measured with a motion."""
         return replace(self, course=motion.temperature) if motion.temperature else self
@@ -310,18 +316,18 @@ class TemperatureDependentFriction(Effect):
 
     def particulars(self) -> dict[str, Any]:
         """Return the reference temperature of each joint."""
-        pairs = zip(self.joints, self.at_reference(self.joints), strict=True)
-        return {'reference_temperature': dict(pairs)}
+        return {'reference_temperature': self.reference_temperatures}
 
     def with_particulars(self, entry: Mapping[str, Any]) -> Self:
         """Return the effect with the reference temperatures of an entry of model.yaml."""
         known = entry.get('reference_temperature', {})
         return self.referred_to({joint: finite(t, f'{joint}: T0') for joint, t in known.items()})
 
-    def at_reference(self, joints: tuple[str, ...]) -> list[float]:
-        """Return the reference temperatures of joints [degC]."""
+    @property
+    def reference_temperatures(self) -> dict[str, float]:
+        """Reference temperature of each joint [degC]."""
         known = dict(self.reference)
-        return [known.get(joint, _REFERENCE) for joint in joints]
+        return {joint: known[joint] for joint in self.joints}
 
     def plausible(self, values: FloatArray, std: FloatArray, arm: Arm) -> bool:
         """Return whether viscous friction decreases, and both change by at most 5 % per K."""
@@ -359,4 +365,6 @@ class TemperatureDependentFriction(Effect):
         """Return T - T0 of all joints, zero where not measured, shape (N, n) [K]."""
         if self.course is None:
             return np.zeros((np.size(t), len(joints)))
-        return np.nan_to_num(self.course.at(t) - self.at_reference(joints))
+        known = dict(self.reference)
+        reference = [known.get(joint, _REFERENCE) for joint in joints]
+        return np.nan_to_num(self.course.at(t) - reference)

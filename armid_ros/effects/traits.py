@@ -39,6 +39,8 @@ class Traits:
         Whether the effect is an error of the description, not a change of the arm.
     nuisance : tuple of tuple of float
         Shapes of the effect as a nuisance parameter, if it was not requested; () if never.
+    measured_as : str
+        Effect that explains the same by a measured signal, where it was measured; '' if none.
     separate : tuple of tuple of int
         Groups of quantities that are separate causes; empty if all quantities are one cause.
     urdf_attribute, mjcf_attribute : str
@@ -55,6 +57,7 @@ class Traits:
     external: bool = False
     corrects: bool = False
     nuisance: tuple[tuple[float, ...], ...] = ()
+    measured_as: str = ''
     separate: tuple[tuple[int, ...], ...] = ()
     urdf_attribute: str = ''
     mjcf_attribute: str = ''
@@ -148,6 +151,7 @@ TRAITS = {
         shown_by='the same motion cold and after half an hour of work',
         look_at='the temperature of the gear, and the time of work before the recording',
         friction=True,
+        measured_as='temperature_dependent_friction',
     ),
     'temperature_dependent_friction': Traits(
         shown_by='the same motion cold and warm, with the temperature of each joint',

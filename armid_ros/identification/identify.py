@@ -48,7 +48,7 @@ from armid_ros.identification.rows.signals import (
     no_stretch,
     SignalSettings,
 )
-from armid_ros.identification.rows.temperature import at_mean_temperature, friction_per_kelvin
+from armid_ros.identification.rows.temperature import at_mean_temperature
 from armid_ros.model import BaseParameters
 from armid_ros.motion import FloatArray
 from armid_ros.recording import Recording
@@ -222,11 +222,10 @@ def identify(
         unit; the message contains cause and remedy.
 
     """
-    settings = settings or IdentificationSettings()
+    settings, arm = settings or IdentificationSettings(), at_mean_temperature(arm, recordings)
     used = conditioning(recordings, settings.signals)
     recordings, notes = without_damage(recordings, used)
     used = conditioning(recordings, settings.signals) if notes else used
-    arm = at_mean_temperature(arm, recordings)
     notes += check_motion(arm.robot, recordings) + beyond_limits(arm.robot, recordings)
     notes += too_short_to_tell(recordings)
     theory = arm.base_parameters(rng)
@@ -258,24 +257,22 @@ def identify(
         fit = fit_by_instruments(fit, recordings, used)
     spread = base_spread(whole, fit.base) if settings.holds_description else None
     prior = fit.base.values(whole.theta)
-    estimate = Estimate(fit.base.parameters, fit.values, fit.solution.covariance)
-    changes = scatter(fit.problem, fit.solution.weights, fit.solution.values)
     return Identification(
         arm=fit.arm,
         theory=theory,
         base=fit.base,
-        estimate=estimate,
+        estimate=Estimate(fit.base.parameters, fit.values, fit.solution.covariance),
         condition_number=fit.solution.condition_number,
         joint_std=fit.solution.joint_std,
         training=fit.fits,
         used=used,
         settings=settings,
-        notes=notes + _remarks(fit, theory) + friction_per_kelvin(fit.arm, estimate, changes),
+        notes=notes + _remarks(fit, theory),
         halves=halves_error(fit.problem, fit.solution.weights, prior, spread),
         physical=None if bodies is None or settings.physical is None else bodies[3],
         bodies_cost=None if bodies is None else bodies[3].cost,
         passes=fit.passes,
-        scatter=changes,
+        scatter=scatter(fit.problem, fit.solution.weights, fit.solution.values),
     )
 
 

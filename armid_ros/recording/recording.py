@@ -258,12 +258,6 @@ class Recording:
         """Freeze the arrays and check their shapes."""
         object.__setattr__(self, 'joints', tuple(self.joints))
         freeze_samples(self.source or 'recording', self, 'q', 'dq', 'tau')
-        heat = self.temperature
-        if heat is not None and heat.values.shape != (len(heat.t), len(self.joints)):
-            raise RecordingError(
-                f'{self.source or "recording"}: temperatures have shape {heat.values.shape}, but '
-                f'their times and the joints need {(len(heat.t), len(self.joints))}'
-            )
         backwards = np.flatnonzero(np.diff(self.t) <= 0.0)
         if len(backwards):
             k = int(backwards[0]) + 1

@@ -142,7 +142,7 @@ def _readings(bag: Bag, topic: Topic, recording: Recording) -> Iterator[tuple[st
                 continue
             last[frame] = received
             try:
-                message = store.deserialize_cdr(cdr, topic.type_name)
+                message: Any = store.deserialize_cdr(cdr, topic.type_name)
             except Exception as error:  # of any kind, for damaged messages
                 raise RecordingError(
                     f'{bag.path}: {topic.name}: message {index} is damaged: {error}'

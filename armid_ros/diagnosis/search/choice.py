@@ -42,7 +42,6 @@ from armid_ros.diagnosis.search.nuisance import Nuisance
 from armid_ros.diagnosis.search.posterior import JointFit, SAME_GRAVITY
 from armid_ros.diagnosis.search.setting import Setting
 from armid_ros.diagnosis.settings import DiagnosisSettings
-from armid_ros.effects.friction import TemperatureDependentFriction, ThermalFriction
 from armid_ros.effects.gravity import GravityVector
 from armid_ros.identification.rows.temperature import mean_temperatures
 from armid_ros.motion import FloatArray
@@ -287,11 +286,13 @@ class Explainer:
         fuller, unknown = with_friction(arm, settings.library)
         nuisance = Nuisance.of(rows, memoized_arm(fuller), self.rng, known, gravity=gravity)
         changed = self.baseline is not None or self.misfit is not None
-        kinds = [kind for kind in settings.kinds if not kind.lasting]
         reference = self._reference()
-        if reference is not None:  # a measured temperature replaces the time of a warm-up
-            lasting = [kind for kind in settings.kinds if kind.lasting]
-            kinds = [kind for kind in kinds if not issubclass(kind, ThermalFriction)] + lasting
+        measured = {kind.name for kind in settings.kinds if kind.lasting and reference is not None}
+        kinds = [
+            kind
+            for kind in settings.kinds
+            if kind.name in measured or not (kind.lasting or kind.traits.measured_as in measured)
+        ]
         if changed:
             kinds = [kind.as_change() for kind in kinds]
         fitted = () if changed else ((effect.name, effect.joints) for effect in unknown)
@@ -306,9 +307,8 @@ class Explainer:
         before = [part.motion for part in self.baseline.data] if self.baseline else today
         if mean_temperatures([*before, *today]) is None:
             return None
-        given = (e for e in self.arm.effects if isinstance(e, TemperatureDependentFriction))
-        known = next(given, None)
-        return mean_temperatures(before) if known is None else dict(known.reference)
+        given = (one.reference_temperatures for one in self.arm.effects if one.lasting)
+        return next(given, None) or mean_temperatures(before)
 
 
 def _speed(data: Sequence[Trajectory]) -> FloatArray:

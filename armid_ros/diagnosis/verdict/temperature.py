@@ -9,8 +9,7 @@ from collections.abc import Iterator, Sequence
 from armid_ros.arm import ArmModel
 from armid_ros.diagnosis.data.trajectory import Trajectory
 from armid_ros.diagnosis.verdict.finding import Finding
-from armid_ros.effects import CATALOGUE
-from armid_ros.effects.friction import TemperatureDependentFriction
+from armid_ros.effects import CATALOGUE, Effect
 from armid_ros.estimate import name_in_words
 from armid_ros.identification.rows.temperature import mean_temperatures
 import numpy as np
@@ -37,7 +36,7 @@ def temperature_remarks(
         temperatures of the model are compared.
 
     """
-    laws = [own for own in arm.effects if isinstance(own, TemperatureDependentFriction)]
+    laws = [own for own in arm.effects if own.lasting]
     today = mean_temperatures([part.motion for part in now])
     if today is None:
         if laws:
@@ -48,8 +47,7 @@ def temperature_remarks(
         return
     before = mean_temperatures([part.motion for part in then])
     if before is None and laws:
-        known = laws[0].at_reference(arm.robot.joints)
-        before = dict(zip(arm.robot.joints, known, strict=True))
+        before = laws[0].reference_temperatures
     if before is None:
         return
     warmer = {joint: today[joint] - before[joint] for joint in today if joint in before}
@@ -83,7 +81,7 @@ def temperature_remarks(
 
 
 def _changes(
-    laws: Sequence[TemperatureDependentFriction],
+    laws: Sequence[Effect],
     arm: ArmModel,
     now: Sequence[Trajectory],
     warmer: dict[str, float],

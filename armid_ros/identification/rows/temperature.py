@@ -8,9 +8,8 @@ from collections.abc import Sequence
 from dataclasses import replace
 
 from armid_ros.arm import ArmModel
-from armid_ros.effects.friction import TemperatureDependentFriction
 from armid_ros.errors import IdentificationError
-from armid_ros.estimate import Estimate
+from armid_ros.estimate import Estimate, name_in_words
 from armid_ros.identification.fitting.identifiability import HALF_WIDTH
 from armid_ros.motion import FloatArray, Motion
 from armid_ros.recording import Recording
@@ -59,7 +58,7 @@ def at_mean_temperature(arm: ArmModel, recordings: Sequence[Recording]) -> ArmMo
 
 def friction_per_kelvin(arm: ArmModel, estimate: Estimate, scatter: FloatArray) -> tuple[str, ...]:
     """
-    Return a note with the relative slopes of friction with temperature, if there are any.
+    Return a note on each joint with its relative slopes of friction with temperature.
 
     The 95 % intervals are those of noise, or those of the differences between recordings if wider.
 
@@ -76,13 +75,11 @@ def friction_per_kelvin(arm: ArmModel, estimate: Estimate, scatter: FloatArray) 
     rows = {(name.name, name.joint): k for k, name in enumerate(estimate.parameters)}
     said = []
     for effect in arm.effects:
-        if not isinstance(effect, TemperatureDependentFriction):
-            continue
-        for joint, t0 in zip(effect.joints, effect.at_reference(effect.joints), strict=True):
+        for joint, t0 in effect.reference_temperatures.items():
             parts = []
             for slope, size in _SIZES.items():
-                pair = [rows.get((name, joint)) for name in (slope, size)]
-                if None in pair or estimate.values[pair[1]] <= 0.0:
+                pair = [rows[name, joint] for name in (slope, size) if (name, joint) in rows]
+                if len(pair) < 2 or estimate.values[pair[1]] <= 0.0:
                     continue
                 change, known = estimate.values[pair]
                 ratio = change / known
@@ -93,8 +90,8 @@ def friction_per_kelvin(arm: ArmModel, estimate: Estimate, scatter: FloatArray) 
                 if len(scatter) > 1:
                     factor = student_t.ppf(0.975, len(scatter) - 1)
                     wide = max(wide, factor * float(np.linalg.norm(scatter[:, pair] @ by)))
-                name = slope.partition('_')[0]
+                name = name_in_words(slope).partition(' ')[0]
                 parts.append(f'{name} {100 * ratio:+.2f} ± {100 * wide:.2f} %/K')
             if parts:
-                said.append(f'{joint} {", ".join(parts)} at {t0:g} degC')
-    return (f'friction over temperature: {"; ".join(said)}',) if said else ()
+                said.append(f'Friction of {joint} at {t0:g} degC: {", ".join(parts)}')
+    return tuple(said)
