@@ -51,7 +51,9 @@ def glides(speed):
 
 
 def test_every_effect_of_the_catalogue_is_hidden():
-    assert set(CATALOGUED) == {name for name, kind in CATALOGUE.items() if not kind.learned}
+    """Friction over measured temperature is that of warm_arm, as it needs a channel."""
+    every = {name for name, kind in CATALOGUE.items() if not (kind.learned or kind.lasting)}
+    assert set(CATALOGUED) == every
 
 
 @pytest.mark.parametrize('name', CATALOGUED)

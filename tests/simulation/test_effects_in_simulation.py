@@ -6,6 +6,7 @@ from armid_ros.arm import ArmModel
 from armid_ros.effects import CATALOGUE, make_effect
 from armid_ros.motion import FloatArray, Motion
 from armid_ros.simulation import ComputedTorque, Reference, simulate, SimulatedArm, SimulatedRun
+from armid_ros.simulation.warm_up import at_temperature, temperature_course
 import numpy as np
 import pytest
 
@@ -47,6 +48,7 @@ CASES = {
     'actuator_saturation': ([0.6, 0.0], [1.0]),
     'human_interaction': ([100.0, 3.0, 1.0, 1.0, 1.0], None),
     'interface_slack': (200.0, None),
+    'temperature_dependent_friction': ([0.004, 0.004], None),
 }
 SCALED = {
     'viscous_friction',
@@ -59,12 +61,14 @@ SCALED = {
     'torque_ripple',
     'joint_spring',
     'soft_limit',
+    'temperature_dependent_friction',
 }
 #: What may be left of an effect: with friction that falls, or follows the load of the last step,
 #: and where links are where the first order of the twist puts them.
 COARSE = {
     'stribeck_friction': 2e-3,
     'load_dependent_friction': 3e-3,
+    'temperature_dependent_friction': 2e-3,
     'joint_elasticity': 0.03,
 }
 
@@ -113,7 +117,8 @@ def rms(x: FloatArray) -> float:
     'name', [n for n, kind in CATALOGUE.items() if n != 'backlash' and not kind.learned]
 )
 def test_what_is_recorded_is_what_the_model_predicts(humanoid, reference, name) -> None:
-    arm = arm_with(humanoid, name)
+    course = temperature_course('30:60:1', humanoid.n_joints, 2.0)
+    arm = at_temperature(arm_with(humanoid, name), course)
     run = simulate(arm, reference, rng=np.random.default_rng(0))
     motion, chosen = recorded(run), moving(run)
     assert chosen.mean() > 0.75
