@@ -162,6 +162,7 @@ def read_recording(
     position: str | None = None,
     velocity: str | None = None,
     effort: str | None = None,
+    temperature: str | None = None,
     time_unit: str | None = None,
     rate_hz: float | None = None,
     degrees: bool = False,
@@ -186,10 +187,10 @@ def read_recording(
         only JointState topic of a bag, or of ``topic``.
     topic : str, optional
         JointState topic, where a bag has several.
-    time, position, velocity, effort : str, optional
+    time, position, velocity, effort, temperature : str, optional
         Columns of a table: a name, names with commas, ``'q{}'`` for the joint's name or number;
         ``'[1..7]'`` for columns without names, counted from 0; ``'none'`` to skip the
-        quantity. Guessed by default.
+        quantity, of a bag only temperatures. Guessed by default.
     time_unit : {'s', 'ms', 'us', 'ns'}, optional
         Unit of the column of time; guessed by default.
     rate_hz : float, optional
@@ -234,6 +235,7 @@ def read_recording(
         position=position,
         velocity=velocity,
         effort=effort,
+        temperature=temperature,
         time_unit=time_unit,
         rate_hz=rate_hz,
         degrees=degrees,

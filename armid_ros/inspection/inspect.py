@@ -297,8 +297,8 @@ def _of_temperatures(recording: Recording) -> Iterator[Remark]:
         return
     heat = recording.temperature.at(recording.t)
     ends = zip(recording.joints, heat.min(axis=0), heat.max(axis=0), strict=True)
-    said = [f'{name} {low:.1f} to {high:.1f}' for name, low, high in ends if np.isfinite(low)]
-    yield Remark('note', f'temperatures [degC]: {", ".join(said)}')
+    ranges = [f'{name} {low:.1f} to {high:.1f}' for name, low, high in ends if np.isfinite(low)]
+    yield Remark('note', f'temperatures [degC]: {", ".join(ranges)}')
 
 
 def _of_efforts(joints: tuple[JointFacts, ...], trial: TrialFit | None) -> Iterator[Remark]:

@@ -4,7 +4,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Collection, Iterator, Sequence
 
 from armid_ros.arm import ArmModel
 from armid_ros.diagnosis.data.trajectory import Trajectory
@@ -17,6 +17,9 @@ import numpy as np
 #: Difference of temperature that counts as another temperature [K], and change of friction that
 #: is worth a remark, as a share.
 _OTHER, _WORTH = 2.0, 0.03
+#: Standard deviation of the temperature within a day, over its difference between the days, that
+#: separates a law of temperature from wear.
+_VARIED = 0.2
 
 
 def temperature_remarks(
@@ -38,46 +41,66 @@ def temperature_remarks(
     """
     laws = [own for own in arm.effects if own.lasting]
     today = mean_temperatures([part.motion for part in now])
-    if today is None:
-        if laws:
-            yield (
-                f'The temperature was not recorded: {name_in_words(laws[0].name)} is taken at the '
-                'reference temperature.'
-            )
-        return
+    if today is None and laws:
+        yield (
+            f'The temperature was not recorded: {name_in_words(laws[0].name)} is taken at the '
+            'reference temperature.'
+        )
     before = mean_temperatures([part.motion for part in then])
     if before is None and laws:
         before = laws[0].reference_temperatures
-    if before is None:
+    warmer = {
+        joint: mean - before[joint]
+        for joint, mean in (today or {}).items()
+        if before is not None and joint in before
+    }
+    if not warmer:
         return
-    warmer = {joint: today[joint] - before[joint] for joint in today if joint in before}
-    of = 'in the baseline' if then else 'the reference temperature'
     changes: dict[str, list[str]] = {'colder': [], 'warmer': []}
     for joint, share in _changes(laws, arm, now, warmer).items():
         if abs(warmer[joint]) >= _OTHER and abs(share) >= _WORTH:
             changes['colder' if warmer[joint] < 0.0 else 'warmer'].append(
                 f'{joint} by {abs(warmer[joint]):.0f} degC (friction {100.0 * share:+.0f} %)'
             )
-    of = 'in the baseline' if then else 'at the reference temperature of the model'
+    than = 'in the baseline' if then else 'at the reference temperature of the model'
     yield from (
-        f'{word.capitalize()} than {of}: {", ".join(joints)}.'
+        f'{word.capitalize()} than {than}: {", ".join(joints)}.'
         for word, joints in changes.items()
         if joints
     )
-    told = {joint for law in laws for joint in law.joints}
-    told |= {joint for joint, more in warmer.items() if abs(more) < _OTHER}
-    names, where = list[str](), dict[str, None]()
+    within = max(_spread(now), _spread(then))
+    named = any(CATALOGUE[one.name].lasting for one in found if one.name in CATALOGUE)
+    if named and within < _VARIED * max(map(abs, warmer.values())):
+        yield (
+            'The temperature differs between the days and hardly within them, so wear of the same '
+            'size is not excluded: record a day over a range of temperatures.'
+        )
+    equal = {joint for joint, more in warmer.items() if abs(more) < _OTHER}
+    yield from _worn(found, equal.union(*(law.joints for law in laws)))
+
+
+def _worn(found: Sequence[Finding], equal: Collection[str]) -> Iterator[str]:
+    """Yield a sentence on friction that changed at equal temperature, in the given joints."""
+    names, where = dict[str, None](), dict[str, None]()
     for one in found:
         kinds = [CATALOGUE[name] for name in (one.name, *one.ambiguous_with) if name in CATALOGUE]
-        if kinds and kinds[0].traits.friction and not any(kind.lasting for kind in kinds):
-            names.append(name_in_words(one.name))
-            where |= dict.fromkeys(joint for joint in one.joints if joint in told)
-    if where:
+        joints = [joint for joint in one.joints if joint in equal]
+        rubs = one.name in CATALOGUE and kinds[0].traits.friction
+        if joints and rubs and not any(kind.lasting for kind in kinds):
+            names[name_in_words(one.name)] = None
+            where |= dict.fromkeys(joints)
+    if names:
         text = f'{" and ".join(names)} of {", ".join(where)}'
         yield (
             f'{text[0].upper()}{text[1:]} changed at equal temperature: wear or another grease, '
             'not a cold start.'
         )
+
+
+def _spread(data: Sequence[Trajectory]) -> float:
+    """Return the largest standard deviation of the temperature of a joint on a day [K]."""
+    found = [part.motion.temperature.at(part.t) for part in data if part.motion.temperature]
+    return float(np.nanmax(np.concatenate(found).std(axis=0))) if found else 0.0
 
 
 def _changes(

@@ -73,7 +73,7 @@ def friction_per_kelvin(arm: ArmModel, estimate: Estimate, scatter: FloatArray) 
 
     """
     rows = {(name.name, name.joint): k for k, name in enumerate(estimate.parameters)}
-    said = []
+    texts = []
     for effect in arm.effects:
         for joint, t0 in effect.reference_temperatures.items():
             parts = []
@@ -93,5 +93,5 @@ def friction_per_kelvin(arm: ArmModel, estimate: Estimate, scatter: FloatArray) 
                 name = name_in_words(slope).partition(' ')[0]
                 parts.append(f'{name} {100 * ratio:+.2f} ± {100 * wide:.2f} %/K')
             if parts:
-                said.append(f'Friction of {joint} at {t0:g} degC: {", ".join(parts)}')
-    return tuple(said)
+                texts.append(f'Friction of {joint} at {t0:g} degC: {", ".join(parts)}')
+    return tuple(texts)
