@@ -79,7 +79,7 @@ def friction_per_kelvin(arm: ArmModel, estimate: Estimate, scatter: FloatArray) 
             parts = []
             for slope, size in _SIZES.items():
                 pair = [rows[name, joint] for name in (slope, size) if (name, joint) in rows]
-                if len(pair) < 2 or estimate.values[pair[1]] <= 0.0:
+                if len(pair) < 2 or estimate.values[pair[1]] <= HALF_WIDTH * estimate.std[pair[1]]:
                     continue
                 change, known = estimate.values[pair]
                 ratio = change / known
