@@ -17,7 +17,7 @@ from armid_ros.arm import ArmModel, Misfit
 from armid_ros.arm.memoized_arm import memoized_arm, plain_arm
 from armid_ros.diagnosis.data.baseline import Baseline
 from armid_ros.diagnosis.data.evidence import Evidence, noise_floor
-from armid_ros.diagnosis.data.trajectory import not_shown, trajectories, Trajectory
+from armid_ros.diagnosis.data.trajectory import trajectories, Trajectory
 from armid_ros.diagnosis.doubt import doubt_of, doubted
 from armid_ros.diagnosis.prepare import choose_filters, mended, prepare, with_friction
 from armid_ros.diagnosis.search.choice import Explainer
@@ -26,12 +26,12 @@ from armid_ros.diagnosis.search.spans import acting_spans, Span
 from armid_ros.diagnosis.settings import DiagnosisSettings
 from armid_ros.diagnosis.ties.ties import diagnose_ties
 from armid_ros.diagnosis.verdict.attribution import headline, predicted
+from armid_ros.diagnosis.verdict.data_remarks import data_remarks
 from armid_ros.diagnosis.verdict.finding import Diagnosis, Finding
 from armid_ros.diagnosis.verdict.gap import measure_gap, not_repeating
 from armid_ros.diagnosis.verdict.naming import findings, small_print
 from armid_ros.diagnosis.verdict.remaining_misfit import places_held, RemainingMisfit
 from armid_ros.diagnosis.verdict.same_body import as_placed_bodies
-from armid_ros.diagnosis.verdict.temperature import temperature_remarks
 from armid_ros.diagnosis.verdict.where import where_it_is, where_left
 from armid_ros.diagnosis.verdict.words import decide, Verdict
 from armid_ros.errors import IdentificationError
@@ -334,17 +334,15 @@ def _remarks(
 ) -> list[str]:
     """Return remarks: why the model is doubtful or not patched, and which joints are unchecked."""
     found, arm = result
-    still = ', '.join(not_shown(explainer.prepared.data, explainer.arm.robot.joints))
     names = ' and '.join(name_in_words(one.name) for one in found)
     remarks = {
         f'The model is not patched: {names} would make it worse in {", ".join(worse)}.': worse,
         chosen.untested: verdict.word == 'unknown',
         doubt: verdict.word != 'consistent',  # then it precedes the verdict
-        f'Not checked: {still} did not move, or turned round all the time.': still,
     }
     then = () if explainer.baseline is None else explainer.baseline.data
-    at_temperature = temperature_remarks(found, arm, explainer.prepared.data, then)
-    return [*(text for text, told in remarks.items() if text and told), *at_temperature]
+    of_data = data_remarks(found, arm, explainer.prepared.data, then)
+    return [*(text for text, told in remarks.items() if text and told), *of_data]
 
 
 def _held_out_evidence(

@@ -69,4 +69,5 @@ def recorded(arm, motion, seed=0, torque_noise=0.0, position_noise=0.0, source='
         q=motion.q + position_noise * rng.normal(size=motion.q.shape),
         tau=tau + torque_noise * rng.normal(size=tau.shape),
         source=source,
+        temperature=motion.temperature,
     )

@@ -2,6 +2,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """Every effect of the catalogue, alone and in pairs, is fitted as the arm has it."""
 
+from dataclasses import replace
 from itertools import pairwise
 
 from armid_ros.arm import ArmModel
@@ -11,6 +12,7 @@ from armid_ros.identification import (
     identify,
     Score,
 )
+from armid_ros.motion import Temperatures
 import numpy as np
 import pytest
 
@@ -34,7 +36,7 @@ def with_sizes(robot, names, seed):
     rng = np.random.default_rng(seed)
     arm = ArmModel(robot.with_inertias(1.1 * robot.rigid_parameters))
     for name in dict.fromkeys(['viscous_friction', *names]):
-        effect = make_effect(name, robot)
+        effect = make_effect(name, robot).referred_to(dict.fromkeys(robot.joints, 30.0))
         if name == 'presliding_hysteresis':  # what it was bent by before is soon forgotten
             effect = effect.with_shape(0.001)
         typical = [np.sqrt(np.prod(q.typical)) if q.typical else 0.1 for q in effect.quantities]
@@ -47,10 +49,17 @@ def with_sizes(robot, names, seed):
     return arm
 
 
+def warming(robot, duration, seed):
+    """Return a motion in which the joints warm up from 20 to 40 degC."""
+    ends = np.tile([[20.0], [40.0]], robot.n_joints)
+    motion = multisine(robot.joints, duration, 200.0, seed=seed)
+    return replace(motion, temperature=Temperatures(motion.t[[0, -1]], ends))
+
+
 def fitted(robot, names, seed=0, **settings):
     """Return the true arm, what was recorded of it, and its identification."""
     truth = with_sizes(robot, names, seed)
-    recording = recorded(truth, multisine(robot.joints, 12.0, 200.0, seed=1), seed, NOISE)
+    recording = recorded(truth, warming(robot, 12.0, 1), seed, NOISE)
     structure = ArmModel(robot, truth.effects)
     asked = IdentificationSettings(**settings)
     result = identify(structure, [recording], asked, rng=np.random.default_rng(0))
@@ -69,7 +78,7 @@ def agrees(robot, names, seed=0):
     np.testing.assert_allclose(
         result.joint_std, NOISE * np.linalg.norm(result.used.taps), rtol=0.3
     )
-    other = recorded(truth, multisine(robot.joints, 6.0, 200.0, seed=7))
+    other = recorded(truth, warming(robot, 6.0, 7))
     assert error(result.predict([other])) < 1.0
     return truth, result
 

@@ -1,13 +1,13 @@
 # Copyright 2026 The armid_ros developers
 # SPDX-License-Identifier: Apache-2.0
-"""Remarks on measured temperatures: a cold start in degrees, and wear at equal temperature."""
+"""Remarks on data: unchecked joints, a cold start in degrees, and wear at equal temperature."""
 
 from __future__ import annotations
 
 from collections.abc import Collection, Iterator, Sequence
 
 from armid_ros.arm import ArmModel
-from armid_ros.diagnosis.data.trajectory import Trajectory
+from armid_ros.diagnosis.data.trajectory import not_shown, Trajectory
 from armid_ros.diagnosis.verdict.finding import Finding
 from armid_ros.effects import CATALOGUE, Effect
 from armid_ros.estimate import name_in_words
@@ -22,11 +22,11 @@ _OTHER, _WORTH = 2.0, 0.03
 _VARIED = 0.2
 
 
-def temperature_remarks(
+def data_remarks(
     found: Sequence[Finding], arm: ArmModel, now: Sequence[Trajectory], then: Sequence[Trajectory]
 ) -> Iterator[str]:
     """
-    Yield remarks on the temperatures of the diagnosed day.
+    Yield remarks on joints that did not move, and on the temperatures of the diagnosed day.
 
     Parameters
     ----------
@@ -39,6 +39,9 @@ def temperature_remarks(
         temperatures of the model are compared.
 
     """
+    still = ', '.join(not_shown(now, arm.robot.joints))
+    if still:
+        yield f'Not checked: {still} did not move, or turned round all the time.'
     laws = [own for own in arm.effects if own.lasting]
     today = mean_temperatures([part.motion for part in now])
     if today is None and laws:
