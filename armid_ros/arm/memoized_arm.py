@@ -62,8 +62,7 @@ class _Memoized(ArmModel):
         """Return the cached regressor; None for another link motion, or if memory is exhausted."""
         if self.action().displacement is not None:
             return None
-        places = (array.ctypes.data for array in (motion.q, motion.dq, motion.ddq))
-        key = *places, len(motion), tuple(self.body.gravity.tolist()), self.quasi_static
+        key = self._key(motion)
         if key not in self.regressors:
             used = sum(one.columns.nbytes for one in self.regressors.values())
             # memory of the cached regressors [bytes]; further regressors are not kept
@@ -72,8 +71,15 @@ class _Memoized(ArmModel):
             self.regressors[key] = _Regressor(motion, regressor(self.body, self.felt(motion)))
         return self.regressors[key]
 
+    def _key(self, motion: Motion) -> tuple[object, ...]:
+        places = (array.ctypes.data for array in (motion.q, motion.dq, motion.ddq))
+        return *places, len(motion), tuple(self.body.gravity.tolist()), self.quasi_static
+
     def load(self, motion: Motion) -> FloatArray:
         """Return the torque of the rigid body along a motion of the links, (N, n) [N m]."""
+        known = self.regressors.get(self._key(motion))
+        if known is not None:
+            return known.columns @ self.body.rigid_parameters
         return np.array(self._once('load', motion, super().load))
 
     def body_columns(self, motion: Motion) -> FloatArray:

@@ -160,9 +160,10 @@ def diagnose(
             return _as_diagnosis(tied, notes, explainer, doubt, given)
     chosen = explainer.chosen()
     result = _as_diagnosis(chosen, notes, explainer, doubt, given)
-    return _diagnose_span(
-        result, chosen, explainer, (recordings, validate, baseline)
-    ) or _each_alone(result, ([*recordings, *validate], baseline), used, explainer)
+    if _hardly_explained(result, settings):
+        timed = _of_spans(chosen, explainer, recordings, validate, notes, doubt)
+        result = timed or result
+    return _each_alone(result, ([*recordings, *validate], baseline), used, explainer)
 
 
 def _hardly_explained(result: Diagnosis, settings: DiagnosisSettings) -> bool:
@@ -171,43 +172,39 @@ def _hardly_explained(result: Diagnosis, settings: DiagnosisSettings) -> bool:
     return result.verdict in OPEN or largest <= settings.thresholds.open_share
 
 
-def _diagnose_span(
-    result: Diagnosis,
+def _of_spans(
     chosen: Chosen,
     explainer: Explainer,
-    read: tuple[Sequence[Recording], Sequence[Recording], Sequence[Recording]],
+    recordings: Sequence[Recording],
+    validate: Sequence[Recording],
+    notes: Sequence[str],
+    doubt: str,
 ) -> Diagnosis | None:
     """Diagnose only the time span in which a cause acts; None if no cause explains that gap."""
-    settings, look = explainer.settings, chosen.look
-    recordings, validate, baseline = read
-    if not settings.spans or look is None or not _hardly_explained(result, settings):
+    settings, arm, prepared = explainer.settings, explainer.arm, explainer.prepared
+    spans = () if chosen.look is None else acting_spans(chosen.look, settings.thresholds)
+    if all(one.whole for one in spans):
         return None
-    spans = acting_spans(look, settings.thresholds)
     timed = [*recordings, *validate][: len(spans)]
     cut = [_cropped(*each) for each in zip(spans, timed, strict=True)]
-    shorter, unseen = (
-        [one for one in part if one is not None]
-        for part in (cut[: len(recordings)], cut[len(recordings) :])
-    )
-    if not shorter or all(one.whole for one in spans):
+    count = len(recordings)
+    shorter, held_out = ([x for x in part if x is not None] for part in (cut[:count], cut[count:]))
+    if not shorter:
         return None
     try:
-        found = diagnose(
-            plain_arm(explainer.arm),
-            shorter,
-            validate=unseen,
-            baseline=baseline,
-            misfit=explainer.misfit,
-            settings=replace(settings, spans=False),
-            rng=explainer.rng,
-            progress=explainer.tell,
+        data, unseen = (
+            trajectories(part, prepared.used, arm, prepared.allowed)
+            for part in (shorter, held_out)
         )
     except IdentificationError:  # too short for the filters, or without motion
         return None
+    by_misfit = explainer.baseline is not None
+    prepared = prepare(arm, prepared.used, data, settings, explainer.rng, by_misfit)
+    within = replace(explainer, prepared=prepared, unseen=unseen)
+    untimed = () if len(timed) == len(recordings) + len(validate) else (_NOT_TIMED,)
+    found = _as_diagnosis(within.chosen(), (*notes, *untimed), within, doubt, plain_arm(arm))
     if _hardly_explained(found, settings):
         return None
-    if len(timed) < len(recordings) + len(validate):
-        found = replace(found, notes=(*found.notes, _NOT_TIMED))
     return found.acting_in([one for one in spans if one.stop > one.start])
 
 

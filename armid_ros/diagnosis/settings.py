@@ -104,8 +104,6 @@ class DiagnosisSettings:
         Share of a joint's rms torque below which a cause is not material [-].
     everything : bool
         Whether causes that are not material are added to the patched model as well.
-    spans : bool
-        Whether causes that act part of the time are compared if a gap remains.
     prior : mapping of str to str
         Frequency of effects on this arm, by name: often, usual, seldom or never.
     thresholds : Thresholds
@@ -126,7 +124,6 @@ class DiagnosisSettings:
     signals: SignalSettings = field(default_factory=SignalSettings)
     material: float = 0.01
     everything: bool = False
-    spans: bool = True
     prior: Mapping[str, str] = field(default_factory=dict)
     thresholds: Thresholds = field(default_factory=Thresholds)
 

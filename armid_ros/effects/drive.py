@@ -92,8 +92,10 @@ class TorqueRipple(Effect):
     def columns(self, motion: Motion, arm: Arm) -> FloatArray:
         """Return dtau/d(A, B) = (sin(n q), cos(n q)) [-], shape (N, n, P)."""
         (order,) = self.shape_over_joints(arm.robot)
-        angle = order * motion.q
-        return joint_columns(self, motion, np.sin(angle), np.cos(angle))
+        own, (sine, cosine) = list(self.indices(motion.joints)), np.zeros((2, *motion.q.shape))
+        angle = order[own] * motion.q[:, own]
+        sine[:, own], cosine[:, own] = np.sin(angle), np.cos(angle)
+        return joint_columns(self, motion, sine, cosine)
 
     def action(self, values: FloatArray, arm: Arm) -> Action:
         """Return an action with the ripple torque."""

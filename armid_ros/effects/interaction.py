@@ -182,21 +182,18 @@ class InterfaceSlack(Attached):
         weight = unexplained.weight[rows, :, np.newaxis]
         basis = np.linalg.qr((unexplained.beside[rows] * weight).reshape(weight.size, -1))[0]
 
-        def rest(values: FloatArray) -> FloatArray:
-            """Return values (M, n, A), weighted and orthogonal to `beside`, shape (M n, A)."""
-            flat = (values * weight).reshape(weight.size, -1)
-            return np.asarray(flat - basis @ (basis.T @ flat))
-
-        target = rest(unexplained.residual[rows, :, np.newaxis])[:, 0]
+        target = (unexplained.residual[rows, :, np.newaxis] * weight).ravel()
+        target -= basis @ (basis.T @ target)
         starts, frames = [], LinkFrames.of(arm.robot, unexplained.q[rows])
         for joint, shape in zip(self.joints, self.shape_values, strict=True):
-            places = frames.places(joint, shape[:3])
-            anchors, slacks = _proposals(places)
-            pairs = zip(anchors, slacks, strict=True)
-            pulls = [extension(places - anchor, slack) for anchor, slack in pairs]
-            straps = np.stack([frames.torques(joint, places, pull) for pull in pulls], axis=2)
-            columns = rest(straps)
-            own, aim = np.sum(columns**2, axis=0), columns.T @ target
+            positions, jacobians = frames.points((joint,), shape[np.newaxis, :3])
+            anchors, slacks = _proposals(positions[:, 0])
+            pulls = extension(positions - anchors, slacks)
+            straps = jacobians[:, 0].swapaxes(1, 2) @ pulls.swapaxes(1, 2)
+            columns = (straps * weight).reshape(weight.size, -1)
+            # squares and products of the parts of the columns beyond `beside`
+            own = np.sum(columns**2, axis=0) - np.sum((basis.T @ columns) ** 2, axis=0)
+            aim = columns.T @ target
             gain = np.maximum(aim, 0.0) ** 2 / np.maximum(own, max(1e-12 * own.max(), 1e-300))
             best = np.argsort(-gain)[:2]  # both kinds become candidate causes
             starts.append([(*shape[:3], *anchors[k], slacks[k]) for k in best])

@@ -6,6 +6,7 @@ from __future__ import annotations
 
 from abc import abstractmethod
 from dataclasses import dataclass, replace
+from functools import lru_cache
 
 from armid_ros.effects.base import Arm
 from armid_ros.effects.layout import joint_columns
@@ -166,7 +167,12 @@ def within_band(motion: Motion, x: FloatArray) -> FloatArray:
     rate = (len(motion) - 1) / float(motion.t[-1] - motion.t[0])
     if motion.band_hz >= 0.5 * rate:
         return x
-    return np.asarray(sosfiltfilt(butter(3, motion.band_hz, fs=rate, output='sos'), x, axis=0))
+    return np.asarray(sosfiltfilt(_sections(motion.band_hz, rate), x, axis=0))
+
+
+@lru_cache(maxsize=64)
+def _sections(band_hz: float, rate_hz: float) -> FloatArray:
+    return np.asarray(butter(3, band_hz, fs=rate_hz, output='sos'))
 
 
 def smoothed(motion: Motion) -> Motion:

@@ -293,9 +293,9 @@ def cause_of(
         prior,
         tuple(joints),
         tuple(weighted),
-        tuple(products),
-        tuple(squares),
-        tuple(aim),
+        np.array(products),
+        np.array(squares),
+        np.array(aim),
         np.zeros((len(nuisance.rows.torque), len(unit))) if torque is None else torque,
     )
 

@@ -34,8 +34,9 @@ class Cause:
         The t joints on which the cause acts.
     columns : tuple of ndarray, each (t, M, p)
         Weighted columns in each recording.
-    products, own, aim : tuple of ndarray, each (q, p), (p, p), (p,)
-        Products of `columns` with the nuisance columns, with themselves, and with the residual.
+    products, own, aim : ndarray, shape (K, q, p), (K, p, p), (K, p)
+        Products of `columns` with the nuisance columns, with themselves, and with the residual, in
+        each of K recordings.
     torque : ndarray, shape (n, p)
         Root mean square torque per unit of each value on the diagnosed day [N m].
     shapes : int
@@ -49,9 +50,9 @@ class Cause:
     prior: float
     joints: tuple[int, ...]
     columns: tuple[FloatArray, ...]
-    products: tuple[FloatArray, ...]
-    own: tuple[FloatArray, ...]
-    aim: tuple[FloatArray, ...]
+    products: FloatArray
+    own: FloatArray
+    aim: FloatArray
     torque: FloatArray
     shapes: int = 1
 
@@ -79,9 +80,9 @@ class Cause:
             unit=self.unit[values],
             prior=self.prior - float(np.log(shapes)),
             columns=tuple(x[:, :, values] for x in self.columns),
-            products=tuple(x[:, values] for x in self.products),
-            own=tuple(x[np.ix_(values, values)] for x in self.own),
-            aim=tuple(x[values] for x in self.aim),
+            products=self.products[:, :, values],
+            own=self.own[:, values[:, np.newaxis], values],
+            aim=self.aim[:, values],
             torque=self.torque[:, values],
             shapes=shapes,
         )
@@ -90,16 +91,17 @@ class Cause:
         """Return the cause with `aim` recomputed for another residual, (n, M) per recording."""
         joints = list(self.joints)
         pairs = zip(self.columns, residual, strict=True)
-        aim = tuple(np.einsum('tmp,tm->p', x, y[joints]) for x, y in pairs)
-        return replace(self, aim=aim)
+        aim = [np.einsum('tmp,tm->p', x, y[joints]) for x, y in pairs]
+        return replace(self, aim=np.array(aim))
 
-    def products_with(self, other: Cause, recording: int) -> FloatArray:
-        """Return products of the columns with those of another cause, (p, p')."""
-        total = np.zeros((len(self.unit), len(other.unit)))
+    def products_with(self, other: Cause) -> FloatArray:
+        """Return products of the columns with those of another cause, (K, p, p')."""
+        total = np.zeros((len(self.columns), len(self.unit), len(other.unit)))
         for k, joint in enumerate(self.joints):
             if joint in other.joints:
-                theirs = other.columns[recording][other.joints.index(joint)]
-                total += self.columns[recording][k].T @ theirs
+                theirs = other.joints.index(joint)
+                for own, x, y in zip(total, self.columns, other.columns, strict=True):
+                    own += x[k].T @ y[theirs]
         return total
 
 

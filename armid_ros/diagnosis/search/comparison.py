@@ -23,6 +23,7 @@ from armid_ros.diagnosis.search.odds import (
     IMPOSSIBLE,
     odds,
     OWN_SPREADS,
+    unbounded_odds,
     usual_spread,
 )
 from armid_ros.diagnosis.search.priors import UNLISTED
@@ -241,9 +242,11 @@ class CauseComparison:
         """Compare every cause that is not accepted yet, and refine the shapes of the best."""
         settings, likeliest = self._settings(nuisance), self._likeliest(nuisance)
         tried = settings if len(settings) == 1 else _leading_settings(settings)
+        causes = self._causes_of(nuisance)
         each = [
-            (odds(cause, nuisance, one, bounded=False), cause, one)
-            for cause, one in product(self._causes_of(nuisance), tried)
+            (fit, cause, one)
+            for one in tried
+            for cause, fit in unbounded_odds(causes, nuisance, one)
         ]
         each.sort(key=lambda one: -(one[0].factor + one[2].evidence + one[1].prior))
         first: dict[object, tuple[float, Cause, Marginal]] = {}
@@ -323,10 +326,14 @@ def settings_of_baseline(nuisance: Nuisance) -> tuple[Setting, ...]:
     before = np.flatnonzero(~nuisance.rows.today).tolist()
     lasting = 1.0
     for _ in range(2):
-        tried = (
-            nuisance.marginal(Setting(1.0, shared, own, noise, lasting), before)
-            for shared, own, noise in product(_SHARED, _OWN, _NOISE)
-        )
+        tried = list[Marginal]()
+        priors = [(x, *nuisance.prior(Setting(1.0, x, 0.0, 1.0, lasting))) for x in _SHARED]
+        for own, noise in product(_OWN, _NOISE):
+            setting = Setting(1.0, _SHARED[0], own, noise, lasting)
+            likelihood = nuisance.likelihood(setting, priors[0][1], before)
+            for shared, used, prior in priors:
+                one = replace(setting, shared=shared)
+                tried.append(Marginal.of(one, used, prior, *likelihood))
         found = max(tried, key=lambda one: one.evidence)
         lasting = nuisance.lasting(found, before, LASTING)
     return (replace(found.setting, lasting=lasting),)

@@ -25,7 +25,7 @@ from armid_ros.diagnosis.data.baseline import described_precision, excited
 from armid_ros.diagnosis.data.days import Rows
 from armid_ros.diagnosis.data.discrepancy import discrepancy_columns
 from armid_ros.diagnosis.search.cause import Cause, CauseTerm
-from armid_ros.diagnosis.search.setting import Marginal, MotionDiscrepancy, Setting
+from armid_ros.diagnosis.search.setting import LogDensity, Marginal, MotionDiscrepancy, Setting
 from armid_ros.model import BaseParameters
 from armid_ros.motion import FloatArray
 import numpy as np
@@ -64,8 +64,8 @@ class Nuisance:
         Weighted columns of each recording: body, and the discrepancy of one joint after the other.
     residual : tuple of ndarray, each (n, M)
         Weighted residual of the model.
-    fixed : tuple of (ndarray, shape (q, q), ndarray, shape (q,))
-        Products of these columns with each other and with the residual.
+    fixed : (ndarray, shape (K, q, q), ndarray, shape (K, q))
+        Products of these columns with each other and with the residual, in each recording.
     accepted : tuple of CauseTerm
         Accepted causes.
 
@@ -79,7 +79,7 @@ class Nuisance:
     open: npt.NDArray[np.bool_]
     columns: tuple[FloatArray, ...]
     residual: tuple[FloatArray, ...]
-    fixed: tuple[tuple[FloatArray, FloatArray], ...]
+    fixed: tuple[FloatArray, FloatArray]
     accepted: tuple[CauseTerm, ...] = ()
 
     @classmethod
@@ -143,7 +143,7 @@ class Nuisance:
             unset,
             tuple(weighted),
             tuple(residual),
-            tuple((x.T @ x, x.T @ y) for x, y in pairs),
+            (np.array([x.T @ x for x, _ in pairs]), np.array([x.T @ y for x, y in pairs])),
         )
 
     @property
@@ -168,43 +168,45 @@ class Nuisance:
         ]
 
     @cached_property
-    def count(self) -> list[int]:
-        """Return the number of informative entries of each recording."""
+    def count(self) -> npt.NDArray[np.intp]:
+        """Return the number of informative entries of each recording, (K,)."""
         seen = [(w > 0.0)[:, :, np.newaxis].astype(float) for w in self.rows.weight]
         joints = range(len(self.columns[0]))
-        return [int(np.count_nonzero(x)) for x in self.rows.weighted(seen, joints)]
+        return np.array([np.count_nonzero(x) for x in self.rows.weighted(seen, joints)])
 
     @cached_property
-    def square(self) -> list[FloatArray]:
-        """Products of the columns of each recording; columns of accepted causes are last."""
-        found = []
-        for k, (fixed, _) in enumerate(self.fixed):
-            parts = [float(one.acts[k]) * one.cause.products[k] for one in self.accepted]
-            border = np.concatenate([np.zeros((len(fixed), 0)), *parts], axis=1)
-            own = [float(one.acts[k]) * self.among_accepted(one.cause, k) for one in self.accepted]
-            within = np.concatenate(own, axis=1) if own else np.zeros((0, 0))
-            found.append(np.block([[fixed, border], [border.T, within]]))
-        return found
-
-    @cached_property
-    def cross(self) -> list[FloatArray]:
-        """Products of the columns of each recording with its residual, (q + a,) each."""
-        found = []
-        for k, (_, fixed) in enumerate(self.fixed):
-            aims = [one.cause.aim[k] * one.acts[k] for one in self.accepted]
-            found.append(np.concatenate([fixed, *aims]))
-        return found
-
-    def among_accepted(self, cause: Cause, k: int) -> FloatArray:
-        """Return the cross products of accepted causes with a cause, (a, p)."""
-        parts = [float(one.acts[k]) * one.cause.products_with(cause, k) for one in self.accepted]
-        return np.concatenate([np.zeros((0, len(cause.unit))), *parts])
-
-    def products(self, cause: Cause, k: int) -> FloatArray:
-        """Return the cross products of all columns of a recording with a cause, (q + a, p)."""
+    def square(self) -> FloatArray:
+        """Products of all columns of each recording, (K, q + a, q + a); causes are last."""
         if not self.accepted:
-            return cause.products[k]
-        return np.concatenate([cause.products[k], self.among_accepted(cause, k)])
+            return self.fixed[0]
+        acts = [one.acts[:, np.newaxis, np.newaxis].astype(float) for one in self.accepted]
+        pairs = list(zip(acts, (one.cause for one in self.accepted), strict=True))
+        border = np.concatenate([act * cause.products for act, cause in pairs], axis=2)
+        within = np.concatenate([act * self._among_accepted(x) for act, x in pairs], axis=2)
+        below = np.concatenate([border.swapaxes(1, 2), within], axis=2)
+        return np.concatenate([np.concatenate([self.fixed[0], border], axis=2), below], axis=1)
+
+    @cached_property
+    def cross(self) -> FloatArray:
+        """Products of all columns of each recording with its residual, (K, q + a)."""
+        aims = [one.cause.aim * one.acts[:, np.newaxis] for one in self.accepted]
+        return np.concatenate([self.fixed[1], *aims], axis=1)
+
+    @cached_property
+    def power(self) -> FloatArray:
+        """Sum of squares of the weighted residual of each recording, (K,)."""
+        return np.array([np.sum(own**2) for own in self.residual])
+
+    def _among_accepted(self, cause: Cause) -> FloatArray:
+        """Return the cross products of accepted causes with a cause, (K, a, p)."""
+        pairs = [(one.acts[:, np.newaxis, np.newaxis], one.cause) for one in self.accepted]
+        return np.concatenate([act * one.products_with(cause) for act, one in pairs], axis=1)
+
+    def products(self, cause: Cause) -> FloatArray:
+        """Return the cross products of all columns with a cause, (K, q + a, p)."""
+        if not self.accepted:
+            return cause.products
+        return np.concatenate([cause.products, self._among_accepted(cause)], axis=1)
 
     def and_cause(
         self,
@@ -224,10 +226,12 @@ class Nuisance:
 
     def with_residual(self, residual: Sequence[FloatArray]) -> Nuisance:
         """Return the nuisance with another weighted residual, (n, M) of each recording."""
-        pairs = zip(self.fixed, self.columns, residual, strict=True)
-        fixed = tuple((own, x.reshape(-1, x.shape[2]).T @ y.ravel()) for (own, _), x, y in pairs)
-        accepted = [replace(one, cause=one.cause.aimed_at(residual)) for one in self.accepted]
-        return replace(self, residual=tuple(residual), fixed=fixed, accepted=tuple(accepted))
+        pairs = zip(self.columns, residual, strict=True)
+        aims = np.array([x.reshape(-1, x.shape[2]).T @ y.ravel() for x, y in pairs])
+        accepted = tuple(replace(one, cause=one.cause.aimed_at(residual)) for one in self.accepted)
+        return replace(
+            self, residual=tuple(residual), fixed=(self.fixed[0], aims), accepted=accepted
+        )
 
     @property
     def spans(self) -> list[slice]:
@@ -258,8 +262,8 @@ class Nuisance:
             more = np.sqrt(np.where(now > 0.0, now / then, 1.0))
         return np.asarray(np.clip(more, 1.0, most[:, np.newaxis]))
 
-    def _precision(self, setting: Setting) -> tuple[FloatArray, npt.NDArray[np.intp]]:
-        """Return the prior precision of the fitted parameters, and their indices."""
+    def prior(self, setting: Setting) -> tuple[npt.NDArray[np.intp], LogDensity]:
+        """Return the indices of the fitted parameters, and their prior."""
         unit = self.rows.amplitude[0]
         rigid = self.base.independent < len(self.arm.robot.rigid_parameters)
         scale = np.where(rigid, setting.body or 1.0, 1.0)
@@ -269,11 +273,17 @@ class Nuisance:
         shared = size.ravel() ** -2.0
         more = [one.prior[0] for one in self.accepted]
         whole = linalg.block_diag(body, np.diag(shared), *more)
-        used = np.ones(len(whole), dtype=bool)
-        used[: self.rank] = (setting.body > 0.0) | self.open
-        used[self.discrepancy.ravel()] = setting.shared > 0.0
-        kept = np.flatnonzero(used)
-        return whole[np.ix_(kept, kept)], kept
+        fitted = np.ones(len(whole), dtype=bool)
+        fitted[: self.rank] = (setting.body > 0.0) | self.open
+        fitted[self.discrepancy.ravel()] = setting.shared > 0.0
+        used = np.flatnonzero(fitted)
+        matrix = whole[np.ix_(used, used)]
+        means = np.zeros(len(whole))
+        for one, span in zip(self.accepted, self.spans, strict=True):
+            means[span] = one.prior[1]
+        normaliser = 0.5 * float(np.linalg.slogdet(matrix)[1]) + setting.prior
+        loss = sum(one.prior[2] for one in self.accepted)
+        return used, LogDensity(matrix, means[used], normaliser, loss)
 
     def rows_of(self, k: int) -> FloatArray:
         """Return the weighted columns of all parameters in a recording, (M, n, q + a)."""
@@ -305,71 +315,60 @@ class Nuisance:
             A recording, with columns and residual of those of its rows that are left out.
 
         """
-        whole, kept = self._precision(setting)
-        evidence = 0.5 * np.linalg.slogdet(whole)[1] + setting.prior
-        scale, loss = setting.precision, sum(one.prior[2] for one in self.accepted)
-        means = np.zeros(len(self.cross[0]))
-        for one, span in zip(self.accepted, self.spans, strict=True):
-            means[span] = one.prior[1]
-        aim = means[kept]
-        motions = dict[int, MotionDiscrepancy]()
-        for k in range(len(self.columns)) if among is None else among:
-            square, cross, count = self.square[k], self.cross[k], self.count[k]
-            power = float(np.sum(self.residual[k] ** 2)) * scale
-            if less is not None and less[0] == k:
-                _, x, y = less
-                square, cross, count = square - x.T @ x, cross - x.T @ y, count - len(y)
-                power -= float(y @ y) * scale
-            own, to = square[np.ix_(kept, kept)] * scale, cross[kept] * scale
-            if setting.own:
-                size = setting.own * self.rows.amplitude[k]
-                motion, log_size = self._motion(square, cross, kept, scale, size)
-                border = square[np.ix_(self.discrepancy.ravel(), kept)]
-                own = own - scale * border.T @ motion.regressed
-                to = to - motion.regressed.T @ motion.aim.ravel()
-                made = np.einsum('jf,jfg,jg->', motion.aim, motion.inverse, motion.aim)
-                power, evidence = power - float(made), evidence + log_size
-                motions[k] = motion
-            whole, aim = whole + own, aim + to
-            loss += 0.5 * power
-            evidence -= count / setting.lasting * np.log(setting.noise)
-        lower = np.linalg.cholesky(whole)
-        root = linalg.solve_triangular(lower, np.eye(len(kept)), lower=True)
-        values = root.T @ (root @ aim)
-        loss -= 0.5 * float(aim @ values)
-        evidence -= loss + float(np.sum(np.log(np.diag(lower))))
-        return Marginal(setting, kept, root, values, float(evidence), loss, motions)
+        used, prior = self.prior(setting)
+        return Marginal.of(setting, used, prior, *self.likelihood(setting, used, among, less))
 
-    def _motion(
+    def likelihood(
         self,
-        square: FloatArray,
-        cross: FloatArray,
-        kept: npt.NDArray[np.intp],
-        scale: float,
-        size: FloatArray,
-    ) -> tuple[MotionDiscrepancy, float]:
-        """Marginalise d_k with prior amplitude (n,); return d_k and the log of the integral."""
-        place, functions = self.discrepancy, self.discrepancy.shape[1]
-        own = square[place[:, :, np.newaxis], place[:, np.newaxis, :]] * scale
-        held = own + np.eye(functions) * size[:, np.newaxis, np.newaxis] ** -2.0
-        inverse = np.linalg.inv(held)
-        border = square[np.ix_(place.ravel(), kept)] * scale
-        regressed = (inverse @ border.reshape(*place.shape, -1)).reshape(place.size, -1)
-        log_size = 0.5 * np.linalg.slogdet(held)[1].sum() + functions * np.log(size).sum()
-        return MotionDiscrepancy(np.asarray(inverse), cross[place] * scale, regressed), -float(
-            log_size
+        setting: Setting,
+        used: npt.NDArray[np.intp],
+        among: Sequence[int] | None = None,
+        less: tuple[int, FloatArray, FloatArray] | None = None,
+    ) -> tuple[LogDensity, MotionDiscrepancy | None]:
+        """Return the likelihood of the parameters `used`; see `marginal`."""
+        fitted = list(range(len(self.columns)) if among is None else among)
+        square, cross, count = (
+            self.square[fitted],
+            self.cross[fitted],
+            int(self.count[fitted].sum()),
         )
+        scale, power = setting.precision, float(self.power[fitted].sum())
+        if less is not None:
+            k, x, y = less
+            square[fitted.index(k)] -= x.T @ x
+            cross[fitted.index(k)] -= x.T @ y
+            count, power = count - len(y), power - float(y @ y)
+        matrix = square.sum(axis=0)[np.ix_(used, used)] * scale
+        vector = cross.sum(axis=0)[used] * scale
+        normaliser, loss = -count / setting.lasting * np.log(setting.noise), 0.5 * power * scale
+        if not setting.own:
+            return LogDensity(matrix, vector, normaliser, loss), None
+        place, functions = self.discrepancy, self.discrepancy.shape[1]
+        size = setting.own * np.array(self.rows.amplitude)[fitted]
+        held = square[:, place[:, :, np.newaxis], place[:, np.newaxis, :]] * scale
+        held += np.eye(functions) * size[:, :, np.newaxis, np.newaxis] ** -2.0
+        covariance = np.asarray(np.linalg.inv(held))
+        border = square[:, place.ravel()][:, :, used] * scale
+        regressed = (covariance @ border.reshape(*held.shape[:3], -1)).reshape(border.shape)
+        aim = cross[:, place] * scale
+        matrix -= border.reshape(-1, len(used)).T @ regressed.reshape(-1, len(used))
+        vector -= aim.ravel() @ regressed.reshape(-1, len(used))
+        loss -= 0.5 * float(np.einsum('kjf,kjfg,kjg->', aim, covariance, aim))
+        normaliser -= 0.5 * float(np.linalg.slogdet(held)[1].sum())
+        normaliser -= functions * float(np.log(size).sum())
+        motion = MotionDiscrepancy(covariance, aim, regressed)
+        return LogDensity(matrix, vector, normaliser, loss), motion
 
     def whole(self, under: Marginal) -> tuple[FloatArray, FloatArray]:
         """Return the means of all parameters and their covariance; zero where not fitted."""
-        size = len(self.cross[0])
+        size = self.cross.shape[1]
         covariance = np.zeros((size, size))
         covariance[np.ix_(under.used, under.used)] = under.root.T @ under.root
         return self.means(under), covariance
 
     def means(self, under: Marginal) -> FloatArray:
         """Return the means of all parameters under a setting; zero where not fitted."""
-        values = np.zeros(len(self.cross[0]))
+        values = np.zeros(self.cross.shape[1])
         values[under.used] = under.values
         return values
 

@@ -71,17 +71,17 @@ class CauseFit:
 @dataclass(frozen=True)
 class CauseInformation:
     """
-    Information on the values of a cause, per group of recordings, in its unit.
+    Information on the values of causes, per group of recordings, in their units.
 
     Attributes
     ----------
-    matrix : ndarray, shape (G p, G p)
-        Precision of the values in each group.
-    vector : ndarray, shape (G p,)
+    matrix : ndarray, shape (..., G p, G p)
+        Precision of the values in each group; for several causes, one after the other.
+    vector : ndarray, shape (..., G p)
         Matrix times mean.
     today : ndarray of bool, shape (G,)
         Whether each group is of the diagnosed day.
-    visible : float
+    visible : ndarray, shape (...)
         Share of the length of the columns that the nuisance columns cannot reproduce.
 
     """
@@ -89,82 +89,104 @@ class CauseInformation:
     matrix: FloatArray
     vector: FloatArray
     today: npt.NDArray[np.bool_]
-    visible: float
+    visible: FloatArray
 
     @classmethod
     def of(
         cls, cause: Cause, nuisance: Nuisance, under: Marginal, by_day: bool = False
     ) -> CauseInformation:
         """Return the information per recording or day; nuisance parameters are integrated out."""
-        today = nuisance.rows.today
-        groups = [[k] for k in range(len(today))]
-        if by_day:
-            days = (np.flatnonzero(~today).tolist(), np.flatnonzero(today).tolist())
-            groups = [day for day in days if day]
-        size, p, scale = len(groups), len(cause.unit), under.setting.precision
-        border = np.zeros((len(under.used), size, p))
-        own, aim = np.zeros((size, p, size, p)), np.zeros((size, p))
-        for g, group in enumerate(groups):
-            for k in group:
-                products = nuisance.products(cause, k) * scale
-                border[:, g] += products[under.used]
-                own[g, :, g] += cause.own[k] * scale
-                aim[g] += cause.aim[k] * scale
-                if k in under.motions:
-                    motion, place = under.motions[k], nuisance.discrepancy
-                    made = products[place]
-                    flat = made.reshape(-1, p)
-                    solved = motion.inverse @ made
-                    border[:, g] -= motion.regressed.T @ flat
-                    own[g, :, g] -= flat.T @ solved.reshape(-1, p)
-                    aim[g] -= motion.aim.ravel() @ solved.reshape(-1, p)
-        flat = border.reshape(len(border), size * p)
-        fitted = under.root @ flat
-        unit = np.tile(cause.unit, size)
-        square = own.reshape(size * p, size * p)
-        whole = (square - fitted.T @ fitted) * np.outer(unit, unit)
-        length = np.diag(square) * unit**2
-        seen = float(np.trace(whole)) / max(
-            float(sum(np.trace(x) for x in cause.own)) * scale, 1e-300
+        found = cls.of_all([cause], nuisance, under, by_day)
+        return replace(
+            found, matrix=found.matrix[0], vector=found.vector[0], visible=found.visible[0]
         )
+
+    @classmethod
+    def of_all(
+        cls, causes: Sequence[Cause], nuisance: Nuisance, under: Marginal, by_day: bool = False
+    ) -> CauseInformation:
+        """Return the information on C causes with the same number of values."""
+        today, scale = nuisance.rows.today, under.setting.precision
+        count, recordings, p = len(causes), len(today), len(causes[0].unit)
+        first = np.unique([0, nuisance.rows.before]) if by_day else np.arange(recordings)
+        products = np.concatenate([nuisance.products(one) for one in causes], axis=2) * scale
+        own = np.array([one.own for one in causes]) * scale
+        aim = np.array([one.aim for one in causes]) * scale
+        total = np.trace(own, axis1=2, axis2=3).sum(axis=1)
+        border = products[:, under.used]
+        if under.motion is not None:
+            motion, made = under.motion, products[:, nuisance.discrepancy]
+            flat = made.reshape(recordings, -1, count * p)
+            solved = (motion.covariance @ made).reshape(flat.shape)
+            border -= motion.regressed.swapaxes(1, 2) @ flat
+            regressed = motion.aim.reshape(recordings, 1, -1) @ solved
+            aim -= regressed.reshape(recordings, count, p).swapaxes(0, 1)
+            left, right = (
+                x.reshape(recordings, -1, count, p).transpose(2, 0, 1, 3) for x in (flat, solved)
+            )
+            own -= left.swapaxes(2, 3) @ right
+        border = np.add.reduceat(border, first, axis=0)
+        own, aim = (np.add.reduceat(x, first, axis=1) for x in (own, aim))
+        size = len(first) * p
+        by_cause = border.reshape(len(first), -1, count, p).transpose(2, 1, 0, 3)
+        border = by_cause.reshape(count, -1, size)
+        fitted = under.root @ border
+        unit = np.tile([one.unit for one in causes], len(first))
+        square = _block_diagonal(own)
+        whole = square - fitted.swapaxes(1, 2) @ fitted
+        whole *= unit[:, :, np.newaxis] * unit[:, np.newaxis]
+        length = np.diagonal(square, axis1=1, axis2=2) * unit**2
+        seen = np.trace(whole, axis1=1, axis2=2) / np.maximum(total, 1e-300)
+        held = np.eye(size) * (_ROUNDING * length + 1e-12)[:, np.newaxis]
         return cls(
-            0.5 * (whole + whole.T) + np.diag(_ROUNDING * length + 1e-12),
-            (aim.ravel() - flat.T @ under.values) * unit,
-            np.array([bool(today[group[0]]) for group in groups]),
-            float(np.sqrt(np.clip(seen, 0.0, 1.0))),
+            0.5 * (whole + whole.swapaxes(1, 2)) + held,
+            (aim.reshape(count, size) - under.values @ border) * unit,
+            today[first],
+            np.sqrt(np.clip(seen, 0.0, 1.0)),
         )
 
     @property
     def size(self) -> int:
-        """Return the number of values of the cause."""
-        return len(self.vector) // len(self.today)
+        """Return the number of values of a cause."""
+        return int(self.vector.shape[-1]) // len(self.today)
 
     def of_day(self, today: bool) -> CauseInformation:
         """Return the information of one day: the diagnosed day or the baseline."""
         of_it = self.today == today
-        kept = np.flatnonzero(np.repeat(of_it, self.size))
-        matrix = self.matrix[np.ix_(kept, kept)]
-        return replace(self, matrix=matrix, vector=self.vector[kept], today=self.today[of_it])
+        found = self._at(np.flatnonzero(np.repeat(of_it, self.size)))
+        return replace(found, today=self.today[of_it])
 
     def among(self, values: npt.NDArray[np.intp]) -> CauseInformation:
         """Return the information on some of the values, while the others are zero."""
-        kept = np.add.outer(self.size * np.arange(len(self.today)), values).ravel()
-        return replace(self, matrix=self.matrix[np.ix_(kept, kept)], vector=self.vector[kept])
+        return self._at(np.add.outer(self.size * np.arange(len(self.today)), values).ravel())
+
+    def _at(self, kept: npt.NDArray[np.intp]) -> CauseInformation:
+        matrix = self.matrix[..., kept[:, np.newaxis], kept]
+        return replace(self, matrix=matrix, vector=self.vector[..., kept])
 
     def apart(self, spread: float) -> list[FloatArray]:
         """Return a root of the prior covariance of differences u_k, in a list; empty if none."""
         if not spread:
             return []
         p, groups = self.size, len(self.today)
-        blocks = self.matrix.reshape(groups, p, groups, p)
-        mean = np.mean([blocks[g, :, g] for g in range(groups)], axis=0)
-        size, axes = np.linalg.eigh(mean)
-        size = np.maximum(size, 1e-9 * max(float(size.max()), 1e-300))
-        return [np.kron(np.eye(groups), axes * np.sqrt(np.minimum(spread / size, THERE**2)))]
+        blocks = self.matrix.reshape(*self.matrix.shape[:-2], groups, p, groups, p)
+        size, axes = np.linalg.eigh(np.einsum('...gpgq->...pq', blocks) / groups)
+        size = np.maximum(size, 1e-9 * np.maximum(size.max(axis=-1, keepdims=True), 1e-300))
+        root = axes * np.sqrt(np.minimum(spread / size, THERE**2))[..., np.newaxis, :]
+        return [_block_diagonal(np.stack([root] * groups, axis=-3))]
 
     def there(self) -> FloatArray:
         """Return a root of the prior covariance of values that act on both days (g0)."""
         return np.tile(THERE * np.eye(self.size), (len(self.today), 1))
+
+
+def _block_diagonal(blocks: FloatArray) -> FloatArray:
+    """Return block-diagonal matrices (..., G p, G p) of blocks (..., G, p, p)."""
+    *shape, groups, p, _ = blocks.shape
+    whole = np.zeros((*shape, groups, p, groups, p))
+    for k in range(groups):
+        whole[..., k, :, k, :] = blocks[..., k, :, :]
+    return whole.reshape(*shape, groups * p, groups * p)
 
 
 def odds(
@@ -173,10 +195,11 @@ def odds(
     under: Marginal | CauseInformation,
     usual: float = 0.0,
     spreads: FloatArray = EQUAL,
-    bounded: bool = True,
 ) -> CauseFit:
     """
     Return the log Bayes factor of a cause and its posterior values.
+
+    Physically impossible values count against the cause; see `allowed`.
 
     Parameters
     ----------
@@ -190,54 +213,84 @@ def odds(
         The usual spread of values between recordings.
     spreads : ndarray, shape (k,)
         Spreads to average over.
-    bounded : bool
-        Whether physically impossible values count against the cause; see `allowed`.
 
     """
     known = under
     if isinstance(known, Marginal):
         known = CauseInformation.of(cause, nuisance, known, by_day=not spreads.any())
-    p, acts = known.size, cause.acts(known.today)
+    known = replace(known, matrix=known.matrix[np.newaxis], vector=known.vector[np.newaxis])
+    (fit,) = posteriors([cause], nuisance, known, usual, spreads)
+    return replace(fit, factor=fit.factor + allowed(cause, fit, nuisance))
+
+
+def unbounded_odds(
+    causes: Sequence[Cause], nuisance: Nuisance, under: Marginal
+) -> list[tuple[Cause, CauseFit]]:
+    """Return causes with their odds, in which physically impossible values do not count."""
+    alike: dict[tuple[int, bool], list[Cause]] = {}
+    for one in causes:
+        alike.setdefault((len(one.unit), one.effect.lasting), []).append(one)
+    found = list[tuple[Cause, CauseFit]]()
+    for group in alike.values():
+        known = CauseInformation.of_all(group, nuisance, under, by_day=True)
+        found += zip(group, posteriors(group, nuisance, known), strict=True)
+    return found
+
+
+def posteriors(
+    causes: Sequence[Cause],
+    nuisance: Nuisance,
+    known: CauseInformation,
+    usual: float = 0.0,
+    spreads: FloatArray = EQUAL,
+) -> list[CauseFit]:
+    """
+    Return the posteriors of causes without the limits of their values; see `odds`.
+
+    All causes have the same number of values and act on the same days.
+
+    """
+    count, p, acts = len(causes), known.size, causes[0].acts(known.today)
     there = [known.there()] if not np.all(acts) else []
     if nuisance.rows.unseen:
-        there = [np.tile(np.diag(_unseen(cause, nuisance)), (len(known.today), 1))]
+        largest = np.array([_unseen(cause, nuisance) for cause in causes])
+        there = [np.tile(np.eye(p) * largest[:, np.newaxis], (len(known.today), 1))]
     asked = np.kron(acts.astype(float)[:, np.newaxis], np.eye(p))
     prior = -0.5 * np.log((spreads + 1.0) / (usual + 1.0)) ** 2
     prior -= np.logaddexp.reduce(prior)
-    nothing, changed = prior.copy(), prior.copy()
-    best: tuple[float, int, FloatArray, FloatArray, FloatArray] | None = None
-    for n, spread in enumerate(spreads):
+    nothing, changed = np.tile(prior, (2, count, 1))
+    squares = SIZES[:, np.newaxis] ** 2
+    tried = list[tuple[FloatArray, ...]]()
+    for n, spread in enumerate(spreads.tolist()):
         square, aim = known.matrix, known.vector
         for root in [*known.apart(spread), *there]:
             square, aim, more = without(square, aim, root)
-            nothing[n] += more
-        own, to = asked.T @ square @ asked, asked.T @ aim
+            nothing[:, n] += more
+        own, to = asked.T @ square @ asked, aim @ asked
         value, axes = np.linalg.eigh(own)
-        wide = 1.0 + SIZES[:, np.newaxis] ** 2 * np.maximum(value, 0.0)
-        along = SIZES[:, np.newaxis] ** 2 * (axes.T @ to) ** 2
-        each = nothing[n] + 0.5 * np.sum(along / wide - np.log(wide), axis=1)
-        changed[n] = np.logaddexp.reduce(each) - np.log(len(SIZES))
-        if best is None or each.max() > best[0]:
-            best = (
-                float(each.max()),
-                int(np.argmax(each)),
-                own,
-                to,
-                0.5 * np.sum(along / wide, axis=1),
-            )
-    assert best is not None
-    # All values of a cause depend on the same misfit, so only recordings are independent.
+        wide = 1.0 + squares * np.maximum(value, 0.0)[:, np.newaxis]
+        along = squares * ((to[:, np.newaxis] @ axes) ** 2)
+        explained = 0.5 * np.sum(along / wide, axis=2)
+        each = nothing[:, n, np.newaxis] + explained - 0.5 * np.sum(np.log(wide), axis=2)
+        changed[:, n] = np.logaddexp.reduce(each, axis=1) - np.log(len(SIZES))
+        tried.append((each, explained, own, to))
+    # All values of a cause vary with one misfit, so only recordings are independent.
     weight = prior + (changed - prior) / p
-    weight -= np.logaddexp.reduce(weight)
-    factor = -float(np.logaddexp.reduce(weight + nothing - changed))
-    _, first, own, to, explained = best
-    size = float(SIZES[first])
-    covariance = np.linalg.inv(own + np.eye(p) / size**2)
-    values = covariance @ to * cause.unit
-    std = np.sqrt(np.diag(covariance)) * cause.unit
-    resolution = np.diag(covariance @ own)
-    fit = CauseFit(factor, float(explained[first]), size, values, std, resolution)
-    return replace(fit, factor=factor + allowed(cause, fit, nuisance)) if bounded else fit
+    weight -= np.logaddexp.reduce(weight, axis=1, keepdims=True)
+    factor = -np.logaddexp.reduce(weight + nothing - changed, axis=1)
+    every, parts, owns, aims = (np.array(x) for x in zip(*tried, strict=True))
+    best, rows = np.argmax(every.max(axis=2), axis=0), np.arange(count)
+    first = np.argmax(every[best, rows], axis=1)
+    own, to, size = owns[best, rows], aims[best, rows], SIZES[first]
+    covariance = np.linalg.inv(own + np.eye(p) / size[:, np.newaxis, np.newaxis] ** 2)
+    unit = np.array([cause.unit for cause in causes])
+    values = (covariance @ to[:, :, np.newaxis])[:, :, 0] * unit
+    std = np.sqrt(np.diagonal(covariance, axis1=1, axis2=2)) * unit
+    resolution = np.diagonal(covariance @ own, axis1=1, axis2=2)
+    explained = parts[best, rows, first]
+    numbers = zip(factor.tolist(), explained.tolist(), size.tolist(), strict=True)
+    arrays = zip(numbers, values, std, resolution, strict=True)
+    return [CauseFit(*three, *rest) for three, *rest in arrays]
 
 
 def _unseen(cause: Cause, nuisance: Nuisance) -> FloatArray:
@@ -282,7 +335,7 @@ def usual_spread(causes: Sequence[Cause], nuisance: Nuisance, under: Marginal) -
             square, aim, total = known.matrix, known.vector, 0.0
             for root in [*known.apart(spread), known.there()]:
                 square, aim, more = without(square, aim, root)
-                total += more
+                total += float(more)
             found.append(total / known.size)
         logs.append(np.log(_USUAL_SPREADS[int(np.argmax(found))] + 1.0))
     return float(np.exp(np.mean(logs)) - 1.0) if logs else POPULATION_SPREAD
@@ -290,11 +343,20 @@ def usual_spread(causes: Sequence[Cause], nuisance: Nuisance, under: Marginal) -
 
 def without(
     square: FloatArray, aim: FloatArray, root: FloatArray
-) -> tuple[FloatArray, FloatArray, float]:
-    """Marginalise values of covariance R R'; return the reduced equations and log evidence."""
+) -> tuple[FloatArray, FloatArray, FloatArray]:
+    """
+    Marginalise values of covariance R R'; return the reduced equations and log evidence.
+
+    Equations of several causes, (..., Gp, Gp) and (..., Gp), are reduced together.
+
+    """
     border = square @ root
-    inner = root.T @ border
-    lower = np.linalg.inv(np.linalg.cholesky(0.5 * (inner + inner.T) + np.eye(len(inner))))
-    x, y = lower @ border.T, lower @ (root.T @ aim)
-    gained = 0.5 * float(y @ y) + float(np.sum(np.log(np.diag(lower))))
-    return square - x.T @ x, aim - x.T @ y, gained
+    inner = root.swapaxes(-1, -2) @ border
+    inner = 0.5 * (inner + inner.swapaxes(-1, -2)) + np.eye(inner.shape[-1])
+    lower = np.linalg.inv(np.linalg.cholesky(inner))
+    x = lower @ border.swapaxes(-1, -2)
+    y = lower @ (root.swapaxes(-1, -2) @ aim[..., np.newaxis])
+    gained = 0.5 * np.sum(y[..., 0] ** 2, axis=-1)
+    gained += np.sum(np.log(np.diagonal(lower, axis1=-2, axis2=-1)), axis=-1)
+    turned = x.swapaxes(-1, -2)
+    return square - turned @ x, aim - (turned @ y)[..., 0], gained

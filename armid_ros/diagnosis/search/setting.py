@@ -5,10 +5,12 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import cached_property
 
 from armid_ros.motion import FloatArray
 import numpy as np
 import numpy.typing as npt
+from scipy import linalg
 
 #: Number of correlated rows that equal one independent row, without a baseline.
 LASTING = 2.0
@@ -50,11 +52,47 @@ class Setting:
 
 @dataclass(frozen=True)
 class MotionDiscrepancy:
-    """The marginalised discrepancy d_k of one recording; see `Nuisance.marginal`."""
+    """
+    The discrepancies d_k of K recordings, which are integrated out.
 
-    inverse: FloatArray
+    Attributes
+    ----------
+    covariance : ndarray, shape (K, n, f, f)
+        Their covariance, given all other parameters.
+    aim : ndarray, shape (K, n, f)
+        Products of their columns with the residual, over the variance of the noise.
+    regressed : ndarray, shape (K, n f, u)
+        Regression of their values on the fitted parameters.
+
+    """
+
+    covariance: FloatArray
     aim: FloatArray
     regressed: FloatArray
+
+
+@dataclass(frozen=True)
+class LogDensity:
+    """
+    Logarithm of a Gaussian density of the fitted parameters: a prior, or a likelihood.
+
+    Attributes
+    ----------
+    matrix : ndarray, shape (u, u)
+        Precision.
+    vector : ndarray, shape (u,)
+        Precision times mean.
+    normaliser : float
+        Logarithm of the density, without its exponent.
+    loss : float
+        Negative exponent where all parameters are zero.
+
+    """
+
+    matrix: FloatArray
+    vector: FloatArray
+    normaliser: float
+    loss: float
 
 
 @dataclass(frozen=True)
@@ -68,23 +106,46 @@ class Marginal:
         The setting.
     used : ndarray of int, shape (u,)
         Indices of the fitted parameters.
-    root : ndarray, shape (u, u)
-        Matrix R of the covariance R'R of the fitted parameters.
+    lower : ndarray, shape (u, u)
+        Cholesky factor of the precision of the fitted parameters.
     values : ndarray, shape (u,)
         Means of the fitted parameters.
     evidence : float
         Log evidence.
     loss : float
         Half of the remaining weighted squares.
-    motions : mapping of int to MotionDiscrepancy
-        The marginalised discrepancy d_k of each recording.
+    motion : MotionDiscrepancy or None
+        The discrepancies d_k of the fitted recordings; None if they are zero.
 
     """
 
     setting: Setting
     used: npt.NDArray[np.intp]
-    root: FloatArray
+    lower: FloatArray
     values: FloatArray
     evidence: float
     loss: float
-    motions: dict[int, MotionDiscrepancy]
+    motion: MotionDiscrepancy | None
+
+    @classmethod
+    def of(
+        cls,
+        setting: Setting,
+        used: npt.NDArray[np.intp],
+        prior: LogDensity,
+        likelihood: LogDensity,
+        motion: MotionDiscrepancy | None,
+    ) -> Marginal:
+        """Multiply prior and likelihood of the fitted parameters."""
+        vector = prior.vector + likelihood.vector
+        lower = np.asarray(np.linalg.cholesky(prior.matrix + likelihood.matrix))
+        values = linalg.cho_solve((lower, True), vector)
+        loss = prior.loss + likelihood.loss - 0.5 * float(vector @ values)
+        evidence = prior.normaliser + likelihood.normaliser - loss
+        evidence -= float(np.sum(np.log(np.diag(lower))))
+        return cls(setting, used, lower, values, evidence, loss, motion)
+
+    @cached_property
+    def root(self) -> FloatArray:
+        """Return the matrix R of the covariance R'R of the fitted parameters, (u, u)."""
+        return np.asarray(linalg.solve_triangular(self.lower, np.eye(len(self.lower)), lower=True))

@@ -10,7 +10,7 @@ recording after the other, the pair of change points with the largest evidence i
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 from itertools import combinations, pairwise
@@ -18,7 +18,13 @@ from pathlib import Path
 from typing import TypeAlias
 
 from armid_ros.diagnosis.search.cause import Cause
-from armid_ros.diagnosis.search.odds import CauseInformation, odds, OWN_SPREADS
+from armid_ros.diagnosis.search.odds import (
+    allowed,
+    CauseInformation,
+    odds,
+    OWN_SPREADS,
+    posteriors,
+)
 from armid_ros.diagnosis.search.trial import Look, Ranked
 from armid_ros.diagnosis.settings import Thresholds
 from armid_ros.motion import FloatArray
@@ -103,27 +109,38 @@ class _Timed:
             found[k] = _up_to(first), _up_to(second), _up_to(third)
         return found
 
-    def within(self, spans: Spans) -> Ranked:
-        """Return the cause that acts between two edges of each recording."""
-        cause, nuisance = self.ranked.cause, self.look.nuisance
-        products, own, aim = list(cause.products), list(cause.own), list(cause.aim)
-        tried = 0.0
+    def within(self, tried: Sequence[Spans]) -> list[Ranked]:
+        """Return the cause that acts between two edges of each recording, for several spans."""
+        nuisance, timed = self.look.nuisance, [self._timed(spans) for spans in tried]
+        causes = [cause for cause, _ in timed]
+        # Earlier values act throughout, so that all spans are compared with the same null model.
+        known = CauseInformation.of_all(causes, nuisance, self.ranked.under, by_day=True)
+        fits = posteriors(causes, nuisance, known.of_day(today=True))
+        return [
+            replace(
+                self.ranked,
+                cause=cause,
+                fit=fit,
+                data=fit.factor + allowed(cause, fit, nuisance) - chosen,
+            )
+            for (cause, chosen), fit in zip(timed, fits, strict=True)
+        ]
+
+    def _timed(self, spans: Spans) -> tuple[Cause, float]:
+        """Return the cause within spans, and the log of the number of possible spans."""
+        cause, chosen = self.ranked.cause, 0.0
+        products, own, aim = (x.copy() for x in (cause.products, cause.own, cause.aim))
         for k, (a, b) in spans.items():
             products[k], own[k], aim[k] = (x[b] - x[a] for x in self._sums[k])
             count = len(self.edges[k])
             if b - a < count - 1:
-                tried += float(np.log(0.5 * count * (count - 1)))
-        timed: Cause = replace(cause, products=tuple(products), own=tuple(own), aim=tuple(aim))
-        # Values before the change act all the time, so all spans are compared with the same null
-        # model.
-        known = CauseInformation.of(timed, nuisance, self.ranked.under, by_day=True)
-        fit = odds(timed, nuisance, known.of_day(today=True))
-        return replace(self.ranked, cause=timed, fit=fit, data=fit.factor - tried)
+                chosen += float(np.log(0.5 * count * (count - 1)))
+        return replace(cause, products=products, own=own, aim=aim), chosen
 
     @cached_property
     def throughout(self) -> Ranked:
-        """The cause that acts all the time."""
-        return self.within(self._whole)
+        """The cause that acts throughout."""
+        return self.within([self._whole])[0]
 
     @property
     def _whole(self) -> Spans:
@@ -160,13 +177,14 @@ class _Timed:
     ) -> tuple[Ranked, Spans]:
         """Return the likeliest candidate span of one recording."""
         last, least = len(self.edges[recording]) - 1, round(_SHORTEST / _STEP)
-        for a, b in tried:
-            if 0 <= a <= b <= last and (b - a >= least or a == b == 0):
-                other = {**spans, recording: (a, b)}
-                one = self.within(other)
-                if one.worth > found.worth:
-                    found, spans = one, other
-        return found, spans
+        others = [
+            {**spans, recording: (a, b)}
+            for a, b in tried
+            if 0 <= a <= b <= last and (b - a >= least or a == b == 0)
+        ]
+        ranked = self.within(others) if others else []
+        pairs: list[tuple[Ranked, Spans]] = [(found, spans), *zip(ranked, others, strict=True)]
+        return max(pairs, key=lambda one: one[0].worth)
 
 
 def _up_to(parts: FloatArray) -> FloatArray:

@@ -205,7 +205,7 @@ class Look:
             fit.std,
             fit.resolution,
             np.asarray(material / np.maximum(torque.max(axis=0), 1e-300)),
-            known.visible,
+            float(known.visible),
             2.0 * fit.factor,
             fit.factor - float(np.log(cause.shapes * places)),
             min(made / self._left, 1.0),

@@ -176,7 +176,7 @@ class _Fold:
 def _folds(problem: JointFit, linear: Nuisance) -> list[_Fold]:
     """Return the folds of the diagnosed day, each predicted from all other rows."""
     rows, found = linear.rows, list[_Fold]()
-    part_of_arm = np.ones(len(linear.cross[0]), dtype=bool)
+    part_of_arm = np.ones(linear.cross.shape[1], dtype=bool)
     part_of_arm[: linear.rank] = problem.stated
     part_of_arm[linear.discrepancy] = False
     for k in problem.recordings:

@@ -118,9 +118,9 @@ def _mistaken(
     """Return the mistake that all recordings share, or otherwise joints in a wrong unit."""
     # with a baseline, the comparison with it gives the factor of all torques
     since = bool(before) and bool(np.any(_factors_since(arm, motions, before) > 0.0))
-    for one, sources in shared_mistakes(arm.body, recordings, used):
-        # with a baseline, a mistake that appears only with fitted links is a change of the arm
-        known = before and (one.fitted or (since and one.hypotheses[0].of_masses))
+    # with a baseline, a mistake that needs a fitted body is a change of the arm instead
+    for one, sources in shared_mistakes(arm.body, recordings, used, refit=not before):
+        known = since and one.hypotheses[0].of_masses
         if len(sources) == len(recordings) and one.of_data and not known:
             return [one.text]
     return unit_faults(arm, motions, before)

@@ -97,7 +97,7 @@ class Mistake:
 
 
 def shared_mistakes(
-    robot: Robot, recordings: Sequence[Recording], used: Conditioning
+    robot: Robot, recordings: Sequence[Recording], used: Conditioning, *, refit: bool = True
 ) -> list[tuple[Mistake, tuple[str, ...]]]:
     """
     Find the mistakes in recordings, grouped by kind and joint.
@@ -110,6 +110,8 @@ def shared_mistakes(
         Data with torques.
     used : Conditioning
         Filters that the recordings are identified with.
+    refit : bool
+        Whether a mistake counts that only a fitted body reveals.
 
     Returns
     -------
@@ -119,7 +121,7 @@ def shared_mistakes(
     """
     alike: dict[tuple[object, ...], list[tuple[str, Mistake]]] = {}
     for recording in recordings:
-        mistake = find_mistake(robot, recording, used)
+        mistake = find_mistake(robot, recording, used, refit=refit)
         if mistake is not None:
             kind = (mistake.hypotheses[0].kind, *mistake.hypotheses[0].where)
             alike.setdefault(kind, []).append((recording.source, mistake))
@@ -142,7 +144,9 @@ class _Row(NamedTuple):
     as_fitted: float
 
 
-def find_mistake(robot: Robot, recording: Recording, used: Conditioning) -> Mistake | None:
+def find_mistake(
+    robot: Robot, recording: Recording, used: Conditioning, *, refit: bool = True
+) -> Mistake | None:
     """
     Find the most likely mistake in a recording.
 
@@ -154,6 +158,8 @@ def find_mistake(robot: Robot, recording: Recording, used: Conditioning) -> Mist
         Data with torques.
     used : Conditioning
         Filters that the recording is identified with.
+    refit : bool
+        Whether a mistake counts that only a fitted body reveals.
 
     Returns
     -------
@@ -170,7 +176,7 @@ def find_mistake(robot: Robot, recording: Recording, used: Conditioning) -> Mist
         return None
     without = replace(described, joints=np.minimum(described.joints, bare.joints))
     # whether the residual with fitted links alone is large enough to reveal a mistake
-    alone = bool(100.0 * near.joints.max() >= LIMITS.poor)
+    alone = refit and bool(100.0 * near.joints.max() >= LIMITS.poor)
     exact = PredictionError(np.zeros(robot.n_joints), without.torque)
     if without.gain(exact) < LIMITS.gain and not alone:
         return None

@@ -12,6 +12,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from itertools import product
 
 from armid_ros.identification.assess.grade_limits import FREEDOM, LIMITS
 from armid_ros.identification.fitting.excited import near_deviation
@@ -104,22 +105,22 @@ def prediction_error(robot: Robot, motion: Motion, *, near: bool) -> PredictionE
 
     """
     assert motion.tau is not None
-    (count, n), joints = motion.q.shape, np.arange(motion.n_joints)
     scale, weight = root_mean_square(motion.tau), _weight(motion)
-    own = np.zeros((count, n, n, _OWN))
-    own[:, joints, joints] = _own_columns(motion)
-    columns = own.reshape(count, n, -1)
-    bodies = 0
-    if near:
-        body = regressor(robot, motion)
-        described = body @ robot.rigid_parameters
-        by_body = body * (near_deviation(robot) * np.sqrt(FREEDOM / count)) / scale[:, np.newaxis]
-        bodies = by_body.shape[2]
-        columns = np.concatenate([by_body, columns], axis=2)
-    else:
-        described = inverse_dynamics(robot, motion)
-    rest = (motion.tau - described) / scale * weight
-    stacked = (columns * weight[:, :, np.newaxis]).reshape(-1, columns.shape[2])
+    own = _own_columns(motion) * weight[:, :, np.newaxis]
+    if not near:
+        rest = (motion.tau - inverse_dynamics(robot, motion)) / scale * weight
+        left = rest - np.einsum('rja,ja->rj', own, _own_values(own, rest))
+        return PredictionError(np.sqrt(np.mean(left**2, axis=0)), scale)
+    (count, n), joints = motion.q.shape, np.arange(motion.n_joints)
+    body = regressor(robot, motion)
+    rest = (motion.tau - body @ robot.rigid_parameters) / scale * weight
+    by_body = body * (near_deviation(robot) * np.sqrt(FREEDOM / count))
+    by_body *= (weight / scale)[:, :, np.newaxis]
+    bodies = by_body.shape[2]
+    of_joints = np.zeros((count, n, n, _OWN))
+    of_joints[:, joints, joints] = own
+    stacked = np.concatenate([by_body, of_joints.reshape(count, n, -1)], axis=2)
+    stacked = stacked.reshape(count * n, -1)
     normal = stacked.T @ stacked + LIMITS.floor**2 * np.eye(stacked.shape[1])
     least = np.full(stacked.shape[1], -np.inf)
     least[bodies:].reshape(n, _OWN)[:, 1:] = 0.0
@@ -129,6 +130,25 @@ def prediction_error(robot: Robot, motion: Motion, *, near: bool) -> PredictionE
     left = rest - (stacked @ values).reshape(rest.shape)
     off = float(np.sum(values[:bodies] ** 2)) * FREEDOM / count
     return PredictionError(np.sqrt(np.mean(left**2, axis=0)), scale, off)
+
+
+def _own_values(own: FloatArray, rest: FloatArray) -> FloatArray:
+    """
+    Fit columns (N, n, 4) of each joint to its torque (N, n); all but the offset are positive.
+
+    The joints are independent, and have eight sets of active bounds: the solution is the best
+    feasible one. Returns values of shape (n, 4).
+
+    """
+    normal = np.einsum('rja,rjb->jab', own, own) + LIMITS.floor**2 * np.eye(_OWN)
+    aim = np.einsum('rja,rj->ja', own, rest)
+    free = np.array([(True, *some) for some in product((True, False), repeat=_OWN - 1)])
+    both = free[:, np.newaxis, :, np.newaxis] & free[:, np.newaxis, np.newaxis, :]
+    held = aim * free[:, np.newaxis]
+    values = np.linalg.solve(np.where(both, normal, np.eye(_OWN)), held[..., np.newaxis])[..., 0]
+    feasible = np.all(values[:, :, 1:] >= 0.0, axis=2)
+    explained = np.where(feasible, np.sum(values * aim, axis=2), -np.inf)
+    return np.asarray(values[np.argmax(explained, axis=0), np.arange(len(aim))])
 
 
 def common_values(motion: Motion, fixed: FloatArray, columns: FloatArray) -> FloatArray:
