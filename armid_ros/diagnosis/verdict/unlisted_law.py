@@ -6,21 +6,26 @@ Laws that the catalogue lacks: a new torque of one joint over its velocity or po
 The discrepancy of a model differs between motions by its usual size. A new law on the diagnosed
 day is a discrepancy of several times that size, equal in all recordings of the day. The
 log odds of the larger size are compared with the alarm odds, while the named causes, the body and
-the usual discrepancy are fitted as well.
+the usual discrepancy are fitted as well. If several causes were found in one joint, a law in place
+of them is a simpler explanation, and is compared with the named ones.
 
 """
 
 from __future__ import annotations
 
+from collections import Counter
 from collections.abc import Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 from armid_ros.diagnosis.data.discrepancy import hats
 from armid_ros.diagnosis.search.candidates import cause_of
-from armid_ros.diagnosis.search.cause import SelectedEffect
+from armid_ros.diagnosis.search.cause import Cause, SelectedEffect
 from armid_ros.diagnosis.search.explanation import Explanation
+from armid_ros.diagnosis.search.nuisance import Nuisance
 from armid_ros.diagnosis.search.patch import Patch
-from armid_ros.diagnosis.settings import DiagnosisSettings
+from armid_ros.diagnosis.search.posterior import JointFit
+from armid_ros.diagnosis.search.priors import UNLISTED
+from armid_ros.diagnosis.settings import DiagnosisSettings, Thresholds
 from armid_ros.diagnosis.verdict.where import Excess
 from armid_ros.effects import Effect, Quantity
 from armid_ros.effects.base import Arm
@@ -60,7 +65,8 @@ def unlisted_laws(explanation: Explanation, settings: DiagnosisSettings) -> list
     Return the squared torque of new laws over its limit, for velocity and for position.
 
     The limit is the squared unit of the gap plus a torque that is not material. The ratio is zero
-    in joints whose log odds of a new law are below the alarm odds.
+    in joints whose log odds of a new law are below the alarm odds. If several causes were found
+    in a joint, it is at least the ratio of `_instead`.
 
     """
     problem, named, evidence = explanation.problem, explanation.fitted, explanation.evidence
@@ -71,6 +77,7 @@ def unlisted_laws(explanation: Explanation, settings: DiagnosisSettings) -> list
     limit = np.mean(np.square(evidence.sigma), axis=0) * (1.0 + evidence.matters(settings))
     ratio = {of: np.zeros(len(joints)) for of in ('velocity', 'position')}
     alarm = settings.thresholds.alarm + np.log(len(ratio) * len(joints))
+    found = Counter(one.effect.joints for one in (*explanation.steps, *explanation.minor))
     for law in _laws([linear.arm.link_motion(part.at_rows) for part in rows.data], joints):
         joint = joints.index(law.joints[0])
         columns = [law.columns(part.at_rows, linear.arm) for part in rows.data]
@@ -80,12 +87,44 @@ def unlisted_laws(explanation: Explanation, settings: DiagnosisSettings) -> list
             with_law = linear.and_cause(cause, size)
             under = with_law.marginal(problem.setting, problem.recordings)
             fits.append(under.evidence)
+        if found[law.joints] > 1:
+            ratio[law.of][joint] = _instead(problem, linear, cause, settings.thresholds)
         odds = np.logaddexp.reduce(fits[1:]) - np.log(len(_NEW)) - fits[0]
         if odds > alarm:
             values = with_law.means(under)[with_law.spans[-1]]
             torque = np.concatenate([columns[k][:, joint] @ values for k in rows.in_question])
-            ratio[law.of][joint] = np.mean(torque**2) / limit[joint]
+            power = np.mean(torque**2) / limit[joint]
+            ratio[law.of][joint] = max(ratio[law.of][joint], power)
     return [Excess(own, f'that varies with its {of}') for of, own in ratio.items()]
+
+
+def _instead(problem: JointFit, linear: Nuisance, law: Cause, levels: Thresholds) -> float:
+    """
+    Return what a law explains beyond the named causes of its joint, over its limit.
+
+    The law is fitted in place of these causes. At the limit it is as likely as they are, apart
+    from the relative error of the laws of the catalogue.
+
+    """
+    named = linear.marginal(problem.setting, problem.recordings)
+    pairs = zip(linear.accepted, linear.spans, strict=True)
+    own = [(one, span) for one, span in pairs if one.cause.joints == law.joints]
+    if not own:
+        return 0.0
+    others = [one for one in linear.accepted if one.cause.joints != law.joints]
+    bare = replace(linear, accepted=tuple(others))
+    means = linear.means(named)
+    made = [np.concatenate(one.cause.columns, axis=1)[0] @ means[span] for one, span in own]
+    size = 1.0 + float(np.sqrt(np.mean(np.sum(made, axis=0) ** 2)))
+    fits = [
+        bare.and_cause(law, new * size).marginal(problem.setting, problem.recordings)
+        for new in _NEW
+    ]
+    best = max(fits, key=lambda fit: fit.evidence)
+    explained = bare.marginal(problem.setting, problem.recordings).loss - named.loss
+    gained = named.loss - best.loss
+    odds = best.evidence - float(np.log(len(_NEW))) - named.evidence + float(np.log(UNLISTED))
+    return gained / (max(gained - odds, 0.0) + levels.inexact * max(explained, 1.0))
 
 
 def _laws(motions: list[Motion], joints: tuple[str, ...]) -> Iterator[UnlistedLaw]:
