@@ -151,6 +151,19 @@ def test_a_new_law_that_the_catalogue_lacks_leaves_the_gap_open(bench, of):
     assert {one.joint for one in (*found.where, *found.left)} == {'elbow'}
 
 
+def test_a_new_law_of_the_catalogue_closes_the_gap(bench):
+    """Quadratic friction is named, and no unlisted law, where the gap is only a few misfits."""
+
+    def law(motion, tau):
+        new = 0.05 * motion.dq * np.abs(motion.dq)
+        return 0.3 * hose(motion, tau) + np.array([0.0, 1.0]) * new
+
+    before = bench.recordings(lambda motion, tau: 0.3 * hose(motion, tau), seed=1)
+    found = asked(bench, before, bench.recordings(law, seed=2), bench.recordings(law, seed=3))
+    assert found.verdict == 'named', found.summary
+    assert [one.name for one in found.findings] == ['quadratic_friction']
+
+
 def test_recordings_with_more_noise_than_the_baseline_have_a_floor_of_their_own(bench):
     """A simulated baseline has no noise at all."""
     floors = []
