@@ -115,15 +115,16 @@ def diagnose(
 
     """
     settings = settings or DiagnosisSettings()
-    tell = progress or _silent
+    tell = progress or (lambda share, what: None)
     if settings.everything:
+        thresholds = replace(settings.thresholds, headline=0.0)
         result = diagnose(
             arm,
             recordings,
             validate=validate,
             baseline=baseline,
             misfit=misfit,
-            settings=settings.without_small_print(),
+            settings=replace(settings, material=0.0, everything=False, thresholds=thresholds),
             rng=rng,
             progress=tell,
         )
@@ -260,7 +261,9 @@ def _as_diagnosis(
     explanation, shares = headline(explanation, least, settings)
     whole = shares.share(range(len(explanation.steps)))
     if before is not None and chosen.untested and whole <= settings.thresholds.open_share:
-        explanation, shares = headline(explanation.with_nothing_named(), least, settings)
+        minor_ones = *explanation.steps, *explanation.minor
+        nothing = replace(explanation, fitted=explanation.reference, steps=(), minor=minor_ones)
+        explanation, shares = headline(nothing, least, settings)
     if unseen is not None:
         explanation, shares = predicted(explanation, shares.order, unseen)
     measured = RemainingMisfit(chosen, unseen, before, arm, settings)
@@ -372,7 +375,3 @@ def _bad(
         notes=tuple(notes),
         baseline='',
     )
-
-
-def _silent(share: float, what: str) -> None:
-    """Report no progress."""

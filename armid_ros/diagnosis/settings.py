@@ -5,7 +5,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 
 from armid_ros.diagnosis.search.priors import HOW_OFTEN
 from armid_ros.effects import CATALOGUE, Effect
@@ -137,11 +137,6 @@ class DiagnosisSettings:
                         f"prior '{name}={how}': there is no {what} '{word}'"
                         f'{meant(word, known)}; known are: {", ".join(known)}'
                     )
-
-    def without_small_print(self) -> DiagnosisSettings:
-        """Return settings that name every significant cause, however small."""
-        thresholds = replace(self.thresholds, headline=0.0)
-        return replace(self, material=0.0, everything=False, thresholds=thresholds)
 
     @property
     def kinds(self) -> tuple[type[Effect], ...]:

@@ -4,7 +4,7 @@
 The comparison of causes: the best cause is accepted repeatedly, until no cause is significant.
 
 The spread of values between recordings decides whether a change is significant. The explained
-torque decides between causes. Differences below 2 % are ignored, as laws are inexact.
+torque decides between causes. A lead of 2 % excludes no rival, as laws are inexact.
 
 """
 
@@ -210,10 +210,11 @@ class CauseComparison:
         able = [one for one in telling if one.odds > levels.alone]
         if not able or max(one.odds for one in able) < levels.alarm:
             return None
-        winner = min(able, key=lambda one: able[0].ahead(one, levels))
-        others = [one for one in able if one is not winner]
-        # A rival with larger evidence but lower total odds is at most as likely as the winner.
-        behind = np.array([min(-winner.ahead(one, levels), 0.0) for one in others])
+        winner, *others = able
+        # The log odds of a rival are the larger ones of those with and without a small lead.
+        behind = np.array(
+            [min(max(-winner.ahead(x, levels), x.worth - winner.worth), 0.0) for x in others]
+        )
         total = np.logaddexp.reduce(np.append(behind, 0.0)) + np.logaddexp(0.0, -winner.odds)
         total -= np.log1p(-UNLISTED)
         rated = [replace(winner, probability=float(np.exp(-total)))]

@@ -395,10 +395,6 @@ class Nuisance:
             rest[joint] -= functions @ np.linalg.solve(held, aim)
         return rest
 
-    def body_change(self, values: FloatArray) -> FloatArray:
-        """Return the change of the base parameters, (r,), from the means of all parameters."""
-        return np.asarray(self.turn @ values[: self.rank])
-
     def lasting(self, under: Marginal, recordings: Sequence[int], least: float) -> float:
         """Return the median correlation length of the residual [rows]."""
         found = []

@@ -198,7 +198,7 @@ class JointFit:
 
     def _arm(self, state: Patch, means: FloatArray) -> ArmModel:
         """Return the arm with the named causes, and with fitted body and friction if stated."""
-        change = self.nuisance.body_change(means)
+        change = self.nuisance.turn @ means[: self.nuisance.rank]
         if not (self.stated and np.any(change)):
             return state.model
         base, theta = self.nuisance.base, self.arm.theta

@@ -71,7 +71,12 @@ class _Timed:
     @cached_property
     def edges(self) -> dict[int, npt.NDArray[np.intp]]:
         """Rows of each recording at which a span may begin or end."""
-        return {k: np.searchsorted(t, self._points(t)) for k, t in self.times.items()}
+        found = {}
+        for k, t in self.times.items():
+            points = np.linspace(t[0], t[-1], max(int((t[-1] - t[0]) / _STEP), 1) + 1)
+            points[-1] = np.inf
+            found[k] = np.searchsorted(t, points)
+        return found
 
     @cached_property
     def times(self) -> dict[int, FloatArray]:
@@ -81,13 +86,6 @@ class _Timed:
             k: np.concatenate([part.t for part in rows.data if part.fold == k])
             for k in np.flatnonzero(rows.today).tolist()
         }
-
-    @staticmethod
-    def _points(t: FloatArray) -> FloatArray:
-        count = max(int((t[-1] - t[0]) / _STEP), 1) + 1
-        points = np.linspace(t[0], t[-1], count)
-        points[-1] = np.inf
-        return points
 
     @cached_property
     def _sums(self) -> dict[int, tuple[FloatArray, FloatArray, FloatArray]]:
