@@ -117,20 +117,7 @@ def diagnose(
     settings = settings or DiagnosisSettings()
     tell = progress or (lambda share, what: None)
     if settings.everything:
-        thresholds = replace(settings.thresholds, headline=0.0)
-        result = diagnose(
-            arm,
-            recordings,
-            validate=validate,
-            baseline=baseline,
-            misfit=misfit,
-            settings=replace(settings, material=0.0, everything=False, thresholds=thresholds),
-            rng=rng,
-            progress=tell,
-        )
-        large = tuple(one for one in result.findings if one.share >= settings.thresholds.headline)
-        small = tuple(one for one in result.findings if one.share < settings.thresholds.headline)
-        return replace(result, findings=large, minor=(*small, *result.minor))
+        settings = replace(settings, material=0.0)
     tell(0.02, 'filtering')
     given, arm = arm, memoized_arm(arm)
     recordings, validate, baseline, repairs = mended(recordings, validate, baseline, settings)
@@ -257,13 +244,14 @@ def _as_diagnosis(
     explainer.tell(0.85, 'held-out gap')
     explanation, said = as_placed_bodies(chosen.explanation)
     unseen = _held_out_evidence(explainer.unseen, explanation, chosen)
-    least = 0.0 if chosen.measured else settings.thresholds.headline
-    explanation, shares = headline(explanation, least, settings)
+    least = settings.thresholds.headline
+    every = 0.0 if chosen.measured or settings.everything else least
+    explanation, shares = headline(explanation, every, settings)
     whole = shares.share(range(len(explanation.steps)))
     if before is not None and chosen.untested and whole <= settings.thresholds.open_share:
         minor_ones = *explanation.steps, *explanation.minor
         nothing = replace(explanation, fitted=explanation.reference, steps=(), minor=minor_ones)
-        explanation, shares = headline(nothing, least, settings)
+        explanation, shares = headline(nothing, every, settings)
     if unseen is not None:
         explanation, shares = predicted(explanation, shares.order, unseen)
     measured = RemainingMisfit(chosen, unseen, before, arm, settings)
@@ -292,12 +280,13 @@ def _as_diagnosis(
     new = np.max([np.zeros(arm.robot.n_joints), *(one.ratio for one in laws)], axis=0) > 1.0
     places = where_it_is(explanation, (unseen or evidence) if found else open_in, settings, new)
     explainer.tell(1.0, word.word)
+    small = tuple(one for one in found if settings.everything and one.share < least)
     remarks = _remarks((found, patched), worse, chosen, word, doubt, explainer)
     return Diagnosis(
         verdict=word.word,
         summary=' '.join([word.summary, *remarks]),
-        findings=found,
-        minor=minor,
+        findings=tuple(one for one in found if one not in small),
+        minor=(*small, *minor),
         where=places or places_held(arm, resting),
         left=where_left(explanation, patched, open_in, settings, new),
         gap=gap,

@@ -8,14 +8,13 @@ from collections.abc import Collection, Iterator, Sequence
 from dataclasses import replace
 
 from armid_ros.diagnosis.data.evidence import Evidence
-from armid_ros.diagnosis.search.cause import Cause, SelectedEffect
+from armid_ros.diagnosis.search.cause import SelectedEffect
 from armid_ros.diagnosis.search.comparison import Result
 from armid_ros.diagnosis.search.explanation import Explanation
 from armid_ros.diagnosis.search.posterior import Fitted, JointFit
 from armid_ros.diagnosis.search.trial import Key, Survey, Trial
 from armid_ros.diagnosis.settings import DiagnosisSettings
 from armid_ros.effects import Effect
-from armid_ros.motion import FloatArray
 import numpy as np
 
 #: Prior precision of a value without prior knowledge.
@@ -60,7 +59,8 @@ def explain(
             rivals=tuple(one.look.worth(other, material) for other in one.tied),
         )
         cause = one.best.cause
-        if not _matters(cause, means[span], result, material):
+        made = np.max(np.abs(means[span]) * cause.torque, axis=1)
+        if not np.any(made >= material * result.nuisance.rows.torque):
             small.append(trial)
             continue
         named.append(SelectedEffect(cause.effect, cause.kept))
@@ -86,12 +86,6 @@ def explain(
         problem,
         problem.refits_body,
     )
-
-
-def _matters(cause: Cause, values: FloatArray, result: Result, material: float) -> bool:
-    """Return whether the torque of a cause is a material share of the torque of any joint."""
-    made = np.max(np.abs(values) * cause.torque, axis=1)
-    return bool(np.any(made >= material * result.nuisance.rows.torque))
 
 
 def _open(
