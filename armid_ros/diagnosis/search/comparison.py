@@ -181,8 +181,13 @@ class CauseComparison:
     def _exchanged(
         self, accepted: list[Accepted], nuisance: Nuisance
     ) -> tuple[list[Accepted], Nuisance]:
-        """Replace a cause that resembles several others if these explain more without it."""
-        for k, one in enumerate(accepted if len(accepted) > 1 else ()):
+        """
+        Replace a cause that resembles several others, if they explain more without it.
+
+        The last one was the best beside all others already.
+
+        """
+        for k, one in enumerate(accepted[:-1]):
             look = self.look(nuisance.without(k))
             others = [*accepted[:k], *accepted[k + 1 :]]
             best = self.best(look, sum(max(other.best.data, 0.0) for other in others))
