@@ -179,18 +179,19 @@ def _of_spans(
     shorter, held_out = ([x for x in part if x is not None] for part in (cut[:count], cut[count:]))
     if not shorter:
         return None
+    untimed = () if len(timed) == len(recordings) + len(validate) else (_NOT_TIMED,)
+    by_misfit = explainer.baseline is not None and settings.partner is None
     try:
         data, unseen = (
             trajectories(part, prepared.used, arm, prepared.allowed)
             for part in (shorter, held_out)
         )
+        prepared = prepare(arm, prepared.used, data, settings, explainer.rng, by_misfit)
+        within = replace(explainer, prepared=prepared, unseen=unseen)
+        notes = (*notes, *untimed)
+        found = _as_diagnosis(within.chosen(), notes, within, doubt, plain_arm(arm))
     except IdentificationError:  # too short for the filters, or without motion
         return None
-    by_misfit = explainer.baseline is not None
-    prepared = prepare(arm, prepared.used, data, settings, explainer.rng, by_misfit)
-    within = replace(explainer, prepared=prepared, unseen=unseen)
-    untimed = () if len(timed) == len(recordings) + len(validate) else (_NOT_TIMED,)
-    found = _as_diagnosis(within.chosen(), (*notes, *untimed), within, doubt, plain_arm(arm))
     if _hardly_explained(found, settings):
         return None
     return found.acting_in([one for one in spans if one.stop > one.start])
