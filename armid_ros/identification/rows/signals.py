@@ -373,9 +373,9 @@ def _differentiated(
     # differences of two samples damp the cut-off by sinc(1 / 20), 0.4 %
     few = max(1, int(used.rate_hz / (20.0 * used.cutoff_hz)))
     sparse = smooth[::few, :n]
-    # the transform is faster for a length without large prime factors, so a few samples are
-    # dropped
-    bands = [(sparse[: 1 + fft.prev_fast_len(len(sparse) - 1)], used.cutoff_hz)]
+    if len(sparse) > 50_000:  # a length without large prime factors is transformed faster
+        sparse = sparse[: 1 + fft.prev_fast_len(len(sparse) - 1)]
+    bands = [(sparse, used.cutoff_hz)]
     band = _CURVATURE_BANDS * _motion_band(bands, used.rate_hz / few)
     points = None
     if recording.partner is not None:
