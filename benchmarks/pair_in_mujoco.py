@@ -4,10 +4,9 @@
 The human-exoskeleton pair in MuJoCo: joints that follow torques, and a cycle on the ground.
 
 MuJoCo reads both descriptions itself; the springs are tendons. Prescribed joints follow the
-reference. Their armature is so large that other torques do not move them, a torque accelerates
-the armature, and their state is reset to the reference after every step. The ground of the
-source's Table 3 is implemented here independently, as a force on heels and toes at every stage of
-the integrator.
+reference. Their armature is so large that other torques do not move them, a torque accelerates it,
+and their state is reset to the reference after every step. The ground of the source's Table 3 is
+implemented here independently, as a force on heels and toes at every stage of the integrator.
 
 """
 

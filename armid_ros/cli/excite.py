@@ -116,8 +116,7 @@ class Speed(click.ParamType[str | float]):
     shell_complete=parameters.completed,
     multiple=True,
     metavar='NAME:k=v',
-    help='Effect of known size, which uses a part of the torque limits. May be given several '
-    'times.',
+    help='Effect of known size, which uses torque limits. May be given several times.',
 )
 @click.option(
     '--rival',

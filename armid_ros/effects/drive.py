@@ -185,8 +185,7 @@ class ActuatorSaturation(TorqueReading):
         Quantity('lost_share', '', lower=0.0, upper=1.0, typical=(0.05, 1.0)),
         Quantity('clipped_share', '', lower=0.0, upper=1.0, typical=(0.05, 1.0)),
     )
-    #: Start values near the highest measured torque; with lower values, the effect would replace
-    #: the whole torque.
+    #: Start values near the highest measured torque; lower ones would explain all torque.
     shapes = (
         Shape('saturation_torque', 'N m', 1e-6, 1e6, 10.0, (0.3, 1.0, 3.0, 10.0, 30.0), near=0.08),
     )

@@ -86,8 +86,7 @@ class TorqueDrift(TorqueReading):
 
     Time counts from the beginning of the recording. The drift does not depend on the motion,
     unlike thermal_friction. Equal periods differ by it. Confounded with torque_offset if the
-    recording begins when the sensor is warm. In one short recording, also confounded with a
-    payload that slips.
+    recording begins with a warm sensor and, in one short recording, with a payload that slips.
 
     """
 

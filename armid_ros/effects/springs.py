@@ -57,9 +57,8 @@ class SoftLimit(Effect):
     """
     Bumpers that push back beyond a position at either end of the range of motion.
 
-    tau = k_up max(q - q_up, 0) - k_low max(q_low - q, 0); The torque is zero between q_low and
-    q_up. Confounded with a hardening joint_spring; motion outside of the bumpers distinguishes
-    them.
+    tau = k_up max(q - q_up, 0) - k_low max(q_low - q, 0), zero between q_low and q_up. Confounded
+    with a hardening joint_spring; motion outside the bumpers distinguishes them.
 
     """
 

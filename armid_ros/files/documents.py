@@ -21,8 +21,7 @@ from typing import Any
 from armid_ros.errors import ArmidError
 import yaml
 
-#: Largest allowed number in a document. Quantities are smaller, and products of three numbers are
-#: finite.
+#: Largest allowed number in a document. Quantities are smaller; products of three are finite.
 LARGEST = 1e100
 
 # The C parser, if installed, is ten times as fast.

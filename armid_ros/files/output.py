@@ -30,8 +30,7 @@ from armid_ros.errors import OutputError
 from armid_ros.files.documents import load_yaml, reading
 from armid_ros.files.regular import open_regular, read_text
 
-#: Model file that may be in a folder without a document, and schemas of results that may replace
-#: it.
+#: Model file that may be in a folder without a document; schemas of results that replace it.
 _MODEL = 'model.yaml'
 _WITH_MODEL = ('armid/identification/1', 'armid/diagnosis/1')
 #: Files and folders of each kind of result, by schema; the JSON document comes first.

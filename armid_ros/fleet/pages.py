@@ -61,8 +61,8 @@ def _overview(found: Watch, diagnoses: Diagnoses) -> str:
     heads = ('Arm', 'Health', 'What', 'Bags', 'Refused', 'Error')
     rows = [_arm_row(arm, diagnoses.get(arm.arm)) for arm in found.arms]
     hint = (
-        'Small curves: the changed parameter over time. The axis spans at least six standard '
-        'deviations; a dashed line marks the change. Error: median of 100 |residual torque| / '
+        'Small curves: the changed parameter over time, on six standard deviations or more; a '
+        'dashed line marks the change. Error: median of 100 |residual torque| / '
         '|torque| '
         'over the bags of an arm, each fitted by itself.'
     )

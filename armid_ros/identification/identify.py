@@ -320,8 +320,7 @@ def _fitted(
     rigid = len(arm.robot.rigid_parameters)
     if np.all(np.any(theory.grouping[:, rigid:], axis=0)):
         return theory, fit
-    # fit again with effects that do not act in the described arm, such as saturation that it does
-    # not reach
+    # fit again with effects that the described arm does not have, such as unreached saturation
     now = fit.arm.base_parameters(rng)
     if now.rank <= theory.rank:
         return theory, fit

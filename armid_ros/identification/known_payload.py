@@ -228,8 +228,7 @@ def _gain(
     """Return the coefficient of the known torque, its std, and the 95 % half-width."""
     scale = np.linalg.norm(columns, axis=0)
     columns = columns[:, scale > 0.0] / scale[scale > 0.0]
-    # The coefficient is that of the column's residual after a fit of the other columns (Frisch,
-    # Waugh).
+    # The coefficient is that of the column's residual after the other columns (Frisch, Waugh).
     rest = known - columns @ np.linalg.lstsq(columns, known, rcond=1e-10)[0]
     size = float(rest @ rest)
     # the joint's own columns explain the torque of the payload

@@ -109,8 +109,7 @@ class ExcitationPublisherNode(ArmidNode):
         self._simulated = bool(self.value('simulation') or self.value('use_sim_time'))
         if not self._simulated:
             return table
-        # Simulations are excepted, as they send no joint states while they check a long
-        # trajectory.
+        # Simulations are exempt: they send no joint states while they check a long trajectory.
         lively = {'speed': 'fast', 'start': True, 'state_timeout': 5.0, 'effort_factor': 0.0}
         return [replace(p, default=lively.get(p.name, p.default)) for p in table]
 

@@ -24,8 +24,7 @@ TERMS = {
     'floor': 'Error that a perfect model would have: noise, or the error of the previous model.',
     'gap': 'Squared torque error of the given model, each joint in units of its floor.',
     'held out': 'Not used to fit the model.',
-    'condition number': 'Ratio of the best to the worst excited direction of parameters; below '
-    '100 is good.',
+    'condition number': 'Ratio of best to worst excitation of parameters; below 100 is good.',
 }
 
 

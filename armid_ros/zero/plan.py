@@ -3,10 +3,9 @@
 """
 Static poses that determine zeros, gains, gravity and tool, and a closed tour through them.
 
-For each pose, the tour has a transfer, a rest, a short motion beyond the pose and back, and
-another rest. The arm thus reaches each pose from both sides. A Gaussian filter smooths the tour,
-so it keeps all limits. The tour is a Fourier series, so the publisher checks and plays it like
-any `Excitation`.
+The tour has for each pose a transfer, a rest, a short motion beyond it and back, and another rest.
+The arm thus reaches each pose from both sides. A Gaussian filter smooths the tour, so it keeps all
+limits. The tour is a Fourier series, so the publisher plays it like any `Excitation`.
 
 """
 

@@ -5,10 +5,9 @@ Model discrepancy: the part of a misfit that is the same in every motion.
 
 Measured torque is the sum of the torque of the model, a function of the state that the model
 lacks, and noise (Kennedy and O'Hagan, Bayesian calibration of computer models, 2001). The function
-belongs to the arm and does not change. Other motions visit other states, so the misfit differs
-between motions although nothing has changed. In each joint it is a function of position, plus one
-of velocity, plus load-dependent friction, fitted to the recordings of both days together with each
-cause.
+belongs to the arm and does not change. Other motions visit other states and have another misfit,
+although nothing has changed. In each joint it is a function of position, plus one of velocity,
+plus load-dependent friction, fitted to the recordings of both days together with each cause.
 
 """
 

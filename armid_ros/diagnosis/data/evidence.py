@@ -6,8 +6,7 @@ Data in units of the noise, or of the misfit of the model.
 The noise is the difference between the residuals of two equal periods of one trajectory. Each
 residual is evaluated at the positions measured in its period, so the difference includes encoder
 noise that propagates through the model. Torques that depend on the motion alone cancel. Without
-equal periods, the noise is assumed from differences between neighbouring rows, and the result
-states this.
+equal periods, noise is assumed from differences of neighbouring rows, and the result states so.
 
 """
 

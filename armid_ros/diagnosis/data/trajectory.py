@@ -206,8 +206,7 @@ def thinnable(used: Conditioning) -> Conditioning:
     """
     Reduce the decimation of rows to a multiple of the decimation of columns.
 
-    Each row then spans a whole number of samples of the columns. The number of rows grows by at
-    most an eighth.
+    Each row then spans a whole number of column samples; rows increase by at most an eighth.
 
     """
     widest = _widest(used)

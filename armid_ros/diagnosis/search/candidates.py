@@ -110,8 +110,7 @@ class Causes:
         """
         Yield a friction law on the joints that maximise its evidence, if at least two.
 
-        Values of joints are independent under a common prior; each number of joints is equally
-        likely.
+        Values of joints are independent, with one prior; all numbers of joints are equally likely.
 
         """
         first, count = singles[0].effect, len(singles)

@@ -324,8 +324,7 @@ def _noise_within(
     Return the noise of each trajectory if the misfit already contains some noise, (n,).
 
     An event in one of two periods increases their difference, but it belongs to the gap. The
-    noise is therefore limited to the misfit plus the excess of differences between rows over
-    those in the misfit.
+    noise is limited to the misfit plus the excess of row-to-row differences over those in it.
 
     """
     more = [np.maximum(floor.rough**2 - contained**2, 0.0) for floor in prepared.floors]

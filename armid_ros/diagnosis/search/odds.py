@@ -34,8 +34,7 @@ _USUAL_SPREADS = np.array([0.0, 0.5, 1.0, 2.0, 4.0, 8.0, 16.0, 32.0, 64.0, 128.0
 POPULATION_SPREAD = 1.0
 #: Log odds of physically impossible values.
 IMPOSSIBLE = -1e6
-#: Relative rounding error of the squares of a column, added to its part outside the nuisance
-#: columns.
+#: Relative rounding error of a column's squares, added to its part outside nuisance columns.
 _ROUNDING = 1e-7
 
 

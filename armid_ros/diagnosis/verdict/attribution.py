@@ -24,8 +24,7 @@ from armid_ros.diagnosis.settings import DiagnosisSettings
 from armid_ros.motion import FloatArray
 import numpy as np
 
-#: Number of bootstrap samples of the blocks: the ends of a 95 % interval are then accurate to a
-#: tenth of its width.
+#: Number of bootstrap samples: ends of a 95 % interval are accurate to a tenth of its width.
 _RESAMPLINGS = 500
 
 

@@ -32,8 +32,7 @@ _MOST_CANDIDATES = 20
 SHOWS = 5.0
 #: Smallest resolution of an identifiable value; two inseparable values have at most 0.5 each.
 _IDENTIFIABLE = 0.9
-#: Largest detectable size over the largest typical value; with a larger one, the torque is only
-#: rounding error.
+#: Largest detectable size over the largest typical value; above, torques are rounding errors.
 _ROUNDING = 1e-6
 
 
@@ -218,8 +217,7 @@ def smallest_size(trial: Trial, robot: Robot) -> tuple[int, float]:
     """
     Return the first identifiable parameter of a cause, and its smallest detectable size.
 
-    A detectable size is significant and material. It is inf if the parameter cannot reach that
-    size.
+    A detectable size is significant and material. It is inf if the parameter cannot reach it.
 
     """
     return next(_sizes(trial, robot), (trial.named.kept[0], float('inf')))

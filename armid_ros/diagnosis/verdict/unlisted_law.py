@@ -35,8 +35,7 @@ import numpy as np
 #: Sizes of the usual discrepancy and of a new law, as multiples of the joint's misfit. Of 40 arms
 #: with a right name or without a change, one has log odds above 3 (6.4, of a smaller torque).
 _USUAL, _NEW = 1.0, (3.0, 10.0)
-#: Knots of positions, as shares of their range, and of velocities in each direction, as shares of
-#: the top speed.
+#: Knots of positions over their range, and of velocities in each direction over the top speed.
 _POSITIONS, _SPEEDS = 12, np.array([0.03, 0.1, 0.25, 0.5, 0.75, 1.0])
 
 

@@ -16,9 +16,8 @@ import scipy.stats
 WIDTH = 2.0
 #: Degrees of freedom of an estimated covariance. The covariance comes from the spectrum of the
 #: residual in the band of the motion. A run of 20 s has few samples of it. In 23 simulations of
-#: the demo, the distance of 56 parameters had mean 56 and deviation 17, as with this number. With
-#: a known covariance, the deviation would be 11, and five simulations would be rejected instead of
-#: one.
+#: the demo, the distance of 56 parameters had mean 56 and deviation 17, as with this number. A
+#: known covariance would have deviation 11 and reject five simulations, not one.
 FREEDOM = 40.0
 
 
@@ -53,8 +52,7 @@ class Agreement:
         """
         Compare an estimate of P parameters with the truth, shape (P,).
 
-        The covariance has `freedom` degrees of freedom; infinity for a covariance that is known
-        exactly.
+        The covariance has `freedom` degrees of freedom; infinity if it is known exactly.
 
         """
         scaled = (estimate.values - truth) / estimate.std

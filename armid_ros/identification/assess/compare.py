@@ -53,8 +53,7 @@ CHANCE = 0.05
 #: Eigenvalues of a scaled covariance below this share of the largest are rounding errors. The
 #: same holds for differences below this share of a value.
 _ROUNDING = 1e-10
-#: Residual of a joint, as a share of its torque, below which it is due to filters and not to the
-#: arm.
+#: Residual of a joint, as a share of its torque, below which filters and not the arm cause it.
 _LEAST_RESIDUAL = 1e-3
 #: Name of a link parameter in the terms of base parameters, with the number of the link.
 _NUMBERED = re.compile(r'(?:m[xyz]?|I[xyz]{2})(\d+)$')

@@ -208,8 +208,7 @@ class Comparison:
         Return the factor, after over before, of each joint, if one factor fits nearly all values.
 
         No load and no wear multiplies masses and friction of all joints by several times: the
-        torques of one result are in another unit, or they are currents. Empty if no factor is
-        found.
+        torques of one result are in another unit, or currents. Empty if no factor is found.
 
         """
         clear = [

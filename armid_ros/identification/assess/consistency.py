@@ -39,8 +39,7 @@ _NOISE_ABOVE = 0.3
 #: Negligible difference between the two fits, in standard deviations. Without this margin, the
 #: test is too sensitive: it distinguishes two fits of the same data that differ by 0.1 %.
 NEGLIGIBLE = 0.1
-#: Smallest relevant bias, in standard deviations: it reduces the coverage of 95 % intervals to 94
-#: %.
+#: Smallest relevant bias, in standard deviations: it reduces a coverage of 95 % to 94 %.
 BIAS_LIMIT = 0.25
 #: Significance of the test.
 SIGNIFICANCE = 0.05
@@ -174,8 +173,7 @@ def check_noise(
 
     # A fit with noisy columns V to the torque W beta of exact columns yields M beta, M = V^+ W.
     # The estimate beta_hat is M times the truth, so its bias is beta_hat - M^-1 beta_hat. This
-    # bias is M^-1 V^+ times the difference of the arm's torques along the exact and the noisy
-    # motion.
+    # is M^-1 V^+ times the difference of its torques along the exact and the noisy motion.
     noise = np.sqrt(np.mean([position_noise(r) ** 2 for r in recordings], axis=0))
     values, std = result.estimate.values, result.estimate.std
     scale = np.where(std > 0.0, std, 1.0)
@@ -203,8 +201,7 @@ def position_noise(recording: Recording) -> FloatArray:
     """
     Return the standard deviation of white position noise, shape (n,) [rad or m].
 
-    It follows from the upper end of the spectrum. Stretches end at gaps, as jumps across gaps are
-    no noise.
+    It follows from the upper end of the spectrum. Jumps across gaps are no noise.
 
     """
     rate = 1.0 / recording.period

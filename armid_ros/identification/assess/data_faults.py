@@ -4,8 +4,7 @@
 Checks for faults of the data, before physical causes of a residual are searched.
 
 The checks cover time base, units, signs, order of joints, delay and clipped readings: a fault of
-the data takes precedence over any effect. Names, signs and units are checked as in identification;
-see `mistakes`.
+the data takes precedence over any effect. Names, signs and units: see `mistakes`.
 
 """
 
@@ -41,8 +40,7 @@ import numpy.typing as npt
 
 #: Median factor of torques from which their unit is wrong; loads cause smaller factors.
 _GAINS = 4.0
-#: Largest ratio of a factor since a baseline to the factor of a unit of force; masses cancel
-#: there.
+#: Largest ratio of a factor since a baseline to that of a unit of force; masses cancel.
 _NEAR_SINCE = 1.05
 #: Ratio of a torque to the drive limit above which a note is given.
 _BEYOND = 1.5

@@ -84,8 +84,7 @@ class Hypothesis:
 
 
 AS_RECORDED = Hypothesis('nothing', 'the data have no mistake', values=0)
-#: Hypothesis that the described links explain nothing: friction and drives alone explain the
-#: torques.
+#: Hypothesis that the described links explain nothing, and friction and drives everything.
 WITHOUT_BODY = Hypothesis(
     'body',
     'the description does not explain the torques',

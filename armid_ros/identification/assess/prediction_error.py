@@ -26,8 +26,7 @@ from scipy.stats import t as student
 
 #: Number of columns of each joint: offset, viscous and Coulomb friction, drive inertia.
 _OWN = 4
-#: Number of blocks of a recording whose scores give the standard deviation; nine degrees of
-#: freedom.
+#: Number of blocks whose scores give the standard deviation; nine degrees of freedom.
 _BLOCKS = 10
 
 

@@ -52,8 +52,7 @@ _PLAIN, _ALIKE = 0.98, 0.02
 #: the torque of inertia by 10 %. Errors of encoders, clocks and the integral are at most 1 %.
 _TOLERANCE = 0.05
 #: A velocity is in another unit if its correlation with the rate of the position is at least
-#: this, which explains half of its power, and the factor differs from that of the unit by less
-#: than this ratio.
+#: this, which explains half of its power, and its factor is within this ratio of the unit's.
 _FOLLOWS, _NEAR = 0.7, 1.25
 #: Ratio of the median reading of a joint to the limit of its drive from which it is in another
 #: unit. The smallest factor of a unit is 100. This ratio is its square root, and no drive
@@ -286,8 +285,7 @@ def _distance(t: FloatArray, dq: FloatArray) -> float:
         return 0.0
     way = cumulative_trapezoid(dq, t, initial=0.0)
     way -= (t - t[0]) * way[-1] / (t[-1] - t[0])
-    # integrated white noise is a random walk; second differences of white noise have six times its
-    # variance
+    # integrated white noise is a random walk; its second differences have 6 times its variance
     noise = float(np.mean(np.diff(dq, 2) ** 2)) / 6.0
     return max(float(np.ptp(way)) - _WALK * float(np.sqrt(noise * np.sum(np.diff(t) ** 2))), 0.0)
 

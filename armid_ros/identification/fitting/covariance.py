@@ -182,8 +182,7 @@ def scatter(problem: Sequence[Regression], weights: FloatArray, values: FloatArr
 
     The weight of a change is the precision with which the other recordings determine the value.
     For white noise, the sum of squares then equals the variance of least squares, even if one
-    recording determines most of a value. The change is zero for a value that the other recordings
-    do not determine.
+    recording determines most of a value. Values that the others do not determine have no change.
 
     Parameters
     ----------

@@ -4,10 +4,9 @@
 Parameters that given data determine, and their bounds.
 
 Parameters that a motion does not separate are grouped. Parameters that the data determine worse
-than the description keep their described values: the mean squared error of an unbiased estimate
-is its variance; the mean squared error of the description is its largest expected error squared.
-If joints move one after the other, columns of coupling are small but independent. Their parameters
-would be fitted to noise.
+than the description keep their described values: the mean squared error of an unbiased estimate is
+its variance, and that of the description is its largest expected error squared. If joints move one
+after the other, columns of coupling are small but independent. They would fit noise.
 
 """
 

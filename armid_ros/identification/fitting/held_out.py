@@ -34,8 +34,7 @@ _OF_HALVES, _OF_CUTOFFS = 4000, 6000
 #: Number of evenly spread windows for the comparison of cut-offs on longer data. Together they
 #: have twice as many rows; at 1 kHz, a filter of 1 Hz removes a tenth of each window at its ends.
 _WINDOWS = 8
-#: Smallest share of rows that remain with a cut-off; with fewer rows, the cut-off is too low for
-#: the stretches.
+#: Smallest share of rows that remain with a cut-off; with fewer rows, the cut-off is too low.
 _KEPT = 0.8
 #: Number of folds (stretches); their losses give the standard error of the mean.
 _STRETCHES = 16

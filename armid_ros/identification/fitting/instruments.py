@@ -36,8 +36,7 @@ import numpy as np
 from scipy import signal
 import scipy.linalg
 
-#: Band of the instruments, divided by the band of the regressor, which is ten times that of the
-#: motion.
+#: Band of the instruments over that of the regressor, which is ten times the motion's.
 _SHARE = 0.2
 
 

@@ -43,8 +43,7 @@ IN_WORDS: dict[Estimator, str] = {
     'iv': 'instrumental variables from the smoothed motion',
 }
 
-#: Residuals above this number of robust standard deviations lose weight (Huber 1981: 95 %
-#: efficiency).
+#: Residuals above this many robust standard deviations lose weight (Huber 1981, 95 % efficient).
 _HUBER = 1.345
 
 

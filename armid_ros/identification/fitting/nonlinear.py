@@ -44,8 +44,7 @@ MOST_PASSES = 20
 _NOTHING = 1.0
 #: Decrease of the cost by a step below which the iteration ends.
 _LITTLE = 0.1
-#: A fit has converged if the predicted further decrease of the cost is below this share of the
-#: cost.
+#: A fit has converged if the predicted further decrease is below this share of the cost.
 _STUCK = 0.5
 #: Damping factors of a step, relative to the squared columns.
 _DAMPINGS = tuple(10.0 ** np.arange(-8.0, 3.0))
@@ -144,8 +143,8 @@ def fit_values(
         problem, _ = linearised(arm, base, recordings, used)
     elif not curved(arm, reached, motions):
         predicted = tuple(part.torque(solution.values) for part in problem)
-        # use the parameters nearest to the description if their torque along this motion is the
-        # fitted one
+        # parameters nearest to the description, if their torque along this motion is the fitted
+        # one
         nearest = arm.with_theta(base.lift(solution.values, arm.theta))
         rigid = _rigid(arm)
         if free is None and (

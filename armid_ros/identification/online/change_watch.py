@@ -78,9 +78,8 @@ class NuisanceRows:
 
     Such friction biases the identified parameters, and the bias varies with the motion. A search
     for changes would attribute this variation to a change. The friction law itself does not vary,
-    so it is estimated as well: viscous and Coulomb friction, if the model lacks them, and
-    friction in proportion to the load. Bell-shaped functions at low velocities describe a curve
-    over velocity.
+    so it is estimated as well: viscous and Coulomb friction, if the model lacks them, and friction
+    in proportion to the load. Bell-shaped functions at low velocities add up to a curve.
 
     Parameters
     ----------

@@ -48,8 +48,7 @@ import pinocchio as pin
 
 __all__ = ['OnlineIdentifier', 'OnlineSample', 'OnlineSettings']
 
-#: Time constants of the row filter after which the effect of its start, or of a joint at rest, is
-#: 3e-3.
+#: Time constants of the row filter after which the effect of its start, or of a rest, is 3e-3.
 _FORGOTTEN = 10.0
 #: A joint below this velocity [rad/s or m/s] for longer than this time [s] is at rest; a
 #: reversal is shorter. Dry friction may hold such a joint with any torque, so its torque is not

@@ -149,8 +149,7 @@ class NullCalibration:
         single = np.full(len(self._sizes), np.nan)
         for columns in _in_pieces(later):
             some = np.arange(len(single))[columns][judged[columns]]
-            # factors for which the means of the limited statistics have their values in white
-            # noise
+            # factors that give the means of the limited statistics their white-noise values
             seen, most, mean = later[:, some], self._most[some], self._mean[some] * counts[some]
             factor = np.sum(seen, axis=0) / (self._sizes[some] * counts[some])
             for _ in range(8):  # until both converge
@@ -168,8 +167,7 @@ class NullCalibration:
         factors = np.full(len(self._sizes), np.nan)
         factors[judged] = np.exp(value + drawn * (middle - value)).clip(1.0)
         yield
-        # 99 % quantile of the statistics, each divided by its quantile in white noise; zero means
-        # no data
+        # 99 % quantile of the statistics, each over its quantile in white noise; zero: no data
         relative = (later[:, judged] / (factors * self._rare)[judged]).ravel()
         count = np.count_nonzero(relative)
         place = len(relative) - count + (1.0 - _RARE) * (count - 1)

@@ -28,8 +28,7 @@ from scipy import linalg, stats
 
 #: Number of columns transformed in one piece of work.
 _COLUMNS = 24
-#: Regularisation (ridge) for directions without excitation, which keeps the information invertible
-#: [-].
+#: Ridge for directions without excitation, which keeps the information invertible [-].
 _RIDGE = 1e-9
 #: Lower bound of a divisor.
 _SMALLEST = 1e-100

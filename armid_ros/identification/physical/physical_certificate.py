@@ -13,9 +13,8 @@ from armid_ros.model.pseudo_inertia import Consistency
 from armid_ros.motion import FloatArray
 import numpy as np
 
-#: Smallest size of a pseudo-inertia in any direction, relative to the described one, that is off
-#: the limit of physical consistency. Largest distance to a wall of a box, relative to its width,
-#: that is zero.
+#: Relative size of a pseudo-inertia in any direction, up to which it is at the limit of physical
+#: consistency; relative distance to a wall of a box, up to which it is at the wall.
 ACTIVE_SHARE = 1e-3
 #: Held-out torque error, relative to an unconstrained fit, above which the constraints do not fit
 #: the arm.

@@ -35,8 +35,7 @@ import clarabel
 import numpy as np
 from scipy import sparse
 
-#: Weight c of the prior of a mass: a mass three times as large has to reduce the squared residuals
-#: by 0.2 %.
+#: Weight c of the prior of a mass: three times the mass has to reduce squared residuals by 0.2 %.
 _MASS = 1e-3
 #: Numbers of variables of a log-determinant: a triangle, then the logarithms of its diagonal.
 _TRIANGLE, _DIAGONAL = 10, 4

@@ -34,8 +34,7 @@ from scipy.ndimage import correlate1d
 SLOWEST = 2.0
 #: Rates at which arms are recorded [Hz].
 USUAL_RATES = (20.0, 20_000.0)
-#: Band of torque and regressor, divided by that of the motion; it includes harmonics of friction
-#: steps.
+#: Band of torque and regressor over that of the motion, with harmonics of friction steps.
 MODEL_BANDS = 10.0
 #: Largest cut-off of positions, divided by the band of the rows. The Butterworth filter, applied
 #: in both directions, changes that band by at most 5^-8, which is below TORQUE_RESOLUTION.
@@ -129,9 +128,8 @@ class Conditioning:
         """
         Largest stride for smooth functions of the filtered positions, in samples.
 
-        The spectrum of the positions ends at the cut-off, and the spectrum of smooth functions
-        slightly above. Five samples per period of the cut-off are enough for the pass band of the
-        decimation.
+        The spectrum of positions ends at the cut-off, that of smooth functions slightly above.
+        Five samples per period of the cut-off are enough for the pass band of the decimation.
 
         """
         widest = self.rate_hz / (_SMOOTH_SAMPLES * self.cutoff_hz)
@@ -154,8 +152,7 @@ def conditioning(recordings: Sequence[Recording], settings: SignalSettings) -> C
     rate = float(np.median([1.0 / recording.period for recording in recordings]))
     cutoff, decimation = settings.cutoff_hz, settings.decimation
     if cutoff is None or decimation is None:
-        # frequency at which the spectrum of each position falls to its noise, which is white at
-        # the sensor
+        # where the spectrum of each position falls to its noise, which is white at the sensor
         crossings = []
         for recording in recordings:
             frequency, power, floor = _position_spectrum(recording)

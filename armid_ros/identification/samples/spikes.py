@@ -13,17 +13,16 @@ samples are used. A real change is therefore never lost, however large it is.
 Positions are continuous. A position that steps and continues from there means that a clock was set
 or an encoder zeroed, and a new stretch begins (``StreamSample.begins``). A torque may jump and
 return, for example when free play is crossed. The usual range of the torque distinguishes such
-pulses from damage. A stream leaves them out without a report of damage, as the range is known too
-late. A recording keeps them.
+pulses from damage. A stream leaves them out unreported, as it knows the range too late; a
+recording keeps them.
 
 The largest allowed error is the largest of three. The first is the usual prediction error in the
-noisiest part of the last minute, so that rest does not reduce it. It is multiplied by the normal
-quantile for one false alarm in `false_alarm_time`. The second is the resolution, the smallest
-step of a signal, times the same quantile. The third is the negligible error (``floor``): the
-error of one sample that changes an estimate as much as noise does. Across a gap, errors are
-larger: those of an acceleration grow with the square of time, those of noise hardly. The errors of
-a signal reveal which of the two dominates: successive errors of white noise have the correlation
--2/3, those of an acceleration 1.
+noisiest part of the last minute, times the normal quantile for one false alarm in
+`false_alarm_time`. The second is the resolution, the smallest step of a signal, times the same
+quantile. The third is the negligible error (``floor``): the error of one sample that changes an
+estimate as much as noise does. Across a gap, errors are larger: those of an acceleration grow with
+the square of time, those of noise hardly. The errors of a signal reveal which of the two
+dominates: successive errors of white noise have the correlation -2/3, those of an acceleration 1.
 
 """
 

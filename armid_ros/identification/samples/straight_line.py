@@ -29,8 +29,7 @@ _HALF_A_TURN = np.pi
 _WINDOW = 100
 #: Number of windows kept: one minute at 1 kHz.
 _REMEMBERED = 600
-#: Share of predictions that define the usual error. The others may be steps of friction, or
-#: damage.
+#: Share of predictions that define the usual error. Others may be friction steps, or damage.
 _SHARE = 0.95
 #: Share for the first few samples, where one damaged sample spoils three predictions.
 _SHARE_FIRST = 0.75

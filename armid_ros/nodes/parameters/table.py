@@ -84,7 +84,7 @@ class NodeParameter:
         """
         Return a value with the type of the parameter.
 
-        An integer is accepted for a float, a single value for a list, and [] for an empty list of
+        An integer is accepted for a float, one value for a list, and [] for an empty list of
         names.
 
         Raises

@@ -3,10 +3,9 @@
 """
 Springs between two machines: online identification, and slack of the straps.
 
-A strap with slack pulls with k (|D| - slack) along D if |D| exceeds the slack; otherwise the force
-is zero. The torque is nonlinear in the slack, so the stiffness is fitted at several slacks. A
-parabola through the best fit and its neighbours gives the slack; its curvature gives the standard
-deviation.
+A strap with slack pulls with k (|D| - slack) along D if |D| exceeds the slack; otherwise not. The
+torque is nonlinear in the slack, so the stiffness is fitted at several slacks. A parabola through
+the best fit and its neighbours gives the slack, and its curvature the standard deviation.
 
 """
 

@@ -231,8 +231,8 @@ def isolability_section(isolability: Isolability) -> ContentSection:
         'Isolability',
         [
             Paragraph(
-                'Effects that this run makes detectable, for an arm with a known model and the '
-                'assumed torque noise. An effect is detectable at five standard deviations of '
+                'Effects that this run makes detectable in a known arm at the assumed torque '
+                'noise. An effect is detectable at five standard deviations of '
                 'its value. It is '
                 'not distinguishable from an effect that reproduces its torque to 10 % (rms).'
             ),

@@ -3,10 +3,9 @@
 """
 Step 1: the arm with rigid joints, at frequencies far below its resonances.
 
-tau = (M + diag(mm gear^2)) q'' + h + (dl + dm gear^2) q' + fm gear sgn(q'). alpha + mm1 gear^2,
-beta, gamma, mm2 gear^2, the sums of friction and the Coulomb torques are identifiable. Of motor
-and link inertia of joint 1, and of motor and link friction of any joint, only the sum is
-identifiable.
+tau = (M + diag(mm gear^2)) q'' + h + (dl + dm gear^2) q' + fm gear sgn(q'). The identifiable
+parameters are alpha + mm1 gear^2, beta, gamma, mm2 gear^2, the sums of friction and the Coulomb
+torques. Only sums are identifiable of motor and link friction, and of the inertias of joint 1.
 
 """
 

@@ -152,8 +152,7 @@ def tune(
     after = arm(factors)
     found = unpack(after)
     rows, left = jacobian(factors), residual(factors)
-    # residuals are correlated, so scores are summed over the channels of a sample, without the
-    # prior
+    # residuals are correlated, so scores are summed over channels of a sample, without the prior
     white_noise, data = _covariance(rows), len(left) - len(prior)
     scores = (rows * left[:, np.newaxis])[:data].reshape(*measured.shape, -1).sum(axis=2)
     lags = max(1, count // 10)  # residuals are correlated over at most a tenth of an experiment

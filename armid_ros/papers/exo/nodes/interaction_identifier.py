@@ -53,15 +53,12 @@ class InteractionIdentifierNode(ArmidNode):
     """
 
     table = (
-        NodeParameter(
-            'memory', 10.0, 'Length of the past that estimates use.', 's', limits=(3.0, 600.0)
-        ),
+        NodeParameter('memory', 10.0, 'Time that estimates use.', 's', limits=(3.0, 600.0)),
         NodeParameter('period', 2.0, 'Time between estimates.', 's', limits=(0.1, 600.0)),
         NodeParameter(
             'slack_period',
             30.0,
-            'Time between fits of slack, made if springs without slack do not explain the '
-            'torques.',
+            'Time between fits of slack, if springs without it do not explain torques.',
             's',
             limits=(1.0, 3600.0),
         ),
