@@ -216,8 +216,7 @@ class ExcitationResult(Shown):
         """
         for name in ('excitation.yaml', 'excitation.csv'):
             save_excitation(self.core.excitation, folder / name)
-        # with approach and return, if there is a path to the trajectory
-        for name in ('excitation.yaml', 'excitation.csv'):
+        for name in ('excitation.yaml', 'excitation.csv'):  # if a path to the trajectory is found
             save_excitation(self.run.excitation, folder / name)
         robot = self.arm.robot
         write_joint_trajectory(folder / BAG, self.run.motion(), robot_description=robot.urdf)

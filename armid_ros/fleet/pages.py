@@ -62,8 +62,7 @@ def _overview(found: Watch, diagnoses: Diagnoses) -> str:
     rows = [_arm_row(arm, diagnoses.get(arm.arm)) for arm in found.arms]
     hint = (
         'Small curves: the changed parameter over time, on six standard deviations or more; a '
-        'dashed line marks the change. Error: median of 100 |residual torque| / '
-        '|torque| '
+        'dashed line marks the change. Error: median of 100 |residual torque| / |torque| '
         'over the bags of an arm, each fitted by itself.'
     )
     sections: list[Section] = [

@@ -66,8 +66,7 @@ def call_publisher(node: str, action: str, speed: float | None, timeout: float) 
         executor.spin_until_future_complete(future, max(end - time.monotonic(), 0.1))
         if not future.done():
             raise TrajectoryError(
-                f'{name} did not answer {action} within {timeout:g} s; '
-                'whether the action took place is unknown'
+                f'{name} did not answer {action} within {timeout:g} s; whether it acted is unknown'
             )
         answer = future.result()
     finally:

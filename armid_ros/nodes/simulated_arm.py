@@ -150,8 +150,7 @@ class SimulatedArmNode(ArmidNode):
             arm = make_arm(self.value, self._bare, drives, self.get_logger().warn)
         self._arm = arm
         self._dt_ns = round(self._arm.plant.dt * 1e9)
-        # refuse invalid parameters before publishers are made
-        self._stride = self._steps_at(self.value('rate'))
+        self._stride = self._steps_at(self.value('rate'))  # refused before publishers are made
         self._follows = bool(self.value('use_sim_time'))
         self._origin_ns = start_ns
         if start_ns is None and not self._follows:

@@ -258,9 +258,8 @@ def _with_degrees(value: float, std: float, unit: str) -> str:
 
 def _strange(joints: Sequence[str], findings: Sequence[Finding]) -> str:
     text = (
-        f'Equal periods differ in {", ".join(joints)} by more than noise, and the difference '
-        'does not depend on time or velocity. Something acts that does not repeat, such as '
-        'contact or a person. '
+        f'Equal periods differ in {", ".join(joints)} by more than noise, independent of '
+        'time and velocity. Something acts that does not repeat, such as contact or a person. '
     )
     if findings:
         names = ', '.join(name_in_words(finding.name) for finding in findings)

@@ -84,8 +84,7 @@ class NodeParameter:
         """
         Return a value with the type of the parameter.
 
-        An integer is accepted for a float, one value for a list, and [] for an empty list of
-        names.
+        An integer is accepted for a float, one value for a list, and [] for no names.
 
         Raises
         ------
@@ -105,10 +104,7 @@ class NodeParameter:
             return typed
         instead = f'use a value such as {str(default).lower() if kind is bool else default}'
         if kind is str:
-            instead = (
-                'use a text; put a number or a truth value into two pairs of quotes: '
-                f'-p {self.name}:="\'{value}\'"'
-            )
+            instead = f'use a text; quote other values twice: -p {self.name}:="\'{value}\'"'
         raise ParameterError(f"parameter '{self.name}' cannot be {value}; {instead}")
 
     def objection(self, value: object) -> str:

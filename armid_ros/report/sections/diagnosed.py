@@ -232,8 +232,7 @@ def isolability_section(isolability: Isolability) -> ContentSection:
         [
             Paragraph(
                 'Effects that this run makes detectable in a known arm at the assumed torque '
-                'noise. An effect is detectable at five standard deviations of '
-                'its value. It is '
+                'noise. An effect is detectable at five standard deviations of its value. It is '
                 'not distinguishable from an effect that reproduces its torque to 10 % (rms).'
             ),
             DataTable(heads, rows, tuple(range(len(heads)))),

@@ -36,8 +36,7 @@ from scipy.signal import csd
 
 #: Number of states of motor, spring and link that the velocities determine.
 ORDER = 3
-#: Drives hold their torque between samples, and links move smoothly.
-_HOLD: tuple[Hold, Hold] = ('zero', 'first')
+_HOLD: tuple[Hold, Hold] = ('zero', 'first')  # drives hold their torque, links move smoothly
 
 
 def link_columns(q: FloatArray, dq: FloatArray, ddq: FloatArray) -> FloatArray:
