@@ -3,10 +3,6 @@
 """What `import armid_ros` offers: late, complete, and readable."""
 
 import json
-import os
-from pathlib import Path
-import subprocess
-import sys
 
 import armid_ros as ar
 import numpy as np
@@ -50,23 +46,6 @@ def found(model, loaded):
     return ar.diagnose(model, loaded)
 
 
-def test_importing_it_imports_nothing_else():
-    """The numerical libraries come with the first name that needs them."""
-    code = (
-        'import sys, armid_ros\n'
-        "heavy = {'numpy', 'scipy', 'pinocchio', 'matplotlib', 'rclpy', 'rich', 'click'}\n"
-        'print(sorted(heavy & set(sys.modules)))'
-    )
-    done = subprocess.run(
-        [sys.executable, '-c', code],
-        env={**os.environ, 'PYTHONPATH': str(Path(__file__).parents[2])},
-        capture_output=True,
-        text=True,
-        check=True,
-    )
-    assert done.stdout.strip() == '[]'
-
-
 @pytest.mark.parametrize('name', ar.__all__)
 def test_every_name_is_there_and_documented(name):
     value = getattr(ar, name)
@@ -98,13 +77,6 @@ def test_a_saved_identification_is_what_the_command_line_writes(model, tmp_path)
     assert {path.name for path in folder.iterdir()} == names
     again = ar.load_model(folder / 'model.yaml')
     np.testing.assert_allclose(again.theta, model.arm.theta)
-
-
-def test_a_physical_identification_gives_a_urdf_that_loads(runs, tmp_path):
-    found = ar.identify('humanoid_arm', runs[0], physical=True)
-    found.urdf(tmp_path / 'arm.urdf')
-    robot = ar.load_robot(tmp_path / 'arm.urdf')
-    np.testing.assert_allclose(robot.rigid_parameters, found.arm.robot.rigid_parameters, atol=1e-6)
 
 
 def test_recordings_and_residuals_of_a_model_are_its_baseline_from_memory_and_file(
@@ -264,3 +236,41 @@ def test_residuals_are_a_table_of_every_joint(model, found):
     left = found.residual_table()
     assert list(left.columns) == list(table.columns)
     assert (left[joints].std() < 3.0 * errors).all()
+
+
+@pytest.mark.parametrize('ask', [ar.identify, ar.diagnose])
+@pytest.mark.parametrize(
+    ('recordings', 'said'),
+    [([], 'no recordings'), (None, "'None'.*Recording"), (3, "'3'"), ([None], "'None'")],
+)
+def test_no_recording_is_said(arm, ask, recordings, said):
+    with pytest.raises(ar.ArmidError, match=said):
+        ask(arm, recordings)
+
+
+def test_a_recording_in_place_of_the_robot_is_answered_with_the_order(run):
+    with pytest.raises(ar.ArmidError, match=r'Recording is no robot.*before recordings'):
+        ar.identify(run, 'my_arm.urdf')
+
+
+def test_a_folder_in_place_of_a_model_is_answered_with_the_model_in_it(tmp_path):
+    (tmp_path / 'model.yaml').touch()
+    with pytest.raises(ar.ArmidError, match=r'name .*model\.yaml'):
+        ar.identify(tmp_path, 'monday')
+
+
+def test_a_model_is_read_with_a_robot_in_any_form(arm, tmp_path):
+    path = tmp_path / 'model.yaml'
+    ar.save_model(path, arm, 'nowhere.urdf')
+    for robot in (arm, arm.robot, 'humanoid_arm', arm.robot.path):
+        np.testing.assert_array_equal(ar.load_model(path, robot).theta, arm.theta)
+    with pytest.raises(ar.ArmidError, match=r'absent\.urdf'):
+        ar.load_model(path, 'absent.urdf')
+
+
+def test_a_misspelt_robot_or_prior_is_answered_with_what_was_meant(runs):
+    with pytest.raises(ar.ArmidError, match="'humanoid_arm'"):
+        ar.load_robot('humanoid_am')
+    for prior in ({'viscus_friction': 'often'}, {'viscous_friction': 'ofen'}):
+        with pytest.raises(ar.ArmidError, match=r"'(viscous_friction|often)'"):
+            ar.diagnose('humanoid_arm', runs[0], prior=prior)

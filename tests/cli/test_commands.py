@@ -2,6 +2,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """The command line: what it writes, prints and refuses."""
 
+import inspect
 import json
 from pathlib import Path
 import re
@@ -18,6 +19,9 @@ from armid_ros.excitation.schedule import MAX_DURATION
 from armid_ros.identification.fitting.least_squares import ESTIMATORS
 from armid_ros.recording.columns import TIME_UNITS
 from armid_ros.robots import load_robot
+import click
+from click.shell_completion import ShellComplete
+from click.testing import CliRunner
 import pytest
 
 from .conftest import armid, ROBOT
@@ -254,3 +258,69 @@ def test_passwords_are_in_no_page(tmp_path, monkeypatch):
     armid(*asked)
     page = (tmp_path / 'out' / 'report.html').read_text()
     assert 'hunter2' not in page and 'password' in page
+
+
+def commands(group, path=()):
+    """Yield all commands with their names, and those of the groups in it."""
+    context = click.Context(group)
+    for name in group.list_commands(context):
+        command = group.get_command(context, name)
+        if isinstance(command, click.Group):
+            yield from commands(command, (*path, name))
+        else:
+            yield ' '.join((*path, name)), command
+
+
+COMMANDS = dict(commands(main))
+
+
+@pytest.mark.parametrize('name', COMMANDS)
+def test_a_command_takes_its_options_and_nothing_else(name):
+    command = COMMANDS[name]
+    parameters = inspect.signature(command.callback).parameters.values()
+    taken = {p.name for p in parameters if p.kind is not p.VAR_KEYWORD}
+    options = {parameter.name for parameter in command.params if parameter.expose_value}
+    assert taken <= options
+    if len(taken) == len(parameters):
+        assert taken == options
+
+
+def test_a_misspelt_command_is_corrected():
+    result = CliRunner().invoke(main, ['identfy'])
+    assert result.exit_code == 2 and "'identify'" in result.output
+
+
+def completed(*words):
+    """Return what completes the last word."""
+    shell = ShellComplete(main, {}, 'armid', '_ARMID_COMPLETE')
+    return [item.value for item in shell.get_completions(list(words[:-1]), words[-1])]
+
+
+def test_commands_and_options_are_completed():
+    assert completed('id') == ['identify']
+    assert {'robots', 'recover'} <= set(completed('r'))
+    assert completed('identify', '--effects') == ['--effects']
+    assert '--version' in completed('--v')
+
+
+def test_values_are_completed():
+    assert 'humanoid_arm' in completed('identify', '--robot', 'hum')
+    assert completed('identify', '--effects', 'viscous_friction,stribeck') == [
+        'viscous_friction,stribeck_friction'
+    ]
+
+
+@pytest.mark.parametrize(
+    ('words', 'found'),
+    [
+        (['simulate', '--effect', 'stri'], ['stribeck_friction']),
+        (['excite', '--effect', 'stri'], ['stribeck_friction']),
+        (['demo', '--hide', 'stri'], ['stribeck_friction']),
+        (['diagnose', '--prior', 'stri'], ['stribeck_friction']),
+        (['diagnose', '--prior', 'stribeck_friction=o'], ['stribeck_friction=often']),
+        (['excite', '--speed', 'm'], ['medium']),
+        (['identify', '--gravity', ''], ['earth', 'moon']),
+    ],
+)
+def test_values_of_an_option_are_completed(words, found):
+    assert completed(*words) == found

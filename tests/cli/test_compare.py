@@ -83,15 +83,6 @@ def test_a_change_is_printed_with_its_interval_and_shown(tmp_path, compared):
     assert 'http' not in page.split('<main>')[1].split('<script>')[0]
 
 
-def test_an_escape_sequence_in_a_name_does_not_reach_the_terminal(tmp_path, compared):
-    first, second = identified(tmp_path / 'a', 0.08), identified(tmp_path / 'b', 0.1)
-    for folder in (first, second):
-        path = folder / 'identification.json'
-        path.write_text(path.read_text().replace('elbow', r'elb\u001b[2Jow'))
-    text, _, _ = compared(first, second)
-    assert '\x1b' not in text and r'elb\x1b[2Jow' in text
-
-
 def test_a_model_that_describes_no_arm_is_said_first_and_nothing_is_unchanged(tmp_path, compared):
     text, page, document = compared(
         identified(tmp_path / 'a', 0.08), second := unusable(tmp_path / 'b', 0.081)

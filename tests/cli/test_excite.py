@@ -81,19 +81,6 @@ def test_an_arm_whose_zero_is_on_the_floor_starts_near_it_and_names_the_link(ur5
     assert 'wrist_3_link' in said
 
 
-@pytest.mark.long
-def test_an_arm_that_hangs_is_asked_for_its_floor(tmp_path):
-    name = example('talos_left_arm')
-    refused = excite(name, tmp_path / 'plan', code=2).stderr
-    assert '--floor none' in refused and len(refused.strip().splitlines()) == 1
-    assert not (tmp_path / 'plan').exists()
-    excite(name, tmp_path / 'none', '--floor', 'none')
-    document = json.loads((tmp_path / 'none' / 'excitation.json').read_text())
-    assert any('floor' in one for one in document['not_checked'])
-    page = (tmp_path / 'none' / 'report.html').read_text()
-    assert 'class="verdict fair"' in page and document['verdict'] in page
-
-
 def test_a_trajectory_begins_and_ends_at_rest_where_the_arm_stands(tmp_path):
     """All of it is inside the limits and clear, the way there and back as well."""
     start, speed = '0.3,-0.2,0.1,0.5,0,0', 'fast'

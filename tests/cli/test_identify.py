@@ -149,15 +149,6 @@ def test_gravity_of_another_body_is_said_first_and_ends_a_strict_run(tmp_path):
     assert armid(*arguments, '--gravity', 'moon').stdout.startswith('GOOD:')
 
 
-def test_a_joint_without_effort_is_named(bags, tmp_path):
-    recording = read_recording(bags[0], joints=load_robot(ROBOT).joints)
-    tau = np.array(recording.tau)
-    tau[:, 4] = np.nan
-    write_recording(tmp_path / 'bag', replace(recording, tau=tau))
-    result = armid('identify', tmp_path / 'bag', '--robot', ROBOT, '--out', tmp_path / 'o', code=2)
-    assert 'effort' in result.stderr and 'forearm_yaw' in result.stderr
-
-
 def test_the_model_file_holds_the_residual_of_held_out_data_where_there_are_any(made, quick):
     assert load_misfit(quick[0] / 'model.yaml').data == 'training'
     misfit = load_misfit(made[0] / 'model.yaml')

@@ -26,14 +26,3 @@ def test_a_table_is_inspected_as_a_bag_is(tmp_path):
     assert 'in degrees' in result.stdout
     assert '(guessed)' in result.stderr
     assert 'in degrees' not in armid('inspect', path, '--degrees').stdout
-
-
-def test_a_bag_without_joint_states_is_answered_with_what_there_is(tmp_path):
-    from armid_ros.recording import BagWriter
-    from armid_ros.recording.message_types import string_cdr
-
-    with BagWriter(tmp_path / 'bag') as writer:
-        writer.add_topic('/chatter', 'std_msgs/msg/String')
-        writer.write('/chatter', string_cdr('hello'), 10**9)
-    error = armid('inspect', tmp_path / 'bag', code=2).stderr
-    assert '/chatter' in error and 'std_msgs/msg/String' in error

@@ -3,7 +3,7 @@
 """Units of effects go with how their joints move, slide or turn."""
 
 from armid_ros.arm import ArmModel, load_model, save_model
-from armid_ros.effects import make_effect
+from armid_ros.effects import make_effect, Shape
 from armid_ros.robots import robot_from_urdf
 import numpy as np
 import pytest
@@ -53,3 +53,24 @@ def test_units_are_those_of_joint_or_pair_in_a_file_as_well(scara, tmp_path, eff
     save_model(tmp_path / 'model.yaml', arm, str(tmp_path / 'scara.urdf'))
     (again,) = load_model(tmp_path / 'model.yaml').effects
     assert again == made
+
+
+TIME = Shape('time', 's', 0.1, 1e5, 600.0, (10.0, 60.0, 3000.0))
+LAG = Shape('lag', 's', 0.0, 1.0, 0.0, (0.0, 0.001, 0.01))
+POWER = Shape('power', '', 0.3, 4.0, 2.0, (1.0, 2.0))
+
+
+@pytest.mark.parametrize(
+    ('shape', 'value', 'half', 'told'),
+    [
+        (TIME, 206.0, 40.0, True),
+        (TIME, 206.0, 25000.0, False),
+        (TIME, 206.0, np.inf, False),
+        (LAG, 0.0, 0.002, True),
+        (LAG, 0.0, 0.05, False),
+        (POWER, 2.0, 0.5, True),
+        (POWER, 2.0, 3.0, False),
+    ],
+)
+def test_a_shape_is_determined_where_its_interval_leaves_something_out(shape, value, half, told):
+    assert shape.determined(value, half) is told

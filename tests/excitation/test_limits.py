@@ -9,15 +9,22 @@ from armid_ros.arm import ArmModel
 from armid_ros.errors import TrajectoryError
 from armid_ros.excitation import (
     check_limits,
+    CollisionScene,
     Design,
     DesignSettings,
     Excitation,
     FourierTrajectory,
     Limits,
+    random_feasible,
+    with_joint_limits,
 )
 from armid_ros.excitation.feasibility import trajectory_faults
+from armid_ros.excitation.limits import SLOW_VELOCITY, TIME_TO_TOP_SPEED
+from armid_ros.robots import joints_beside_arms, load_arms, robot_from_urdf
 import numpy as np
 import pytest
+
+from .conftest import urdf
 
 
 @pytest.fixture
@@ -108,3 +115,117 @@ def test_limits_without_room_are_refused_with_the_joint(limits):
         replace(limits, lower=np.array([-1.0, 1.0]), upper=np.array([1.0, 1.0]))
     with pytest.raises(TrajectoryError, match=r'shoulder.*velocity'):
         replace(limits, velocity=np.array([0.0, 1.0]))
+
+
+def arm_urdf(name='small', limit=2.0):
+    """Write an arm of three joints that stands."""
+    return urdf(
+        ('waist', 'revolute', 'base', 'a', '0 0 0.5', '0 0 1', -limit, limit, 200),
+        ('shoulder', 'revolute', 'a', 'b', '0 0 0.4', '0 1 0', -1, 1, 100),
+        ('elbow', 'revolute', 'b', 'c', '0 0 0.4', '0 1 0', -1, 1, 50),
+        name=name,
+    )
+
+
+@pytest.mark.parametrize('given', ['velocity="0"', '', 'velocity="inf"'])
+def test_a_joint_without_a_velocity_limit_is_slow_and_that_is_said(given):
+    text = arm_urdf().replace('velocity="2"', given, 1)
+    robot = robot_from_urdf(text)
+    limits = Limits.of(robot, speed=1.0)
+    np.testing.assert_allclose(limits.velocity, [SLOW_VELOCITY, 2.0, 2.0])
+    np.testing.assert_allclose(limits.acceleration, limits.velocity / TIME_TO_TOP_SPEED)
+    assert any('waist' in line for line in CollisionScene.of(robot, 0.01).unchecked)
+    mended = with_joint_limits(robot, velocity=['waist:=1.5'])
+    assert Limits.of(mended, speed=1.0).velocity[0] == 1.5
+    assert not any('velocity' in line for line in CollisionScene.of(mended, 0.01).unchecked)
+
+
+@pytest.mark.parametrize(
+    'text', ['waist', 'wrist:=1', 'waist:=0', 'waist:=-1', 'waist:=nan', 'waist:=']
+)
+def test_a_velocity_that_is_none_is_refused(text):
+    with pytest.raises(TrajectoryError, match='waist'):
+        with_joint_limits(robot_from_urdf(arm_urdf()), velocity=[text])
+
+
+def test_limits_in_degrees_are_asked_about():
+    with pytest.raises(TrajectoryError, match=r'waist.*160.*degrees'):
+        CollisionScene.of(robot_from_urdf(arm_urdf(limit=160.0)), 0.01)
+
+
+def test_moveit_limits_are_read(tmp_path):
+    path = tmp_path / 'joint_limits.yaml'
+    path.write_text(
+        'joint_limits:\n'
+        '  waist: {has_velocity_limits: true, max_velocity: 1.0, has_acceleration_limits: true, '
+        'max_acceleration: 3.0}\n'
+        '  shoulder: {has_velocity_limits: true, max_velocity: 9.0, has_acceleration_limits: '
+        'false, max_acceleration: 0}\n'
+    )
+    robot = with_joint_limits(robot_from_urdf(arm_urdf()), path)
+    limits = Limits.of(robot, speed=1.0)
+    np.testing.assert_allclose(limits.velocity, [1.0, 2.0, 2.0])
+    np.testing.assert_allclose(limits.acceleration, [3.0, 8.0, 8.0])
+    path.write_text('joint_limits: {waist: {has_acceleration_limits: true}}')
+    with pytest.raises(TrajectoryError, match='waist: max_acceleration'):
+        with_joint_limits(robot, path)
+
+
+@pytest.mark.parametrize(
+    ('least', 'most', 'lower', 'upper'), [(-0.5, 0.7, -0.5, 0.7), (-9, 9, -2, 2)]
+)
+def test_moveit_position_limits_narrow_those_of_the_description(
+    tmp_path, least, most, lower, upper
+):
+    path = tmp_path / 'joint_limits.yaml'
+    limits = f'has_position_limits: true, min_position: {least}, max_position: {most}'
+    path.write_text(f'joint_limits: {{waist: {{{limits}}}, shoulder: }}')  # null: none
+    robot = with_joint_limits(robot_from_urdf(arm_urdf(limit=2.0)), path)
+    np.testing.assert_array_equal(robot.lower, [lower, -1, -1])
+    np.testing.assert_array_equal(robot.upper, [upper, 1, 1])
+    found = random_feasible(
+        ArmModel(robot), Limits.of(robot, speed=1.0), 4.0, 2, np.random.default_rng(0)
+    )
+    q = Excitation(found, 1, 2.0).motion(100.0).q
+    assert np.all((q >= robot.lower) & (q <= robot.upper))
+    assert np.ptp(q[:, 0]) > 0.2 * (upper - lower)
+
+
+@pytest.mark.parametrize(
+    ('entry', 'named'),
+    [
+        ('waist: {has_position_limits: true, min_position: -1}', 'waist: max_position'),
+        ('waist: {has_position_limits: true, min_position: 3, max_position: 4}', 'waist'),
+        ('elbow_1: {has_velocity_limits: true, max_velocity: 1}', 'waist, shoulder'),
+    ],
+)
+def test_a_file_of_limits_that_leave_nothing_is_refused(tmp_path, entry, named):
+    path = tmp_path / 'joint_limits.yaml'
+    path.write_text(f'joint_limits: {{{entry}}}')
+    with pytest.raises(TrajectoryError, match=named):
+        with_joint_limits(robot_from_urdf(arm_urdf(limit=2.0)), path)
+
+
+def test_wheels_head_and_torso_belong_to_no_arm():
+    parts = [('torso', 'revolute', 'base', 'trunk', '0 0 0.5', '0 0 1', -1, 1, 200)]
+    parts += [
+        (f'wheel{k}', 'continuous', 'base', f'tyre{k}', f'{k} 0 0', '0 1 0', 0, 0, 9)
+        for k in range(2)
+    ]
+    parts.append(('head', 'revolute', 'trunk', 'skull', '0 0 0.5', '0 0 1', -1, 1, 9))
+    arms = []
+    for side in ('left', 'right'):
+        parent = 'trunk'
+        for k in range(3):
+            name = f'{side}{k}'
+            parts.append((name, 'revolute', parent, f'{name}_link', '0 0 0.3', '0 1 0', -1, 1, 9))
+            parent = f'{name}_link'
+            arms.append(name)
+    robot = robot_from_urdf(urdf(*parts))
+    assert set(robot.joints) - set(joints_beside_arms(robot)) == set(arms)
+    loaded, others = load_arms(lambda joints: robot_from_urdf(urdf(*parts), joints=joints), None)
+    assert set(loaded.joints) == set(arms) and set(others).isdisjoint(arms)
+    one = [part for part in parts if not part[0].startswith('left')]
+    robot = robot_from_urdf(urdf(*one))
+    assert set(joints_beside_arms(robot)) == {'wheel0', 'wheel1', 'head'}
+    assert joints_beside_arms(robot_from_urdf(urdf(*parts[1:3]))) == ()

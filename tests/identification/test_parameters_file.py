@@ -5,9 +5,8 @@
 from dataclasses import replace
 
 from armid_ros.effects import CATALOGUE
-from armid_ros.identification import identify
-from armid_ros.identification.output import identification_document
-from armid_ros.identification.parameters_file import parameters_of
+from armid_ros.identification import identification_document, identify
+from armid_ros.identification.parameters_file import known_fit, parameters_of
 import numpy as np
 import pytest
 
@@ -46,3 +45,53 @@ def test_no_information_on_parameters_that_were_not_identified(bench, read):
     known = len(bench.arm.parameters)
     assert not np.any(told[known:]) and not np.any(told[:, known:])
     np.testing.assert_allclose(told[:known, :known], read.information(bench.arm.parameters))
+
+
+def score(rms, errors, **others):
+    joints = 'ab'
+    return {
+        'relative_error_percent': max(errors),
+        'joint_relative_error_percent': dict(zip(joints, errors, strict=True)),
+        'rms': dict(zip(joints, rms, strict=True)),
+    } | others
+
+
+def misfit(rms, torque):
+    return {
+        'unit': 'N m',
+        'data': 'held-out',
+        'rms': {'a': rms},
+        'relative_error_percent': 3.0,
+        'torque_rms': {'a': torque},
+    }
+
+
+def test_what_was_fitted_counts_as_what_was_held_out_may_be_of_a_changed_arm():
+    training = score([0.1, 0.2], [1.0, 2.0], bags=['x', 'y', 'z'])
+    held_out = [score([0.3, 0.4], [30.0, 40.0], bag='v')]
+    found = known_fit({'training': training, 'validation': held_out})
+    assert (found.recordings, found.rms, found.grade) == (3, {'a': 0.1, 'b': 0.2}, 'good')
+    assert found.torque('b') == pytest.approx(10.0)
+
+
+def test_a_grade_that_is_written_is_kept_with_its_reason():
+    document = {'grade': 'unusable', 'reasons': ['Because.', 'So.']}
+    found = known_fit(document | {'training': score([0.1, 0.1], [1.0, 1.0])})
+    assert found.unusable and found.reason == 'Because.'
+
+
+@pytest.mark.parametrize(('rms', 'grade'), [(0.1, 'good'), (0.3, 'poor'), (0.6, 'unusable')])
+def test_a_model_alone_is_graded_by_what_it_leaves_of_a_joint(rms, grade):
+    found = known_fit({'misfit': misfit(rms, 1.0)})
+    assert (found.grade, found.as_diagnosed) == (grade, True)
+    assert f'{100.0 * rms:g} %' in found.reason
+
+
+def test_a_file_without_a_score_says_nothing():
+    assert known_fit({}) is None
+
+
+@pytest.mark.parametrize('rms', [float('nan'), -0.1, 'much'])
+def test_numbers_that_no_residual_has_are_refused(rms):
+    with pytest.raises(ValueError, match='rms of a'):
+        known_fit({'training': score([rms, 0.1], [1.0, 1.0])})

@@ -9,7 +9,11 @@ import subprocess
 import sys
 import tomllib
 
+import grimp
+import numpy as np
 import pytest
+from scipy.sparse import coo_matrix
+from scipy.sparse.csgraph import connected_components
 
 LAYERS = (
     ('fleet', 'papers', 'positions', 'view', 'zero'),
@@ -100,3 +104,24 @@ def test_nodes_may_import_ros(project):
     (project / 'armid_ros' / 'cli' / 'x.py').write_text('import armid_ros.nodes.novelty\n')
     code, output = lint_imports(project)
     assert code == 0, output
+
+
+def circles(package):
+    """Return the sets of modules that import each other, imports for types included."""
+    graph = grimp.build_graph(package)
+    modules = sorted(graph.modules)
+    place = {module: k for k, module in enumerate(modules)}
+    pairs = [
+        (place[module], place[other])
+        for module in modules
+        for other in graph.find_modules_directly_imported_by(module)
+    ]
+    rows, columns = np.array(pairs).T
+    matrix = coo_matrix((np.ones(len(pairs)), (rows, columns)), shape=(len(modules),) * 2)
+    _, label = connected_components(matrix, directed=True, connection='strong')
+    found = [{m for m, own in zip(modules, label, strict=True) if own == k} for k in set(label)]
+    return [sorted(circle) for circle in found if len(circle) > 1]
+
+
+def test_no_module_needs_itself():
+    assert circles('armid_ros') == []

@@ -45,11 +45,11 @@ for module in walk_packages(armid_ros.__path__, 'armid_ros.'):
         import_module(module.name)
 """
 #: A few tests of the core: of a regression, and of commands.
-FEW = ('cli/test_completion.py', 'identification/fitting/test_normal_equations.py')
+FEW = ('cli/test_driven.py', 'identification/fitting/test_normal_equations.py')
 #: Tests of the tree, and tests of the core that only read tables.
 OTHERS = (
     *('packaging', 'docsite', 'examples', 'golden'),
-    *('cli/test_convert.py', 'cli/test_convert_real.py', 'fuzz/test_tables.py'),
+    *('cli/test_convert.py', 'fuzz/test_tables.py'),
     'recording/test_turns.py',
 )
 #: Other tests of the core that read a table.

@@ -4,10 +4,8 @@
 
 from collections.abc import Callable
 from pathlib import Path
-from xml.etree import ElementTree
 
 from armid_ros.robots import load_robot, Robot
-import mujoco
 import numpy as np
 import pinocchio as pin
 import pytest
@@ -52,36 +50,6 @@ def test_regressor_times_parameters_is_inverse_dynamics(
         regressor = pin.computeJointTorqueRegressor(robot.model, data, q, dq, ddq)
         error = np.linalg.norm(regressor @ robot.rigid_parameters - tau)
         assert error <= 1e-9 * np.linalg.norm(tau)
-
-
-@pytest.mark.parametrize('name', ['panda.urdf', 'kinova.urdf', 'ur10_robot.urdf', 'z1.urdf'])
-def test_an_independent_engine_computes_the_same_torques(
-    name: str, example_robot: FindRobot
-) -> None:
-    gravity = (0.5, -3.0, -9.0)
-    robot = load_robot(example_robot(name), gravity=gravity)
-    other = mujoco.MjModel.from_xml_string(without_shapes(robot.urdf))
-    other.opt.gravity[:] = gravity
-    other.opt.disableflags |= mujoco.mjtDisableBit.mjDSBL_CONSTRAINT
-    other.dof_damping[:] = 0.0
-    other.dof_frictionloss[:] = 0.0
-    dofs = [int(other.joint(joint).dofadr[0]) for joint in robot.joints]
-    data, state = robot.model.createData(), mujoco.MjData(other)
-    for q, dq, ddq in random_states(robot, 20):
-        state.qpos[dofs], state.qvel[dofs], state.qacc[dofs] = q, dq, ddq
-        mujoco.mj_inverse(other, state)
-        tau = pin.rnea(robot.model, data, q, dq, ddq)
-        np.testing.assert_allclose(
-            tau, state.qfrc_inverse[dofs], atol=1e-6 * np.abs(tau).max(), rtol=0.0
-        )
-
-
-def without_shapes(urdf: str) -> str:
-    root = ElementTree.fromstring(urdf)
-    for link in root.findall('link'):
-        for shape in [*link.findall('visual'), *link.findall('collision')]:
-            link.remove(shape)
-    return ElementTree.tostring(root, encoding='unicode')
 
 
 def test_the_panda_is_seven_joints_and_a_closed_hand(example_robot: FindRobot) -> None:

@@ -5,18 +5,13 @@
 from dataclasses import replace
 import re
 
-from armid_ros.arm import ArmModel
-from armid_ros.effects import make_effect
 from armid_ros.identification import grade, identify, Score
 from armid_ros.identification.assess.grade_limits import LIMITS
-from armid_ros.recording import read_recording, ReadReport
-from armid_ros.robots import load_robot
+from armid_ros.recording import ReadReport
 import numpy as np
 import pytest
 
-from benchmarks import real_recordings
-
-from ..conftest import FRICTION, multisine, recorded
+from ..conftest import multisine, recorded
 
 RATE = 100.0
 
@@ -203,13 +198,6 @@ def test_a_mistake_that_a_free_fit_hides_is_not_good(structure, run, change, wor
     assert re.search(said, found.reasons[0])
 
 
-def test_gravity_of_the_earth_on_a_recording_from_the_moon_is_unusable(arm, structure):
-    moon = replace(arm, robot=arm.robot.with_gravity((0.0, 0.0, -1.62)))
-    found, _ = graded(structure, [record(moon, 1)])
-    assert found.word == 'unusable'
-    assert '--gravity moon' in found.reasons[0]
-
-
 @pytest.mark.filterwarnings('error')
 def test_a_channel_of_torque_that_is_numerically_zero_is_unusable(structure, run):
     """The fit explains a torque that is not there by links that weigh nothing."""
@@ -224,40 +212,3 @@ def test_a_clock_that_was_set_back_is_said(structure, run):
     found, _ = graded(structure, [replace(run, report=report)])
     assert found.word == 'good'
     assert any('clock' in line and '1000' in line for line in found.reasons)
-
-
-def test_what_goes_down_gives_out_energy_and_is_no_wrong_sign(arm, structure):
-    """Three seconds in which the arm sinks were refused as torques of the opposite sign."""
-    motion = multisine(arm.robot.joints, 3.0, 200.0, seed=1)
-    found, _ = graded(structure, [recorded(arm, motion, torque_noise=0.02)])
-    assert not any('sign' in reason for reason in found.reasons)
-
-
-def of_machine(machine, real_data, folder, effects=FRICTION):
-    maker = getattr(real_recordings, machine)
-    data = maker(real_data) if machine == 'ur10' else maker(real_data, folder)
-    robot = load_robot(str(data.robot))
-    structure = ArmModel(robot)
-    for name in effects:
-        structure = structure.with_effect(make_effect(name, robot))
-    recordings = [read_recording(bag, joints=robot.joints) for bag in data.bags]
-    found, _ = graded(structure, recordings[:1], recordings[1:])
-    return found
-
-
-@pytest.mark.real_data
-@pytest.mark.parametrize('machine', ['emps', 'ur10'])
-def test_real_recordings_are_good(machine, real_data, tmp_path):
-    assert of_machine(machine, real_data, tmp_path).word == 'good'
-
-
-@pytest.mark.long
-@pytest.mark.real_data
-def test_a_wrist_with_a_coupling_is_good_with_it_and_unusable_without(real_data, tmp_path):
-    """Half of the torque of joint 5 of the TX40 is friction of the coupling with joint 6."""
-    without = of_machine('tx40', real_data, tmp_path)
-    assert without.word == 'unusable'
-    assert 'joint_5' in without.reasons[0]
-    (folder := tmp_path / 'coupled').mkdir()
-    effects = (*FRICTION, 'coupled_joint_friction')
-    assert of_machine('tx40', real_data, folder, effects).word == 'good'

@@ -6,8 +6,9 @@ from dataclasses import replace
 
 from armid_ros.errors import IdentificationError
 from armid_ros.identification import grade, IdentificationSettings, identify
-from armid_ros.identification.rows.signals import SignalSettings
-from armid_ros.identification.rows.stamps import uneven_stamps
+from armid_ros.identification.rows.signals import conditioning, SignalSettings
+from armid_ros.identification.rows.stamps import two_senders, uneven_stamps
+from armid_ros.recording import Recording
 import numpy as np
 import pytest
 
@@ -58,3 +59,76 @@ def test_a_grade_says_it_where_enough_is_left(structure, run):
     found = grade(fitted, structure, [late], {})
     assert found.word != 'good'
     assert any('uneven' in one for one in found.reasons)
+
+
+JOINTS = ('shoulder', 'elbow', 'wrist')
+
+
+def sent(seed=1, rate=100.0, amplitude=0.5, noise=1e-5, step=0.0):
+    motion = multisine(JOINTS, 40.0, rate, seed, amplitude)
+    q = motion.q + noise * np.random.default_rng(seed).normal(size=motion.q.shape)
+    q = np.round(q / step) * step if step else q
+    return Recording(joints=JOINTS, t=motion.t, q=q, dq=motion.dq, tau=3.0 * motion.q)
+
+
+def mixed(one, other, later):
+    """Put the messages of two recordings into one, in order of time."""
+    t = np.concatenate([one.t, other.t + later])
+    order = np.argsort(t, kind='stable')
+    q, dq, tau = (
+        np.concatenate([getattr(one, name), getattr(other, name)])[order]
+        for name in ('q', 'dq', 'tau')
+    )
+    return Recording(joints=JOINTS, t=t[order], q=q, dq=dq, tau=tau, source='mixed')
+
+
+def zeros_of_another(one, count=200):
+    t = np.sort(np.random.default_rng(0).uniform(0.0, one.t[-1], count))
+    nothing = np.zeros((count, len(JOINTS)))
+    return mixed(one, Recording(joints=JOINTS, t=t, q=nothing, dq=nothing, tau=nothing), 0.0)
+
+
+def leader_and_follower(one):
+    lag = np.column_stack([np.interp(one.t - 0.05, one.t, column) for column in one.q.T])
+    return mixed(one, replace(one, q=lag), 0.003)
+
+
+def two_arms(one):
+    return mixed(one, sent(2), 0.0003)
+
+
+@pytest.mark.parametrize('velocity', [True, False])
+@pytest.mark.parametrize('mix', [zeros_of_another, leader_and_follower, two_arms])
+def test_two_senders_of_one_topic_are_refused(mix, velocity):
+    recording = mix(sent())
+    recording = recording if velocity else replace(recording, dq=None)
+    with pytest.raises(IdentificationError, match='two senders'):
+        conditioning([recording], SignalSettings())
+
+
+def with_faulty_samples(value):
+    def spoil(one):
+        rng, q = np.random.default_rng(0), one.q.copy()
+        rows = rng.choice(len(q), 200, replace=False)
+        q[rows] = value(rng, (200, len(JOINTS)))
+        return replace(one, q=q)
+
+    return spoil
+
+
+@pytest.mark.parametrize(
+    'sound',
+    [
+        sent(),
+        sent(noise=1e-2),
+        sent(step=5e-3),
+        sent(amplitude=1e-3, noise=2e-3),
+        sent(rate=20.0),
+        sent(rate=1000.0, noise=5e-3),
+        with_faulty_samples(lambda rng, shape: np.zeros(shape))(sent()),
+        with_faulty_samples(lambda rng, shape: rng.normal(size=shape))(sent()),
+    ],
+)
+@pytest.mark.parametrize('velocity', [True, False])
+def test_one_sender_is_one(sound, velocity):
+    assert two_senders(sound if velocity else replace(sound, dq=None)) == ''

@@ -17,9 +17,6 @@ from tests.papers.elastic.two_link_in_mujoco import (
     SENSORS,
     steps,
 )
-from tests.report.conftest import browser, charts_drawn
-
-__all__ = ['browser', 'charts_drawn']
 
 
 @pytest.fixture(scope='session')

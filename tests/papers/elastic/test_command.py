@@ -34,19 +34,6 @@ def read(folder):
     return document, [row['value'] for row in document['parameters'] if row['name'] == 'kg']
 
 
-@pytest.mark.long
-def test_demo_finds_the_springs_and_a_browser_draws_it(tmp_path, truth, charts_drawn) -> None:
-    out = tmp_path / 'result'
-    said = run('--demo', '--experiments', 3, '--out', out, '--json')
-    document, stiffness = read(out)
-    assert json.loads(said) == document
-    assert stiffness == pytest.approx(truth.stiffness.tolist(), rel=0.02)
-    assert document['story']['main_parameters_percent_before'] > 50.0
-    assert document['story']['main_parameters_percent_after'] < 0.5
-    assert document['story']['factor'] > 150.0
-    assert charts_drawn((out / 'report.html').read_text('utf-8'), 390, dark=False) == 6 + 8
-
-
 def test_experiments_without_steps_leave_out_the_tuning(runs, truth, tmp_path) -> None:
     robot = load_robot('two_link_elastic')
     sensors = LinkAccelerometers(robot, np.outer([0.4, 0.4], [1.0, 0.0, 0.0]))

@@ -8,6 +8,8 @@ from armid_ros.errors import ModelError
 from armid_ros.model import inverse_dynamics, random_motion
 from armid_ros.papers.exo.plant.gait import read_gait
 from armid_ros.papers.exo.plant.leg_pair import (
+    exercise,
+    EXERCISES,
     leg_pair,
     pair_torques,
     PairMotion,
@@ -83,3 +85,24 @@ def test_a_segment_that_is_none_is_refused() -> None:
         leg_pair([1.0, 2.0])
     with pytest.raises(ModelError, match='not negative'):
         leg_pair(-1.0)
+
+
+PAIR = leg_pair()
+T = np.linspace(0.0, 2.0, 2001)
+
+
+@pytest.mark.parametrize('name', EXERCISES)
+def test_velocity_and_acceleration_are_those_of_the_position(name) -> None:
+    for motion in exercise(PAIR, name, T):
+        speed = np.gradient(motion.q, T, axis=0)[5:-5]
+        hurry = np.gradient(motion.dq, T, axis=0)[5:-5]
+        np.testing.assert_allclose(motion.dq[5:-5], speed, atol=2e-3)
+        np.testing.assert_allclose(motion.ddq[5:-5], hurry, atol=3e-2)
+
+
+@pytest.mark.parametrize('name', EXERCISES)
+def test_knees_bend_one_way_and_the_stance_foot_is_flat(name) -> None:
+    wearer = exercise(PAIR, name, T).other
+    ankle, knee, hip, _, far_knee, _ = wearer.q.T
+    assert min(knee.min(), far_knee.min()) > -0.05
+    np.testing.assert_allclose(ankle, knee - hip, atol=1e-12)

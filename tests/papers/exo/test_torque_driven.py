@@ -8,10 +8,11 @@ from armid_ros.papers.exo.plant.leg_pair import (
     leg_pair,
     pair_torques,
     PairMotion,
+    stepping,
     TiedPair,
     walking,
 )
-from armid_ros.papers.exo.plant.torque_driven import drive_by_torque, splined
+from armid_ros.papers.exo.plant.torque_driven import drive_by_torque, SimulatedPair, splined
 import numpy as np
 import pytest
 
@@ -51,3 +52,51 @@ def test_an_even_number_of_samples_is_refused(pair) -> None:
     even = walking(pair, read_gait(), np.linspace(0.0, 0.4, 20))
     with pytest.raises(TrajectoryError, match='odd'):
         drive_by_torque(pair, *even, ['exo_swing_hip'], lambda t: np.zeros(1))
+
+
+def simulated(**options) -> SimulatedPair:
+    return SimulatedPair(leg_pair(), read_gait(), rng=np.random.default_rng(0), **options)
+
+
+def test_without_noise_it_is_the_gait_and_its_torques():
+    pair, samples = leg_pair(), []
+    standing = simulated()
+    for _ in range(120):
+        samples.append(standing.advance())
+    motions = stepping(pair, read_gait(), np.array([s.t for s in samples]))
+    np.testing.assert_allclose([s.q for s in samples], motions.own.q, atol=1e-12)
+    np.testing.assert_allclose([s.other_q for s in samples], motions.other.q, atol=1e-12)
+    np.testing.assert_allclose(
+        [s.tau for s in samples], pair_torques(pair, *motions).tau, atol=1e-9
+    )
+
+
+def test_one_joint_by_torque_stays_with_the_gait():
+    by_torque = simulated(driven=('exo_swing_knee',))
+    for _ in range(300):
+        sample = by_torque.advance()
+    gait = stepping(by_torque.pair, read_gait(), np.array([sample.t])).own.q[0]
+    assert np.degrees(np.abs(sample.q - gait).max()) < 0.01
+    assert not by_torque.fallen
+
+
+def test_all_joints_in_open_loop_fall_where_torques_are_sampled_coarsely():
+    """The instability of the open loop: nothing holds what a small error begins."""
+    by_torque = simulated(driven=leg_pair().robot.joints, torque_rate=30.0)
+    for _ in range(3000):
+        by_torque.advance()
+        if by_torque.fallen:
+            break
+    assert by_torque.fallen and by_torque.t < 3.0
+    by_torque.reset()
+    assert not by_torque.fallen and by_torque.t == 0.0
+
+
+def test_noise_has_the_size_asked_for_and_comes_from_the_seed():
+    noise = {'angle_noise': 1e-3, 'torque_noise': 0.5}
+    noisy, again, clean = simulated(**noise), simulated(**noise), simulated()
+    triples = [(noisy.advance(), again.advance(), clean.advance()) for _ in range(200)]
+    errors = np.array([a.q - c.q for a, _, c in triples])
+    assert errors.std() == pytest.approx(1e-3, rel=0.1)
+    assert np.array([a.tau - c.tau for a, _, c in triples]).std() == pytest.approx(0.5, rel=0.1)
+    assert all(np.array_equal(a.q, b.q) for a, b, _ in triples)

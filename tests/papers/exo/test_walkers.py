@@ -1,10 +1,21 @@
 # Copyright 2026 The armid_ros developers
 # SPDX-License-Identifier: Apache-2.0
-"""A body on one foot, hung from its trunk: the same body."""
+"""The ground of Table 3, the wearer, and a gait with feet that stay where they stand."""
 
 from armid_ros.model import inverse_dynamics, random_motion
 from armid_ros.motion import Motion
-from armid_ros.papers.exo.plant.walkers import columns, floating, walker
+from armid_ros.papers.exo.plant.gait import read_gait
+from armid_ros.papers.exo.plant.walkers import (
+    columns,
+    floating,
+    foot_points,
+    ground_force,
+    HEEL_DOWN,
+    LegLength,
+    TOE_DOWN,
+    walkable,
+    walker,
+)
 from armid_ros.robots import load_robot
 import numpy as np
 import pytest
@@ -38,3 +49,62 @@ def test_hips_carry_the_weight(name) -> None:
     weight = 9.81 * free.rigid_parameters[::10].sum()
     assert tau[0, up] == pytest.approx(weight, rel=1e-3)
     assert tau[0, ahead] == pytest.approx(0.0, abs=1e-9)
+
+
+def test_a_millimetre_deep_is_a_hundred_newton() -> None:
+    force = ground_force(np.array(-1e-3), np.array(0.0), np.array(0.0))
+    np.testing.assert_allclose(force, [0.0, 100.0], rtol=1e-12)
+
+
+def test_nothing_acts_above_the_ground_and_nothing_pulls() -> None:
+    above = ground_force(np.array(1e-6), np.array(-3.0), np.array(1.0))
+    leaving = ground_force(np.array(-1e-3), np.array(2.0), np.array(1.0))
+    np.testing.assert_array_equal(above, [0.0, 0.0])
+    np.testing.assert_array_equal(leaving, [0.0, 0.0])
+
+
+def test_the_damper_works_from_the_first_touch() -> None:
+    force = ground_force(np.array(-1e-9), np.array(-0.2), np.array(0.0))
+    assert force[1] == pytest.approx(200.0, rel=1e-4)
+
+
+@pytest.mark.parametrize('sliding', [-1.0, 1.0])
+def test_friction_opposes_sliding_and_has_a_bound(sliding: float) -> None:
+    ahead, up = ground_force(np.array(-2e-3), np.array(0.0), np.array(sliding))
+    assert ahead == pytest.approx(-0.3 * sliding * up)
+
+
+LEG = LegLength(thigh=0.3605, shank=0.3854, foot=0.2572)
+
+
+@pytest.fixture(scope='module')
+def plan():
+    return walkable(read_gait(), LEG, 1.2)
+
+
+def feet(plan):
+    phase = np.arange(len(plan.hips)) / len(plan.hips)
+    way = np.outer(phase, [plan.stride, 0.0])
+    return phase, *foot_points(plan.gait(phase), plan.hips + way, plan.lean, LEG)
+
+
+def test_heel_and_toe_stay_where_they_stand(plan) -> None:
+    phase, heel, toe = feet(plan)
+    for point, place, (begin, end) in (
+        (heel, [0.0, 0.0], HEEL_DOWN),
+        (toe, [LEG.foot, 0.0], TOE_DOWN),
+    ):
+        down = (phase >= begin) & (phase <= end)
+        np.testing.assert_allclose(point[down], np.tile(place, (down.sum(), 1)), atol=2e-3)
+
+
+def test_the_swing_foot_clears_the_ground(plan) -> None:
+    phase, heel, toe = feet(plan)
+    swing = (phase > 0.68) & (phase < 0.92)
+    assert min(heel[swing, 1].min(), toe[swing, 1].min()) > 0.01
+
+
+def test_curves_of_hip_and_knee_stay_near_those_asked_for(plan) -> None:
+    phase = np.linspace(0.0, 1.0, 101)
+    off = np.degrees(plan.gait(phase) - read_gait()(phase))[:, :2]
+    assert np.sqrt(np.mean(off**2, axis=0)).max() < 3.0
