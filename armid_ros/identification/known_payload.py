@@ -32,9 +32,6 @@ import numpy as np
 import pinocchio as pin
 from scipy.stats import t as student
 
-#: Largest relative standard deviation of an identified gain.
-_SURE = 0.05
-
 
 @dataclass(frozen=True)
 class DriveGains:
@@ -240,7 +237,8 @@ def _gain(
     scores = np.bincount(np.unique(blocks, return_inverse=True)[1], weights=rest * left)
     count = len(scores)
     std = float(np.sqrt(count / (count - 1.0) * np.sum(scores**2)) / size)
-    if not std < _SURE * abs(gain):
+    # largest relative standard deviation of a gain that is determined
+    if not std < 0.05 * abs(gain):
         return 1.0, np.inf, np.inf
     return gain, std, float(student.ppf(0.975, count - 1)) * std
 

@@ -48,17 +48,11 @@ import numpy as np
 from scipy import stats
 import scipy.linalg
 
-#: Probability that the list of changes contains a false change.
-CHANCE = 0.05
-#: Eigenvalues of a scaled covariance below this share of the largest are rounding errors. The
-#: same holds for differences below this share of a value.
+#: Eigenvalues of a scaled covariance below this share of the largest are rounding errors, as are
+#: differences of a value below this share of it.
 _ROUNDING = 1e-10
-#: Residual of a joint, as a share of its torque, below which filters and not the arm cause it.
-_LEAST_RESIDUAL = 1e-3
 #: Name of a link parameter in the terms of base parameters, with the number of the link.
 _NUMBERED = re.compile(r'(?:m[xyz]?|I[xyz]{2})(\d+)$')
-#: Significance at which a load is rejected as the explanation of the changes.
-_REFUSED = 0.01
 
 
 def compare(before: ParameterFile, after: ParameterFile) -> Comparison:
@@ -86,7 +80,8 @@ def compare(before: ParameterFile, after: ParameterFile) -> Comparison:
         groups.setdefault('' if name.rigid else f'effects of {name.joint}', []).append(position)
     places = [group for group in groups.values() if len(group) > 1]
     residuals = residual_changes(before.fit, after.fit)
-    chance = CHANCE / sum((True, bool(places), bool(residuals)))
+    # probability that the list of changes contains a false change
+    chance = 0.05 / sum((True, bool(places), bool(residuals)))
     chances = [_whole(sides, (first, second), shared, group)[2] for group in places]
     numbers = [*(side.values for side in sides), *(side.std for side in sides)]
     sure = beyond_chance(_single_chances(*sides), chance)
@@ -278,7 +273,8 @@ def _load(link: int, columns: FloatArray, white: FloatArray) -> LoadChange | Non
     rest = float(white @ white - along @ along)
     freedom = len(white) - len(sizes)
     p_value = float(tail(rest, freedom)) if freedom > 0 else 0.0
-    if p_value < _REFUSED or np.linalg.norm(right[:, 0]) < 1.0 - 1e-6:
+    # significance at which a load is rejected as the explanation of the changes
+    if p_value < 0.01 or np.linalg.norm(right[:, 0]) < 1.0 - 1e-6:
         return None
     values = (right.T @ (along / sizes)) / scale
     mass, std = float(values[0]), float(np.linalg.norm(right[:, 0] / sizes) / scale[0])
@@ -305,8 +301,10 @@ def residual_changes(
     found = []
     for joint in (one for one in before.rms if one in after.rms):
         torques = [one.torque(joint) for one in (before, after)]
+        # residual of a joint, as a share of its torque, below which filters rather than the arm
+        # cause it
         first, second = (
-            max(one.rms[joint], _LEAST_RESIDUAL * torque)
+            max(one.rms[joint], 1e-3 * torque)
             for one, torque in zip((before, after), torques, strict=True)
         )
         # the residual of a model grows with the torque

@@ -34,16 +34,6 @@ from armid_ros.recording import Recording
 import numpy as np
 from scipy.stats import chi2
 
-#: Share of the sampling rate above which the spectrum of positions is noise.
-_NOISE_ABOVE = 0.3
-#: Negligible difference between the two fits, in standard deviations. Without this margin, the
-#: test is too sensitive: it distinguishes two fits of the same data that differ by 0.1 %.
-NEGLIGIBLE = 0.1
-#: Smallest relevant bias, in standard deviations: it reduces a coverage of 95 % to 94 %.
-BIAS_LIMIT = 0.25
-#: Significance of the test.
-SIGNIFICANCE = 0.05
-
 
 @dataclass(frozen=True)
 class NoiseCheck:
@@ -83,7 +73,8 @@ class NoiseCheck:
     @property
     def consistent(self) -> bool:
         """Whether the test is not significant."""
-        return self.p_value >= SIGNIFICANCE
+        # significance of the test
+        return self.p_value >= 0.05
 
     @property
     def relative_bias(self) -> FloatArray:
@@ -93,7 +84,8 @@ class NoiseCheck:
     @property
     def harmless(self) -> bool:
         """Whether the bias of every parameter is negligible against its standard deviation."""
-        return bool(np.max(np.abs(self.relative_bias), initial=0.0) < BIAS_LIMIT)
+        # smallest bias that matters, in standard deviations: it reduces 95 % intervals to 94 %
+        return bool(np.max(np.abs(self.relative_bias), initial=0.0) < 0.25)
 
     def findings(self) -> tuple[tuple[str, bool], tuple[str, bool]]:
         """
@@ -167,7 +159,9 @@ def check_noise(
     found = by_instruments(problem, [part.columns for part in exact], weights)
     unit = 1.0 / np.sqrt(np.diag(found.covariance))
     sizes, axes = np.linalg.eigh(found.spread * np.outer(unit, unit))
-    counted = 1.0 / (sizes.clip(0.0) + NEGLIGIBLE**2)
+    # negligible difference between the two fits, in standard deviations. Without it, the test is
+    # too sensitive: two fits of the same data are distinguishable to a thousandth.
+    counted = 1.0 / (sizes.clip(0.0) + 0.1**2)
     statistic = float(np.sum((axes.T @ (found.difference * unit)) ** 2 * counted))
     freedom = max(float(np.sum(sizes.clip(0.0) * counted)), 1.0)  # expected value of the statistic
 
@@ -206,7 +200,8 @@ def position_noise(recording: Recording) -> FloatArray:
     """
     rate = 1.0 / recording.period
     frequency, power = mean_spectrum(even_positions(recording), rate, detrend='linear')
-    level = np.mean(power[frequency > _NOISE_ABOVE * rate], axis=0)
+    # share of the sampling rate above which the spectrum of positions is noise
+    level = np.mean(power[frequency > 0.3 * rate], axis=0)
     return np.asarray(np.sqrt(level * 0.5 * rate))
 
 

@@ -11,6 +11,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, replace
+from functools import partial
 from itertools import combinations
 from typing import Literal
 
@@ -18,7 +19,7 @@ from armid_ros.arm import ArmModel
 from armid_ros.identification.assess.grade_limits import LIMITS
 from armid_ros.identification.assess.prediction_error import common_values, thinned
 from armid_ros.identification.rows.checks import (
-    effort_unit,
+    FORCE_UNITS,
     torque_factors,
     TORQUE_UNITS,
     unit_of,
@@ -30,10 +31,6 @@ import numpy as np
 
 #: Possible zero errors of a joint [degrees], by its encoder, its axis or the description.
 TURNS = (-135.0, -90.0, -45.0, 45.0, 90.0, 135.0, 180.0)
-#: Largest distance of a gravity vector from the known vector that replaces it, over its length.
-_KNOWN = 0.3
-#: Smallest correlation for a reliable factor of a joint: its residual is below 15 % of its torque.
-_CLEAR = 0.989
 
 Quantity = Literal['position', 'torque', 'position and torque']
 QUANTITIES: tuple[Quantity, ...] = ('position and torque', 'position', 'torque')
@@ -105,18 +102,30 @@ def hypotheses(robot: Robot, motions: Sequence[Motion]) -> Iterator[Hypothesis]:
     yield from _of_all_torques(robot, motions)
     if np.any(turned):
         yield _in_degrees(robot)
-    for joint in range(robot.n_joints):
+    for joint, name in enumerate(robot.joints):
         for unit in TORQUE_UNITS:
             yield in_unit(robot, joint, unit)
         for quantity in QUANTITIES:
-            yield _reversed(robot, joint, quantity)
+            text = f'the {quantity} of {name} seems to have the opposite sign: negate it'
+            if quantity == 'position and torque':
+                text = f'position and torque of {name} seem to have the opposite sign: negate both'
+            change = _times(robot, quantity, joint, -1.0)
+            yield Hypothesis('sign', text, change, (joint, quantity))
         if turned[joint] and robot.n_joints > 1:
             yield _in_degrees(robot, joint)
         for degrees in () if robot.prismatic[joint] else TURNS:
             yield _zero_off(robot, joint, degrees)
     for first, second in combinations(range(robot.n_joints), 2):
+        matrix = np.eye(robot.n_joints)
+        matrix[[first, second]] = matrix[[second, first]]
         for quantity in QUANTITIES:
-            yield _exchanged(robot, first, second, quantity)
+            yield Hypothesis(
+                'exchange',
+                f'the {quantity} of {robot.joints[first]} and of {robot.joints[second]} seem to '
+                'be exchanged: check the names of the joints',
+                partial(_changed, quantity, matrix),
+                (first, second, quantity),
+            )
 
 
 def _of_all_torques(robot: Robot, motions: Sequence[Motion]) -> Iterator[Hypothesis]:
@@ -138,7 +147,8 @@ def _of_all_torques(robot: Robot, motions: Sequence[Motion]) -> Iterator[Hypothe
 
 def in_unit(robot: Robot, joint: int, unit: str) -> Hypothesis:
     """Return the hypothesis that the torque of a joint is not in N m."""
-    wrong, right = effort_unit(robot, joint, unit), robot.torque_units[joint]
+    wrong = FORCE_UNITS[unit] if robot.prismatic[joint] else unit
+    right = robot.torque_units[joint]
     return Hypothesis(
         'unit',
         f'the torque of {robot.joints[joint]} seems to be in {wrong} instead of {right}: '
@@ -212,7 +222,8 @@ def other_gravity(robot: Robot, vector: FloatArray) -> Hypothesis | None:
         for name, value in known.items()
     }
     option, nearest = min(off, key=off.__getitem__), vector
-    if off[option] < _KNOWN:
+    # largest distance of a gravity vector from the known vector that replaces it, over its length
+    if off[option] < 0.3:
         nearest = known[option]
     else:
         option = ','.join(f'{part:.3g}' for part in vector + 0.0)
@@ -230,7 +241,8 @@ def other_gravity(robot: Robot, vector: FloatArray) -> Hypothesis | None:
 def _other_scale(robot: Robot, factor: float, motions: Sequence[Motion]) -> Hypothesis:
     """Return the hypothesis that efforts are in another unit than N m, or are currents."""
     factors, correlation = torque_factors(ArmModel(robot), motions)
-    known = (correlation > _CLEAR) & (factors > 0.0)
+    # smallest correlation for a reliable factor of a joint: the residual is below 15 % of torque
+    known = (correlation > 0.989) & (factors > 0.0)
     unit = unit_of(factor, factors[known].tolist())
     text = (
         f'the efforts of all joints seem to be in {unit} instead of N m: convert them'
@@ -246,27 +258,6 @@ def _other_scale(robot: Robot, factor: float, motions: Sequence[Motion]) -> Hypo
         text += f'; the factor of {hidden} is not determined' if hidden else ''
     scaled = _times(robot, 'torque', slice(None), 1.0 / factor)
     return Hypothesis('units' if unit else 'scale', text, scaled)
-
-
-def _reversed(robot: Robot, joint: int, quantity: Quantity) -> Hypothesis:
-    name = robot.joints[joint]
-    text = f'the {quantity} of {name} seems to have the opposite sign: negate it'
-    if quantity == 'position and torque':
-        text = f'position and torque of {name} seem to have the opposite sign: negate both'
-    change = _times(robot, quantity, joint, -1.0)
-    return Hypothesis('sign', text, change, (joint, quantity))
-
-
-def _exchanged(robot: Robot, first: int, second: int, quantity: Quantity) -> Hypothesis:
-    matrix = np.eye(robot.n_joints)
-    matrix[[first, second]] = matrix[[second, first]]
-    return Hypothesis(
-        'exchange',
-        f'the {quantity} of {robot.joints[first]} and of {robot.joints[second]} seem to be '
-        'exchanged: check the names of the joints',
-        _changed(quantity, matrix),
-        (first, second, quantity),
-    )
 
 
 def _zero_off(robot: Robot, joint: int, degrees: float) -> Hypothesis:
@@ -304,19 +295,15 @@ def _times(
     """Return a function that multiplies a quantity of one or several joints."""
     scale = np.ones(robot.n_joints)
     scale[joint] = factor
-    return _changed(quantity, np.diag(scale))
+    return partial(_changed, quantity, np.diag(scale))
 
 
-def _changed(quantity: Quantity, matrix: FloatArray) -> Callable[[Motion], Motion]:
-    """Return a function that multiplies a quantity of all joints by a matrix."""
-
-    def changed(motion: Motion) -> Motion:
-        if quantity != 'torque':
-            q, dq, ddq = (x @ matrix for x in (motion.q, motion.dq, motion.ddq))
-            motion = replace(motion, q=q, dq=dq, ddq=ddq)
-        if quantity != 'position':
-            assert motion.tau is not None
-            motion = motion.with_torque(motion.tau @ matrix)
-        return motion
-
-    return changed
+def _changed(quantity: Quantity, matrix: FloatArray, motion: Motion) -> Motion:
+    """Multiply a quantity of all joints by a matrix."""
+    if quantity != 'torque':
+        q, dq, ddq = (x @ matrix for x in (motion.q, motion.dq, motion.ddq))
+        motion = replace(motion, q=q, dq=dq, ddq=ddq)
+    if quantity != 'position':
+        assert motion.tau is not None
+        motion = motion.with_torque(motion.tau @ matrix)
+    return motion

@@ -200,8 +200,12 @@ def find_mistake(
     tried = rows([*hypotheses(robot, slow), *([] if late is None else [delayed(*late)])])
     for ratio in ('as_described', 'as_fitted'):
         tried += rows(max(tried, key=attrgetter(ratio)).hypothesis.nearby())
-    # prefer hypotheses that explain more than any links near the description
-    sure = [row for row in tried if _predicts(robot, row) and row.as_described >= 1.0]
+    # hypotheses with which the model predicts the corrected data
+    after = (row.described if row.as_described >= 1.0 else row.fitted for row in tried)
+    errors = [100.0 * one.whole(robot) for one in after]
+    tried = [row for row, error in zip(tried, errors, strict=True) if error < LIMITS.unusable]
+    # prefer hypotheses that explain more than any body near the description
+    sure = [row for row in tried if row.as_described >= 1.0]
     both = [row for row in sure if row.as_fitted >= 1.0]
     if both:
         return _first(both, 'as_described', described)
@@ -209,8 +213,7 @@ def find_mistake(
     changes = [
         row
         for row in tried
-        if _predicts(robot, row)
-        and row.hypothesis.kind != 'unit'
+        if row.hypothesis.kind != 'unit'
         and not row.hypothesis.of_masses
         and row.as_fitted >= price
         and near.of_data(row.fitted) >= 1.0
@@ -219,12 +222,6 @@ def find_mistake(
         return _first(changes, 'as_fitted', near)
     masses = [row for row in sure if row.hypothesis.of_masses]
     return _first(masses, 'as_described', described) if masses else None
-
-
-def _predicts(robot: Robot, row: _Row) -> bool:
-    """Whether the model predicts the corrected data."""
-    after = row.described if row.as_described >= 1.0 else row.fitted
-    return bool(100.0 * after.whole(robot) < LIMITS.unusable)
 
 
 def _error(

@@ -31,13 +31,6 @@ from armid_ros.simulation import Controller, Plant, simulate
 from armid_ros.simulation.controller import BANDWIDTH, LinearFeedback
 import numpy as np
 
-#: Largest simulated time of all held-out recordings, and of one recording [s]. The computation
-#: takes a tenth of this time.
-_SIMULATED, _LONGEST = 60.0, 30.0
-#: Smallest relevant growth of an error, as a share of it and of the largest error of joints with
-#: the same unit. Reversals of friction vary by less between models.
-_WORSE = 0.05
-
 Progress = Callable[[float, str], None]
 
 
@@ -211,7 +204,9 @@ class ForwardValidation:
         before, after = self.before.position_error, self.after.position_error
         units = np.array(self.after.units)
         largest = np.array([after[units == unit].max() for unit in units])
-        grown = after - before > _WORSE * np.maximum(before, largest)
+        # growth of an error that counts as worse, as a share of it and of the largest error of
+        # joints of the same unit; reversals of friction vary by less between models
+        grown = after - before > 0.05 * np.maximum(before, largest)
         return tuple(name for name, more in zip(self.after.joints, grown, strict=True) if more)
 
     def comment(self) -> str:
@@ -331,7 +326,9 @@ def simulate_held_out(
         return (), ('not simulated: a quasi-static model has no inertia',)
     pairs: list[ForwardValidation] = []
     left_out: list[str] = []
-    duration = min(_LONGEST, _SIMULATED / len(held_out))
+    # total simulated motion of all held-out recordings, and of one recording at most [s].
+    # Simulation takes a tenth of that time.
+    duration = min(30.0, 60.0 / len(held_out))
     for index, recording in enumerate(held_out):
         progress(index / len(held_out), 'simulating held-out recordings')
         patched = plain = None

@@ -22,9 +22,7 @@ import numpy.typing as npt
 from scipy import fft
 import scipy.linalg
 
-#: Order of the autoregression that whitens residuals; it describes drift and one resonance.
-AR_ORDER = 3
-#: Lower bound of the share of noise in a band that remains in the residual.
+#: Lower bound of the share of the noise that remains in the residual of a band.
 LEAST_LEFT = 0.1
 
 
@@ -147,7 +145,8 @@ def _noise_spectrum(
     lags = np.fft.irfft(power, size)[:count]
     # whitened by an autoregression, smoothed by a Parzen window over lags, and coloured again,
     # which keeps peaks from being smoothed away (Andrews and Monahan 1992)
-    order, whitening = min(AR_ORDER, len(lags) - 1), np.ones(len(leverage))
+    # order of the autoregression that whitens residuals: enough for drift and one resonance
+    order, whitening = min(3, len(lags) - 1), np.ones(len(leverage))
     if lags[0] > 0.0 and order >= 1:
         regular = lags[: order + 1].copy()
         regular[0] *= 1.0 + 1e-6

@@ -25,10 +25,6 @@ from armid_ros.motion import FloatArray
 from armid_ros.robots import Robot
 import numpy as np
 
-#: Independent share of a column below which its parameter is grouped with others. 1e-4 of the
-#: length of a column is far below the noise.
-EXCITATION_TOLERANCE = 1e-4
-
 
 def excited(
     theory: BaseParameters, problem: Sequence[Regression]
@@ -78,7 +74,9 @@ def identifiable_base(
     """
     names = tuple(theory.standard[column] for column in theory.independent)
     rows, _ = factored(normal.summed()[:-1, :-1])
-    data = group_columns(rows, names, tolerance=EXCITATION_TOLERANCE)
+    # share of a column that is independent of the others, below which its parameter is grouped
+    # with them: 1e-4 of the length of a column is far below the noise
+    data = group_columns(rows, names, tolerance=1e-4)
     base = theory if data.rank == theory.rank else regroup(theory, data)
     order = {int(column): position for position, column in enumerate(theory.independent)}
     return base, [order[int(column)] for column in base.independent]

@@ -87,8 +87,8 @@ def halves_error(
         Errors of the predicted torque.
 
     """
-    columns, tau, target, informative = _some_rows(problem, _OF_HALVES)
-    rest, weight = target - columns @ described, weights[:: _step(problem, _OF_HALVES)]
+    step, columns, tau, target, informative = _some_rows(problem, _OF_HALVES)
+    rest, weight = target - columns @ described, weights[::step]
     most = np.full(len(described), np.inf) if spread is None else spread
     middle = len(tau) // 2
     halves = slice(0, middle), slice(middle, None)
@@ -206,10 +206,10 @@ def _as_good(losses: FloatArray, best: FloatArray) -> bool:
 
 def _losses(problem: Sequence[Regression]) -> FloatArray:
     """Return the held-out loss of each stretch, the mean log rms error of its joints, (S,)."""
-    # odd stretches are predicted from even ones, and vice versa. Joints have equal weight, by
-    # the ratio of their errors. Otherwise a light joint, whose torque is mostly noise, could gain
-    # by a low cut-off and hide the loss of a heavy joint
-    x, _, y, informative = _some_rows(problem, _OF_CUTOFFS)
+    # odd stretches are predicted from even ones, and vice versa. Every joint counts by the ratio
+    # of its errors: a light joint, whose torque is mostly noise, gains by a low cut-off and must
+    # not hide that a heavy one loses
+    _, x, _, y, informative = _some_rows(problem, _OF_CUTOFFS)
     stretch = np.arange(len(y)) * _STRETCHES // len(y)
     left = np.zeros_like(y)
     whole = _fit(x, y, informative)
@@ -244,19 +244,14 @@ def _fit(
     return informative_solution(normal, rows.T @ (y * weights).ravel())
 
 
-def _step(problem: Sequence[Regression], most: int) -> int:
-    """Return the stride that keeps about `most` rows."""
-    return max(1, sum(len(part.tau) for part in problem) // most)
-
-
 def _some_rows(
     problem: Sequence[Regression], most: int
-) -> tuple[FloatArray, FloatArray, FloatArray, npt.NDArray[np.bool_]]:
-    """Return columns (N, n, r), torque, target and informative mask of about `most` rows."""
-    step = _step(problem, most)
+) -> tuple[int, FloatArray, FloatArray, FloatArray, npt.NDArray[np.bool_]]:
+    """Return stride, columns (N, n, r), torque, target and mask of about `most` rows."""
+    step = max(1, sum(len(part.tau) for part in problem) // most)
     columns, tau, target = (
         np.concatenate([getattr(part, name) for part in problem])[::step]
         for name in ('columns', 'tau', 'target')
     )
     informative = np.concatenate([part.informative for part in problem])[::step]
-    return columns, tau, target, informative
+    return step, columns, tau, target, informative

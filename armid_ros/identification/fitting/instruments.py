@@ -36,9 +36,6 @@ import numpy as np
 from scipy import signal
 import scipy.linalg
 
-#: Band of the instruments over that of the regressor, which is ten times the motion's.
-_SHARE = 0.2
-
 
 @dataclass(frozen=True)
 class Instrumented:
@@ -161,7 +158,9 @@ def smoothed(recordings: Sequence[Recording], used: Conditioning) -> list[Record
     """Return recordings with positions smoothed far below the cut-off of the regressor."""
     calm = []
     for recording in recordings:
-        cutoff = _SHARE * used.cutoff_hz * recording.period * 2.0
+        # band of the instruments over that of the regressor, which is ten times the band of the
+        # motion
+        cutoff = 0.2 * used.cutoff_hz * recording.period * 2.0
         sections = signal.butter(4, min(0.9, cutoff), output='sos')
         q = recording.q.copy()
         for part in unbroken(recording, 1.0 / recording.period):

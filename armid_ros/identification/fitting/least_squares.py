@@ -43,9 +43,6 @@ IN_WORDS: dict[Estimator, str] = {
     'iv': 'instrumental variables from the smoothed motion',
 }
 
-#: Residuals above this many robust standard deviations lose weight (Huber 1981, 95 % efficient).
-_HUBER = 1.345
-
 
 @dataclass(frozen=True)
 class Solution:
@@ -109,7 +106,8 @@ def solve(
         fit, relative = _robust(problem, used, fit)
     values = fit.values if bounds is None else within(fit.values, fit.factor, bounds)
     weights = np.asarray(relative / fit.scale)
-    products = noise_products(problem, _residual(problem, values) * weights, weights, fit.inverse)
+    residual = np.concatenate([part.residual(values) for part in problem])
+    products = noise_products(problem, residual * weights, weights, fit.inverse)
     return Solution(
         values=values,
         covariance=sandwich(fit.bread, products),
@@ -127,18 +125,16 @@ def _robust(
     relative: FloatArray = used.astype(float)
     for _ in range(ROUNDS):
         before = (fit.scale, relative)
-        residual = _residual(problem, fit.values)
+        residual = np.concatenate([part.residual(fit.values) for part in problem])
         # standard deviation of each joint's residual, from its median absolute deviation
         masked = np.where(used, residual, np.nan)
         spread = np.nanmedian(np.abs(masked - np.nanmedian(masked, axis=0)), axis=0)
         scale = positive(1.4826 * np.nan_to_num(spread))
         size = np.maximum(np.abs(residual) / scale, 1e-12)
-        relative = np.asarray(used * np.sqrt(np.minimum(1.0, _HUBER / size)))
+        # residuals beyond this many robust standard deviations lose weight (Huber 1981: 95 %
+        # efficiency)
+        relative = np.asarray(used * np.sqrt(np.minimum(1.0, 1.345 / size)))
         fit = scaled_fit(NormalEquations.of(problem, relative), scale)
         if np.allclose(scale, before[0], rtol=1e-6) and np.allclose(relative, before[1]):
             break
     return fit, relative
-
-
-def _residual(problem: Sequence[Regression], values: FloatArray) -> FloatArray:
-    return np.concatenate([part.residual(values) for part in problem])

@@ -34,23 +34,13 @@ from armid_ros.robots import NO_MASS
 import numpy as np
 import scipy.linalg
 
-#: Linear model and arm agree if their torques differ by less than this share of the residual.
-AGREED = 1e-4
-#: The same as a share of the torque, for data without noise.
+#: Smallest relevant share of the torque, where there is no noise.
 _EXACT = 1e-8
 #: Largest number of linearisations; fits that converge take three to eight.
 MOST_PASSES = 20
-#: Decrease of the cost that corresponds to one standard deviation of one parameter.
-_NOTHING = 1.0
-#: Decrease of the cost by a step below which the iteration ends.
-_LITTLE = 0.1
-#: A fit has converged if the predicted further decrease is below this share of the cost.
-_STUCK = 0.5
 #: Damping factors of a step, relative to the squared columns.
 _DAMPINGS = tuple(10.0 ** np.arange(-8.0, 3.0))
-#: Largest ratio of the cost of an undamped step to the cost that the linear model predicts.
-_KEPT = 2.0
-#: Largest negligible deviation due to inertia, divided by the standard deviation of the fit.
+#: Negligible deviation due to inertia, over the standard deviation of the fit.
 _NEGLIGIBLE = 0.1
 
 Torques = tuple[FloatArray, ...]
@@ -138,7 +128,9 @@ def fit_values(
     motions = [part.motion for part in problem]
     chosen = ungrouped(arm, base) if free is None else free
     reached = moved(arm, base, solution.values, chosen)
-    bare = arm.with_theta(np.where(np.arange(len(arm.theta)) < _rigid(arm), arm.theta, 0.0))
+    bare = arm.with_theta(
+        np.where(np.arange(len(arm.theta)) < len(arm.robot.rigid_parameters), arm.theta, 0.0)
+    )
     if curved(bare, arm, motions):
         problem, _ = linearised(arm, base, recordings, used)
     elif not curved(arm, reached, motions):
@@ -146,7 +138,7 @@ def fit_values(
         # parameters nearest to the description, if their torque along this motion is the fitted
         # one
         nearest = arm.with_theta(base.lift(solution.values, arm.theta))
-        rigid = _rigid(arm)
+        rigid = len(arm.robot.rigid_parameters)
         if free is None and (
             np.allclose(nearest.theta[rigid:], reached.theta[rigid:])
             or agree(problem, solution.weights, predicted, torques(nearest, recordings, used))
@@ -203,7 +195,7 @@ def moved(arm: ArmModel, base: BaseParameters, values: FloatArray, free: FloatAr
     """
     change = np.zeros(len(arm.theta))
     change[base.independent] = values - base.values(arm.theta)
-    rigid = _rigid(arm)
+    rigid = len(arm.robot.rigid_parameters)
     change[:rigid] -= free @ (free.T @ change[:rigid])
     theta = arm.theta + change
     links = theta[:rigid].reshape(-1, len(LINK_PARAMETERS))
@@ -259,7 +251,9 @@ def agree(
     off = _size(weights, [p - q for p, q in zip(promised, predicted, strict=True)])
     whole = _size(weights, [part.tau for part in problem])
     left = [part.tau - torque for part, torque in zip(problem, promised, strict=True)]
-    return bool(off <= max(AGREED * _size(weights, left), _EXACT * whole))
+    # linear model and arm agree where they differ by less than this share of the residual,
+    # or of the torque
+    return bool(off <= max(1e-4 * _size(weights, left), _EXACT * whole))
 
 
 def _iterate(
@@ -279,7 +273,8 @@ def _iterate(
         passes += 1
         solution = solve(now.problem, method, limits)
         promised = tuple(part.torque(solution.values) for part in now.problem)
-        if passes > 1 and abs(now.gain(promised)) < _NOTHING:
+        # decrease of the cost that corresponds to one standard deviation of one parameter
+        if passes > 1 and abs(now.gain(promised)) < 1.0:
             break
         trial: _State | None = None
         vain = 0.0
@@ -292,13 +287,18 @@ def _iterate(
             predicted = torques(stepped, recordings, used)
             if now.cost(predicted) <= now.cost(None if trial is None else trial.predicted):
                 trial = _State(stepped, values, through(now.problem, predicted, values))
-            if not damping and now.cost(predicted) <= _KEPT * now.cost(promised):
+            # largest ratio of the cost of an undamped step to the cost that the linear model
+            # predicts
+            if not damping and now.cost(predicted) <= 2.0 * now.cost(promised):
                 break
         if trial is None:
-            settled = vain < _STUCK * now.cost()
+            # largest unattained decrease of the cost, as a share of it, with which a fit counts as
+            # converged
+            settled = vain < 0.5 * now.cost()
             break
         settled = agree(now.problem, solution.weights, promised, trial.predicted)
-        settled = settled or now.gain(trial.predicted) < _LITTLE
+        # decrease of the cost by a step below which the iteration ends
+        settled = settled or now.gain(trial.predicted) < 0.1
         if settled or passes == MOST_PASSES:
             now = trial
             break
@@ -411,11 +411,7 @@ def with_uncertain_inertia(
 
 def ungrouped(arm: ArmModel, base: BaseParameters) -> FloatArray:
     """Return directions of the rigid parameters that change no base parameter, (10 n, k)."""
-    return np.asarray(scipy.linalg.null_space(base.grouping[:, : _rigid(arm)]))
-
-
-def _rigid(arm: ArmModel) -> int:
-    return len(arm.robot.rigid_parameters)
+    return np.asarray(scipy.linalg.null_space(base.grouping[:, : len(arm.robot.rigid_parameters)]))
 
 
 def _size(weights: FloatArray, torque: Sequence[FloatArray]) -> float:

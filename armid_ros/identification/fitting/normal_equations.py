@@ -14,7 +14,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 from armid_ros.identification.rows.regression import by_stretch, Regression
-from armid_ros.motion import FloatArray, read_only
+from armid_ros.motion import FloatArray
 import numpy as np
 import numpy.typing as npt
 import scipy.linalg
@@ -43,11 +43,6 @@ class NormalEquations:
 
     products: FloatArray
     counts: FloatArray
-
-    def __post_init__(self) -> None:
-        """Freeze the arrays."""
-        object.__setattr__(self, 'products', read_only(self.products))
-        object.__setattr__(self, 'counts', read_only(self.counts))
 
     @classmethod
     def of(

@@ -34,11 +34,8 @@ import numpy as np
 
 #: Length of a block [s].
 BLOCK = 0.25
-#: Smallest residual scale if only the ratios of noise between joints are known: 0.01 of the
-#: assumed noise, which is 1e-4 of the torque limit [-].
-_LEAST_NOISE = 0.01
-#: Samples processed in one piece of work: together, or one by one with forgetting. Fewer samples
-#: arrive meanwhile, so the backlog decreases.
+#: Samples learned in one piece of work: together, or one by one with forgetting. Fewer samples
+#: arrive in the meantime, so that the backlog shrinks.
 _TOGETHER, _ONE_BY_ONE = 10, 4
 Item = TypeVar('Item')
 
@@ -191,9 +188,9 @@ class ChangeWatch:
         self.changes: list[Change] = []
         self._wider.reset()
         self._search.reset()
-        self._residual_scale = ResidualScale(
-            _LEAST_NOISE if self._estimator.noise_is_relative else 1.0
-        )
+        # smallest residual scale where only the ratios of the noise between joints are known: 0.01
+        # of the assumed noise, which is 1e-4 of the torque limit [-]
+        self._residual_scale = ResidualScale(0.01 if self._estimator.noise_is_relative else 1.0)
         self._fit_ratios: deque[float] = deque(maxlen=BLOCKS)
         self._open: _Stretch | None = None
         self._queued: deque[_Stretch] = deque()

@@ -48,17 +48,6 @@ import pinocchio as pin
 
 __all__ = ['OnlineIdentifier', 'OnlineSample', 'OnlineSettings']
 
-#: Time constants of the row filter after which the effect of its start, or of a rest, is 3e-3.
-_FORGOTTEN = 10.0
-#: A joint below this velocity [rad/s or m/s] for longer than this time [s] is at rest; a
-#: reversal is shorter. Dry friction may hold such a joint with any torque, so its torque is not
-#: used.
-_REST_VELOCITY, _REST_TIME = 0.01, 0.1
-#: Samples per row from which no background work runs in the sample of an update. With fewer
-#: samples per row, both share a sample.
-_SPARE = 4.0
-#: Length of the windows for the spectrum of the errors [s], beyond their correlation time.
-_WINDOW = 4.0
 #: Lower bound of a divisor.
 _SMALLEST = float(np.finfo(float).tiny)
 
@@ -149,7 +138,8 @@ class OnlineIdentifier:
             start=self.base.values(arm.theta),
             scale_covariance=settings.torque_noise is None,
         )
-        window = max(1, round(_WINDOW / self._row_period))
+        # length of the windows for the spectrum of the errors [s], beyond their correlation time
+        window = max(1, round(4.0 / self._row_period))
         self._scores = RobustCovariance(window, settings.forgetting, self._work)
         self._watch = None
         if settings.false_alarm_time is not None:
@@ -222,7 +212,9 @@ class OnlineIdentifier:
         if self.latest:
             busy = not self._had_row
         else:
-            busy = added and _SPARE * period <= self._row_period
+            # samples per row from which the update with a row has a sample to itself. With fewer
+            # samples, the update shares its sample with pieces of background work.
+            busy = added and 4.0 * period <= self._row_period
         if not busy:
             self._add_pending_row()
             # smallest number of pieces per second
@@ -255,15 +247,20 @@ class OnlineIdentifier:
             self._last_row = self._noise = None
             self._last_moving[:] = -np.inf
             self._last_useless[:] = motion.t
-        self._last_moving[np.abs(motion.dq) >= _REST_VELOCITY] = motion.t
-        resting = motion.t - self._last_moving > _REST_TIME
+        # a joint below this velocity [rad/s or m/s] for longer than this time [s] is at rest; a
+        # reversal is shorter. Dry friction may hold a joint at rest with any torque, so its torque
+        # is not used.
+        self._last_moving[np.abs(motion.dq) >= 0.01] = motion.t
+        resting = motion.t - self._last_moving > 0.1
         self._last_useless[resting & self._held] = motion.t
         begins = self._last_row is None
         step = self._row_period if self._last_row is None else motion.t - self._last_row
         if step < self._row_period - 0.5 * (self._filter.period or 0.0):
             return None
         self._last_row = motion.t
-        used = motion.t - self._last_useless > _FORGOTTEN / self._row_filter.pole
+        # time constants of the row filter until the effect of its start, or a joint's rest, is
+        # 3e-3
+        used = motion.t - self._last_useless > 10.0 / self._row_filter.pole
         usable = not (self._checks.silent or self._checks.error)
         return self._new_row(motion, step, used & usable, begins)
 

@@ -22,8 +22,6 @@ import numpy as np
 _BLOCK = 0.5
 #: Fewest blocks before a change, so that their variance can be estimated.
 _FEWEST = 4
-#: Probability of a false change, over all tested times and joints.
-_ERROR_RATE = 0.01
 
 
 def onset(arm: ArmModel, recording: Recording) -> float | None:
@@ -59,7 +57,8 @@ def onset(arm: ArmModel, recording: Recording) -> float | None:
     within = ((logs - logs.mean(axis=0)) ** 2).sum(axis=0) - between
     ratios = (between * (count - 2) / np.maximum(within, 1e-300)).max(axis=1)
     best = int(np.argmax(ratios))
-    if tail(ratios[best], 1, count - 2) * len(ratios) * logs.shape[1] >= _ERROR_RATE:
+    # probability of a false change, over all tested times and joints
+    if tail(ratios[best], 1, count - 2) * len(ratios) * logs.shape[1] >= 0.01:
         return None
     edge = recording.duration - (times[-1] + _BLOCK)  # time that the filter removes at the end
     return float(times[_FEWEST + best] + _BLOCK + edge)

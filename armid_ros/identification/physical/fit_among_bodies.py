@@ -43,8 +43,6 @@ HEAVY = 3.0
 BLOCKS = 5
 #: Weights of the divergence that are compared. The fit term is a mean square of about one.
 WEIGHTS = tuple(float(w) for w in 10.0 ** np.arange(-7.0, 0.5))
-#: Tolerance of the held-out error above the smallest one; the largest weight within it is chosen.
-TOLERANCE = 1e-3
 
 
 @dataclass(frozen=True)
@@ -165,7 +163,8 @@ def _bodies(
 
     tried = _held_out_errors(program, blocks, counts)
     best = min(error for _, error in tried)
-    weight = max(w for w, error in tried if error <= (1.0 + TOLERANCE) * best)
+    # tolerance of the held-out error over the least one: the largest weight within it is chosen
+    weight = max(w for w, error in tried if error <= (1.0 + 1e-3) * best)
     theta = program.solve(whole, float(counts.sum()), weight)
     rigid = theta[: len(theta) - len(lower)].reshape(-1, PER_LINK)
     links = tuple(

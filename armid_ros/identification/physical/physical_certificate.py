@@ -16,9 +16,6 @@ import numpy as np
 #: Relative size of a pseudo-inertia in any direction, up to which it is at the limit of physical
 #: consistency; relative distance to a wall of a box, up to which it is at the wall.
 ACTIVE_SHARE = 1e-3
-#: Held-out torque error, relative to an unconstrained fit, above which the constraints do not fit
-#: the arm.
-DEAR = 1.03
 
 
 @dataclass(frozen=True)
@@ -87,7 +84,9 @@ class PhysicalCertificate:
     def activity(self) -> tuple[str, ...]:
         """Return notes on active constraints and their cost; empty if none is active."""
         notes = []
-        if self.held_out_ratio > DEAR:
+        # held-out torque error, relative to an unconstrained fit, above which the constraints do
+        # not fit the arm
+        if self.held_out_ratio > 1.03:
             notes.append(
                 f'constraints cost {100.0 * (self.held_out_ratio - 1.0):.1f} % of torque error on '
                 'blocks left out: a given mass or box is wrong, or the model lacks an effect'

@@ -34,12 +34,7 @@ MOTION_FILTER_RATIO = 4.0
 #: Rate of regressor rows over the cut-off frequency of F. The rate resolves the steps of
 #: sign(dq), and aliases of the output of G are outside the band of F.
 ROW_RATE_RATIO = 40.0
-#: Interval between two samples, in periods, above which samples are missing.
-_GAP = 1.5
-#: Default noise of a torque sensor, over the torque limit of its joint. Only the ratios between
-#: joints matter; the residuals then give the size of the noise.
-_NOISE_OF_LIMIT = 0.01
-#: Largest valid position or torque [SI units]; squares of larger numbers would dominate all sums.
+#: Largest valid position or torque [SI units]; squares of larger numbers dominate the rest.
 LARGEST = 1e6
 
 
@@ -297,7 +292,8 @@ class CausalFilter:
         # after the gap and three samples before it. Their distances equal the gap, so the cubic
         # has hardly more noise than the samples.
         assert self.period is not None
-        count = round(dt / self.period) if dt > _GAP * self.period else 1
+        # interval between two samples, in periods, above which samples are missing
+        count = round(dt / self.period) if dt > 1.5 * self.period else 1
         if count < 2 or not self._recent:
             return []
         last = t - dt
@@ -392,4 +388,6 @@ def sensor_noise(robot: Robot, given: tuple[float, ...] | None) -> FloatArray:
     known = np.isfinite(limit) & (limit > 0.0)
     if not known.any():
         return np.ones(robot.n_joints)
-    return _NOISE_OF_LIMIT * np.where(known, limit, np.median(limit[known]))
+    # default noise of a torque sensor, over the torque limit of its joint. Only the ratios between
+    # joints matter, as the size of the noise then follows from the residuals.
+    return 0.01 * np.where(known, limit, np.median(limit[known]))

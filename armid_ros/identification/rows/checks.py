@@ -30,8 +30,6 @@ LIMIT_EXCESS_TURNING, LIMIT_EXCESS_SLIDING = 4.0 * np.pi, 1.0
 _LIMIT_SLACK = 0.01
 #: Shortest recording with a movement [s].
 SHORTEST = 1.0
-#: Correlation with the direction of motion above which a torque is only friction.
-_CLEAR = 0.8
 #: Correlation of measured and described torque above which their ratio is meaningful: four fifths
 #: of the power are explained.
 FOLLOWS = 0.9
@@ -53,8 +51,8 @@ NEAR = 1.5
 #: Wrong masses of a description change the factor of one joint by as much.
 _NEAR_FORCE = 1.2
 #: Unit of force of a prismatic joint that corresponds to each unit of torque.
-_FORCE_UNITS = {'N m': 'N', 'N mm': 'mN', 'N cm': 'cN', 'kN m': 'kN'}
-#: Share of its top speed below which friction may hold a joint with any torque.
+FORCE_UNITS = {'N m': 'N', 'N mm': 'mN', 'N cm': 'cN', 'kN m': 'kN'}
+#: Share of its top speed below which a joint may be held by friction with any torque.
 SLOW = 0.05
 #: Message on missing torques.
 SILENT = 'the torque of every joint is constant; fill in effort'
@@ -212,7 +210,8 @@ def driven_by_friction(robot: Robot, motions: Sequence[Motion]) -> str:
         held = np.column_stack([*weight, ddq, described[:, joint]])
         rest = residual_of_fit(np.column_stack([np.sign(dq), tau]), held)
         size = float(np.sqrt(np.prod(np.sum(rest**2, axis=0))))
-        if size > 0.0 and rest[:, 0] @ rest[:, 1] < -_CLEAR * size:
+        # correlation with the direction of motion above which a torque is friction alone
+        if size > 0.0 and rest[:, 0] @ rest[:, 1] < -0.8 * size:
             found.append(name)
     if not found:
         return ''
@@ -253,11 +252,6 @@ def position_problem(robot: Robot, lowest: FloatArray, highest: FloatArray) -> s
         f'{robot.position_units[worst]}; positions have to be in rad or m, with the zero of the '
         'description'
     )
-
-
-def effort_unit(robot: Robot, joint: int, unit: str) -> str:
-    """Return a unit of torque, or the corresponding unit of force for a prismatic joint."""
-    return _FORCE_UNITS[unit] if robot.prismatic[joint] else unit
 
 
 def beyond_limits(robot: Robot, recordings: Sequence[Recording]) -> tuple[str, ...]:

@@ -14,9 +14,7 @@ from armid_ros.motion import FloatArray
 from armid_ros.recording import Recording
 import numpy as np
 
-#: Noise of a torque over the spread of that torque, assumed before any fit.
-_NOISE_OF_TORQUE = 0.01
-#: Largest number of damaged samples in a note.
+#: Number of damaged samples that a note names.
 _NAMED = 3
 
 
@@ -46,7 +44,8 @@ def without_damage(
             continue
         some = tau[:: max(1, len(tau) // 10_000)]  # enough for a spread within 2 %
         spread = 1.4826 * np.median(np.abs(some - np.median(some, axis=0)), axis=0)
-        floor = np.concatenate([np.zeros(len(joints)), _NOISE_OF_TORQUE * spread / peak])
+        # noise of a torque over the spread of that torque, assumed before any fit
+        floor = np.concatenate([np.zeros(len(joints)), 0.01 * spread / peak])
         gate = SpikeGate([True] * len(joints), 'qt')  # angles of a recording are not wrapped
         excursions = impossible_excursions(gate, t, np.hstack([recording.q, tau]), floor)
         damaged = [sample.t for one in excursions for sample in one.samples]

@@ -20,16 +20,6 @@ import numpy as np
 import numpy.typing as npt
 from scipy.ndimage import maximum_filter1d
 
-#: Largest residual of a law, over the torque that the model needs in addition to the law: no
-#: model overestimates inertia tenfold.
-_WITHOUT_INERTIA = 0.1
-#: Largest residual of a law as a share of the torque. Friction of a real joint depends on speed,
-#: so it differs more from a law without speed.
-_FOLLOWS = 0.03
-#: Smallest torque of a driven joint as a share of the torque of the model. With less torque, the
-#: joint swings freely, or the model is wrong.
-_DRIVEN = 0.5
-
 
 def laws_of_controllers(
     robot: Robot, motion: Motion, informative: npt.NDArray[np.bool_]
@@ -81,9 +71,14 @@ def laws_of_controllers(
             silent += 1
             continue
         size = float(np.sqrt(np.mean(tau**2)))
-        if size < _DRIVEN * float(np.sqrt(np.mean(needed[rows, joint] ** 2))):
+        # smallest torque of a driven joint as a share of the torque of the model. With less, the
+        # joint swings freely, or the model is wrong.
+        if size < 0.5 * float(np.sqrt(np.mean(needed[rows, joint] ** 2))):
             continue
-        if left > _FOLLOWS * size or left > _WITHOUT_INERTIA * lacking:
+        # largest residual of a law as a share of the torque: friction of a real joint depends on
+        # speed, so it differs by more from a law without speed; and over the torque that the
+        # model needs in addition to the law: no model has an inertia that is ten times too large
+        if left > 0.03 * size or left > 0.1 * lacking:
             return ()
         laws.append(
             f'the torque of {name} is a law of position and direction of motion alone, to '

@@ -9,9 +9,6 @@ import numpy as np
 
 #: Positions of two periods agree within this share of the range of motion.
 _SAME = 0.02
-#: Smallest range of some joint in a period, in units of `_SAME`: slower motion resembles itself
-#: at any lag. A change by 30 % changes the result of none of 108 recordings of 17 arms.
-_FARTHER = 3.0
 
 
 def find_period(t: FloatArray, positions: FloatArray) -> tuple[int, slice] | None:
@@ -56,7 +53,9 @@ def find_period(t: FloatArray, positions: FloatArray) -> tuple[int, slice] | Non
         length = int(np.sum(moving[start:stop]))
         if length <= 0.6 * lag or (best is not None and length <= 1.2 * (best[2] - best[1])):
             continue
-        if np.ptp(q[start : start + lag], axis=0).max() > _FARTHER * _SAME:
+        # smallest range of some joint in a period, in units of `_SAME`: slower motion agrees with
+        # itself after any lag. Of 108 recordings of 17 arms, 30 % more or less changes none.
+        if np.ptp(q[start : start + lag], axis=0).max() > 3.0 * _SAME:
             best = lag, start, stop
     if best is None:
         return None

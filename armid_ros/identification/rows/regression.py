@@ -29,10 +29,8 @@ from armid_ros.recording import Recording
 import numpy as np
 import numpy.typing as npt
 
-#: A joint is at rest if its speed stays below this share of its top speed ...
+#: Share of the top speed of a joint below which it is at rest.
 REST_SPEED = 0.02
-#: ... for at least this time [s]; a reversal is shorter.
-REST_TIME = 0.2
 
 _Columns = Callable[[Motion], FloatArray]
 
@@ -353,7 +351,8 @@ def held_samples(
 
     """
     rest, unsure = np.zeros((2, *motion.q.shape), dtype=bool)
-    shortest = REST_TIME / float(motion.t[1] - motion.t[0])
+    # at rest for at least this long [s]; a reversal of direction is shorter
+    shortest = 0.2 / float(motion.t[1] - motion.t[0])
     held = {joint for effect in arm.effects if effect.holds_at_rest for joint in effect.joints}
     for joint in map(motion.joints.index, held):
         velocity = motion.dq[:, joint]

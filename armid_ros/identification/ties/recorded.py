@@ -33,8 +33,6 @@ import numpy as np
 
 #: Order of the differences from which noise is computed.
 _ORDER = 6
-#: Ratio of a spectrum to the noise that ends the band of the motion.
-_ABOVE = 3.0
 
 
 def recorded_interaction_problem(
@@ -203,7 +201,8 @@ def band_of_motion(
         for recording in recordings:
             # spectra of pieces of 4 s are averaged
             frequency, power = mean_spectrum([recording.q], used.rate_hz, 'linear', 4.0)
-            above = power > _ABOVE * 2.0 * _white(recording.q) ** 2 / used.rate_hz
+            # ratio of a spectrum to the noise that ends the band of the motion
+            above = power > 3.0 * 2.0 * _white(recording.q) ** 2 / used.rate_hz
             above[-1] = False
             ends += [float(frequency[2:][np.argmin(column)]) for column in above[2:].T]
         used = replace(used, cutoff_hz=min(used.cutoff_hz, margin * max(ends)))

@@ -29,9 +29,7 @@ from scipy.optimize import minimize
 
 #: Largest gradient, in standard deviations, at the end of the iteration.
 _CONVERGED = 1e-3
-#: Assumed share of torque noise in the mean squared residual, if no noise was measured.
-_LEAST_SHARE = 0.01
-#: Smallest z-score of a real stiffness; a false one has a probability of 3e-5.
+#: Smallest z-score of an existing stiffness: a false one has a probability of 3e-5.
 LEAST_Z = 4.0
 
 
@@ -111,7 +109,8 @@ def identify_interaction(problem: InteractionProblem) -> Interaction:
     theta = _least_squares(problem, columns)
     theta = np.concatenate([np.full(count, theta[0]), theta[1:]])
     noise = problem.torque_noise
-    least = _LEAST_SHARE * np.mean(problem.residual(theta) ** 2, axis=0) + 1e-18
+    # assumed share of torque noise in the mean square of residuals if no noise was measured
+    least = 0.01 * np.mean(problem.residual(theta) ** 2, axis=0) + 1e-18
     used = np.where(noise > 0.0, noise**2, least)
     theta = _most_likely(problem, theta, used)
     step = _gauss_newton(problem, theta, used)
