@@ -16,9 +16,6 @@ from armid_ros.motion import FloatArray
 import numpy as np
 
 SCHEMA = 'armid/comparison/1'
-#: Smallest z-score of a value whose ratio is used, smallest number of ratios, and share of the
-#: ratios that have to agree.
-_CLEAR, _FEWEST, _MOST = 5.0, 4, 0.8
 
 
 @dataclass(frozen=True)
@@ -211,17 +208,20 @@ class Comparison:
         torques of one result are in another unit, or currents. Empty if no factor is found.
 
         """
+        # smallest z-score of a value whose ratio is used, smallest number of ratios, and share of
+        # the ratios that have to agree
+        least, fewest, most = 5.0, 4, 0.8
         clear = [
             (c.parameter.joint, c.after / c.before)
             for c in self.changes
-            if abs(c.before) > _CLEAR * c.before_std and abs(c.after) > _CLEAR * c.after_std
+            if abs(c.before) > least * c.before_std and abs(c.after) > least * c.after_std
         ]
         ratios = np.array([ratio for _, ratio in clear])
-        if len(ratios) < _FEWEST or np.mean(ratios > 0.0) < _MOST:
+        if len(ratios) < fewest or np.mean(ratios > 0.0) < most:
             return {}
         common = float(np.median(ratios))
         near = np.abs(np.log(np.maximum(ratios / common, 1e-9))) < np.log(NEAR)
-        if 1.0 / LIMITS.torque_factor < common < LIMITS.torque_factor or np.mean(near) < _MOST:
+        if 1.0 / LIMITS.torque_factor < common < LIMITS.torque_factor or np.mean(near) < most:
             return {}
         joints = dict.fromkeys(joint for joint, _ in clear if joint)
         return {

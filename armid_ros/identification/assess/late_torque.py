@@ -33,14 +33,6 @@ from armid_ros.recording import Recording
 from armid_ros.robots import Robot
 import numpy as np
 
-#: Presliding lengths of friction [rad or m], as in gears of arms. Steps of a factor of three
-#: cover all lengths between. On 63 recordings with lengths of 1 to 3 mrad, the delay errs by -1 to
-#: 6 ms (5 to 95 %). Lengths of 1 and 3 mrad alone err by 0 to 6 ms, 0.1 to 30 mrad by -3 to 6 ms.
-#: Without lengths, the error is -24 to 17 ms, with a six times wider interval.
-_LENGTHS = (0.0003, 0.001, 0.003, 0.01)
-#: Largest delay that is tested [s].
-_LONGEST = 0.3
-
 
 class Delay(NamedTuple):
     """Delay of a torque, negative if early, and half-width of its 95 % interval [s]."""
@@ -63,6 +55,8 @@ def late_torque(robot: Robot, recording: Recording, used: Conditioning) -> Delay
         Filters that the recording is identified with.
 
     """
+    # longest delay that is tested [s]
+    longest = 0.3
     stretches = list(segments(recording, used))
     seconds, half = 0.0, np.inf
     for _ in range(10):  # Gauss-Newton steps
@@ -76,7 +70,7 @@ def late_torque(robot: Robot, recording: Recording, used: Conditioning) -> Delay
         torque = root_mean_square(tau.T)[:, np.newaxis, np.newaxis]
         (step,), (half,) = shared_values(own, shared / torque, near / torque)
         before = seconds
-        seconds = float(np.clip(seconds + step, -_LONGEST, _LONGEST))
+        seconds = float(np.clip(seconds + step, -longest, longest))
         # a smaller step [s], or a small share of the interval, changes no decision
         if abs(seconds - before) < max(1e-4, 0.05 * half):
             break
@@ -84,14 +78,19 @@ def late_torque(robot: Robot, recording: Recording, used: Conditioning) -> Delay
 
 
 def _rows(robot: Robot, motion: Motion, used: Conditioning) -> tuple[FloatArray, ...]:
-    """Return columns of rigid bodies, of a delay and of other terms, (n, M, k), and torques."""
-    # columns of one joint: offset, viscous friction, drive inertia, and dry friction without and
-    # with presliding, constant and proportional to the load. Friction steps within a sample, so
-    # it passes the filter of the torque
+    """Return columns of each joint, of bodies, of a delay and the rest, (n, M, k), and torques."""
+    # presliding lengths of friction [rad or m], as in gears of arms, in steps of three to cover
+    # all lengths between. On 63 recordings with lengths of 1 to 3 mrad, the delay errs by -1 to 6
+    # ms (5 to 95 %). Lengths of 1 and 3 mrad alone err by 0 to 6 ms, 0.1 to 30 mrad by -3 to 6 ms.
+    # Without lengths, the error is -24 to 17 ms, with a six times wider interval.
+    lengths = (0.0003, 0.001, 0.003, 0.01)
+    # own columns: offset, viscous friction, drive inertia, and dry friction without and with
+    # presliding, constant and in proportion to the load; it is filtered as the torque is, as it
+    # steps within a sample
     assert motion.tau is not None
     n, kept = motion.n_joints, np.array(decimated_samples(len(motion), used), dtype=np.intp)
     slow = motion.select(kept)
-    elements = [Hysteresis(np.eye(n), np.ones(n), np.full(n, length)) for length in _LENGTHS]
+    elements = [Hysteresis(np.eye(n), np.ones(n), np.full(n, length)) for length in lengths]
     states = (one.along(motion.q, motion.dq) for one in elements)
     tau, *dry = (
         within_band(slow, decimate(x, used)) for x in (motion.tau, np.sign(motion.dq), *states)

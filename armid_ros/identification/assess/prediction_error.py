@@ -24,11 +24,6 @@ from armid_ros.robots import Robot
 import numpy as np
 from scipy.stats import t as student
 
-#: Number of columns of each joint: offset, viscous and Coulomb friction, drive inertia.
-_OWN = 4
-#: Number of blocks whose scores give the standard deviation; nine degrees of freedom.
-_BLOCKS = 10
-
 
 @dataclass(frozen=True)
 class PredictionError:
@@ -103,6 +98,8 @@ def prediction_error(robot: Robot, motion: Motion, *, near: bool) -> PredictionE
         values in a recording.
 
     """
+    # number of own columns of each joint: offset, viscous and Coulomb friction, drive inertia
+    kinds = 4
     assert motion.tau is not None
     scale, weight = root_mean_square(motion.tau), _weight(motion)
     own = _own_columns(motion) * weight[:, :, np.newaxis]
@@ -116,13 +113,13 @@ def prediction_error(robot: Robot, motion: Motion, *, near: bool) -> PredictionE
     by_body = body * (near_deviation(robot) * np.sqrt(FREEDOM / count))
     by_body *= (weight / scale)[:, :, np.newaxis]
     bodies = by_body.shape[2]
-    of_joints = np.zeros((count, n, n, _OWN))
+    of_joints = np.zeros((count, n, n, kinds))
     of_joints[:, joints, joints] = own
     stacked = np.concatenate([by_body, of_joints.reshape(count, n, -1)], axis=2)
     stacked = stacked.reshape(count * n, -1)
     normal = stacked.T @ stacked + LIMITS.floor**2 * np.eye(stacked.shape[1])
     least = np.full(stacked.shape[1], -np.inf)
-    least[bodies:].reshape(n, _OWN)[:, 1:] = 0.0
+    least[bodies:].reshape(n, kinds)[:, 1:] = 0.0
     free = np.asarray(np.linalg.solve(normal, stacked.T @ rest.ravel()))
     factor = np.asarray(np.linalg.cholesky(normal).T)
     values = within(free, factor, (least, np.full(len(free), np.inf)))
@@ -203,6 +200,8 @@ def shared_values(
         The values, and the half-widths of their 95 % intervals.
 
     """
+    # number of blocks of a recording whose scores give the deviation; nine degrees of freedom
+    n_blocks = 10
     n, rows, bodies = len(own), own.shape[1], 0 if near is None else near.shape[2]
     both = shared if near is None else np.concatenate([near, shared], axis=2)
     turned = own.transpose(0, 2, 1)
@@ -220,13 +219,13 @@ def shared_values(
         left = target[:, :, 0] - columns @ values
         size = np.maximum(size * np.sqrt(np.mean(left**2, axis=1)), LIMITS.floor)
     scores = (columns * left[:, :, np.newaxis]) @ inverse
-    blocks = np.stack([part.sum(axis=(0, 1)) for part in np.array_split(scores, _BLOCKS, axis=1)])
-    # standard deviation of the total of several sums; zero for a single sum
+    blocks = np.stack([part.sum(axis=(0, 1)) for part in np.array_split(scores, n_blocks, axis=1)])
+    # standard deviation of the total of several sums; zero if there is only one
     spreads = [
         np.sqrt(np.sum(sums**2, axis=0) * len(sums) / max(len(sums) - 1, 1))
         for sums in (blocks, scores.sum(axis=1))
     ]
-    half = student.ppf(0.975, _BLOCKS - 1) * np.max(spreads, axis=0)
+    half = student.ppf(0.975, n_blocks - 1) * np.max(spreads, axis=0)
     return values[bodies:], half[bodies:]
 
 

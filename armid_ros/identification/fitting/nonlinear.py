@@ -38,10 +38,6 @@ import scipy.linalg
 _EXACT = 1e-8
 #: Largest number of linearisations; fits that converge take three to eight.
 MOST_PASSES = 20
-#: Damping factors of a step, relative to the squared columns.
-_DAMPINGS = tuple(10.0 ** np.arange(-8.0, 3.0))
-#: Negligible deviation due to inertia, over the standard deviation of the fit.
-_NEGLIGIBLE = 0.1
 
 Torques = tuple[FloatArray, ...]
 
@@ -266,6 +262,8 @@ def _iterate(
     free: FloatArray,
 ) -> FittedValues:
     """Take damped Gauss-Newton steps until the linear model and the arm agree."""
+    # damping factors of a step, relative to the squared columns
+    dampings = tuple(10.0 ** np.arange(-8.0, 3.0))
     limits = bounds(arm, base)
     now = _State(arm, base.values(arm.theta), problem)
     passes, settled = 0, True
@@ -278,8 +276,8 @@ def _iterate(
             break
         trial: _State | None = None
         vain = 0.0
-        # take the undamped step if its cost is near the prediction, otherwise the best damped step
-        for damping in (0.0, *_DAMPINGS):
+        # the undamped step if its cost is near the predicted one, otherwise the best damped step
+        for damping in (0.0, *dampings):
             values = now.damped(damping, limits) if damping else solution.values
             if damping:
                 vain = max(vain, now.gain(tuple(part.torque(values) for part in now.problem)))
@@ -379,6 +377,8 @@ def with_uncertain_inertia(
         Speed at which inertia would be negligible, if it is not.
 
     """
+    # negligible deviation due to inertia, over the standard deviation of the fit
+    negligible = 0.1
     rigid = len(description.robot.rigid_parameters)
     everything = regressions(fit.arm, np.arange(rigid), recordings, used)
     # base parameters that a weighted fit of each rigid column gives
@@ -394,9 +394,9 @@ def with_uncertain_inertia(
     solution = replace(fit.solution, covariance=plain + added)
     ratio = np.sqrt(np.diag(added) / np.maximum(np.diag(plain), 1e-300)).max()
     notes: tuple[str, ...] = ()
-    if ratio > _NEGLIGIBLE:
+    if ratio > negligible:
         # the torque of inertia grows with the square of the speed
-        speed = float(np.sqrt(_NEGLIGIBLE / ratio))
+        speed = float(np.sqrt(negligible / ratio))
         slower = (
             'these torques have so little noise that inertia matters at any speed'
             if speed < 0.02

@@ -138,8 +138,7 @@ class OnlineIdentifier:
             start=self.base.values(arm.theta),
             scale_covariance=settings.torque_noise is None,
         )
-        # length of the windows for the spectrum of the errors [s], beyond their correlation time
-        window = max(1, round(4.0 / self._row_period))
+        window = max(1, round(4.0 / self._row_period))  # 4 s, beyond the correlation of errors
         self._scores = RobustCovariance(window, settings.forgetting, self._work)
         self._watch = None
         if settings.false_alarm_time is not None:

@@ -14,11 +14,7 @@ from armid_ros.model import BaseParameters, inverse_dynamics, random_motion
 from armid_ros.motion import FloatArray
 import numpy as np
 
-#: Time in which a standard deviation has to fall [s].
-_WAIT = 10.0
-#: Largest number of joints in the message.
-_NAMED = 3
-#: Unit of a kind of rigid parameter, its name, and the motion that it needs.
+#: Unit of a kind of rigid parameter, its name, and the motion that identifies it.
 _OF_BODY = {
     'kg m^2': ('inertia', 'accelerate it harder'),
     'kg m': ('balance', 'move it through more of its range'),
@@ -100,12 +96,14 @@ class LearningProgress:
             Estimate of the base parameters.
 
         """
+        # time in which a standard deviation has to fall [s]
+        wait = 10.0
         if self._past and t < self._past[-1][0]:
             self._past.clear()
         self._past.append((t, estimate.std))
-        while len(self._past) > 1 and self._past[1][0] <= t - _WAIT:
+        while len(self._past) > 1 and self._past[1][0] <= t - wait:
             self._past.popleft()
-        if self._past[0][0] > t - _WAIT:
+        if self._past[0][0] > t - wait:
             return ()
         # the usual torque of a joint is that of the described links and of the effects (mainly
         # friction) whose estimates exceed two standard deviations
@@ -131,8 +129,10 @@ class LearningProgress:
 
 def too_little_motion(unlearned: Sequence[Unlearned]) -> str:
     """Return a message on parameters that the motion does not identify; empty if none."""
+    # largest number of joints in the message
+    most = 3
     if not unlearned:
         return ''
-    rest = len(unlearned) - _NAMED
+    rest = len(unlearned) - most
     more = f'; and {rest} more joint{"s" if rest > 1 else ""}' if rest > 0 else ''
-    return f'too little motion to learn from: {"; ".join(map(str, unlearned[:_NAMED]))}{more}'
+    return f'too little motion to learn from: {"; ".join(map(str, unlearned[:most]))}{more}'

@@ -20,10 +20,6 @@ from armid_ros.motion import FloatArray
 import numpy as np
 from scipy import stats
 
-#: Number of windows kept: ten minutes at four windows per second.
-_MEMORY = 2400
-#: Tail probability of the quantile that limits large statistics in a mean.
-_TAIL = 0.05
 #: Tail probability of the quantile that shows whether large statistics are too frequent.
 _RARE = 0.01
 #: Number of blocks kept: one minute at four blocks per second.
@@ -90,24 +86,28 @@ class NullCalibration:
     """
 
     def __init__(self, sizes: Sequence[int], overlap: int, sources: int) -> None:
+        # tail probability of the quantile to which larger statistics are limited in the mean
+        tail_share = 0.05
+        # number of windows kept: ten minutes at four windows per second
+        memory = 2400
         self._sizes = np.array(sizes)
         shared = np.arange(1, overlap) / overlap
         self._overlap = 1.0 + 2.0 * float(np.sum(shared**2))  # windows per independent window
         self._sources = sources
-        self._ratios = History(len(sizes), _MEMORY)
-        self._strengths = History(int(np.sum(sizes)), _MEMORY)
+        self._ratios = History(len(sizes), memory)
+        self._strengths = History(int(np.sum(sizes)), memory)
         self._first = np.cumsum([0, *sizes[:-1]])
         self._strength = np.zeros(int(np.sum(sizes)))
-        self._most = stats.chi2.isf(_TAIL, self._sizes)
+        self._most = stats.chi2.isf(tail_share, self._sizes)
         below = self._sizes * stats.chi2.cdf(self._most, self._sizes + 2)
         square = self._sizes * (self._sizes + 2) * stats.chi2.cdf(self._most, self._sizes + 4)
         self._fresh = 0
         self._rare = stats.chi2.isf(_RARE, self._sizes)
         self._tail = 1.0
         self._limits: tuple[float, FloatArray] | None = None
-        self._mean = below + _TAIL * self._most
+        self._mean = below + tail_share * self._most
         # variance of the logarithm of a factor that is estimated from one window
-        self._variance = (square + _TAIL * self._most**2 - self._mean**2) / below**2
+        self._variance = (square + tail_share * self._most**2 - self._mean**2) / below**2
         self.factors = np.full(len(sizes), np.nan)
         self._freedom = np.zeros(len(sizes))
 

@@ -20,8 +20,6 @@ import numpy as np
 #: Length of the blocks whose residual power is compared [s]; longer than the correlation of the
 #: residual.
 _BLOCK = 0.5
-#: Fewest blocks before a change, so that their variance can be estimated.
-_FEWEST = 4
 
 
 def onset(arm: ArmModel, recording: Recording) -> float | None:
@@ -46,22 +44,24 @@ def onset(arm: ArmModel, recording: Recording) -> float | None:
         a change.
 
     """
+    # fewest blocks before a change, so that their variance can be estimated
+    fewest = 4
     power = _block_powers(arm, recording)
     times, logs = power[:, 0], np.log(np.maximum(power[:, 1:], 1e-300))
     count = len(logs)
-    if count <= _FEWEST:
+    if count <= fewest:
         return None
     # F ratio of two means against one mean, for every joint
     low, high, std = two_means(logs, np.ones_like(logs))
-    between = ((high - low) / std)[_FEWEST - 1 :] ** 2
+    between = ((high - low) / std)[fewest - 1 :] ** 2
     within = ((logs - logs.mean(axis=0)) ** 2).sum(axis=0) - between
     ratios = (between * (count - 2) / np.maximum(within, 1e-300)).max(axis=1)
     best = int(np.argmax(ratios))
     # probability of a false change, over all tested times and joints
     if tail(ratios[best], 1, count - 2) * len(ratios) * logs.shape[1] >= 0.01:
         return None
-    edge = recording.duration - (times[-1] + _BLOCK)  # time that the filter removes at the end
-    return float(times[_FEWEST + best] + _BLOCK + edge)
+    edge = recording.duration - (times[-1] + _BLOCK)  # time that the filter cuts off at the end
+    return float(times[fewest + best] + _BLOCK + edge)
 
 
 def _block_powers(arm: ArmModel, recording: Recording) -> FloatArray:

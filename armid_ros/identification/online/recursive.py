@@ -33,8 +33,6 @@ SMALLEST_FORGETTING = 0.9
 #: Standard deviation of every parameter before the first sample, in its SI unit. Robots have
 #: parameters of 1e-4 to 1e3; a parameter that the data do not identify keeps this deviation.
 PRIOR_STD = 1e6
-#: Largest share of the old information that one sample may remove in any direction [-].
-_LARGEST_LOSS = 0.5
 _BLOCK = 8  # columns of a Householder block; the fastest for 60 to 120 parameters
 
 
@@ -309,6 +307,8 @@ def replaced(root: FloatArray, rows: FloatArray, forgetting: float) -> FloatArra
         Forgetting factor, below 1.
 
     """
+    # largest share of the old information that one sample may remove in any direction [-]
+    largest_loss = 0.5
     whitened, _ = lapack.dtrtrs(root, rows.T, trans=1)
     gains, directions = np.linalg.eigh(whitened.T @ whitened)
     # Twice the loss of exponential forgetting, as samples with little information lose less. With
@@ -319,7 +319,7 @@ def replaced(root: FloatArray, rows: FloatArray, forgetting: float) -> FloatArra
     some = np.maximum(gains, 0.0)
     levels = (budget - np.append(0.0, np.cumsum(some[:-1]))) / np.arange(len(some), 0, -1)
     above = some >= levels
-    level = min(float(levels[np.argmax(above)]), _LARGEST_LOSS) if above.any() else _LARGEST_LOSS
+    level = min(float(levels[np.argmax(above)]), largest_loss) if above.any() else largest_loss
     kept = np.sqrt(np.maximum(1.0 - level / np.maximum(gains, level), 0.0))
     if np.any(kept > 0.0):
         root, *_ = lapack.dtpqrt(

@@ -26,14 +26,10 @@ from armid_ros.motion import FloatArray
 import numpy as np
 from scipy import linalg, stats
 
-#: Number of columns transformed in one piece of work.
-_COLUMNS = 24
-#: Ridge for directions without excitation, which keeps the information invertible [-].
+#: Ridge that keeps the information invertible in directions that were never excited [-].
 _RIDGE = 1e-9
 #: Lower bound of a divisor.
 _SMALLEST = 1e-100
-#: Level of the upper end of an interval.
-_LEVEL = 0.975
 
 
 @dataclass(frozen=True, eq=False)
@@ -202,6 +198,8 @@ def _sum(some: _Bands, more: _Bands) -> Pieces[_Bands]:
 
 def _transformed(columns: FloatArray) -> Pieces[_Bands]:
     """Return the products of a window of rows [W, y] of shape (m, k, P + 1), in octaves."""
+    # number of columns transformed in one piece of work
+    at_once = 24
     joints, count, size = columns.shape
     # the low-pass filter stops all frequencies above one per 8 rows
     bins = max(2, count // 8)
@@ -210,8 +208,8 @@ def _transformed(columns: FloatArray) -> Pieces[_Bands]:
     counts = np.zeros((joints, len(edges) - 1))
     for joint, rows in enumerate(columns):
         parts = []
-        for first in range(0, size, _COLUMNS):
-            parts.append(np.fft.rfft(rows[:, first : first + _COLUMNS], axis=0)[:bins])
+        for first in range(0, size, at_once):
+            parts.append(np.fft.rfft(rows[:, first : first + at_once], axis=0)[:bins])
             yield
         transformed = np.concatenate(parts, axis=1) * np.sqrt(2.0 / count)
         transformed[0] *= np.sqrt(0.5)
@@ -227,6 +225,8 @@ def _transformed(columns: FloatArray) -> Pieces[_Bands]:
 
 def _shape(bands: _Bands, values: FloatArray) -> Pieces[tuple[FloatArray, FloatArray]]:
     """Return a root of R_M^-T J R_M^-1 with R_M^T R_M = M, and factors that widen deviations."""
+    # level of the upper end of an interval
+    level = 0.975
     # The noise power in a band is that of the residuals, corrected for the degrees of freedom of
     # the fit. The variance of a value is a sum over bands, with degrees by Satterthwaite (1946).
     information, scores = bands.information, bands.products[..., :-1, :-1]
@@ -267,8 +267,8 @@ def _shape(bands: _Bands, values: FloatArray) -> Pieces[tuple[FloatArray, FloatA
         uncertain += shares**2 / freedom[joint, band]
         yield
     known = all_shares**2 / uncertain.clip(_SMALLEST)
-    student = stats.t.ppf(_LEVEL, np.maximum(known, 3.0))  # at least 3 degrees of freedom
-    return half, student / stats.norm.ppf(_LEVEL)
+    student = stats.t.ppf(level, np.maximum(known, 3.0))  # at least 3 degrees of freedom
+    return half, student / stats.norm.ppf(level)
 
 
 def _triangle(information: FloatArray) -> FloatArray:

@@ -37,13 +37,6 @@ from armid_ros.robots.robot import PER_LINK
 import numpy as np
 import scipy.linalg
 
-#: Ratio of a mass to the described one above which a note is given.
-HEAVY = 3.0
-#: Blocks of the training data that are left out in turn to choose the weight of the prior.
-BLOCKS = 5
-#: Weights of the divergence that are compared. The fit term is a mean square of about one.
-WEIGHTS = tuple(float(w) for w in 10.0 ** np.arange(-7.0, 0.5))
-
 
 @dataclass(frozen=True)
 class PhysicalSettings:
@@ -148,23 +141,23 @@ def _bodies(
     base, problem, weights = fit.base, fit.problem, fit.solution.weights
     program, notes = physical_program(arm, base, settings)
     prior, lower, upper, boxes = program.prior, program.lower, program.upper, program.boxes
-    # products of the weighted rows of blocks of successive samples
-    ends = np.cumsum([len(part) for part in np.array_split(weights, BLOCKS)])[:-1]
+    # products of the weighted rows of blocks of successive samples, which are left out in turn
+    n_blocks = 5
+    ends = np.cumsum([len(part) for part in np.array_split(weights, n_blocks)])[:-1]
     columns, target = weighted_rows(problem, weights)
     rows = np.column_stack([columns, target])
     blocks = np.array([own.T @ own for own in np.split(rows, ends * weights.shape[1])])
     whole = blocks.sum(axis=0)
     least = _misfit(whole, fit.solution.values)
     least = max(least, TORQUE_RESOLUTION * float(np.sqrt(whole[-1, -1])))
-    counted = np.array_split(np.count_nonzero(weights, axis=1), BLOCKS)
+    counted = np.array_split(np.count_nonzero(weights, axis=1), n_blocks)
     share = np.array([part.sum() for part in counted], dtype=float)
     # scaled to a mean square of one in the unconstrained fit
     counts = share / share.sum() * least**2
 
     tried = _held_out_errors(program, blocks, counts)
     best = min(error for _, error in tried)
-    # tolerance of the held-out error over the least one: the largest weight within it is chosen
-    weight = max(w for w, error in tried if error <= (1.0 + 1e-3) * best)
+    weight = max(w for w, error in tried if error <= (1.0 + 1e-3) * best)  # tolerance of 0.1 %
     theta = program.solve(whole, float(counts.sum()), weight)
     rigid = theta[: len(theta) - len(lower)].reshape(-1, PER_LINK)
     links = tuple(
@@ -207,16 +200,18 @@ def _bodies(
 
 def far_from_described(robot: Robot, masses: FloatArray) -> tuple[str, ...]:
     """Return a note on links whose mass, (n,) [kg], is far from the description, or none."""
+    # ratio of a mass to the described one above which a note is given
+    heavy = 3.0
     described = robot.rigid_parameters[::PER_LINK]
     named = [
         f'{link} {mass:.3g} kg, described {known:.3g} kg'
         for link, known, mass in zip(robot.links, described, masses, strict=True)
-        if known > 0.0 and not known / HEAVY <= mass <= HEAVY * known
+        if known > 0.0 and not known / heavy <= mass <= heavy * known
     ]
     if not named:
         return ()
     return (
-        f'masses more than {HEAVY:g} times off the description: {"; ".join(named)}; correct the '
+        f'masses more than {heavy:g} times off the description: {"; ".join(named)}; correct the '
         'masses, or add missing parts, such as rotors, springs or a load',
     )
 
@@ -296,13 +291,15 @@ def _held_out_errors(
     counts: FloatArray,
 ) -> tuple[tuple[float, float], ...]:
     """Return the candidate weights with held-out errors, relative to unconstrained fits."""
+    # weights of the divergence that are compared. The fit term is a mean square of about one.
+    candidates = tuple(float(w) for w in 10.0 ** np.arange(-7.0, 0.5))
     free = 0.0
-    squares = dict.fromkeys(WEIGHTS, 0.0)
+    squares = dict.fromkeys(candidates, 0.0)
     for left_out, block in enumerate(blocks):
         others = np.delete(blocks, left_out, axis=0).sum(axis=0)
         count = float(counts.sum() - counts[left_out])
         free += _misfit(block, informative_solution(others[:-1, :-1], others[:-1, -1])) ** 2
-        for weight in WEIGHTS:
+        for weight in candidates:
             theta = program.solve(others, count, weight)
             squares[weight] += _misfit(block, program.base.values(theta)) ** 2
     floor = max(free, TORQUE_RESOLUTION**2 * float(blocks[:, -1, -1].sum()))

@@ -35,8 +35,6 @@ import clarabel
 import numpy as np
 from scipy import sparse
 
-#: Weight c of the prior of a mass: three times the mass has to reduce squared residuals by 0.2 %.
-_MASS = 1e-3
 #: Numbers of variables of a log-determinant: a triangle, then the logarithms of its diagonal.
 _TRIANGLE, _DIAGONAL = 10, 4
 _LOG_DETERMINANT = _TRIANGLE + _DIAGONAL
@@ -107,6 +105,9 @@ class PhysicalProgram:
             If no parameters satisfy the constraints.
 
         """
+        # weight c of the prior of a mass: a mass three times as large must reduce the squares by
+        # 0.2 %
+        mass_weight = 1e-3
         rank, size, rigid = self.base.rank, len(self.prior), self._rigid
         information = self.base.grouping.T @ (products[:rank, :rank] / count) @ self.base.grouping
         lengths = np.sqrt(np.diag(information)[rigid:])
@@ -130,8 +131,8 @@ class PhysicalProgram:
         for link in range(self.n_links):
             gradient[self._first(link) + _TRIANGLE : self._first(link + 1)] = -weight
             mass = change[PER_LINK * link] / self.prior[PER_LINK * link]  # relative to the prior
-            hessian[:size, :size] += _MASS * np.outer(mass, mass)
-            gradient[:size] -= _MASS * mass
+            hessian[:size, :size] += mass_weight * np.outer(mass, mass)
+            gradient[:size] -= mass_weight * mass
         rows, offsets, cones = self._constraints(change, origin)
         settings = clarabel.DefaultSettings()
         settings.verbose = False

@@ -22,11 +22,8 @@ import numpy.typing as npt
 
 #: A joint that stays within this range is at rest [rad or m].
 REST_RANGE = 1e-3
-#: Largest excess of positions over the limits that is not due to a wrong unit: two turns of a
-#: joint without a stop [rad], or one metre [m].
-LIMIT_EXCESS_TURNING, LIMIT_EXCESS_SLIDING = 4.0 * np.pi, 1.0
-#: Largest harmless excess of a position over a limit, as a share of the range: stops are
-#: elastic, and encoders have noise.
+#: Excess of a position over a limit that is no fault, as a share of the range: a stop gives way,
+#: and an encoder has noise.
 _LIMIT_SLACK = 0.01
 #: Shortest recording with a movement [s].
 SHORTEST = 1.0
@@ -229,9 +226,12 @@ def check_positions(robot: Robot, source: str, lowest: FloatArray, highest: Floa
 
 
 def position_problem(robot: Robot, lowest: FloatArray, highest: FloatArray) -> str:
-    """Return an error on the joint that exceeds its limits most, by ranges (n,), or ''."""
+    """Return an error on the joint farthest out of limits, by ranges (n,); empty if none."""
+    # largest excess of positions over the limits that is no wrong unit: two turns of a joint that
+    # a controller lets spin [rad], or one metre [m]
+    turning, sliding = 4.0 * np.pi, 1.0
     excess = np.maximum(robot.lower - lowest, highest - robot.upper)
-    allowed = np.where(robot.prismatic, LIMIT_EXCESS_SLIDING, LIMIT_EXCESS_TURNING)
+    allowed = np.where(robot.prismatic, sliding, turning)
     worst = int(np.argmax(excess / allowed))
     if not excess[worst] > allowed[worst]:
         return ''

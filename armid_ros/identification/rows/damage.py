@@ -14,9 +14,6 @@ from armid_ros.motion import FloatArray
 from armid_ros.recording import Recording
 import numpy as np
 
-#: Number of damaged samples that a note names.
-_NAMED = 3
-
 
 def without_damage(
     recordings: Sequence[Recording], used: Conditioning
@@ -35,6 +32,8 @@ def without_damage(
         Notes on the damage: recording, number of samples, and the first of them.
 
     """
+    # number of damaged samples that a note names
+    most = 3
     peak = float(np.max(used.taps) / np.sum(used.taps))
     repaired, found = [], []
     for recording in recordings:
@@ -58,7 +57,7 @@ def without_damage(
             for one in excursions
             for sample in one.samples
         ]
-        named[_NAMED:] = ['...'] if len(damaged) > _NAMED else []
+        named[most:] = ['...'] if len(damaged) > most else []
         what = '1 sample jumps and comes back; it was'
         if len(damaged) > 1:
             what = f'{len(damaged)} samples jump and come back; they were'

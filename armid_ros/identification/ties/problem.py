@@ -28,13 +28,9 @@ import numpy.typing as npt
 from scipy import signal
 import scipy.linalg
 
-#: Residual share of a column below which it is a linear combination of the others.
-_RANK_TOLERANCE = 1e-6
 #: Step of the central differences of rigid columns [rad or m].
 _STEP = 1e-5
 
-#: Number of samples over which errors are correlated after filtering.
-_LAGS = 6
 
 Inertias = Literal['known', 'free']
 #: Arrays of a problem with one row per sample.
@@ -237,15 +233,17 @@ def _free_inertias(
     robot: Robot, motion: Motion, springs: FloatArray, names: Sequence[str]
 ) -> tuple[FloatArray, BaseParameters]:
     """Return the inertial columns that are identifiable with the springs, and their grouping."""
+    # remainder of a column, as a share of it, below which it is a combination of the others
+    tolerance = 1e-6
     body = regressor(robot, motion)
     every = rigid_parameter_names(robot)
-    base = group_columns(body.reshape(-1, body.shape[2]), every, _RANK_TOLERANCE)
+    base = group_columns(body.reshape(-1, body.shape[2]), every, tolerance)
     w = np.concatenate([body[:, :, base.independent], springs], axis=2)
     w = w.reshape(-1, w.shape[2])
     scale = np.linalg.norm(w, axis=0)
     scaled = w / np.where(scale > 0.0, scale, 1.0)
     left = np.abs(np.diag(np.linalg.qr(scaled, mode='r')))[base.rank :]
-    if len(left) and left.min() < _RANK_TOLERANCE:
+    if len(left) and left.min() < tolerance:
         which = names[int(np.argmin(left))] if len(names) > 1 else 'the springs'
         raise IdentificationError(
             f'{which}: its stiffness cannot be distinguished from weight '
@@ -267,6 +265,8 @@ def _springs_by_motion(
 
 def _passed(used: Conditioning | None) -> tuple[FloatArray, FloatArray]:
     """Return the covariances of filtered white noise of positions and of torques, over lags."""
+    # number of samples over which errors are correlated after filtering
+    n_lags = 6
     # covariances of position, velocity, acceleration of a row with itself and with later rows,
     # shape (1 + lags, 3, 3), and of torques, (1 + lags,). Columns change slowly compared with
     # the filter of the decimation, so they do not affect the noise that passes it
@@ -276,12 +276,12 @@ def _passed(used: Conditioning | None) -> tuple[FloatArray, FloatArray]:
     sections = signal.butter(4, used.cutoff_hz, fs=used.rate_hz, output='sos')
     gain = np.abs(signal.sosfreqz(sections, w)[1]) ** 4
     gain = gain * np.abs(signal.freqz(used.taps, worN=w)[1]) ** 2
-    result = np.empty((1 + _LAGS, 3, 3))
+    result = np.empty((1 + n_lags, 3, 3))
     for lag, i, j in np.ndindex(result.shape):
         turned = np.cos(w * lag * used.decimation + (i + j) * np.pi / 2.0)
         result[lag, i, j] = (-1) ** i * np.mean(gain * (used.rate_hz * w) ** (i + j) * turned)
     taps = used.taps
-    ends = [len(taps) - lag * used.decimation for lag in range(1 + _LAGS)]
+    ends = [len(taps) - lag * used.decimation for lag in range(1 + n_lags)]
     return result, np.array([taps[:end] @ taps[-end:] if end > 0 else 0.0 for end in ends])
 
 

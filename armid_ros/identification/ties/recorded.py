@@ -31,9 +31,6 @@ from armid_ros.recording import recorded_together, Recording
 from armid_ros.robots import Robot
 import numpy as np
 
-#: Order of the differences from which noise is computed.
-_ORDER = 6
-
 
 def recorded_interaction_problem(
     machines: TiedMachines,
@@ -214,9 +211,11 @@ def band_of_motion(
 
 def _white(signals: FloatArray) -> FloatArray:
     """Return the standard deviation of white noise in signals of shape (N, n)."""
+    # order of the differences from which noise is computed
+    order = 6
     # Differences of high order remove a densely sampled motion.
-    differences = np.diff(signals, _ORDER, axis=0)
-    return np.asarray(np.sqrt(np.mean(differences**2, axis=0) / comb(2 * _ORDER, _ORDER)))
+    differences = np.diff(signals, order, axis=0)
+    return np.asarray(np.sqrt(np.mean(differences**2, axis=0) / comb(2 * order, order)))
 
 
 @dataclass(frozen=True)

@@ -27,8 +27,6 @@ from armid_ros.motion import FloatArray, read_only
 import numpy as np
 from scipy.optimize import minimize
 
-#: Largest gradient, in standard deviations, at the end of the iteration.
-_CONVERGED = 1e-3
 #: Smallest z-score of an existing stiffness: a false one has a probability of 3e-5.
 LEAST_Z = 4.0
 
@@ -133,9 +131,11 @@ def _most_likely(
     problem: InteractionProblem, theta: FloatArray, variance: FloatArray
 ) -> FloatArray:
     """Return the most likely theta, from a start near it, by a quasi-Newton method (BFGS)."""
-    # if noise dominates a column, the loss is much flatter than the information predicts, and
-    # Gauss-Newton steps oscillate. BFGS starts with the information and corrects the curvature by
-    # gradients
+    # largest gradient, in standard deviations, at the end of the iteration
+    converged = 1e-3
+    # where noise dominates a column, the loss is much flatter than by the information, and
+    # Gauss-Newton steps oscillate; BFGS learns the curvature from the gradients, beginning with
+    # the information
     information = _gauss_newton(problem, theta, variance).information
     size = np.sqrt(np.diag(information))
     root = np.linalg.cholesky(information / np.outer(size, size))
@@ -153,9 +153,9 @@ def _most_likely(
         np.zeros(len(theta)),
         jac=True,
         method='BFGS',
-        options={'gtol': _CONVERGED, 'maxiter': 300},
+        options={'gtol': converged, 'maxiter': 300},
     )
-    if not np.max(np.abs(found.jac)) < 10.0 * _CONVERGED:
+    if not np.max(np.abs(found.jac)) < 10.0 * converged:
         raise IdentificationError(
             'the stiffness does not converge: the angles are too noisy for extensions of '
             f'{1e3 * problem.typical_way:.2g} mm; filter them, or move more'
