@@ -6,11 +6,13 @@ import inspect
 import json
 from pathlib import Path
 import re
+import shlex
 import subprocess
 import sys
 
 from armid_ros.cli import choices
 from armid_ros.cli.commands import main
+from armid_ros.cli.terminal import progress_line, say
 from armid_ros.diagnosis.search.priors import HOW_OFTEN
 from armid_ros.effects import CATALOGUE, USUAL_EFFECTS
 from armid_ros.effects.catalogue import EXAMPLES
@@ -324,3 +326,76 @@ def test_values_are_completed():
 )
 def test_values_of_an_option_are_completed(words, found):
     assert completed(*words) == found
+
+
+@pytest.mark.parametrize(
+    ('share', 'numbers'),
+    [(0.25, (25, 10, 30)), (0.5, (50, 10, 10)), (0.0, (0, 10)), (1.0, (100, 10))],
+)
+def test_a_line_of_progress_has_share_time_and_time_to_go(share, numbers):
+    line = progress_line('identifying', share, 10.0)
+    assert line.startswith('identifying: ')
+    assert tuple(map(int, re.findall(r'\d+', line))) == numbers
+    assert 'to go' not in progress_line('identifying', share, 10.0, steady=False)
+
+
+@pytest.mark.parametrize(
+    ('terminal', 'colour', 'shown'),
+    [
+        (True, 'green', '\x1b[32mfit \\x1b[31m\x1b[0m\n'),
+        (False, 'green', 'fit \\x1b[31m\n'),
+        (False, None, 'fit \\x1b[31m\n'),
+    ],
+)
+def test_a_colour_is_for_terminals_and_escapes_of_a_text_are_shown(terminal, colour, shown):
+    """Colours are of terminals; text of a file has no say in it."""
+    command = click.Command('excite', callback=lambda: say('fit \x1b[31m', colour))
+    assert CliRunner().invoke(command, color=terminal).output == shown
+
+
+FAST = ('--no-physical', '--no-verify')
+QUICK = ('--duration', 6, '--starts', 1, '--iterations', 1)
+
+
+@pytest.fixture(scope='module')
+def folder(tmp_path_factory):
+    return tmp_path_factory.mktemp('results')
+
+
+@pytest.mark.parametrize(
+    ('command', 'then', 'words'),
+    [
+        (('check', ROBOT), 'excite', (ROBOT,)),
+        (
+            ('check', ROBOT, 'BAG', '--topic', 'joint_states'),
+            'identify',
+            ('--topic', 'joint_states'),
+        ),
+        (('check', ROBOT, 'BAG', '--gravity', 'moon'), 'inspect', ('BAG', '--gravity', 'moon')),
+        (('inspect', 'BAG', '--robot', '-'), 'identify', ('BAG', '-')),
+        (('excite', '--robot', ROBOT, *QUICK, '--out', 'plan'), 'simulate', (ROBOT,)),
+        (('identify', 'BAG', '--robot', ROBOT, *FAST, '--out', 'a'), 'excite', (ROBOT,)),
+        (('identify', 'HELD', '--robot', ROBOT, *FAST, '--out', 'b'), 'excite', (ROBOT,)),
+        (('compare', 'a', 'b', '--out', 'c'), 'identify', ('BAG', 'HELD', ROBOT)),
+        (('diagnose', 'BAG', '--robot', ROBOT, '--out', 'd'), 'simulate', (ROBOT, '--model')),
+    ],
+)
+def test_the_last_line_is_a_command(bags, folder, command, then, words):
+    paths = {name: str(folder / name) for name in ('plan', 'a', 'b', 'c', 'd')}
+    paths |= {'BAG': str(bags[0]), 'HELD': str(bags[1])}
+    done = armid(*(paths.get(word, word) for word in command)).stdout.splitlines()
+    program, name, *arguments = shlex.split(done[-1].removeprefix('next: '))
+    assert (program, name) == ('armid', then)
+    main.get_command(None, name).make_context(name, list(arguments))
+    assert {paths.get(word, word) for word in words} <= set(arguments)
+    for page in (folder / name / 'report.html' for name in ('plan', 'c') if name in command):
+        assert done[-1].removeprefix('next: ') in page.read_text()
+
+
+def test_a_check_takes_the_robot_of_the_project(bags, tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    armid('check', code=2)
+    (tmp_path / 'armid.toml').write_text(f'robot = "{ROBOT}"\n')
+    assert f'{ROBOT}' in armid('check', bags[0]).stdout.splitlines()[-1]
+    armid('check', 'no.urdf', code=2)
+    assert '- is taken' in armid('check', '-', bags[0]).stderr

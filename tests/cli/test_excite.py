@@ -7,9 +7,8 @@ import json
 import shutil
 
 import armid_ros.api.excitation as excitation_files
-from armid_ros.arm import ArmModel
 from armid_ros.errors import TrajectoryError
-from armid_ros.excitation import check_limits, ClearanceModel, Limits, load_excitation
+from armid_ros.excitation import load_excitation
 from armid_ros.excitation.geometry.floor import lowest_point
 from armid_ros.motion import Motion
 from armid_ros.recording import read_recording, read_waypoints
@@ -79,26 +78,6 @@ def test_an_arm_whose_zero_is_on_the_floor_starts_near_it_and_names_the_link(ur5
     first = plan_of(example('ur5_robot'), out).q[0]
     assert 0.0 < np.abs(first).max() < 0.2
     assert 'wrist_3_link' in said
-
-
-def test_a_trajectory_begins_and_ends_at_rest_where_the_arm_stands(tmp_path):
-    """All of it is inside the limits and clear, the way there and back as well."""
-    start, speed = '0.3,-0.2,0.1,0.5,0,0', 'fast'
-    excite(ROBOT, tmp_path / 'plan', '--speed', speed, '--start', start)
-    motion, robot = plan_of(ROBOT, tmp_path / 'plan'), load_robot(ROBOT)
-    pose = np.array(start.split(','), dtype=float)
-    assert motion.t[0] == 0.0
-    np.testing.assert_allclose(motion.q[[0, -1]], [pose, pose], atol=1e-9)
-    np.testing.assert_allclose(motion.dq[[0, -1]], 0.0, atol=1e-9)
-    limits = Limits.of(robot, speed=speed, reserve=False)
-    assert check_limits(limits, motion, ArmModel(robot).torque(motion)) == ()
-    assert ClearanceModel.of(collision_model(robot)).smallest(motion.q).min() >= 0.0099
-    excitation = load_excitation(tmp_path / 'plan' / 'excitation.yaml')
-    document = json.loads((tmp_path / 'plan' / 'excitation.json').read_text())
-    begin = round(document['approach'] * 50.0) + int(np.ceil(excitation.run_in * 50.0 - 1e-6))
-    samples = round(excitation.trajectory.period * 50.0)
-    first, second = motion.q[begin:][: 2 * samples].reshape(2, samples, -1)
-    np.testing.assert_allclose(first, second, atol=1e-9)
 
 
 def test_a_simulated_arm_follows_the_plan_from_its_first_point(made, tmp_path):

@@ -7,6 +7,7 @@ from __future__ import annotations
 from dataclasses import replace
 
 from armid_ros.diagnosis import known_misfit
+from armid_ros.identification.online.onset import onset
 from armid_ros.identification.rows.signals import Conditioning
 from armid_ros.motion import Motion
 from armid_ros.nodes.live import DiagnosisRequest
@@ -80,3 +81,14 @@ def test_what_friction_holds_at_rest_is_no_misfit(known_arm, healthy):
     filters = Conditioning(200.0, 12.0, 8)
     moving, both = (known_misfit(known_arm, [], filters, [part]).rms for part in (healthy, rested))
     np.testing.assert_allclose(list(both.values()), list(moving.values()), rtol=0.3)
+
+
+def test_nothing_is_found_where_nothing_changes(known_arm, healthy):
+    assert onset(known_arm, healthy) is None
+
+
+def test_what_came_before_a_change_is_left_out_and_the_change_itself(known_arm, changed):
+    """However long ago it was: a window is seldom cut where blocks begin."""
+    for end in (8.6, 9.3, 12.2, 17.9):
+        assert onset(known_arm, changed.select(changed.t < end)) >= 8.0
+    assert onset(known_arm, changed) < 9.0

@@ -3,8 +3,10 @@
 """The lock files pin all that is asked for, and the check names what a machine lacks."""
 
 import importlib.util
+from pathlib import Path
 import re
 import shutil
+import subprocess
 import sys
 import sysconfig
 
@@ -107,3 +109,24 @@ def test_environment_of_another_python_is_not_mixed_with(host, tmp_path):
     (tmp_path / '.venv').mkdir()
     (tmp_path / '.venv' / 'pyvenv.cfg').write_text('home = /usr/bin\nversion = 3.9.1\n')
     assert 'Python 3.9' in host.missing()
+
+
+def test_the_linter_finds_nothing(root):
+    command = [Path(sys.prefix, 'bin', 'hadolint'), root / 'Dockerfile']
+    done = subprocess.run(command, capture_output=True, text=True)
+    assert done.returncode == 0, done.stdout + done.stderr
+
+
+def test_what_it_names_in_the_tree_is_there(root):
+    text = (root / 'Dockerfile').read_text()
+    for path in re.findall(r'src/armid_ros/([\w./]+)', text):
+        assert (root / path).exists(), path
+    for script in (root / 'docker').iterdir():
+        assert script.stat().st_mode & 0o111 == 0o111
+        assert subprocess.run(['bash', '-n', script]).returncode == 0
+
+
+def test_nothing_that_was_built_goes_into_the_image(root):
+    """What is left out of the repository is left out of the image, too."""
+    ignored = (root / '.dockerignore').read_text().split()
+    assert {'.git', '.venv', 'build', 'install', 'log', 'dist'} <= set(ignored)

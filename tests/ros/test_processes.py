@@ -221,13 +221,6 @@ def test_a_process_that_cannot_leave_is_ended_and_says_where_it_hangs(tmp_path):
     assert (tmp_path / 'bag' / 'metadata.yaml').is_file()
 
 
-def test_a_wrong_start_ends_with_one_clear_line(processes):
-    process = processes.run('recorder', '--bag', 'run')
-    _, errors = process.communicate(timeout=PATIENCE)
-    assert process.returncode == 2
-    assert '--bag run' in errors and len(errors.strip().splitlines()) == 1, errors
-
-
 @pytest.mark.parametrize(
     ('executor', 'signals'),
     [

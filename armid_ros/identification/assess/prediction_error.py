@@ -24,6 +24,9 @@ from armid_ros.robots import Robot
 import numpy as np
 from scipy.stats import t as student
 
+#: Number of columns of each joint: offset, viscous and Coulomb friction, drive inertia.
+_OWN = 4
+
 
 @dataclass(frozen=True)
 class PredictionError:
@@ -98,8 +101,6 @@ def prediction_error(robot: Robot, motion: Motion, *, near: bool) -> PredictionE
         values in a recording.
 
     """
-    # number of own columns of each joint: offset, viscous and Coulomb friction, drive inertia
-    kinds = 4
     assert motion.tau is not None
     scale, weight = root_mean_square(motion.tau), _weight(motion)
     own = _own_columns(motion) * weight[:, :, np.newaxis]
@@ -113,13 +114,13 @@ def prediction_error(robot: Robot, motion: Motion, *, near: bool) -> PredictionE
     by_body = body * (near_deviation(robot) * np.sqrt(FREEDOM / count))
     by_body *= (weight / scale)[:, :, np.newaxis]
     bodies = by_body.shape[2]
-    of_joints = np.zeros((count, n, n, kinds))
+    of_joints = np.zeros((count, n, n, _OWN))
     of_joints[:, joints, joints] = own
     stacked = np.concatenate([by_body, of_joints.reshape(count, n, -1)], axis=2)
     stacked = stacked.reshape(count * n, -1)
     normal = stacked.T @ stacked + LIMITS.floor**2 * np.eye(stacked.shape[1])
     least = np.full(stacked.shape[1], -np.inf)
-    least[bodies:].reshape(n, kinds)[:, 1:] = 0.0
+    least[bodies:].reshape(n, _OWN)[:, 1:] = 0.0
     free = np.asarray(np.linalg.solve(normal, stacked.T @ rest.ravel()))
     factor = np.asarray(np.linalg.cholesky(normal).T)
     values = within(free, factor, (least, np.full(len(free), np.inf)))

@@ -201,20 +201,6 @@ def test_reset_forgets_everything(arm, motion, tau):
     np.testing.assert_array_equal(online.estimate().values, fresh.estimate().values)
 
 
-@pytest.mark.parametrize(
-    ('settings', 'message'),
-    [
-        (OnlineSettings(torque_noise=(1.0, 2.0)), 'torque_noise'),
-        (OnlineSettings(row_rate=3.0), 'rows per second'),
-        (OnlineSettings(forgetting=0.5), 'forgetting factor'),
-        (OnlineSettings(cutoff=-1.0), 'cut-off'),
-    ],
-)
-def test_settings_that_do_not_fit_are_refused(arm, settings, message):
-    with pytest.raises(IdentificationError, match=message):
-        identifier(arm, settings)
-
-
 def test_joints_are_found_by_name_in_any_order():
     order = partial(joint_places, ('b', 'a'))
     np.testing.assert_array_equal(order(['a', 'gripper', 'b']), [2, 0])

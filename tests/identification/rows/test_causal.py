@@ -1,6 +1,5 @@
 # Copyright 2026 The armid_ros developers
 # SPDX-License-Identifier: Apache-2.0
-from armid_ros.errors import IdentificationError
 from armid_ros.identification.rows.causal import CausalFilter, TripleLag
 import numpy as np
 import pytest
@@ -203,16 +202,3 @@ def test_a_new_rate_after_a_dropout_is_learned():
     assert causal.period == pytest.approx(0.02)
     assert outputs[-1] is not None
     assert causal.restarts['dropout'] == 1
-
-
-@pytest.mark.parametrize(
-    ('arguments', 'message'),
-    [
-        ({'cutoff': 0.0}, 'cut-off'),
-        ({'cutoff': np.nan}, 'cut-off'),
-        ({'cutoff': 5.0, 'max_gap': 0}, 'gap'),
-    ],
-)
-def test_settings_out_of_range_are_refused(arguments, message):
-    with pytest.raises(IdentificationError, match=message):
-        CausalFilter(2, **arguments)

@@ -123,12 +123,6 @@ def test_velocities_lack_what_positions_show_beyond_the_cutoff():
     assert above < 0.01 * lacking
 
 
-@pytest.mark.parametrize('settings', [{'cutoff_hz': -1.0}, {'decimation': 0}])
-def test_settings_that_cannot_filter_are_refused(settings):
-    with pytest.raises(IdentificationError, match=r'positive|1 or more'):
-        SignalSettings(**settings)
-
-
 def test_a_cutoff_beyond_the_rate_is_refused(arm):
     t, q = sine(rate=100.0)
     recording = Recording(joints=('a',), t=t, q=q, tau=q, source='bag')

@@ -61,8 +61,3 @@ def test_what_comes_after_an_interruption_is_not_mixed_with_what_was_before():
         online.take_other(10.0 + 0.01 * k, np.zeros(6))
         assert not online.take(10.0 + 0.01 * k, np.zeros(6), np.zeros(6))
     assert online.separate is before
-
-
-def test_settings_that_do_not_fit_are_refused():
-    with pytest.raises(IdentificationError, match='memory'):
-        OnlineInteraction(leg_pair(), memory=1.0)
