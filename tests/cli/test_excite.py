@@ -21,6 +21,7 @@ from .conftest import armid, DURATION, RATE, ROBOT
 pytestmark = pytest.mark.slow
 
 QUICK = ('--duration', 8, '--starts', 1, '--iterations', 3)
+START = '0.3,-0.2,0.1,0.5,0,0'
 Z = np.array([0.0, 0.0, 1.0])
 HINGE = (
     '<robot name="hinge"><link name="base"/><link name="rod"><inertial><origin xyz="0.1 0 0.4"/>'
@@ -50,7 +51,7 @@ def plan_of(robot, out):
 def made(tmp_path_factory):
     """Return the folder of a plan for the shipped arm; a test takes a copy to change it."""
     out = tmp_path_factory.mktemp('made') / 'plan'
-    excite(ROBOT, out)
+    excite(ROBOT, out, '--start', START)
     return out
 
 
@@ -85,6 +86,9 @@ def test_a_simulated_arm_follows_the_plan_from_its_first_point(made, tmp_path):
     armid('simulate', *arguments, '--out', tmp_path / 'run')
     recording = read_recording(tmp_path / 'run', joints=load_robot(ROBOT).joints)
     motion = plan_of(ROBOT, made)
+    np.testing.assert_allclose(
+        motion.q[[0, -1]], 2 * [np.array(START.split(','), float)], atol=1e-9
+    )
     np.testing.assert_allclose(recording.q[0], motion.q[0], atol=1e-6)
     assert recording.t[-1] == pytest.approx(motion.t[-1], abs=0.01)
 

@@ -49,7 +49,7 @@ FEW = ('cli/test_driven.py', 'identification/fitting/test_normal_equations.py')
 #: Tests of the tree, and tests of the core that only read tables.
 OTHERS = (
     *('packaging', 'docsite', 'examples', 'golden'),
-    *('cli/test_convert.py', 'fuzz/test_tables.py'),
+    *('cli/test_convert.py', 'cli/test_convert_real.py', 'fuzz/test_tables.py'),
     'recording/test_turns.py',
 )
 #: Other tests of the core that read a table.
