@@ -20,6 +20,7 @@ from itertools import pairwise
 from armid_ros.arm import ArmModel
 from armid_ros.errors import ModelError
 from armid_ros.estimate import ParameterName
+from armid_ros.model import inverse_dynamics
 from armid_ros.motion import FloatArray, Motion
 from armid_ros.recording import Recording
 from armid_ros.recording.recording import GAP_PERIODS
@@ -29,9 +30,13 @@ from armid_ros.simulation.controller import Controller, LinearFeedback
 from armid_ros.simulation.plant import Plant
 import numpy as np
 import pinocchio as pin
+from scipy.interpolate import CubicSpline
 
 #: Step of the plant [s].
 STEP = 1e-3
+#: Parts of a step in which friction sticks or slips from some time on. A reversal at the end of
+#: its step delays the joint by up to a step, and such a delay resembles viscous friction.
+_PARTS = 4
 #: Duration of a window, and of the simulation before it, in which errors of the initial state
 #: decay [s].
 WINDOW, LEAD = 5.0, 0.5
@@ -187,6 +192,33 @@ class LoopModel:
         values = (*np.split(x[2 * n + 1 : -5], 3), tool.toDynamicParameters())
         return replace(self.bare, values=values)
 
+    def with_torque(
+        self, x: FloatArray, recording: Recording, commands: CommandedMotion
+    ) -> Recording:
+        """
+        Return a recording with the torque of the controller, while commands last.
+
+        Parameters
+        ----------
+        x : ndarray, shape (P,)
+            Values of the parameters; delay and gains are used.
+        recording, commands : Recording, CommandedMotion
+            Measured and commanded positions.
+
+        """
+        n = self.robot.n_joints
+        arrived = recording.t - x[0]
+        known = (arrived >= commands.t[0]) & (arrived <= commands.t[-1] + _HELD)
+        t, q = recording.t[known], recording.q[known]
+        dq = CubicSpline(t, q)(t, 1)
+        half = 0.5 * recording.period
+        u, du = commands.mean(np.append(t - half, t[-1] + half) - x[0])
+        tau = x[1 : n + 1] * (u - q) + x[n + 1 : 2 * n + 1] * (du - dq)
+        if self.compensated:
+            still = np.zeros_like(q)
+            tau += inverse_dynamics(self.robot, Motion(self.robot.joints, t, q, still, still))
+        return replace(recording, t=t, q=q, dq=None, tau=tau)
+
     def simulated(self, x: FloatArray, windows: Sequence[Window]) -> list[FloatArray]:
         """
         Simulate windows with values of the parameters, shape (P,).
@@ -202,7 +234,7 @@ class LoopModel:
         rotor, viscous, *others = effects.values
         endless = replace(self.robot, torque_limit=np.full(n, np.inf))
         damped = replace(effects, robot=endless, values=(rotor, viscous + kd, *others))
-        plant = Plant(damped, STEP, hard_stops=False)
+        plant, fine = (Plant(damped, dt, hard_stops=False) for dt in (STEP, STEP / _PARTS))
         # positions half a step ahead: kp (u - q - dq STEP / 2)
         feedback = LinearFeedback(
             self.robot,
@@ -215,21 +247,25 @@ class LoopModel:
         compiled = CompiledLoop.of(plant, control)
         found = []
         for window in windows:
-            steps = int(np.ceil((window.t[-1] - window.start) / STEP)) + 1
-            edges = window.start - x[0] + STEP * np.arange(steps + 2)
+            sent = window.commands.t
+            # steps begin when commands arrive: friction may hold against the mean of two commands
+            late = (sent[np.searchsorted(sent, window.start - x[0]) - 1] + x[0] - window.start) % STEP
+            start, (q, dq, ddq) = window.start + late, window.state
+            steps = int(np.ceil((window.t[-1] - start) / STEP)) + 1
+            edges = start - x[0] + STEP * np.arange(steps + 2)
             u, du = window.commands.mean(edges)
             still = np.zeros_like(u)
             targets = Motion(self.robot.joints, edges[:-1], u, still, still, kd * du)
-            state, rows = plant.state(*window.state), range(1, len(u))
+            state, rows = plant.state(q + late * dq, dq + late * ddq, ddq), range(1, len(u))
             first = u[0], still[0], still[0]
             torque = control.torque(state.q, state.dq, first, kd * du[0])
             try:
-                trace = run(plant, control, state, torque, targets, rows, compiled)
+                trace = run(plant, control, state, torque, targets, rows, compiled, fine)
             except (ModelError, FloatingPointError):  # the simulation is unstable
                 found.append(np.full_like(window.q, _FAR))
                 continue
             q, dq, _ = trace.links
-            place = (window.t - window.start) / STEP
+            place = (window.t - start) / STEP
             k = np.minimum(place.astype(int), steps - 1)
             s = (place - k)[:, np.newaxis]
             here = q[k] + (q[k + 1] - q[k]) * s**2 * (3.0 - 2.0 * s)  # Hermite's spline

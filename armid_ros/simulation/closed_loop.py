@@ -231,6 +231,7 @@ def run(
     targets: Motion,
     rows: range,
     compiled: CompiledLoop | None = None,
+    fine: Plant | None = None,
 ) -> Trace:
     """
     Simulate an arm that follows a reference.
@@ -251,6 +252,9 @@ def run(
         Rows of the targets at the end of each step.
     compiled : CompiledLoop, optional
         The same plant and controller in compiled form, used for the steps that it supports.
+    fine : Plant, optional
+        The same arm without drives, whose step is a whole part of the step of the plant. It
+        integrates the other steps, in which friction sticks or slips from some time on.
 
     """
     drive, last = plant.action.drive, len(rows)
@@ -272,7 +276,13 @@ def run(
             state = State(steps, steps * plant.dt, at, speed, pull, modes, memory)
             k, torque = reached, tau[reached]
             continue
-        state = step(plant, state, torque if drive is None else drive(torque))
+        if fine is None:
+            state = step(plant, state, torque if drive is None else drive(torque))
+        else:
+            steps = state.steps + 1
+            for _ in range(round(plant.dt / fine.dt)):
+                state = step(fine, state, torque)
+            state = State(steps, steps * plant.dt, *state[2:])
         torque = command(plant, controller, state, targets, rows[k])
         k += 1
     q[last], dq[last], ddq[last], tau[last] = state.q, state.dq, state.ddq, torque
