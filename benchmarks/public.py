@@ -4,8 +4,8 @@
 A public benchmark of diagnosis: recordings of arms on two days, and a score of the answers.
 
     python -m benchmarks.public make FOLDER --seed 7 [--cases 24]
-    python -m benchmarks.public answer FOLDER answers.json [--method diagnosis|bic|parameters]
-    python -m benchmarks.public score FOLDER.truth.json answers.json
+    python -m benchmarks.public answer FOLDER answers.json [--method METHOD]
+    python -m benchmarks.public score FOLDER.truth.json answers.json [--keep METHOD]
 
 A case is a folder with `arm.urdf` (its masses are up to 6 % wrong), three bags of day 1, three of
 day 2, and one more of day 2 that may be used for validation. Between the days one thing changed,
@@ -13,14 +13,20 @@ or nothing did. `answers.json` has an object for each folder, with the keys of `
 
     {"case_00": {"verdict": "named", "effects": [{"name": "payload", "joints": ["joint_6"]}]}}
 
-Rules: an answer uses only the folder; the method is fixed before the cases are made; a seed is
-scored once. The maker of the cases keeps seed and truth secret until the answers are given.
+Methods: `diagnosis` is this tool; `bic` is a plain ranking of the same causes; `parameters`,
+`figaroh` and `sysid` identify both days and name the parameter with the most significant
+difference.
+
+Rules: an answer uses the folder alone; the method is fixed before the cases are made; one seed is
+scored once, from committed code. Whoever makes the cases keeps the seed and the truth until the
+answers are given. `--keep` adds the score to results/public.json, which benchmarks/rates.md shows.
 
 """
 
 from __future__ import annotations
 
 import argparse
+from collections.abc import Callable
 from dataclasses import asdict, replace
 import json
 from pathlib import Path
@@ -35,7 +41,9 @@ import numpy as np
 
 from benchmarks.bic_selection import bic_selection
 from benchmarks.lived_scoring import LivedJudged, LivedTruth, score
+from benchmarks.looks import results_of, write_json
 from benchmarks.metrics import table
+from benchmarks.other_ways import Estimates, figaroh_estimates, sysid_days
 from benchmarks.two_days import Answer, answer_of, identification_of
 from tests.hidden.lived.cases import case_of
 from tests.hidden.lived.specification import LivedSpec, specify
@@ -47,7 +55,10 @@ EFFECT_OF = {
     'viscous_coefficient': 'viscous_friction',
     'coulomb_torque': 'coulomb_friction',
     'torque_offset': 'torque_offset',
+    'rotor_inertia': 'rotor_inertia',
 }
+#: Scores of the methods.
+RESULTS = Path(__file__).parent / 'results' / 'public.json'
 
 
 def specification(seed: int, index: int) -> LivedSpec:
@@ -85,8 +96,8 @@ def answer(case: Path, method: str) -> dict[str, Any]:
         [read_recording(path, robot) for path in sorted(case.glob(f'{day}_*'))]
         for day in ('day_1', 'day_2', 'held_out')
     )
-    if method == 'parameters':
-        return changed_parameters(robot, day_1, [*day_2, *held_out])
+    if method in DAYS:
+        return changed_parameter(*DAYS[method](robot, day_1, [*day_2, *held_out]))
     arm, rng = identification_of(robot, day_1).arm, np.random.default_rng(0)
     if method == 'bic':
         causes = bic_selection(arm, [*day_2, *held_out], DiagnosisSettings(), rng)
@@ -95,20 +106,42 @@ def answer(case: Path, method: str) -> dict[str, Any]:
     return diagnosis_document(diagnose(arm, day_2, validate=held_out, baseline=day_1, rng=rng))
 
 
-def changed_parameters(
-    robot: Robot, before: list[Recording], after: list[Recording]
-) -> dict[str, Any]:
-    """Identify both days; name the parameter with the most significant difference."""
-    first, second = (identification_of(robot, day).estimate for day in (before, after))
-    shared = [one for one in first.parameters if one in second.parameters]
-    k, j = ([day.parameters.index(one) for one in shared] for day in (first, second))
-    spread = np.sqrt(first.std[k] ** 2 + second.std[j] ** 2)
-    z = np.abs(second.values[j] - first.values[k]) / np.where(spread > 0.0, spread, np.inf)
-    if z.max() < SIGNIFICANT:
-        return {'verdict': 'consistent', 'effects': []}
-    one = shared[int(np.argmax(z))]
-    name = EFFECT_OF.get(one.name, 'link_inertia')
-    return {'verdict': 'named', 'effects': [{'name': name, 'joints': [one.joint]}]}
+def own_days(robot: Robot, *days: list[Recording]) -> list[Estimates]:
+    """Identify each day with this tool."""
+    found = [identification_of(robot, day).estimate for day in days]
+    return [
+        {
+            (name.name, name.joint): (value, std)
+            for name, value, std in zip(one.parameters, one.values, one.std, strict=True)
+        }
+        for one in found
+    ]
+
+
+def figaroh_days(robot: Robot, *days: list[Recording]) -> list[Estimates]:
+    """Identify each day with figaroh."""
+    return [figaroh_estimates(robot, day) for day in days]
+
+
+#: Methods that identify both days: from robot and recordings to estimates.
+DAYS: dict[str, Callable[..., list[Estimates]]] = {
+    'parameters': own_days,
+    'figaroh': figaroh_days,
+    'sysid': sysid_days,
+}
+
+
+def changed_parameter(before: Estimates, after: Estimates) -> dict[str, Any]:
+    """Name the parameter with the most significant difference."""
+    most, found = SIGNIFICANT, {'verdict': 'consistent', 'effects': []}
+    for (name, joint), (value, std) in before.items():
+        other, spread = after.get((name, joint), (value, 0.0))
+        error = float(np.hypot(std, spread))
+        z = abs(other - value) / error if error > 0.0 else 0.0
+        if z > most:
+            effect = {'name': EFFECT_OF.get(name, 'link_inertia'), 'joints': [joint]}
+            most, found = z, {'verdict': 'named', 'effects': [effect]}
+    return found
 
 
 def judged(truth: Path, answers: Path) -> list[LivedJudged]:
@@ -139,22 +172,32 @@ def main() -> None:
     command = commands.add_parser('answer', help='answer all cases by a method')
     command.add_argument('folder', type=Path)
     command.add_argument('answers', type=Path)
-    methods = ('diagnosis', 'bic', 'parameters')
+    methods = ('diagnosis', 'bic', *DAYS)
     command.add_argument('--method', choices=methods, default='diagnosis')
     command = commands.add_parser('score', help='compare answers with the truth')
     command.add_argument('truth', type=Path)
     command.add_argument('answers', type=Path)
+    command.add_argument('--keep', choices=methods, help='add the score to results/public.json')
     options = parser.parse_args()
     if options.command == 'make':
         make(options.folder, options.seed, options.cases)
     elif options.command == 'answer':
-        cases = sorted(options.folder.glob('case_*'))
-        found = {case.name: answer(case, options.method) for case in cases}
-        options.answers.write_text(json.dumps(found, indent=1) + '\n', encoding='utf-8')
+        found = {}
+        for case in sorted(options.folder.glob('case_*')):
+            try:
+                found[case.name] = answer(case, options.method)
+            except Exception as error:  # of any tool: the case has no answer
+                print(f'{case.name}: {type(error).__name__}: {error}', flush=True)
+            options.answers.write_text(json.dumps(found, indent=1) + '\n', encoding='utf-8')
     else:
         cases = judged(options.truth, options.answers)
+        metrics = score(cases)
         print('\n'.join(one.line for one in cases))
-        print(table(score(cases)))
+        print(table(metrics))
+        if options.keep:
+            kept = json.loads(RESULTS.read_text(encoding='utf-8')) if RESULTS.exists() else {}
+            kept[options.keep] = results_of(metrics)
+            write_json(RESULTS, kept)
 
 
 if __name__ == '__main__':
