@@ -37,7 +37,7 @@ CUTOFF, SAMPLES, ROWS = 10.0, 62.5, 25.0
 #: Names of the parameters of figaroh; the others are of links.
 OF_FIGAROH = {'fv': 'viscous_coefficient', 'fs': 'coulomb_torque', 'off': 'torque_offset'}
 #: Duration of a stretch of mujoco.sysid [s], and number of stretches of a day.
-STRETCH, STRETCHES = 0.4, 24
+STRETCH, STRETCHES = 0.4, 16
 #: Share of the largest singular value below which a direction of the parameters is not determined.
 RANK = 1e-6
 
@@ -160,7 +160,7 @@ def sysid_days(robot: Robot, *days: list[Recording]) -> list[Estimates]:
         runs = sysid.ModelSequences('arm', spec, *_stretches(robot, model, day, period))
         residual = sysid.build_residual_fn(models_sequences=[runs], n_threads=1)
         with redirect_stdout(io.StringIO()):
-            parameters, result = sysid.optimize(parameters, residual, verbose=False, max_iters=12)
+            parameters, result = sysid.optimize(parameters, residual, verbose=False, max_iters=10)
         rest = np.concatenate(residual(parameters.as_vector(), parameters)[0])
         scale = np.linalg.norm(result.jac, axis=0) + 1e-12
         inverse = np.linalg.pinv(result.jac / scale, rcond=RANK)
