@@ -65,6 +65,7 @@ _WRITES = {
     'armid/springs/1': ('elastic.json', 'report.html'),
     'armid/exo/1': ('exo.json', 'report.html', 'recording'),
     'armid/lunar/1': ('lunar.json', 'report.html'),
+    'armid/positions/1': ('positions.json', 'model.yaml', 'robot.urdf', 'torque'),
     'armid/layout/1': ('plotjuggler.xml', 'foxglove.json', 'arm.rviz'),
     'armid/fleet/1': (
         'fleet.json',

@@ -5,6 +5,7 @@
 from __future__ import annotations
 
 from itertools import compress
+import json
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -26,8 +27,8 @@ if TYPE_CHECKING:
 @click.option(
     '--gains',
     metavar='KP,KD',
-    help='Known gains of the position control [N m/rad, N m s/rad]: one pair for all joints, or '
-    'KP of each joint and then KD of each joint. By default they are fitted.',
+    help='Known gains of the position control [N m/rad, N m s/rad], of all joints; or KP of each '
+    'joint and then KD of each joint; or positions.json of an earlier fit. Fitted by default.',
 )
 @click.option(
     '--commands',
@@ -62,7 +63,8 @@ def positions(
     The control is tau = kp (u - q) + kd (du - dq) with a delayed command u; du is 0 without
     commanded velocities. The described links are taken as exact. Without commanded velocities,
     viscous friction needs --gains. model.yaml has the effects; positions.json also has delay and
-    gains.
+    gains. The folder torque has each recording with the torque of the control, for armid identify
+    and armid diagnose.
 
     """
     from armid_ros.arm import save_model
@@ -71,7 +73,8 @@ def positions(
     from armid_ros.positions.commands import read_commands
     from armid_ros.positions.fit import fit_positions
     from armid_ros.positions.loop import LoopModel
-    from armid_ros.positions.text import fit_document, fit_summary, SCHEMA
+    from armid_ros.positions.text import fit_document, fit_summary, limit_hints, SCHEMA
+    from armid_ros.recording import write_recording
     import numpy as np
 
     staged = options.stage(out, SCHEMA, robot_source)
@@ -86,27 +89,37 @@ def positions(
             for path, one in zip(bags, recordings, strict=True)
         ]
         tick(0.1, 'fitting')
-        found = fit_positions(LoopModel(robot, compensated), runs, known)
+        model = LoopModel(robot, compensated)
+        found = fit_positions(model, runs, known)
+    torques = [model.with_torque(found.values, *run) for run in runs]
+    for k, one in enumerate(torques):
+        write_recording(staged.folder / 'torque' / f'{k + 1}_{bags[k].stem}', one)
     source = options.kept_source(robot_source, robot, staged.folder)
     sure = np.isfinite(found.std)
     names = tuple(compress(found.parameters, sure))
     estimate = Estimate(names, found.values[sure], np.diag(found.std[sure] ** 2))
     save_model(staged.folder / 'model.yaml', found.arm, source, estimate)
-    document = fit_document(found)
-    step = f'armid simulate --model {out / "model.yaml"} --out simulated'
-    summary = None if as_json else fit_summary(found, document['verdict'], step)
-    options.deliver_document(staged, 'positions', document, summary, 'model.yaml')
+    document = fit_document(found, limit_hints(runs, torques, robot))
+    step = f'armid identify {out}/torque/* --robot {robot_source} --out model'
+    summary = None if as_json else fit_summary(found, document, step)
+    options.deliver_document(staged, 'positions', document, summary, 'model.yaml', 'torque')
 
 
 def gains_of(text: str, robot: Robot) -> FloatArray:
     """Parse --gains: kp and kd of each joint, shape (2, n); RobotError if it is malformed."""
     from armid_ros.errors import RobotError
     from armid_ros.files import reading
+    from armid_ros.files.regular import read_text
     from armid_ros.recording.columns import numbers
     import numpy as np
 
     with reading('--gains', RobotError):
-        values = np.array(numbers(text))
+        if text.endswith('.json'):
+            rows = json.loads(read_text(text, RobotError))['quantities']
+            gains = [row['value'] for row in rows if row['name'].endswith('_gain')]
+            values = np.array(gains)
+        else:
+            values = np.array(numbers(text))
     if len(values) not in (2, 2 * robot.n_joints) or np.any(values < 0.0) or not values[0]:
         raise RobotError(
             f"--gains '{text}' has to be KP,KD, or {robot.n_joints} values of KP and then as many "

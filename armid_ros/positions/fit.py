@@ -14,7 +14,7 @@ hold for residuals that are correlated within blocks of time.
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 from armid_ros.api.arguments import motion_of
 from armid_ros.arm import ArmModel
@@ -44,6 +44,8 @@ _BLOCK = 0.5
 _LIGHTEST = 0.03
 #: Largest number of samples of a recording for the start values.
 _THINNED = 2000
+#: Residual over noise of a joint, above which a law of the joint is missing or a gain is wrong.
+COLOURED = 1.3
 #: Number of fits, each with a new estimate of the noise of the joints.
 _ROUNDS = 3
 
@@ -70,6 +72,8 @@ class PositionFit:
         kp that the data demand over the given kp, with its standard error; 1 and 0 if fitted.
     tracking, residual : ndarray, shape (n,)
         Rms of command minus position, and of simulated minus measured position [rad or m].
+    noise : ndarray, shape (n,)
+        Rms of the part of the residual that is independent from sample to sample [rad or m].
     duration : float
         Compared time [s].
 
@@ -84,6 +88,7 @@ class PositionFit:
     gain_ratio_std: FloatArray
     tracking: FloatArray
     residual: FloatArray
+    noise: FloatArray
     duration: float
 
     def of(self, name: str, joint: str = '') -> tuple[float, float]:
@@ -284,14 +289,21 @@ def _judged(problem: _Problem, x: FloatArray, free: npt.NDArray[np.bool_]) -> Po
         if 'velocity_gain' in (other.name, model.parameters[place].name):
             mixed += '; give --gains, or record commanded velocities'
         reasons[place] = mixed if alone < _SEEN * _PRIOR else 'the motion does not depend on it'
-    ratio, ratio_std = np.ones(n), np.zeros(n)
-    if not free[1]:  # a Gauss-Newton step in which kp is also free
-        more = np.flatnonzero(free | (np.arange(count) <= n))
-        covariance, spread = errors(more)
-        step = -covariance @ pulls.sum(axis=0)[more]
-        kp = slice(1, n + 1)
-        ratio = 1.0 + step[kp] * problem.size[kp] / x[kp]
-        ratio_std = spread[kp] * problem.size[kp] / x[kp]
+    residual = np.sqrt(np.mean(rest**2, axis=0))
+    noise = np.sqrt(np.mean(np.diff(rest, 3, axis=0) ** 2, axis=0) / 20.0)
+    ratio, ratio_std, kp = np.ones(n), np.zeros(n), slice(1, n + 1)
+    if not free[1]:
+        with_kp = free | (np.arange(count) <= n)
+        if np.any(residual > COLOURED * noise):  # far from the optimum
+            again = replace(problem, start=x).solved(with_kp)
+            refitted = _judged(problem, again, with_kp)
+            ratio, ratio_std = refitted.values[kp] / x[kp], refitted.std[kp] / x[kp]
+        else:  # one Gauss-Newton step with kp free as well
+            more = np.flatnonzero(with_kp)
+            covariance, spread = errors(more)
+            step = -covariance @ pulls.sum(axis=0)[more]
+            ratio = 1.0 + step[kp] * problem.size[kp] / x[kp]
+            ratio_std = spread[kp] * problem.size[kp] / x[kp]
     behind = [w.commands.mean(np.append(w.t, w.t[-1] + 1e-3))[0] - w.q for w in problem.windows]
     return PositionFit(
         model.arm(x),
@@ -302,6 +314,7 @@ def _judged(problem: _Problem, x: FloatArray, free: npt.NDArray[np.bool_]) -> Po
         ratio,
         ratio_std,
         np.sqrt(np.mean(np.concatenate(behind) ** 2, axis=0)),
-        np.sqrt(np.mean(rest**2, axis=0)),
+        residual,
+        noise,
         sum(float(w.t[-1] - w.t[0]) for w in problem.windows),
     )

@@ -247,9 +247,9 @@ class LoopModel:
         compiled = CompiledLoop.of(plant, control)
         found = []
         for window in windows:
-            sent = window.commands.t
-            # steps begin when commands arrive: friction may hold against the mean of two commands
-            late = (sent[np.searchsorted(sent, window.start - x[0]) - 1] + x[0] - window.start) % STEP
+            # steps begin when commands arrive, as friction may hold against a mean of two commands
+            sent = window.commands.t[np.searchsorted(window.commands.t, window.start - x[0]) - 1]
+            late = (sent + x[0] - window.start) % STEP
             start, (q, dq, ddq) = window.start + late, window.state
             steps = int(np.ceil((window.t[-1] - start) / STEP)) + 1
             edges = start - x[0] + STEP * np.arange(steps + 2)

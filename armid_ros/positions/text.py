@@ -4,11 +4,14 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from typing import Any
 
 from armid_ros.api.table import Summary
-from armid_ros.positions.fit import PositionFit
+from armid_ros.positions.fit import COLOURED, PositionFit, Run
+from armid_ros.recording import Recording
 from armid_ros.report.notation import measured
+from armid_ros.robots import Robot
 import numpy as np
 
 SCHEMA = 'armid/positions/1'
@@ -16,6 +19,8 @@ SCHEMA = 'armid/positions/1'
 _POOR = 0.3
 #: Given gains contradict the data above this number of standard errors and this share.
 _DIFFERS, _SHARE = 3.0, 0.02
+#: Share of samples beyond a limit that is reported, and share of a torque limit that reaches it.
+_OFTEN, _REACHED = 0.001, 0.99
 #: Quantities of the joints in the table, and their headings.
 _COLUMNS = {
     'position_gain': 'kp',
@@ -24,19 +29,47 @@ _COLUMNS = {
     'viscous_coefficient': 'viscous',
     'coulomb_torque': 'Coulomb',
 }
+#: Quantities that are shown as an upper limit if their interval includes zero.
+_NOT_NEGATIVE = 'rotor_inertia', 'viscous_coefficient', 'coulomb_torque', 'payload_m'
 
 
-def fit_document(found: PositionFit) -> dict[str, Any]:
-    """Return the content of positions.json."""
+def limit_hints(runs: Sequence[Run], torques: Sequence[Recording], robot: Robot) -> list[str]:
+    """Return hints about commands beyond position limits, and torques at the limits of drives."""
+    commands = np.concatenate([commands.q for _, commands in runs])
+    torque = np.concatenate([one.tau for one in torques if one.tau is not None])
+    beyond = np.mean((commands < robot.lower) | (commands > robot.upper), axis=0)
+    reached = np.mean(np.abs(torque) > _REACHED * robot.torque_limit, axis=0)
+    return [
+        f'{joint}: {100.0 * share:.3g} % of the {text}'
+        for shares, text in (
+            (beyond, 'commands lie beyond its position limits; a stop is not modelled'),
+            (reached, 'torque reaches the limit of its drive, which is not modelled; move slower'),
+        )
+        for joint, share in zip(robot.joints, shares, strict=True)
+        if share > _OFTEN
+    ]
+
+
+def fit_document(found: PositionFit, hints: Sequence[str] = ()) -> dict[str, Any]:
+    """Return the content of positions.json; `hints` are of `limit_hints`."""
     poor = bool(np.any(found.residual > _POOR * found.tracking))
     std = [float(one) if np.isfinite(one) else None for one in found.std]
     values = zip(found.parameters, found.values.tolist(), std, found.reasons, strict=True)
-    columns = 'tracking', 'residual', 'gain_ratio', 'gain_ratio_std'
+    columns = 'tracking', 'residual', 'noise', 'gain_ratio', 'gain_ratio_std'
     rows = zip(*(getattr(found, name).tolist() for name in columns), strict=True)
+    coloured = [
+        f'{joint}: the residual is {rest / noise:.2g} times the noise of the positions; a law is '
+        'not modelled (soft or load-dependent friction, an elastic joint), or --gains are wrong'
+        for joint, rest, noise in zip(
+            found.arm.robot.joints, found.residual, found.noise, strict=True
+        )
+        if rest > COLOURED * noise
+    ]
+    partial = any(found.reasons) or coloured or hints
     return {
         'schema': SCHEMA,
         'robot': found.arm.robot.name,
-        'verdict': 'not explained' if poor else 'in part' if any(found.reasons) else 'determined',
+        'verdict': 'not explained' if poor else 'in part' if partial else 'determined',
         'duration': found.duration,
         'quantities': [
             {
@@ -53,11 +86,13 @@ def fit_document(found: PositionFit) -> dict[str, Any]:
             {'joint': joint, **dict(zip(columns, row, strict=True))}
             for joint, row in zip(found.arm.robot.joints, rows, strict=True)
         ],
+        'hints': [*coloured, *hints],
     }
 
 
-def fit_summary(found: PositionFit, verdict: str, step: str) -> Summary:
-    """Return the summary of a fit; `step` is the next step after a good fit."""
+def fit_summary(found: PositionFit, document: dict[str, Any], step: str) -> Summary:
+    """Return the summary of a fit and its document; `step` is the next step after a good fit."""
+    verdict = document['verdict']
     joints = found.arm.robot.joints
 
     def cell(name: str, joint: str = '', factor: float = 1.0) -> str:
@@ -65,6 +100,8 @@ def fit_summary(found: PositionFit, verdict: str, step: str) -> Summary:
         value, std = found.of(name, joint)
         if not np.isfinite(std):
             return 'not det.'
+        if name in _NOT_NEGATIVE and 0.0 < std and value < 1.96 * std:
+            return f'< {measured(value + 1.96 * std, 1.96 * std)[0]}'
         text, half = measured(factor * value, factor * 1.96 * std)
         return f'{text} ± {half}' if std else f'{text} (given)'
 
@@ -97,6 +134,7 @@ def fit_summary(found: PositionFit, verdict: str, step: str) -> Summary:
     for reason, names in reasons.items():
         text = ', '.join(names) if len(names) < 9 else f'{len(names)} values'
         lines.append(f'not determined: {text}: {reason}')
+    lines += document['hints']
     if verdict == 'not explained':
         step = (
             'check --robot, --gravity, --gains, --commands, contacts, and whether the controller '

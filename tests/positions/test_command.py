@@ -2,6 +2,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """`armid positions`: what it reads, writes and refuses."""
 
+from dataclasses import replace
 from functools import partial
 import json
 
@@ -9,6 +10,8 @@ import armid_ros as ar
 from armid_ros.errors import RecordingError, RobotError
 from armid_ros.positions.command import gains_of, positions
 from armid_ros.positions.commands import read_commands
+from armid_ros.positions.loop import CommandedMotion
+from armid_ros.positions.text import limit_hints
 from armid_ros.recording import read_recording
 from armid_ros.recording.joint_state.encoder import write_joint_states
 from armid_ros.recording.writer import whole_bag
@@ -72,6 +75,22 @@ def test_the_command_writes_model_and_document(folder, robot, secret):
     values = {effect.name: value for effect, value in zip(arm.effects, arm.values, strict=True)}
     np.testing.assert_allclose(values['coulomb_friction'], secret.coulomb, rtol=0.1)
     np.testing.assert_allclose(values['viscous_friction'], secret.viscous, rtol=0.1)
+    torque = read_recording(out / 'torque' / '1_run', joints=robot.joints).tau
+    assert torque is not None and np.all(np.ptp(torque, axis=0) > 0.0)
+    gains = gains_of(str(out / 'positions.json'), robot)
+    np.testing.assert_allclose(gains, [secret.kp, secret.kd])
+
+
+def test_commands_beyond_limits_and_torques_at_limits_are_hints(robot, played):
+    measured, commanded = played
+    commands = CommandedMotion.of(commanded, measured)
+    still = replace(measured, tau=np.zeros_like(measured.q))
+    assert limit_hints([(measured, commands)], [still], robot) == []
+    far = replace(commands, q=commands.q + 10.0)
+    most = replace(measured, tau=still.tau + robot.torque_limit)
+    hints = limit_hints([(measured, far)], [most], robot)
+    assert len(hints) == 2 * robot.n_joints
+    assert hints[0].startswith('joint0: 100 % of the commands')
 
 
 def test_a_table_has_positions_and_commands_in_columns(folder, robot, played):
