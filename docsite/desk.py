@@ -5,7 +5,7 @@ The files in the examples of pages and docstrings: an arm, its plan, and a week 
 
 ``my_arm.urdf`` is the arm of the examples. It has friction that its URDF lacks. On Monday and
 Tuesday nothing is wrong; on Friday it holds 0.4 kg; today a spring pulls at its elbow.
-``bags`` is the folder of the repository.
+``bags`` and ``examples`` are folders of the repository.
 
 """
 
@@ -32,7 +32,8 @@ def lay_out(folder: Path) -> Path:
     """Write all files into a folder, and return the folder."""
     urdf = folder / 'my_arm.urdf'
     shutil.copy(ARM, urdf)
-    shutil.copytree(ARM.parents[1] / 'bags', folder / 'bags')
+    for name in ('bags', 'examples'):
+        shutil.copytree(ARM.parents[1] / name, folder / name)
     arms = {
         'monday': FRICTION,
         'tuesday': FRICTION,
