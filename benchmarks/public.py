@@ -7,6 +7,8 @@ A public benchmark of diagnosis: recordings of arms on two days, and a score of 
     python -m benchmarks.public answer FOLDER answers.json [--method METHOD]
     python -m benchmarks.public score FOLDER.truth.json answers.json [--keep METHOD]
 
+The generators are tests and not in the wheel, so this is no command of `armid`.
+
 A case is a folder with `arm.urdf` (its masses are up to 6 % wrong), three bags of day 1, three of
 day 2, and one more of day 2 that may be used for validation. Between the days one thing changed,
 or nothing did. `answers.json` has an object for each folder, with the keys of `diagnosis.json`:
@@ -19,7 +21,8 @@ difference.
 
 Rules: an answer uses the folder alone; the method is fixed before the cases are made; one seed is
 scored once, from committed code. Whoever makes the cases keeps the seed and the truth until the
-answers are given. `--keep` adds the score to results/public.json, which benchmarks/rates.md shows.
+answers are given. `--keep` adds the score to results/public.json; `python -m benchmarks.rates`
+shows it on public.md.
 
 """
 
@@ -40,9 +43,8 @@ from armid_ros.robots import load_robot, Robot
 import numpy as np
 
 from benchmarks.bic_selection import bic_selection
-from benchmarks.lived_scoring import LivedJudged, LivedTruth, score
-from benchmarks.looks import results_of, write_json
-from benchmarks.metrics import table
+from benchmarks.lived_scoring import LivedJudged, LivedTruth, score, VISIBLE
+from benchmarks.metrics import rate, table
 from benchmarks.other_ways import Estimates, figaroh_estimates, sysid_days
 from benchmarks.two_days import Answer, answer_of, identification_of
 from tests.hidden.lived.cases import case_of
@@ -191,13 +193,20 @@ def main() -> None:
             options.answers.write_text(json.dumps(found, indent=1) + '\n', encoding='utf-8')
     else:
         cases = judged(options.truth, options.answers)
-        metrics = score(cases)
+        own = {*EFFECT_OF.values(), 'payload', 'link_inertia'}
+        simple = [one for one in cases if one.truth.gap >= VISIBLE and one.truth.name in own]
+        metrics = (*score(cases), rate('simple cause named first', simple, lambda one: one.first))
         print('\n'.join(one.line for one in cases))
         print(table(metrics))
         if options.keep:
             kept = json.loads(RESULTS.read_text(encoding='utf-8')) if RESULTS.exists() else {}
-            kept[options.keep] = results_of(metrics)
-            write_json(RESULTS, kept)
+            kept[options.keep] = {
+                one.name.strip(): [round(one.value * one.count), one.count]
+                for one in metrics
+                if np.isfinite(one.value) and np.isfinite(one.low)
+            }
+            rows = (f' {json.dumps(name)}: {json.dumps(one)}' for name, one in kept.items())
+            RESULTS.write_text('{\n' + ',\n'.join(rows) + '\n}\n', encoding='utf-8')
 
 
 if __name__ == '__main__':
