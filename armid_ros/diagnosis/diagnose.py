@@ -250,15 +250,12 @@ def _as_diagnosis(
     explanation, shares = headline(explanation, every, settings)
     whole = shares.share(range(len(explanation.steps)))
     if before is not None and chosen.untested and whole <= settings.thresholds.open_share:
-        minor_ones = *explanation.steps, *explanation.minor
-        nothing = replace(explanation, fitted=explanation.reference, steps=(), minor=minor_ones)
-        explanation, shares = headline(nothing, every, settings)
+        explanation, shares = headline(explanation.with_nothing_named(), every, settings)
     if unseen is not None:
         explanation, shares = predicted(explanation, shares.order, unseen)
     measured = RemainingMisfit(chosen, unseen, before, arm, settings)
     evidence, patched = explanation.evidence, explanation.fitted.arm
-    found = findings(explanation, shares, arm, explainer.rng)
-    minor = small_print(explanation)
+    found, minor = findings(explanation, shares, arm, explainer.rng), small_print(explanation)
     worse = measured.harmed(explanation)
     floors = tuple(noise_floor(part, patched) for part in evidence.data)
     left, resting = measured.beside(explanation), measured.resting(explanation)
@@ -281,7 +278,7 @@ def _as_diagnosis(
     new = np.max([np.zeros(arm.robot.n_joints), *(one.ratio for one in laws)], axis=0) > 1.0
     places = where_it_is(explanation, (unseen or evidence) if found else open_in, settings, new)
     explainer.tell(1.0, word.word)
-    small = tuple(one for one in found if settings.everything and one.share < least)
+    small = [one for one in found if settings.everything and one.share < least]
     remarks = _remarks((found, patched), worse, chosen, word, doubt, explainer)
     return Diagnosis(
         verdict=word.word,
