@@ -119,7 +119,7 @@ class TablePlan:
         lines.append(f'  joints    {", ".join(self.joints)}')
         if self.unread:
             lines.append(f'  not read  {self.unread}')
-        lines += [f'  note: {note}' for note in (*table.notes, *self.notes)]
+        lines += [f'  note: {note}' for note in (*table.damage, *table.notes, *self.notes)]
         return lines[:1] + [
             textwrap.fill(line, 80, subsequent_indent=' ' * 12, break_long_words=False)
             for line in lines[1:]
@@ -383,7 +383,7 @@ def measured(plan: TablePlan) -> Recording:
             'unstamped': int(np.sum(~stamped)),
             'messages': len(table),
             'absent': plan.absent,
-            'damage': '; '.join(note for note in table.notes if 'cut off' in note),
+            'damage': '; '.join(table.damage),
         },
         source=table.source,
         topic=topic,

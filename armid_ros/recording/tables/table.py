@@ -107,8 +107,8 @@ class Table:
         Line of the first row, in a text file.
     rate_hz : float or None
         Samples per second, if the file states a rate instead of times.
-    notes : tuple of str
-        Notes from reading the file.
+    notes, damage : tuple of str
+        Notes from reading the file: on its content, and on its damage.
     words : mapping of str to sequence of str
         Columns of words, and empty columns.
 
@@ -120,6 +120,7 @@ class Table:
     first_line: int | None = None
     rate_hz: float | None = None
     notes: tuple[str, ...] = ()
+    damage: tuple[str, ...] = ()
     words: Mapping[str, Sequence[str]] = field(default_factory=dict)
 
     def __post_init__(self) -> None:
@@ -274,6 +275,7 @@ def side_by_side(tables: Sequence[Table]) -> Table:
         tables[0].first_line,
         next((table.rate_hz for table in tables if table.rate_hz), None),
         tuple(note for table in tables for note in table.notes),
+        tuple(note for table in tables for note in table.damage),
     )
 
 

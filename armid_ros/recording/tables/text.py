@@ -54,13 +54,16 @@ def read_text(path: Path) -> Table:
         else:
             heads += [(f'{name}[{i}]', name, said.get(k, '')) for i in range(width)]
     columns = [name for name, _, _ in heads]
-    values, words, notes = _numbers(path, lines[first:], separator, columns, widths, first + 1)
+    values, words, notes, damage = _numbers(
+        path, lines[first:], separator, columns, widths, first + 1
+    )
     return Table(
         str(path),
         tuple(TableColumn(n, v, a, u) for (n, a, u), v in zip(heads, values.T, strict=True)),
         f'text with {_SEPARATORS[separator]}',
         first_line=first + 1,
         notes=notes,
+        damage=damage,
         words=words,
     )
 
@@ -157,16 +160,17 @@ def _numbers(
     names: list[str],
     widths: list[int | None],
     first_line: int,
-) -> tuple[FloatArray, dict[str, Sequence[str]], tuple[str, ...]]:
-    """Return the values, shape (N, columns), text cells by column, and notes."""
+) -> tuple[FloatArray, dict[str, Sequence[str]], tuple[str, ...], tuple[str, ...]]:
+    """Return values (N, columns), text cells by column, and notes on content and damage."""
     with suppress(ValueError):  # fast path if every cell is a number
         delimiter = None if separator == ' ' else separator
         values = np.loadtxt(io.StringIO('\n'.join(rows)), delimiter=delimiter, ndmin=2)
         if values.shape[1] == len(names):
-            return values, {}, ()
+            return values, {}, (), ()
     values = np.full((len(rows), len(names)), np.nan)
     said: dict[int, dict[int, str]] = {}
-    notes: list[str] = []
+    notes: tuple[str, ...] = ()
+    damage: tuple[str, ...] = ()
     for k, line in enumerate(rows):
         where = f'line {first_line + k}'
         cells = _split(line, separator)
@@ -174,7 +178,7 @@ def _numbers(
             if not cells or line.lstrip().startswith(_COMMENTS):
                 continue
             if k == len(rows) - 1:
-                notes.append(f'{where} is incomplete and left out')
+                damage = (f'{where} is incomplete and left out',)
                 values = values[:k]
                 break
             raise RecordingError(
@@ -200,11 +204,11 @@ def _numbers(
     if len(empty):
         many = '1 cell is' if len(empty) == 1 else f'{len(empty)} cells are'
         row, column = empty[0]
-        notes.append(
+        notes = (
             f'{many} empty and read as NaN, the first in line {first_line + row}, '
-            f'column {names[column]}'
+            f'column {names[column]}',
         )
-    return values, words, tuple(notes)
+    return values, words, notes, damage
 
 
 def _taken_apart(cells: list[str], widths: list[int | None], where: str) -> Iterator[str]:
