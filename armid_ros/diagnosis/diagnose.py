@@ -243,7 +243,7 @@ def _as_diagnosis(
     """Return the diagnosis of an explanation; shares are measured on held-out data."""
     arm, settings, before = explainer.arm, explainer.settings, explainer.baseline
     explainer.tell(0.85, 'held-out gap')
-    explanation, said = as_placed_bodies(chosen.explanation)
+    explanation, of_bodies = as_placed_bodies(chosen.explanation)
     unseen = _held_out_evidence(explainer.unseen, explanation, chosen)
     least = settings.thresholds.headline
     every = 0.0 if chosen.measured or settings.everything else least
@@ -293,7 +293,7 @@ def _as_diagnosis(
         data=tuple(evidence.data),
         not_visible=_not_visible(explanation, found, explainer),
         refitted=explanation.refitted,
-        notes=tuple(x for x in (*notes, *chosen.notes, *said) if x not in remarks),
+        notes=tuple(x for x in (*notes, *chosen.notes, *of_bodies) if x not in remarks),
         baseline=chosen.floor_in_words,
         harmful=bool(found and worse),
         doubt=doubt,

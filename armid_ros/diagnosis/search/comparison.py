@@ -14,6 +14,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 from itertools import product
+import math
 
 from armid_ros.diagnosis.search.candidates import Causes, line_search
 from armid_ros.diagnosis.search.cause import Cause
@@ -181,12 +182,8 @@ class CauseComparison:
     def _exchanged(
         self, accepted: list[Accepted], nuisance: Nuisance
     ) -> tuple[list[Accepted], Nuisance]:
-        """
-        Replace a cause that resembles several others, if they explain more without it.
-
-        The last one was the best beside all others already.
-
-        """
+        """Replace a cause that resembles several others if these explain more without it."""
+        # the last cause was selected with all others in the model
         for k, one in enumerate(accepted[:-1]):
             look = self.look(nuisance.without(k))
             others = [*accepted[:k], *accepted[k + 1 :]]
@@ -215,10 +212,18 @@ class CauseComparison:
         able = [one for one in telling if one.odds > levels.alone]
         if not able or max(one.odds for one in able) < levels.alarm:
             return None
-        winner, *others = able
+        first = able[0]
+        # the same law on some of the joints, unless the lead of all is more than laws are inexact
+        parts = [one for one in able if one is first or one.is_part_of(first)]
+        winner = min(parts, key=lambda one: first.ahead(one, levels))
+        others = [one for one in able if one is not winner]
         # The log odds of a rival are the larger ones of those with and without a small lead.
+        leads = [-math.inf if x is first else x.worth - winner.worth for x in others]
         behind = np.array(
-            [min(max(-winner.ahead(x, levels), x.worth - winner.worth), 0.0) for x in others]
+            [
+                min(max(-winner.ahead(x, levels), lead), 0.0)
+                for x, lead in zip(others, leads, strict=True)
+            ]
         )
         total = np.logaddexp.reduce(np.append(behind, 0.0)) + np.logaddexp(0.0, -winner.odds)
         total -= np.log1p(-UNLISTED)

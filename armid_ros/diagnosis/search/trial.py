@@ -138,6 +138,11 @@ class Ranked:
         seen = float(np.sign(lead)) * max(abs(lead) - slack, 0.0)
         return seen + (self.worth - self.fit.explained) - (other.worth - other.fit.explained)
 
+    def is_part_of(self, other: Ranked) -> bool:
+        """Return whether the other cause is the same law on these and more joints."""
+        own, whole = self.cause.effect, other.cause.effect
+        return own.name == whole.name and set(own.joints) < set(whole.joints)
+
 
 @dataclass(frozen=True)
 class Look:
