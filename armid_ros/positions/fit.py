@@ -15,6 +15,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from functools import partial
 
 from armid_ros.api.arguments import motion_of
 from armid_ros.arm import ArmModel
@@ -250,6 +251,19 @@ class _Problem:
         return x
 
 
+def _errors(
+    information: FloatArray, scores: FloatArray, some: npt.NDArray[np.intp]
+) -> tuple[FloatArray, FloatArray]:
+    """Return covariance and standard errors of some parameters, relative to their sizes."""
+    inside = information[np.ix_(some, some)] + np.eye(len(some)) / _PRIOR**2
+    covariance = np.linalg.inv(inside)
+    blocks = len(scores)
+    lost = blocks / max(blocks - len(some), 0.2 * blocks)
+    middle = lost * scores[:, some].T @ scores[:, some]
+    robust = np.diag(covariance @ middle @ covariance)
+    return np.asarray(covariance), np.sqrt(np.maximum(np.diag(covariance), robust))
+
+
 def _judged(problem: _Problem, x: FloatArray, free: npt.NDArray[np.bool_]) -> PositionFit:
     """Return the fit at the solution, with standard errors."""
     model, n, count = problem.model, problem.model.robot.n_joints, len(x)
@@ -263,16 +277,7 @@ def _judged(problem: _Problem, x: FloatArray, free: npt.NDArray[np.bool_]) -> Po
     np.add.at(scores, block, pulls)
     information = np.einsum('mjp,mjr->pr', weighted, weighted)
 
-    def errors(some: npt.NDArray[np.intp]) -> tuple[FloatArray, FloatArray]:
-        """Return covariance and standard errors of some parameters, relative to their sizes."""
-        inside = information[np.ix_(some, some)] + np.eye(len(some)) / _PRIOR**2
-        covariance = np.linalg.inv(inside)
-        blocks = len(scores)
-        lost = blocks / max(blocks - len(some), 0.2 * blocks)
-        middle = lost * scores[:, some].T @ scores[:, some]
-        robust = np.diag(covariance @ middle @ covariance)
-        return covariance, np.sqrt(np.maximum(np.diag(covariance), robust))
-
+    errors = partial(_errors, information, scores)
     fitted = np.flatnonzero(free)
     covariance, own = errors(fitted)
     std, reasons = np.zeros(count), [''] * count
@@ -291,19 +296,20 @@ def _judged(problem: _Problem, x: FloatArray, free: npt.NDArray[np.bool_]) -> Po
         reasons[place] = mixed if alone < _SEEN * _PRIOR else 'the motion does not depend on it'
     residual = np.sqrt(np.mean(rest**2, axis=0))
     noise = np.sqrt(np.mean(np.diff(rest, 3, axis=0) ** 2, axis=0) / 20.0)
-    ratio, ratio_std, kp = np.ones(n), np.zeros(n), slice(1, n + 1)
+    ratio, ratio_std = np.ones(n), np.zeros(n)
     if not free[1]:
+        values, deviation = x.copy(), np.zeros(count)
         with_kp = free | (np.arange(count) <= n)
         if np.any(residual > COLOURED * noise):  # far from the optimum
             again = replace(problem, start=x).solved(with_kp)
             refitted = _judged(problem, again, with_kp)
-            ratio, ratio_std = refitted.values[kp] / x[kp], refitted.std[kp] / x[kp]
+            values, deviation = refitted.values, refitted.std
         else:  # one Gauss-Newton step with kp free as well
-            more = np.flatnonzero(with_kp)
-            covariance, spread = errors(more)
-            step = -covariance @ pulls.sum(axis=0)[more]
-            ratio = 1.0 + step[kp] * problem.size[kp] / x[kp]
-            ratio_std = spread[kp] * problem.size[kp] / x[kp]
+            some = np.flatnonzero(with_kp)
+            covariance, own = errors(some)
+            values[some] -= covariance @ pulls.sum(axis=0)[some] * problem.size[some]
+            deviation[some] = own * problem.size[some]
+        ratio, ratio_std = (each[1 : n + 1] / x[1 : n + 1] for each in (values, deviation))
     behind = [w.commands.mean(np.append(w.t, w.t[-1] + 1e-3))[0] - w.q for w in problem.windows]
     return PositionFit(
         model.arm(x),

@@ -29,8 +29,6 @@ _COLUMNS = {
     'viscous_coefficient': 'viscous',
     'coulomb_torque': 'Coulomb',
 }
-#: Quantities that are shown as an upper limit if their interval includes zero.
-_NOT_NEGATIVE = 'rotor_inertia', 'viscous_coefficient', 'coulomb_torque', 'payload_m'
 
 
 def limit_hints(runs: Sequence[Run], torques: Sequence[Recording], robot: Robot) -> list[str]:
@@ -100,7 +98,9 @@ def fit_summary(found: PositionFit, document: dict[str, Any], step: str) -> Summ
         value, std = found.of(name, joint)
         if not np.isfinite(std):
             return 'not det.'
-        if name in _NOT_NEGATIVE and 0.0 < std and value < 1.96 * std:
+        # all quantities but the centre of mass are positive, and have an upper limit at least
+        positive = not name.startswith('payload_center')
+        if positive and 0.0 < std and value < 1.96 * std:
             return f'< {measured(value + 1.96 * std, 1.96 * std)[0]}'
         text, half = measured(factor * value, factor * 1.96 * std)
         return f'{text} ± {half}' if std else f'{text} (given)'
