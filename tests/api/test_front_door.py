@@ -248,9 +248,9 @@ def test_no_recording_is_said(arm, ask, recordings, said):
         ask(arm, recordings)
 
 
-def test_a_recording_in_place_of_the_robot_is_answered_with_the_order(run):
+def test_a_recording_in_place_of_the_robot_is_answered_with_the_order(runs):
     with pytest.raises(ar.ArmidError, match=r'Recording is no robot.*before recordings'):
-        ar.identify(run, 'my_arm.urdf')
+        ar.identify(runs[0], 'my_arm.urdf')
 
 
 def test_a_folder_in_place_of_a_model_is_answered_with_the_model_in_it(tmp_path):

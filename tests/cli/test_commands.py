@@ -398,4 +398,4 @@ def test_a_check_takes_the_robot_of_the_project(bags, tmp_path, monkeypatch):
     (tmp_path / 'armid.toml').write_text(f'robot = "{ROBOT}"\n')
     assert f'{ROBOT}' in armid('check', bags[0]).stdout.splitlines()[-1]
     armid('check', 'no.urdf', code=2)
-    assert '- is taken' in armid('check', '-', bags[0]).stderr
+    assert '- is used' in armid('check', '-', bags[0]).stderr

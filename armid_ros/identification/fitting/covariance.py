@@ -108,13 +108,13 @@ def noise_products(
     products = np.zeros((size, size))
     splits = (by_stretch(problem, rows) for rows in (residual, weights))
     for part, more, left, weight in zip(problem, added, *splits, strict=True):
-        length = 2 * fft.next_fast_len(len(part.tau), real=True)
+        count = len(part.tau)
         for joint in range(part.tau.shape[1]):
             columns = np.concatenate([part.columns[:, joint], more[:, joint]], axis=1)
             active = np.flatnonzero(columns.any(axis=0))
             weighted = columns.T[active] * weight[:, joint]
             # one row per column; real and imaginary parts next to each other give real products
-            transformed = fft.rfft(weighted, length).view(float)
+            transformed = fft.rfft(weighted, 2 * count).view(float)
             fitted = active < rank
             taken = inverse[active[fitted]].T @ transformed[fitted]
             informative = weight[:, joint] > 0.0
@@ -122,7 +122,7 @@ def noise_products(
             leverage = shares / max(np.count_nonzero(informative), 1)
             spectrum = _noise_spectrum(left[:, joint], informative, leverage)
             spectrum[1:-1] *= 2.0  # the constant and the Nyquist bin have no conjugate
-            transformed *= np.repeat(np.sqrt(spectrum / length), 2)
+            transformed *= np.repeat(np.sqrt(spectrum / (2 * count)), 2)
             products[np.ix_(active, active)] += transformed @ transformed.T
     return products
 
@@ -130,8 +130,9 @@ def noise_products(
 def _noise_spectrum(
     residual: FloatArray, informative: npt.NDArray[np.bool_], leverage: FloatArray
 ) -> FloatArray:
-    """Estimate the power of noise (K,) on the K bins of the leverage from a residual (M,)."""
-    count, size = len(residual), 2 * (len(leverage) - 1)
+    """Estimate the power of noise (M + 1,) on the bins of an rfft from a residual (M,)."""
+    count = len(residual)
+    size = 2 * count
     # the autocovariance of the informative samples is divided by the number of their pairs
     # (Parzen 1963); negative power due to gaps is removed
     sums, pairs = (
@@ -139,14 +140,12 @@ def _noise_spectrum(
         for signal in (residual, informative.astype(float))
     )
     lags = sums / np.maximum(pairs, 1.0) * np.arange(count, 0, -1) / count
-    power = np.fft.rfft(
-        np.concatenate([lags, np.zeros(size - 2 * count + 1), lags[:0:-1]])
-    ).real.clip(0.0)
+    power = np.fft.rfft(np.concatenate([lags, [0.0], lags[:0:-1]])).real.clip(0.0)
     lags = np.fft.irfft(power, size)[:count]
     # whitened by an autoregression, smoothed by a Parzen window over lags, and coloured again,
     # which keeps peaks from being smoothed away (Andrews and Monahan 1992)
     # order of the autoregression that whitens residuals: enough for drift and one resonance
-    order, whitening = min(3, len(lags) - 1), np.ones(len(leverage))
+    order, whitening = min(3, len(lags) - 1), np.ones(count + 1)
     if lags[0] > 0.0 and order >= 1:
         regular = lags[: order + 1].copy()
         regular[0] *= 1.0 + 1e-6

@@ -148,8 +148,8 @@ def _bodies(
     rows = np.column_stack([columns, target])
     blocks = np.array([own.T @ own for own in np.split(rows, ends * weights.shape[1])])
     whole = blocks.sum(axis=0)
-    least = _misfit(whole, fit.solution.values)
-    least = max(least, TORQUE_RESOLUTION * float(np.sqrt(whole[-1, -1])))
+    smallest = TORQUE_RESOLUTION * float(np.sqrt(whole[-1, -1]))
+    least = max(_misfit(whole, fit.solution.values), smallest)
     counted = np.array_split(np.count_nonzero(weights, axis=1), n_blocks)
     share = np.array([part.sum() for part in counted], dtype=float)
     # scaled to a mean square of one in the unconstrained fit
@@ -166,12 +166,10 @@ def _bodies(
     effects = theta[len(theta) - len(lower) :]
     scale = 1e-6 * np.maximum(np.abs(effects).max(initial=0.0), 1e-9)
     held = (effects - lower <= scale) | (upper - effects <= scale)
-    names = arm.parameters[len(theta) - len(lower) :]
-    values = base.values(theta)
+    names, values = arm.parameters[len(theta) - len(lower) :], base.values(theta)
     described = prior[: rigid.size].reshape(-1, PER_LINK)
-    off = np.abs(np.log(rigid[:, 0] / described[:, 0]))
-    # at the bound, up to rounding
-    off = off > (1.0 - 1e-3) * np.log(settings.mass_range or np.inf)
+    bound = (1.0 - 1e-3) * np.log(settings.mass_range or np.inf)  # up to rounding
+    off = np.abs(np.log(rigid[:, 0] / described[:, 0])) > bound
     certificate = PhysicalCertificate(
         links=links,
         shares=np.array(

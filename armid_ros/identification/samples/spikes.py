@@ -13,7 +13,7 @@ samples are used. A real change is therefore never lost, however large it is.
 Positions are continuous. A position that steps and continues from there means that a clock was set
 or an encoder zeroed, and a new stretch begins (``StreamSample.begins``). A torque may jump and
 return, for example when free play is crossed. The usual range of the torque distinguishes such
-pulses from damage. A stream leaves them out unreported, as it knows the range too late; a
+pulses from damage. A stream leaves them out unreported, as the range is known too late; a
 recording keeps them.
 
 The largest allowed error is the largest of three. The first is the usual prediction error in the
