@@ -178,6 +178,8 @@ def start_values(
     speed, rate, effort, error = (
         np.sqrt(np.mean(x**2, axis=0)) + 1e-6 for x in (dq, ddq, effort, behind)
     )
+    # a joint that sticks moves only by the noise of its encoder, which is no scale
+    speed, rate = (np.maximum(x, 0.01 * x.max()) for x in (speed, rate))
     if gains is None:  # the described load of a light last link gives no scale
         more = np.maximum(_LIGHTEST * effort.max() / effort, 1.0)
         values, effort = more * values, more * effort
