@@ -3,11 +3,23 @@
 """Executables run the node of their name, and say in one line what is missing."""
 
 import os
+import signal
 import subprocess
 import sys
 
 from armid_ros.cli import node
 import pytest
+
+
+@pytest.fixture(autouse=True)
+def signal_handlers():
+    """Restore the handlers, as a node that ends leaves signals ignored, also by later children."""
+    handlers = {
+        one: signal.getsignal(one) for one in (signal.SIGINT, signal.SIGTERM, signal.SIGHUP)
+    }
+    yield
+    for one, handler in handlers.items():
+        signal.signal(one, handler)
 
 
 def test_an_executable_runs_the_node_of_its_name(monkeypatch, capsys):
