@@ -12,6 +12,7 @@ shown of them, and the rates of other sets; `results/public.json` has the public
 
 from __future__ import annotations
 
+from collections.abc import Iterable
 import json
 from pathlib import Path
 from typing import Any
@@ -61,9 +62,16 @@ def page(looks: str, rates: str) -> str:
         Contents of looks.jsonl and rates.json.
 
     """
-    runs = map(json.loads, looks.splitlines())
+    runs = [json.loads(line) for line in looks.splitlines()]
     last = {run['set']: run['results'] for run in runs if run.get('results')}
     other = json.loads(rates)
+    for one in other['locked']:
+        if 'commits' in one:  # looks at different cases of one set are added
+            last[one['set']] = _added(
+                run['results']
+                for run in runs
+                if run['commit'] in one['commits'] and run['set'].startswith('lived, locked, ')
+            )
     return '\n'.join(
         [
             _HEAD,
@@ -136,6 +144,18 @@ def public_page(public: str) -> str:
             '',
         ]
     )
+
+
+def _added(looks: Iterable[dict[str, Any]]) -> dict[str, Any]:
+    """Return the rates of several looks together."""
+    total: dict[str, list[int]] = {}
+    for look in looks:
+        for name, found in look.items():
+            if found['cases']:
+                pair = total.setdefault(name, [0, 0])
+                pair[0] += round(found['value'] * found['cases'])
+                pair[1] += found['cases']
+    return {name: {'value': hits / cases, 'cases': cases} for name, (hits, cases) in total.items()}
 
 
 def _locked_row(command: str, question: str, found: dict[str, Any]) -> str:
