@@ -62,21 +62,18 @@ def ours(bag):
     return seconds, result.estimate.values[index], result.estimate.std[index]
 
 
-def theirs(bag):
-    """Identify with figaroh; return both times, viscous friction of joint 1, and its std."""
+def figaroh_arm(robot, recording, cutoff_hz, every=1):
+    """Return the class with which figaroh identifies a robot from every k-th sample."""
     from figaroh.identification.base_identification import BaseIdentification
-    from pinocchio.robot_wrapper import RobotWrapper
 
-    robot = panda().robot
-    recording = read_recording(bag, joints=robot.joints)
+    n = robot.n_joints
 
-    class Panda(BaseIdentification):
+    class Arm(BaseIdentification):
         def load_param(self, config_file, setting_type='identification'):
-            axes = list(range(7))
             self.identif_config = {
-                'robot_name': 'panda',
-                'act_idxq': axes,
-                'act_idxv': axes,
+                'robot_name': robot.name,
+                'act_idxq': list(range(n)),
+                'act_idxv': list(range(n)),
                 'active_joints': list(robot.joints),
                 'has_friction': True,
                 'has_actuator_inertia': False,
@@ -84,29 +81,38 @@ def theirs(bag):
                 'is_joint_torques': True,
                 'is_external_wrench': False,
                 'force_torque': None,
-                **dict.fromkeys(('fv', 'fs', 'Ia', 'off'), [0.0] * 7),
+                **dict.fromkeys(('fv', 'fs', 'Ia', 'off'), [0.0] * n),
                 'filter_config': {
                     'differentiation_method': 'gradient',
                     'filter_params': {
                         'nbutter': 4,
-                        'f_butter': CUTOFF_HZ,
+                        'f_butter': cutoff_hz,
                         'med_fil': 5,
-                        'f_sample': RATE,
+                        'f_sample': 1.0 / (every * recording.period),
                     },
                 },
             }
 
         def load_trajectory_data(self, data_source=None):
             return {
-                'timestamps': recording.t,
-                'positions': recording.q,
+                'timestamps': recording.t[::every],
+                'positions': recording.q[::every],
                 'velocities': None,
                 'accelerations': None,
-                'torques': recording.tau,
+                'torques': recording.tau[::every],
             }
 
+    return Arm
+
+
+def theirs(bag):
+    """Identify with figaroh; return both times, viscous friction of joint 1, and its std."""
+    from pinocchio.robot_wrapper import RobotWrapper
+
+    robot = panda().robot
+    arm = figaroh_arm(robot, read_recording(bag, joints=robot.joints), CUTOFF_HZ)
     start = _now()
-    task = Panda(RobotWrapper(robot.model.copy()), '')
+    task = arm(RobotWrapper(robot.model.copy()), '')
     task.initialize()
     task.solve(decimation_factor=DECIMATION, plotting=False, wls=True)
     seconds = _since(start)

@@ -26,7 +26,9 @@ from armid_ros.recording import Recording
 from armid_ros.robots import Robot
 import mujoco
 import numpy as np
+from pinocchio.robot_wrapper import RobotWrapper
 
+from benchmarks.offline_speed import figaroh_arm
 from tests.hidden.descriptions import bare_urdf
 
 #: Value and standard error of each parameter, by name and joint.
@@ -47,7 +49,8 @@ def figaroh_estimates(robot: Robot, recordings: list[Recording]) -> Estimates:
     found = defaultdict(list)
     for recording in recordings:
         every = max(round(1.0 / (SAMPLES * recording.period)), 1)
-        task = _figaroh_task(robot, recording, every)
+        arm = figaroh_arm(robot, recording, CUTOFF, every)
+        task = arm(RobotWrapper(robot.model.copy()), '')
         with redirect_stdout(io.StringIO()):
             task.initialize()
             step = max(round(1.0 / (ROWS * every * recording.period)), 2)
@@ -70,49 +73,6 @@ def _place(robot: Robot, name: str) -> tuple[str, str]:
     places = [k for k in robot.joints if k in name.split(' ')[0]]
     joint = max(places, key=len) if places else robot.joints[int(re.findall(r'\d+', joint)[0]) - 1]
     return OF_FIGAROH.get(kind, name), joint
-
-
-def _figaroh_task(robot: Robot, recording: Recording, every: int) -> Any:
-    from figaroh.identification.base_identification import BaseIdentification
-    from pinocchio.robot_wrapper import RobotWrapper
-
-    n = robot.n_joints
-
-    class Arm(BaseIdentification):
-        def load_param(self, config_file, setting_type='identification'):
-            self.identif_config = {
-                'robot_name': robot.name,
-                'act_idxq': list(range(n)),
-                'act_idxv': list(range(n)),
-                'active_joints': list(robot.joints),
-                'has_friction': True,
-                'has_actuator_inertia': False,
-                'has_joint_offset': True,
-                'is_joint_torques': True,
-                'is_external_wrench': False,
-                'force_torque': None,
-                **dict.fromkeys(('fv', 'fs', 'Ia', 'off'), [0.0] * n),
-                'filter_config': {
-                    'differentiation_method': 'gradient',
-                    'filter_params': {
-                        'nbutter': 4,
-                        'f_butter': CUTOFF,
-                        'med_fil': 5,
-                        'f_sample': 1.0 / (every * recording.period),
-                    },
-                },
-            }
-
-        def load_trajectory_data(self, data_source=None):
-            return {
-                'timestamps': recording.t[::every],
-                'positions': recording.q[::every],
-                'velocities': None,
-                'accelerations': None,
-                'torques': recording.tau[::every],
-            }
-
-    return Arm(RobotWrapper(robot.model.copy()), '')
 
 
 def sysid_days(robot: Robot, *days: list[Recording]) -> list[Estimates]:

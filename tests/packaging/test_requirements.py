@@ -127,6 +127,6 @@ def test_what_it_names_in_the_tree_is_there(root):
 
 
 def test_nothing_that_was_built_goes_into_the_image(root):
-    """What is left out of the repository is left out of the image, too."""
+    """The image leaves out the files that the repository ignores."""
     ignored = (root / '.dockerignore').read_text().split()
     assert {'.git', '.venv', 'build', 'install', 'log', 'dist'} <= set(ignored)

@@ -25,7 +25,7 @@ _FEWEST, _SHARE_OF_MESSAGES = 20, 0.01
 #: Smallest ratio of a jump between two senders to the steps of one sender.
 _TRACK = 3.0
 #: A second sender with less than this share of the messages sends between those of the first. If
-#: gaps of so many periods remain without them, they are faults of an encoder.
+#: gaps of this number of periods remain without its messages, these are faults of an encoder.
 _FEW, _REPLACED = 0.2, 1.5
 
 
