@@ -25,7 +25,7 @@ from armid_ros.diagnosis.search.explanation import Chosen, Explanation, NOISE
 from armid_ros.diagnosis.search.spans import acting_spans, Span
 from armid_ros.diagnosis.settings import DiagnosisSettings
 from armid_ros.diagnosis.ties.ties import diagnose_ties
-from armid_ros.diagnosis.verdict.attribution import headline, predicted
+from armid_ros.diagnosis.verdict.attribution import headline
 from armid_ros.diagnosis.verdict.data_remarks import data_remarks
 from armid_ros.diagnosis.verdict.finding import Diagnosis, Finding
 from armid_ros.diagnosis.verdict.gap import measure_gap, not_repeating
@@ -247,12 +247,11 @@ def _as_diagnosis(
     unseen = _held_out_evidence(explainer.unseen, explanation, chosen)
     least = settings.thresholds.headline
     every = 0.0 if chosen.measured or settings.everything else least
-    explanation, shares = headline(explanation, every, settings)
+    explanation, shares = headline(explanation, unseen, every, settings)
     whole = shares.share(range(len(explanation.steps)))
     if before is not None and chosen.untested and whole <= settings.thresholds.open_share:
-        explanation, shares = headline(explanation.with_nothing_named(), every, settings)
-    if unseen is not None:
-        explanation, shares = predicted(explanation, shares.order, unseen)
+        nothing = explanation.with_nothing_named()
+        explanation, shares = headline(nothing, unseen, every, settings)
     measured = RemainingMisfit(chosen, unseen, before, arm, settings)
     evidence, patched = explanation.evidence, explanation.fitted.arm
     found, minor = findings(explanation, shares, arm, explainer.rng), small_print(explanation)

@@ -37,6 +37,9 @@ class Traits:
         Whether the cause is outside the arm, such as a person or another machine.
     corrects : bool
         Whether the effect is an error of the description, not a change of the arm.
+    rests : bool
+        Whether the effect has no torque in a part of the motion, as a strap while it is slack. A
+        strap that is always taut is a spring.
     nuisance : tuple of tuple of float
         Shapes of the effect as a nuisance parameter, if it was not requested; () if never.
     measured_as : str
@@ -56,6 +59,7 @@ class Traits:
     friction: bool = False
     external: bool = False
     corrects: bool = False
+    rests: bool = False
     nuisance: tuple[tuple[float, ...], ...] = ()
     measured_as: str = ''
     separate: tuple[tuple[int, ...], ...] = ()
@@ -186,6 +190,7 @@ TRAITS = {
         shown_by='the same motion at two tensions of the strap',
         look_at='the strap, cable, table or fixture that may hold the arm, and its tightness',
         external=True,
+        rests=True,
     ),
     'payload': Traits(
         shown_by='the same motion with the tool taken off',

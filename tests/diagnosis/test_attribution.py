@@ -8,7 +8,8 @@ from armid_ros.diagnosis.data.evidence import Evidence, noise_floor
 from armid_ros.diagnosis.search.cause import SelectedEffect
 from armid_ros.diagnosis.search.explanation import Explanation
 from armid_ros.diagnosis.search.posterior import JointFit
-from armid_ros.diagnosis.verdict.attribution import Attribution, left_out, predicted
+from armid_ros.diagnosis.settings import DiagnosisSettings
+from armid_ros.diagnosis.verdict.attribution import Attribution, headline, left_out, predicted
 from armid_ros.effects import CATALOGUE
 import numpy as np
 import pytest
@@ -52,13 +53,13 @@ def test_a_share_is_that_of_the_squares_and_lies_in_its_interval():
 
 
 def test_a_cause_that_predicts_nothing_of_other_data_is_minor(bench, sprung):
-    sprung = replace(sprung, steps=('spring',))
-    kept, shares = predicted(sprung, [0], evidence_of(bench, spring))
+    sprung, settings = replace(sprung, steps=('spring',)), DiagnosisSettings()
+    kept, shares = headline(sprung, evidence_of(bench, spring), 0.1, settings)
     assert kept is sprung and shares.share([0]) > 0.95
-    left, shares = predicted(sprung, [0], evidence_of(bench, None))
-    assert (left.steps, left.minor, shares.order) == ((), ('spring',), ())
+    fewer, shares = headline(sprung, evidence_of(bench, None), 0.0, settings)
+    assert (fewer.steps, fewer.minor, shares.order) == ((), ('spring',), ())
 
 
 def test_folds_that_were_not_fitted_show_it_as_well(sprung):
-    folds, (_, whole) = left_out(sprung), predicted(sprung, [0], sprung.evidence)
+    folds, whole = left_out(sprung), predicted(sprung, [0], sprung.evidence)
     assert folds.share([0]) == pytest.approx(whole.share([0]), abs=0.01)

@@ -41,6 +41,9 @@ _MOST_SHAPES = 12
 _LOBES, _PEAK = 3.0, 0.2
 #: Largest number of evaluations of one line search.
 _EVALUATIONS = 9
+#: Smallest share of samples in which an effect that rests has no torque; a strap that is always
+#: taut fits as a spring.
+_LEAST_AT_REST = 0.1
 #: Reference temperatures where none is measured.
 _NO_REFERENCE: Mapping[str, float] = MappingProxyType({})
 #: Largest mass [1], first moments [m] and inertias [m^2] of a body, divided by its mass.
@@ -198,11 +201,16 @@ class Causes:
     def made(
         self, effect: Effect, kept: tuple[int, ...], columns: Sequence[FloatArray]
     ) -> Cause | None:
-        """Make a cause from columns (M, n, p); None if all are zero on the diagnosed day."""
+        """
+        Make a cause from columns (M, n, p).
+
+        None if all are zero on the diagnosed day, or if an effect that rests never does.
+
+        """
         rows, robot = self.nuisance.rows, self.nuisance.arm.robot
         torque = _torque_of(columns, rows)
         seen = torque.any(axis=0)
-        if not seen.any():
+        if not seen.any() or (effect.traits.rests and _at_rest(columns, rows) < _LEAST_AT_REST):
             return None
         return cause_of(
             self.nuisance,
@@ -222,6 +230,12 @@ def _torque_of(columns: Sequence[FloatArray], rows: Rows) -> FloatArray:
         moving = rows.weight[k][:, :, np.newaxis] > 0.0
         squares += np.sum(columns[k] ** 2, axis=0, where=moving)
     return np.asarray(np.sqrt(squares / rows.informative[:, np.newaxis]))
+
+
+def _at_rest(columns: Sequence[FloatArray], rows: Rows) -> float:
+    """Return the share of the samples of the diagnosed day in which all columns are zero."""
+    zero = [~columns[k].any(axis=(1, 2)) for k in rows.in_question]
+    return float(np.mean(np.concatenate(zero)))
 
 
 def _unit(own: SelectedEffect, torque: FloatArray, rows: Rows, robot: Robot) -> FloatArray:

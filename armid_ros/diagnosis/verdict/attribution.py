@@ -63,45 +63,49 @@ class Attribution:
 
 
 def headline(
-    explanation: Explanation, least: float, settings: DiagnosisSettings
+    explanation: Explanation, unseen: Evidence | None, least: float, settings: DiagnosisSettings
 ) -> tuple[Explanation, Attribution]:
     """
     Move causes with a small share to the minor causes; return the shares of all others.
 
-    A cause is minor if its cross-validated share of the gap is below `least`, and no joint has a
-    gap without it.
+    Shares are cross-validated, and measured on held-out data if there are any. A cause is minor
+    if its larger share is below `least`, and no joint has a gap without it: a cause may act in
+    some motions only. It is minor as well if it increases one of the prediction errors. The
+    returned shares are those of held-out data if there are any.
 
     Parameters
     ----------
     explanation : Explanation
         The fitted causes.
+    unseen : Evidence or None
+        Held-out data.
     least : float
         Smallest share of a cause in the headline.
     settings : DiagnosisSettings
         Limits of a residual without gap.
 
     """
-    shares = left_out(explanation)
-    for k in sorted(range(len(explanation.steps)), key=lambda k: shares.share([k])):
-        if shares.share([k]) >= least:
+    fitted = left_out(explanation)
+    held_out = None if unseen is None else predicted(explanation, fitted.order, unseen)
+    causes = range(len(explanation.steps))
+    measured = [fitted] if held_out is None else [fitted, held_out]
+    share = np.array([max(one.share([k]) for one in measured) for k in causes])
+    for k in np.argsort(share, kind='stable').tolist():
+        if share[k] >= least:
             break
         fewer = explanation.without(k)
         limits = explanation.evidence.limits(explanation.residual, settings)
         opens = (fewer.chi2_per_row > limits) & (explanation.chi2_per_row <= limits)
         if not np.any(opens):
-            return headline(fewer, least, settings)
-    return explanation, shares
+            return headline(fewer, unseen, least, settings)
+    worse = [k for k in causes if min(one.share([k]) for one in measured) < 0.0]
+    if worse:
+        return headline(explanation.without(*worse), unseen, least, settings)
+    return explanation, held_out or fitted
 
 
-def predicted(
-    explanation: Explanation, order: Sequence[int], unseen: Evidence
-) -> tuple[Explanation, Attribution]:
-    """
-    Return the gain of each cause on held-out data; causes are added in a given order.
-
-    A cause that increases the prediction error of these data is minor.
-
-    """
+def predicted(explanation: Explanation, order: Sequence[int], unseen: Evidence) -> Attribution:
+    """Return the gain of each cause on held-out data; causes are added in a given order."""
     fewer = [explanation.only(order[:count]) for count in range(1, len(order))]
     every = [explanation.reference, *(one.fitted for one in fewer), explanation.fitted]
     arms = [one.arm for one in every[: len(order) + 1]]
@@ -109,12 +113,7 @@ def predicted(
     taken = np.zeros((len(order), len(squares[0])))
     for position, k in enumerate(order):
         taken[k] = squares[position] - squares[position + 1]
-    shares = Attribution(tuple(order), squares[0], taken)
-    worse = [k for k in order if shares.share([k]) < 0.0]
-    if not worse:
-        return explanation, shares
-    others = [k - sum(k > one for one in worse) for k in order if k not in worse]
-    return predicted(explanation.without(*worse), others, unseen)
+    return Attribution(tuple(order), squares[0], taken)
 
 
 def left_out(explanation: Explanation) -> Attribution:
