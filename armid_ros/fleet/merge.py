@@ -22,7 +22,7 @@ from armid_ros.fleet.plan import filters_at, Job
 from armid_ros.fleet.store import fetched
 from armid_ros.identification.fitting.covariance import noise_products, sandwich
 from armid_ros.identification.fitting.excited import bounds, identifiable_base
-from armid_ros.identification.fitting.normal_equations import (
+from armid_ros.identification.fitting.least_squares import (
     NormalEquations,
     weighted_fit,
     WeightedFit,
@@ -128,15 +128,15 @@ class FleetFit:
 
     def estimate(self, normal: NormalEquations, noise: FloatArray) -> FleetEstimate:
         """Return the estimate, given the noise products of the same rows."""
-        some = normal.restrict(self.kept)
+        some, inverse = normal.restrict(self.kept), self.fit.inverse
         squares = some.squares(self.fit.values).sum() / some.target_squares.sum()
         return FleetEstimate(
             self.base.parameters,
             self.fit.values,
-            np.sqrt(np.diag(sandwich(self.fit.bread, noise))),
+            np.sqrt(np.diag(sandwich(inverse @ inverse.T, noise))),
             some.joint_std(self.fit.values),
             float(100.0 * np.sqrt(squares)),
-            self.fit.condition_number,
+            float(np.linalg.cond(self.fit.factor)),
         )
 
 

@@ -23,7 +23,7 @@ from armid_ros.fleet.bags import BagFile, digest, folder_of
 from armid_ros.fleet.merge import BagSummary, FleetEstimate, MergedBags, Refused
 from armid_ros.fleet.plan import Job
 from armid_ros.fleet.store import Store
-from armid_ros.identification.fitting.normal_equations import NormalEquations
+from armid_ros.identification.fitting.least_squares import NormalEquations
 import numpy as np
 import pyarrow as pa
 

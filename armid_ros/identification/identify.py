@@ -10,9 +10,13 @@ from dataclasses import dataclass, field, replace
 from armid_ros.arm import ArmModel
 from armid_ros.errors import IdentificationError
 from armid_ros.estimate import Estimate
-from armid_ros.identification.fitting.covariance import scatter
 from armid_ros.identification.fitting.excited import base_spread, determined, excited
-from armid_ros.identification.fitting.held_out import cutoff_of_torques, halves_error, HalvesError
+from armid_ros.identification.fitting.held_out import (
+    cutoff_of_torques,
+    halves_error,
+    HalvesError,
+    scatter,
+)
 from armid_ros.identification.fitting.identifiability import Unidentified, unidentified
 from armid_ros.identification.fitting.instruments import fit_by_instruments
 from armid_ros.identification.fitting.least_squares import Estimator, ESTIMATORS, Method

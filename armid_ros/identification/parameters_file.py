@@ -19,7 +19,7 @@ from armid_ros.estimate import ParameterName
 from armid_ros.files import finite, is_file, load_yaml, read_text, reading
 from armid_ros.identification.assess.grade_limits import by_error
 from armid_ros.identification.fitting.identifiability import NOT_SHOWN
-from armid_ros.identification.fitting.normal_equations import scaled_inverse
+from armid_ros.identification.fitting.least_squares import scaled_inverse
 from armid_ros.identification.output import kinematics_digest, SCHEMA
 from armid_ros.model.base_parameters import symbol
 from armid_ros.motion import FloatArray

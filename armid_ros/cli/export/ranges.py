@@ -7,7 +7,7 @@ from __future__ import annotations
 from armid_ros.arm import ArmModel
 from armid_ros.effects.load import described_spread
 from armid_ros.estimate import Estimate, ParameterName
-from armid_ros.identification.fitting.normal_equations import scaled_inverse
+from armid_ros.identification.fitting.least_squares import scaled_inverse
 from armid_ros.identification.parameters_file import ParameterFile
 from armid_ros.model import LINK_PARAMETERS
 from armid_ros.motion import FloatArray

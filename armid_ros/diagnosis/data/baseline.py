@@ -26,7 +26,7 @@ from armid_ros.diagnosis.data.trajectory import (
     Trajectory,
 )
 from armid_ros.effects.load import described_spread
-from armid_ros.identification.fitting.normal_equations import informative_solution, scaled_inverse
+from armid_ros.identification.fitting.least_squares import informative_solution, scaled_inverse
 from armid_ros.identification.rows.signals import Conditioning
 from armid_ros.model import BaseParameters, group_columns
 from armid_ros.motion import FloatArray

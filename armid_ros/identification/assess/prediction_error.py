@@ -16,7 +16,7 @@ from itertools import product
 
 from armid_ros.identification.assess.grade_limits import FREEDOM, LIMITS
 from armid_ros.identification.fitting.excited import near_deviation
-from armid_ros.identification.fitting.normal_equations import within
+from armid_ros.identification.fitting.least_squares import within
 from armid_ros.identification.rows.checks import joined, SLOW
 from armid_ros.model import inverse_dynamics, regressor
 from armid_ros.motion import FloatArray, Motion

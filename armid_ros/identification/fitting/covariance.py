@@ -5,8 +5,7 @@ Sandwich covariances, bread middle bread', of estimates whose errors are not whi
 
 The bread is the inverse of the products of the columns. The middle is the covariance of the
 products of columns and noise; it follows from the spectrum of the residuals (`noise_products`) or
-from neighbouring scores (`score_products`). Model errors differ between motions; `scatter`
-measures this difference by the jackknife over recordings.
+from neighbouring scores (`score_products`).
 
 """
 
@@ -14,7 +13,6 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
-from armid_ros.identification.fitting.normal_equations import informative_basis, NormalEquations
 from armid_ros.identification.rows.regression import by_stretch, Regression
 from armid_ros.motion import FloatArray
 import numpy as np
@@ -172,56 +170,3 @@ def _smoothed(spectrum: FloatArray, reach: int) -> FloatArray:
     tapered[:reach] = lags[:reach] * parzen
     tapered[size - reach + 1 :] = tapered[1:reach][::-1]
     return np.asarray(np.fft.rfft(tapered).real)
-
-
-def scatter(problem: Sequence[Regression], weights: FloatArray, values: FloatArray) -> FloatArray:
-    """
-    Return the jackknife changes of each value; the squared changes sum to its variance.
-
-    The weight of a change is the precision with which the other recordings determine the value.
-    For white noise, the sum of squares then equals the variance of least squares, even if one
-    recording determines most of a value. Values that the others do not determine have no change.
-
-    Parameters
-    ----------
-    problem : sequence of Regression
-        N rows of r columns.
-    weights : ndarray, shape (N, n)
-        Factors of the rows in the fit.
-    values : ndarray, shape (r,)
-        Fitted values.
-
-    Returns
-    -------
-    ndarray, shape (K, r)
-        Changes without each of K recordings; empty for a single recording.
-
-    References
-    ----------
-    Wu, Jackknife, bootstrap and other resampling methods in regression analysis, Annals of
-    Statistics 14, 1986.
-
-    """
-    parts: dict[str, FloatArray] = {}
-    for part, weight in zip(problem, by_stretch(problem, weights), strict=True):
-        own = NormalEquations.of([part], weight).summed()[:-1]
-        own[:, -1] -= own[:, :-1] @ values
-        parts[part.source] = parts.get(part.source, np.zeros_like(own)) + own
-    if len(parts) < 2:
-        return np.zeros((0, len(values)))
-    products = np.array(list(parts.values()))
-    whole = products.sum(axis=0)
-    change, std = _solution(whole)
-    result = []
-    for own in products:
-        held_change, held_std = _solution(whole - own)
-        seen = held_std > 0.0
-        share = np.where(seen, std / np.where(seen, held_std, 1.0), 0.0)
-        result.append(share * (held_change - change))
-    return np.array(result)
-
-
-def _solution(products: FloatArray) -> tuple[FloatArray, FloatArray]:
-    """Return solution and deviations (p,) of normal equations (p, p + 1); 0 if undetermined."""
-    basis = informative_basis(products[:, :-1])
-    return basis @ (basis.T @ products[:, -1]), np.sqrt(np.sum(basis**2, axis=1))

@@ -17,8 +17,13 @@ from dataclasses import replace
 
 from armid_ros.arm import ArmModel
 from armid_ros.effects.load import described_spread
-from armid_ros.identification.fitting.least_squares import Method, Solution, solve
-from armid_ros.identification.fitting.normal_equations import factored, NormalEquations
+from armid_ros.identification.fitting.least_squares import (
+    factored,
+    Method,
+    NormalEquations,
+    Solution,
+    solve,
+)
 from armid_ros.identification.rows.regression import Regression
 from armid_ros.model import BaseParameters, group_columns, regroup
 from armid_ros.motion import FloatArray

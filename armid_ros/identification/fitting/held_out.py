@@ -20,27 +20,21 @@ from dataclasses import dataclass, replace
 
 from armid_ros.arm import ArmModel
 from armid_ros.errors import IdentificationError
-from armid_ros.identification.fitting.normal_equations import informative_solution
-from armid_ros.identification.rows.regression import Regression, regressions
+from armid_ros.identification.fitting.least_squares import (
+    informative_basis,
+    informative_solution,
+    NormalEquations,
+)
+from armid_ros.identification.rows.regression import by_stretch, Regression, regressions
 from armid_ros.identification.rows.signals import Conditioning, TORQUE_RESOLUTION
 from armid_ros.motion import FloatArray
 from armid_ros.recording import Recording
 import numpy as np
 import numpy.typing as npt
 
-#: Number of rows for the comparison of halves and of cut-offs: about fifty and a hundred for every
-#: parameter of seven joints.
-_OF_HALVES, _OF_CUTOFFS = 4000, 6000
-#: Number of evenly spread windows for the comparison of cut-offs on longer data. Together they
-#: have twice as many rows; at 1 kHz, a filter of 1 Hz removes a tenth of each window at its ends.
-_WINDOWS = 8
-#: Smallest share of rows that remain with a cut-off; with fewer rows, the cut-off is too low.
-_KEPT = 0.8
-#: Number of folds (stretches); their losses give the standard error of the mean.
-_STRETCHES = 16
-#: Smallest gain, as a share of the error, for which a cut-off is lowered. Jitter and backlash
-#: increase the error by a third or more on every tested machine.
-_NEAR = 0.1
+#: Number of rows for the comparison of cut-offs: about a hundred for every parameter of seven
+#: joints.
+_MAX_ROWS = 6000
 
 
 @dataclass(frozen=True)
@@ -87,7 +81,8 @@ def halves_error(
         Errors of the predicted torque.
 
     """
-    step, columns, tau, target, informative = _some_rows(problem, _OF_HALVES)
+    # about fifty rows for every parameter of seven joints
+    step, columns, tau, target, informative = _some_rows(problem, 4000)
     rest, weight = target - columns @ described, weights[::step]
     most = np.full(len(described), np.inf) if spread is None else spread
     middle = len(tau) // 2
@@ -110,6 +105,56 @@ def halves_error(
         float(100.0 * np.linalg.norm(error) / whole) if whole > 0.0 else 0.0,
         100.0 * np.divide(error, length, out=np.zeros_like(error), where=length > 0.0),
     )
+
+
+def scatter(problem: Sequence[Regression], weights: FloatArray, values: FloatArray) -> FloatArray:
+    """
+    Return the jackknife changes of each value; the squared changes sum to its variance.
+
+    The weight of a change is the precision with which the other recordings determine the value.
+    For white noise, the sum of squares then equals the variance of least squares, even if one
+    recording determines most of a value. Values that the others do not determine have no change.
+
+    Parameters
+    ----------
+    problem : sequence of Regression
+        N rows of r columns.
+    weights : ndarray, shape (N, n)
+        Factors of the rows in the fit.
+    values : ndarray, shape (r,)
+        Fitted values.
+
+    Returns
+    -------
+    ndarray, shape (K, r)
+        Changes without each of K recordings; empty for a single recording.
+
+    References
+    ----------
+    Wu, Jackknife, bootstrap and other resampling methods in regression analysis, Annals of
+    Statistics 14, 1986.
+
+    """
+    parts: dict[str, FloatArray] = {}
+    for part, weight in zip(problem, by_stretch(problem, weights), strict=True):
+        own = NormalEquations.of([part], weight).summed()[:-1]
+        own[:, -1] -= own[:, :-1] @ values
+        parts[part.source] = parts.get(part.source, np.zeros_like(own)) + own
+    if len(parts) < 2:
+        return np.zeros((0, len(values)))
+    products = np.array(list(parts.values()))
+    whole = products.sum(axis=0)
+    fits = []
+    for normal in (whole, *(whole - products)):
+        basis = informative_basis(normal[:, :-1])
+        fits.append((basis @ (basis.T @ normal[:, -1]), np.sqrt(np.sum(basis**2, axis=1))))
+    (change, std), *held_out = fits
+    result = []
+    for held_change, held_std in held_out:
+        seen = held_std > 0.0
+        share = np.where(seen, std / np.where(seen, held_std, 1.0), 0.0)
+        result.append(share * (held_change - change))
+    return np.array(result)
 
 
 def cutoff_of_torques(
@@ -142,7 +187,7 @@ def cutoff_of_torques(
         Filters with the chosen cut-off.
 
     """
-    recordings = _windows(recordings, 2 * _OF_CUTOFFS * used.decimation)
+    recordings = _windows(recordings, 2 * _MAX_ROWS * used.decimation)
     tried: dict[float, list[list[Regression]]] = {}
     losses: dict[float, FloatArray] = {}
     cutoff, rows = used.cutoff_hz, 0
@@ -153,7 +198,7 @@ def cutoff_of_torques(
         except IdentificationError:
             break
         count = sum(len(part.tau) for parts in problem for part in parts)
-        if count < _KEPT * rows or not count:
+        if count < 0.8 * rows or not count:  # the cut-off is too low for these stretches
             break
         rows = max(rows, count)
         tried[cutoff] = problem
@@ -169,10 +214,12 @@ def cutoff_of_torques(
 
 def _windows(recordings: Sequence[Recording], samples: int) -> list[Recording]:
     """Return evenly spread windows of recordings, with about `samples` samples in total."""
-    total, size = sum(len(recording) for recording in recordings), samples // _WINDOWS
+    # number of windows; at 1 kHz, a filter of 1 Hz removes a tenth of each window at its ends
+    n_windows = 8
+    total, size = sum(len(recording) for recording in recordings), samples // n_windows
     if total <= samples:
         return list(recordings)
-    begins = np.linspace(0, total - size, _WINDOWS).astype(int)
+    begins = np.linspace(0, total - size, n_windows).astype(int)
     result, before = [], 0
     for recording in recordings:
         inside = np.clip(np.stack([begins, begins + size]) - before, 0, len(recording))
@@ -198,29 +245,31 @@ def _shared(
 
 
 def _as_good(losses: FloatArray, best: FloatArray) -> bool:
-    """Whether losses equal the smallest loss within one standard error or `_NEAR`."""
+    """Whether losses equal the smallest loss within one standard error or a tenth."""
+    # smallest gain, as a share of the error, for which a cut-off is lowered. Jitter and backlash
+    # increase the error by a third or more on every tested machine.
+    min_gain = 0.1
     worse = losses - best
-    deviation = np.std(worse, ddof=1) / np.sqrt(len(worse))
-    return bool(np.mean(worse) <= max(float(deviation), _NEAR))
+    standard_error = np.std(worse, ddof=1) / np.sqrt(len(worse))
+    return bool(np.mean(worse) <= max(float(standard_error), min_gain))
 
 
 def _losses(problem: Sequence[Regression]) -> FloatArray:
-    """Return the held-out loss of each stretch, the mean log rms error of its joints, (S,)."""
-    # odd stretches are predicted from even ones, and vice versa. Every joint counts by the ratio
-    # of its errors: a light joint, whose torque is mostly noise, gains by a low cut-off and must
-    # not hide that a heavy one loses
-    _, x, _, y, informative = _some_rows(problem, _OF_CUTOFFS)
-    stretch = np.arange(len(y)) * _STRETCHES // len(y)
-    left = np.zeros_like(y)
+    """Return the held-out loss of each fold, the mean log rms error of its joints, (S,)."""
+    # Odd folds are predicted from even ones, and vice versa; their losses give the standard error
+    # of the mean. Every joint counts by the ratio of its errors: a light joint, whose torque is
+    # mostly noise, gains by a low cut-off and must not hide that a heavy one loses.
+    n_folds = 16
+    _, x, _, y, informative = _some_rows(problem, _MAX_ROWS)
+    fold = np.arange(len(y)) * n_folds // len(y)
+    residual = np.zeros_like(y)
     whole = _fit(x, y, informative)
     weight = 1.0 / np.maximum(_rms(y - x @ whole, informative), 1e-12)
     for odd in (0, 1):
-        chosen = stretch % 2 == odd
+        chosen = fold % 2 == odd
         value = _fit(x[chosen], y[chosen], informative[chosen] * weight)
-        left[~chosen] = y[~chosen] - x[~chosen] @ value
-    rms = np.array(
-        [_rms(left[stretch == k], informative[stretch == k]) for k in range(_STRETCHES)]
-    )
+        residual[~chosen] = y[~chosen] - x[~chosen] @ value
+    rms = np.array([_rms(residual[fold == k], informative[fold == k]) for k in range(n_folds)])
     least = np.maximum(TORQUE_RESOLUTION * _rms(y, informative), 1e-12)
     return np.asarray(np.mean(np.log(np.maximum(rms, least)), axis=1))
 

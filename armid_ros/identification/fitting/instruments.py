@@ -19,6 +19,7 @@ from armid_ros.arm import ArmModel
 from armid_ros.errors import IdentificationError
 from armid_ros.identification.fitting.covariance import noise_products, sandwich
 from armid_ros.identification.fitting.excited import bounds
+from armid_ros.identification.fitting.least_squares import within
 from armid_ros.identification.fitting.nonlinear import (
     FittedValues,
     linearised,
@@ -26,7 +27,6 @@ from armid_ros.identification.fitting.nonlinear import (
     torques,
     ungrouped,
 )
-from armid_ros.identification.fitting.normal_equations import within
 from armid_ros.identification.rows.regression import Regression, regressions, weighted_rows
 from armid_ros.identification.rows.signals import Conditioning, unbroken
 from armid_ros.model import BaseParameters

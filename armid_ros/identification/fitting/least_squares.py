@@ -1,7 +1,10 @@
 # Copyright 2026 The armid_ros developers
 # SPDX-License-Identifier: Apache-2.0
 """
-Linear least squares with joint weights, outliers and coloured residuals.
+Weighted and robust least squares of arms, by normal equations.
+
+Normal equations do not grow with the rows, and they add up over stretches, recordings and workers.
+Joints are summed separately, because their weights are known only after all rows.
 
 The standard deviations come from the spectrum of the actual residuals. With filtered,
 over-sampled or badly modelled torque, neighbouring residuals are correlated. Standard deviations
@@ -16,19 +19,18 @@ from dataclasses import dataclass
 from typing import get_args, Literal
 
 from armid_ros.identification.fitting.covariance import noise_products, sandwich
-from armid_ros.identification.fitting.normal_equations import (
-    NormalEquations,
-    positive,
-    ROUNDS,
-    scaled_fit,
-    weighted_fit,
-    WeightedFit,
-    within,
-)
-from armid_ros.identification.rows.regression import Regression
+from armid_ros.identification.rows.regression import by_stretch, Regression
 from armid_ros.motion import FloatArray
 import numpy as np
 import numpy.typing as npt
+import scipy.linalg
+import scipy.optimize
+
+#: Largest number of iterations of reweighting; the weights converge in three to ten.
+_MAX_ITERATIONS = 20
+#: Share of the largest eigenvalue of normalised columns below which a direction is not
+#: identifiable, given the digits of products of columns.
+_MIN_EIGENVALUE = 1e-10
 
 Method = Literal['ols', 'wls', 'irls']
 Estimator = Literal['ols', 'wls', 'irls', 'iv']
@@ -74,6 +76,109 @@ class Solution:
     weights: FloatArray
 
 
+@dataclass(frozen=True, eq=False)
+class NormalEquations:
+    """
+    Normal equations of all joints.
+
+    Attributes
+    ----------
+    products : ndarray, shape (n, r + 1, r + 1)
+        [W_j, y_j]' [W_j, y_j] of each joint.
+    counts : ndarray, shape (n,)
+        Informative rows of each joint.
+
+    """
+
+    products: FloatArray
+    counts: FloatArray
+
+    @classmethod
+    def of(
+        cls, problem: Sequence[Regression], weights: npt.NDArray[np.floating] | None = None
+    ) -> NormalEquations:
+        """
+        Sum up the rows of one or more stretches.
+
+        Parameters
+        ----------
+        problem : sequence of Regression
+            N rows of each of n joints in r columns.
+        weights : ndarray, shape (N, n), optional
+            Factors of the rows; by default 1, and 0 for a row that is not informative.
+
+        """
+        n_joints, rank = problem[0].columns.shape[1:]
+        products, counts = np.zeros((n_joints, rank + 1, rank + 1)), np.zeros(n_joints)
+        if weights is None:
+            weights = np.concatenate([part.informative for part in problem])
+        own = by_stretch(problem, np.asarray(weights, dtype=float))
+        for part, weight in zip(problem, own, strict=True):
+            target = part.target
+            counts += part.informative.sum(axis=0)
+            for joint in range(n_joints):
+                rows = np.column_stack([part.columns[:, joint], target[:, joint]])
+                # torques do not depend on links nearer to the base
+                active = np.flatnonzero(rows.any(axis=0))
+                rows = rows[:, active] * weight[:, joint, np.newaxis]
+                products[joint][np.ix_(active, active)] += rows.T @ rows
+        return cls(products, counts)
+
+    def __add__(self, other: NormalEquations) -> NormalEquations:
+        """Add the normal equations of two sets of rows."""
+        return NormalEquations(self.products + other.products, self.counts + other.counts)
+
+    def restrict(self, columns: Sequence[int] | npt.NDArray[np.intp]) -> NormalEquations:
+        """Return the normal equations restricted to some columns."""
+        kept = np.append(np.asarray(columns, dtype=np.intp), self.rank)
+        return NormalEquations(self.products[:, kept[:, np.newaxis], kept], self.counts)
+
+    @property
+    def rank(self) -> int:
+        """Return the number of columns r."""
+        return int(self.products.shape[2]) - 1
+
+    @property
+    def target_squares(self) -> FloatArray:
+        """Sum of the squared targets of each joint, shape (n,) [(N m)^2]."""
+        return np.asarray(self.products[:, -1, -1])
+
+    def summed(self, scale: npt.ArrayLike = 1.0) -> FloatArray:
+        """Return the sum over joints, each divided by a scale (n,), shape (r + 1, r + 1)."""
+        weight = np.broadcast_to(np.asarray(scale, dtype=float), self.counts.shape) ** -2.0
+        return np.asarray(np.tensordot(weight, self.products, axes=1))
+
+    def squares(self, values: FloatArray) -> FloatArray:
+        """Return the sum of the squared residuals of each joint, shape (n,) [(N m)^2]."""
+        ends = np.append(values, -1.0)
+        # smaller values are rounding errors of the products
+        return np.asarray(np.maximum(self.products @ ends @ ends, 1e-12 * self.target_squares))
+
+    def joint_std(self, values: FloatArray) -> FloatArray:
+        """Return the standard deviation of the residual of each joint, shape (n,) [N m]."""
+        counts = np.maximum(self.counts, 1.0)
+        rows = float(counts.sum())
+        freedom = rows / max(1.0, rows - self.rank)  # correction for degrees of freedom
+        return np.asarray(np.sqrt(freedom * self.squares(values) / counts))
+
+    def packed(self) -> FloatArray:
+        """Return all numbers in one array: number of joints, counts and upper triangles."""
+        upper = np.triu_indices(self.rank + 1)
+        numbers = self.products[:, upper[0], upper[1]].ravel()
+        return np.concatenate([[len(self.counts)], self.counts, numbers])
+
+    @classmethod
+    def unpacked(cls, numbers: FloatArray) -> NormalEquations:
+        """Return normal equations from the numbers of `packed`."""
+        joints = int(numbers[0])
+        triangles = numbers[1 + joints :].reshape(joints, -1)
+        size = int(np.sqrt(2 * triangles.shape[1]))
+        first, second = np.triu_indices(size)
+        products = np.zeros((joints, size, size))
+        products[:, first, second] = products[:, second, first] = triangles
+        return cls(products, numbers[1 : 1 + joints])
+
+
 def solve(
     problem: Sequence[Regression],
     method: Method = 'wls',
@@ -110,9 +215,9 @@ def solve(
     products = noise_products(problem, residual * weights, weights, fit.inverse)
     return Solution(
         values=values,
-        covariance=sandwich(fit.bread, products),
+        covariance=sandwich(fit.inverse @ fit.inverse.T, products),
         joint_std=normal.joint_std(values),
-        condition_number=fit.condition_number,
+        condition_number=float(np.linalg.cond(fit.factor)),
         outliers=int(np.sum(used & (relative**2 < 0.5))),
         weights=weights,
     )
@@ -123,13 +228,13 @@ def _robust(
 ) -> tuple[WeightedFit, FloatArray]:
     """Reduce the weight of outliers; return the fit and the unscaled row factors, (N, n)."""
     relative: FloatArray = used.astype(float)
-    for _ in range(ROUNDS):
+    for _ in range(_MAX_ITERATIONS):
         before = (fit.scale, relative)
         residual = np.concatenate([part.residual(fit.values) for part in problem])
         # standard deviation of each joint's residual, from its median absolute deviation
         masked = np.where(used, residual, np.nan)
         spread = np.nanmedian(np.abs(masked - np.nanmedian(masked, axis=0)), axis=0)
-        scale = positive(1.4826 * np.nan_to_num(spread))
+        scale = _positive(1.4826 * np.nan_to_num(spread))
         size = np.maximum(np.abs(residual) / scale, 1e-12)
         # residuals beyond this many robust standard deviations lose weight (Huber 1981: 95 %
         # efficiency)
@@ -138,3 +243,159 @@ def _robust(
         if np.allclose(scale, before[0], rtol=1e-6) and np.allclose(relative, before[1]):
             break
     return fit, relative
+
+
+@dataclass(frozen=True, eq=False)
+class WeightedFit:
+    """
+    Solution of weighted least squares.
+
+    Attributes
+    ----------
+    values : ndarray, shape (r,)
+        Parameters.
+    scale : ndarray, shape (n,)
+        Divisor of the rows of each joint.
+    factor, inverse : ndarray, shape (r, r)
+        F, with F' F the products of the weighted columns, and its inverse.
+
+    """
+
+    values: FloatArray
+    scale: FloatArray
+    factor: FloatArray
+    inverse: FloatArray
+
+
+def weighted_fit(normal: NormalEquations, *, weighted: bool = True) -> WeightedFit:
+    """
+    Fit parameters to normal equations.
+
+    Parameters
+    ----------
+    normal : NormalEquations
+        Normal equations of the rows.
+    weighted : bool
+        Whether every joint is weighted by its own residual.
+
+    """
+    fit = scaled_fit(normal, np.ones(len(normal.counts)))
+    for _ in range(_MAX_ITERATIONS if weighted else 0):
+        before = fit.scale
+        fit = scaled_fit(normal, _positive(normal.joint_std(fit.values)))
+        if np.allclose(fit.scale, before, rtol=1e-6):
+            break
+    return fit
+
+
+def scaled_fit(normal: NormalEquations, scale: FloatArray) -> WeightedFit:
+    """Solve normal equations with the rows of every joint divided by a scale, shape (n,)."""
+    products = normal.summed(scale)
+    factor, inverse = factored(products[:-1, :-1])
+    return WeightedFit(inverse @ (inverse.T @ products[:-1, -1]), scale, factor, inverse)
+
+
+def _positive(scale: FloatArray) -> FloatArray:
+    """Apply a lower bound to scales, so that an exactly fitted joint has a finite weight."""
+    return np.maximum(scale, max(1e-9 * float(np.max(scale)), 1e-100))
+
+
+def factored(products: FloatArray) -> tuple[FloatArray, FloatArray]:
+    """
+    Return F with F' F = products, shape (p, p), and its inverse.
+
+    Eigenvalues below the rounding error are raised to it.
+
+    """
+    length = np.sqrt(np.diag(products))
+    size = np.where(length > 0.0, length, 1.0)
+    lengths, axes = np.linalg.eigh(products / np.outer(size, size))
+    least = len(size) * np.finfo(float).eps * lengths.max(initial=0.0)
+    lengths = np.sqrt(np.maximum(lengths, max(least, 1e-300)))
+    return lengths[:, np.newaxis] * axes.T * length, axes / lengths / size[:, np.newaxis]
+
+
+def within(
+    values: FloatArray, factor: FloatArray, bounds: tuple[FloatArray, FloatArray]
+) -> FloatArray:
+    """
+    Return the bounded fit whose predictions are nearest to those of the unbounded fit.
+
+    Parameters
+    ----------
+    values : ndarray, shape (r,)
+        Values of the unbounded fit.
+    factor : ndarray, shape (r, r)
+        F with F' F the products of the weighted columns.
+    bounds : tuple of two ndarray, each of shape (r,)
+        Lower and upper bounds.
+
+    """
+    if np.all((values >= bounds[0]) & (values <= bounds[1])):
+        return values
+    scale = np.linalg.norm(factor, axis=0)
+    solution = scipy.optimize.lsq_linear(
+        factor / scale, factor @ values, (bounds[0] * scale, bounds[1] * scale), method='bvls'
+    )
+    return np.asarray(np.clip(solution.x / scale, *bounds))
+
+
+def informative_basis(products: FloatArray) -> FloatArray:
+    """
+    Return a basis of the identifiable directions.
+
+    Parameters
+    ----------
+    products : ndarray, shape (p, p)
+        Products of columns with each other; positive semi-definite.
+
+    Returns
+    -------
+    ndarray, shape (p, k)
+        Basis B, where B B' is the pseudo-inverse of the products.
+
+    """
+    scale = 1.0 / np.sqrt(np.maximum(np.diag(products), 1e-300))
+    scaled = products * np.outer(scale, scale)
+    lower, failed = scipy.linalg.lapack.dpotrf(scaled, lower=True)
+    if not failed and len(scaled):
+        inverse, _ = scipy.linalg.lapack.dtrtri(lower, lower=True)
+        # every direction is determined: the smallest eigenvalue is at least 1 / trace(inverse),
+        # and the largest is at most trace(products)
+        if np.sum(inverse**2) * np.trace(scaled) * _MIN_EIGENVALUE <= 1.0:
+            return np.asarray(scale[:, np.newaxis] * inverse.T)
+    values, vectors = np.linalg.eigh(scaled)
+    good = values > _MIN_EIGENVALUE * max(float(values.max(initial=0.0)), 1e-300)
+    return np.asarray(scale[:, np.newaxis] * vectors[:, good] / np.sqrt(values[good]))
+
+
+def informative_solution(products: FloatArray, aim: FloatArray) -> FloatArray:
+    """
+    Solve normal equations; unidentifiable directions stay zero.
+
+    Parameters
+    ----------
+    products : ndarray, shape (p, p)
+        Products of columns with each other; positive semi-definite.
+    aim : ndarray, shape (p,) or (p, k)
+        Products of the columns with the targets.
+
+    Returns
+    -------
+    ndarray, shape (p,) or (p, k)
+
+    """
+    basis = informative_basis(products)
+    return np.asarray(basis @ (basis.T @ aim))
+
+
+def scaled_inverse(matrix: FloatArray) -> FloatArray:
+    """
+    Invert a covariance or a precision, (p, p), with values of any units.
+
+    Eigenvalues below the rounding error are raised to it.
+
+    """
+    scale = 1.0 / np.sqrt(np.maximum(np.diag(matrix), 1e-300))
+    both = np.outer(scale, scale)
+    return np.asarray(np.linalg.inv(matrix * both + _MIN_EIGENVALUE * np.eye(len(matrix))) * both)

@@ -18,9 +18,8 @@ from dataclasses import dataclass, field, replace
 from armid_ros.arm import ArmModel
 from armid_ros.errors import IdentificationError
 from armid_ros.identification.fitting.excited import bounds, excited
-from armid_ros.identification.fitting.least_squares import Method, solve
+from armid_ros.identification.fitting.least_squares import informative_solution, Method, solve
 from armid_ros.identification.fitting.nonlinear import agree, FittedValues, through, torques
-from armid_ros.identification.fitting.normal_equations import informative_solution
 from armid_ros.identification.physical.physical_certificate import (
     PhysicalCertificate,
     walls_reached,

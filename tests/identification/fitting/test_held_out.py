@@ -64,7 +64,7 @@ def test_long_recordings_are_compared_on_a_part_with_the_same_answer(arm, monkey
     whole = chosen(arm, data)
     used = conditioning(data, SignalSettings())
     total = sum(len(recording) for recording in data)
-    monkeypatch.setattr(held_out, '_OF_CUTOFFS', total // (4 * used.decimation))
+    monkeypatch.setattr(held_out, '_MAX_ROWS', total // (4 * used.decimation))
     compared = []
 
     def counted(arm, columns, parts, lower):

@@ -2,7 +2,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """The scatter of values between recordings is their variance, whatever makes them vary."""
 
-from armid_ros.identification.fitting.covariance import scatter
+from armid_ros.identification.fitting.held_out import scatter
 from armid_ros.identification.rows.regression import Regression
 from armid_ros.motion import Motion
 import numpy as np

@@ -3,7 +3,7 @@
 """A bag larger than the memory: its rows come piece by piece, and are those of the whole."""
 
 from armid_ros.arm import ArmModel
-from armid_ros.identification.fitting.normal_equations import NormalEquations, weighted_fit
+from armid_ros.identification.fitting.least_squares import NormalEquations, weighted_fit
 from armid_ros.identification.rows.regression import regressions
 from armid_ros.identification.rows.signals import Conditioning
 from armid_ros.identification.rows.streaming import streamed

@@ -17,8 +17,7 @@ from dataclasses import dataclass
 from armid_ros.errors import IdentificationError
 from armid_ros.estimate import Estimate, ParameterName
 from armid_ros.identification.fitting.covariance import sandwich, score_products
-from armid_ros.identification.fitting.least_squares import solve
-from armid_ros.identification.fitting.normal_equations import NormalEquations
+from armid_ros.identification.fitting.least_squares import NormalEquations, solve
 from armid_ros.identification.rows.regression import by_stretch, Regression, weighted_rows
 from armid_ros.motion import ElasticRun, FloatArray
 from armid_ros.papers.elastic.identification.interaction import direction, link_columns
