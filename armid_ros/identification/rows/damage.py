@@ -9,10 +9,21 @@ from dataclasses import replace
 
 from armid_ros.identification.rows.signals import Conditioning
 from armid_ros.identification.samples.spikes import FIRST, SpikeGate
-from armid_ros.identification.samples.straight_line import Excursion, missed_by, StreamSample
+from armid_ros.identification.samples.straight_line import (
+    Excursion,
+    growth_over,
+    missed_by,
+    robust_scale,
+    share_of_noise,
+    smallest_steps,
+    StreamSample,
+    Usual,
+    WINDOW,
+)
 from armid_ros.motion import FloatArray
 from armid_ros.recording import Recording
 import numpy as np
+import numpy.typing as npt
 
 
 def without_damage(
@@ -32,8 +43,6 @@ def without_damage(
         Notes on the damage: recording, number of samples, and the first of them.
 
     """
-    # number of damaged samples that a note names
-    most = 3
     peak = float(np.max(used.taps) / np.sum(used.taps))
     repaired, found = [], []
     for recording in recordings:
@@ -57,7 +66,7 @@ def without_damage(
             for one in excursions
             for sample in one.samples
         ]
-        named[most:] = ['...'] if len(damaged) > most else []
+        named[3:] = ['...'] if len(damaged) > 3 else []
         what = '1 sample jumps and comes back; it was'
         if len(damaged) > 1:
             what = f'{len(damaged)} samples jump and come back; they were'
@@ -96,20 +105,20 @@ def impossible_excursions(
     list of Excursion
 
     """
-    lines = gate.line_errors(t, x, floor)
+    stretch, suspect, usual = _suspects(gate, t, x, floor)
     found: list[Excursion] = []
     done = 0
-    for k in np.flatnonzero(lines.suspect).tolist():
+    for k in np.flatnonzero(suspect).tolist():
         if k < done:
             continue
-        start, known, bent = int(lines.stretch[k]), [], np.zeros(x.shape[1])
+        start, known, bent = int(stretch[k]), [], np.zeros(x.shape[1])
         if k - start >= FIRST or start < done:
             known = [StreamSample(float(t[i]), x[i]) for i in range(max(start, k - 3), k)]
             if len(known) == 3:
-                error = missed_by(known[:2], known[2], lines.usual.period)
+                error = missed_by(known[:2], known[2], usual.period)
                 bent = error.error / error.bend
             start = k
-        gate.begin(lines.usual, known[-2:], bent)
+        gate.begin(usual, known[-2:], bent)
         passed, done = 0, start
         while done < len(t) and (passed < 2 or done <= k):
             good = gate.take(float(t[done]), x[done], floor)
@@ -121,3 +130,46 @@ def impossible_excursions(
         return found
     lowest, highest = np.min(x[good_ones], axis=0), np.max(x[good_ones], axis=0)
     return [one for one in found if not gate.possible(one, lowest, highest)]
+
+
+def _suspects(
+    gate: SpikeGate, t: FloatArray, x: FloatArray, floor: FloatArray
+) -> tuple[npt.NDArray[np.intp], npt.NDArray[np.bool_], Usual]:
+    """
+    Compare all samples with the straight lines through the two samples before.
+
+    Returns the first sample of the stretch of each sample, (N,), whether a signal of a sample is
+    off its line by more than the largest allowed error, (N,), and the usual error in the noisiest
+    part.
+
+    """
+    dt = np.diff(t)
+    period = float(np.median(dt))
+    gap = dt > gate.max_gap * period
+    first = np.where(np.concatenate([[True], gap]), np.arange(len(t)), 0)
+    apart = gap[1:] | gap[:-1]
+    ratio, (noise, bend) = dt[1:] / dt[:-1], growth_over(dt[:-1], dt[1:], period)
+    growth = np.maximum(noise, bend)
+    suspect = np.zeros(len(t), dtype=bool)
+    sizes, shares = np.zeros((2, x.shape[1]))
+    # windows of equal length are processed together; the last few samples are in none
+    count = max(1, len(ratio) // WINDOW)
+    length = len(ratio) // count
+    for signal in range(x.shape[1]):  # the arrays of one signal fit into the cache
+        moves = np.diff(x[:, signal])
+        error = moves[1:] - ratio * moves[:-1]
+        error[apart] = 0.0
+        windows = (error / growth)[: count * length].reshape(count, length).T
+        scales = robust_scale(windows)
+        loudest = int(np.argmax(scales))
+        white = share_of_noise(windows[:, loudest], scales[loudest])
+        step = float(smallest_steps(np.abs(moves)[:, np.newaxis])[-1, 0])
+        resolution = min(step if np.isfinite(step) else 0.0, float(np.abs(error).max()))
+        size = max(scales[loudest], resolution)
+        usual = Usual(period, np.array([size]), np.array([white]))
+        limit = np.maximum(usual.limits(gate.quantile(period), noise, bend), floor[signal])
+        # a smooth signal keeps its curvature
+        error[1:] -= usual.smoothness * (error[:-1] / bend[:-1]) * bend[1:]
+        suspect[2:] |= (np.abs(error) > limit) & ~apart
+        sizes[signal], shares[signal] = size, white
+    return np.maximum.accumulate(first), suspect, Usual(period, sizes, shares)

@@ -36,8 +36,6 @@ import math
 from armid_ros.identification.samples.straight_line import (
     all_unwrapped,
     Excursion,
-    line_errors,
-    LineErrors,
     Missed,
     missed_by,
     NoiseLevel,
@@ -118,7 +116,7 @@ class SpikeGate:
         self._least_seen = tuple(
             scale * [least[one] for one in kind] for least in (_FINEST, _ONSET)
         )
-        self._max_gap = max_gap
+        self.max_gap = max_gap
         self._false_alarm_time = false_alarm_time
         self.reset()
 
@@ -132,7 +130,7 @@ class SpikeGate:
         self._last: FloatArray | None = None  # last good sample, also of an earlier stretch
         count = len(self._turn)
         self.lowest, self.highest = np.full(count, np.inf), np.full(count, -np.inf)
-        self._level = NoiseLevel(count, self._max_gap + 1, *self._least_seen)
+        self._level = NoiseLevel(count, self.max_gap + 1, *self._least_seen)
         self._least: tuple[Usual, float, FloatArray] | None = None
         self._restart([])
 
@@ -159,7 +157,7 @@ class SpikeGate:
             else:
                 good = self._take(early)
         ahead = 0.0 if self._tail is None else t - self._tail.t
-        if _LEAP * self._period < ahead <= self._max_gap * self._period < math.inf:
+        if _LEAP * self._period < ahead <= self.max_gap * self._period < math.inf:
             # samples seem to be lost before this one
             self._early = StreamSample(t, x)
             return good
@@ -198,11 +196,7 @@ class SpikeGate:
         self._level.set(usual)
         self._restart(None if known else [], known, bent)
         if known:
-            self._period, self._quantile = usual.period, self._quantile_of(usual.period)
-
-    def line_errors(self, t: FloatArray, x: FloatArray, floor: FloatArray) -> LineErrors:
-        """Return the prediction errors of all samples of a recording; see `line_errors`."""
-        return line_errors(t, x, floor, self._max_gap, self._quantile_of)
+            self._period, self._quantile = usual.period, self.quantile(usual.period)
 
     def possible(self, excursion: Excursion, lowest: FloatArray, highest: FloatArray) -> bool:
         """
@@ -218,7 +212,7 @@ class SpikeGate:
         far = beyond > np.maximum(excursion.limit, highest - lowest)
         return not bool(np.any((excursion.off > 1.0) & (far | ~self._pulsing)))
 
-    def _quantile_of(self, period: float) -> float:
+    def quantile(self, period: float) -> float:
         """Return the limit in standard deviations for the false alarm time, given a period [s]."""
         chance = period / self._false_alarm_time / len(self._turn)
         return float(stats.norm.isf(min(chance, 0.5) / 2.0))
@@ -250,7 +244,7 @@ class SpikeGate:
         """Return whether a stamp continues the stream; two other stamps begin a new stretch."""
         tail, stray, self._stray = self._tail, self._stray, None
         dt = 0.0 if tail is None else sample.t - tail.t
-        longest = self._max_gap * self._period
+        longest = self.max_gap * self._period
         if tail is None or 0.0 < dt <= longest:
             if stray is not None:
                 self.rejected['stamp'] += 1
@@ -272,7 +266,7 @@ class SpikeGate:
         raw, self._first = self._first or [], None
         first = all_unwrapped(raw, self._turn)
         self._period = float(np.median(np.diff([s.t for s in first])))
-        self._quantile = self._quantile_of(self._period)
+        self._quantile = self.quantile(self._period)
         missed = self._lines_through(first)
         self._level.begin(missed, np.diff([s.x for s in first], axis=0), self._period)
         straight = [bool(np.all(self._off_by(m) <= 1.0)) for m in missed]
@@ -318,9 +312,9 @@ class SpikeGate:
         self._held.append(sample)
         self._off = np.maximum(self._off, off)
         self._went_on += goes_on
-        if len(self._held) <= self._max_gap:
+        if len(self._held) <= self.max_gap:
             return []
-        if 2 * self._went_on > self._max_gap:
+        if 2 * self._went_on > self.max_gap:
             if len(self._held) > 1 and self._stepped():
                 self._held[0] = replace(self._held[0], begins=True)
             return self._release()

@@ -11,31 +11,19 @@ stream must not wait.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import NamedTuple, TypeVar
 
 from armid_ros.motion import FloatArray
 import numpy as np
-import numpy.typing as npt
 from scipy import special
 
 #: Correlation of successive errors of a straight line in white noise.
 _NOISE_CORRELATION = -2.0 / 3.0
-#: Smallest jump that may be a full turn [rad].
-_HALF_A_TURN = np.pi
 #: Number of predictions in a window, whose usual error is computed together.
-_WINDOW = 100
-#: Number of windows kept: one minute at 1 kHz.
-_REMEMBERED = 600
-#: Share of predictions that define the usual error. Others may be friction steps, or damage.
-_SHARE = 0.95
-#: Share for the first few samples, where one damaged sample spoils three predictions.
-_SHARE_FIRST = 0.75
-#: Number of occurrences from which a step is the resolution of the signal.
-_SEEN = 3
-
+WINDOW = 100
 
 #: Growth factor of errors over other times, of one sample or of each, shape (N, 1).
 Factor = float | FloatArray
@@ -171,7 +159,7 @@ def missed_by(known: Sequence[StreamSample], sample: StreamSample, period: float
 
 def unwrapped(x: FloatArray, last: FloatArray, turn: FloatArray) -> FloatArray:
     """Undo a jump by full turns, by which drivers keep positions within +-pi."""
-    if float(np.abs(x - last).max()) <= _HALF_A_TURN:
+    if float(np.abs(x - last).max()) <= np.pi:
         return x
     turns = np.rint(np.divide(x - last, turn, where=turn > 0.0, out=np.zeros_like(x)))
     return np.asarray(x - turns * turn)
@@ -185,8 +173,13 @@ def all_unwrapped(samples: Sequence[StreamSample], turn: FloatArray) -> list[Str
     return found
 
 
-def robust_scale(missed: FloatArray, share: float) -> FloatArray:
-    """Return the standard deviation of errors, (k, m), from one of their quantiles."""
+def robust_scale(missed: FloatArray, share: float = 0.95) -> FloatArray:
+    """
+    Return the standard deviation of errors, (k, m), from the quantile of a share of them.
+
+    The other errors may be friction steps, or damage.
+
+    """
     ordered = np.sort(np.abs(missed), axis=0)  # numpy's quantile takes ten times as long
     place = share * (len(ordered) - 1)
     first = int(place)
@@ -230,11 +223,12 @@ class NoiseLevel:
     def __init__(self, count: int, together: int, finest: FloatArray, onset: FloatArray) -> None:
         self._finest, self._onset = finest, onset
         self.usual = Usual(np.inf, np.zeros(count), np.zeros(count))
-        self._steps, self._most = np.full((_SEEN, count), np.inf), np.zeros(count)
-        self._sizes, self._shares = np.zeros((2, _REMEMBERED, count))
+        # a step that occurs three times is the resolution of a signal
+        self._steps, self._most = np.full((3, count), np.inf), np.zeros(count)
+        self._sizes, self._shares = np.zeros((2, 600, count))  # windows of a minute at 1 kHz
         self._seen = 0
-        self._errors, self._moves = np.empty((2, _WINDOW + together, count))
-        self._growths = np.empty((_WINDOW + together, 2, 1))
+        self._errors, self._moves = np.empty((2, WINDOW + together, count))
+        self._growths = np.empty((WINDOW + together, 2, 1))
         self._waiting = 0
 
     def set(self, usual: Usual) -> None:
@@ -266,7 +260,8 @@ class NoiseLevel:
         self._most = np.maximum(self._most, np.max(np.abs([m.error for m in missed]), axis=0))
         if not self._seen:
             errors = np.array([m.error / max(m.noise, m.bend) for m in missed])
-            size = np.maximum(robust_scale(errors, _SHARE_FIRST), self._least(period))
+            # one damaged sample spoils three of the first predictions
+            size = np.maximum(robust_scale(errors, 0.75), self._least(period))
             self.usual = Usual(period, size, share_of_noise(errors, size))
 
     def learn(self, missed: Missed, move: FloatArray) -> None:
@@ -278,13 +273,13 @@ class NoiseLevel:
 
     def settle(self, period: float) -> None:
         """Update the usual error when a window of errors is complete."""
-        if self._waiting < _WINDOW:
+        if self._waiting < WINDOW:
             return
         growths, moves = self._growths[: self._waiting], self._moves[: self._waiting]
         errors = self._errors[: self._waiting] / self.usual.growth(growths[:, 0], growths[:, 1])
         self._waiting = 0
         self._most = np.maximum(self._most, np.abs(errors).max(axis=0))
-        size = robust_scale(errors, _SHARE)
+        size = robust_scale(errors)
         self._remember(size, share_of_noise(errors, size))
         self.see_steps(moves)
         loudest = np.argmax(self._sizes, axis=0), np.arange(len(size))
@@ -292,13 +287,13 @@ class NoiseLevel:
         self.usual = Usual(period, size, self._shares[loudest])
 
     def _remember(self, size: FloatArray, noisy: FloatArray) -> None:
-        place = self._seen % _REMEMBERED
+        place = self._seen % len(self._sizes)
         self._sizes[place], self._shares[place] = size, noisy
         self._seen += 1
 
     def see_steps(self, moves: FloatArray) -> None:
         """Estimate the resolution from changes between samples, shape (k, m)."""
-        self._steps = _smallest(np.concatenate([self._steps, np.abs(moves)]))
+        self._steps = smallest_steps(np.concatenate([self._steps, np.abs(moves)]))
 
     def _least(self, period: float) -> FloatArray:
         """Return the smallest step of every signal, at least the finest and that of an onset."""
@@ -308,85 +303,8 @@ class NoiseLevel:
         return np.maximum(np.minimum(self._most, step), least)
 
 
-class LineErrors(NamedTuple):
-    """
-    Prediction errors of the samples of a recording.
-
-    Attributes
-    ----------
-    stretch : ndarray of int, shape (N,)
-        First sample of the stretch that contains a sample; long gaps separate stretches.
-    suspect : ndarray of bool, shape (N,)
-        Whether a signal is off the line of the two samples before by more than the largest allowed
-        error; False for the first two samples of a stretch.
-    usual : Usual
-        Usual error in the noisiest part of the recording.
-
-    """
-
-    stretch: npt.NDArray[np.intp]
-    suspect: npt.NDArray[np.bool_]
-    usual: Usual
-
-
-def line_errors(
-    t: FloatArray,
-    x: FloatArray,
-    floor: FloatArray,
-    max_gap: int,
-    quantile: Callable[[float], float],
-) -> LineErrors:
-    """
-    Compare all samples of a recording with the straight lines through the two samples before.
-
-    Parameters
-    ----------
-    t : ndarray, shape (N,)
-        Stamps, at least 3, each after the one before [s].
-    x : ndarray, shape (N, m)
-        Signals.
-    floor : ndarray, shape (m,)
-        Negligible error of a sample.
-    max_gap : int
-        Longest gap within a stretch, in periods.
-    quantile : callable
-        Function of the period [s] that returns the largest allowed error in standard deviations.
-
-    """
-    dt = np.diff(t)
-    period = float(np.median(dt))
-    gap = dt > max_gap * period
-    first = np.where(np.concatenate([[True], gap]), np.arange(len(t)), 0)
-    apart = gap[1:] | gap[:-1]
-    ratio, (noise, bend) = dt[1:] / dt[:-1], growth_over(dt[:-1], dt[1:], period)
-    growth = np.maximum(noise, bend)
-    suspect = np.zeros(len(t), dtype=bool)
-    sizes, shares = np.zeros((2, x.shape[1]))
-    # windows of equal length are processed together; the last few samples are in none
-    count = max(1, len(ratio) // _WINDOW)
-    length = len(ratio) // count
-    for signal in range(x.shape[1]):  # the arrays of one signal fit into the cache
-        moves = np.diff(x[:, signal])
-        error = moves[1:] - ratio * moves[:-1]
-        error[apart] = 0.0
-        windows = (error / growth)[: count * length].reshape(count, length).T
-        scales = robust_scale(windows, _SHARE)
-        loudest = int(np.argmax(scales))
-        noisy = share_of_noise(windows[:, loudest], scales[loudest])
-        step = float(_smallest(np.abs(moves)[:, np.newaxis])[-1, 0])
-        least = min(step if np.isfinite(step) else 0.0, float(np.abs(error).max()))
-        size = max(scales[loudest], least)
-        usual = Usual(period, np.array([size]), np.array([noisy]))
-        limit = np.maximum(usual.limits(quantile(period), noise, bend), floor[signal])
-        # a smooth signal keeps its curvature
-        error[1:] -= usual.smoothness * (error[:-1] / bend[:-1]) * bend[1:]
-        suspect[2:] |= (np.abs(error) > limit) & ~apart
-        sizes[signal], shares[signal] = size, noisy
-    return LineErrors(np.maximum.accumulate(first), suspect, Usual(period, sizes, shares))
-
-
-def _smallest(steps: FloatArray) -> FloatArray:
-    """Return the smallest nonzero steps of every signal, shape (_SEEN, m)."""
-    none = np.full((_SEEN, steps.shape[1]), np.inf)
+def smallest_steps(steps: FloatArray) -> FloatArray:
+    """Return the three smallest nonzero steps of every signal, shape (3, m)."""
+    none = np.full((3, steps.shape[1]), np.inf)
     steps = np.concatenate([none, np.where(steps > 0.0, steps, np.inf)])
-    return np.partition(steps, _SEEN - 1, axis=0)[:_SEEN]
+    return np.partition(steps, 2, axis=0)[:3]
