@@ -38,15 +38,6 @@ from armid_ros.robots import Robot
 import numpy as np
 import numpy.typing as npt
 
-#: Median factor of torques from which their unit is wrong; loads cause smaller factors.
-_GAINS = 4.0
-#: Largest ratio of a factor since a baseline to that of a unit of force; masses cancel.
-_NEAR_SINCE = 1.05
-#: Ratio of a torque to the drive limit above which a note is given.
-_BEYOND = 1.5
-#: Share of samples at the largest value of a reading, above which it is clipped.
-_CLIPPED = 0.02
-
 
 def check_data(
     arm: ArmModel,
@@ -186,8 +177,9 @@ def unit_faults(
     if not before or len(clear) < min(2, robot.n_joints):
         return []
     typical = float(np.median(factors[clear]))
-    unit = unit_of(typical, factors[clear].tolist(), _NEAR_SINCE)
-    if not unit and 1.0 / _GAINS < typical < _GAINS:
+    # masses cancel in factors since a baseline, which are near that of a unit of force to 5 %
+    unit = unit_of(typical, factors[clear].tolist(), 1.05)
+    if not unit and 1.0 / 4.0 < typical < 4.0:  # loads cause such factors
         return []
     named = ', '.join(f'{factors[k]:.3g} in {robot.joints[k]}' for k in clear)
     gains = ','.join(f'{1.0 / factor:.3g}' if factor > 0.0 else '?' for factor in factors)
@@ -261,12 +253,12 @@ def _extremes(robot: Robot, recording: Recording) -> Iterator[str]:
         reading, unit = recording.tau[:, j], robot.torque_units[j]
         top = np.abs(reading).max()
         share = float(np.mean(np.abs(reading) >= top * (1.0 - 1e-9)))
-        if top > 0.0 and share > _CLIPPED and len(np.unique(reading)) > 10:
+        if top > 0.0 and share > 0.02 and len(np.unique(reading)) > 10:  # the reading is clipped
             yield (
                 f'{source}: {100 * share:.0f} % of the torque of {joint} is at {top:.4g} {unit}, '
                 'its highest value: a limit'
             )
-        if top > _BEYOND * limit:
+        if top > 1.5 * limit:
             yield (
                 f'{source}: the torque of {joint} reaches {top:.4g}, its limit is {limit:.4g} '
                 f'{unit}'

@@ -30,42 +30,6 @@ from armid_ros.robots import described_at, held_joints, HeldJoint, Robot
 import numpy as np
 from scipy.integrate import cumulative_trapezoid
 
-#: A step is no motion if its velocity is this multiple of the limit and of this percentile of
-#: all steps. A step that reverts within this number of samples is repaired (`damage`).
-_IMPOSSIBLE, _USUAL, _BRIDGED = 10.0, 99.0, 10
-#: Range of a Brownian bridge over its scale with a probability of 1e-6 (Kuiper 1960).
-_WALK = 3.0
-#: Largest error of the integral of a constant speed, as a share of the distance. Errors of
-#: clocks and units are smaller. A reversal of the joint changes half of the distance.
-_WAY = 0.1
-#: Least time [s], and least share of the joint's range, over which a constant channel is dead.
-#: Least change of its load, as a share of weight or inertia, which cancel in a passive joint.
-_LONG, _FAR, _TAKEN = 1.0, 0.2, 0.5
-#: Longest piece over which velocities are integrated [s], above a usual period: integrated noise
-#: is a random walk. Largest RMS distance of a position from a line at constant speed [rad or m].
-_PIECE, _STEADY = 10.0, 0.1 * REST_RANGE
-#: Correlation from which a ratio is a plain factor: a low-pass that reduces a velocity by 5 %
-#: delays it by a phase with cosine 0.95. Largest relative difference of the ratios of
-#: joints with a common factor.
-_PLAIN, _ALIKE = 0.98, 0.02
-#: Smallest deviation of a common factor from 1 that is a fault. An error of time by 5 % changes
-#: the torque of inertia by 10 %. Errors of encoders, clocks and the integral are at most 1 %.
-_TOLERANCE = 0.05
-#: A velocity is in another unit if its correlation with the rate of the position is at least
-#: this, which explains half of its power, and its factor is within this ratio of the unit's.
-_FOLLOWS, _NEAR = 0.7, 1.25
-#: Ratio of the median reading of a joint to the limit of its drive from which it is in another
-#: unit. The smallest factor of a unit is 100. This ratio is its square root, and no drive
-#: exceeds its limit as much.
-_BEYOND_DRIVE = 10.0
-_DEGREE = float(np.deg2rad(1.0))
-#: Ratios of velocities to those of the positions, and the fault that each indicates.
-_RATIOS = {
-    1.0 / _DEGREE: 'are in degrees/s while positions are in rad',
-    _DEGREE: 'are in rad/s while positions are in degrees',
-    -1.0: 'have the opposite sign of the rates of the positions',
-}
-
 
 @dataclass(frozen=True)
 class Fault:
@@ -140,14 +104,16 @@ def _jumps(robot: Robot, recording: Recording) -> Iterator[Fault]:
     """Yield the first impossible jump of a position that is not reverted."""
     if len(recording) < 2:
         return
+    # A step is no motion if it is ten times as fast as the limit and as 99 % of all steps. A step
+    # that reverts within ten samples is repaired (`damage`).
     time = np.maximum(np.diff(recording.t), recording.period)[:, np.newaxis]
     steps = np.diff(recording.q, axis=0)
-    usual = np.percentile(np.abs(steps) / time, _USUAL, axis=0)
+    usual = np.percentile(np.abs(steps) / time, 99.0, axis=0)
     known = np.isfinite(robot.velocity_limit) & (robot.velocity_limit > 0.0)
     limit = np.maximum(usual, np.where(known, robot.velocity_limit, 0.0))
-    jumps = (np.abs(steps) > _IMPOSSIBLE * limit * time) & (limit > 0.0)
+    jumps = (np.abs(steps) > 10.0 * limit * time) & (limit > 0.0)
     for row, joint in np.argwhere(jumps).tolist():
-        step, later = steps[row, joint], recording.q[row + 1 :, joint][: _BRIDGED + 1]
+        step, later = steps[row, joint], recording.q[row + 1 :, joint][:11]
         if abs(later[-1] - recording.q[row, joint]) > 0.5 * abs(step):
             yield Fault(
                 f'the position of {robot.joints[joint]} jumps by {step:.3g} '
@@ -165,8 +131,9 @@ def encoder_faults(recording: Recording, units: Sequence[str] | None) -> Iterato
         return
     t, units = recording.t, units or ('rad',) * recording.n_joints
     moved = np.ptp(recording.q, axis=0)
-    # A wheel or a turntable may have constant speed, whose integral is its distance.
-    way = np.ptp(recording.q - recording.dq * (t - t[0])[:, np.newaxis], axis=0)
+    # A wheel or a turntable may have constant speed, whose integral is its distance to a tenth.
+    # Errors of clocks and units are smaller; a reversal changes half of the distance.
+    deviation = np.ptp(recording.q - recording.dq * (t - t[0])[:, np.newaxis], axis=0)
     changes = np.ptp(recording.dq, axis=0) > 0.0
     measured = bool(np.any((moved > REST_RANGE) & changes))  # or there are no velocities
     for j, unit in enumerate(units):
@@ -174,12 +141,22 @@ def encoder_faults(recording: Recording, units: Sequence[str] | None) -> Iterato
         # range of positions at rest, plus one step of the encoder
         steps = np.abs(np.diff(recording.q[:, j]))
         hidden = REST_RANGE + (float(steps[steps > 0.0].min()) if steps.any() else 0.0)
-        goes = _distance(t[start:stop], recording.dq[start:stop, j])
-        if goes > hidden:
-            why = f', while its velocity goes {goes:.3g} {unit}: its encoder is dead'
+        distance = 0.0  # range of the integral of the velocity minus its mean
+        if stop - start > 2:
+            time, dq = t[start:stop], recording.dq[start:stop, j]
+            integral = cumulative_trapezoid(dq, time, initial=0.0)
+            integral -= (time - time[0]) * integral[-1] / (time[-1] - time[0])
+            # Integrated white noise is a random walk; its second differences have 6 times its
+            # variance. The range of a Brownian bridge is 3 times its scale with a probability of
+            # 1e-6 (Kuiper 1960).
+            noise = float(np.mean(np.diff(dq, 2) ** 2)) / 6.0
+            walk = float(np.sqrt(noise * np.sum(np.diff(time) ** 2)))
+            distance = float(np.ptp(integral)) - 3.0 * walk
+        if distance > hidden:
+            why = f', while its velocity goes {distance:.3g} {unit}: its encoder is dead'
             value = f'{recording.q[start, j]:.4g} {unit}'
             yield _stays(recording, j, 'position', value, (start, stop), why, 'record again')
-        if measured and moved[j] > REST_RANGE and not changes[j] and way[j] > _WAY * moved[j]:
+        if measured and moved[j] > REST_RANGE and not changes[j] and deviation[j] > 0.1 * moved[j]:
             why = f', while its position goes {moved[j]:.3g} {unit}: one of the two is dead'
             remedy = 'record again, or leave velocities out if the positions are right'
             value = f'{recording.dq[0, j] + 0.0:.4g} {unit}/s'
@@ -194,11 +171,13 @@ def torque_faults(
     if np.all(np.ptp(recording.tau, axis=0) < NOTHING):
         yield Fault(SILENT, 'unusable', recording.source)
         return
-    t, least = recording.t, max(2, round(_LONG / recording.period))
+    # A channel is dead if it is constant for 1 s over a fifth of the joint's range, while its load
+    # changes by half of weight or inertia, which cancel in a passive joint.
+    t, least = recording.t, max(2, round(1.0 / recording.period))
     for j in range(recording.n_joints):
         reading, q = recording.tau[:, j], recording.q[:, j]
         start, stop = _longest_same(reading, NOTHING)
-        moved = float(np.ptp(q[start:stop])) > _FAR * float(np.ptp(q))
+        moved = float(np.ptp(q[start:stop])) > 0.2 * float(np.ptp(q))
         at_limit = 0.0 < np.abs(reading).max() == abs(reading[start]) and stop - start < len(t)
         if stop - start < least or not moved or at_limit:
             continue
@@ -208,7 +187,7 @@ def torque_faults(
                 continue
             load, weight = arm.load(part)[:, j], arm.load(part.at_rest())[:, j]
             largest = max(float(np.std(weight)), float(np.std(load - weight)))
-            if float(np.std(load)) > _TAKEN * largest > 0.0:
+            if float(np.std(load)) > 0.5 * largest > 0.0:
                 value = f'{reading[start] + 0.0:.4g} {arm.robot.torque_units[j]}'
                 why = ' while the joint moves: its channel is dead'
                 remedy = 'record with the joint held still'
@@ -240,7 +219,8 @@ def units_beyond_drives(
         return
     usual = np.median(np.abs(np.concatenate(measured)), axis=0)
     known = np.isfinite(robot.torque_limit) & (robot.torque_limit > 0.0)
-    beyond = known & (usual > _BEYOND_DRIVE * robot.torque_limit)
+    # the smallest factor of a unit is 100; no drive exceeds its limit by the square root of it
+    beyond = known & (usual > 10.0 * robot.torque_limit)
     if 2 * np.sum(beyond) > np.sum(known):
         return
     needed = np.max([np.abs(inverse_dynamics(robot, one)).max(axis=0) for one in motions], axis=0)
@@ -279,17 +259,6 @@ def _longest_same(reading: FloatArray, step: float = 0.0) -> tuple[int, int]:
     return int(bounds[longest]), int(bounds[longest + 1])
 
 
-def _distance(t: FloatArray, dq: FloatArray) -> float:
-    """Return the range of the integral of a recorded velocity minus its mean [rad or m]."""
-    if len(t) < 3:
-        return 0.0
-    way = cumulative_trapezoid(dq, t, initial=0.0)
-    way -= (t - t[0]) * way[-1] / (t[-1] - t[0])
-    # integrated white noise is a random walk; its second differences have 6 times its variance
-    noise = float(np.mean(np.diff(dq, 2) ** 2)) / 6.0
-    return max(float(np.ptp(way)) - _WALK * float(np.sqrt(noise * np.sum(np.diff(t) ** 2))), 0.0)
-
-
 def velocity_ratio(recording: Recording) -> tuple[FloatArray, FloatArray]:
     """
     Compare velocities of a recording with its positions, in the recorded time.
@@ -309,11 +278,12 @@ def velocity_ratio(recording: Recording) -> tuple[FloatArray, FloatArray]:
     nothing = np.full(recording.n_joints, np.nan), np.zeros(recording.n_joints)
     if recording.dq is None:
         return nothing
-    # positions and integrated velocities of unbroken pieces, both without linear trend
+    # positions and integrated velocities of unbroken pieces, both without linear trend; of at most
+    # 10 s, above a usual period, as integrated noise is a random walk
     pairs = []
     for stretch in unbroken(recording, 1.0 / recording.period):
         duration = recording.t[stretch[-1]] - recording.t[stretch[0]]
-        for part in np.array_split(stretch, max(1, int(np.ceil(duration / _PIECE)))):
+        for part in np.array_split(stretch, max(1, int(np.ceil(duration / 10.0)))):
             if len(part) > 3:
                 t = recording.t[part] - recording.t[part[0]]
                 line = np.linalg.qr(np.column_stack([np.ones(len(t)), t]))[0]
@@ -323,8 +293,9 @@ def velocity_ratio(recording: Recording) -> tuple[FloatArray, FloatArray]:
         return nothing
     moved, made = (np.concatenate(parts) for parts in zip(*pairs, strict=True))
     product, own, other = np.sum(moved * made, 0), np.sum(moved**2, 0), np.sum(made**2, 0)
-    # A joint with constant speed has only a linear trend and noise.
-    rests = (np.ptp(recording.q, axis=0) < REST_RANGE) | (own < len(moved) * _STEADY**2)
+    # a joint with constant speed has only a linear trend and noise: a tenth of the range at rest
+    rests = np.ptp(recording.q, axis=0) < REST_RANGE
+    rests |= own < len(moved) * (0.1 * REST_RANGE) ** 2
     size = np.sqrt(own * other)
     return (
         np.where(rests, np.nan, product / np.where(rests, 1.0, own)),
@@ -340,11 +311,16 @@ def velocity_faults(recording: Recording) -> Iterator[Fault]:
     A wrong time base needs at least two joints that agree, and no moving joint that disagrees.
 
     """
+    degree = float(np.deg2rad(1.0))
     ratio, fit = velocity_ratio(recording)
-    plain = ratio[fit > _PLAIN]
+    # A low-pass that reduces a velocity by 5 % delays it by a phase with cosine 0.95: a higher
+    # correlation shows a plain factor. Ratios of joints with a common factor differ by 2 %.
+    plain = ratio[fit > 0.98]
     factor = float(np.median(plain)) if len(plain) > 1 else 1.0
-    known = any(abs(factor / one - 1.0) <= _TOLERANCE for one in (1.0, _DEGREE, 1.0 / _DEGREE))
-    if not known and np.all(np.abs(plain / factor - 1.0) <= _ALIKE):
+    # An error of time by 5 % changes the torque of inertia by 10 %. Errors of encoders, clocks and
+    # the integral are at most 1 %.
+    known = any(abs(factor / one - 1.0) <= 0.05 for one in (1.0, degree, 1.0 / degree))
+    if not known and np.all(np.abs(plain / factor - 1.0) <= 0.02):
         yield Fault(
             f'velocities of all moving joints are {factor:.3g} times the rates of the positions. '
             f'Either time stamps run {factor:.3g} times the true time, and inertias are off by '
@@ -353,9 +329,15 @@ def velocity_faults(recording: Recording) -> Iterator[Fault]:
             'poor',
             recording.source,
         )
-    for expected, text in _RATIOS.items():
-        follows = fit * np.sign(expected) > _FOLLOWS
-        off = follows & (ratio / expected > 1.0 / _NEAR) & (ratio / expected < _NEAR)
+    texts = {
+        1.0 / degree: 'are in degrees/s while positions are in rad',
+        degree: 'are in rad/s while positions are in degrees',
+        -1.0: 'have the opposite sign of the rates of the positions',
+    }
+    for expected, text in texts.items():
+        # a correlation of 0.7 explains half of the power; a factor is near that of the unit
+        follows = fit * np.sign(expected) > 0.7
+        off = follows & (ratio / expected > 1.0 / 1.25) & (ratio / expected < 1.25)
         if off.any():
             named = ', '.join(recording.joints[k] for k in np.flatnonzero(off))
             what = f'velocities of {named} {text}; the fit takes velocities from the positions'

@@ -10,23 +10,7 @@ import numpy as np
 
 #: Share of uneven time steps above which stamps are uneven. A step is uneven if it differs by half
 #: of the median or more, or is less than half of the mean.
-_UNEVEN = 0.05
-#: Largest harmless error due to jitter, as a share of a signal at the upper end of the band.
-_BLURRED = 0.1
-#: Number of samples over which stamps are compared with an even grid. It shows jitter, but no
-#: slow drift of the clock.
-_WINDOW = 50
-#: Step between two messages below which a joint may be at rest with noise [rad or m].
-_LEAST_STEP = 1e-3
-#: Smallest ratio of a message's distance from its neighbours to that between the neighbours.
-_CLOSER = 5.0
-#: Number and share of contradicted messages below which these are faulty samples.
-_FEWEST, _SHARE_OF_MESSAGES = 20, 0.01
-#: Smallest ratio of a jump between two senders to the steps of one sender.
-_TRACK = 3.0
-#: A second sender with less than this share of the messages sends between those of the first. If
-#: gaps of this number of periods remain without its messages, these are faults of an encoder.
-_FEW, _REPLACED = 0.2, 1.5
+_UNEVEN_SHARE = 0.05
 
 
 def uneven_stamps(recording: Recording, cutoff_hz: float, band_hz: float) -> str:
@@ -49,8 +33,10 @@ def uneven_stamps(recording: Recording, cutoff_hz: float, band_hz: float) -> str
     median = float(np.median(steps))
     uneven = float(np.mean(np.abs(steps - median) > 0.5 * median))
     jitter = float(np.sqrt(np.mean(np.minimum(np.abs(steps - median), median) ** 2)))
-    blurred = uneven > _UNEVEN and 2.0 * np.pi * band_hz * jitter > _BLURRED
-    if not blurred and not 2.0 * np.pi * cutoff_hz * _wander(recording.t) > _BLURRED:
+    # largest harmless error due to jitter, as a share of a signal at the upper end of the band
+    harmless = 0.1
+    jitters = uneven > _UNEVEN_SHARE and 2.0 * np.pi * band_hz * jitter > harmless
+    if not jitters and not 2.0 * np.pi * cutoff_hz * _wander(recording.t) > harmless:
         return ''
     return (
         f'{recording.source or "recording"}: {100 * uneven:.0f} % of the time stamps are uneven '
@@ -66,7 +52,7 @@ def rounded_stamps(recording: Recording) -> str:
 
     """
     report, steps = recording.report, np.diff(recording.t)
-    if report.duplicates <= _UNEVEN * report.messages or len(steps) == 0:
+    if report.duplicates <= _UNEVEN_SHARE * report.messages or len(steps) == 0:
         return ''
     step = float(steps.min())
     # time steps that are multiples of the smallest step, to a hundredth of it
@@ -84,10 +70,11 @@ def _wander(t: FloatArray) -> float:
     # lost samples only make steps longer; varying delays of stamps make short steps too. Steps
     # alone do not determine the error of the stamps
     steps = np.diff(t)
-    if len(t) < _WINDOW or np.mean(steps < 0.5 * np.mean(steps)) <= _UNEVEN:
+    window = 50  # samples that are compared with an even grid: jitter, but no slow drift
+    if len(t) < window or np.mean(steps < 0.5 * np.mean(steps)) <= _UNEVEN_SHARE:
         return 0.0
-    windows = t[: len(t) - len(t) % _WINDOW].reshape(-1, _WINDOW).T
-    line = np.linalg.qr(np.column_stack([np.ones(_WINDOW), np.arange(_WINDOW)]))[0]
+    windows = t[: len(t) - len(t) % window].reshape(-1, window).T
+    line = np.linalg.qr(np.column_stack([np.ones(window), np.arange(window)]))[0]
     return float(np.sqrt(np.median(np.mean((windows - line @ (line.T @ windows)) ** 2, axis=0))))
 
 
@@ -101,9 +88,10 @@ def two_senders(recording: Recording) -> str:
 
     """
     t, q = recording.t, recording.q
-    if len(t) < 2 * _FEWEST:
+    # fewer contradicted messages, or less than 1 %, are faulty samples
+    fewest = max(20, 0.01 * len(t))
+    if len(t) < 40:
         return ''
-    fewest = max(_FEWEST, _SHARE_OF_MESSAGES * len(t))
     # rows of each joint whose message is far from both neighbours in the same direction, with
     # the step and its sign; joint by joint, as the arrays of one fit into the cache
     found = []
@@ -111,7 +99,8 @@ def two_senders(recording: Recording) -> str:
         steps = np.diff(q[:, joint])
         before, after, across = steps[:-1], -steps[1:], q[2:, joint] - q[:-2, joint]
         step = np.minimum(np.abs(before), np.abs(after))
-        apart = step > np.maximum(_LEAST_STEP, _CLOSER * np.abs(across))
+        # a step below 1e-3 [rad or m] may be noise at rest
+        apart = step > np.maximum(1e-3, 5.0 * np.abs(across))
         rows = np.flatnonzero(apart & (before * after > 0.0))
         found.append((rows, step[rows], before[rows] > 0.0))
     if sum(len(rows) for rows, *_ in found) < fewest:
@@ -130,12 +119,12 @@ def two_senders(recording: Recording) -> str:
     rows, step, side = found[joint]
     jump = float(np.median(step))
     own = [np.abs(np.diff(q[rows[one] + 1, joint])) for one in (side, ~side) if one.sum() > 1]
-    if not own or float(np.median(np.concatenate(own))) * _TRACK > jump:
+    # a jump between two senders is at least three times as large as the steps of one sender
+    if not own or 3.0 * float(np.median(np.concatenate(own))) > jump:
         return ''
-    if (
-        len(rows) < _FEW * len(t)
-        and np.median(t[rows + 2] - t[rows]) > _REPLACED * recording.period
-    ):
+    # A second sender of less than a fifth of the messages sends between those of the first. If
+    # gaps remain without its messages, these are faults of an encoder.
+    if len(rows) < 0.2 * len(t) and np.median(t[rows + 2] - t[rows]) > 1.5 * recording.period:
         return ''
     return (
         f'{len(rows)} of {len(t)} messages contradict those around them, as of two senders of '
