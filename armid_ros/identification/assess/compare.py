@@ -25,7 +25,7 @@ explain dozens of changes within their uncertainty, they are a load; the first n
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 import re
 
 from armid_ros.changes.statistic import beyond_chance, quadratic_form, tail
@@ -72,39 +72,49 @@ def compare(before: ParameterFile, after: ParameterFile) -> Comparison:
     )
     shared = [name for name in first.values if name in second.values]
     if not shared:
-        raise ModelError(_nothing_shared(before, after))
-    sides = [_Side.of(one, shared) for one in (first, second)]
+        for one in (before, after):
+            if not one.values and one.without_std:
+                raise ModelError(
+                    f'{one.source} has no standard deviation of any parameter, so changes cannot '
+                    'be tested; name a result of identify'
+                )
+        raise ModelError(
+            f'{before.source} and {after.source} have no identified parameter in common; '
+            'are they of one robot, with one gravity?'
+        )
     joint = before.covariance is not None and after.covariance is not None
-    groups: dict[str, list[int]] = {}
-    for position, name in enumerate(shared if joint else ()):
-        groups.setdefault('' if name.rigid else f'effects of {name.joint}', []).append(position)
-    places = [group for group in groups.values() if len(group) > 1]
+    grouped: dict[tuple[bool, str], list[ParameterName]] = {}
+    for name in shared if joint else ():
+        grouped.setdefault((name.rigid, '' if name.rigid else name.joint), []).append(name)
+    members = {group: tuple(own) for group, own in grouped.items() if len(own) > 1}
     residuals = residual_changes(before.fit, after.fit)
     # probability that the list of changes contains a false change
-    chance = 0.05 / sum((True, bool(places), bool(residuals)))
-    chances = [_whole(sides, (first, second), shared, group)[2] for group in places]
-    numbers = [*(side.values for side in sides), *(side.std for side in sides)]
-    sure = beyond_chance(_single_chances(*sides), chance)
-    changes = tuple(map(ParameterChange, shared, *(one.tolist() for one in numbers), sure))
-    members = [tuple(shared[k] for k in group) for group in places]
-    joints = ['' if own[0].rigid else own[0].joint for own in members]
-    found = tuple(map(GroupChange, joints, members, chances, beyond_chance(chances, chance)))
-    rigid = [k for k, name in enumerate(shared) if name.rigid]
+    chance = 0.05 / sum((True, bool(members), bool(residuals)))
+    values, std, p_values = _single_changes(first, second, shared)
+    significant = beyond_chance(p_values, chance)
+    numbers = zip(*values.tolist(), *std.tolist(), significant, strict=True)
+    changes = tuple(ParameterChange(n, *row) for n, row in zip(shared, numbers, strict=True))
+    p_values = [_common_change(first, second, own)[2] for own in members.values()]
+    significant = beyond_chance(p_values, chance)
+    joints = [joint for _, joint in members]
+    groups = tuple(map(GroupChange, joints, members.values(), p_values, significant))
     load = None
-    moved = any(changes[k].changed for k in rigid) or any(g.changed and not g.joint for g in found)
-    if joint and moved:
-        terms = [first.terms.get(shared[k], {}) for k in rigid]
-        load = _find_load(terms, *_whole(sides, (first, second), shared, rigid)[:2])
-    left = beyond_chance([one.p_value for one in residuals], chance)
+    rigid = [change for change in changes if change.parameter.rigid]
+    body_changed = any(one.changed for one in (*rigid, *(g for g in groups if not g.joint)))
+    if joint and body_changed:
+        names = [change.parameter for change in rigid]
+        terms = [first.terms.get(name, {}) for name in names]
+        load = _find_load(terms, *_common_change(first, second, names)[:2])
+    significant = beyond_chance([one.p_value for one in residuals], chance)
     return Comparison(
         before,
         after,
         changes,
         tuple(_only_in(before, second)),
         tuple(_only_in(after, first)),
-        found,
+        groups,
         load,
-        tuple(replace(one, changed=sure) for one, sure in zip(residuals, left, strict=True)),
+        tuple(replace(one, changed=so) for one, so in zip(residuals, significant, strict=True)),
         tuple(
             NotCompared(name, 'deviation')
             for name in dict.fromkeys((*before.without_std, *after.without_std))
@@ -133,20 +143,6 @@ def _require_two_of_one_robot(before: ParameterFile, after: ParameterFile) -> No
         )
 
 
-def _nothing_shared(before: ParameterFile, after: ParameterFile) -> str:
-    """Return the error message on two files that cannot be compared."""
-    for one in (before, after):
-        if not one.values and one.without_std:
-            return (
-                f'{one.source} has no standard deviation of any parameter, so changes cannot be '
-                'tested; name a result of identify'
-            )
-    return (
-        f'{before.source} and {after.source} have no identified parameter in common; '
-        'are they of one robot, with one gravity?'
-    )
-
-
 def _only_in(one: ParameterFile, other: ParameterFile) -> Iterator[NotCompared]:
     """Yield the parameters that only one of two results has."""
     for name in one.values:
@@ -160,128 +156,113 @@ def _only_in(one: ParameterFile, other: ParameterFile) -> Iterator[NotCompared]:
             yield NotCompared(name, 'deviation' if other.without_std else 'grouping')
 
 
-@dataclass(frozen=True)
-class _Side:
-    """Values, standard deviations and scatter of the shared parameters in one result."""
+def _single_changes(
+    before: ParameterFile, after: ParameterFile, names: Sequence[ParameterName]
+) -> tuple[FloatArray, FloatArray, FloatArray]:
+    """
+    Return values and standard deviations of both files, (2, p), and p-values of changes, (p,).
 
-    values: FloatArray  # (p,)
-    #: Standard deviations due to noise. If the scatter between recordings exceeds the noise of a
-    #: joint, they are multiplied by the ratio.
-    std: FloatArray
-    scatter: FloatArray  # changes of the values without each recording, (K, p)
-    #: Degrees of freedom of each standard deviation, infinite for noise. A mean square of n
-    #: values with correlations R has n^2 / sum(R^2) times the degrees of one value
-    #: (Satterthwaite).
-    freedoms: FloatArray
+    Standard deviations are those of noise. If the scatter between recordings exceeds the noise of
+    a joint, they are multiplied by the ratio.
 
-    @classmethod
-    def of(cls, known: ParameterFile, names: Sequence[ParameterName]) -> _Side:
-        """Return the values of one file."""
-        values, std = np.array([known.values[name] for name in names]).T
-        scatter = known.scatter_of(names)
-        freedoms = np.full(len(names), np.inf)
-        if len(scatter) > 1 and np.all(std > 0.0):
-            squares = np.sum((scatter / std) ** 2, axis=0)
-            alike = (known.covariance_of(names) / np.outer(std, std)) ** 2
-            std = std.copy()
-            for joint in {name.joint for name in names}:
-                own = [k for k, name in enumerate(names) if name.joint == joint]
-                inflation = float(np.mean(squares[own]))
-                if inflation > 1.0:
-                    std[own] *= np.sqrt(inflation)
-                    together = len(own) ** 2 / np.sum(alike[np.ix_(own, own)])
-                    freedoms[own] = (len(scatter) - 1) * together
-        return cls(values, std, scatter, freedoms)
-
-
-def _single_chances(before: _Side, after: _Side) -> FloatArray:
-    """Return the p-value of each difference, with degrees of freedom by Welch."""
-    size, std = np.abs(after.values - before.values), np.hypot(before.std, after.std)
-    same = size <= _ROUNDING * np.abs(before.values)
-    safe = np.where(std > 0.0, std, 1.0)
-    shares = [((side.std / safe) ** 4) / side.freedoms for side in (before, after)]
+    """
+    known = np.array([[one.values[name] for name in names] for one in (before, after)])
+    values, std = known[..., 0], known[..., 1].copy()
+    # degrees of freedom of each standard deviation, infinite for noise
+    freedom = np.full(std.shape, np.inf)
+    for one, own_std, own_freedom in zip((before, after), std, freedom, strict=True):
+        scatter = one.scatter_of(names)
+        if len(scatter) < 2 or not np.all(own_std > 0.0):
+            continue
+        squares = np.sum((scatter / own_std) ** 2, axis=0)
+        correlation = one.covariance_of(names) / np.outer(own_std, own_std)
+        for joint in {name.joint for name in names}:
+            own = [k for k, name in enumerate(names) if name.joint == joint]
+            inflation = float(np.mean(squares[own]))
+            if inflation > 1.0:
+                own_std[own] *= np.sqrt(inflation)
+                # a mean square of n values with correlations R has n^2 / sum(R^2) times the
+                # degrees of one value (Satterthwaite)
+                times = len(own) ** 2 / np.sum(correlation[np.ix_(own, own)] ** 2)
+                own_freedom[own] = (len(scatter) - 1) * times
+    change, of_change = values[1] - values[0], np.hypot(*std)
+    same = np.abs(change) <= _ROUNDING * np.abs(values[0])
+    safe = np.where(of_change > 0.0, of_change, 1.0)
+    shares = np.sum((std / safe) ** 4 / freedom, axis=0)
     with np.errstate(over='ignore', divide='ignore'):  # an infinite z-score has p-value 0
-        chances = tail((size / safe) ** 2, 1, 1.0 / (shares[0] + shares[1]))
-    return np.where(std > 0.0, chances, same)
+        p_values = tail((change / safe) ** 2, 1, 1.0 / shares)  # degrees of freedom by Welch
+    return values, std, np.where(of_change > 0.0, p_values, same)
 
 
-def _whole(
-    sides: Sequence[_Side],
-    files: Sequence[ParameterFile],
-    names: Sequence[ParameterName],
-    group: Sequence[int],
+def _common_change(
+    before: ParameterFile, after: ParameterFile, names: Sequence[ParameterName]
 ) -> tuple[FloatArray, FloatArray, float]:
     """Return the differences of some parameters, their covariance and overall p-value."""
-    own = [names[k] for k in group]
-    difference = (sides[1].values - sides[0].values)[list(group)]
-    covariance = files[0].covariance_of(own) + files[1].covariance_of(own)
-    if not np.all(np.diag(covariance) > 0.0):
+    files = before, after
+    difference = np.array([after.values[name][0] - before.values[name][0] for name in names])
+    covariance = sum((one.covariance_of(names) for one in files), np.zeros(()))
+    std = np.sqrt(np.diag(covariance))
+    if not np.all(std > 0.0):
         return difference, covariance, 1.0
+
+    def distance(rows: FloatArray) -> tuple[float, int]:
+        """Return the summed squared Mahalanobis distances of rows (K, p), and the rank."""
+        correlation = covariance / np.outer(std, std)
+        with np.errstate(over='ignore'):
+            squares, rank = quadratic_form(rows / std, correlation, _ROUNDING)
+            return float(squares.sum()), int(rank.max())
+
     # the covariance of noise is multiplied by the excess scatter between recordings
-    scatter = np.concatenate([side.scatter[:, list(group)] for side in sides])
+    scatters = [one.scatter_of(names) for one in files]
     inflation = 1.0
-    if len(scatter):
-        squares, rank = _squares(scatter, covariance)
+    if sum(map(len, scatters)):
+        squares, rank = distance(np.concatenate(scatters))
         inflation = max(1.0, squares / rank)
-    squares, rank = _squares(difference[np.newaxis], covariance)
-    freedom = sum(max(len(side.scatter) - 1, 0) for side in sides)
+    squares, rank = distance(difference[np.newaxis])
+    freedom = sum(max(len(scatter) - 1, 0) for scatter in scatters)
     known = np.inf if inflation <= 1.0 else rank * freedom
     return difference, inflation * covariance, float(tail(squares / inflation, rank, known))
-
-
-def _squares(rows: FloatArray, covariance: FloatArray) -> tuple[float, int]:
-    """Return the summed squared Mahalanobis distances of rows (K, p), and the rank."""
-    std = np.sqrt(np.diag(covariance))
-    with np.errstate(over='ignore'):
-        squares, rank = quadratic_form(rows / std, covariance / np.outer(std, std), _ROUNDING)
-        return float(squares.sum()), int(rank.max())
 
 
 def _find_load(
     terms: Sequence[Mapping[str, float]], difference: FloatArray, covariance: FloatArray
 ) -> LoadChange | None:
     """Return the load that explains the changes, on the outermost possible link, or None."""
-    # arms hold loads at the outermost link; a mass not different from zero is no load
     std = np.sqrt(np.diag(covariance))
     if not len(std) or not np.all(std > 0.0):
         return None
     root = np.linalg.cholesky(covariance / np.outer(std, std) + 1e-12 * np.eye(len(std)))
     white = scipy.linalg.solve_triangular(root, difference / std, lower=True)
     numbers = {int(found[1]) for row in terms for key in row if (found := _NUMBERED.match(key))}
-    loads = []
+    loads: list[LoadChange] = []
     for link in sorted(numbers):
         keys = [f'{symbol}{link}' for symbol in LINK_PARAMETERS]
         factors = np.array([[row.get(key, 0.0) for key in keys] for row in terms])
         columns = scipy.linalg.solve_triangular(root, factors / std[:, np.newaxis], lower=True)
-        load = _load(link, columns, white)
-        if load is not None:
-            loads.append(load)
+        lengths = np.linalg.norm(columns, axis=0)
+        scale = np.where(lengths > 0.0, lengths, 1.0)
+        left, sizes, right = np.linalg.svd(columns / scale, full_matrices=False)
+        # directions with smaller singular values are not identifiable
+        seen = sizes > 1e-9 * sizes[0]
+        left, sizes, right = left[:, seen], sizes[seen], right[seen]
+        along = left.T @ white
+        freedom = len(white) - len(sizes)
+        unexplained = float(white @ white - along @ along)
+        p_value = float(tail(unexplained, freedom)) if freedom > 0 else 0.0
+        # significance at which a load is rejected as the explanation of the changes
+        if p_value < 0.01 or np.linalg.norm(right[:, 0]) < 1.0 - 1e-6:
+            continue
+        values = (right.T @ (along / sizes)) / scale
+        mass, mass_std = float(values[0]), float(np.linalg.norm(right[:, 0] / sizes) / scale[0])
+        if abs(mass) < HALF_WIDTH * mass_std:  # a mass not different from zero is no load
+            continue
+        whole = np.all(np.linalg.norm(right[:, 1:4], axis=0) > 1.0 - 1e-6)
+        center = values[1:4] / mass if whole else None
+        loads.append(LoadChange(link, mass, mass_std, center, p_value))
     if not loads:
         return None
+    # arms hold loads at the outermost link
     return replace(loads[-1], rivals=tuple(load.link for load in loads[:-1]))
-
-
-def _load(link: int, columns: FloatArray, white: FloatArray) -> LoadChange | None:
-    """Fit a load on one link to whitened changes of base parameters; None if it is rejected."""
-    lengths = np.linalg.norm(columns, axis=0)
-    scale = np.where(lengths > 0.0, lengths, 1.0)
-    left, sizes, right = np.linalg.svd(columns / scale, full_matrices=False)
-    # directions with smaller singular values are not identifiable
-    seen = sizes > 1e-9 * sizes[0]
-    left, sizes, right = left[:, seen], sizes[seen], right[seen]
-    along = left.T @ white
-    rest = float(white @ white - along @ along)
-    freedom = len(white) - len(sizes)
-    p_value = float(tail(rest, freedom)) if freedom > 0 else 0.0
-    # significance at which a load is rejected as the explanation of the changes
-    if p_value < 0.01 or np.linalg.norm(right[:, 0]) < 1.0 - 1e-6:
-        return None
-    values = (right.T @ (along / sizes)) / scale
-    mass, std = float(values[0]), float(np.linalg.norm(right[:, 0] / sizes) / scale[0])
-    if abs(mass) < HALF_WIDTH * std:
-        return None
-    whole = np.all(np.linalg.norm(right[:, 1:4], axis=0) > 1.0 - 1e-6)
-    return LoadChange(link, mass, std, values[1:4] / mass if whole else None, p_value)
 
 
 def residual_changes(
