@@ -58,10 +58,6 @@ from armid_ros.motion import FloatArray
 from armid_ros.recording import Recording
 import numpy as np
 
-#: Largest increase of the torque error, as a share, for which physically consistent links are
-#: preferred: simulators need them, and a model that lacks an effect costs more.
-_CHEAP = 0.1
-
 
 @dataclass(frozen=True)
 class IdentificationSettings:
@@ -252,7 +248,8 @@ def identify(
     else:
         data = base, problem, recordings, used
         bodies = _among_bodies(arm, theory, data, settings, rng)
-        if bodies is not None and (settings.physical or bodies[3].cost <= _CHEAP):
+        # simulators need physically consistent links; a model that lacks an effect costs more
+        if bodies is not None and (settings.physical or bodies[3].cost <= 0.1):
             settings, theory, fit, _ = bodies
             notes += bodies[3].sentences()
         else:

@@ -13,12 +13,7 @@ import numpy as np
 import scipy.stats
 
 #: Half width of the interval around the true value, in standard deviations.
-WIDTH = 2.0
-#: Degrees of freedom of an estimated covariance. The covariance comes from the spectrum of the
-#: residual in the band of the motion. A run of 20 s has few samples of it. In 23 simulations of
-#: the demo, the distance of 56 parameters had mean 56 and deviation 17, as with this number. A
-#: known covariance would have deviation 11 and reject five simulations, not one.
-FREEDOM = 40.0
+_Z_SCORE = 2.0
 
 
 @dataclass(frozen=True)
@@ -48,11 +43,15 @@ class Agreement:
     upper: float
 
     @staticmethod
-    def of(estimate: Estimate, truth: FloatArray, freedom: float = FREEDOM) -> Agreement:
+    def of(estimate: Estimate, truth: FloatArray, freedom: float = 40.0) -> Agreement:
         """
         Compare an estimate of P parameters with the truth, shape (P,).
 
-        The covariance has `freedom` degrees of freedom; infinity if it is known exactly.
+        The covariance has `freedom` degrees of freedom; infinity if it is known exactly. It comes
+        from the spectrum of the residual in the band of the motion, of which a run of 20 s has few
+        samples. In 23 simulations of the demo, the distance of 56 parameters had mean 56 and
+        deviation 17, as with 40 degrees. A known covariance would have deviation 11 and reject
+        five simulations, not one.
 
         """
         scaled = (estimate.values - truth) / estimate.std
@@ -60,13 +59,13 @@ class Agreement:
         count, tail = len(scaled), 0.5 * (1.0 - 0.95)  # 95 % range
         lower, upper = count * scipy.stats.f.ppf((tail, 1.0 - tail), count, freedom)
         distance = float(scaled @ np.linalg.solve(correlation, scaled))
-        within = int(np.sum(np.abs(scaled) < WIDTH))
+        within = int(np.sum(np.abs(scaled) < _Z_SCORE))
         return Agreement(count, within, distance, float(lower), float(upper))
 
     @property
     def expected(self) -> float:
         """Return the expected number of parameters within two standard deviations."""
-        return float(self.parameters * (2.0 * scipy.stats.norm.cdf(WIDTH) - 1.0))
+        return float(self.parameters * (2.0 * scipy.stats.norm.cdf(_Z_SCORE) - 1.0))
 
     @property
     def holds(self) -> bool:

@@ -29,9 +29,6 @@ from armid_ros.motion import FloatArray, Motion
 from armid_ros.robots import GRAVITIES, Robot
 import numpy as np
 
-#: Possible zero errors of a joint [degrees], by its encoder, its axis or the description.
-TURNS = (-135.0, -90.0, -45.0, 45.0, 90.0, 135.0, 180.0)
-
 Quantity = Literal['position', 'torque', 'position and torque']
 QUANTITIES: tuple[Quantity, ...] = ('position and torque', 'position', 'torque')
 
@@ -80,13 +77,12 @@ class Hypothesis:
         return self.kind in ('units', 'unit', 'degrees', 'sign', 'exchange')
 
 
-AS_RECORDED = Hypothesis('nothing', 'the data have no mistake', values=0)
+AS_RECORDED = Hypothesis('nothing', 'the data have no mistake')
 #: Hypothesis that the described links explain nothing, and friction and drives everything.
 WITHOUT_BODY = Hypothesis(
     'body',
     'the description does not explain the torques',
     body=lambda robot: robot.with_inertias(np.zeros_like(robot.rigid_parameters)),
-    values=0,
 )
 
 
@@ -113,7 +109,8 @@ def hypotheses(robot: Robot, motions: Sequence[Motion]) -> Iterator[Hypothesis]:
             yield Hypothesis('sign', text, change, (joint, quantity))
         if turned[joint] and robot.n_joints > 1:
             yield _in_degrees(robot, joint)
-        for degrees in () if robot.prismatic[joint] else TURNS:
+        # possible zero errors of an encoder, an axis or a description
+        for degrees in () if robot.prismatic[joint] else (-135, -90, -45, 45, 90, 135, 180):
             yield _zero_off(robot, joint, degrees)
     for first, second in combinations(range(robot.n_joints), 2):
         matrix = np.eye(robot.n_joints)

@@ -6,8 +6,7 @@ from dataclasses import replace
 
 from armid_ros.arm import ArmModel
 from armid_ros.effects.slipping import Hysteresis
-from armid_ros.identification.assess.late_torque import late_torque
-from armid_ros.identification.assess.mistakes import find_mistake
+from armid_ros.identification.assess.mistakes import find_mistake, torque_delay
 from armid_ros.identification.rows.signals import conditioning, SignalSettings
 import numpy as np
 import pytest
@@ -40,7 +39,7 @@ def delayed(recording, seconds):
 
 def told(robot, recording):
     """Return the delay that is told of a recording; none where it is told from no zero."""
-    return late_torque(robot, recording, conditioning([recording], SignalSettings()))
+    return torque_delay(robot, recording, conditioning([recording], SignalSettings()))
 
 
 @pytest.mark.parametrize(('length', 'share'), [(1e-4, 2.0), (1e-3, 0.5), (3e-3, 2.0), (1e-2, 0.5)])
