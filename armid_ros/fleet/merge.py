@@ -21,7 +21,7 @@ from armid_ros.fleet.bags import BagFile, DAY_NS
 from armid_ros.fleet.plan import filters_at, Job
 from armid_ros.fleet.store import fetched
 from armid_ros.identification.fitting.covariance import noise_products, sandwich
-from armid_ros.identification.fitting.excited import bounds, identifiable_base
+from armid_ros.identification.fitting.identifiability import bounds, identifiable_base
 from armid_ros.identification.fitting.least_squares import (
     NormalEquations,
     weighted_fit,

@@ -11,8 +11,10 @@ from armid_ros.identification.assess.grade import Grade, grade
 from armid_ros.identification.assess.verification import Verification, verify
 from armid_ros.identification.identify import Identification, IdentificationSettings, identify
 from armid_ros.identification.output import identification_document, write_document
-from armid_ros.identification.physical.fit_among_bodies import PhysicalSettings
-from armid_ros.identification.physical.physical_certificate import PhysicalCertificate
+from armid_ros.identification.physical.fit_among_bodies import (
+    PhysicalCertificate,
+    PhysicalSettings,
+)
 from armid_ros.identification.rows.regression import Fit, Score
 from armid_ros.identification.rows.signals import Conditioning, SignalSettings
 

@@ -1,14 +1,35 @@
 # Copyright 2026 The armid_ros developers
 # SPDX-License-Identifier: Apache-2.0
-"""Parameters that data do not identify; reports contain the reason instead of a value."""
+"""
+Parameters that given data determine, their bounds, and the reasons for undetermined ones.
+
+Parameters that a motion does not separate are grouped. Parameters that the data determine worse
+than the description keep their described values: the mean squared error of an unbiased estimate is
+its variance, and that of the description is its largest expected error squared. If joints move one
+after the other, columns of coupling are small but independent. They would fit noise.
+
+"""
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
 from typing import Literal
 
+from armid_ros.arm import ArmModel
+from armid_ros.effects.load import described_spread
 from armid_ros.estimate import Estimate, ParameterName
-from armid_ros.model import BaseParameters
+from armid_ros.identification.fitting.least_squares import (
+    factored,
+    Method,
+    NormalEquations,
+    Solution,
+    solve,
+)
+from armid_ros.identification.rows.regression import Regression
+from armid_ros.model import BaseParameters, group_columns, regroup
+from armid_ros.motion import FloatArray
+from armid_ros.robots import Robot
 import numpy as np
 import numpy.typing as npt
 
@@ -88,3 +109,147 @@ def unidentified(
         if not sure
     ]
     return tuple(found)
+
+
+def excited(
+    theory: BaseParameters, problem: Sequence[Regression]
+) -> tuple[BaseParameters, tuple[Regression, ...]]:
+    """
+    Group parameters that a motion does not separate, such as links of a joint at rest.
+
+    Parameters
+    ----------
+    theory : BaseParameters
+        Base parameters that are identifiable in some motion.
+    problem : sequence of Regression
+        Columns of `theory` along this motion.
+
+    Returns
+    -------
+    base : BaseParameters
+        Base parameters that are identifiable in this motion.
+    problem : tuple of Regression
+        Columns of `base`.
+
+    """
+    base, kept = identifiable_base(theory, NormalEquations.of(problem))
+    return base, tuple(part.restrict(kept) for part in problem)
+
+
+def identifiable_base(
+    theory: BaseParameters, normal: NormalEquations
+) -> tuple[BaseParameters, list[int]]:
+    """
+    Group parameters that normal equations do not separate.
+
+    Parameters
+    ----------
+    theory : BaseParameters
+        Base parameters that are identifiable in some motion.
+    normal : NormalEquations
+        Normal equations in the columns of `theory`.
+
+    Returns
+    -------
+    base : BaseParameters
+        Base parameters that these rows identify.
+    kept : list of int
+        Indices of its columns among those of `theory`.
+
+    """
+    names = tuple(theory.standard[column] for column in theory.independent)
+    rows, _ = factored(normal.summed()[:-1, :-1])
+    # share of a column that is independent of the others, below which its parameter is grouped
+    # with them: 1e-4 of the length of a column is far below the noise
+    data = group_columns(rows, names, tolerance=1e-4)
+    base = theory if data.rank == theory.rank else regroup(theory, data)
+    order = {int(column): position for position, column in enumerate(theory.independent)}
+    return base, [order[int(column)] for column in base.independent]
+
+
+def bounds(arm: ArmModel, base: BaseParameters) -> tuple[FloatArray, FloatArray]:
+    """Return the bounds of base parameters; a group of parameters has none."""
+    free = np.full(len(arm.robot.rigid_parameters), np.inf)
+    effects = [effect.bounds() for effect in arm.effects]
+    lower = np.concatenate([-free, *(limits[0] for limits in effects)])[base.independent]
+    upper = np.concatenate([free, *(limits[1] for limits in effects)])[base.independent]
+    alone = np.count_nonzero(base.grouping, axis=1) == 1
+    return np.where(alone, lower, -np.inf), np.where(alone, upper, np.inf)
+
+
+def determined(
+    arm: ArmModel, base: BaseParameters, problem: Sequence[Regression], method: Method
+) -> tuple[BaseParameters, tuple[Regression, ...], Solution]:
+    """
+    Fix parameters to the description if it is more certain than the data.
+
+    Parameters are fixed one at a time, as each fixed parameter makes the others more certain.
+
+    Parameters
+    ----------
+    arm : ArmModel
+        Arm as described.
+    base : BaseParameters
+        Base parameters that the data identify.
+    problem : sequence of Regression
+        Columns of `base`.
+    method : {'ols', 'wls', 'irls'}
+        Weights of the fit; see ``solve``.
+
+    Returns
+    -------
+    base : BaseParameters
+        Base parameters that are fitted.
+    problem : tuple of Regression
+        Columns of these, with the torque of held parameters as a constant.
+    solution : Solution
+        Solution of the returned problem.
+
+    """
+    problem = tuple(problem)
+    spread = base_spread(arm, base)
+    while True:
+        solution = solve(problem, method, bounds(arm, base))
+        if not base.rank:
+            break
+        std = np.sqrt(np.diag(solution.covariance))
+        worst = int(np.argmax(std / spread))
+        if std[worst] <= spread[worst]:
+            break
+        kept = np.delete(np.arange(base.rank), worst)
+        value = float(base.values(arm.theta)[worst])
+        torques = [part.columns[:, :, worst] * value for part in problem]
+        problem = tuple(
+            replace(part, constant=torque + (0.0 if part.constant is None else part.constant))
+            for part, torque in zip(problem, torques, strict=True)
+        )
+        problem = tuple(part.restrict(kept) for part in problem)
+        parameters = tuple(base.parameters[k] for k in kept)
+        base = replace(
+            base,
+            parameters=parameters,
+            independent=base.independent[kept],
+            grouping=base.grouping[kept],
+        )
+        spread = spread[kept]
+    return base, problem, solution
+
+
+def base_spread(arm: ArmModel, base: BaseParameters) -> FloatArray:
+    """
+    Return the largest expected errors of described base parameters, shape (r,).
+
+    The error is infinite for an effect of unknown size, and if no link has a mass.
+
+    """
+    effects = [effect.spread(arm.robot) for effect in arm.effects]
+    spread = np.concatenate([described_spread(arm.robot).ravel(), *effects])
+    unknown = np.any(base.grouping[:, ~np.isfinite(spread)], axis=1)
+    known = np.where(np.isfinite(spread), spread, 0.0)
+    size = np.linalg.norm(base.grouping * known, axis=1)
+    return np.where(~unknown & (size > 0.0), size, np.inf)
+
+
+def near_deviation(robot: Robot) -> FloatArray:
+    """Return the prior standard deviation of rigid parameters, shape (10 n,)."""
+    return np.asarray(described_spread(robot).ravel() / np.sqrt(3.0))

@@ -18,7 +18,7 @@ from dataclasses import dataclass, replace
 from armid_ros.arm import ArmModel
 from armid_ros.errors import IdentificationError
 from armid_ros.identification.fitting.covariance import noise_products, sandwich
-from armid_ros.identification.fitting.excited import bounds
+from armid_ros.identification.fitting.identifiability import bounds
 from armid_ros.identification.fitting.least_squares import within
 from armid_ros.identification.fitting.nonlinear import (
     FittedValues,

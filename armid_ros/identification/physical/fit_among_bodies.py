@@ -14,17 +14,19 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
+from typing import Any
 
 from armid_ros.arm import ArmModel
 from armid_ros.errors import IdentificationError
-from armid_ros.identification.fitting.excited import bounds, excited
+from armid_ros.estimate import ParameterName
+from armid_ros.identification.fitting.identifiability import bounds, excited
 from armid_ros.identification.fitting.least_squares import informative_solution, Method, solve
 from armid_ros.identification.fitting.nonlinear import agree, FittedValues, through, torques
-from armid_ros.identification.physical.physical_certificate import (
-    PhysicalCertificate,
-    walls_reached,
+from armid_ros.identification.physical.physical_program import (
+    Box,
+    box_conditions,
+    PhysicalProgram,
 )
-from armid_ros.identification.physical.physical_program import Box, PhysicalProgram
 from armid_ros.identification.rows.regression import regressions, weighted_rows
 from armid_ros.identification.rows.signals import Conditioning, TORQUE_RESOLUTION
 from armid_ros.model import BaseParameters
@@ -35,6 +37,10 @@ from armid_ros.robots import Robot
 from armid_ros.robots.robot import PER_LINK
 import numpy as np
 import scipy.linalg
+
+#: Relative size of a pseudo-inertia in any direction, up to which it is at the limit of physical
+#: consistency; relative distance to a wall of a box, up to which it is at the wall.
+_ACTIVE_SHARE = 1e-3
 
 
 @dataclass(frozen=True)
@@ -71,6 +77,136 @@ class PhysicalSettings:
                     f"box of joint '{joint}': {tuple(lower)} has to be below {tuple(upper)} "
                     'along x, y and z'
                 )
+
+
+@dataclass(frozen=True)
+class PhysicalCertificate:
+    """
+    Evidence of physical consistency, and increase of the torque error by the constraints.
+
+    Attributes
+    ----------
+    links : tuple of Consistency
+        Eigenvalues of every pseudo-inertia, mass, centre, principal moments.
+    shares : ndarray, shape (n,)
+        Smallest size of each pseudo-inertia relative to the prior's, over all directions.
+    at_bound : tuple of ParameterName
+        Effect parameters at their bounds.
+    at_wall : tuple of str
+        Joints whose link is at the limit of its box, with the side.
+    total_mass : float or None
+        Given sum of the masses [kg].
+    weight : float
+        Weight of the prior.
+    tried : tuple of (float, float)
+        Compared weights, with held-out errors relative to those of unconstrained fits.
+    misfit_ratio : float
+        Weighted error on the training data, relative to the unconstrained fit's.
+    notes : tuple of str
+        Assumptions on links without a body in the description.
+    at_mass : tuple of str
+        Links at the lower or upper limit of their mass.
+
+    """
+
+    links: tuple[Consistency, ...]
+    shares: FloatArray
+    at_bound: tuple[ParameterName, ...]
+    at_wall: tuple[str, ...]
+    total_mass: float | None
+    weight: float
+    tried: tuple[tuple[float, float], ...]
+    misfit_ratio: float
+    notes: tuple[str, ...]
+    at_mass: tuple[str, ...] = ()
+
+    @property
+    def consistent(self) -> bool:
+        """Whether every link is physically consistent."""
+        return all(link.consistent for link in self.links)
+
+    @property
+    def held_out_ratio(self) -> float:
+        """Error on held-out blocks with the chosen weight, relative to unconstrained fits."""
+        return dict(self.tried)[self.weight]
+
+    @property
+    def cost(self) -> float:
+        """Relative increase of training or held-out error by the constraints, the larger one."""
+        return max(self.misfit_ratio, self.held_out_ratio) - 1.0
+
+    @property
+    def active(self) -> tuple[str, ...]:
+        """Links at the limit of physical consistency."""
+        near = self.shares < _ACTIVE_SHARE
+        return tuple(link.link for link, at in zip(self.links, near, strict=True) if at)
+
+    @property
+    def activity(self) -> tuple[str, ...]:
+        """Return notes on active constraints and their cost; empty if none is active."""
+        notes = []
+        # held-out torque error, relative to an unconstrained fit, above which the constraints do
+        # not fit the arm
+        if self.held_out_ratio > 1.03:
+            notes.append(
+                f'constraints cost {100.0 * (self.held_out_ratio - 1.0):.1f} % of torque error on '
+                'blocks left out: a given mass or box is wrong, or the model lacks an effect'
+            )
+        if self.active:
+            notes.append(
+                f'at the limit of what a body can be: {", ".join(self.active)}; '
+                'the model lacks an effect there, or the data are poor'
+            )
+        if self.at_wall:
+            notes.append(f'at the limit of the box: {", ".join(self.at_wall)}')
+        if self.at_mass:
+            notes.append(f'as light or heavy as they may be: {", ".join(self.at_mass)}')
+        if self.total_mass is not None:
+            notes.append(f'the masses add up to {self.total_mass:g} kg, as given')
+        if self.at_bound:
+            names = ', '.join(f'{p.name} of {p.joint}' for p in self.at_bound)
+            notes.append(f'held by their bounds: {names}')
+        return tuple(notes)
+
+    def sentences(self) -> tuple[str, ...]:
+        """Return the findings as sentences."""
+        least = min(self.links, key=lambda link: float(link.eigenvalues[0]))
+        verdict = 'every link is a body' if self.consistent else 'not every link is a body'
+        return (
+            f'{verdict}: the smallest eigenvalue of a pseudo-inertia is '
+            f'{least.eigenvalues[0]:.3g} ({least.link})',
+            f'constraints cost {100.0 * (self.misfit_ratio - 1.0):.2f} % of torque error on the '
+            f'training data and {100.0 * (self.held_out_ratio - 1.0):+.2f} % on blocks left out; '
+            f'weight of the description {self.weight:g}',
+            *(self.activity or ('no constraint is active',)),
+            *self.notes,
+        )
+
+    def document(self) -> dict[str, Any]:
+        """Return the certificate as a document."""
+        return {
+            'consistent': self.consistent,
+            'links': [
+                {
+                    'link': link.link,
+                    'eigenvalues': link.eigenvalues.tolist(),
+                    'mass': link.mass,
+                    'center': link.center.tolist(),
+                    'principal_moments': link.moments.tolist(),
+                    'share_of_prior': float(share),
+                    'at_limit': link.link in self.active,
+                }
+                for link, share in zip(self.links, self.shares, strict=True)
+            ],
+            'at_bound': [{'name': p.name, 'joint': p.joint} for p in self.at_bound],
+            'at_wall': list(self.at_wall),
+            'at_mass': list(self.at_mass),
+            'total_mass': self.total_mass,
+            'prior_weight': self.weight,
+            'tried': [{'weight': w, 'held_out_ratio': ratio} for w, ratio in self.tried],
+            'training_ratio': self.misfit_ratio,
+            'held_out_ratio': self.held_out_ratio,
+        }
 
 
 def fit_to_bodies(
@@ -117,8 +253,7 @@ def fit_to_bodies(
         promised = tuple(part.torque(fit.values) for part in fit.problem)
         predicted = torques(fit.arm, recordings, used)
         fit = replace(fit, predicted=predicted, passes=free.passes + passes)
-        settled = agree(fit.problem, fit.solution.weights, promised, predicted)
-        if settled:
+        if agree(fit.problem, fit.solution.weights, promised, predicted):
             return replace(fit, settled=free.settled), certificate
         # linearise about the fit in the parameters that are identifiable there, and solve
         theory = fit.arm.base_parameters(rng)
@@ -139,7 +274,6 @@ def _bodies(
     """Fit physically consistent standard parameters to a linear problem."""
     base, problem, weights = fit.base, fit.problem, fit.solution.weights
     program, notes = physical_program(arm, base, settings)
-    prior, lower, upper, boxes = program.prior, program.lower, program.upper, program.boxes
     # products of the weighted rows of blocks of successive samples, which are left out in turn
     n_blocks = 5
     ends = np.cumsum([len(part) for part in np.array_split(weights, n_blocks)])[:-1]
@@ -158,15 +292,14 @@ def _bodies(
     best = min(error for _, error in tried)
     weight = max(w for w, error in tried if error <= (1.0 + 1e-3) * best)  # tolerance of 0.1 %
     theta = program.solve(whole, float(counts.sum()), weight)
-    rigid = theta[: len(theta) - len(lower)].reshape(-1, PER_LINK)
+    size = len(theta) - len(program.lower)
+    rigid, effects = theta[:size].reshape(-1, PER_LINK), theta[size:]
     links = tuple(
         Consistency.of(link, values) for link, values in zip(arm.robot.links, rigid, strict=True)
     )
-    effects = theta[len(theta) - len(lower) :]
     scale = 1e-6 * np.maximum(np.abs(effects).max(initial=0.0), 1e-9)
-    held = (effects - lower <= scale) | (upper - effects <= scale)
-    names, values = arm.parameters[len(theta) - len(lower) :], base.values(theta)
-    described = prior[: rigid.size].reshape(-1, PER_LINK)
+    held = (effects - program.lower <= scale) | (program.upper - effects <= scale)
+    values, described = base.values(theta), program.prior[:size].reshape(-1, PER_LINK)
     bound = (1.0 - 1e-3) * np.log(settings.mass_range or np.inf)  # up to rounding
     off = np.abs(np.log(rigid[:, 0] / described[:, 0])) > bound
     certificate = PhysicalCertificate(
@@ -177,22 +310,31 @@ def _bodies(
                 for own, before in zip(rigid, described, strict=True)
             ]
         ),
-        at_bound=tuple(name for name, at in zip(names, held, strict=True) if at),
+        at_bound=tuple(arm.parameters[size + k] for k in np.flatnonzero(held)),
         at_wall=tuple(
             f'{arm.robot.joints[link]} at {wall}'
-            for link, box in boxes.items()
-            for wall in walls_reached(rigid[link], box)
+            for link, box in program.boxes.items()
+            for wall in _walls_reached(rigid[link], box)
         ),
         total_mass=settings.total_mass,
         weight=weight,
         tried=tried,
         misfit_ratio=max(_misfit(whole, values) / least, 1.0),
         notes=(*notes, *far_from_described(arm.robot, rigid[:, 0])),
-        at_mass=tuple(link for link, at in zip(arm.robot.links, off, strict=True) if at),
+        at_mass=tuple(arm.robot.links[k] for k in np.flatnonzero(off)),
     )
-    found = arm.with_theta(theta)
     predicted = tuple(part.torque(values) for part in problem)
-    return replace(fit, arm=found, values=values, predicted=predicted), certificate
+    fit = replace(fit, arm=arm.with_theta(theta), values=values, predicted=predicted)
+    return fit, certificate
+
+
+def _walls_reached(parameters: FloatArray, box: Box) -> list[str]:
+    """Return the active limits of the box of a link with ten inertial parameters."""
+    width = box[1] - box[0]
+    largest = np.concatenate([width, width, 0.25 * width**2]) * parameters[0]
+    near = box_conditions(box) @ parameters < _ACTIVE_SHARE * largest
+    walls = [f'{side} {axis}' for side in ('lower', 'upper', 'spread along') for axis in 'xyz']
+    return [wall for wall, at in zip(walls, near, strict=True) if at]
 
 
 def far_from_described(robot: Robot, masses: FloatArray) -> tuple[str, ...]:
@@ -226,10 +368,8 @@ def physical_program(
     }
     rigid = len(prior) - len(lower)
     prior[rigid:] = np.clip(prior[rigid:], lower, upper)
-    program = PhysicalProgram(
-        base, prior, lower, upper, settings.total_mass, boxes, settings.mass_range
-    )
-    return program, notes
+    given = settings.total_mass, boxes, settings.mass_range
+    return PhysicalProgram(base, prior, lower, upper, *given), notes
 
 
 def bodily_prior(arm: ArmModel) -> tuple[FloatArray, tuple[str, ...]]:

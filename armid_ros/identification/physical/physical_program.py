@@ -77,10 +77,6 @@ class PhysicalProgram:
         """Return the number of links n."""
         return (len(self.prior) - len(self.lower)) // PER_LINK
 
-    @property
-    def _rigid(self) -> int:
-        return PER_LINK * self.n_links
-
     def solve(self, products: FloatArray, count: float, weight: float) -> FloatArray:
         """
         Return the standard parameters that minimise the cost under the constraints.
@@ -108,7 +104,7 @@ class PhysicalProgram:
         # weight c of the prior of a mass: a mass three times as large must reduce the squares by
         # 0.2 %
         mass_weight = 1e-3
-        rank, size, rigid = self.base.rank, len(self.prior), self._rigid
+        rank, size, rigid = self.base.rank, len(self.prior), len(self.prior) - len(self.lower)
         information = self.base.grouping.T @ (products[:rank, :rank] / count) @ self.base.grouping
         lengths = np.sqrt(np.diag(information)[rigid:])
         # linear map to theta from symmetric matrices (the identity is the prior) and effects
@@ -174,6 +170,7 @@ class PhysicalProgram:
         offsets: list[FloatArray] = []
         cones: list[Any] = []
         empty = sparse.csr_matrix((1, _LOG_DETERMINANT * self.n_links))
+        rigid = len(self.prior) - len(self.lower)
 
         def linear(cone: Any, normal: FloatArray, offset: FloatArray) -> None:
             """Constrain normal @ theta + offset to a cone with one dimension per row."""
@@ -185,15 +182,15 @@ class PhysicalProgram:
 
         if self.total_mass is not None:
             masses = np.zeros((1, len(self.prior)))
-            masses[0, : self._rigid : PER_LINK] = 1.0
+            masses[0, :rigid:PER_LINK] = 1.0
             linear(clarabel.ZeroConeT, masses, np.array([-self.total_mass]))
-        unit = np.eye(len(self.prior))[self._rigid :]
+        unit = np.eye(len(self.prior))[rigid:]
         for sign, bound in ((1.0, self.lower), (-1.0, self.upper)):
             finite = np.isfinite(bound)
             linear(clarabel.NonnegativeConeT, sign * unit[finite], -sign * bound[finite])
         if self.mass_range is not None:
-            mass = np.eye(len(self.prior))[: self._rigid : PER_LINK]
-            described = self.prior[: self._rigid : PER_LINK]
+            mass = np.eye(len(self.prior))[:rigid:PER_LINK]
+            described = self.prior[:rigid:PER_LINK]
             linear(clarabel.NonnegativeConeT, mass, -described / self.mass_range)
             linear(clarabel.NonnegativeConeT, -mass, described * self.mass_range)
         for link, box in self.boxes.items():

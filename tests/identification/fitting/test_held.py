@@ -5,8 +5,7 @@
 from dataclasses import replace
 
 from armid_ros.identification import grade, identify
-from armid_ros.identification.fitting.excited import base_spread
-from armid_ros.identification.fitting.identifiability import NOT_SHOWN
+from armid_ros.identification.fitting.identifiability import base_spread, NOT_SHOWN
 from armid_ros.identification.rows.regression import Score
 import numpy as np
 import pytest
