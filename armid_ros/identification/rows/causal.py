@@ -31,9 +31,6 @@ from scipy import signal as signals
 _CUTOFF_OF_POLE = float(np.sqrt(2.0 ** (1.0 / 3.0) - 1.0))
 #: G is faster than F by this factor, where the sampling rate allows it.
 MOTION_FILTER_RATIO = 4.0
-#: Rate of regressor rows over the cut-off frequency of F. The rate resolves the steps of
-#: sign(dq), and aliases of the output of G are outside the band of F.
-ROW_RATE_RATIO = 40.0
 #: Largest valid position or torque [SI units]; squares of larger numbers dominate the rest.
 LARGEST = 1e6
 

@@ -8,17 +8,17 @@ from collections.abc import Iterable, Sequence
 
 from armid_ros.arm import ArmModel
 from armid_ros.errors import IdentificationError
-from armid_ros.identification.rows.feedback import laws_of_controllers, residual_of_fit
-from armid_ros.identification.rows.regression import Regression
+from armid_ros.identification.rows.regression import Regression, REST_SPEED
 from armid_ros.identification.rows.signals import Conditioning
 from armid_ros.identification.rows.stamps import uneven_stamps
-from armid_ros.model import inverse_dynamics
+from armid_ros.model import inverse_dynamics, regressor
 from armid_ros.motion import FloatArray, Motion
 from armid_ros.recording import Recording
 from armid_ros.recording.series import NOTHING
 from armid_ros.robots import Robot
 import numpy as np
 import numpy.typing as npt
+from scipy.ndimage import maximum_filter1d
 
 #: A joint that stays within this range is at rest [rad or m].
 REST_RANGE = 1e-3
@@ -44,9 +44,6 @@ _UNITS_OF_ALL = {
 #: Largest ratio between a factor of torques and the factor of their unit: masses of a description
 #: are wrong by less.
 NEAR = 1.5
-#: The same ratio for units of force, which are near gains of currents: 10 N m/A is 1.02 kgf m/A.
-#: Wrong masses of a description change the factor of one joint by as much.
-_NEAR_FORCE = 1.2
 #: Unit of force of a prismatic joint that corresponds to each unit of torque.
 FORCE_UNITS = {'N m': 'N', 'N mm': 'mN', 'N cm': 'cN', 'kN m': 'kN'}
 #: Share of its top speed below which a joint may be held by friction with any torque.
@@ -218,6 +215,82 @@ def driven_by_friction(robot: Robot, motions: Sequence[Motion]) -> str:
     )
 
 
+def laws_of_controllers(
+    robot: Robot, motion: Motion, informative: npt.NDArray[np.bool_]
+) -> tuple[str, ...]:
+    """
+    Return messages if the torque of every driven joint is a law of position and direction alone.
+
+    Gravity compensation outputs the weight of the arm while a hand moves it; energy shaping
+    outputs a constant torque in the direction of motion. Such a torque does not contain the torque
+    of inertia. A fit then attributes everything to friction, or finds an arm without mass.
+
+    If only some joints follow such a law, the model lacks their inertia instead. There is no
+    result if the motion is too short to test most joints.
+
+    Parameters
+    ----------
+    robot : Robot
+        The arm.
+    motion : Motion
+        Filtered motion with the torque filtered alike, R samples of n joints.
+    informative : ndarray of bool, shape (R, n)
+        False where a joint is at rest.
+
+    Returns
+    -------
+    tuple of str
+        A sentence for each such joint, with the remedy; none if any driven joint obeys no law, or
+        if at least as many joints cannot be tested.
+
+    """
+    # rows where a joint reverses, and three on either side, which filters smear
+    speed = np.abs(motion.dq)
+    slow = speed <= REST_SPEED * speed.max(axis=0, initial=0.0)
+    slow[1:] |= np.diff(np.sign(motion.dq), axis=0) != 0
+    smeared = maximum_filter1d(slow, 7, axis=0, mode='constant')
+    # 5000 rows are about sixty for every value of seven joints
+    some = slice(None, None, max(1, len(motion) // 5000))
+    informative = (informative & ~smeared)[some]
+    motion = motion.select(some)
+    assert motion.tau is not None
+    weight, needed = regressor(robot, motion.at_rest()), inverse_dynamics(robot, motion)
+    laws: list[str] = []
+    untested = 0
+    for joint, (name, unit) in enumerate(zip(robot.joints, robot.torque_units, strict=True)):
+        rows = informative[:, joint]
+        tau = motion.tau[rows, joint]
+        direction = np.sign(motion.dq[rows, joint])
+        law = np.column_stack([weight[rows, joint], direction, np.ones_like(tau)])
+        # with fewer rows, any torque fits a law
+        rank = int(np.linalg.matrix_rank(law)) if len(law) else 0
+        if len(law) < 10 * max(rank, 1):
+            untested += 1
+            continue
+        residual, lacking = (
+            float(np.sqrt(np.sum(residual_of_fit(y, law) ** 2) / (len(law) - rank)))
+            for y in (tau, needed[rows, joint])
+        )
+        size = float(np.sqrt(np.mean(tau**2)))
+        # smallest torque of a driven joint as a share of the torque of the model. With less, the
+        # joint swings freely, or the model is wrong.
+        if size < 0.5 * float(np.sqrt(np.mean(needed[rows, joint] ** 2))):
+            continue
+        # largest residual of a law as a share of the torque: friction of a real joint depends on
+        # speed, so it differs by more from a law without speed; and over the torque that the
+        # model needs in addition to the law: no model has an inertia that is ten times too large
+        if residual > 0.03 * size or residual > 0.1 * lacking:
+            return ()
+        laws.append(
+            f'the torque of {name} is a law of position and direction of motion alone, to '
+            f'{100 * residual / size:.1f} %. A controller that holds the weight or pushes along '
+            f'makes such a torque. The {lacking:.2g} {unit} of the inertia are missing in it. '
+            'Something else moves the arm, or body and friction cannot be distinguished: record '
+            'the arm while it follows a trajectory'
+        )
+    return tuple(laws) if len(laws) > untested else ()
+
+
 def check_positions(robot: Robot, source: str, lowest: FloatArray, highest: FloatArray) -> None:
     """Raise an error for joints far out of limits, by lowest and highest positions (n,)."""
     problem = position_problem(robot, lowest, highest)
@@ -258,13 +331,13 @@ def beyond_limits(robot: Robot, recordings: Sequence[Recording]) -> tuple[str, .
     """Return a note on joints that exceed described limits, with position and limit."""
     slack = _LIMIT_SLACK * (robot.upper - robot.lower)
     found = []
-    for way, limits, ends in (
+    for sign, limits, ends in (
         (-1.0, robot.lower, np.min([one.q.min(axis=0) for one in recordings], axis=0)),
         (1.0, robot.upper, np.max([one.q.max(axis=0) for one in recordings], axis=0)),
     ):
         found += [
             f'{robot.joints[j]} reaches {ends[j]:.4g} of {limits[j]:.4g} {robot.position_units[j]}'
-            for j in np.flatnonzero(way * (ends - limits) > slack)
+            for j in np.flatnonzero(sign * (ends - limits) > slack)
         ]
     if not found:
         return ()
@@ -321,9 +394,7 @@ def joined(motions: Sequence[Motion]) -> Motion:
     return Motion(motions[0].joints, *arrays)
 
 
-def unit_of(
-    factor: float, of_joints: Sequence[float] = (), near_force: float = _NEAR_FORCE
-) -> str:
+def unit_of(factor: float, of_joints: Sequence[float] = (), near_force: float = 1.2) -> str:
     """
     Return the units that explain a factor of torques, joined by 'or'; '' if there are none.
 
@@ -334,15 +405,22 @@ def unit_of(
     of_joints : sequence of float
         Factors of single joints. A unit has to fit each of them; gains of currents differ.
     near_force : float
-        Largest ratio between a factor and that of a unit of force on a lever.
+        Largest ratio between a factor and that of a unit of force on a lever. These are near
+        gains of currents: 10 N m/A is 1.02 kgf m/A. Wrong masses change the factor of one joint
+        by a fifth.
 
     """
     if factor <= 0.0:
         return ''
-    off = {}
+    distances = {}
     for unit, per in _UNITS_OF_ALL.items():
         near = np.log(near_force if unit.startswith(('kgf', 'lbf')) else NEAR)
         apart = np.abs(np.log(np.array([factor, *of_joints]) / per)) / near
         if np.all(apart < 1.0):
-            off[unit] = float(apart[0])
-    return ' or '.join(sorted(off, key=off.__getitem__))
+            distances[unit] = float(apart[0])
+    return ' or '.join(sorted(distances, key=distances.__getitem__))
+
+
+def residual_of_fit(values: FloatArray, columns: FloatArray) -> FloatArray:
+    """Return the residual of a least-squares fit of values by columns, shape (N, ...)."""
+    return np.asarray(values - columns @ np.linalg.lstsq(columns, values, rcond=None)[0])

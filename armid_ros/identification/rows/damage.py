@@ -12,6 +12,7 @@ from armid_ros.identification.samples.spikes import FIRST, SpikeGate
 from armid_ros.identification.samples.straight_line import (
     Excursion,
     growth_over,
+    MAX_GAP,
     missed_by,
     robust_scale,
     share_of_noise,
@@ -145,7 +146,7 @@ def _suspects(
     """
     dt = np.diff(t)
     period = float(np.median(dt))
-    gap = dt > gate.max_gap * period
+    gap = dt > MAX_GAP * period
     first = np.where(np.concatenate([[True], gap]), np.arange(len(t)), 0)
     apart = gap[1:] | gap[:-1]
     ratio, (noise, bend) = dt[1:] / dt[:-1], growth_over(dt[:-1], dt[1:], period)

@@ -7,9 +7,6 @@ from __future__ import annotations
 from armid_ros.motion import FloatArray
 import numpy as np
 
-#: Positions of two periods agree within this share of the range of motion.
-_SAME = 0.02
-
 
 def find_period(t: FloatArray, positions: FloatArray) -> tuple[int, slice] | None:
     """
@@ -30,6 +27,8 @@ def find_period(t: FloatArray, positions: FloatArray) -> tuple[int, slice] | Non
         Samples that are repeated one period later.
 
     """
+    # positions of two periods agree within this share of the range of motion
+    tolerance = 0.02
     rate = 1.0 / float(t[1] - t[0])
     stride = max(1, int(rate / 25.0))
     q = positions[::stride]
@@ -40,7 +39,7 @@ def find_period(t: FloatArray, positions: FloatArray) -> tuple[int, slice] | Non
     change = np.abs(np.gradient(q, axis=0))
     speed = change.max(axis=1)
     moving = speed > 0.05 * speed.max()
-    allowed = _SAME + change  # at this stage, the lag is known to one sample
+    allowed = tolerance + change  # at this stage, the lag is known to one sample
     shortest = int(1.5 * rate / stride)  # the shortest period is 1.5 s
     best: tuple[int, int, int] | None = None
     for lag in range(shortest, int(0.7 * len(q))):
@@ -53,9 +52,9 @@ def find_period(t: FloatArray, positions: FloatArray) -> tuple[int, slice] | Non
         length = int(np.sum(moving[start:stop]))
         if length <= 0.6 * lag or (best is not None and length <= 1.2 * (best[2] - best[1])):
             continue
-        # smallest range of some joint in a period, in units of `_SAME`: slower motion agrees with
+        # smallest range of some joint in a period, over the tolerance: slower motion agrees with
         # itself after any lag. Of 108 recordings of 17 arms, 30 % more or less changes none.
-        if np.ptp(q[start : start + lag], axis=0).max() > 3.0 * _SAME:
+        if np.ptp(q[start : start + lag], axis=0).max() > 3.0 * tolerance:
             best = lag, start, stop
     if best is None:
         return None

@@ -314,9 +314,9 @@ def filtered_columns(
     step = max(used.decimation, 10_000 // used.decimation * used.decimation)
     for start in range(0, max(1, len(motion) - overlap), step):
         stop, before = min(len(motion), start + step + overlap), max(0, start - margin)
-        around, inside = slice(before, stop + margin), slice(start - before, stop - before)
+        window, inside = slice(before, stop + margin), slice(start - before, stop - before)
         rows = slice(row, row + len(decimated_samples(stop - start, used)))
-        piece = motion.select(around)
+        piece = motion.select(window)
         for function, inner, there in local:
             if function == arm.rigid_columns and stride > 1:
                 # smooth columns need no interpolation and fewer samples
@@ -324,7 +324,7 @@ def filtered_columns(
                 result[rows, :, there] = decimate(block, used, stride)
             else:
                 block = function(piece)[:, :, inner]
-                result[rows, :, there] = decimate(bridged(block, unsure[around])[inside], used)
+                result[rows, :, there] = decimate(bridged(block, unsure[window])[inside], used)
         row = rows.stop
     result.setflags(write=False)  # a read-only array is frozen without a copy
     return result
@@ -392,9 +392,9 @@ def bridged(values: FloatArray, unsure: npt.NDArray[np.bool_]) -> FloatArray:
             result = values.copy()
         sure = np.flatnonzero(~unsure[:, joint])
         after = np.searchsorted(sure, gaps)
-        left = sure[np.maximum(after - 1, 0)]
-        right = sure[np.minimum(after, len(sure) - 1)]
-        share = (gaps - left) / np.maximum(right - left, 1)
+        before = sure[np.maximum(after - 1, 0)]
+        following = sure[np.minimum(after, len(sure) - 1)]
+        share = (gaps - before) / np.maximum(following - before, 1)
         share = share.reshape(-1, *(1,) * (own.ndim - 1))
-        result[gaps, joint] = own[left] + share * (own[right] - own[left])
+        result[gaps, joint] = own[before] + share * (own[following] - own[before])
     return result

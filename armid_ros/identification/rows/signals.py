@@ -31,14 +31,11 @@ from scipy.interpolate import CubicSpline
 from scipy.ndimage import correlate1d
 
 #: Lowest sampling rate that resolves the motion of an arm [Hz].
-SLOWEST = 2.0
+_MIN_RATE = 2.0
 #: Rates at which arms are recorded [Hz].
 USUAL_RATES = (20.0, 20_000.0)
 #: Band of torque and regressor over that of the motion, with harmonics of friction steps.
 MODEL_BANDS = 10.0
-#: Largest cut-off of positions, divided by the band of the rows. The Butterworth filter, applied
-#: in both directions, changes that band by at most 5^-8, which is below TORQUE_RESOLUTION.
-_POSITION_BANDS = 5.0
 #: Samples per period of the cut-off that describe a smooth function of the filtered positions.
 _SMOOTH_SAMPLES = 5.0
 #: Ratio of a spectrum of positions to its noise below which it is only noise.
@@ -53,11 +50,8 @@ _CUTOFF_PERIODS = 2.0 * EDGE_PERIODS + 2.0
 TORQUE_RESOLUTION = 1e-4
 #: Half length of the decimation filter in output samples; its edges are cut off.
 _HALF_TAPS = 4
-#: Band of second derivatives of torques (fourth of positions), over that of the motion. From 2
-#: to 5, elasticity is detected equally well; at 10, there is only noise.
-_CURVATURE_BANDS = 2.0
 #: Smallest number of samples of a stretch for a spectrum.
-_LEAST_SAMPLES = 4
+_MIN_SAMPLES = 4
 
 
 @dataclass(frozen=True)
@@ -164,11 +158,15 @@ def conditioning(recordings: Sequence[Recording], settings: SignalSettings) -> C
             for q in _unbroken_positions(recording, rate)
         ]
         band = MODEL_BANDS * _motion_band(parts, rate)
+        # Largest cut-off of positions, divided by the band of the rows. The Butterworth filter,
+        # applied in both directions, changes that band by at most 5^-8, which is below
+        # TORQUE_RESOLUTION.
+        position_bands = 5.0
         if decimation is None:
-            stride = max(1, int(rate / (_SMOOTH_SAMPLES * _POSITION_BANDS * band)))
+            stride = max(1, int(rate / (_SMOOTH_SAMPLES * position_bands * band)))
             decimation = max(1, int(rate / (2.5 * band)) // stride * stride)  # see smooth_stride
         kept = max(band, Conditioning(rate, band, decimation).kept_hz)
-        highest = min(_POSITION_BANDS * kept, 0.2 * rate)
+        highest = min(position_bands * kept, 0.2 * rate)
         cutoff = cutoff or min(max(float(np.max(crossings)), band), highest)
     if cutoff >= 0.5 * rate:
         raise IdentificationError(
@@ -213,7 +211,7 @@ def check_recordings(recordings: Sequence[Recording]) -> None:
     """
     for recording in recordings:
         rate = 1.0 / recording.period
-        if rate < SLOWEST:
+        if rate < _MIN_RATE:
             units = (('milliseconds', 1e3), ('microseconds', 1e6), ('nanoseconds', 1e9))
             likely = [
                 f'; the stamps seem to be {unit} in place of seconds, {factor * rate:.4g} '
@@ -252,7 +250,7 @@ def segments(recording: Recording, used: Conditioning) -> Iterator[Motion]:
     measured = np.where(nothing, 0.0, measured) if nothing.any() else measured
     period = 1.0 / used.rate_hz
     for part in unbroken(recording, used.rate_hz):
-        if len(part) >= _LEAST_SAMPLES and np.ptp(recording.t[part]) > _shortest(used):
+        if len(part) >= _MIN_SAMPLES and np.ptp(recording.t[part]) > _shortest(used):
             own = slice(int(part[0]), int(part[-1]) + 1)  # a slice copies nothing
             t, q, tau = _even(recording.t[own], period, positions[own], measured[own])
             yield _differentiated(recording, t, q, tau, used)
@@ -350,7 +348,7 @@ def _even(t: FloatArray, period: float, *signals: FloatArray) -> tuple[FloatArra
 def even_positions(recording: Recording) -> list[FloatArray]:
     """Return the positions of every stretch without a gap at even times, each (K, n)."""
     rate = 1.0 / recording.period
-    parts = [part for part in unbroken(recording, rate) if len(part) >= _LEAST_SAMPLES]
+    parts = [part for part in unbroken(recording, rate) if len(part) >= _MIN_SAMPLES]
     return [_even(recording.t[part], 1.0 / rate, recording.q[part])[1] for part in parts]
 
 
@@ -372,8 +370,9 @@ def _differentiated(
     sparse = smooth[::few, :n]
     if len(sparse) > 50_000:  # a length without large prime factors is transformed faster
         sparse = sparse[: 1 + fft.prev_fast_len(len(sparse) - 1)]
-    bands = [(sparse, used.cutoff_hz)]
-    band = _CURVATURE_BANDS * _motion_band(bands, used.rate_hz / few)
+    # Band of second derivatives of torques (fourth of positions): twice that of the motion. From 2
+    # to 5 times, elasticity is detected equally well; at 10, there is only noise.
+    band = 2.0 * _motion_band([(sparse, used.cutoff_hz)], used.rate_hz / few)
     points = None
     if recording.partner is not None:
         # motion of the ends of the ties on the other machine
@@ -401,7 +400,7 @@ def _central_difference(x: FloatArray, step: float) -> FloatArray:
 
 def _unbroken_positions(recording: Recording, rate: float) -> list[FloatArray]:
     """Return the positions of every stretch without a gap; of all samples if each is too short."""
-    parts = [part for part in unbroken(recording, rate) if len(part) >= _LEAST_SAMPLES]
+    parts = [part for part in unbroken(recording, rate) if len(part) >= _MIN_SAMPLES]
     return [recording.q[part] for part in parts] or [recording.q]
 
 

@@ -4,7 +4,6 @@
 
 from __future__ import annotations
 
-from armid_ros.motion import FloatArray
 from armid_ros.recording import Recording
 import numpy as np
 
@@ -35,8 +34,16 @@ def uneven_stamps(recording: Recording, cutoff_hz: float, band_hz: float) -> str
     jitter = float(np.sqrt(np.mean(np.minimum(np.abs(steps - median), median) ** 2)))
     # largest harmless error due to jitter, as a share of a signal at the upper end of the band
     harmless = 0.1
+    # Lost samples only make steps longer; varying delays of stamps make short steps too. Windows
+    # of 50 stamps are compared with an even grid: jitter, but no slow drift of the clock.
+    window, deviation = 50, 0.0
+    if len(recording) >= window and np.mean(steps < 0.5 * np.mean(steps)) > _UNEVEN_SHARE:
+        windows = recording.t[: len(recording) // window * window].reshape(-1, window).T
+        line = np.linalg.qr(np.column_stack([np.ones(window), np.arange(window)]))[0]
+        squares = np.mean((windows - line @ (line.T @ windows)) ** 2, axis=0)
+        deviation = float(np.sqrt(np.median(squares)))
     jitters = uneven > _UNEVEN_SHARE and 2.0 * np.pi * band_hz * jitter > harmless
-    if not jitters and not 2.0 * np.pi * cutoff_hz * _wander(recording.t) > harmless:
+    if not jitters and not 2.0 * np.pi * cutoff_hz * deviation > harmless:
         return ''
     return (
         f'{recording.source or "recording"}: {100 * uneven:.0f} % of the time stamps are uneven '
@@ -63,19 +70,6 @@ def rounded_stamps(recording: Recording) -> str:
         f'{report.duplicates} of {report.messages} samples had the stamp of another and are left '
         'out. Write stamps with more digits, or record with those of the driver'
     )
-
-
-def _wander(t: FloatArray) -> float:
-    """Return the RMS deviation of stamps from an even grid [s]; zero without short steps."""
-    # lost samples only make steps longer; varying delays of stamps make short steps too. Steps
-    # alone do not determine the error of the stamps
-    steps = np.diff(t)
-    window = 50  # samples that are compared with an even grid: jitter, but no slow drift
-    if len(t) < window or np.mean(steps < 0.5 * np.mean(steps)) <= _UNEVEN_SHARE:
-        return 0.0
-    windows = t[: len(t) - len(t) % window].reshape(-1, window).T
-    line = np.linalg.qr(np.column_stack([np.ones(window), np.arange(window)]))[0]
-    return float(np.sqrt(np.median(np.mean((windows - line @ (line.T @ windows)) ** 2, axis=0))))
 
 
 def two_senders(recording: Recording) -> str:

@@ -14,7 +14,7 @@ import numpy as np
 import numpy.typing as npt
 
 #: Longest gap of a sender that is interpolated, in its periods.
-_LONGEST = 10.0
+_MAX_GAP_PERIODS = 10.0
 
 Moment = tuple[float, FloatArray]
 
@@ -35,7 +35,7 @@ class _Part:
             if step < 0.0:
                 self.samples.clear()
             elif np.isfinite(self.period):
-                self.period += 0.05 * (min(step, _LONGEST * self.period) - self.period)
+                self.period += 0.05 * (min(step, _MAX_GAP_PERIODS * self.period) - self.period)
             else:
                 self.period = step
         self.samples.append((t, values))
@@ -51,7 +51,7 @@ class _Part:
         first, values = self.samples[0]
         if first == t:
             return values
-        if first > t or self.samples[1][0] - first > _LONGEST * self.period:
+        if first > t or self.samples[1][0] - first > _MAX_GAP_PERIODS * self.period:
             return None
         second, following = self.samples[1]
         return np.asarray(values + (t - first) / (second - first) * (following - values))

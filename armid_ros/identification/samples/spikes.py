@@ -36,6 +36,7 @@ import math
 from armid_ros.identification.samples.straight_line import (
     all_unwrapped,
     Excursion,
+    MAX_GAP,
     Missed,
     missed_by,
     NoiseLevel,
@@ -50,17 +51,6 @@ from scipy import stats
 
 #: Number of samples from which noise and period are measured before the first check.
 FIRST = 20
-#: Largest ratio of a sample's error from continued held samples to its error from the line.
-_NEARER = 0.5
-#: Gap in periods after which a sample is held until the next one, which may prove its stamp wrong.
-_LEAP = 1.5
-#: Best resolution of a position [rad or m], of a velocity (per second), and of a torque as a share
-#: of its limit: an encoder of 22 bits, a torque sensor of 17. A simulation without noise and an
-#: arm at rest have less noise; limits from that noise would reject valid data.
-_FINEST = {'q': 1e-6, 'v': 1e-5, 't': 1e-5}
-#: Second derivative of each signal when an arm at rest begins to move, in these units per second
-#: squared: 2 rad/s^2, a jerk of 50 rad/s^3, and a torque at its limit that oscillates at 1 Hz.
-_ONSET = {'q': 2.0, 'v': 50.0, 't': 50.0}
 
 
 class SpikeGate:
@@ -76,8 +66,6 @@ class SpikeGate:
         velocities; t for torques, which may jump and return; as in 'qt'. They are m in all.
     torque_limit : array_like, shape (n,), optional
         Largest torque of each joint [N m or N], infinite where unknown.
-    max_gap : int
-        Largest number of successive damaged samples; a longer deviation is real.
     false_alarm_time : float
         Mean time between two good samples left out by error, in normal noise [s].
 
@@ -101,7 +89,6 @@ class SpikeGate:
         signals: str,
         *,
         torque_limit: npt.ArrayLike = 0.0,
-        max_gap: int = 10,
         false_alarm_time: float = 360000.0,
     ) -> None:
         turning = ~np.asarray(prismatic, dtype=bool)
@@ -113,10 +100,14 @@ class SpikeGate:
         known = limit[np.isfinite(limit)]
         limit = np.where(np.isfinite(limit), limit, known.min() if len(known) else 0.0)
         scale = np.where(self._pulsing, np.tile(limit, len(signals)), 1.0)
-        self._least_seen = tuple(
-            scale * [least[one] for one in kind] for least in (_FINEST, _ONSET)
-        )
-        self.max_gap = max_gap
+        # Best resolution of a position [rad or m], of a velocity (per second), and of a torque as
+        # a share of its limit: an encoder of 22 bits, a torque sensor of 17. A simulation without
+        # noise and an arm at rest have less noise; limits from that noise would reject valid data.
+        finest = {'q': 1e-6, 'v': 1e-5, 't': 1e-5}
+        # second derivative of each signal when an arm at rest begins to move, in these units per
+        # second squared: 2 rad/s^2, a jerk of 50 rad/s^3, and a torque at its limit at 1 Hz
+        onset = {'q': 2.0, 'v': 50.0, 't': 50.0}
+        self._least_seen = tuple(scale * [least[one] for one in kind] for least in (finest, onset))
         self._false_alarm_time = false_alarm_time
         self.reset()
 
@@ -130,7 +121,7 @@ class SpikeGate:
         self._last: FloatArray | None = None  # last good sample, also of an earlier stretch
         count = len(self._turn)
         self.lowest, self.highest = np.full(count, np.inf), np.full(count, -np.inf)
-        self._level = NoiseLevel(count, self.max_gap + 1, *self._least_seen)
+        self._level = NoiseLevel(*self._least_seen)
         self._least: tuple[Usual, float, FloatArray] | None = None
         self._restart([])
 
@@ -157,8 +148,8 @@ class SpikeGate:
             else:
                 good = self._take(early)
         ahead = 0.0 if self._tail is None else t - self._tail.t
-        if _LEAP * self._period < ahead <= self.max_gap * self._period < math.inf:
-            # samples seem to be lost before this one
+        if 1.5 * self._period < ahead <= MAX_GAP * self._period < math.inf:
+            # samples seem to be lost before this one; the next one may prove its stamp wrong
             self._early = StreamSample(t, x)
             return good
         return good + self._take(StreamSample(t, x))
@@ -244,7 +235,7 @@ class SpikeGate:
         """Return whether a stamp continues the stream; two other stamps begin a new stretch."""
         tail, stray, self._stray = self._tail, self._stray, None
         dt = 0.0 if tail is None else sample.t - tail.t
-        longest = self.max_gap * self._period
+        longest = MAX_GAP * self._period
         if tail is None or 0.0 < dt <= longest:
             if stray is not None:
                 self.rejected['stamp'] += 1
@@ -312,9 +303,9 @@ class SpikeGate:
         self._held.append(sample)
         self._off = np.maximum(self._off, off)
         self._went_on += goes_on
-        if len(self._held) <= self.max_gap:
+        if len(self._held) <= MAX_GAP:
             return []
-        if 2 * self._went_on > self.max_gap:
+        if 2 * self._went_on > MAX_GAP:
             if len(self._held) > 1 and self._stepped():
                 self._held[0] = replace(self._held[0], begins=True)
             return self._release()
@@ -347,7 +338,8 @@ class SpikeGate:
         first, second = self._known
         slope = (second.x - first.x) / (second.t - first.t)
         as_before = StreamSample(before.t, last.x - slope * (last.t - before.t))
-        far_enough = max(1.0, _NEARER * float(np.max(off[self._suspect])))
+        # the error from the continued samples is at most half of that from the old line
+        far_enough = max(1.0, 0.5 * float(np.max(off[self._suspect])))
         for one in (as_before, before):
             rest = self._off_by(missed_by((one, last), sample, self._period))
             if float(np.max(rest[self._suspect])) < far_enough:

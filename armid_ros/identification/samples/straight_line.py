@@ -24,6 +24,9 @@ from scipy import special
 _NOISE_CORRELATION = -2.0 / 3.0
 #: Number of predictions in a window, whose usual error is computed together.
 WINDOW = 100
+#: Largest number of successive damaged samples, and of periods in a gap; a longer deviation is
+#: real, and a longer gap begins a new stretch.
+MAX_GAP = 10
 
 #: Growth factor of errors over other times, of one sample or of each, shape (N, 1).
 Factor = float | FloatArray
@@ -204,10 +207,6 @@ class NoiseLevel:
 
     Parameters
     ----------
-    count : int
-        Number of signals m.
-    together : int
-        Largest number of samples that are added before `settle`.
     finest : ndarray, shape (m,)
         Best resolution of the signals.
     onset : ndarray, shape (m,)
@@ -220,15 +219,17 @@ class NoiseLevel:
 
     """
 
-    def __init__(self, count: int, together: int, finest: FloatArray, onset: FloatArray) -> None:
+    def __init__(self, finest: FloatArray, onset: FloatArray) -> None:
+        count = len(finest)
         self._finest, self._onset = finest, onset
         self.usual = Usual(np.inf, np.zeros(count), np.zeros(count))
         # a step that occurs three times is the resolution of a signal
         self._steps, self._most = np.full((3, count), np.inf), np.zeros(count)
         self._sizes, self._shares = np.zeros((2, 600, count))  # windows of a minute at 1 kHz
         self._seen = 0
-        self._errors, self._moves = np.empty((2, WINDOW + together, count))
-        self._growths = np.empty((WINDOW + together, 2, 1))
+        most = WINDOW + MAX_GAP + 1  # held samples are added at once before `settle`
+        self._errors, self._moves = np.empty((2, most, count))
+        self._growths = np.empty((most, 2, 1))
         self._waiting = 0
 
     def set(self, usual: Usual) -> None:

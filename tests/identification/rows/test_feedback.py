@@ -11,7 +11,7 @@ from armid_ros.arm import ArmModel
 from armid_ros.diagnosis import diagnose
 from armid_ros.errors import IdentificationError
 from armid_ros.identification import identify
-from armid_ros.identification.rows.feedback import laws_of_controllers
+from armid_ros.identification.rows.checks import laws_of_controllers
 from armid_ros.model import inverse_dynamics
 import numpy as np
 import pytest
