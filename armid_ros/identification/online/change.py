@@ -15,7 +15,7 @@ from armid_ros.motion import FloatArray, read_only
 import numpy as np
 
 #: Relative singular value below which directions count as linearly dependent [-].
-_INDEPENDENT = 1e-6
+_MIN_SINGULAR_VALUE = 1e-6
 
 
 @dataclass(frozen=True, eq=False)
@@ -92,8 +92,8 @@ class Change:
         """Independent directions of all possible changes, rivals included, shape (P, k)."""
         columns = np.hstack([c.reopened for c in (self.candidate, *self.rivals)])
         columns = columns / np.linalg.norm(columns, axis=0)
-        left, size, _ = np.linalg.svd(columns, full_matrices=False)
-        return np.asarray(left[:, size > _INDEPENDENT * size[0]])
+        directions, size, _ = np.linalg.svd(columns, full_matrices=False)
+        return np.asarray(directions[:, size > _MIN_SINGULAR_VALUE * size[0]])
 
     def __str__(self) -> str:
         """Return a sentence on the change: candidate, sizes and rivals."""
@@ -153,7 +153,9 @@ def _candidate(
     # a maximal set of linearly independent columns, in their order
     lengths = np.linalg.norm(columns, axis=0)
     unit = columns / np.where(lengths > 0.0, lengths, 1.0)
-    ranks = [np.linalg.matrix_rank(unit[:, :k], _INDEPENDENT) for k in range(len(lengths) + 1)]
+    ranks = [
+        np.linalg.matrix_rank(unit[:, :k], _MIN_SINGULAR_VALUE) for k in range(len(lengths) + 1)
+    ]
     independent = np.flatnonzero(np.diff(ranks)).tolist()
     # Mass and first moments of a load are reported. The torque of its inertia about its centre is
     # comparatively small.

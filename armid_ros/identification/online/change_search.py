@@ -5,7 +5,8 @@ Search the last blocks of rows for a change, its onset and its cause.
 
 After each block, the windows of 0.5, 1 and 2 s that end with it are tested. After a positive test,
 all possible onsets are compared. The change is named when no rival explains the torques equally
-well, or after `_LATEST` blocks. The test is the likelihood ratio of a change in the window.
+well, or after six blocks with its torque. The test is the likelihood ratio of a change in the
+window.
 
 The estimate before a window is theta0, with the information A = R^T R. The rows W of the window,
 of unit noise, give M = W^T W and c = W^T tau. The hypothesis theta = theta0 + D delta in the
@@ -40,13 +41,9 @@ import numpy.typing as npt
 from scipy.linalg import lapack
 
 #: Lengths of the tested windows, in blocks.
-_LENGTHS = (2, 4, 8)
-#: Number of blocks with torque of a change after which the change is named despite rivals.
-_LATEST = 6
-#: Difference of log-likelihoods from which one explanation is clearly better.
-_CLEAR = 5.0
+_WINDOW_LENGTHS = (2, 4, 8)
 #: Eigenvalues of an information matrix below this share of the largest count as zero [-].
-_NOTHING = 1e-9
+_MIN_EIGENVALUE = 1e-9
 
 
 @dataclass(frozen=True, eq=False)
@@ -110,7 +107,7 @@ class ScoreStatistics:
     def ratios(self, sets: npt.NDArray[np.intp]) -> FloatArray:
         """Return twice the log likelihood ratio of G sets of p changes, (G, p): (G,)."""
         information = self.information[sets[:, :, np.newaxis], sets[:, np.newaxis, :]]
-        return quadratic_form(self.score[sets], information, _NOTHING)[0]
+        return quadratic_form(self.score[sets], information, _MIN_EIGENVALUE)[0]
 
     def size(self, some: slice) -> tuple[FloatArray, FloatArray]:
         """
@@ -159,7 +156,7 @@ def score_statistics(
     both = before.known / residual_scale**2 + information
     scale = 1.0 / np.sqrt(np.diag(both))
     both *= scale * scale[:, np.newaxis]
-    np.fill_diagonal(both, 1.0 + _NOTHING)
+    np.fill_diagonal(both, 1.0 + _MIN_EIGENVALUE)
     yield
     factor, _ = lapack.dpotrf(both, lower=1, clean=0)
     score = right - information @ before.before.values
@@ -173,28 +170,9 @@ def score_statistics(
     return ScoreStatistics((shared[:, :-1] + shared[:, :-1].T) / 2.0, shared[:, -1], strength)
 
 
-@dataclass(frozen=True, eq=False)
-class FoundChange:
-    """
-    A significant change.
-
-    Attributes
-    ----------
-    change : Change
-        The change, with its covariance in the usual noise.
-    before : Block
-        The last block before the change.
-    after : sequence of Block
-        The blocks wholly after the change.
-    likelihood : float
-        Logarithm of the likelihood ratio.
-
-    """
-
-    change: Change
-    before: Block
-    after: Sequence[Block]
-    likelihood: float
+#: A significant change, with its covariance in the usual noise; the last block before the change,
+#: and the blocks wholly after it.
+FoundChange = tuple[Change, Block, Sequence[Block]]
 
 
 class ChangeSearch:
@@ -243,20 +221,20 @@ class ChangeSearch:
 
     def set_chance(self, chance: float) -> None:
         """Set the false alarm probability; 0 disables detection."""
-        self._chance = chance / (len(self._sizes) * len(_LENGTHS))
+        self._chance = chance / (len(self._sizes) * len(_WINDOW_LENGTHS))
 
     def reset(self) -> None:
         """Clear the calibration and all blocks."""
         places = {c.joint for c in self._candidates}
         self._calibrations = {
-            m: NullCalibration(self._sizes.tolist(), m, len(places)) for m in _LENGTHS
+            m: NullCalibration(self._sizes.tolist(), m, len(places)) for m in _WINDOW_LENGTHS
         }
         self._latest_change = -np.inf, 0.0
         self.interrupt()
 
     def interrupt(self) -> None:
         """Begin a new stretch after an interruption."""
-        self._blocks: deque[Block] = deque(maxlen=_LENGTHS[-1] + 1)
+        self._blocks: deque[Block] = deque(maxlen=_WINDOW_LENGTHS[-1] + 1)
         self._waiting: deque[dict[int, tuple[FloatArray, FloatArray]]] = deque()
 
     def take(self, block: Block, residual_scale: float) -> Pieces[FoundChange | None]:
@@ -272,10 +250,12 @@ class ChangeSearch:
 
         """
         self._blocks.append(block)
-        lengths = [m for m in _LENGTHS if m <= len(self._blocks)]
+        blocks = list(self._blocks)
         statistics, positive = {}, False
-        for m in lengths:
-            window = yield from self._window(len(self._blocks) - m, residual_scale)
+        for m in (m for m in _WINDOW_LENGTHS if m <= len(blocks)):
+            window = yield from score_statistics(
+                blocks[-m:], blocks[-m], self.directions, residual_scale
+            )
             yield
             statistics[m] = self._ratios(window), window.strength
             if self._chance > 0.0:
@@ -285,11 +265,10 @@ class ChangeSearch:
         if positive:
             found = yield from self._judge(residual_scale)
             if found is not None:
-                self._latest_change = block.end, found.likelihood
                 self.interrupt()
                 return found
         self._waiting.append(statistics)
-        if len(self._waiting) > _LENGTHS[-1]:  # a change would have been named before
+        if len(self._waiting) > _WINDOW_LENGTHS[-1]:  # a change would have been named before
             for m, values in self._waiting.popleft().items():
                 self._work.begin(self._calibrations[m].update(*values))
         return None
@@ -311,11 +290,6 @@ class ChangeSearch:
         )
         return Estimate(candidate.parameters, values, covariance * usual)
 
-    def _window(self, first: int, residual_scale: float) -> Pieces[ScoreStatistics]:
-        """Compute the statistics of the window from block `first` to the last one."""
-        blocks = list(self._blocks)[first:]
-        return score_statistics(blocks, blocks[0], self.directions, residual_scale)
-
     def _ratios(self, window: ScoreStatistics) -> FloatArray:
         ratios = np.empty(len(self._candidates))
         for some, sets in self._of_size:
@@ -324,44 +298,49 @@ class ChangeSearch:
 
     def _judge(self, residual_scale: float) -> Pieces[FoundChange | None]:
         """Return onset and cause of the change; None if they are still ambiguous."""
-        rows = []
-        for k in range(len(self._blocks) - 1):
-            window = yield from self._window(k, residual_scale)
+        # difference of log-likelihoods from which one explanation is clearly better
+        clear = 5.0
+        rows, blocks = [], list(self._blocks)
+        for k, block in enumerate(blocks[:-1]):
+            window = yield from score_statistics(
+                blocks[k:], block, self.directions, residual_scale
+            )
             yield
             rows.append(self._ratios(window))
             yield
         # log-likelihoods, with a penalty for each free parameter
         usual = np.nanmedian(np.concatenate([u.factors for u in self._calibrations.values()]))
-        observations = sum(len(block.samples) for block in self._blocks)
+        observations = sum(len(block.samples) for block in blocks)
         likelihood = np.array(rows) / (2.0 * usual) - 0.5 * self._sizes * np.log(observations)
-        at = likelihood.max(axis=0)
-        best = int(np.argmax(at))
+        largest = likelihood.max(axis=0)
+        best = int(np.argmax(largest))
         # Soon after a change, the data cannot distinguish onsets: every onset before the change
         # fits. The choice is the last onset whose log-likelihood is less than 4 below the best.
-        first = int(np.flatnonzero(likelihood[:, best] > at[best] - 4.0)[-1])
+        first = int(np.flatnonzero(likelihood[:, best] > largest[best] - 4.0)[-1])
         # Number of blocks since the onset that contain the torque of the candidate: at least 5 %
         # of the squared torque of the largest block. Blocks at rest have no friction torque. An
         # arm that stops has its largest errors in the last slow motion, and these raise no alarm.
         some = self._slices[best]
         directions = self.directions[:, some]
-        moved = [one.moved[:, some] for one in self._blocks]
+        moved = [block.moved[:, some] for block in blocks]
         strength = np.array([np.einsum('pq,pq->q', directions, one) for one in moved])
-        shows = np.any(strength > 0.05 * strength.max(axis=0), axis=1)
-        seen = int(np.count_nonzero(shows[first:]))
+        has_torque = np.any(strength > 0.05 * strength.max(axis=0), axis=1)
+        n_blocks = int(np.count_nonzero(has_torque[first:]))
         # The size of a change is learned for 10 s. During this time, another change needs 0.3
         # times the log-likelihood of the first change. With less, it is a correction of the size.
         t, before = self._latest_change
-        least = max(_CLEAR, 0.3 * before) if self._blocks[-1].end - t < 10.0 else _CLEAR
-        if not (at[best] > least and seen >= 4):
+        least = max(clear, 0.3 * before) if blocks[-1].end - t < 10.0 else clear
+        if not (largest[best] > least and n_blocks >= 4):
             return None
-        alike = [self._candidates[k] for k in np.flatnonzero(at > max(at[best] - _CLEAR, 0.0))]
+        likely = [
+            self._candidates[k] for k in np.flatnonzero(largest > max(largest[best] - clear, 0.0))
+        ]
         # a load is preferred among equally likely candidates: arms often pick things up
-        named = next((c for c in alike if c.common), self._candidates[best])
-        rivals = tuple(c for c in alike if not (c.includes(named) or named.includes(c)))
-        if rivals and seen < _LATEST:
+        named = next((c for c in likely if c.common), self._candidates[best])
+        rivals = tuple(c for c in likely if not (c.includes(named) or named.includes(c)))
+        if rivals and n_blocks < 6:  # after six blocks, the change is named despite rivals
             return None
-        blocks = list(self._blocks)
-        last, since = blocks[max(first - 1, 0)], blocks[min(first + 1, len(blocks) - 1) :]
-        size = yield from self.size(named, last, since, residual_scale)
-        change = Change(named, rivals, blocks[first].begin, size)
-        return FoundChange(change, last, since, float(at[best]))
+        earlier, later = blocks[max(first - 1, 0)], blocks[min(first + 1, len(blocks) - 1) :]
+        size = yield from self.size(named, earlier, later, residual_scale)
+        self._latest_change = blocks[-1].end, float(largest[best])
+        return Change(named, rivals, blocks[first].begin, size), earlier, later

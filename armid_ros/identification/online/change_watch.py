@@ -34,9 +34,8 @@ import numpy as np
 
 #: Length of a block [s].
 BLOCK = 0.25
-#: Samples learned in one piece of work: together, or one by one with forgetting. Fewer samples
-#: arrive in the meantime, so that the backlog shrinks.
-_TOGETHER, _ONE_BY_ONE = 10, 4
+#: Samples learned together in one piece of work; fewer arrive in the meantime.
+_SAMPLES_PER_PIECE = 10
 Item = TypeVar('Item')
 
 
@@ -273,7 +272,8 @@ class ChangeWatch:
 
     @property
     def _at_a_time(self) -> int:
-        return _ONE_BY_ONE if self._estimator.forgetting < 1.0 else _TOGETHER
+        # with forgetting, samples are learned one by one
+        return 4 if self._estimator.forgetting < 1.0 else _SAMPLES_PER_PIECE
 
     def _widened(self, rows: Sequence[Row]) -> Pieces[list[WeightedSample]]:
         """Return successive samples with the columns of all parameters."""
@@ -298,7 +298,7 @@ class ChangeWatch:
         residual_scale, residuals, squares = self._residual_scale.value, [], 0.0
         size = len(self._wider.parameters)
         information, right = np.zeros((size, size)), np.zeros(size)
-        for part in _parts(samples, _TOGETHER):
+        for part in _parts(samples, _SAMPLES_PER_PIECE):
             rows, tau, weights = (np.stack(some) for some in zip(*part, strict=True))
             scale = self._estimator.scale(weights)
             residuals.append(scale * (tau - rows @ before.values))
@@ -331,17 +331,18 @@ class ChangeWatch:
 
     def _name(self, found: FoundChange) -> Job:
         """Restore the state before a change, reset the changed parameters, report the change."""
-        change, size, reopened = found.change, found.change.size, found.change.reopened
+        change, before, after = found
+        size, reopened = change.size, change.reopened
         again = copy(self._estimator)
         for estimator, known, directions in (
-            (self._wider, found.before.before, self._among_all(reopened)),
-            (again, found.before.narrow, reopened),
+            (self._wider, before.before, self._among_all(reopened)),
+            (again, before.narrow, reopened),
         ):
             estimator.restore(known)
             estimator.reopen(directions)
             yield
-        since = [sample for block in found.after for sample in block.samples]
-        yield from self._learn_both(again, since)
+        later = [sample for block in after for sample in block.samples]
+        yield from self._learn_both(again, later)
         while len(rows := self._unsearched()) > self._at_a_time:
             yield from self._learn_both(again, (yield from self._widened(rows)))
         at_once(self._learn_both(again, at_once(self._widened(rows))))
@@ -349,7 +350,7 @@ class ChangeWatch:
         # A change causes unusual motion that no earlier row contains. The covariance is
         # therefore multiplied by the ratio of squared residuals to usual squared residuals.
         squares = count = 0.0
-        for block in found.after:
+        for block in after:
             columns, tau, weights = (np.stack(part) for part in zip(*block.samples, strict=True))
             residual = self._estimator.scale(weights) * (tau - columns @ self._wider.values)
             squares += float(np.sum((residual / self._residual_scale.value) ** 2))

@@ -122,7 +122,6 @@ class OnlineIdentifier:
             robot.prismatic,
             'qvt' if settings.measured_velocity else 'qt',
             torque_limit=robot.torque_limit,
-            max_gap=10,  # number of successive damaged samples; a longer deviation is real
             false_alarm_time=settings.false_alarm_time or FALSE_ALARM_TIME,
         )
         self._checks = StreamChecks(robot, self._gate)
@@ -410,8 +409,10 @@ class OnlineIdentifier:
             for change in self._watch.changes[self._reopened :]:
                 self._scores.reopen(change.reopened, estimator.values)
                 self._reopened += 1
-        left = sample.tau - sample.rows @ estimator.values
-        self._squares = estimator.forgetting * self._squares + sample.weights * innovation * left
+        residual = sample.tau - sample.rows @ estimator.values
+        self._squares = (
+            estimator.forgetting * self._squares + sample.weights * innovation * residual
+        )
         self._counts = estimator.forgetting * self._counts + sample.weights
         known = np.maximum(self._counts, _SMALLEST)
         self._deviation = np.sqrt(np.maximum(self._squares, 0.0) / known)

@@ -21,7 +21,7 @@ import numpy as np
 from scipy import stats
 
 #: Tail probability of the quantile that shows whether large statistics are too frequent.
-_RARE = 0.01
+_TAIL_PROBABILITY = 0.01
 #: Number of blocks kept: one minute at four blocks per second.
 BLOCKS = 240
 
@@ -102,7 +102,7 @@ class NullCalibration:
         below = self._sizes * stats.chi2.cdf(self._most, self._sizes + 2)
         square = self._sizes * (self._sizes + 2) * stats.chi2.cdf(self._most, self._sizes + 4)
         self._fresh = 0
-        self._rare = stats.chi2.isf(_RARE, self._sizes)
+        self._rare = stats.chi2.isf(_TAIL_PROBABILITY, self._sizes)
         self._tail = 1.0
         self._limits: tuple[float, FloatArray] | None = None
         self._mean = below + tail_share * self._most
@@ -163,19 +163,19 @@ class NullCalibration:
         spread = max(apart, 0.1**2)  # smallest variance between the logarithms of the factors
         middle = float(np.average(value, weights=1.0 / (variance + spread)))
         drawn = variance / (variance + spread)
-        left = drawn * spread + drawn**2 * np.mean(variance + spread) / self._sources
+        remaining = drawn * spread + drawn**2 * np.mean(variance + spread) / self._sources
         factors = np.full(len(self._sizes), np.nan)
         factors[judged] = np.exp(value + drawn * (middle - value)).clip(1.0)
         yield
         # 99 % quantile of the statistics, each over its quantile in white noise; zero: no data
         relative = (later[:, judged] / (factors * self._rare)[judged]).ravel()
         count = np.count_nonzero(relative)
-        place = len(relative) - count + (1.0 - _RARE) * (count - 1)
+        place = len(relative) - count + (1.0 - _TAIL_PROBABILITY) * (count - 1)
         largest = np.sort(np.partition(relative, int(place))[int(place) :])
         tail = float(np.interp(place % 1.0, np.arange(len(largest)), largest))
         self.factors, self._tail = factors, max(1.0, tail)
         self._freedom = np.zeros(len(self._sizes))
-        self._freedom[judged] = 2.0 / left  # a mean square of k degrees varies by 2 / k
+        self._freedom[judged] = 2.0 / remaining  # a mean square of k degrees varies by 2 / k
         self._limits = None
 
     def excess(self, ratios: FloatArray, strength: FloatArray, chance: float) -> FloatArray:

@@ -13,13 +13,8 @@ from armid_ros.identification.rows.signals import (
     segments,
     SignalSettings,
 )
-from armid_ros.motion import FloatArray
 from armid_ros.recording import Recording
 import numpy as np
-
-#: Length of the blocks whose residual power is compared [s]; longer than the correlation of the
-#: residual.
-_BLOCK = 0.5
 
 
 def onset(arm: ArmModel, recording: Recording) -> float | None:
@@ -44,13 +39,24 @@ def onset(arm: ArmModel, recording: Recording) -> float | None:
         a change.
 
     """
+    # length of the blocks [s], longer than the correlation of the residual
+    block = 0.5
     # fewest blocks before a change, so that their variance can be estimated
     fewest = 4
-    power = _block_powers(arm, recording)
-    times, logs = power[:, 0], np.log(np.maximum(power[:, 1:], 1e-300))
-    count = len(logs)
+    used = conditioning([recording], SignalSettings())
+    times, powers = [], []  # starts and mean squared residuals of blocks; the last ends the motion
+    for motion in segments(recording, used):
+        assert motion.tau is not None
+        squares = decimate(motion.tau - arm.torque(motion), used) ** 2
+        t = motion.t[decimated_samples(len(motion.t), used)]
+        blocks = int((t[-1] - t[0]) / block) if len(t) else 0
+        for begin in t[-1] - block * np.arange(blocks, 0, -1) if blocks else ():
+            times.append(begin)
+            powers.append(squares[(t > begin) & (t <= begin + block)].mean(axis=0))
+    count = len(powers)
     if count <= fewest:
         return None
+    logs = np.log(np.maximum(powers, 1e-300))
     # F ratio of two means against one mean, for every joint
     low, high, std = two_means(logs, np.ones_like(logs))
     between = ((high - low) / std)[fewest - 1 :] ** 2
@@ -60,21 +66,5 @@ def onset(arm: ArmModel, recording: Recording) -> float | None:
     # probability of a false change, over all tested times and joints
     if tail(ratios[best], 1, count - 2) * len(ratios) * logs.shape[1] >= 0.01:
         return None
-    edge = recording.duration - (times[-1] + _BLOCK)  # time that the filter cuts off at the end
-    return float(times[fewest + best] + _BLOCK + edge)
-
-
-def _block_powers(arm: ArmModel, recording: Recording) -> FloatArray:
-    """Return the start [s] and the mean squared residuals of short blocks, shape (B, 1 + n)."""
-    # the last block ends with the motion
-    used = conditioning([recording], SignalSettings())
-    rows = [np.empty((0, 1 + len(arm.robot.joints)))]
-    for motion in segments(recording, used):
-        assert motion.tau is not None
-        squares = decimate(motion.tau - arm.torque(motion), used) ** 2
-        t = motion.t[decimated_samples(len(motion.t), used)]
-        blocks = int((t[-1] - t[0]) / _BLOCK) if len(t) else 0
-        for begin in t[-1] - _BLOCK * np.arange(blocks, 0, -1) if blocks else ():
-            own = squares[(t > begin) & (t <= begin + _BLOCK)]
-            rows.append(np.r_[begin, own.mean(axis=0)][np.newaxis])
-    return np.concatenate(rows)
+    edge = recording.duration - (times[-1] + block)  # time that the filter cuts off at the end
+    return float(times[fewest + best] + block + edge)

@@ -29,11 +29,12 @@ import numpy.typing as npt
 from scipy.linalg import lapack
 
 #: Smallest forgetting factor; with less, the memory is shorter than ten samples.
-SMALLEST_FORGETTING = 0.9
+MIN_FORGETTING = 0.9
 #: Standard deviation of every parameter before the first sample, in its SI unit. Robots have
 #: parameters of 1e-4 to 1e3; a parameter that the data do not identify keeps this deviation.
 PRIOR_STD = 1e6
-_BLOCK = 8  # columns of a Householder block; the fastest for 60 to 120 parameters
+#: Columns of a Householder block; the fastest for 60 to 120 parameters.
+_BLOCK_COLUMNS = 8
 
 
 class WeightedSample(NamedTuple):
@@ -177,7 +178,7 @@ class RecursiveLeastSquares:
         else:
             # Householder reflections add the rows to R theta = z
             self._root, reflectors, factors, _ = lapack.dtpqrt(
-                0, min(_BLOCK, len(self._root)), self._root, rows, overwrite_a=1
+                0, min(_BLOCK_COLUMNS, len(self._root)), self._root, rows, overwrite_a=1
             )
             self._right, _, _ = lapack.dtpmqrt(
                 *(0, reflectors, factors, self._right, (tau * scale)[:, np.newaxis]),
@@ -323,7 +324,7 @@ def replaced(root: FloatArray, rows: FloatArray, forgetting: float) -> FloatArra
     kept = np.sqrt(np.maximum(1.0 - level / np.maximum(gains, level), 0.0))
     if np.any(kept > 0.0):
         root, *_ = lapack.dtpqrt(
-            0, min(_BLOCK, len(root)), root, (directions * kept).T @ rows, overwrite_a=1
+            0, min(_BLOCK_COLUMNS, len(root)), root, (directions * kept).T @ rows, overwrite_a=1
         )
     return root
 
@@ -346,7 +347,7 @@ def reopened(root: FloatArray, directions: FloatArray) -> FloatArray:
 
 def check_forgetting(factor: float) -> None:
     """Raise an error for a forgetting factor out of range."""
-    if not SMALLEST_FORGETTING <= factor <= 1.0:
+    if not MIN_FORGETTING <= factor <= 1.0:
         raise IdentificationError(
-            f'forgetting factor {factor}: has to be from {SMALLEST_FORGETTING} to 1'
+            f'forgetting factor {factor}: has to be from {MIN_FORGETTING} to 1'
         )

@@ -19,7 +19,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 from itertools import pairwise
 
-from armid_ros.identification.fitting.covariance import LEAST_LEFT
+from armid_ros.identification.fitting.covariance import MIN_RESIDUAL_SHARE
 from armid_ros.identification.online.background import Background, Job, Pieces
 from armid_ros.identification.online.recursive import PRIOR_STD
 from armid_ros.motion import FloatArray
@@ -28,8 +28,6 @@ from scipy import linalg, stats
 
 #: Ridge that keeps the information invertible in directions that were never excited [-].
 _RIDGE = 1e-9
-#: Lower bound of a divisor.
-_SMALLEST = 1e-100
 
 
 @dataclass(frozen=True, eq=False)
@@ -153,7 +151,7 @@ class RobustCovariance:
         products, size = self._settled.products, len(values)
         both = products.sum(axis=(0, 1))[:size]
         directions = directions / np.sqrt(
-            np.einsum('pk,pq,qk->k', directions, both[:, :size], directions).clip(_SMALLEST)
+            np.einsum('pk,pq,qk->k', directions, both[:, :size], directions).clip(1e-100)
         )
         along = linalg.pinvh(directions.T @ both[:, :size] @ directions) @ directions.T @ both
         change = np.eye(size + 1)
@@ -245,8 +243,8 @@ def _shape(bands: _Bands, values: FloatArray) -> Pieces[tuple[FloatArray, FloatA
         parts.append((absorbed, products @ ends @ ends))
         yield
     taken, power = (np.array(part) for part in zip(*parts, strict=True))
-    counts = bands.counts.clip(_SMALLEST)
-    freedom = counts * (1.0 - taken / counts).clip(LEAST_LEFT)
+    counts = bands.counts.clip(1e-100)
+    freedom = counts * (1.0 - taken / counts).clip(MIN_RESIDUAL_SHARE)
     # noise below this share of the torque power is a rounding error
     noise = np.maximum(power, 1e-20 * bands.products[..., -1, -1]) / freedom
 
@@ -266,7 +264,7 @@ def _shape(bands: _Bands, values: FloatArray) -> Pieces[tuple[FloatArray, FloatA
         all_shares += shares
         uncertain += shares**2 / freedom[joint, band]
         yield
-    known = all_shares**2 / uncertain.clip(_SMALLEST)
+    known = all_shares**2 / uncertain.clip(1e-100)
     student = stats.t.ppf(level, np.maximum(known, 3.0))  # at least 3 degrees of freedom
     return half, student / stats.norm.ppf(level)
 

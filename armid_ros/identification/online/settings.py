@@ -7,7 +7,6 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 from armid_ros.errors import IdentificationError
-from armid_ros.identification.rows.causal import ROW_RATE_RATIO
 from armid_ros.motion import FloatArray
 import numpy as np
 import numpy.typing as npt
@@ -68,7 +67,9 @@ class OnlineSettings:
             If it is too low for the cut-off frequency.
 
         """
-        rate = ROW_RATE_RATIO * self.cutoff if self.row_rate is None else self.row_rate
+        # 40 rows resolve the steps of sign(dq), and aliases of the motion filter are outside the
+        # band of the row filter
+        rate = 40.0 * self.cutoff if self.row_rate is None else self.row_rate
         if not (np.isfinite(rate) and rate >= 2.0 * self.cutoff):
             raise IdentificationError(
                 f'{rate} rows per second: a cut-off frequency of {self.cutoff:g} Hz needs at '
