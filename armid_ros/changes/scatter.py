@@ -34,12 +34,11 @@ from scipy import optimize, special
 
 #: Smallest number of bags of a tested series.
 FEWEST = 4
-#: Number of neighbouring bags for the median, itself included, and z-score of an outlier.
-_WINDOW, _ODD = 5, 3.0
-#: Smallest number of arms of a kind with a bag on a day for an effect of that day.
-_SIBLINGS = 8
+#: Smallest number of arms of a kind for a comparison of arms, or of those with a bag on a day for
+#: an effect of that day.
+_MIN_ARMS = 8
 #: Prior degrees of freedom of the variances of arms if these do not differ.
-_ALIKE = 1e6
+_MAX_FREEDOM = 1e6
 
 
 @dataclass(frozen=True, eq=False)
@@ -85,7 +84,7 @@ class Spread:
         Standard deviation between bags.
     freedom : float
         Degrees of freedom of `std`.
-    alike : float
+    prior_freedom : float
         Prior degrees of freedom of the variances of arms; large if arms do not differ.
     steps, trends : float
         Ratios of the steps and trends of healthy arms to those predicted from differences of
@@ -95,7 +94,7 @@ class Spread:
 
     std: float
     freedom: float
-    alike: float = _ALIKE
+    prior_freedom: float = _MAX_FREEDOM
     steps: float = 1.0
     trends: float = 1.0
 
@@ -140,13 +139,11 @@ def splits(series: ParameterHistory, spread: Spread) -> Splits:
     """Return the steps and the trend of a series, in standard deviations of neighbours."""
     variance, freedom = variances(series, spread)
     std = np.sqrt(variance)
-    # outliers are clipped to the noise range of their neighbours
-    windows = np.lib.stride_tricks.sliding_window_view(
-        series.values, min(_WINDOW, len(series.values))
-    )
-    nearest = np.clip(np.arange(len(std)) - _WINDOW // 2, 0, len(windows) - 1)
+    # outliers are clipped to three standard deviations around the median of five bags
+    windows = np.lib.stride_tricks.sliding_window_view(series.values, min(5, len(series.values)))
+    nearest = np.clip(np.arange(len(std)) - 2, 0, len(windows) - 1)
     middle = np.median(windows, axis=1)[nearest]
-    x = np.clip(series.values, middle - _ODD * std, middle + _ODD * std)
+    x = np.clip(series.values, middle - 3.0 * std, middle + 3.0 * std)
     weights = 1.0 / variance
     return Splits(*two_means(x, weights), *line(series.days, x, weights), freedom)
 
@@ -157,8 +154,10 @@ def spreads(series: Sequence[ParameterHistory]) -> dict[tuple[str, str], Spread]
     names: dict[str, list[ParameterHistory]] = {}
     for one in series:
         names.setdefault(one.name, []).append(one)
-    alike = {name: _prior_freedom(group, found) for name, group in names.items()}
-    found = {one: replace(spread, alike=alike[one[0]]) for one, spread in found.items()}
+    prior_freedom = {name: _prior_freedom(group, found) for name, group in names.items()}
+    found = {
+        one: replace(spread, prior_freedom=prior_freedom[one[0]]) for one, spread in found.items()
+    }
     factors = {name: _lasting(group, found) for name, group in names.items()}
     return {
         one: replace(spread, steps=factors[one[0]][0], trends=factors[one[0]][1])
@@ -200,12 +199,12 @@ def _polished(group: Sequence[ParameterHistory]) -> list[FloatArray]:
     arms_of_day = np.bincount(np.unique(np.stack([day, arm]), axis=1)[0], minlength=day.max() + 1)
     level = _medians(values, arm)
     middle = float(np.median(level))
-    alike = bool(np.all(level * middle > 0.0))
-    share = level / middle if alike else np.ones(len(level))
+    prior_freedom = bool(np.all(level * middle > 0.0))
+    share = level / middle if prior_freedom else np.ones(len(level))
     common = np.zeros(len(arms_of_day))
     for _ in range(4):
         common = _medians((values - level[arm]) / share[arm], day)
-        common[arms_of_day < _SIBLINGS] = 0.0
+        common[arms_of_day < _MIN_ARMS] = 0.0
         level = _medians(values - share[arm] * common[day], arm)
     rest = values - share[arm] * common[day]
     return np.split(rest, np.cumsum([len(one.days) for one in group])[:-1])
@@ -252,8 +251,8 @@ def _prior_freedom(
 
     """
     tested = [one for one in group if len(one.values) >= FEWEST]
-    if len(tested) < _SIBLINGS:
-        return _ALIKE
+    if len(tested) < _MIN_ARMS:
+        return _MAX_FREEDOM
     logs = np.log([_ratio(one, found[one.parameter]) for one in tested])
     own = [_trigamma(0.5 * _freedom(len(one.values))) for one in tested]
     # relative standard error of a variance from the median of n absolute deviations
@@ -286,22 +285,24 @@ def _trigamma(x: float) -> float:
 
 
 def _inverse_trigamma(value: float) -> float:
-    """Return 2 x with trigamma(x) = value, between 1 and `_ALIKE`."""
-    if value <= _trigamma(0.5 * _ALIKE):
-        return _ALIKE
+    """Return 2 x with trigamma(x) = value, between 1 and `_MAX_FREEDOM`."""
+    if value <= _trigamma(0.5 * _MAX_FREEDOM):
+        return _MAX_FREEDOM
     if value >= _trigamma(0.5):
         return 1.0
-    return 2.0 * float(optimize.brentq(lambda x: _trigamma(x) - value, 0.5, 0.5 * _ALIKE))
+    return 2.0 * float(optimize.brentq(lambda x: _trigamma(x) - value, 0.5, 0.5 * _MAX_FREEDOM))
 
 
 def variances(series: ParameterHistory, spread: Spread) -> tuple[FloatArray, float]:
     """Return the variance of every value, shape (K,), and its degrees of freedom."""
     usual = np.maximum(series.std**2 + spread.std**2, 1e-300)
-    if len(series.values) < FEWEST or spread.alike >= _ALIKE:
+    if len(series.values) < FEWEST or spread.prior_freedom >= _MAX_FREEDOM:
         return usual, spread.freedom
     ratio, freedom = _ratio(series, spread), _freedom(len(series.values))
-    both = spread.alike + freedom
-    return usual * (spread.alike + freedom * ratio) / both, min(both, spread.freedom + freedom)
+    both = spread.prior_freedom + freedom
+    return usual * (spread.prior_freedom + freedom * ratio) / both, min(
+        both, spread.freedom + freedom
+    )
 
 
 def _lasting(

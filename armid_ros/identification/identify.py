@@ -10,14 +10,19 @@ from dataclasses import dataclass, field, replace
 from armid_ros.arm import ArmModel
 from armid_ros.errors import IdentificationError
 from armid_ros.estimate import Estimate
-from armid_ros.identification.fitting.excited import base_spread, determined, excited
 from armid_ros.identification.fitting.held_out import (
     cutoff_of_torques,
     halves_error,
     HalvesError,
     scatter,
 )
-from armid_ros.identification.fitting.identifiability import Unidentified, unidentified
+from armid_ros.identification.fitting.identifiability import (
+    base_spread,
+    determined,
+    excited,
+    Unidentified,
+    unidentified,
+)
 from armid_ros.identification.fitting.instruments import fit_by_instruments
 from armid_ros.identification.fitting.least_squares import Estimator, ESTIMATORS, Method
 from armid_ros.identification.fitting.nonlinear import (
@@ -28,8 +33,11 @@ from armid_ros.identification.fitting.nonlinear import (
     ungrouped,
     with_uncertain_inertia,
 )
-from armid_ros.identification.physical.fit_among_bodies import fit_to_bodies, PhysicalSettings
-from armid_ros.identification.physical.physical_certificate import PhysicalCertificate
+from armid_ros.identification.physical.fit_among_bodies import (
+    fit_to_bodies,
+    PhysicalCertificate,
+    PhysicalSettings,
+)
 from armid_ros.identification.rows.checks import (
     beyond_limits,
     check_motion,
@@ -337,9 +345,9 @@ def _require_samples(
 ) -> None:
     """Raise an error for fewer than two torques per parameter."""
     samples = sum(len(part.motion) for part in columns)
-    left = {part.source for part in columns}
+    filtered = {part.source for part in columns}
     for recording in recordings:
-        if recording.source not in left:
+        if recording.source not in filtered:
             check_stamps([recording], used)
             raise no_stretch(recording, used)
     if sum(part.tau.size for part in columns) < 2 * theory.rank:

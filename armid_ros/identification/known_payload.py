@@ -226,15 +226,15 @@ def _gain(
     scale = np.linalg.norm(columns, axis=0)
     columns = columns[:, scale > 0.0] / scale[scale > 0.0]
     # The coefficient is that of the column's residual after the other columns (Frisch, Waugh).
-    rest = known - columns @ np.linalg.lstsq(columns, known, rcond=1e-10)[0]
-    size = float(rest @ rest)
+    column = known - columns @ np.linalg.lstsq(columns, known, rcond=1e-10)[0]
+    size = float(column @ column)
     # the joint's own columns explain the torque of the payload
     if size <= 1e-8 * float(known @ known):
         return 1.0, np.inf, np.inf
-    gain = float(rest @ tau) / size
-    left = tau - gain * known
-    left = left - columns @ np.linalg.lstsq(columns, left, rcond=1e-10)[0]
-    scores = np.bincount(np.unique(blocks, return_inverse=True)[1], weights=rest * left)
+    gain = float(column @ tau) / size
+    residual = tau - gain * known
+    residual = residual - columns @ np.linalg.lstsq(columns, residual, rcond=1e-10)[0]
+    scores = np.bincount(np.unique(blocks, return_inverse=True)[1], weights=column * residual)
     count = len(scores)
     std = float(np.sqrt(count / (count - 1.0) * np.sum(scores**2)) / size)
     # largest relative standard deviation of a gain that is determined

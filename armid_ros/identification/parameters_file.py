@@ -28,7 +28,7 @@ import numpy as np
 import yaml
 
 #: Relative residual below which a base parameter is a linear combination of others.
-_SAME_GROUPING = 1e-6
+_MAX_RELATIVE_RESIDUAL = 1e-6
 _SCHEMAS = (SCHEMA, MODEL)
 
 
@@ -181,8 +181,8 @@ class ParameterFile:
         keys = list(dict.fromkeys(key for row in (*own, *theirs) for key in row))
         mine, wanted = _matrix(own, keys), _matrix(theirs, keys)
         factors = np.linalg.lstsq(mine.T, wanted.T, rcond=None)[0].T
-        left = np.linalg.norm(factors @ mine - wanted, axis=1)
-        follows = left < _SAME_GROUPING * np.linalg.norm(wanted, axis=1)
+        remainder = np.linalg.norm(factors @ mine - wanted, axis=1)
+        follows = remainder < _MAX_RELATIVE_RESIDUAL * np.linalg.norm(wanted, axis=1)
         factors = np.concatenate([np.eye(len(own)), factors[follows]])
         covariance = factors @ self.covariance @ factors.T
         values = factors[len(own) :] @ [value for value, _ in self.values.values()]
@@ -272,8 +272,8 @@ def _identification_of(path: Path, model: Mapping[str, Any]) -> ParameterFile | 
             return None
     for name, row in found.terms.items():
         value, std = found.values[name]
-        made = sum(factor * values[key] for key, factor in row.items())
-        if abs(made - value) > _SAME_GROUPING * (std + abs(value)):
+        reproduced = sum(factor * values[key] for key, factor in row.items())
+        if abs(reproduced - value) > _MAX_RELATIVE_RESIDUAL * (std + abs(value)):
             return None
     return found
 
@@ -403,7 +403,9 @@ def known_fit(document: Mapping[str, Any]) -> KnownFit | None:
     if document.get('misfit') is not None:
         known = misfit_of_block(document['misfit'])
         torque = known.torque_rms or {}
-        errors = {j: 100.0 * left / torque[j] for j, left in known.rms.items() if torque.get(j)}
+        errors = {
+            j: 100.0 * remainder / torque[j] for j, remainder in known.rms.items() if torque.get(j)
+        }
         overall = known.relative_error_percent
         reason = _worst(errors, overall, f'{known.data} data')
         grade = by_error(max(errors.values(), default=overall))

@@ -171,11 +171,16 @@ def check_noise(
     noise = np.sqrt(np.mean([position_noise(r) ** 2 for r in recordings], axis=0))
     values, std = result.estimate.values, result.estimate.std
     scale = np.where(std > 0.0, std, 1.0)
-    w, torque = weighted_rows(exact, weights)[0] * scale, _torque(exact, weights, values)
+
+    def torque(problem: Sequence[Regression]) -> FloatArray:
+        """Return the weighted torque of linear models, shape (N n,)."""
+        return np.asarray((weights * np.concatenate([p.torque(values) for p in problem])).ravel())
+
+    w, exact_torque = weighted_rows(exact, weights)[0] * scale, torque(exact)
     biases = []
     for k in range(repeats):
         noisy = about([replace(r, q=r.q + noise * rng.normal(size=r.q.shape)) for r in calm])
-        both = np.column_stack([w, torque - _torque(noisy, weights, values)])
+        both = np.column_stack([w, exact_torque - torque(noisy)])
         gain = np.linalg.lstsq(weighted_rows(noisy, weights)[0] * scale, both, rcond=None)[0]
         biases.append(np.linalg.solve(gain[:, :-1], gain[:, -1]))
         progress((k + 3.0) / (repeats + 2))
@@ -203,8 +208,3 @@ def position_noise(recording: Recording) -> FloatArray:
     # share of the sampling rate above which the spectrum of positions is noise
     level = np.mean(power[frequency > 0.3 * rate], axis=0)
     return np.asarray(np.sqrt(level * 0.5 * rate))
-
-
-def _torque(problem: Sequence[Regression], weights: FloatArray, values: FloatArray) -> FloatArray:
-    """Return the weighted torque of linear models, shape (N n,)."""
-    return np.asarray((weights * np.concatenate([p.torque(values) for p in problem])).ravel())

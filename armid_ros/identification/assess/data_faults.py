@@ -23,13 +23,13 @@ from armid_ros.identification.rows.checks import (
     driven_by_friction,
     FOLLOWS,
     joined,
+    laws_of_controllers,
     NEAR,
     SLOW,
     torque_factors,
     TORQUE_UNITS,
     unit_of,
 )
-from armid_ros.identification.rows.feedback import laws_of_controllers
 from armid_ros.identification.rows.regression import Stretch
 from armid_ros.identification.rows.signals import Conditioning
 from armid_ros.motion import FloatArray, Motion

@@ -102,7 +102,15 @@ def grade(
     # a dead sensor causes other apparent mistakes in its recording
     blind = {fault.source for fault in sensors if fault.word == 'unusable'}
     seeing = [one for one in every if one.source not in blind]
-    mistakes = _mistakes(result, description, seeing)
+    mistakes = []  # in names, signs, units, encoder zeros, delays or gravity
+    repaired, _ = without_damage(seeing, result.used)
+    for mistake, sources in shared_mistakes(description.body, repaired, result.used):
+        text = mistake.sentence(description.body)
+        if len(sources) < len(seeing):
+            text = f'in {", ".join(dict.fromkeys(sources))}: {text}'
+        error = 100.0 * float(mistake.before.joints[mistake.joint])
+        certain = error > LIMITS.unusable and mistake.hypotheses[0].kind != 'scale'
+        mistakes.append(Fault(text, 'unusable' if certain else 'poor'))
     units = units_beyond_drives(description.robot, seeing, [fit.motion for fit in fits])
     faults = [
         *(fault for fault in sensors if fault.word != 'good'),
@@ -118,7 +126,11 @@ def grade(
         *_resting(result, validation),
         *(fault for fault in sensors if fault.word == 'good'),
     ]
-    ordered = _worst_first(reasons)
+
+    def quality(reason: Fault) -> int:
+        return -get_args(Word).index(reason.word)
+
+    ordered = sorted(reasons, key=quality)
     error, joint = max((one.measured, one.joint) for one in worst.values())
     return Grade(
         ordered[0].word,
@@ -126,30 +138,10 @@ def grade(
             f'{text[0].upper()}{text[1:]}{"" if text.endswith("?") else "."}'
             for text in (reason.text for reason in ordered)
         ),
-        tuple(fault.text for fault in _worst_first(faults)),
+        tuple(fault.text for fault in sorted(faults, key=quality)),
         error,
         result.arm.robot.joints[joint],
     )
-
-
-def _worst_first(reasons: Sequence[Fault]) -> list[Fault]:
-    return sorted(reasons, key=lambda reason: -get_args(Word).index(reason.word))
-
-
-def _mistakes(
-    result: Identification, description: ArmModel, recordings: Sequence[Recording]
-) -> list[Fault]:
-    """Return mistakes in recordings: names, signs, units, encoder zeros, delays, gravity."""
-    repaired, _ = without_damage(recordings, result.used)
-    faults = []
-    for worst, sources in shared_mistakes(description.body, repaired, result.used):
-        text = worst.sentence(description.body)
-        if len(sources) < len(recordings):
-            text = f'in {", ".join(dict.fromkeys(sources))}: {text}'
-        error = 100.0 * float(worst.before.joints[worst.joint])
-        certain = error > LIMITS.unusable and worst.hypotheses[0].kind != 'scale'
-        faults.append(Fault(text, 'unusable' if certain else 'poor'))
-    return faults
 
 
 def _errors(
@@ -250,8 +242,10 @@ def _resting(result: Identification, validation: Mapping[str, Sequence[Fit]]) ->
 
 def beyond_noise(errors: FloatArray, fits: Sequence[Fit], used: Conditioning) -> FloatArray:
     """
-    Return the relative torque errors of joints, corrected for torque noise.
+    Return the relative torque errors of joints, corrected for white torque noise.
 
+    The noise is computed from the median of second differences (Gasser, Sroka and Jennen-Steinmetz
+    1986): torques of motion change little from row to row, and friction jumps in few rows only.
     Noise enters twice: in a row, and in its prediction, which is as uncertain as a measurement
     at a leverage of one (Hoaglin and Welsch 1978). An error as large as the sensor's is no error
     of the model.
@@ -275,27 +269,17 @@ def beyond_noise(errors: FloatArray, fits: Sequence[Fit], used: Conditioning) ->
     torque = informative * np.concatenate([fit.tau for fit in fits])
     rows = np.maximum(np.count_nonzero(informative, axis=0), 1)
     size = np.sqrt(np.sum(torque**2, axis=0) / rows)
-    noise = np.divide(torque_noise(fits, used), size, out=np.zeros_like(size), where=size > 0.0)
-    left = np.sqrt(np.maximum(np.square(errors) - 2.0 * np.square(100.0 * noise), 0.0))
-    return np.where(moving(fit.motion for fit in fits), left, 0.0)
-
-
-def torque_noise(fits: Sequence[Fit], used: Conditioning) -> FloatArray:
-    """
-    Return the standard deviation of the white noise in rows of measured torque, (n,) [N m].
-
-    The noise is computed from the median of second differences (Gasser, Sroka and Jennen-Steinmetz
-    1986): torques of motion change little from row to row, and friction jumps in few rows only.
-
-    """
     differences = np.concatenate([np.abs(np.diff(fit.tau, 2, axis=0)) for fit in fits])
-    if not len(differences):
-        return np.zeros(fits[0].motion.n_joints)
-    deviation = np.median(differences, axis=0) / float(stats.norm.ppf(0.75))
-    # for filtered white noise: variance of second differences of rows over that of rows
-    taps, step = used.taps, used.decimation
-    own, next_one, after = (
-        float(taps[: len(taps) - lag] @ taps[lag:]) if lag < len(taps) else 0.0
-        for lag in (0, step, 2 * step)
-    )
-    return np.asarray(deviation / np.sqrt((6.0 * own - 8.0 * next_one + 2.0 * after) / own))
+    noise = np.zeros_like(size)
+    if len(differences):
+        deviation = np.median(differences, axis=0) / float(stats.norm.ppf(0.75))
+        # for filtered white noise: variance of second differences of rows over that of rows
+        taps, step = used.taps, used.decimation
+        own, next_one, after = (
+            float(taps[: len(taps) - lag] @ taps[lag:]) if lag < len(taps) else 0.0
+            for lag in (0, step, 2 * step)
+        )
+        noise = deviation / np.sqrt((6.0 * own - 8.0 * next_one + 2.0 * after) / own)
+    share = np.divide(noise, size, out=np.zeros_like(size), where=size > 0.0)
+    corrected = np.sqrt(np.maximum(np.square(errors) - 2.0 * np.square(100.0 * share), 0.0))
+    return np.where(moving(fit.motion for fit in fits), corrected, 0.0)

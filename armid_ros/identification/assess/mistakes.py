@@ -35,7 +35,7 @@ from armid_ros.identification.assess.prediction_error import (
     shared_values,
     thinned,
 )
-from armid_ros.identification.fitting.excited import near_deviation
+from armid_ros.identification.fitting.identifiability import near_deviation
 from armid_ros.identification.rows.signals import (
     Conditioning,
     decimate,
@@ -124,18 +124,18 @@ def shared_mistakes(
         The mistake in the recording with the largest error, and the sources of all of them.
 
     """
-    alike: dict[tuple[object, ...], list[tuple[str, Mistake]]] = {}
+    by_kind: dict[tuple[object, ...], list[tuple[str, Mistake]]] = {}
     for recording in recordings:
         mistake = find_mistake(robot, recording, used, refit=refit)
         if mistake is not None:
             kind = (mistake.hypotheses[0].kind, *mistake.hypotheses[0].where)
-            alike.setdefault(kind, []).append((recording.source, mistake))
+            by_kind.setdefault(kind, []).append((recording.source, mistake))
     return [
         (
             max((one for _, one in found), key=lambda one: float(one.before.joints.max())),
             tuple(source for source, _ in found),
         )
-        for found in alike.values()
+        for found in by_kind.values()
     ]
 
 

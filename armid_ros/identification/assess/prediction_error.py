@@ -15,7 +15,7 @@ from dataclasses import dataclass
 from itertools import product
 
 from armid_ros.identification.assess.grade_limits import FREEDOM, LIMITS
-from armid_ros.identification.fitting.excited import near_deviation
+from armid_ros.identification.fitting.identifiability import near_deviation
 from armid_ros.identification.fitting.least_squares import within
 from armid_ros.identification.rows.checks import joined, SLOW
 from armid_ros.model import inverse_dynamics, regressor
@@ -25,7 +25,7 @@ import numpy as np
 from scipy.stats import t as student
 
 #: Number of columns of each joint: offset, viscous and Coulomb friction, drive inertia.
-_OWN = 4
+_N_OWN = 4
 
 
 @dataclass(frozen=True)
@@ -50,9 +50,9 @@ class PredictionError:
 
     def whole(self, robot: Robot) -> float:
         """Return the larger of the errors of all prismatic and of all revolute joints."""
-        left = self.joints * self.torque
+        residual = self.joints * self.torque
         return max(
-            float(np.linalg.norm(left[own]) / np.linalg.norm(self.torque[own]))
+            float(np.linalg.norm(residual[own]) / np.linalg.norm(self.torque[own]))
             for own in (robot.prismatic, ~robot.prismatic)
             if np.any(own)
         )
@@ -102,34 +102,33 @@ def prediction_error(robot: Robot, motion: Motion, *, near: bool) -> PredictionE
 
     """
     assert motion.tau is not None
-    scale, weight = root_mean_square(motion.tau), _weight(motion)
-    own = _own_columns(motion) * weight[:, :, np.newaxis]
+    scale, (own, weight) = root_mean_square(motion.tau), _own_columns(motion)
     if not near:
-        rest = (motion.tau - inverse_dynamics(robot, motion)) / scale * weight
-        left = rest - np.einsum('rja,ja->rj', own, _own_values(own, rest))
-        return PredictionError(np.sqrt(np.mean(left**2, axis=0)), scale)
+        target_torque = (motion.tau - inverse_dynamics(robot, motion)) / scale * weight
+        residual = target_torque - np.einsum('rja,ja->rj', own, _own_values(own, target_torque))
+        return PredictionError(np.sqrt(np.mean(residual**2, axis=0)), scale)
     (count, n), joints = motion.q.shape, np.arange(motion.n_joints)
     body = regressor(robot, motion)
-    rest = (motion.tau - body @ robot.rigid_parameters) / scale * weight
+    target_torque = (motion.tau - body @ robot.rigid_parameters) / scale * weight
     by_body = body * (near_deviation(robot) * np.sqrt(FREEDOM / count))
     by_body *= (weight / scale)[:, :, np.newaxis]
     bodies = by_body.shape[2]
-    of_joints = np.zeros((count, n, n, _OWN))
+    of_joints = np.zeros((count, n, n, _N_OWN))
     of_joints[:, joints, joints] = own
     stacked = np.concatenate([by_body, of_joints.reshape(count, n, -1)], axis=2)
     stacked = stacked.reshape(count * n, -1)
     normal = stacked.T @ stacked + LIMITS.floor**2 * np.eye(stacked.shape[1])
     least = np.full(stacked.shape[1], -np.inf)
-    least[bodies:].reshape(n, _OWN)[:, 1:] = 0.0
-    free = np.asarray(np.linalg.solve(normal, stacked.T @ rest.ravel()))
+    least[bodies:].reshape(n, _N_OWN)[:, 1:] = 0.0
+    free = np.asarray(np.linalg.solve(normal, stacked.T @ target_torque.ravel()))
     factor = np.asarray(np.linalg.cholesky(normal).T)
     values = within(free, factor, (least, np.full(len(free), np.inf)))
-    left = rest - (stacked @ values).reshape(rest.shape)
+    residual = target_torque - (stacked @ values).reshape(target_torque.shape)
     off = float(np.sum(values[:bodies] ** 2)) * FREEDOM / count
-    return PredictionError(np.sqrt(np.mean(left**2, axis=0)), scale, off)
+    return PredictionError(np.sqrt(np.mean(residual**2, axis=0)), scale, off)
 
 
-def _own_values(own: FloatArray, rest: FloatArray) -> FloatArray:
+def _own_values(own: FloatArray, target_torque: FloatArray) -> FloatArray:
     """
     Fit columns (N, n, 4) of each joint to its torque (N, n); all but the offset are positive.
 
@@ -137,12 +136,12 @@ def _own_values(own: FloatArray, rest: FloatArray) -> FloatArray:
     feasible one. Returns values of shape (n, 4).
 
     """
-    normal = np.einsum('rja,rjb->jab', own, own) + LIMITS.floor**2 * np.eye(_OWN)
-    aim = np.einsum('rja,rj->ja', own, rest)
-    free = np.array([(True, *some) for some in product((True, False), repeat=_OWN - 1)])
+    normal = np.einsum('rja,rjb->jab', own, own) + LIMITS.floor**2 * np.eye(_N_OWN)
+    aim = np.einsum('rja,rj->ja', own, target_torque)
+    free = np.array([(True, *some) for some in product((True, False), repeat=_N_OWN - 1)])
     both = free[:, np.newaxis, :, np.newaxis] & free[:, np.newaxis, np.newaxis, :]
     held = aim * free[:, np.newaxis]
-    values = np.linalg.solve(np.where(both, normal, np.eye(_OWN)), held[..., np.newaxis])[..., 0]
+    values = np.linalg.solve(np.where(both, normal, np.eye(_N_OWN)), held[..., np.newaxis])[..., 0]
     feasible = np.all(values[:, :, 1:] >= 0.0, axis=2)
     explained = np.where(feasible, np.sum(values * aim, axis=2), -np.inf)
     return np.asarray(values[np.argmax(explained, axis=0), np.arange(len(aim))])
@@ -167,11 +166,10 @@ def common_values(motion: Motion, fixed: FloatArray, columns: FloatArray) -> Flo
 
     """
     assert motion.tau is not None
-    weight = _weight(motion)[:, :, np.newaxis]
-    rest = (motion.tau - fixed)[:, :, np.newaxis]
+    own, weight = _own_columns(motion)
+    target_torque = (motion.tau - fixed)[:, :, np.newaxis]
     scale = root_mean_square(motion.tau)[:, np.newaxis]
-    both = np.concatenate([columns, rest], axis=2) / scale * weight
-    own = _own_columns(motion) * weight
+    both = np.concatenate([columns, target_torque], axis=2) / scale * weight[:, :, np.newaxis]
     return shared_values(own.transpose(1, 0, 2), both.transpose(1, 0, 2))[0]
 
 
@@ -210,16 +208,16 @@ def shared_values(
     both = both - own @ np.linalg.solve(normal, turned @ both)
     prior = np.diag((np.arange(both.shape[2] - 1) < bodies) * rows / FREEDOM)
     values, inverse, size = np.empty(0), prior, np.ones(n)
-    columns, left = both[:, :, :-1], both[:, :, -1]
+    columns, residual = both[:, :, :-1], both[:, :, -1]
     # the residuals of one pass give the weights of the next
     for _ in range(4):
         columns, target = (one / size[:, None, None] for one in (both[:, :, :-1], both[:, :, -1:]))
         stacked = columns.reshape(n * rows, -1)
         inverse = np.linalg.pinv(stacked.T @ stacked + prior, 1e-12, hermitian=True)
         values = inverse @ (stacked.T @ target.ravel())
-        left = target[:, :, 0] - columns @ values
-        size = np.maximum(size * np.sqrt(np.mean(left**2, axis=1)), LIMITS.floor)
-    scores = (columns * left[:, :, np.newaxis]) @ inverse
+        residual = target[:, :, 0] - columns @ values
+        size = np.maximum(size * np.sqrt(np.mean(residual**2, axis=1)), LIMITS.floor)
+    scores = (columns * residual[:, :, np.newaxis]) @ inverse
     blocks = np.stack([part.sum(axis=(0, 1)) for part in np.array_split(scores, n_blocks, axis=1)])
     # standard deviation of the total of several sums; zero if there is only one
     spreads = [
@@ -236,18 +234,14 @@ def root_mean_square(columns: FloatArray) -> FloatArray:
     return np.where(size > 0.0, size, 1.0)
 
 
-def _own_columns(motion: Motion) -> FloatArray:
-    """Return the columns of each joint, scaled to mean square one, shape (N, n, 4)."""
+def _own_columns(motion: Motion) -> tuple[FloatArray, FloatArray]:
+    """Return weighted columns of each joint, (N, n, 4), and weights, (N, n), of mean square 1."""
     dq, ddq = motion.dq, motion.ddq
     columns = np.stack([np.ones_like(dq), dq, np.sign(dq), ddq], axis=-1)
-    return columns / root_mean_square(columns)
-
-
-def _weight(motion: Motion) -> FloatArray:
-    """Return weights of rows, scaled to mean square one, shape (N, n)."""
     # Weights are zero where a joint rests or reverses: dry friction is arbitrary there, and
     # presliding looks like a delayed torque.
-    speed = np.abs(motion.dq)
+    speed = np.abs(dq)
     moves = speed > SLOW * speed.max(axis=0)
     moves[:, ~moves.any(axis=0)] = True
-    return np.asarray(moves / np.sqrt(moves.mean(axis=0)))
+    weight = moves / np.sqrt(moves.mean(axis=0))
+    return columns / root_mean_square(columns) * weight[:, :, np.newaxis], weight

@@ -287,12 +287,12 @@ def velocity_ratio(recording: Recording) -> tuple[FloatArray, FloatArray]:
             if len(part) > 3:
                 t = recording.t[part] - recording.t[part[0]]
                 line = np.linalg.qr(np.column_stack([np.ones(len(t)), t]))[0]
-                made = cumulative_trapezoid(recording.dq[part], t, axis=0, initial=0.0)
-                pairs.append([x - line @ (line.T @ x) for x in (recording.q[part], made)])
+                integral = cumulative_trapezoid(recording.dq[part], t, axis=0, initial=0.0)
+                pairs.append([x - line @ (line.T @ x) for x in (recording.q[part], integral)])
     if not pairs:
         return nothing
-    moved, made = (np.concatenate(parts) for parts in zip(*pairs, strict=True))
-    product, own, other = np.sum(moved * made, 0), np.sum(moved**2, 0), np.sum(made**2, 0)
+    moved, integral = (np.concatenate(parts) for parts in zip(*pairs, strict=True))
+    product, own, other = np.sum(moved * integral, 0), np.sum(moved**2, 0), np.sum(integral**2, 0)
     # a joint with constant speed has only a linear trend and noise: a tenth of the range at rest
     rests = np.ptp(recording.q, axis=0) < REST_RANGE
     rests |= own < len(moved) * (0.1 * REST_RANGE) ** 2

@@ -158,13 +158,13 @@ def forward_validation(
     recorded = np.column_stack([np.interp(t, reference.t, column) for column in reference.q.T])
     given = controller.feedforward(run.truth)
     assert motion.tau is not None
-    left = decimate(motion.tau - arm.torque(motion), used)
+    residual = decimate(motion.tau - arm.torque(motion), used)
     return ForwardScore(
         source=recording.source,
         joints=motion.joints,
         units=arm.robot.position_units,
         position_error=np.sqrt(np.mean((run.truth.q - recorded) ** 2, axis=0)),
-        torque_error=np.sqrt(np.mean(left**2, axis=0)),
+        torque_error=np.sqrt(np.mean(residual**2, axis=0)),
         feedback_torque=np.sqrt(np.mean((run.tau - given) ** 2, axis=0)),
         motion=motion,
         simulated=np.column_stack([np.interp(reference.t, t, q) for q in run.truth.q.T]),

@@ -21,7 +21,7 @@ from scipy import fft
 import scipy.linalg
 
 #: Lower bound of the share of the noise that remains in the residual of a band.
-LEAST_LEFT = 0.1
+MIN_RESIDUAL_SHARE = 0.1
 
 
 def sandwich(bread: FloatArray, middle: FloatArray) -> FloatArray:
@@ -56,8 +56,8 @@ def score_products(scores: Sequence[FloatArray], lags: int) -> FloatArray:
     for part in scores:
         products += part.T @ part
         for lag in range(1, min(lags, len(part))):
-            alike = (1.0 - lag / lags) * part[:-lag].T @ part[lag:]
-            products += alike + alike.T
+            lagged = (1.0 - lag / lags) * part[:-lag].T @ part[lag:]
+            products += lagged + lagged.T
     return products
 
 
@@ -156,7 +156,7 @@ def _noise_spectrum(
     first = int(np.argmax(quiet)) if np.any(quiet) else len(lags)
     reach = int(np.clip(4 * first, min(10, len(lags)), len(lags)))
     # the noise that the fit removed from a band is added again
-    left = _smoothed(1.0 - leverage, reach).clip(LEAST_LEFT)
+    left = _smoothed(1.0 - leverage, reach).clip(MIN_RESIDUAL_SHARE)
     return np.asarray(_smoothed(power * whitening, reach).clip(0.0) / left / whitening)
 
 

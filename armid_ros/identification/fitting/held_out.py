@@ -151,8 +151,8 @@ def scatter(problem: Sequence[Regression], weights: FloatArray, values: FloatArr
     (change, std), *held_out = fits
     result = []
     for held_change, held_std in held_out:
-        seen = held_std > 0.0
-        share = np.where(seen, std / np.where(seen, held_std, 1.0), 0.0)
+        determined = held_std > 0.0
+        share = np.where(determined, std / np.where(determined, held_std, 1.0), 0.0)
         result.append(share * (held_change - change))
     return np.array(result)
 

@@ -17,7 +17,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 from armid_ros.arm import ArmModel
-from armid_ros.identification.fitting.excited import bounds, near_deviation
+from armid_ros.identification.fitting.identifiability import bounds, near_deviation
 from armid_ros.identification.fitting.least_squares import Method, Solution, solve
 from armid_ros.identification.rows.regression import (
     Fit,
@@ -35,9 +35,9 @@ import numpy as np
 import scipy.linalg
 
 #: Smallest relevant share of the torque, where there is no noise.
-_EXACT = 1e-8
+_MIN_TORQUE_SHARE = 1e-8
 #: Largest number of linearisations; fits that converge take three to eight.
-MOST_PASSES = 20
+_MAX_PASSES = 20
 
 Torques = tuple[FloatArray, ...]
 
@@ -246,10 +246,10 @@ def agree(
     """Whether the torque of an arm agrees with its linear model."""
     off = _size(weights, [p - q for p, q in zip(promised, predicted, strict=True)])
     whole = _size(weights, [part.tau for part in problem])
-    left = [part.tau - torque for part, torque in zip(problem, promised, strict=True)]
+    residual = [part.tau - torque for part, torque in zip(problem, promised, strict=True)]
     # linear model and arm agree where they differ by less than this share of the residual,
     # or of the torque
-    return bool(off <= max(1e-4 * _size(weights, left), _EXACT * whole))
+    return bool(off <= max(1e-4 * _size(weights, residual), _MIN_TORQUE_SHARE * whole))
 
 
 def _iterate(
@@ -297,7 +297,7 @@ def _iterate(
         settled = agree(now.problem, solution.weights, promised, trial.predicted)
         # decrease of the cost by a step below which the iteration ends
         settled = settled or now.gain(trial.predicted) < 0.1
-        if settled or passes == MOST_PASSES:
+        if settled or passes == _MAX_PASSES:
             now = trial
             break
         fresh = regressions(trial.arm, base.independent, recordings, used)
@@ -315,15 +315,15 @@ class _State:
         self.predicted = tuple(part.torque(values) for part in problem)
         self._tau = np.concatenate([part.tau for part in problem])
         self._used = np.concatenate([part.informative for part in problem])
-        self._left = self._tau - np.concatenate(self.predicted)
+        self._residual = self._tau - np.concatenate(self.predicted)
         counts = np.maximum(self._used.sum(axis=0), 1)
-        rms = np.sqrt(np.sum(self._left**2, axis=0, where=self._used) / counts)
-        self._weights = self._used / np.maximum(rms, _EXACT * max(rms.max(), 1e-100))
+        rms = np.sqrt(np.sum(self._residual**2, axis=0, where=self._used) / counts)
+        self._weights = self._used / np.maximum(rms, _MIN_TORQUE_SHARE * max(rms.max(), 1e-100))
 
     def gain(self, predicted: Torques) -> float:
         """Return the decrease of the cost with predicted torques; zero without a residual."""
         # a smaller residual torque counts as zero
-        if np.linalg.norm(self._used * self._left) <= 1e-6 * np.linalg.norm(
+        if np.linalg.norm(self._used * self._residual) <= 1e-6 * np.linalg.norm(
             self._used * self._tau
         ):
             return 0.0
@@ -335,15 +335,15 @@ class _State:
         size = np.linalg.norm(w, axis=0)
         scaled = w / np.where(size > 0.0, size, 1.0)
         normal = scaled.T @ scaled + damping * np.eye(len(size))
-        step = np.linalg.solve(normal, scaled.T @ (self._weights * self._left).ravel())
+        step = np.linalg.solve(normal, scaled.T @ (self._weights * self._residual).ravel())
         return np.clip(self.values + step / np.where(size > 0.0, size, np.inf), *limits)
 
     def cost(self, predicted: Torques | None = None) -> float:
         """Return the total squared residual, in units of the present rms of each joint."""
         if predicted is None:
-            return float(np.sum((self._weights * self._left) ** 2))
-        left = self._weights * (self._tau - np.concatenate(predicted))
-        return float(np.sum(left**2))
+            return float(np.sum((self._weights * self._residual) ** 2))
+        residual = self._weights * (self._tau - np.concatenate(predicted))
+        return float(np.sum(residual**2))
 
 
 def with_uncertain_inertia(
@@ -386,8 +386,8 @@ def with_uncertain_inertia(
         weighted_rows(part, fit.solution.weights)[0] for part in (fit.problem, everything)
     )
     scale = np.linalg.norm(rows, axis=0)
-    made = np.linalg.lstsq(rows / scale, body, rcond=None)[0] / scale[:, np.newaxis]
-    pull = made - fit.base.grouping[:, :rigid]
+    fitted = np.linalg.lstsq(rows / scale, body, rcond=None)[0] / scale[:, np.newaxis]
+    pull = fitted - fit.base.grouping[:, :rigid]
     spread = near_deviation(description.robot)
     added = (pull * spread) @ (pull * spread).T
     plain = fit.solution.covariance

@@ -28,15 +28,11 @@ import numpy.typing as npt
 from scipy import signal
 import scipy.linalg
 
-#: Step of the central differences of rigid columns [rad or m].
-_STEP = 1e-5
-
-
 Inertias = Literal['known', 'free']
 #: Arrays of a problem with one row per sample.
 STACKED = ('tau', 'known', 'columns', 'known_by_motion', 'columns_by_motion')
 #: Arrays of a problem that do not depend on its samples.
-_ALIKE = ('motion_lags', 'torque_lags', 'torque_noise', 'described', 'precision')
+_COMMON = ('motion_lags', 'torque_lags', 'torque_noise', 'described', 'precision')
 
 
 @dataclass(frozen=True)
@@ -96,7 +92,7 @@ class InteractionProblem:
 
     def __post_init__(self) -> None:
         """Freeze the arrays."""
-        for name in (*STACKED, *_ALIKE):
+        for name in (*STACKED, *_COMMON):
             object.__setattr__(self, name, read_only(getattr(self, name)))
 
     @property
@@ -189,7 +185,9 @@ def interaction_problem(
     slow, far = motion.select(kept), other_motion.select(kept)
     geometry = tie_geometry(robot, motion.q, other, other_motion.q, ties)
     springs = geometry.pulled(slack)
-    springs_by = _springs_by_motion(machines, slow, far, slack)
+    by_both = tie_columns_derivatives(robot, slow.q, other, far.q, ties, slack)
+    by_angles = np.concatenate(by_both, axis=3)
+    springs_by = np.pad(by_angles, ((0, 0), (0, 0), (0, 0), (0, 2 * by_angles.shape[3])))
     if not separate:
         springs, springs_by = (x.sum(axis=2, keepdims=True) for x in (springs, springs_by))
     names = tuple(tie.name for tie in ties) if separate else ('all',)
@@ -252,17 +250,6 @@ def _free_inertias(
     return body[:, :, base.independent], base
 
 
-def _springs_by_motion(
-    machines: TiedMachines, motion: Motion, other: Motion, slack: float | FloatArray
-) -> FloatArray:
-    """Return the derivatives of spring columns by the motion of both machines, (N, n, S, 3 J)."""
-    by_both = tie_columns_derivatives(
-        machines.robot, motion.q, machines.other, other.q, machines.ties, slack
-    )
-    by_angles = np.concatenate(by_both, axis=3)
-    return np.pad(by_angles, ((0, 0), (0, 0), (0, 0), (0, 2 * by_angles.shape[3])))
-
-
 def _passed(used: Conditioning | None) -> tuple[FloatArray, FloatArray]:
     """Return the covariances of filtered white noise of positions and of torques, over lags."""
     # number of samples over which errors are correlated after filtering
@@ -287,14 +274,15 @@ def _passed(used: Conditioning | None) -> tuple[FloatArray, FloatArray]:
 
 def _regressor_by_motion(robot: Robot, motion: Motion, kept: npt.NDArray[np.intp]) -> FloatArray:
     """Return the derivatives of some rigid columns, shape (N, n, P, 3, n)."""
+    h = 1e-5  # step of the central differences [rad or m]
     n = motion.n_joints
     result = np.empty((len(motion), n, len(kept), 3, n))
     for order, name in enumerate(('q', 'dq', 'ddq')):
-        for j, step in enumerate(_STEP * np.eye(n)):
+        for j, step in enumerate(h * np.eye(n)):
             at = getattr(motion, name)
             after = regressor(robot, replace(motion, **{name: at + step}))
             before = regressor(robot, replace(motion, **{name: at - step}))
-            result[:, :, :, order, j] = (after - before)[:, :, kept] / (2.0 * _STEP)
+            result[:, :, :, order, j] = (after - before)[:, :, kept] / (2.0 * h)
     return result
 
 

@@ -243,7 +243,7 @@ class SensorNoise:
 
     def floor(self, arm: ArmModel) -> FloatArray:
         """Return the standard deviation of the noise of a row, ties included, shape (n,) [N m]."""
-        problem = self._taut
+        problem = self._taut  # with springs without slack
         stiffness = dict.fromkeys(problem.spring_joints, 0.0)
         slack = dict.fromkeys(problem.spring_joints, 0.0)
         for effect, values in zip(arm.effects, arm.values, strict=True):

@@ -230,9 +230,9 @@ def _covariance(
     known = information
     lags = len(problem.torque_lags)
     for lag in range(1, lags):
-        alike = np.einsum('npj,jk,nqk->pq', moved[:-lag], problem.motion_lags[lag], moved[lag:])
+        lagged = np.einsum('npj,jk,nqk->pq', moved[:-lag], problem.motion_lags[lag], moved[lag:])
         torque = problem.torque_lags[lag] * variance
-        alike += np.einsum('nip,i,niq->pq', weighted[:-lag], torque, weighted[lag:])
-        known = known + alike + alike.T
+        lagged += np.einsum('nip,i,niq->pq', weighted[:-lag], torque, weighted[lag:])
+        known = known + lagged + lagged.T
     covariance = excess * inverse @ known @ inverse
     return widened(covariance, inverse, score_products([scores], lags))

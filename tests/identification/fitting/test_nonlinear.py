@@ -117,7 +117,7 @@ def test_what_is_known_of_a_nonlinear_effect_is_where_the_fit_begins(robot):
 
 
 def test_a_fit_that_does_not_settle_says_so(robot, monkeypatch):
-    monkeypatch.setattr('armid_ros.identification.fitting.nonlinear.MOST_PASSES', 1)
+    monkeypatch.setattr('armid_ros.identification.fitting.nonlinear._MAX_PASSES', 1)
     _, recording, result = fitted(robot, ['torque_gain'])
     assert any('has not converged' in note for note in result.notes)
     training = error(result.training)
