@@ -316,25 +316,22 @@ def _fitted(
 ) -> tuple[BaseParameters, FittedValues]:
     """Fit parameters that data determine better than the description; return grouping and fit."""
     base, problem, recordings, used = data
-    method = settings.least_squares
-
-    def fitted(arm: ArmModel, base: BaseParameters, problem: Sequence[Regression]) -> FittedValues:
-        if not settings.holds_description:
-            return fit_values(arm, base, problem, recordings, used, method)
-        kept, problem, solution = determined(arm, base, problem, method)
-        free = None if kept.rank == base.rank else ungrouped(arm, base)
-        return fit_values(arm, kept, problem, recordings, used, method, free, solution)
-
-    fit = fitted(arm, base, problem)
-    rigid = len(arm.robot.rigid_parameters)
-    if np.all(np.any(theory.grouping[:, rigid:], axis=0)):
-        return theory, fit
-    # fit again with effects that the described arm does not have, such as unreached saturation
-    now = fit.arm.base_parameters(rng)
-    if now.rank <= theory.rank:
-        return theory, fit
-    columns = regressions(fit.arm, now.independent, recordings, used)
-    return now, fitted(fit.arm, *excited(now, columns))
+    method, rigid = settings.least_squares, len(arm.robot.rigid_parameters)
+    refitted = False
+    while True:
+        kept, free, solution = base, None, None
+        if settings.holds_description:
+            kept, problem, solution = determined(arm, base, problem, method)
+            free = None if kept.rank == base.rank else ungrouped(arm, base)
+        fit = fit_values(arm, kept, problem, recordings, used, method, free, solution)
+        if refitted or np.all(np.any(theory.grouping[:, rigid:], axis=0)):
+            return theory, fit
+        # fit again with effects that the described arm does not have, such as unreached saturation
+        identifiable = fit.arm.base_parameters(rng)
+        if identifiable.rank <= theory.rank:
+            return theory, fit
+        arm, theory, refitted = fit.arm, identifiable, True
+        base, problem = excited(theory, regressions(arm, theory.independent, recordings, used))
 
 
 def _require_samples(

@@ -152,13 +152,15 @@ class NormalEquations:
         """Return the sum of the squared residuals of each joint, shape (n,) [(N m)^2]."""
         ends = np.append(values, -1.0)
         # smaller values are rounding errors of the products
-        return np.asarray(np.maximum(self.products @ ends @ ends, 1e-12 * self.target_squares))
+        return np.asarray(
+            np.maximum(self.products @ ends @ ends, 1e-12 * self.products[:, -1, -1])
+        )
 
     def joint_std(self, values: FloatArray) -> FloatArray:
         """Return the standard deviation of the residual of each joint, shape (n,) [N m]."""
         counts = np.maximum(self.counts, 1.0)
         rows = float(counts.sum())
-        freedom = rows / max(1.0, rows - self.rank)  # correction for degrees of freedom
+        freedom = rows / max(1.0, rows - len(values))  # correction for degrees of freedom
         return np.asarray(np.sqrt(freedom * self.squares(values) / counts))
 
     def packed(self) -> FloatArray:

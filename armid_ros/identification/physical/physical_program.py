@@ -125,7 +125,8 @@ class PhysicalProgram:
         gradient[:size] = -change.T @ aim
         gradient[:rigid] += weight * np.tile(identity, self.n_links)
         for link in range(self.n_links):
-            gradient[self._first(link) + _TRIANGLE : self._first(link + 1)] = -weight
+            first = size + _LOG_DETERMINANT * link  # variable of the link's log-determinant
+            gradient[first + _TRIANGLE : first + _LOG_DETERMINANT] = -weight
             mass = change[PER_LINK * link] / self.prior[PER_LINK * link]  # relative to the prior
             hessian[:size, :size] += mass_weight * np.outer(mass, mass)
             gradient[:size] -= mass_weight * mass
@@ -157,10 +158,6 @@ class PhysicalProgram:
                 units[_packed(i, j), i, j] = units[_packed(i, j), j, i] = share
             blocks.append(link_parameters(root @ units @ root.T).T)
         return np.asarray(sparse.block_diag(blocks).toarray())
-
-    def _first(self, link: int) -> int:
-        """Return the index of the first variable of a link's log-determinant."""
-        return len(self.prior) + _LOG_DETERMINANT * link
 
     def _constraints(
         self, change: FloatArray, origin: FloatArray
@@ -207,7 +204,8 @@ class PhysicalProgram:
         """Bound the logarithms u by sum u <= log det X, with the whitened matrix X of a link."""
         # X >= Z diag(Z)^-1 Z' for a lower triangle Z, and u <= log of its diagonal (Ben-Tal and
         # Nemirovski 2001, section 4.2).
-        first, width = self._first(link), len(self.prior) + _LOG_DETERMINANT * self.n_links
+        size = len(self.prior)
+        first, width = (size + _LOG_DETERMINANT * k for k in (link, self.n_links))
         matrix = sparse.lil_matrix((36, width))
         for index in range(PER_LINK):
             matrix[index, PER_LINK * link + index] = -1.0

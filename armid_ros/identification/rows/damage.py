@@ -10,15 +10,15 @@ from dataclasses import replace
 from armid_ros.identification.rows.signals import Conditioning
 from armid_ros.identification.samples.spikes import FIRST, SpikeGate
 from armid_ros.identification.samples.straight_line import (
+    ErrorModel,
     Excursion,
     growth_over,
+    innovation_of,
     MAX_GAP,
-    missed_by,
     robust_scale,
     share_of_noise,
     smallest_steps,
     StreamSample,
-    Usual,
     WINDOW,
 )
 from armid_ros.motion import FloatArray
@@ -106,20 +106,20 @@ def impossible_excursions(
     list of Excursion
 
     """
-    stretch, suspect, usual = _suspects(gate, t, x, floor)
+    stretch, suspect, model = _suspects(gate, t, x, floor)
     found: list[Excursion] = []
     done = 0
     for k in np.flatnonzero(suspect).tolist():
         if k < done:
             continue
-        start, known, bent = int(stretch[k]), [], np.zeros(x.shape[1])
+        start, known, curvature = int(stretch[k]), [], np.zeros(x.shape[1])
         if k - start >= FIRST or start < done:
             known = [StreamSample(float(t[i]), x[i]) for i in range(max(start, k - 3), k)]
             if len(known) == 3:
-                error = missed_by(known[:2], known[2], usual.period)
-                bent = error.error / error.bend
+                error = innovation_of(known[:2], known[2], model.period)
+                curvature = error.error / error.acceleration
             start = k
-        gate.begin(usual, known[-2:], bent)
+        gate.begin(model, known[-2:], curvature)
         passed, done = 0, start
         while done < len(t) and (passed < 2 or done <= k):
             good = gate.take(float(t[done]), x[done], floor)
@@ -135,7 +135,7 @@ def impossible_excursions(
 
 def _suspects(
     gate: SpikeGate, t: FloatArray, x: FloatArray, floor: FloatArray
-) -> tuple[npt.NDArray[np.intp], npt.NDArray[np.bool_], Usual]:
+) -> tuple[npt.NDArray[np.intp], npt.NDArray[np.bool_], ErrorModel]:
     """
     Compare all samples with the straight lines through the two samples before.
 
@@ -149,8 +149,8 @@ def _suspects(
     gap = dt > MAX_GAP * period
     first = np.where(np.concatenate([[True], gap]), np.arange(len(t)), 0)
     apart = gap[1:] | gap[:-1]
-    ratio, (noise, bend) = dt[1:] / dt[:-1], growth_over(dt[:-1], dt[1:], period)
-    growth = np.maximum(noise, bend)
+    ratio, (noise, acceleration) = dt[1:] / dt[:-1], growth_over(dt[:-1], dt[1:], period)
+    growth = np.maximum(noise, acceleration)
     suspect = np.zeros(len(t), dtype=bool)
     sizes, shares = np.zeros((2, x.shape[1]))
     # windows of equal length are processed together; the last few samples are in none
@@ -167,10 +167,10 @@ def _suspects(
         step = float(smallest_steps(np.abs(moves)[:, np.newaxis])[-1, 0])
         resolution = min(step if np.isfinite(step) else 0.0, float(np.abs(error).max()))
         size = max(scales[loudest], resolution)
-        usual = Usual(period, np.array([size]), np.array([white]))
-        limit = np.maximum(usual.limits(gate.quantile(period), noise, bend), floor[signal])
+        model = ErrorModel(period, np.array([size]), np.array([white]))
+        limit = np.maximum(model.limits(gate.quantile(period), noise, acceleration), floor[signal])
         # a smooth signal keeps its curvature
-        error[1:] -= usual.smoothness * (error[:-1] / bend[:-1]) * bend[1:]
+        error[1:] -= model.correlation * (error[:-1] / acceleration[:-1]) * acceleration[1:]
         suspect[2:] |= (np.abs(error) > limit) & ~apart
         sizes[signal], shares[signal] = size, white
-    return np.maximum.accumulate(first), suspect, Usual(period, sizes, shares)
+    return np.maximum.accumulate(first), suspect, ErrorModel(period, sizes, shares)

@@ -35,14 +35,14 @@ import math
 
 from armid_ros.identification.samples.straight_line import (
     all_unwrapped,
+    ErrorModel,
     Excursion,
+    Innovation,
+    innovation_of,
     MAX_GAP,
-    Missed,
-    missed_by,
     NoiseLevel,
     StreamSample,
     unwrapped,
-    Usual,
 )
 from armid_ros.motion import FloatArray
 import numpy as np
@@ -97,8 +97,8 @@ class SpikeGate:
         revolute = np.tile(turning, len(signals))
         self._turn = np.where(self._continuous & revolute, 2.0 * np.pi, 0.0)
         limit = np.broadcast_to(np.asarray(torque_limit, dtype=float), turning.shape)
-        known = limit[np.isfinite(limit)]
-        limit = np.where(np.isfinite(limit), limit, known.min() if len(known) else 0.0)
+        finite = limit[np.isfinite(limit)]
+        limit = np.where(np.isfinite(limit), limit, finite.min() if len(finite) else 0.0)
         scale = np.where(self._pulsing, np.tile(limit, len(signals)), 1.0)
         # Best resolution of a position [rad or m], of a velocity (per second), and of a torque as
         # a share of its limit: an encoder of 22 bits, a torque sensor of 17. A simulation without
@@ -107,7 +107,7 @@ class SpikeGate:
         # second derivative of each signal when an arm at rest begins to move, in these units per
         # second squared: 2 rad/s^2, a jerk of 50 rad/s^3, and a torque at its limit at 1 Hz
         onset = {'q': 2.0, 'v': 50.0, 't': 50.0}
-        self._least_seen = tuple(scale * [least[one] for one in kind] for least in (finest, onset))
+        self._min_noise = tuple(scale * [least[one] for one in kind] for least in (finest, onset))
         self._false_alarm_time = false_alarm_time
         self.reset()
 
@@ -117,12 +117,12 @@ class SpikeGate:
         self.rejected: Counter[str] = Counter()
         self.left_out: list[Excursion] = []
         self._floor: FloatArray | float = 0.0
-        self._early: StreamSample | None = None
+        self._delayed: StreamSample | None = None
         self._last: FloatArray | None = None  # last good sample, also of an earlier stretch
         count = len(self._turn)
         self.lowest, self.highest = np.full(count, np.inf), np.full(count, -np.inf)
-        self._level = NoiseLevel(*self._least_seen)
-        self._least: tuple[Usual, float, FloatArray] | None = None
+        self._level = NoiseLevel(*self._min_noise)
+        self._min_limits: tuple[ErrorModel, float, FloatArray] | None = None
         self._restart([])
 
     def take(self, t: float, x: FloatArray, floor: FloatArray | float = 0.0) -> list[StreamSample]:
@@ -140,24 +140,24 @@ class SpikeGate:
 
         """
         self.left_out, self._floor = [], floor
-        early, self._early, tail = self._early, None, self._tail
+        delayed, self._delayed, tail = self._delayed, None, self._tail
         good: list[StreamSample] = []
-        if early is not None and tail is not None:
-            if tail.t < t < early.t:  # the sample that continues the earlier ones is kept
+        if delayed is not None and tail is not None:
+            if tail.t < t < delayed.t:  # the sample that continues the earlier ones is kept
                 self.rejected['out_of_order'] += 1
             else:
-                good = self._take(early)
+                good = self._take(delayed)
         ahead = 0.0 if self._tail is None else t - self._tail.t
         if 1.5 * self._period < ahead <= MAX_GAP * self._period < math.inf:
             # samples seem to be lost before this one; the next one may prove its stamp wrong
-            self._early = StreamSample(t, x)
+            self._delayed = StreamSample(t, x)
             return good
         return good + self._take(StreamSample(t, x))
 
     def _take(self, sample: StreamSample) -> list[StreamSample]:
         """Process a sample whose stamp agrees with the next one."""
-        if self._known:
-            self._last = self._known[1].x
+        if self._reference:
+            self._last = self._reference[1].x
         if self._last is not None:
             x = unwrapped(sample.x, self._last, self._turn)
             sample = sample if x is sample.x else replace(sample, x=x)
@@ -169,25 +169,28 @@ class SpikeGate:
         return self._begin() if len(self._first) == FIRST else []
 
     def begin(
-        self, usual: Usual, known: Sequence[StreamSample] = (), bent: FloatArray | float = 0.0
+        self,
+        model: ErrorModel,
+        reference: Sequence[StreamSample] = (),
+        curvature: FloatArray | float = 0.0,
     ) -> None:
         """
         Begin within a recording whose usual errors are known.
 
         Parameters
         ----------
-        usual : Usual
+        model : ErrorModel
             Usual errors of the recording.
-        known : sequence of StreamSample
+        reference : sequence of StreamSample
             The two good samples before; none at the begin of a stretch.
-        bent : ndarray, shape (m,)
+        curvature : ndarray, shape (m,)
             Prediction error of the last known sample, scaled to one period.
 
         """
-        self._level.set(usual)
-        self._restart(None if known else [], known, bent)
-        if known:
-            self._period, self._quantile = usual.period, self.quantile(usual.period)
+        self._level.set(model)
+        self._restart(None if reference else [], reference, curvature)
+        if reference:
+            self._period, self._quantile = model.period, self.quantile(model.period)
 
     def possible(self, excursion: Excursion, lowest: FloatArray, highest: FloatArray) -> bool:
         """
@@ -201,7 +204,7 @@ class SpikeGate:
         values = np.stack([sample.x for sample in excursion.samples])
         beyond = np.maximum(lowest - values, values - highest).max(axis=0)
         far = beyond > np.maximum(excursion.limit, highest - lowest)
-        return not bool(np.any((excursion.off > 1.0) & (far | ~self._pulsing)))
+        return not bool(np.any((excursion.ratio > 1.0) & (far | ~self._pulsing)))
 
     def quantile(self, period: float) -> float:
         """Return the limit in standard deviations for the false alarm time, given a period [s]."""
@@ -211,29 +214,29 @@ class SpikeGate:
     def _restart(
         self,
         first: list[StreamSample] | None,
-        known: Sequence[StreamSample] = (),
-        bent: FloatArray | float = 0.0,
+        reference: Sequence[StreamSample] = (),
+        curvature: FloatArray | float = 0.0,
     ) -> None:
         """Begin a new stretch with some samples, and keep the usual errors."""
-        self._first, self._known = first, tuple(known)
-        self._bent = bent
-        self._held: list[StreamSample] = []
-        self._went_on, self._suspect = 0, np.empty(0, dtype=np.intp)
-        self._off = self._limit = np.zeros(len(self._turn))
-        self._stray: StreamSample | None = None
-        self._early = None
+        self._first, self._reference = first, tuple(reference)
+        self._curvature = curvature
+        self._pending: list[StreamSample] = []
+        self._n_continuing, self._suspects = 0, np.empty(0, dtype=np.intp)
+        self._ratio = self._limit = np.zeros(len(self._turn))
+        self._jumped: StreamSample | None = None
+        self._delayed = None
         self._period = np.inf
         self._quantile = 0.0
 
     @property
     def _tail(self) -> StreamSample | None:
         """Return the newest sample that is not damaged, as far as known."""
-        latest = self._held or self._first or self._known
+        latest = self._pending or self._first or self._reference
         return latest[-1] if latest else None
 
     def _in_time(self, sample: StreamSample) -> bool:
         """Return whether a stamp continues the stream; two other stamps begin a new stretch."""
-        tail, stray, self._stray = self._tail, self._stray, None
+        tail, stray, self._jumped = self._tail, self._jumped, None
         dt = 0.0 if tail is None else sample.t - tail.t
         longest = MAX_GAP * self._period
         if tail is None or 0.0 < dt <= longest:
@@ -242,9 +245,9 @@ class SpikeGate:
             return True
         if dt == 0.0 or (math.isfinite(longest) and -longest <= dt < 0.0):  # noqa: RUF069 - equal stamps differ by zero
             self.rejected['out_of_order'] += 1
-            self._stray = stray
+            self._jumped = stray
         elif stray is None:
-            self._stray = sample
+            self._jumped = sample
         else:
             if stray.t >= sample.t:
                 self.rejected['stamp'] += 1
@@ -258,20 +261,20 @@ class SpikeGate:
         first = all_unwrapped(raw, self._turn)
         self._period = float(np.median(np.diff([s.t for s in first])))
         self._quantile = self.quantile(self._period)
-        missed = self._lines_through(first)
-        self._level.begin(missed, np.diff([s.x for s in first], axis=0), self._period)
-        straight = [bool(np.all(self._off_by(m) <= 1.0)) for m in missed]
+        innovations = self._lines_through(first)
+        self._level.begin(innovations, np.diff([s.x for s in first], axis=0), self._period)
+        straight = [bool(np.all(self._ratio_to_limit(m) <= 1.0)) for m in innovations]
         if not any(straight):  # erratic, or the noise has changed: measure it again
-            off = np.max([self._off_by(m) for m in missed], axis=0)
-            self._leave_out(Excursion(tuple(first), off, self._limits(missed[0])), True)
+            ratio = np.max([self._ratio_to_limit(m) for m in innovations], axis=0)
+            self._leave_out(Excursion(tuple(first), ratio, self._limits(innovations[0])), True)
             self._level.forget()
             self._restart([])
             return []
         start = straight.index(True)
         first = first[:start] + all_unwrapped(raw[start:], self._turn)  # from undamaged samples
-        self._known = first[start], first[start + 1]
-        self._leave_out_ahead(first[:start], missed[0])
-        good = list(self._known)
+        self._reference = first[start], first[start + 1]
+        self._leave_out_ahead(first[:start], innovations[0])
+        good = list(self._reference)
         for sample in first[start + 2 :]:
             good += self._judge(sample)
         return good
@@ -281,48 +284,48 @@ class SpikeGate:
         if self._first is not None:  # the earlier samples were erratic
             self._first.append(sample)
             return []
-        missed = missed_by(self._known, sample, self._period)
+        innovation = innovation_of(self._reference, sample, self._period)
         # a smooth signal keeps its curvature
-        bent = self._level.usual.smoothness * self._bent * missed.bend
-        judged = missed._replace(error=missed.error - bent)
-        if not self._held and self._surely_in_line(judged):
-            return self._accept([sample], missed)
-        off = self._off_by(judged)
-        if not self._held:
-            if float(np.max(off)) <= 1.0:
-                return self._accept([sample], missed)
-            self._held, self._went_on, self._off = [sample], 0, off
-            self._limit = self._limits(missed)
-            self._suspect = np.flatnonzero(off > 1.0)
+        curvature = self._level.model.correlation * self._curvature * innovation.acceleration
+        judged = innovation._replace(error=innovation.error - curvature)
+        if not self._pending and self._surely_in_line(judged):
+            return self._accept([sample], innovation)
+        ratio = self._ratio_to_limit(judged)
+        if not self._pending:
+            if float(np.max(ratio)) <= 1.0:
+                return self._accept([sample], innovation)
+            self._pending, self._n_continuing, self._ratio = [sample], 0, ratio
+            self._limit = self._limits(innovation)
+            self._suspects = np.flatnonzero(ratio > 1.0)
             return []
-        goes_on = self._continues(sample, off)
-        if not goes_on and float(np.max(off[self._suspect])) <= 1.0:
-            self._leave_out(Excursion(tuple(self._held), self._off, self._limit))
-            self._held = []
+        continues = self._continues(sample, ratio)
+        if not continues and float(np.max(ratio[self._suspects])) <= 1.0:
+            self._leave_out(Excursion(tuple(self._pending), self._ratio, self._limit))
+            self._pending = []
             return self._judge(sample)
-        self._held.append(sample)
-        self._off = np.maximum(self._off, off)
-        self._went_on += goes_on
-        if len(self._held) <= MAX_GAP:
+        self._pending.append(sample)
+        self._ratio = np.maximum(self._ratio, ratio)
+        self._n_continuing += continues
+        if len(self._pending) <= MAX_GAP:
             return []
-        if 2 * self._went_on > MAX_GAP:
-            if len(self._held) > 1 and self._stepped():
-                self._held[0] = replace(self._held[0], begins=True)
+        if 2 * self._n_continuing > MAX_GAP:
+            if len(self._pending) > 1 and self._stepped():
+                self._pending[0] = replace(self._pending[0], begins=True)
             return self._release()
-        self._leave_out(Excursion(tuple(self._held), self._off, self._limit), True)
+        self._leave_out(Excursion(tuple(self._pending), self._ratio, self._limit), True)
         self._restart([])
         return []
 
     def _release(self) -> list[StreamSample]:
         """Pass on the held samples, which are valid; check them for damaged samples again."""
-        held, self._held = self._held, []
-        missed = self._lines_through(held)
+        held, self._pending = self._pending, []
+        innovations = self._lines_through(held)
         steady = ~self._pulsing
-        straight = [bool(np.all(self._off_by(one)[steady] <= 1.0)) for one in missed]
+        straight = [bool(np.all(self._ratio_to_limit(one)[steady] <= 1.0)) for one in innovations]
         if all(straight) or not any(straight):
             return self._accept(held)
         start = straight.index(True)
-        self._leave_out_ahead(held[:start], missed[0])
+        self._leave_out_ahead(held[:start], innovations[0])
         held[start] = replace(held[start], begins=held[0].begins)
         if all(straight[start:]):
             return self._accept(held[start:])
@@ -331,18 +334,18 @@ class SpikeGate:
             good = good + self._judge(sample)
         return good
 
-    def _continues(self, sample: StreamSample, off: FloatArray) -> bool:
+    def _continues(self, sample: StreamSample, ratio: FloatArray) -> bool:
         """Return whether a sample continues the held samples, by the old slope or a new one."""
-        last = self._held[-1]
-        before = self._held[-2] if len(self._held) > 1 else self._known[1]
-        first, second = self._known
+        last = self._pending[-1]
+        before = self._pending[-2] if len(self._pending) > 1 else self._reference[1]
+        first, second = self._reference
         slope = (second.x - first.x) / (second.t - first.t)
         as_before = StreamSample(before.t, last.x - slope * (last.t - before.t))
         # the error from the continued samples is at most half of that from the old line
-        far_enough = max(1.0, 0.5 * float(np.max(off[self._suspect])))
+        max_ratio = max(1.0, 0.5 * float(np.max(ratio[self._suspects])))
         for one in (as_before, before):
-            rest = self._off_by(missed_by((one, last), sample, self._period))
-            if float(np.max(rest[self._suspect])) < far_enough:
+            rest = self._ratio_to_limit(innovation_of((one, last), sample, self._period))
+            if float(np.max(rest[self._suspects])) < max_ratio:
                 return True
         return False
 
@@ -350,57 +353,61 @@ class SpikeGate:
         """Return whether a continuous signal has stepped between known and held samples."""
         # The lines before and after a step do not intersect in between. The lines before and
         # after a collision do.
-        ahead = missed_by(self._known, self._held[0], self._period)
-        back = missed_by((self._held[1], self._held[0]), self._known[1], self._period)
-        far = np.minimum(self._off_by(ahead), self._off_by(back))
+        ahead = innovation_of(self._reference, self._pending[0], self._period)
+        back = innovation_of(
+            (self._pending[1], self._pending[0]), self._reference[1], self._period
+        )
+        far = np.minimum(self._ratio_to_limit(ahead), self._ratio_to_limit(back))
         return bool(np.any(far[self._continuous & (ahead.error * back.error < 0.0)] > 1.0))
 
-    def _limits(self, missed: Missed) -> FloatArray:
+    def _limits(self, innovation: Innovation) -> FloatArray:
         """Return the largest allowed prediction error of a sample, shape (m,)."""
-        limits = self._level.usual.limits(self._quantile, missed.noise, missed.bend)
+        limits = self._level.model.limits(
+            self._quantile, innovation.noise, innovation.acceleration
+        )
         return np.maximum(limits, self._floor)
 
-    def _off_by(self, missed: Missed) -> FloatArray:
+    def _ratio_to_limit(self, innovation: Innovation) -> FloatArray:
         """Return the prediction error of a sample over its limit, shape (m,)."""
-        limit = np.maximum(self._limits(missed), 1e-300)
-        return np.asarray(np.abs(missed.error) / limit)
+        limit = np.maximum(self._limits(innovation), 1e-300)
+        return np.asarray(np.abs(innovation.error) / limit)
 
-    def _surely_in_line(self, missed: Missed) -> bool:
+    def _surely_in_line(self, innovation: Innovation) -> bool:
         """Return whether a sample is within a lower bound of its limits, a fast test."""
-        # Limits grow with the factors `noise` and `bend`, and in proportion if both grow alike. So
-        # they are at least the limits over one period times the smaller factor.
-        least, usual = self._least, self._level.usual
-        if least is None or least[0] is not usual or least[1] != self._quantile:
-            over_a_period = usual.limits(self._quantile, 1.0, 1.0)
-            self._least = least = usual, self._quantile, over_a_period
-        limits = np.maximum(min(missed.noise, missed.bend) * least[2], self._floor)
-        return bool((np.abs(missed.error) <= limits).all())
+        # Limits grow with `noise` and `acceleration`, and in proportion if both grow alike. They
+        # are at least the limits over one period times the smaller factor.
+        least, model = self._min_limits, self._level.model
+        if least is None or least[0] is not model or least[1] != self._quantile:
+            over_a_period = model.limits(self._quantile, 1.0, 1.0)
+            self._min_limits = least = model, self._quantile, over_a_period
+        limits = np.maximum(min(innovation.noise, innovation.acceleration) * least[2], self._floor)
+        return bool((np.abs(innovation.error) <= limits).all())
 
     def _accept(
-        self, samples: list[StreamSample], missed: Missed | None = None
+        self, samples: list[StreamSample], innovation: Innovation | None = None
     ) -> list[StreamSample]:
         """Pass samples on, and update the noise estimate with them."""
-        self._held = []
+        self._pending = []
         for sample in samples:
-            one = missed or missed_by(self._known, sample, self._period)
-            self._level.learn(one, sample.x - self._known[1].x)
-            self._bent = one.error / one.bend
+            one = innovation or innovation_of(self._reference, sample, self._period)
+            self._level.learn(one, sample.x - self._reference[1].x)
+            self._curvature = one.error / one.acceleration
             np.minimum(self.lowest, sample.x, out=self.lowest)
             np.maximum(self.highest, sample.x, out=self.highest)
-            self._known = self._known[1], sample
+            self._reference = self._reference[1], sample
         self._level.settle(self._period)
         return samples
 
-    def _lines_through(self, samples: Sequence[StreamSample]) -> list[Missed]:
+    def _lines_through(self, samples: Sequence[StreamSample]) -> list[Innovation]:
         """Return the error of each sample against the line through the two previous samples."""
         pairs = range(len(samples) - 2)
-        return [missed_by(samples[k : k + 2], samples[k + 2], self._period) for k in pairs]
+        return [innovation_of(samples[k : k + 2], samples[k + 2], self._period) for k in pairs]
 
-    def _leave_out_ahead(self, samples: Sequence[StreamSample], missed: Missed) -> None:
+    def _leave_out_ahead(self, samples: Sequence[StreamSample], innovation: Innovation) -> None:
         """Drop the samples before the first samples that are in line."""
         if samples:
-            off, limit = self._off_by(missed), self._limits(missed)
-            self._leave_out(Excursion(tuple(samples), off, limit))
+            ratio, limit = self._ratio_to_limit(innovation), self._limits(innovation)
+            self._leave_out(Excursion(tuple(samples), ratio, limit))
 
     def _leave_out(self, excursion: Excursion, erratic: bool = False) -> None:
         """Count dropped samples by reason."""
@@ -413,7 +420,7 @@ class SpikeGate:
             self.rejected['pulse'] += count
         else:
             self.rejected['spike'] += count
-            self.spikes[int(np.argmax(excursion.off))] += count
+            self.spikes[int(np.argmax(excursion.ratio))] += count
         values = np.stack([sample.x for sample in excursion.samples])
-        before = self._known[1].x[np.newaxis] if self._known else values[:1]
-        self._level.see_steps(np.diff(values, axis=0, prepend=before))
+        before = self._reference[1].x[np.newaxis] if self._reference else values[:1]
+        self._level.add_steps(np.diff(values, axis=0, prepend=before))

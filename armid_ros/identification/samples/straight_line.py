@@ -63,7 +63,7 @@ class Excursion:
     ----------
     samples : tuple of StreamSample
         Samples off the line.
-    off : ndarray, shape (m,)
+    ratio : ndarray, shape (m,)
         Largest distance from the line, over `limit`.
     limit : ndarray, shape (m,)
         Largest allowed distance from the line, in units of the signals.
@@ -71,14 +71,14 @@ class Excursion:
     """
 
     samples: tuple[StreamSample, ...]
-    off: FloatArray
+    ratio: FloatArray
     limit: FloatArray
 
 
 @dataclass(frozen=True, eq=False)
-class Usual:
+class ErrorModel:
     """
-    Usual prediction errors.
+    Usual prediction errors of a stream.
 
     Attributes
     ----------
@@ -86,33 +86,33 @@ class Usual:
         Sampling period [s].
     size : ndarray, shape (m,)
         Standard deviation of the errors over a period, in the noisiest window.
-    noisy : ndarray, shape (m,)
+    white : ndarray, shape (m,)
         Share of white noise in the squared errors.
 
     """
 
     period: float
     size: FloatArray
-    noisy: FloatArray
+    white: FloatArray
 
-    def growth(self, noise: Factor, bend: Factor) -> FloatArray:
+    def growth(self, noise: Factor, acceleration: Factor) -> FloatArray:
         """Return the growth of the errors over other times, shape (m,) or (N, m)."""
-        squares = bend**2
-        return np.asarray(np.sqrt(squares + self.noisy * (noise**2 - squares)))
+        squares = acceleration**2
+        return np.asarray(np.sqrt(squares + self.white * (noise**2 - squares)))
 
     @cached_property
-    def smoothness(self) -> FloatArray:
+    def correlation(self) -> FloatArray:
         """Correlation of successive errors, 0 for noise, shape (m,)."""
-        return np.clip(1.0 - (1.0 - _NOISE_CORRELATION) * self.noisy, 0.0, 1.0)
+        return np.clip(1.0 - (1.0 - _NOISE_CORRELATION) * self.white, 0.0, 1.0)
 
     @cached_property
     def _shares(self) -> tuple[FloatArray, FloatArray]:
         """Return deviation of noise, and largest error by acceleration, over `size`, (m,)."""
         # the largest acceleration of an arm is twice its 95 % quantile, which is 1.96 standard
         # deviations of a normal variable
-        return np.sqrt(self.noisy), np.sqrt(1.0 - self.noisy) * (2.0 * 1.96)
+        return np.sqrt(self.white), np.sqrt(1.0 - self.white) * (2.0 * 1.96)
 
-    def limits(self, quantile: float, noise: Factor, bend: Factor) -> FloatArray:
+    def limits(self, quantile: float, noise: Factor, acceleration: Factor) -> FloatArray:
         """
         Return the largest allowed prediction errors, shape (m,) or (N, m).
 
@@ -121,12 +121,14 @@ class Usual:
         distribution.
 
         """
-        noisy, smooth = self._shares
-        tails = quantile * self.growth(noise, bend)
-        return np.asarray(self.size * np.minimum(tails, quantile * noisy * noise + smooth * bend))
+        white, smooth = self._shares
+        tails = quantile * self.growth(noise, acceleration)
+        return np.asarray(
+            self.size * np.minimum(tails, quantile * white * noise + smooth * acceleration)
+        )
 
 
-class Missed(NamedTuple):
+class Innovation(NamedTuple):
     """
     Prediction error of one sample.
 
@@ -134,7 +136,7 @@ class Missed(NamedTuple):
     ----------
     error : ndarray, shape (m,)
         Measured minus predicted signals.
-    noise, bend : float
+    noise, acceleration : float
         Growth of the errors by noise, and by an acceleration, over this time relative to one
         period.
 
@@ -142,7 +144,7 @@ class Missed(NamedTuple):
 
     error: FloatArray
     noise: float
-    bend: float
+    acceleration: float
 
 
 def growth_over(step: Time, ahead: Time, period: float) -> tuple[Time, Time]:
@@ -152,12 +154,14 @@ def growth_over(step: Time, ahead: Time, period: float) -> tuple[Time, Time]:
     return noise, 0.5 * ahead * (ahead + step) / period**2
 
 
-def missed_by(known: Sequence[StreamSample], sample: StreamSample, period: float) -> Missed:
+def innovation_of(
+    reference: Sequence[StreamSample], sample: StreamSample, period: float
+) -> Innovation:
     """Return the error of the straight line through two samples at another one."""
-    before, last = known
+    before, last = reference
     step, ahead = last.t - before.t, sample.t - last.t
     error = sample.x - last.x - ahead / step * (last.x - before.x)
-    return Missed(error, *growth_over(step, ahead, period))
+    return Innovation(error, *growth_over(step, ahead, period))
 
 
 def unwrapped(x: FloatArray, last: FloatArray, turn: FloatArray) -> FloatArray:
@@ -176,24 +180,24 @@ def all_unwrapped(samples: Sequence[StreamSample], turn: FloatArray) -> list[Str
     return found
 
 
-def robust_scale(missed: FloatArray, share: float = 0.95) -> FloatArray:
+def robust_scale(innovations: FloatArray, share: float = 0.95) -> FloatArray:
     """
     Return the standard deviation of errors, (k, m), from the quantile of a share of them.
 
     The other errors may be friction steps, or damage.
 
     """
-    ordered = np.sort(np.abs(missed), axis=0)  # numpy's quantile takes ten times as long
+    ordered = np.sort(np.abs(innovations), axis=0)  # numpy's quantile takes ten times as long
     place = share * (len(ordered) - 1)
     first = int(place)
     low, high = ordered[first], ordered[min(first + 1, len(ordered) - 1)]
     return np.asarray((low + (place - first) * (high - low)) / special.ndtri(0.5 + share / 2.0))
 
 
-def share_of_noise(missed: FloatArray, size: FloatArray) -> FloatArray:
+def share_of_noise(innovations: FloatArray, size: FloatArray) -> FloatArray:
     """Return the share of white noise in the squares of successive errors of shape (k, m)."""
     most = 3.0 * size  # larger errors are limited
-    errors = np.minimum(np.maximum(missed, -most), most)
+    errors = np.minimum(np.maximum(innovations, -most), most)
     squares = np.einsum('k...,k...->...', errors, errors)
     products = np.einsum('k...,k...->...', errors[1:], errors[:-1])
     correlation = np.divide(products, squares, where=squares > 0.0, out=np.ones_like(squares))
@@ -214,7 +218,7 @@ class NoiseLevel:
 
     Attributes
     ----------
-    usual : Usual
+    model : ErrorModel
         Usual error in the noisiest window that is kept; at least the resolution.
 
     """
@@ -222,9 +226,9 @@ class NoiseLevel:
     def __init__(self, finest: FloatArray, onset: FloatArray) -> None:
         count = len(finest)
         self._finest, self._onset = finest, onset
-        self.usual = Usual(np.inf, np.zeros(count), np.zeros(count))
+        self.model = ErrorModel(np.inf, np.zeros(count), np.zeros(count))
         # a step that occurs three times is the resolution of a signal
-        self._steps, self._most = np.full((3, count), np.inf), np.zeros(count)
+        self._min_steps, self._max_error = np.full((3, count), np.inf), np.zeros(count)
         self._sizes, self._shares = np.zeros((2, 600, count))  # windows of a minute at 1 kHz
         self._seen = 0
         most = WINDOW + MAX_GAP + 1  # held samples are added at once before `settle`
@@ -232,24 +236,24 @@ class NoiseLevel:
         self._growths = np.empty((most, 2, 1))
         self._waiting = 0
 
-    def set(self, usual: Usual) -> None:
+    def set(self, model: ErrorModel) -> None:
         """Set the usual prediction error."""
         self.forget()
-        self._remember(usual.size, usual.noisy)
-        self.usual = usual
+        self._remember(model.size, model.white)
+        self.model = model
 
     def forget(self) -> None:
         """Clear the measured noise; the next `begin` measures it again."""
         self._sizes[:] = 0.0
         self._seen = 0
 
-    def begin(self, missed: Sequence[Missed], moves: FloatArray, period: float) -> None:
+    def begin(self, innovations: Sequence[Innovation], moves: FloatArray, period: float) -> None:
         """
         Measure the usual errors of the first samples, some of which may be damaged.
 
         Parameters
         ----------
-        missed : sequence of Missed
+        innovations : sequence of Innovation
             The prediction errors.
         moves : ndarray, shape (k, m)
             Differences between successive samples.
@@ -257,18 +261,20 @@ class NoiseLevel:
             Sampling period [s].
 
         """
-        self.see_steps(moves)
-        self._most = np.maximum(self._most, np.max(np.abs([m.error for m in missed]), axis=0))
+        self.add_steps(moves)
+        self._max_error = np.maximum(
+            self._max_error, np.max(np.abs([m.error for m in innovations]), axis=0)
+        )
         if not self._seen:
-            errors = np.array([m.error / max(m.noise, m.bend) for m in missed])
+            errors = np.array([m.error / max(m.noise, m.acceleration) for m in innovations])
             # one damaged sample spoils three of the first predictions
-            size = np.maximum(robust_scale(errors, 0.75), self._least(period))
-            self.usual = Usual(period, size, share_of_noise(errors, size))
+            size = np.maximum(robust_scale(errors, 0.75), self._min_error(period))
+            self.model = ErrorModel(period, size, share_of_noise(errors, size))
 
-    def learn(self, missed: Missed, move: FloatArray) -> None:
+    def learn(self, innovation: Innovation, move: FloatArray) -> None:
         """Add the prediction error of an undamaged sample, and its change, shape (m,)."""
-        self._errors[self._waiting] = missed.error
-        self._growths[self._waiting, :, 0] = missed.noise, missed.bend
+        self._errors[self._waiting] = innovation.error
+        self._growths[self._waiting, :, 0] = innovation.noise, innovation.acceleration
         self._moves[self._waiting] = move
         self._waiting += 1
 
@@ -277,31 +283,31 @@ class NoiseLevel:
         if self._waiting < WINDOW:
             return
         growths, moves = self._growths[: self._waiting], self._moves[: self._waiting]
-        errors = self._errors[: self._waiting] / self.usual.growth(growths[:, 0], growths[:, 1])
+        errors = self._errors[: self._waiting] / self.model.growth(growths[:, 0], growths[:, 1])
         self._waiting = 0
-        self._most = np.maximum(self._most, np.abs(errors).max(axis=0))
+        self._max_error = np.maximum(self._max_error, np.abs(errors).max(axis=0))
         size = robust_scale(errors)
         self._remember(size, share_of_noise(errors, size))
-        self.see_steps(moves)
+        self.add_steps(moves)
         loudest = np.argmax(self._sizes, axis=0), np.arange(len(size))
-        size = np.maximum(self._sizes[loudest], self._least(period))
-        self.usual = Usual(period, size, self._shares[loudest])
+        size = np.maximum(self._sizes[loudest], self._min_error(period))
+        self.model = ErrorModel(period, size, self._shares[loudest])
 
-    def _remember(self, size: FloatArray, noisy: FloatArray) -> None:
+    def _remember(self, size: FloatArray, white: FloatArray) -> None:
         place = self._seen % len(self._sizes)
-        self._sizes[place], self._shares[place] = size, noisy
+        self._sizes[place], self._shares[place] = size, white
         self._seen += 1
 
-    def see_steps(self, moves: FloatArray) -> None:
+    def add_steps(self, moves: FloatArray) -> None:
         """Estimate the resolution from changes between samples, shape (k, m)."""
-        self._steps = smallest_steps(np.concatenate([self._steps, np.abs(moves)]))
+        self._min_steps = smallest_steps(np.concatenate([self._min_steps, np.abs(moves)]))
 
-    def _least(self, period: float) -> FloatArray:
+    def _min_error(self, period: float) -> FloatArray:
         """Return the smallest step of every signal, at least the finest and that of an onset."""
         # A fast signal has no small steps, but its resolution causes prediction errors.
-        step = np.where(np.isfinite(self._steps[-1]), self._steps[-1], 0.0)
+        step = np.where(np.isfinite(self._min_steps[-1]), self._min_steps[-1], 0.0)
         least = np.maximum(self._finest, self._onset * period**2)
-        return np.maximum(np.minimum(self._most, step), least)
+        return np.maximum(np.minimum(self._max_error, step), least)
 
 
 def smallest_steps(steps: FloatArray) -> FloatArray:

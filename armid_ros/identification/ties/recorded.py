@@ -54,12 +54,8 @@ def recorded_interaction_problem(
         Both machines, with the positions of the springs.
     recording, other_recording : Recording
         Recordings of both machines, with overlapping stamps.
-    inertias : {'known', 'free'}
-        Whether the machine's inertias are taken from its description or estimated as well.
-    separate : bool
-        Whether every spring has its own stiffness, or all have the same.
-    slack : float or ndarray, shape (S,)
-        Slack of the springs before they pull [m].
+    inertias, separate, slack
+        See `interaction_problem`.
 
     Raises
     ------
@@ -100,7 +96,7 @@ def together_interaction_problem(
     used : Conditioning
         Filters.
     inertias, separate, slack
-        See `recorded_interaction_problem`.
+        See `interaction_problem`.
     rest : callable, optional
         Function that returns the torque of other effects along a motion, such as friction, shape
         (N, n) [N m].
