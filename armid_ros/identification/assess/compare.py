@@ -91,13 +91,11 @@ def compare(before: ParameterFile, after: ParameterFile) -> Comparison:
     # probability that the list of changes contains a false change
     chance = 0.05 / sum((True, bool(members), bool(residuals)))
     values, std, p_values = _single_changes(first, second, shared)
-    significant = beyond_chance(p_values, chance)
-    numbers = zip(*values.tolist(), *std.tolist(), significant, strict=True)
-    changes = tuple(ParameterChange(n, *row) for n, row in zip(shared, numbers, strict=True))
-    p_values = [_common_change(first, second, own)[2] for own in members.values()]
-    significant = beyond_chance(p_values, chance)
-    joints = [joint for _, joint in members]
-    groups = tuple(map(GroupChange, joints, members.values(), p_values, significant))
+    numbers = *values.tolist(), *std.tolist(), beyond_chance(p_values, chance)
+    changes = tuple(map(ParameterChange, shared, *numbers))
+    chances = [_common_change(first, second, own)[2] for own in members.values()]
+    joints, significant = [name for _, name in members], beyond_chance(chances, chance)
+    groups = tuple(map(GroupChange, joints, members.values(), chances, significant))
     load = None
     rigid = [change for change in changes if change.parameter.rigid]
     body_changed = any(one.changed for one in (*rigid, *(g for g in groups if not g.joint)))
