@@ -21,8 +21,8 @@ from dataclasses import dataclass
 from typing import Literal
 
 from armid_ros.changes.scatter import (
-    FEWEST,
     line,
+    MIN_BAGS,
     ParameterHistory,
     splits,
     Spread,
@@ -116,7 +116,7 @@ def judge(
         by_arm: dict[str, list[HistoryChange]] = {}
         for one in series:
             found = by_arm.setdefault(one.arm, [])
-            if len(one.values) >= FEWEST:
+            if len(one.values) >= MIN_BAGS:
                 found.append(largest_change(one, spread[one.parameter]))
         for arm, changes in by_arm.items():
             changes.sort(key=lambda change: (change.p, -abs(change.size) / change.std))

@@ -33,7 +33,7 @@ import numpy.typing as npt
 from scipy import optimize, special
 
 #: Smallest number of bags of a tested series.
-FEWEST = 4
+MIN_BAGS = 4
 #: Smallest number of arms of a kind for a comparison of arms, or of those with a bag on a day for
 #: an effect of that day.
 _MIN_ARMS = 8
@@ -250,7 +250,7 @@ def _prior_freedom(
     one standard error is a difference between arms.
 
     """
-    tested = [one for one in group if len(one.values) >= FEWEST]
+    tested = [one for one in group if len(one.values) >= MIN_BAGS]
     if len(tested) < _MIN_ARMS:
         return _MAX_FREEDOM
     logs = np.log([_ratio(one, found[one.parameter]) for one in tested])
@@ -296,7 +296,7 @@ def _inverse_trigamma(value: float) -> float:
 def variances(series: ParameterHistory, spread: Spread) -> tuple[FloatArray, float]:
     """Return the variance of every value, shape (K,), and its degrees of freedom."""
     usual = np.maximum(series.std**2 + spread.std**2, 1e-300)
-    if len(series.values) < FEWEST or spread.prior_freedom >= _MAX_FREEDOM:
+    if len(series.values) < MIN_BAGS or spread.prior_freedom >= _MAX_FREEDOM:
         return usual, spread.freedom
     ratio, freedom = _ratio(series, spread), _freedom(len(series.values))
     both = spread.prior_freedom + freedom
@@ -311,7 +311,7 @@ def _lasting(
     """Return `steps` and `trends` of a `Spread`, each 1 or more."""
     steps, trends = [], []
     for one in group:
-        if len(one.values) < FEWEST:
+        if len(one.values) < MIN_BAGS:
             continue
         cut = splits(one, found[one.parameter])
         third = len(cut.scores) // 3

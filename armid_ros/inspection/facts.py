@@ -13,7 +13,7 @@ from armid_ros.identification import identify, Score
 from armid_ros.identification.assess.grade import beyond_noise, grade
 from armid_ros.identification.assess.grade_limits import LIMITS
 from armid_ros.identification.assess.sensor_faults import held_elsewhere, velocity_ratio
-from armid_ros.identification.rows.checks import FOLLOWS, torque_factors
+from armid_ros.identification.rows.checks import MIN_CORRELATION, torque_factors
 from armid_ros.identification.rows.period import find_period, mean_change, parabola_minimum
 from armid_ros.identification.rows.regression import REST_SPEED
 from armid_ros.motion import FloatArray
@@ -271,7 +271,7 @@ def try_identification(robot: Robot, recording: Recording, rng: np.random.Genera
         theory=result.theory.rank,
         condition_number=result.condition_number,
         cutoff_hz=result.used.cutoff_hz,
-        scale=np.where(np.abs(correlation) > FOLLOWS, factors, np.nan),
+        scale=np.where(np.abs(correlation) > MIN_CORRELATION, factors, np.nan),
         notes=result.notes,
         elsewhere=tuple(one.text for one in held_elsewhere(robot, [recording], motions)),
         poor=tuple(

@@ -30,7 +30,7 @@ from armid_ros.errors import IdentificationError
 from armid_ros.estimate import Estimate
 from armid_ros.identification.ties.problem import Inertias, InteractionProblem
 from armid_ros.identification.ties.recorded import stacked, together_interaction_problem
-from armid_ros.identification.ties.stiffness import identify_interaction, Interaction, LEAST_Z
+from armid_ros.identification.ties.stiffness import identify_interaction, Interaction, MIN_Z_SCORE
 from armid_ros.model import inverse_dynamics
 from armid_ros.motion import FloatArray, Motion
 from armid_ros.recording import Recording
@@ -125,7 +125,7 @@ class _Ties:
         if tried[0][2].misfit - best[2].misfit < _LEAST_GAIN * noise:
             best = tried[0]
         slack, problem, found = best
-        while len(found.segments) and not np.min(found.stiffness / found.std) >= LEAST_Z:
+        while len(found.segments) and not np.min(found.stiffness / found.std) >= MIN_Z_SCORE:
             weakest = int(np.argmin(found.stiffness / found.std))
             problem = problem.with_springs(np.delete(np.arange(len(found.segments)), weakest))
             if not problem.segments:

@@ -98,8 +98,8 @@ def compare(before: ParameterFile, after: ParameterFile) -> Comparison:
     groups = tuple(map(GroupChange, joints, members.values(), chances, significant))
     load = None
     rigid = [change for change in changes if change.parameter.rigid]
-    body_changed = any(one.changed for one in (*rigid, *(g for g in groups if not g.joint)))
-    if joint and body_changed:
+    body_changed = any(one.changed for one in rigid)
+    if joint and (body_changed or any(one.changed for one in groups if not one.joint)):
         names = [change.parameter for change in rigid]
         terms = [first.terms.get(name, {}) for name in names]
         load = _find_load(terms, *_common_change(first, second, names)[:2])

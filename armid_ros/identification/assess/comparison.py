@@ -11,7 +11,7 @@ from typing import Any, Literal
 from armid_ros.estimate import ParameterName
 from armid_ros.identification.assess.grade_limits import LIMITS
 from armid_ros.identification.parameters_file import ParameterFile
-from armid_ros.identification.rows.checks import NEAR
+from armid_ros.identification.rows.checks import MAX_UNIT_RATIO
 from armid_ros.motion import FloatArray
 import numpy as np
 
@@ -220,7 +220,7 @@ class Comparison:
         if len(ratios) < fewest or np.mean(ratios > 0.0) < most:
             return {}
         common = float(np.median(ratios))
-        near = np.abs(np.log(np.maximum(ratios / common, 1e-9))) < np.log(NEAR)
+        near = np.abs(np.log(np.maximum(ratios / common, 1e-9))) < np.log(MAX_UNIT_RATIO)
         if 1.0 / LIMITS.torque_factor < common < LIMITS.torque_factor or np.mean(near) < most:
             return {}
         joints = dict.fromkeys(joint for joint, _ in clear if joint)

@@ -21,11 +21,11 @@ from armid_ros.identification.assess.sensor_faults import sensor_faults, units_b
 from armid_ros.identification.rows.checks import (
     check_motion,
     driven_by_friction,
-    FOLLOWS,
     joined,
     laws_of_controllers,
-    NEAR,
-    SLOW,
+    MAX_UNIT_RATIO,
+    MIN_CORRELATION,
+    SLOW_SHARE,
     torque_factors,
     TORQUE_UNITS,
     unit_of,
@@ -169,7 +169,7 @@ def unit_faults(
         in_unit(robot, joint, unit).text
         for joint, factor in enumerate(factors)
         for unit, per in TORQUE_UNITS.items()
-        if per / NEAR < factor < per * NEAR
+        if per / MAX_UNIT_RATIO < factor < per * MAX_UNIT_RATIO
     ]
     if 2 * len(found) <= robot.n_joints and found:
         return found
@@ -209,12 +209,12 @@ def _factors_since(
             whole = joined(before)
             assert whole.tau is not None
             speed, expected = np.abs(whole.dq), np.concatenate([model.torque(x) for x in before])
-            size = np.mean(whole.tau**2, axis=0, where=speed >= SLOW * speed.max(axis=0))
+            size = np.mean(whole.tau**2, axis=0, where=speed >= SLOW_SHARE * speed.max(axis=0))
             off = np.mean(np.square(whole.tau - then * expected), axis=0)
             known = (then > 0.0) & (off < size)
             slope = np.where(known, slope / np.where(known, then, 1.0), 0.0)
             correlation = np.minimum(correlation, follows)
-        better = (correlation > np.maximum(best, FOLLOWS)) & (slope > 0.0)
+        better = (correlation > np.maximum(best, MIN_CORRELATION)) & (slope > 0.0)
         best = np.where(better, correlation, best)
         factors = np.where(better, slope, factors)
     return factors

@@ -17,7 +17,7 @@ from itertools import product
 from armid_ros.identification.assess.grade_limits import FREEDOM, LIMITS
 from armid_ros.identification.fitting.identifiability import near_deviation
 from armid_ros.identification.fitting.least_squares import within
-from armid_ros.identification.rows.checks import joined, SLOW
+from armid_ros.identification.rows.checks import joined, SLOW_SHARE
 from armid_ros.model import inverse_dynamics, regressor
 from armid_ros.motion import FloatArray, Motion
 from armid_ros.robots import Robot
@@ -241,7 +241,7 @@ def _own_columns(motion: Motion) -> tuple[FloatArray, FloatArray]:
     # Weights are zero where a joint rests or reverses: dry friction is arbitrary there, and
     # presliding looks like a delayed torque.
     speed = np.abs(dq)
-    moves = speed > SLOW * speed.max(axis=0)
+    moves = speed > SLOW_SHARE * speed.max(axis=0)
     moves[:, ~moves.any(axis=0)] = True
     weight = moves / np.sqrt(moves.mean(axis=0))
     return columns / root_mean_square(columns) * weight[:, :, np.newaxis], weight

@@ -26,14 +26,14 @@ from armid_ros.effects import CATALOGUE
 from armid_ros.identification.online.background import at_once, Background, Job, Pieces
 from armid_ros.identification.online.change import Change, ChangeCandidate
 from armid_ros.identification.online.change_search import Block, ChangeSearch, FoundChange
-from armid_ros.identification.online.null_calibration import BLOCKS, ResidualScale
+from armid_ros.identification.online.null_calibration import MAX_BLOCKS, ResidualScale
 from armid_ros.identification.online.recursive import RecursiveLeastSquares, WeightedSample
 from armid_ros.identification.rows.causal import CausalMotion, TripleLag
 from armid_ros.motion import FloatArray, Motion
 import numpy as np
 
 #: Length of a block [s].
-BLOCK = 0.25
+BLOCK_LENGTH = 0.25
 #: Samples learned together in one piece of work; fewer arrive in the meantime.
 _SAMPLES_PER_PIECE = 10
 Item = TypeVar('Item')
@@ -177,7 +177,7 @@ class ChangeWatch:
         self._search = ChangeSearch(
             candidates,
             self._among_all(np.hstack([c.directions for c in candidates])),
-            BLOCK / false_alarm_time,
+            BLOCK_LENGTH / false_alarm_time,
             self._work,
         )
         self.reset()
@@ -190,7 +190,7 @@ class ChangeWatch:
         # smallest residual scale where only the ratios of the noise between joints are known: 0.01
         # of the assumed noise, which is 1e-4 of the torque limit [-]
         self._residual_scale = ResidualScale(0.01 if self._estimator.noise_is_relative else 1.0)
-        self._fit_ratios: deque[float] = deque(maxlen=BLOCKS)
+        self._fit_ratios: deque[float] = deque(maxlen=MAX_BLOCKS)
         self._open: _Stretch | None = None
         self._queued: deque[_Stretch] = deque()
         self._searching = False
@@ -207,7 +207,9 @@ class ChangeWatch:
             Forgetting factor of the estimator.
 
         """
-        self._search.set_chance(0.0 if false_alarm_time is None else BLOCK / false_alarm_time)
+        self._search.set_chance(
+            0.0 if false_alarm_time is None else BLOCK_LENGTH / false_alarm_time
+        )
         self._wider.forgetting = forgetting
 
     def interrupt(self) -> None:
@@ -217,7 +219,7 @@ class ChangeWatch:
 
     def update(self, row: Row) -> None:
         """Update the estimator with one row; see ``RecursiveLeastSquares.update``."""
-        if self._open is not None and row.t - self._open.begin >= BLOCK:
+        if self._open is not None and row.t - self._open.begin >= BLOCK_LENGTH:
             self._queue(row.t)
         if self._open is None:
             self._open = _Stretch(row.t, self._estimator.copied())

@@ -4,7 +4,7 @@
 
 from __future__ import annotations
 
-from armid_ros.identification.rows.checks import position_problem, REST_RANGE, SHORTEST, SILENT
+from armid_ros.identification.rows.checks import MIN_DURATION, position_problem, REST_RANGE, SILENT
 from armid_ros.identification.samples.spikes import SpikeGate
 from armid_ros.motion import FloatArray
 from armid_ros.robots import Robot
@@ -55,7 +55,7 @@ class StreamChecks:
     @property
     def error(self) -> str:
         """Return the fault that prevents identification; empty without fault."""
-        if self.silent and abs(self._moving) > SHORTEST:
+        if self.silent and abs(self._moving) > MIN_DURATION:
             return SILENT
         # the ranges are checked at each row, but seldom increase
         lowest, highest = self._positions

@@ -23,7 +23,7 @@ from scipy import stats
 #: Tail probability of the quantile that shows whether large statistics are too frequent.
 _TAIL_PROBABILITY = 0.01
 #: Number of blocks kept: one minute at four blocks per second.
-BLOCKS = 240
+MAX_BLOCKS = 240
 
 
 class History:
@@ -243,7 +243,7 @@ class ResidualScale:
             return  # residuals during motion are kept while the arm is at rest
         squares = np.sum(residual, axis=0) ** 2
         if self._seen is None:
-            self._seen = History(len(squares), BLOCKS)
+            self._seen = History(len(squares), MAX_BLOCKS)
         self._seen.append(np.where(used > 0, squares / np.maximum(used, 1), np.nan))
         if len(self._seen) < 16:  # with fewer blocks, the assumed noise is used
             return

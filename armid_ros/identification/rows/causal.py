@@ -32,7 +32,7 @@ _CUTOFF_OF_POLE = float(np.sqrt(2.0 ** (1.0 / 3.0) - 1.0))
 #: G is faster than F by this factor, where the sampling rate allows it.
 MOTION_FILTER_RATIO = 4.0
 #: Largest valid position or torque [SI units]; squares of larger numbers dominate the rest.
-LARGEST = 1e6
+MAX_MAGNITUDE = 1e6
 
 
 def check_gap(samples: int) -> None:
@@ -141,8 +141,8 @@ class CausalFilter:
     Filter and differentiate a stream of joint states.
 
     The sampling period is the median of the first intervals, learned again after every restart.
-    A sample with a wrong length, or with a number that is not finite or above LARGEST, is left
-    out and counted; the signal is interpolated across it. A gap, or a stamp that does not
+    A sample with a wrong length, or with a number that is not finite or above MAX_MAGNITUDE, is
+    left out and counted; the signal is interpolated across it. A gap, or a stamp that does not
     increase, restarts the filter. Until it has settled again, it has no output. A
     `SpikeGate` removes full turns of positions beforehand.
 
@@ -250,7 +250,7 @@ class CausalFilter:
                 return None
         signal = np.concatenate(arrays)
         largest = float(np.abs(signal).max())
-        if not (largest <= LARGEST and math.isfinite(t)):
+        if not (largest <= MAX_MAGNITUDE and math.isfinite(t)):
             finite = math.isfinite(largest) and math.isfinite(t)
             self.rejected['impossible' if finite else 'not_finite'] += 1
             return None

@@ -26,10 +26,10 @@ REST_RANGE = 1e-3
 #: and an encoder has noise.
 _LIMIT_SLACK = 0.01
 #: Shortest recording with a movement [s].
-SHORTEST = 1.0
+MIN_DURATION = 1.0
 #: Correlation of measured and described torque above which their ratio is meaningful: four fifths
 #: of the power are explained.
-FOLLOWS = 0.9
+MIN_CORRELATION = 0.9
 #: Units of torque that are mistaken for N m, with their number per N m.
 TORQUE_UNITS = {'N mm': 1e3, 'N cm': 1e2, 'kN m': 1e-3}
 #: The same, with degrees for radians and units of force on a lever. These two are tested for all
@@ -43,11 +43,11 @@ _UNITS_OF_ALL = {
 }
 #: Largest ratio between a factor of torques and the factor of their unit: masses of a description
 #: are wrong by less.
-NEAR = 1.5
+MAX_UNIT_RATIO = 1.5
 #: Unit of force of a prismatic joint that corresponds to each unit of torque.
 FORCE_UNITS = {'N m': 'N', 'N mm': 'mN', 'N cm': 'cN', 'kN m': 'kN'}
 #: Share of its top speed below which a joint may be held by friction with any torque.
-SLOW = 0.05
+SLOW_SHARE = 0.05
 #: Message on missing torques.
 SILENT = 'the torque of every joint is constant; fill in effort'
 
@@ -76,7 +76,7 @@ def check_motion(robot: Robot, recordings: Sequence[Recording]) -> tuple[str, ..
     """
     for recording in recordings:
         check_positions(robot, recording.source, recording.q.min(axis=0), recording.q.max(axis=0))
-        if recording.duration < SHORTEST:
+        if recording.duration < MIN_DURATION:
             raise IdentificationError(
                 f'{recording.source}: {recording.duration:.2f} s in {len(recording)} samples is '
                 'too short; record a movement of several seconds; for a table, check '
@@ -153,7 +153,7 @@ def check_torque(
         raise IdentificationError(f'{source}: {SILENT}')
     motions = [part.motion for part in problem]
     slope, correlation = torque_factors(ArmModel(robot), motions)
-    clear = np.abs(correlation) > FOLLOWS
+    clear = np.abs(correlation) > MIN_CORRELATION
     if np.sum(clear) >= min(2, robot.n_joints):
         factors = slope[clear]
         joints = ', '.join(np.array(robot.joints)[clear])
@@ -372,7 +372,7 @@ def torque_factors(arm: ArmModel, motions: Sequence[Motion]) -> tuple[FloatArray
     whole = joined(motions)
     measured, dq = whole.tau, whole.dq
     assert measured is not None
-    moves = np.abs(dq) >= SLOW * np.abs(dq).max(axis=0)
+    moves = np.abs(dq) >= SLOW_SHARE * np.abs(dq).max(axis=0)
     for joint in range(arm.robot.n_joints):
         pair = np.column_stack([predicted[:, joint], measured[:, joint]])
         speed = dq[:, joint]
@@ -414,7 +414,7 @@ def unit_of(factor: float, of_joints: Sequence[float] = (), near_force: float = 
         return ''
     distances = {}
     for unit, per in _UNITS_OF_ALL.items():
-        near = np.log(near_force if unit.startswith(('kgf', 'lbf')) else NEAR)
+        near = np.log(near_force if unit.startswith(('kgf', 'lbf')) else MAX_UNIT_RATIO)
         apart = np.abs(np.log(np.array([factor, *of_joints]) / per)) / near
         if np.all(apart < 1.0):
             distances[unit] = float(apart[0])

@@ -8,7 +8,7 @@ from collections.abc import Sequence
 from dataclasses import replace
 
 from armid_ros.identification.rows.signals import Conditioning
-from armid_ros.identification.samples.spikes import FIRST, SpikeGate
+from armid_ros.identification.samples.spikes import N_FIRST, SpikeGate
 from armid_ros.identification.samples.straight_line import (
     ErrorModel,
     Excursion,
@@ -63,7 +63,7 @@ def without_damage(
             continue
         names = [f'{what} of {joint}' for what in ('position', 'effort') for joint in joints]
         named = [
-            f'{names[int(np.argmax(one.off))]} at {sample.t:.3f} s'
+            f'{names[int(np.argmax(one.ratio))]} at {sample.t:.3f} s'
             for one in excursions
             for sample in one.samples
         ]
@@ -113,7 +113,7 @@ def impossible_excursions(
         if k < done:
             continue
         start, known, curvature = int(stretch[k]), [], np.zeros(x.shape[1])
-        if k - start >= FIRST or start < done:
+        if k - start >= N_FIRST or start < done:
             known = [StreamSample(float(t[i]), x[i]) for i in range(max(start, k - 3), k)]
             if len(known) == 3:
                 error = innovation_of(known[:2], known[2], model.period)

@@ -50,7 +50,7 @@ import numpy.typing as npt
 from scipy import stats
 
 #: Number of samples from which noise and period are measured before the first check.
-FIRST = 20
+N_FIRST = 20
 
 
 class SpikeGate:
@@ -166,7 +166,7 @@ class SpikeGate:
         if self._first is None:
             return self._judge(sample)
         self._first.append(sample)
-        return self._begin() if len(self._first) == FIRST else []
+        return self._begin() if len(self._first) == N_FIRST else []
 
     def begin(
         self,

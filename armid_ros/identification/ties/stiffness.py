@@ -28,7 +28,7 @@ import numpy as np
 from scipy.optimize import minimize
 
 #: Smallest z-score of an existing stiffness: a false one has a probability of 3e-5.
-LEAST_Z = 4.0
+MIN_Z_SCORE = 4.0
 
 
 @dataclass(frozen=True)

@@ -8,7 +8,7 @@ from armid_ros.arm import ArmModel
 from armid_ros.effects import make_effect
 from armid_ros.excitation import Excitation, Limits, random_feasible
 from armid_ros.identification.online.identifier import OnlineIdentifier
-from armid_ros.identification.samples.spikes import FIRST, SpikeGate
+from armid_ros.identification.samples.spikes import N_FIRST, SpikeGate
 from armid_ros.robots import load_robot
 from armid_ros.simulation import Reference, SimulatedArm
 import numpy as np
@@ -67,7 +67,7 @@ def test_a_glitch_of_a_smooth_signal_does_not_hide_in_its_acceleration(where, si
     assert set(gate.spikes) == {0}
 
 
-@pytest.mark.parametrize('where', [0, 1, FIRST - 1, FIRST])
+@pytest.mark.parametrize('where', [0, 1, N_FIRST - 1, N_FIRST])
 def test_damage_among_the_first_samples_is_no_measure_of_noise(where):
     t, x = stream(np.random.default_rng(2))
     x[where, 1] += 50.0
