@@ -29,8 +29,7 @@ from functools import cache
 from armid_ros.changes.statistic import MEDIAN_SQUARE, two_means
 from armid_ros.motion import FloatArray
 import numpy as np
-import numpy.typing as npt
-from scipy import optimize, special
+from scipy import ndimage, optimize, special
 
 #: Smallest number of bags of a tested series.
 MIN_BAGS = 4
@@ -197,27 +196,18 @@ def _polished(group: Sequence[ParameterHistory]) -> list[FloatArray]:
     values = np.concatenate([one.values for one in group])
     _, day = np.unique(days, return_inverse=True)
     arms_of_day = np.bincount(np.unique(np.stack([day, arm]), axis=1)[0], minlength=day.max() + 1)
-    level = _medians(values, arm)
+    arms, dates = np.arange(len(group)), np.arange(len(arms_of_day))
+    level = ndimage.median(values, arm, arms)
     middle = float(np.median(level))
-    prior_freedom = bool(np.all(level * middle > 0.0))
-    share = level / middle if prior_freedom else np.ones(len(level))
+    same_sign = bool(np.all(level * middle > 0.0))
+    share = level / middle if same_sign else np.ones(len(level))
     common = np.zeros(len(arms_of_day))
     for _ in range(4):
-        common = _medians((values - level[arm]) / share[arm], day)
+        common = ndimage.median((values - level[arm]) / share[arm], day, dates)
         common[arms_of_day < _MIN_ARMS] = 0.0
-        level = _medians(values - share[arm] * common[day], arm)
+        level = ndimage.median(values - share[arm] * common[day], arm, arms)
     rest = values - share[arm] * common[day]
     return np.split(rest, np.cumsum([len(one.days) for one in group])[:-1])
-
-
-def _medians(values: FloatArray, label: npt.NDArray[np.intp]) -> FloatArray:
-    """Return the median of the values of each label 0, 1, ..."""
-    order = np.lexsort((values, label))
-    counts = np.bincount(label)
-    starts = np.concatenate([[0], np.cumsum(counts)[:-1]])
-    ordered = values[order]
-    low, high = starts + (counts - 1) // 2, starts + counts // 2
-    return np.asarray(0.5 * (ordered[low] + ordered[high]))
 
 
 def _spread(group: Sequence[ParameterHistory]) -> Spread:

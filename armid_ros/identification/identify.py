@@ -20,6 +20,7 @@ from armid_ros.identification.fitting.identifiability import (
     base_spread,
     determined,
     excited,
+    near_deviation,
     Unidentified,
     unidentified,
 )
@@ -31,7 +32,6 @@ from armid_ros.identification.fitting.nonlinear import (
     through,
     torques,
     ungrouped,
-    with_uncertain_inertia,
 )
 from armid_ros.identification.physical.fit_among_bodies import (
     fit_to_bodies,
@@ -52,6 +52,7 @@ from armid_ros.identification.rows.regression import (
     Regression,
     regressions,
     Score,
+    weighted_rows,
 )
 from armid_ros.identification.rows.signals import (
     check_recordings,
@@ -251,7 +252,7 @@ def identify(
         problem = through(problem, torques(whole, recordings, used), base.values(whole.theta))
         free = ungrouped(whole, whole.base_parameters(rng))
         fit = fit_values(whole, base, problem, recordings, used, settings.least_squares, free)
-        fit, remarks = with_uncertain_inertia(whole, fit, recordings, used)
+        fit, remarks = _with_uncertain_inertia(whole, fit, recordings, used)
         notes += remarks
     else:
         data = base, problem, recordings, used
@@ -332,6 +333,44 @@ def _fitted(
             return theory, fit
         arm, theory, refitted = fit.arm, identifiable, True
         base, problem = excited(theory, regressions(arm, theory.independent, recordings, used))
+
+
+def _with_uncertain_inertia(
+    description: ArmModel, fit: FittedValues, recordings: Sequence[Recording], used: Conditioning
+) -> tuple[FittedValues, tuple[str, ...]]:
+    """Add the uncertainty of the described inertia to a fit of slow motions; return a note too."""
+    # Weight is fitted, and inertia has the described values. Even in slow motion, the torque of
+    # inertia varies with position as weight does, so errors of the description bias the weight.
+    # negligible deviation due to inertia, over the standard deviation of the fit
+    negligible = 0.1
+    rigid = len(description.robot.rigid_parameters)
+    everything = regressions(fit.arm, np.arange(rigid), recordings, used)
+    # base parameters that a weighted fit of each rigid column gives
+    rows, body = (
+        weighted_rows(part, fit.solution.weights)[0] for part in (fit.problem, everything)
+    )
+    scale = np.linalg.norm(rows, axis=0)
+    fitted = np.linalg.lstsq(rows / scale, body, rcond=None)[0] / scale[:, np.newaxis]
+    pull = fitted - fit.base.grouping[:, :rigid]
+    spread = near_deviation(description.robot)
+    added = (pull * spread) @ (pull * spread).T
+    plain = fit.solution.covariance
+    solution = replace(fit.solution, covariance=plain + added)
+    ratio = np.sqrt(np.diag(added) / np.maximum(np.diag(plain), 1e-300)).max()
+    notes: tuple[str, ...] = ()
+    if ratio > negligible:
+        # the torque of inertia grows with the square of the speed
+        speed = float(np.sqrt(negligible / ratio))
+        slower = (
+            'these torques have so little noise that inertia matters at any speed'
+            if speed < 0.02
+            else f'at {speed:.2g} times the speed it would not matter'
+        )
+        notes = (
+            'too fast for quasi-static: the described inertia is subtracted, and its possible '
+            f'error widens the intervals; {slower}',
+        )
+    return replace(fit, solution=solution), notes
 
 
 def _require_samples(

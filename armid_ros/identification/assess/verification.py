@@ -102,43 +102,10 @@ class _RecordedTorque(Controller):
         return np.column_stack([np.interp(desired.t, t, column) for column in self.motion.tau.T])
 
 
-def forward_validation(
-    arm: ArmModel,
-    recording: Recording,
-    used: Conditioning,
-    *,
-    nominal: ArmModel,
-    duration: float,
+def _forward_score(
+    arm: ArmModel, recording: Recording, used: Conditioning, nominal: ArmModel, duration: float
 ) -> ForwardScore:
-    """
-    Simulate an arm in closed loop along a recording, driven by the recorded torques.
-
-    Parameters
-    ----------
-    arm : ArmModel
-        The model to judge.
-    recording : Recording
-        Held-out data.
-    used : Conditioning
-        Filters of the identification.
-    nominal : ArmModel
-        Model with the inertia matrix of the feedback, the same for all compared models.
-    duration : float
-        At most this much of the first unbroken stretch is simulated [s].
-
-    Returns
-    -------
-    ForwardScore
-        Position error of every joint.
-
-    Raises
-    ------
-    IdentificationError
-        If no stretch of the recording can be filtered.
-    ModelError
-        If the arm cannot be simulated, for example because its links are not physical.
-
-    """
+    """Simulate an arm along the first seconds of a recording, with feedback by a nominal model."""
     motion = next(iter(segments(recording, used)), None)
     if motion is None:
         raise IdentificationError(f'{recording.source}: no stretch is long enough to be filtered')
@@ -333,8 +300,8 @@ def simulate_held_out(
         progress(index / len(held_out), 'simulating held-out recordings')
         patched = plain = None
         try:
-            patched = forward_validation(after, recording, used, nominal=after, duration=duration)
-            plain = forward_validation(before, recording, used, nominal=after, duration=duration)
+            patched = _forward_score(after, recording, used, after, duration)
+            plain = _forward_score(before, recording, used, after, duration)
         except ArmidError as error:
             what = '' if patched is None else 'the description is '
             left_out.append(f'{recording.source}: {what}not simulated: {error}')

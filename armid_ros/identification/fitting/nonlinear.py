@@ -17,7 +17,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 from armid_ros.arm import ArmModel
-from armid_ros.identification.fitting.identifiability import bounds, near_deviation
+from armid_ros.identification.fitting.identifiability import bounds
 from armid_ros.identification.fitting.least_squares import Method, Solution, solve
 from armid_ros.identification.rows.regression import (
     Fit,
@@ -344,69 +344,6 @@ class _State:
             return float(np.sum((self._weights * self._residual) ** 2))
         residual = self._weights * (self._tau - np.concatenate(predicted))
         return float(np.sum(residual**2))
-
-
-def with_uncertain_inertia(
-    description: ArmModel,
-    fit: FittedValues,
-    recordings: Sequence[Recording],
-    used: Conditioning,
-) -> tuple[FittedValues, tuple[str, ...]]:
-    """
-    Add the uncertainty of the described inertia to the covariance of a fit of slow motions.
-
-    Weight is fitted, and inertia has the described values. Even in slow motion, the torque of
-    inertia varies with position as weight does, so errors of the description bias the weight.
-
-    Parameters
-    ----------
-    description : ArmModel
-        The arm as described, inertia included.
-    fit : FittedValues
-        Weight and effects, fitted with that inertia.
-    recordings : sequence of Recording
-        Training data.
-    used : Conditioning
-        Filters.
-
-    Returns
-    -------
-    fit : FittedValues
-        Fit with the larger covariance.
-    notes : tuple of str
-        Speed at which inertia would be negligible, if it is not.
-
-    """
-    # negligible deviation due to inertia, over the standard deviation of the fit
-    negligible = 0.1
-    rigid = len(description.robot.rigid_parameters)
-    everything = regressions(fit.arm, np.arange(rigid), recordings, used)
-    # base parameters that a weighted fit of each rigid column gives
-    rows, body = (
-        weighted_rows(part, fit.solution.weights)[0] for part in (fit.problem, everything)
-    )
-    scale = np.linalg.norm(rows, axis=0)
-    fitted = np.linalg.lstsq(rows / scale, body, rcond=None)[0] / scale[:, np.newaxis]
-    pull = fitted - fit.base.grouping[:, :rigid]
-    spread = near_deviation(description.robot)
-    added = (pull * spread) @ (pull * spread).T
-    plain = fit.solution.covariance
-    solution = replace(fit.solution, covariance=plain + added)
-    ratio = np.sqrt(np.diag(added) / np.maximum(np.diag(plain), 1e-300)).max()
-    notes: tuple[str, ...] = ()
-    if ratio > negligible:
-        # the torque of inertia grows with the square of the speed
-        speed = float(np.sqrt(negligible / ratio))
-        slower = (
-            'these torques have so little noise that inertia matters at any speed'
-            if speed < 0.02
-            else f'at {speed:.2g} times the speed it would not matter'
-        )
-        notes = (
-            'too fast for quasi-static: the described inertia is subtracted, and its possible '
-            f'error widens the intervals; {slower}',
-        )
-    return replace(fit, solution=solution), notes
 
 
 def ungrouped(arm: ArmModel, base: BaseParameters) -> FloatArray:

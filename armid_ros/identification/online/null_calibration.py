@@ -168,11 +168,8 @@ class NullCalibration:
         factors[judged] = np.exp(value + drawn * (middle - value)).clip(1.0)
         yield
         # 99 % quantile of the statistics, each over its quantile in white noise; zero: no data
-        relative = (later[:, judged] / (factors * self._rare)[judged]).ravel()
-        count = np.count_nonzero(relative)
-        place = len(relative) - count + (1.0 - _TAIL_PROBABILITY) * (count - 1)
-        largest = np.sort(np.partition(relative, int(place))[int(place) :])
-        tail = float(np.interp(place % 1.0, np.arange(len(largest)), largest))
+        relative = later[:, judged] / (factors * self._rare)[judged]
+        tail = float(np.quantile(relative[relative > 0.0], 1.0 - _TAIL_PROBABILITY))
         self.factors, self._tail = factors, max(1.0, tail)
         self._freedom = np.zeros(len(self._sizes))
         self._freedom[judged] = 2.0 / remaining  # a mean square of k degrees varies by 2 / k
