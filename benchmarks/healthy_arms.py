@@ -15,8 +15,7 @@ change, by steps or wear.
 
 import argparse
 
-from armid_ros.changes.histories import judge, named
-from armid_ros.changes.scatter import ParameterHistory, spreads, without_days
+from armid_ros.changes.histories import judge, named, ParameterHistory, spreads, without_days
 import numpy as np
 
 JOINTS = ('waist', 'shoulder', 'elbow')

@@ -5,8 +5,7 @@ Tests for changes of an arm between two groups of data, or in series of estimate
 
 The difference of two groups of data has an inverse covariance S and a score s, which is S times
 the difference. Then s^T S^-1 s over its rank has Fisher's distribution, with the rank of S and the
-degrees of freedom of the noise estimate (`statistic`). The scatter of estimates beyond their
-standard deviations is estimated from all arms of a kind (`scatter`). Tests for steps and trends
-in series of estimates use it (`histories`).
+degrees of freedom of the noise estimate (`statistic`). Steps and trends in series of estimates are
+tested by the scatter between bags, which is estimated from all arms of a kind (`histories`).
 
 """

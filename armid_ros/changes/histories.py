@@ -3,10 +3,23 @@
 """
 Tests for steps and trends in series of estimates, with control of false discoveries in a fleet.
 
-A change on a day that all arms of a kind share is no change of one arm and is subtracted. Other
-scatter between bags is estimated from all arms (`scatter`). A bag that differs from the median
-of its neighbours by more than noise is an outlier, not a change. Its value is limited to the
-range of the noise (Hampel 1974). After a lasting change, neighbours agree.
+A value of a series is theta + c + e. The effect of the day, c, is the same for all arms of a
+kind, for example by the temperature of a hall. It is estimated by median polish (Tukey 1977) and
+subtracted. The part e has the variance s^2 + t^2: s is the standard deviation of the bag's
+estimate, and t the additional scatter between bags. The scatter follows from the median of squared
+differences of neighbours, which a step or slow trend does not change. Three further properties are
+estimated from all arms of a kind:
+
+- Arms differ in their scatter. The variance of an arm is shrunk towards that of all arms, the
+  more these agree (Smyth 2004).
+- Scatter is correlated over days. Steps and trends of healthy arms then exceed the prediction
+  from differences of neighbours. Their factor is the median of their squares, divided by that of
+  chi-squared (genomic control; Devlin and Roeder 1999), which only needs most arms to be healthy.
+- Few series determine these factors only roughly; uncertain factors are shrunk towards one.
+
+A bag that differs from the median of its neighbours by more than noise is an outlier, not a
+change. Its value is limited to the range of the noise (Hampel 1974). After a lasting change,
+neighbours agree.
 
 The largest step and the trend of every series of an arm are tested, with Bonferroni's factor for
 the number of tests. Over arms, the false discovery rate is controlled (Benjamini and Hochberg
@@ -17,25 +30,84 @@ the number of tests. Over arms, the false discovery rate is controlled (Benjamin
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
-from typing import Literal
+from dataclasses import dataclass, replace
+from functools import cache
+from typing import Literal, NamedTuple
 
-from armid_ros.changes.scatter import (
-    line,
-    MIN_BAGS,
-    ParameterHistory,
-    splits,
-    Spread,
-    variances,
-)
-from armid_ros.changes.statistic import tail
+from armid_ros.changes.statistic import MEDIAN_SQUARE, tail, two_means
+from armid_ros.motion import FloatArray
 import numpy as np
-from scipy import stats
+from scipy import ndimage, optimize, special, stats
 
 Kind = Literal['step', 'trend']
 
+#: Smallest number of bags of a tested series.
+_MIN_BAGS = 4
+#: Smallest number of arms of a kind for a comparison of arms, or of those with a bag on a day for
+#: an effect of that day.
+_MIN_ARMS = 8
+#: Prior degrees of freedom of the variances of arms if these do not differ.
+_MAX_FREEDOM = 1e6
 #: Mean length of a month [days].
 MONTH = 365.25 / 12.0
+
+
+@dataclass(frozen=True, eq=False)
+class ParameterHistory:
+    """
+    A parameter of an arm over time.
+
+    Attributes
+    ----------
+    arm : str
+        Name of the arm.
+    name, joint, unit : str
+        Name, joint and unit of the parameter.
+    days : ndarray, shape (K,)
+        Times of the bags, increasing [days since the epoch].
+    values, std : ndarray, shape (K,)
+        Estimates and their stated standard deviations.
+
+    """
+
+    arm: str
+    name: str
+    joint: str
+    unit: str
+    days: FloatArray
+    values: FloatArray
+    std: FloatArray
+
+    @property
+    def parameter(self) -> tuple[str, str]:
+        """Name and joint of the parameter."""
+        return self.name, self.joint
+
+
+@dataclass(frozen=True)
+class Spread:
+    """
+    Spread of a parameter between bags beyond its stated uncertainty.
+
+    Attributes
+    ----------
+    std : float
+        Standard deviation between bags.
+    freedom : float
+        Degrees of freedom of `std`.
+    prior_freedom : float
+        Prior degrees of freedom of the variances of arms; large if arms do not differ.
+    steps, trends : float
+        Ratios of the steps and trends of healthy arms to those predicted from differences of
+        neighbours, in standard deviations.
+
+    """
+
+    std: float
+    freedom: float
+    prior_freedom: float = _MAX_FREEDOM
+    steps: float = 1.0
+    trends: float = 1.0
 
 
 @dataclass(frozen=True)
@@ -116,8 +188,8 @@ def judge(
         by_arm: dict[str, list[HistoryChange]] = {}
         for one in series:
             found = by_arm.setdefault(one.arm, [])
-            if len(one.values) >= MIN_BAGS:
-                found.append(largest_change(one, spread[one.parameter]))
+            if len(one.values) >= _MIN_BAGS:
+                found.append(_largest_change(one, spread[one.parameter]))
         for arm, changes in by_arm.items():
             changes.sort(key=lambda change: (change.p, -abs(change.size) / change.std))
             p = min(1.0, len(changes) * changes[0].p) if changes else 1.0
@@ -135,27 +207,235 @@ def named(judged: Judged, alpha: float) -> tuple[HistoryChange, ...]:
     return tuple(change for change in judged.changes if change.p <= limit)
 
 
-def largest_change(series: ParameterHistory, spread: Spread) -> HistoryChange:
-    """Return the largest step of a series, or its trend if the trend explains it equally well."""
-    cut, count = splits(series, spread), len(series.values)
-    scores, trend = cut.scores / spread.steps, cut.trend / spread.trends
-    at = int(np.argmax(scores))
-    # the search for the position of a step costs log(count); a trend has no position
-    if trend**2 + np.log(count) >= scores[at] ** 2:
-        p = _p(trend, cut.freedom, count)
-        std = cut.slope_std * spread.trends * MONTH
-        return HistoryChange(series, 'trend', 0, cut.slope * MONTH, std, cut.start, p)
-    p = _p(float(scores[at]), cut.freedom, count)
-    size, std = float(cut.high[at] - cut.low[at]), float(cut.std[at]) * spread.steps
-    return HistoryChange(series, 'step', at + 1, size, std, float(cut.low[at]), p)
-
-
 def wear(series: ParameterHistory, spread: Spread) -> tuple[float, float]:
     """Return the slope of a series per month, and its standard deviation."""
-    slope, std, _ = line(series.days, series.values, 1.0 / variances(series, spread)[0])
+    slope, std, _ = _line(series.days, series.values, 1.0 / _variances(series, spread)[0])
     return slope * MONTH, std * spread.trends * MONTH
+
+
+def spreads(series: Sequence[ParameterHistory]) -> dict[tuple[str, str], Spread]:
+    """Return the spread of each parameter beyond its stated uncertainty."""
+    found = {parameter: _spread(group) for parameter, group in _by_parameter(series).items()}
+    for name in dict.fromkeys(one.name for one in series):  # of all joints together
+        group = [one for one in series if one.name == name]
+        freedom = _prior_freedom(group, found)
+        own = {key: replace(found[key], prior_freedom=freedom) for key in found if key[0] == name}
+        steps, trends = _lasting(group, own)
+        found |= {key: replace(one, steps=steps, trends=trends) for key, one in own.items()}
+    return found
+
+
+def without_days(series: Sequence[ParameterHistory]) -> list[ParameterHistory]:
+    """
+    Subtract the effect of each day, which all siblings share.
+
+    The effect is proportional to the size of the parameter, as for friction that falls with
+    temperature. Days on which few siblings have bags are unchanged.
+
+    """
+    changed: dict[int, ParameterHistory] = {}
+    for group in _by_parameter(series).values():
+        for one, values in zip(group, _polished(group), strict=True):
+            changed[id(one)] = replace(one, values=values)
+    return [changed[id(one)] for one in series]
+
+
+def _largest_change(series: ParameterHistory, spread: Spread) -> HistoryChange:
+    """Return the largest step of a series, or its trend if the trend explains it equally well."""
+    split, count = _splits(series, spread), len(series.values)
+    scores, trend = split.scores / spread.steps, split.trend / spread.trends
+    best = int(np.argmax(scores))
+    # the search for the position of a step costs log(count); a trend has no position
+    if trend**2 + np.log(count) >= scores[best] ** 2:
+        p = _p(trend, split.freedom, count)
+        std = split.slope_std * spread.trends * MONTH
+        return HistoryChange(series, 'trend', 0, split.slope * MONTH, std, split.start, p)
+    p = _p(float(scores[best]), split.freedom, count)
+    size, std = float(split.high[best] - split.low[best]), float(split.std[best]) * spread.steps
+    return HistoryChange(series, 'step', best + 1, size, std, float(split.low[best]), p)
 
 
 def _p(score: float, freedom: float, tried: int) -> float:
     # lower bound of the p-value, which underflows for larger scores
     return min(1.0, tried * max(float(tail(score**2, 1, freedom)), 1e-300))
+
+
+class _Splits(NamedTuple):
+    """Means before and after every possible step of a series, and its straight line."""
+
+    low: FloatArray  # (K - 1,)
+    high: FloatArray
+    std: FloatArray  # of the difference
+    scores: FloatArray  # steps in standard deviations
+    slope: float  # per day
+    slope_std: float  # infinite if all bags are of one day
+    start: float  # value of the line at the beginning
+    trend: float  # slope in standard deviations
+    freedom: float  # degrees of freedom of the variance
+
+
+def _splits(series: ParameterHistory, spread: Spread) -> _Splits:
+    """Return the steps and the trend of a series, in standard deviations of neighbours."""
+    variance, freedom = _variances(series, spread)
+    std = np.sqrt(variance)
+    # outliers are clipped to three standard deviations around the median of five bags
+    windows = np.lib.stride_tricks.sliding_window_view(series.values, min(5, len(series.values)))
+    nearest = np.clip(np.arange(len(std)) - 2, 0, len(windows) - 1)
+    middle = np.median(windows, axis=1)[nearest]
+    x = np.clip(series.values, middle - 3.0 * std, middle + 3.0 * std)
+    weights = 1.0 / variance
+    low, high, difference_std = two_means(x, weights)
+    scores = np.abs(high - low) / difference_std
+    slope, slope_std, start = _line(series.days, x, weights)
+    trend = abs(slope) / slope_std if slope_std < np.inf else 0.0
+    return _Splits(low, high, difference_std, scores, slope, slope_std, start, trend, freedom)
+
+
+def _by_parameter(
+    series: Sequence[ParameterHistory],
+) -> dict[tuple[str, str], list[ParameterHistory]]:
+    """Return the series of all arms of each parameter, by name and joint."""
+    groups: dict[tuple[str, str], list[ParameterHistory]] = {}
+    for one in series:
+        groups.setdefault(one.parameter, []).append(one)
+    return groups
+
+
+def _polished(group: Sequence[ParameterHistory]) -> list[FloatArray]:
+    """Return values without the effects of days, by a median polish with the arms' levels."""
+    days = np.concatenate([np.floor(one.days) for one in group])
+    arm = np.repeat(np.arange(len(group)), [len(one.days) for one in group])
+    values = np.concatenate([one.values for one in group])
+    _, day = np.unique(days, return_inverse=True)
+    arms_of_day = np.bincount(np.unique(np.stack([day, arm]), axis=1)[0], minlength=day.max() + 1)
+    arms, dates = np.arange(len(group)), np.arange(len(arms_of_day))
+    level = ndimage.median(values, arm, arms)
+    middle = float(np.median(level))
+    same_sign = bool(np.all(level * middle > 0.0))
+    share = level / middle if same_sign else np.ones(len(level))
+    common = np.zeros(len(arms_of_day))
+    for _ in range(4):
+        common = ndimage.median((values - level[arm]) / share[arm], day, dates)
+        common[arms_of_day < _MIN_ARMS] = 0.0
+        level = ndimage.median(values - share[arm] * common[day], arm, arms)
+    rest = values - share[arm] * common[day]
+    return np.split(rest, np.cumsum([len(one.days) for one in group])[:-1])
+
+
+def _spread(group: Sequence[ParameterHistory]) -> Spread:
+    """Solve median(d^2 / (s_k^2 + s_k+1^2 + 2 t^2)) = median of chi^2 for t."""
+    squares = np.concatenate([np.diff(one.values) ** 2 for one in group])
+    stated = np.concatenate([one.std[1:] ** 2 + one.std[:-1] ** 2 for one in group])
+    # degrees of freedom of a variance from the median of n squares
+    freedom = max(1.0, 0.37 * len(squares))
+    if not len(squares):
+        return Spread(0.0, freedom)
+
+    def excess(extra: float) -> float:
+        return float(np.median(squares / np.maximum(stated + 2.0 * extra, 1e-300))) - MEDIAN_SQUARE
+
+    most = float(np.max(squares)) + 1e-300
+    extra = 0.0
+    if excess(0.0) > 0.0 > excess(most):
+        extra = float(optimize.brentq(excess, 0.0, most, xtol=1e-9 * most, rtol=1e-6))
+    return Spread(float(np.sqrt(extra)), freedom)
+
+
+def _prior_freedom(
+    group: Sequence[ParameterHistory], found: Mapping[tuple[str, str], Spread]
+) -> float:
+    """
+    Return the prior degrees of freedom of the variances of arms (empirical Bayes).
+
+    The logarithms of variance ratios have the variance trigamma(d_a / 2) + trigamma(d_0 / 2). The
+    degrees d_a are those of one series, and the equation is solved for d_0. Only scatter beyond
+    one standard error is a difference between arms.
+
+    """
+    tested = [one for one in group if len(one.values) >= _MIN_BAGS]
+    if len(tested) < _MIN_ARMS:
+        return _MAX_FREEDOM
+    logs = np.log([_ratio(one, found[one.parameter]) for one in tested])
+    own = [_trigamma(0.5 * _freedom(len(one.values))) for one in tested]
+    # relative standard error of a variance from the median of n absolute deviations
+    sure = 1.0 - 2.33 / np.sqrt(len(logs))
+    beyond = sure * _robust_scale(logs) ** 2 - float(np.mean(own))
+    return _inverse_trigamma(beyond)
+
+
+def _ratio(series: ParameterHistory, spread: Spread) -> float:
+    """Return the ratio of the variance of a series to the usual variance."""
+    stated = series.std[1:] ** 2 + series.std[:-1] ** 2 + 2.0 * spread.std**2
+    squares = np.diff(series.values) ** 2 / np.maximum(stated, 1e-300)
+    return max(float(np.median(squares)) / MEDIAN_SQUARE, 1e-100)
+
+
+@cache
+def _freedom(bags: int) -> float:
+    """Return the degrees of freedom of the variance of a number of bags, from white noise."""
+    noise = np.random.default_rng(0).normal(size=(4000, bags))  # series of white noise
+    medians = np.median(np.diff(noise, axis=1) ** 2, axis=1)
+    return _inverse_trigamma(_robust_scale(np.log(medians)) ** 2)
+
+
+def _robust_scale(values: FloatArray) -> float:
+    return 1.4826 * float(np.median(np.abs(values - np.median(values))))
+
+
+def _trigamma(x: float) -> float:
+    return float(special.polygamma(1, x))
+
+
+def _inverse_trigamma(value: float) -> float:
+    """Return 2 x with trigamma(x) = value, between 1 and `_MAX_FREEDOM`."""
+    if value <= _trigamma(0.5 * _MAX_FREEDOM):
+        return _MAX_FREEDOM
+    if value >= _trigamma(0.5):
+        return 1.0
+    return 2.0 * float(optimize.brentq(lambda x: _trigamma(x) - value, 0.5, 0.5 * _MAX_FREEDOM))
+
+
+def _variances(series: ParameterHistory, spread: Spread) -> tuple[FloatArray, float]:
+    """Return the variance of every value, shape (K,), and its degrees of freedom."""
+    usual = np.maximum(series.std**2 + spread.std**2, 1e-300)
+    if len(series.values) < _MIN_BAGS or spread.prior_freedom >= _MAX_FREEDOM:
+        return usual, spread.freedom
+    ratio, freedom = _ratio(series, spread), _freedom(len(series.values))
+    both = spread.prior_freedom + freedom
+    shrunk = usual * (spread.prior_freedom + freedom * ratio) / both
+    return shrunk, min(both, spread.freedom + freedom)
+
+
+def _lasting(
+    group: Sequence[ParameterHistory], found: dict[tuple[str, str], Spread]
+) -> tuple[float, float]:
+    """Return `steps` and `trends` of a `Spread`, each 1 or more."""
+    steps, trends = [], []
+    for one in group:
+        if len(one.values) < _MIN_BAGS:
+            continue
+        split = _splits(one, found[one.parameter])
+        third = len(split.scores) // 3
+        steps.append(float(np.median(split.scores[third : len(split.scores) - third] ** 2)))
+        trends.append(split.trend**2)
+    if not steps:
+        return 1.0, 1.0
+    # the prior (scatter is uncorrelated over days) has the weight of 10 series
+    weight = len(steps) / (len(steps) + 10.0)
+    step, trend = (
+        max(1.0, float(np.median(squares)) / MEDIAN_SQUARE) ** (0.5 * weight)
+        for squares in (steps, trends)
+    )
+    return step, trend
+
+
+def _line(days: FloatArray, x: FloatArray, weights: FloatArray) -> tuple[float, float, float]:
+    """Return slope, its standard deviation and start value of a weighted straight line."""
+    total = weights.sum()
+    middle, mean = weights @ days / total, weights @ x / total
+    deviation = days - middle
+    inertia = float(weights @ deviation**2)
+    if not inertia > 0.0:
+        return 0.0, np.inf, float(mean)
+    slope = float(weights @ (deviation * (x - mean))) / inertia
+    return slope, 1.0 / np.sqrt(inertia), float(mean + slope * (days[0] - middle))

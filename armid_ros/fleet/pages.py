@@ -15,7 +15,7 @@ import math
 from typing import Any
 from urllib.parse import quote
 
-from armid_ros.changes.scatter import ParameterHistory
+from armid_ros.changes.histories import ParameterHistory
 from armid_ros.fleet.bags import BagFile, DAY_NS, file_name
 from armid_ros.fleet.store import Store
 from armid_ros.fleet.watch import (

@@ -23,9 +23,12 @@ from armid_ros.changes.histories import (
     judge,
     Judged,
     named,
+    ParameterHistory,
+    Spread,
+    spreads,
     wear,
+    without_days,
 )
-from armid_ros.changes.scatter import ParameterHistory, Spread, spreads, without_days
 from armid_ros.errors import FleetError
 from armid_ros.estimate import name_in_words, ParameterName
 from armid_ros.fleet.bags import DAY_NS

@@ -2,8 +2,15 @@
 # SPDX-License-Identifier: Apache-2.0
 """Changes of arms over time: found where there are, and rarely where there are none."""
 
-from armid_ros.changes.histories import judge, MONTH, named, wear
-from armid_ros.changes.scatter import ParameterHistory, spreads, without_days
+from armid_ros.changes.histories import (
+    judge,
+    MONTH,
+    named,
+    ParameterHistory,
+    spreads,
+    wear,
+    without_days,
+)
 import numpy as np
 import pytest
 
