@@ -55,12 +55,12 @@ from armid_ros.identification.rows.regression import (
     weighted_rows,
 )
 from armid_ros.identification.rows.signals import (
-    check_recordings,
     Conditioning,
     conditioning,
     no_stretch,
     SignalSettings,
 )
+from armid_ros.identification.rows.stamps import check_recordings
 from armid_ros.identification.rows.temperature import at_mean_temperature
 from armid_ros.model import BaseParameters
 from armid_ros.motion import FloatArray

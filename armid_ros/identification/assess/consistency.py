@@ -27,8 +27,7 @@ from armid_ros.identification.fitting.instruments import by_instruments, linear_
 from armid_ros.identification.fitting.least_squares import solve
 from armid_ros.identification.identify import Identification
 from armid_ros.identification.rows.regression import Regression, weighted_rows
-from armid_ros.identification.rows.signals import even_positions
-from armid_ros.identification.rows.spectrum import mean_spectrum
+from armid_ros.identification.rows.signals import even_positions, mean_spectrum
 from armid_ros.motion import FloatArray
 from armid_ros.recording import Recording
 import numpy as np

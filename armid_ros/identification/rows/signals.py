@@ -15,10 +15,10 @@ from __future__ import annotations
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field
 from functools import cached_property
+from typing import Literal
 
 from armid_ros.errors import IdentificationError
-from armid_ros.identification.rows.spectrum import mean_spectrum
-from armid_ros.identification.rows.stamps import two_senders
+from armid_ros.identification.rows.stamps import check_recordings
 from armid_ros.model import points_motion
 from armid_ros.motion import FloatArray, Motion, MovingPoints, read_only
 from armid_ros.recording import Recording
@@ -30,10 +30,6 @@ from scipy import fft, signal
 from scipy.interpolate import CubicSpline
 from scipy.ndimage import correlate1d
 
-#: Lowest sampling rate that resolves the motion of an arm [Hz].
-_MIN_RATE = 2.0
-#: Rates at which arms are recorded [Hz].
-USUAL_RATES = (20.0, 20_000.0)
 #: Band of torque and regressor over that of the motion, with harmonics of friction steps.
 MODEL_BANDS = 10.0
 #: Samples per period of the cut-off that describe a smooth function of the filtered positions.
@@ -196,36 +192,6 @@ def velocity_error(recording: Recording, used: Conditioning) -> FloatArray:
     lacking = np.sum(frequency[:, np.newaxis] ** 2 * (power - floor), axis=0, where=lost)
     noise = floor * used.cutoff_hz**3 / 3.0
     return np.asarray(2.0 * np.pi * np.sqrt(noise + lacking * frequency[1]))
-
-
-def check_recordings(recordings: Sequence[Recording]) -> None:
-    """
-    Raise an error for recordings that no filter can process.
-
-    Raises
-    ------
-    IdentificationError
-        If samples are too far apart, as with stamps that are not in seconds, or if a topic has two
-        senders.
-
-    """
-    for recording in recordings:
-        rate = 1.0 / recording.period
-        if rate < _MIN_RATE:
-            units = (('milliseconds', 1e3), ('microseconds', 1e6), ('nanoseconds', 1e9))
-            likely = [
-                f'; the stamps seem to be {unit} in place of seconds, {factor * rate:.4g} '
-                'samples/s: write them in seconds'
-                for unit, factor in units
-                if USUAL_RATES[0] <= factor * rate <= USUAL_RATES[1]
-            ]
-            raise IdentificationError(
-                f'{recording.source}: {len(recording)} samples in {recording.duration:.4g} s, one '
-                f'every {1.0 / rate:.4g} s: too slow for a motion' + (likely[0] if likely else '')
-            )
-        mixed = two_senders(recording)
-        if mixed:
-            raise IdentificationError(f'{recording.source or "recording"}: {mixed}')
 
 
 def segments(recording: Recording, used: Conditioning) -> Iterator[Motion]:
@@ -424,6 +390,47 @@ def _motion_band(stretches: Sequence[tuple[FloatArray, npt.ArrayLike]], rate: fl
         if share[-1] > 0.0:
             band = max(band, float(frequency[order[np.searchsorted(share, 0.99 * share[-1])]]))
     return band
+
+
+def mean_spectrum(
+    stretches: Sequence[FloatArray],
+    rate: float,
+    detrend: Literal['constant', 'linear'] = 'constant',
+    segment: float = 8.0,
+) -> tuple[FloatArray, FloatArray]:
+    """
+    Return the mean power spectrum of stretches that last as long as a segment (Welch 1967).
+
+    Parameters
+    ----------
+    stretches : sequence of ndarray, each (N, n)
+        Evenly sampled signals; segments are no longer than the longest stretch.
+    rate : float
+        Samples per second.
+    detrend : {'constant', 'linear'}
+        Trend that is subtracted from every segment: its mean, or a line.
+    segment : float
+        Length of the segments [s].
+
+    Returns
+    -------
+    frequency : ndarray, shape (K,)
+        Frequencies [Hz].
+    power : ndarray, shape (K, n)
+        Power per Hz.
+
+    """
+    length = min(max(map(len, stretches)), int(segment * rate))
+    long_enough = [values for values in stretches if len(values) >= length]
+    spectra = [
+        signal.welch(
+            values, fs=rate, window='blackmanharris', nperseg=length, detrend=detrend, axis=0
+        )
+        for values in long_enough
+    ]
+    weights = [len(values) for values in long_enough]
+    power = np.average([power for _, power in spectra], axis=0, weights=weights)
+    return spectra[0][0], power
 
 
 def _position_spectrum(recording: Recording) -> tuple[FloatArray, FloatArray, FloatArray]:

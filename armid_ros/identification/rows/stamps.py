@@ -1,9 +1,12 @@
 # Copyright 2026 The armid_ros developers
 # SPDX-License-Identifier: Apache-2.0
-"""Checks of time stamps: uneven or rounded stamps, and two senders on one topic."""
+"""Checks of time stamps: uneven, rounded or slow stamps, and two senders on one topic."""
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
+from armid_ros.errors import IdentificationError
 from armid_ros.recording import Recording
 import numpy as np
 
@@ -70,6 +73,36 @@ def rounded_stamps(recording: Recording) -> str:
         f'{report.duplicates} of {report.messages} samples had the stamp of another and are left '
         'out. Write stamps with more digits, or record with those of the driver'
     )
+
+
+def check_recordings(recordings: Sequence[Recording]) -> None:
+    """
+    Raise an error for recordings that no filter can process.
+
+    Raises
+    ------
+    IdentificationError
+        If samples are too far apart, as with stamps that are not in seconds, or if a topic has two
+        senders.
+
+    """
+    for recording in recordings:
+        rate = 1.0 / recording.period
+        if rate < 2.0:  # too slow to resolve the motion of an arm
+            units = (('milliseconds', 1e3), ('microseconds', 1e6), ('nanoseconds', 1e9))
+            likely = [
+                f'; the stamps seem to be {unit} in place of seconds, {factor * rate:.4g} '
+                'samples/s: write them in seconds'
+                for unit, factor in units
+                if 20.0 <= factor * rate <= 20_000.0  # rates at which arms are recorded [Hz]
+            ]
+            raise IdentificationError(
+                f'{recording.source}: {len(recording)} samples in {recording.duration:.4g} s, one '
+                f'every {1.0 / rate:.4g} s: too slow for a motion' + (likely[0] if likely else '')
+            )
+        mixed = two_senders(recording)
+        if mixed:
+            raise IdentificationError(f'{recording.source or "recording"}: {mixed}')
 
 
 def two_senders(recording: Recording) -> str:

@@ -19,10 +19,10 @@ from armid_ros.arm import ArmModel
 from armid_ros.identification.rows.damage import without_damage
 from armid_ros.identification.rows.regression import Regression, regressions
 from armid_ros.identification.rows.signals import (
-    check_recordings,
     Conditioning,
     EDGE_PERIODS,
 )
+from armid_ros.identification.rows.stamps import check_recordings
 from armid_ros.recording import ReadSettings, Recording
 from armid_ros.recording.reader import read_pieces
 from armid_ros.recording.recording import GAP_PERIODS

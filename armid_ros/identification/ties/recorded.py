@@ -15,10 +15,10 @@ from armid_ros.errors import IdentificationError
 from armid_ros.identification.rows.signals import (
     Conditioning,
     conditioning,
+    mean_spectrum,
     segments,
     SignalSettings,
 )
-from armid_ros.identification.rows.spectrum import mean_spectrum
 from armid_ros.identification.ties.problem import (
     Inertias,
     interaction_problem,
