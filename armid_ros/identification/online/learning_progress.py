@@ -33,14 +33,11 @@ class Unlearned:
         The joint; empty for the whole arm.
     parameters : tuple of ParameterName
         Unidentified parameters, the most uncertain first.
-    uncertainty : float
-        Uncertainty of a torque by the first parameter, over the usual torque of that joint [-].
 
     """
 
     joint: str
     parameters: tuple[ParameterName, ...]
-    uncertainty: float
 
     def __str__(self) -> str:
         """Return the unidentified quantities, and the motion that they need."""
@@ -122,7 +119,7 @@ class LearningProgress:
         for k in sorted(np.flatnonzero(stuck).tolist(), key=lambda k: -float(unknown[k])):
             by_joint.setdefault(estimate.parameters[k].joint, []).append(k)
         return tuple(
-            Unlearned(joint, tuple(estimate.parameters[k] for k in some), float(unknown[some[0]]))
+            Unlearned(joint, tuple(estimate.parameters[k] for k in some))
             for joint, some in by_joint.items()
         )
 

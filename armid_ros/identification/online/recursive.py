@@ -141,7 +141,7 @@ class RecursiveLeastSquares:
         rows: FloatArray,
         tau: FloatArray,
         weights: npt.ArrayLike | None = None,
-    ) -> FloatArray:
+    ) -> None:
         """
         Add one sample, or several at once.
 
@@ -155,16 +155,11 @@ class RecursiveLeastSquares:
             Independent observations that each row stands for: 0 for a row not to be used, less
             than 1 for one of many filtered rows that share their noise. Ones by default.
 
-        Returns
-        -------
-        ndarray, shape (m,)
-            Innovation: the torque minus its prediction from the samples before [N m].
-
         """
         counts = np.ones(len(tau)) if weights is None else np.asarray(weights)
-        innovation = tau - rows @ self._values
         if not counts.any():
-            return innovation
+            return
+        innovation = tau - rows @ self._values
         by_sample = counts.reshape(-1, len(self._noise))
         scale = self.scale(by_sample).reshape(-1)
         rows = rows * scale[:, np.newaxis]
@@ -190,7 +185,6 @@ class RecursiveLeastSquares:
         self._squares += float(innovation * scale @ after)
         self._freedom += float(counts.sum())
         self.samples += int(np.count_nonzero(by_sample.any(axis=1)))
-        return innovation
 
     def update_together(self, samples: Sequence[WeightedSample]) -> None:
         """
