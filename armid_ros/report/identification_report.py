@@ -12,8 +12,8 @@ from armid_ros.arm import ArmModel
 from armid_ros.estimate import Estimate
 from armid_ros.identification import Fit, Grade, Identification, PhysicalCertificate, Verification
 from armid_ros.identification import grade as graded
-from armid_ros.identification.assess.consistency import NoiseCheck
 from armid_ros.identification.fitting.identifiability import HALF_WIDTH
+from armid_ros.identification.fitting.instruments import NoiseCheck
 from armid_ros.identification.fitting.least_squares import IN_WORDS
 from armid_ros.motion import FloatArray
 from armid_ros.recording import Recording

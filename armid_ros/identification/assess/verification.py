@@ -22,7 +22,7 @@ from typing import Any
 
 from armid_ros.arm import ArmModel
 from armid_ros.errors import ArmidError, IdentificationError
-from armid_ros.identification.assess.consistency import check_noise, NoiseCheck
+from armid_ros.identification.fitting.instruments import check_noise, NoiseCheck
 from armid_ros.identification.identify import Identification
 from armid_ros.identification.rows.signals import Conditioning, decimate, segments
 from armid_ros.motion import FloatArray, Motion

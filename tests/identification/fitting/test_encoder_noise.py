@@ -3,7 +3,7 @@
 from dataclasses import replace
 
 from armid_ros.identification import IdentificationSettings, identify, SignalSettings
-from armid_ros.identification.assess.consistency import check_noise, position_noise
+from armid_ros.identification.fitting.instruments import check_noise, position_noise
 import numpy as np
 import pytest
 
