@@ -218,16 +218,15 @@ def determined(
             break
         kept = np.delete(np.arange(base.rank), worst)
         value = float(base.values(arm.theta)[worst])
-        torques = [part.columns[:, :, worst] * value for part in problem]
         problem = tuple(
-            replace(part, constant=torque + (0.0 if part.constant is None else part.constant))
-            for part, torque in zip(problem, torques, strict=True)
+            replace(
+                part.restrict(kept), constant=part.constant + part.columns[:, :, worst] * value
+            )
+            for part in problem
         )
-        problem = tuple(part.restrict(kept) for part in problem)
-        parameters = tuple(base.parameters[k] for k in kept)
         base = replace(
             base,
-            parameters=parameters,
+            parameters=tuple(base.parameters[k] for k in kept),
             independent=base.independent[kept],
             grouping=base.grouping[kept],
         )

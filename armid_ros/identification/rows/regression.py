@@ -71,14 +71,14 @@ class Regression(Stretch):
     ----------
     columns : ndarray, shape (M, n, r)
         Filtered columns of the chosen parameters.
-    constant : ndarray, shape (M, n), or None
-        Filtered torque of the linear model where all values are zero; None if it is zero, as for
-        a model that is linear in all its parameters.
+    constant : ndarray, shape (M, n), or float
+        Filtered torque of the linear model where all values are zero: 0 for a model that is linear
+        in all its parameters.
 
     """
 
     columns: FloatArray
-    constant: FloatArray | None = None
+    constant: FloatArray | float = 0.0
 
     def __post_init__(self) -> None:
         """Freeze the columns."""
@@ -87,12 +87,11 @@ class Regression(Stretch):
     @property
     def target(self) -> FloatArray:
         """Return the torque that the columns are fitted to, shape (M, n)."""
-        return self.tau if self.constant is None else self.tau - self.constant
+        return np.asarray(self.tau - self.constant)
 
     def torque(self, values: FloatArray) -> FloatArray:
         """Return the torque of the linear model for values of the columns, shape (M, n)."""
-        linear = self.columns @ values
-        return np.asarray(linear if self.constant is None else linear + self.constant)
+        return np.asarray(self.columns @ values + self.constant)
 
     def residual(self, values: FloatArray) -> FloatArray:
         """Return the residual torque for values of the columns, shape (M, n)."""
@@ -111,7 +110,7 @@ class Regression(Stretch):
             motion=self.motion.select(rows),
             columns=self.columns[rows],
             informative=self.informative[rows],
-            constant=None if self.constant is None else self.constant[rows],
+            constant=np.broadcast_to(self.constant, self.tau.shape)[rows],
         )
 
 
