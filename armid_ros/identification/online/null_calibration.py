@@ -41,18 +41,18 @@ class History:
 
     def __init__(self, width: int, most: int) -> None:
         self._rows = np.empty((2 * most, width))  # the latest rows move to the front when full
-        self._most = most
+        self._max_rows = most
         self._end = 0
 
     def __len__(self) -> int:
         """Return the number of rows."""
-        return min(self._end, self._most)
+        return min(self._end, self._max_rows)
 
     def append(self, row: FloatArray) -> None:
         """Append a row."""
         if self._end == len(self._rows):
             kept, self._rows = self.values, np.empty_like(self._rows)
-            self._rows[: self._most], self._end = kept, self._most
+            self._rows[: self._max_rows], self._end = kept, self._max_rows
         self._rows[self._end] = row
         self._end += 1
 
@@ -98,16 +98,16 @@ class NullCalibration:
         self._strengths = History(int(np.sum(sizes)), memory)
         self._first = np.cumsum([0, *sizes[:-1]])
         self._strength = np.zeros(int(np.sum(sizes)))
-        self._most = stats.chi2.isf(tail_share, self._sizes)
-        below = self._sizes * stats.chi2.cdf(self._most, self._sizes + 2)
-        square = self._sizes * (self._sizes + 2) * stats.chi2.cdf(self._most, self._sizes + 4)
-        self._fresh = 0
-        self._rare = stats.chi2.isf(_TAIL_PROBABILITY, self._sizes)
+        self._clip = stats.chi2.isf(tail_share, self._sizes)
+        below = self._sizes * stats.chi2.cdf(self._clip, self._sizes + 2)
+        square = self._sizes * (self._sizes + 2) * stats.chi2.cdf(self._clip, self._sizes + 4)
+        self._n_new = 0
+        self._tail_quantile = stats.chi2.isf(_TAIL_PROBABILITY, self._sizes)
         self._tail = 1.0
         self._limits: tuple[float, FloatArray] | None = None
-        self._mean = below + tail_share * self._most
+        self._mean = below + tail_share * self._clip
         # variance of the logarithm of a factor that is estimated from one window
-        self._variance = (square + tail_share * self._most**2 - self._mean**2) / below**2
+        self._variance = (square + tail_share * self._clip**2 - self._mean**2) / below**2
         self.factors = np.full(len(sizes), np.nan)
         self._freedom = np.zeros(len(sizes))
 
@@ -127,10 +127,10 @@ class NullCalibration:
             return
         self._ratios.append(ratios)
         self._strengths.append(strength)
-        self._fresh += 1
-        if self._fresh < max(8, 0.05 * len(self._ratios)):  # often enough
+        self._n_new += 1
+        if self._n_new < max(8, 0.05 * len(self._ratios)):  # often enough
             return
-        self._fresh = 0
+        self._n_new = 0
         yield
         strengths = self._strengths.values
         for columns in _in_pieces(strengths):
@@ -143,36 +143,36 @@ class NullCalibration:
         """Compute the factors from statistics of later windows, where 0 means no data."""
         counts = np.sum(later > 0.0, axis=0)
         independent = counts / self._overlap
-        judged = independent >= 12.0  # too few independent windows for a test
-        if not judged.any():
+        valid = independent >= 12.0  # too few independent windows for a test
+        if not valid.any():
             return
         single = np.full(len(self._sizes), np.nan)
         for columns in _in_pieces(later):
-            some = np.arange(len(single))[columns][judged[columns]]
+            some = np.arange(len(single))[columns][valid[columns]]
             # factors that give the means of the limited statistics their white-noise values
-            seen, most, mean = later[:, some], self._most[some], self._mean[some] * counts[some]
+            seen, most, mean = later[:, some], self._clip[some], self._mean[some] * counts[some]
             factor = np.sum(seen, axis=0) / (self._sizes[some] * counts[some])
             for _ in range(8):  # until both converge
                 factor = factor * np.sum(np.minimum(seen / factor, most), axis=0) / mean
             single[some] = np.log(factor)
             yield
         # shrunk towards their mean according to their uncertainty
-        value, variance = single[judged], self._variance[judged] / independent[judged]
+        value, variance = single[valid], self._variance[valid] / independent[valid]
         middle = float(np.average(value, weights=1.0 / variance))
-        apart = float(np.average((value - middle) ** 2 - variance, weights=1.0 / variance))
-        spread = max(apart, 0.1**2)  # smallest variance between the logarithms of the factors
+        between = float(np.average((value - middle) ** 2 - variance, weights=1.0 / variance))
+        spread = max(between, 0.1**2)  # smallest variance between the logarithms of the factors
         middle = float(np.average(value, weights=1.0 / (variance + spread)))
-        drawn = variance / (variance + spread)
-        remaining = drawn * spread + drawn**2 * np.mean(variance + spread) / self._sources
+        shrinkage = variance / (variance + spread)
+        remaining = shrinkage * spread + shrinkage**2 * np.mean(variance + spread) / self._sources
         factors = np.full(len(self._sizes), np.nan)
-        factors[judged] = np.exp(value + drawn * (middle - value)).clip(1.0)
+        factors[valid] = np.exp(value + shrinkage * (middle - value)).clip(1.0)
         yield
         # 99 % quantile of the statistics, each over its quantile in white noise; zero: no data
-        relative = later[:, judged] / (factors * self._rare)[judged]
+        relative = later[:, valid] / (factors * self._tail_quantile)[valid]
         tail = float(np.quantile(relative[relative > 0.0], 1.0 - _TAIL_PROBABILITY))
         self.factors, self._tail = factors, max(1.0, tail)
         self._freedom = np.zeros(len(self._sizes))
-        self._freedom[judged] = 2.0 / remaining  # a mean square of k degrees varies by 2 / k
+        self._freedom[valid] = 2.0 / remaining  # a mean square of k degrees varies by 2 / k
         self._limits = None
 
     def excess(self, ratios: FloatArray, strength: FloatArray, chance: float) -> FloatArray:
@@ -190,15 +190,15 @@ class NullCalibration:
             Probability of a false alarm of each statistic.
 
         """
-        judged = self._freedom > 0.0
+        valid = self._freedom > 0.0
         if self._limits is None or self._limits[0] != chance:
-            self._limits = chance, limits(chance, self._sizes[judged], self._freedom[judged])
+            self._limits = chance, limits(chance, self._sizes[valid], self._freedom[valid])
         result = np.zeros(len(self._sizes))
         relative = strength / self._strength.clip(1e-100)
         stronger = np.maximum.reduceat(relative, self._first).clip(1.0)
         # the next motion may have 1.3 times the model discrepancy of earlier motions
-        usual = 1.0 + (1.3 * self._tail * self.factors[judged] - 1.0) * stronger[judged]
-        result[judged] = ratios[judged] / (usual * self._limits[1])
+        usual = 1.0 + (1.3 * self._tail * self.factors[valid] - 1.0) * stronger[valid]
+        result[valid] = ratios[valid] / (usual * self._limits[1])
         return result
 
 
@@ -225,7 +225,7 @@ class ResidualScale:
 
     def __init__(self, least: float) -> None:
         self._least = least
-        self._seen: History | None = None
+        self._blocks: History | None = None
         self._value: FloatArray | None = None
 
     @property
@@ -239,12 +239,12 @@ class ResidualScale:
         if not used.any():
             return  # residuals during motion are kept while the arm is at rest
         squares = np.sum(residual, axis=0) ** 2
-        if self._seen is None:
-            self._seen = History(len(squares), MAX_BLOCKS)
-        self._seen.append(np.where(used > 0, squares / np.maximum(used, 1), np.nan))
-        if len(self._seen) < 16:  # with fewer blocks, the assumed noise is used
+        if self._blocks is None:
+            self._blocks = History(len(squares), MAX_BLOCKS)
+        self._blocks.append(np.where(used > 0, squares / np.maximum(used, 1), np.nan))
+        if len(self._blocks) < 16:  # with fewer blocks, the assumed noise is used
             return
-        later = self._seen.values[len(self._seen) // 2 :]
+        later = self._blocks.values[len(self._blocks) // 2 :]
         known = np.any(later > 0.0, axis=0)
         value = np.ones(later.shape[1]) if self._value is None else self._value.copy()
         # medians of the columns without NaN; numpy's nanmedian takes ten times as long

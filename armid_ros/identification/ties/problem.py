@@ -70,7 +70,7 @@ class InteractionProblem:
     precision : ndarray, shape (P, P)
         Precision of the prior. Values of columns that are hardly more than noise would grow
         without it, as any value explains the torques.
-    typical_way : float
+    rms_extension : float
         Root mean square extension of the springs [m].
 
     """
@@ -88,7 +88,7 @@ class InteractionProblem:
     rigid: tuple[ParameterName, ...]
     described: FloatArray
     precision: FloatArray
-    typical_way: float
+    rms_extension: float
 
     def __post_init__(self) -> None:
         """Freeze the arrays."""

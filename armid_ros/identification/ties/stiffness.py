@@ -158,7 +158,7 @@ def _most_likely(
     if not np.max(np.abs(found.jac)) < 10.0 * converged:
         raise IdentificationError(
             'the stiffness does not converge: the angles are too noisy for extensions of '
-            f'{1e3 * problem.typical_way:.2g} mm; filter them, or move more'
+            f'{1e3 * problem.rms_extension:.2g} mm; filter them, or move more'
         )
     return np.asarray(theta + unit @ found.x)
 
