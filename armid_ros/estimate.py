@@ -4,9 +4,12 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass, field
+import math
 import re
 from statistics import NormalDist
+from typing import Any
 
 from armid_ros.errors import meant, ModelError
 from armid_ros.motion import FloatArray, read_only
@@ -153,3 +156,29 @@ class Estimate:
         known = ', '.join(f'{p.name} [{p.joint}]' if p.joint else p.name for p in own)
         guess = meant(name, [one.name for one in own])
         raise ModelError(f"no parameter '{name}' of joint '{joint}'; there are {known}{guess}")
+
+
+def parameter_table(
+    names: Sequence[ParameterName], values: FloatArray, std: Sequence[float | None]
+) -> list[dict[str, Any]]:
+    """Return parameters as rows of name, joint, value, std, unit, ready for YAML or JSON."""
+    return [
+        {
+            'name': name.name,
+            'joint': name.joint,
+            'value': float(value),
+            'std': None if s is None else float(s),
+            'unit': name.unit,
+        }
+        for name, value, s in zip(names, values, std, strict=True)
+    ]
+
+
+def measured(value: float, reach: float) -> tuple[str, str]:
+    """Format a value and the half-width of its interval with their significant digits."""
+    if not (math.isfinite(reach) and reach > 0.0):
+        return f'{value:.4g}', '0'
+    decimals = max(0, 1 - math.floor(math.log10(reach)))
+    if decimals > 7 or max(abs(value), reach) >= 1e7:
+        return f'{value:.3g}', f'{reach:.2g}'
+    return f'{value:z.{decimals}f}', f'{reach:.{decimals}f}'

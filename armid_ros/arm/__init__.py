@@ -4,7 +4,7 @@
 
 from armid_ros.arm.arm_model import ArmModel
 from armid_ros.arm.misfit import Misfit
-from armid_ros.arm.model_file import load_misfit, load_model, parameter_table, save_model
+from armid_ros.arm.model_file import load_misfit, load_model, save_model
 from armid_ros.arm.torque_slope import TorqueSlope
 
 __all__ = [
@@ -13,6 +13,5 @@ __all__ = [
     'TorqueSlope',
     'load_misfit',
     'load_model',
-    'parameter_table',
     'save_model',
 ]

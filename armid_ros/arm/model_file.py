@@ -25,7 +25,7 @@ from armid_ros.effects import CATALOGUE, Effect, Quantity, Shape
 from armid_ros.effects.quantities import written_units
 from armid_ros.effects.tied import tied_as_written
 from armid_ros.errors import ModelError
-from armid_ros.estimate import Estimate, ParameterName
+from armid_ros.estimate import Estimate, parameter_table, ParameterName
 from armid_ros.files import (
     finite,
     is_file,
@@ -47,22 +47,6 @@ _KEYS = *_NEEDED, 'misfit'
 _NEEDED_OF_PARAMETER = 'name', 'joint', 'value'
 _KEYS_OF_PARAMETER = *_NEEDED_OF_PARAMETER, 'std', 'unit'
 _NEEDED_OF_EFFECT = 'name', 'joints', 'parameters'
-
-
-def parameter_table(
-    names: Sequence[ParameterName], values: FloatArray, std: Sequence[float | None]
-) -> list[dict[str, Any]]:
-    """Return parameters as rows of name, joint, value, std, unit, ready for YAML or JSON."""
-    return [
-        {
-            'name': name.name,
-            'joint': name.joint,
-            'value': float(value),
-            'std': None if s is None else float(s),
-            'unit': name.unit,
-        }
-        for name, value, s in zip(names, values, std, strict=True)
-    ]
 
 
 def model_text(

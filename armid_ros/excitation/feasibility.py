@@ -20,7 +20,6 @@ from armid_ros.excitation.geometry.clearance import Approach, ClearanceModel
 from armid_ros.excitation.limits import check_limits, Limits, Violation
 from armid_ros.excitation.schedule import Excitation
 from armid_ros.motion import FloatArray, Motion
-from armid_ros.robots.robot import position_range
 import numpy as np
 
 #: Samples per period and harmonic.
@@ -188,7 +187,7 @@ def feasible_pose(
         If no solution was found; the message names the joint and its limit, or the bodies.
 
     """
-    lower, upper = position_range(limits.lower, limits.upper)
+    lower, upper = limits.position_range()
     q = rng.uniform(lower, upper, (2000, len(lower)))
     motion = Motion.of_states(limits.joints, q, 0.0, 0.0)
     load = np.abs(arm.joint_torque(motion)) / limits.torque
@@ -237,7 +236,7 @@ def _draw(
     )
     motion = raw.one_period(_SAMPLES * harmonics)
     low, high = motion.q.min(axis=0), motion.q.max(axis=0)
-    lower, upper = position_range(limits.lower, limits.upper)
+    lower, upper = limits.position_range()
     largest = np.minimum.reduce(
         [
             (upper - lower) / (high - low),

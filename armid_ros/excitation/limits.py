@@ -14,6 +14,7 @@ from armid_ros.errors import TrajectoryError
 from armid_ros.files import finite, load_yaml, read_text, reading
 from armid_ros.motion import FloatArray, Motion, read_only
 from armid_ros.robots import Robot
+from armid_ros.robots.robot import position_range
 import numpy as np
 import numpy.typing as npt
 
@@ -130,6 +131,10 @@ class Limits:
             torque=(1.0 - 0.1 * reserve) * robot.torque_limit,
             prismatic=robot.prismatic,
         )
+
+    def position_range(self) -> tuple[FloatArray, FloatArray]:
+        """Return lower and upper positions, each (n,), with a finite range for every joint."""
+        return position_range(self.lower, self.upper)
 
     def unit(self, quantity: str, joint: int) -> str:
         """Return the unit of 'position', 'velocity', 'acceleration' or 'torque' of a joint."""

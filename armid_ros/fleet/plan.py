@@ -20,7 +20,7 @@ import json
 from typing import Any
 import uuid
 
-from armid_ros.arm import ArmModel
+from armid_ros import ArmModel
 from armid_ros.errors import ArmidError, FleetError
 from armid_ros.files import json_text, reading
 from armid_ros.files.cells import listed
@@ -35,7 +35,6 @@ from armid_ros.identification.rows.signals import conditioning
 from armid_ros.model import BaseParameters, random_motion
 from armid_ros.recording import ReadSettings, Recording
 from armid_ros.recording.reader import read_pieces
-from armid_ros.robots import load_robot, robot_from_urdf
 import numpy as np
 
 
@@ -287,10 +286,12 @@ def kind_arm(store: Store, facts: Mapping[str, Any], key: str) -> ArmModel:
     urdf = store.read(f'robots/{key}.urdf')
     if urdf is None:
         raise FleetError(f'{store.url}/robots/{key}.urdf: there is no such description')
-    robot = robot_from_urdf(
-        urdf.decode(), gravity=facts['gravity'], joints=facts['joints'], source=facts['robot']
+    return ArmModel.of(
+        urdf.decode(),
+        effects=facts['effects'],
+        gravity=facts['gravity'],
+        joints=facts['joints'],
     )
-    return ArmModel.of(robot, effects=facts['effects'])
 
 
 def document(store: Store) -> dict[str, Any]:
@@ -365,12 +366,12 @@ def choose_filters(
 
 def _model(entry: Entry, settings: FleetSettings) -> ArmModel:
     chosen = entry.joints or settings.joints
-    robot = load_robot(
+    model = ArmModel.of(
         entry.robot,
+        effects=(entry.effects or settings.effects).replace(';', ','),
         gravity=entry.gravity or settings.gravity,
         joints=listed(chosen.replace(';', ',')) if chosen else None,
     )
-    model = ArmModel.of(robot, effects=(entry.effects or settings.effects).replace(';', ','))
     # raise a FleetError if the torque is not linear in the parameters of an effect
     motion = random_motion(model.robot, np.random.default_rng(settings.seed), 200)
     bare = ArmModel(model.robot)

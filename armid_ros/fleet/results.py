@@ -18,7 +18,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 import datetime
 
-from armid_ros.arm import parameter_table
+from armid_ros.estimate import parameter_table
 from armid_ros.fleet.bags import BagFile, digest, folder_of
 from armid_ros.fleet.merge import BagSummary, FleetEstimate, MergedBags, Refused
 from armid_ros.fleet.plan import Job

@@ -30,13 +30,12 @@ from armid_ros.changes.histories import (
     without_days,
 )
 from armid_ros.errors import FleetError
-from armid_ros.estimate import name_in_words, ParameterName
+from armid_ros.estimate import measured, name_in_words, ParameterName
 from armid_ros.fleet.bags import DAY_NS
 from armid_ros.fleet.plan import document, kind_arm
 from armid_ros.fleet.store import Store
 from armid_ros.identification.fitting.identifiability import HALF_WIDTH
 from armid_ros.report.families import full_label
-from armid_ros.report.notation import measured
 import numpy as np
 import pyarrow as pa
 import pyarrow.compute as pc

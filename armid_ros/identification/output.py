@@ -17,8 +17,8 @@ from pathlib import Path
 import re
 from typing import Any
 
-from armid_ros.arm import parameter_table
 from armid_ros.errors import ModelError
+from armid_ros.estimate import parameter_table
 from armid_ros.files import is_file, json_text, read_text, reading, write_file
 from armid_ros.identification.assess.grade import Grade
 from armid_ros.identification.assess.verification import Verification

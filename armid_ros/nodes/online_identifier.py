@@ -14,9 +14,9 @@ import time
 from typing import Any
 
 from armid_msgs.msg import ParameterEstimate
-from armid_ros.arm.model_file import parameter_table, read_model, save_model
+from armid_ros.arm.model_file import read_model, save_model
 from armid_ros.errors import ArmidError, IdentificationError, ModelError
-from armid_ros.estimate import Estimate
+from armid_ros.estimate import Estimate, parameter_table
 from armid_ros.files import write_file
 from armid_ros.files.output import refuse_replacing
 from armid_ros.identification.online.identifier import OnlineIdentifier, OnlineSettings

@@ -67,7 +67,7 @@ def positions(
     and armid diagnose.
 
     """
-    from armid_ros.arm import save_model
+    from armid_ros import save_model
     from armid_ros.cli import options
     from armid_ros.estimate import Estimate
     from armid_ros.positions.commands import read_commands

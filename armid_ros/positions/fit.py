@@ -17,8 +17,8 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import partial
 
+from armid_ros import ArmModel
 from armid_ros.api.arguments import motion_of
-from armid_ros.arm import ArmModel
 from armid_ros.errors import IdentificationError
 from armid_ros.estimate import ParameterName
 from armid_ros.model import inverse_dynamics

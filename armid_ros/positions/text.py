@@ -8,9 +8,9 @@ from collections.abc import Sequence
 from typing import Any
 
 from armid_ros.api.table import Summary
+from armid_ros.estimate import measured
 from armid_ros.positions.fit import COLOURED, PositionFit, Run
 from armid_ros.recording import Recording
-from armid_ros.report.notation import measured
 from armid_ros.robots import Robot
 import numpy as np
 

@@ -7,6 +7,7 @@ from __future__ import annotations
 from collections.abc import Iterator, Sequence
 from math import inf
 
+from armid_ros.estimate import measured
 from armid_ros.identification.assess.comparison import Comparison, LoadChange, ParameterChange
 from armid_ros.identification.fitting.identifiability import excludes_zero, HALF_WIDTH
 from armid_ros.report.blocks import (
@@ -22,7 +23,7 @@ from armid_ros.report.blocks import (
     VerdictSection,
 )
 from armid_ros.report.families import estimate_text, full_label, parameter_folds
-from armid_ros.report.notation import counted, digits, measured, pretty, robot_label
+from armid_ros.report.notation import counted, digits, pretty, robot_label
 from armid_ros.report.page import Page, Section
 from armid_ros.report.provenance import ResultOrigin
 

@@ -8,7 +8,7 @@ from collections.abc import Callable, Sequence
 import re
 
 from armid_ros.arm import ArmModel
-from armid_ros.estimate import Estimate, name_in_words, ParameterName, symbol_in_words
+from armid_ros.estimate import Estimate, measured, name_in_words, ParameterName, symbol_in_words
 from armid_ros.identification import Identification, Score
 from armid_ros.identification.fitting.identifiability import HALF_WIDTH, Unidentified
 from armid_ros.motion import FloatArray
@@ -23,7 +23,7 @@ from armid_ros.report.blocks import (
     Paragraph,
     TableCell,
 )
-from armid_ros.report.notation import counted, digits, measured, pretty
+from armid_ros.report.notation import counted, digits, pretty
 from armid_ros.report.page import Templated
 import numpy as np
 

@@ -8,6 +8,7 @@ from collections import Counter
 from collections.abc import Sequence
 from pathlib import Path
 
+from armid_ros.estimate import measured
 from armid_ros.identification.fitting.identifiability import HALF_WIDTH
 from armid_ros.inspection import Inspection, LinkCheck, Remark
 from armid_ros.motion import FloatArray
@@ -23,7 +24,7 @@ from armid_ros.report.blocks import (
     VerdictSection,
 )
 from armid_ros.report.charts import Chart, Series, thinned
-from armid_ros.report.notation import counted, digits, measured, plain, robot_label
+from armid_ros.report.notation import counted, digits, plain, robot_label
 from armid_ros.report.page import Page, Section, Templated
 from armid_ros.report.provenance import DEFAULT_ORIGIN, ResultOrigin
 import numpy as np

@@ -11,7 +11,7 @@ import re
 
 from armid_ros.diagnosis.verdict import words
 from armid_ros.diagnosis.verdict.finding import Finding
-from armid_ros.estimate import ParameterName
+from armid_ros.estimate import measured, ParameterName
 from armid_ros.identification.fitting.identifiability import HALF_WIDTH
 from markupsafe import escape, Markup
 
@@ -46,16 +46,6 @@ def plain(value: float, count: int = 3) -> str:
     """Format a number without trailing zeros; exponent only below 1e-4 or from 1e7."""
     whole = 10.0**count - 0.5 <= abs(value) < 1e7
     return f'{value:.0f}' if whole else f'{value:.{count}g}'
-
-
-def measured(value: float, reach: float) -> tuple[str, str]:
-    """Format a value and the half-width of its interval with their significant digits."""
-    if not (math.isfinite(reach) and reach > 0.0):
-        return f'{value:.4g}', '0'
-    decimals = max(0, 1 - math.floor(math.log10(reach)))
-    if decimals > 7 or max(abs(value), reach) >= 1e7:
-        return f'{value:.3g}', f'{reach:.2g}'
-    return f'{value:z.{decimals}f}', f'{reach:.{decimals}f}'
 
 
 def with_interval(value: float, std: float, unit: str) -> str:

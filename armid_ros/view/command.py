@@ -47,7 +47,7 @@ def view(
     topic: str | None,
 ) -> None:
     """Show a recording in rerun: the moving arm, torques, and the residual of a model."""
-    from armid_ros.arm import ArmModel
+    from armid_ros import ArmModel
     from armid_ros.cli import options
     from armid_ros.view.rerun_log import log_recording, open_stream
 

@@ -20,14 +20,13 @@ import time
 from types import ModuleType
 from typing import Any
 
-from armid_ros.arm import ArmModel
+from armid_ros import ArmModel, Recording
 from armid_ros.errors import ArmidError, RobotError
 from armid_ros.identification import SignalSettings
 from armid_ros.identification.rows.regression import predictions
 from armid_ros.identification.rows.signals import conditioning
 from armid_ros.model.kinematics import LinkFrames
 from armid_ros.motion import FloatArray
-from armid_ros.recording import Recording
 from armid_ros.robots import Robot
 from armid_ros.robots.geometry import all_in_one, LinkShape, shapes_of, sticks
 from armid_ros.robots.meshes import load_mesh

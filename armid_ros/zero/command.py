@@ -120,7 +120,7 @@ def fit(
     as_json: bool,
 ) -> None:
     """Find zeros, gains, gravity, tool and friction from the rests of recordings."""
-    from armid_ros.arm import ArmModel, save_model
+    from armid_ros import ArmModel, save_model
     from armid_ros.cli import options
     from armid_ros.identification.known_payload import payloads_of
     from armid_ros.zero.fit import fit_document, fit_rests, fit_summary, SCHEMA

@@ -16,13 +16,12 @@ from collections.abc import Collection, Mapping, Sequence
 from dataclasses import asdict, dataclass
 from typing import Any, NamedTuple
 
+from armid_ros import ArmModel, Robot
 from armid_ros.api.table import Summary
-from armid_ros.arm import ArmModel
 from armid_ros.effects import CATALOGUE
 from armid_ros.effects.load import described_spread
+from armid_ros.estimate import measured
 from armid_ros.motion import FloatArray, Motion
-from armid_ros.report.notation import measured
-from armid_ros.robots import Robot
 import numpy as np
 import numpy.typing as npt
 import pinocchio as pin

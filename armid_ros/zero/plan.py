@@ -13,8 +13,8 @@ from __future__ import annotations
 
 from dataclasses import replace
 
+from armid_ros import ArmModel, Robot
 from armid_ros.api.excitation import ExcitationResult
-from armid_ros.arm import ArmModel
 from armid_ros.errors import TrajectoryError
 from armid_ros.excitation import (
     CollisionScene,
@@ -28,8 +28,6 @@ from armid_ros.excitation import (
 )
 from armid_ros.excitation.problem import torque_noise
 from armid_ros.motion import FloatArray, Motion
-from armid_ros.robots import Robot
-from armid_ros.robots.robot import position_range
 from armid_ros.zero.fit import arm_at_rest
 import numpy as np
 
@@ -87,7 +85,7 @@ def _poses(
 
     """
     robot = model.robot
-    lower, upper = position_range(limits.lower, limits.upper)
+    lower, upper = limits.position_range()
     turn = np.where(robot.prismatic, np.inf, np.pi)  # gravity torque is periodic with a full turn
     lower, upper = np.maximum(lower, -turn), np.minimum(upper, turn)
     room = np.minimum(BEYOND, 0.1 * (upper - lower))

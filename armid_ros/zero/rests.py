@@ -4,10 +4,10 @@
 
 from __future__ import annotations
 
+from armid_ros import Recording
 from armid_ros.errors import IdentificationError
 from armid_ros.identification.rows.checks import REST_RANGE
 from armid_ros.motion import FloatArray, Motion
-from armid_ros.recording import Recording
 import numpy as np
 from scipy.ndimage import maximum_filter1d, median_filter, minimum_filter1d, uniform_filter1d
 

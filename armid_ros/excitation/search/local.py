@@ -26,7 +26,6 @@ from armid_ros.excitation.limits import Violation
 from armid_ros.excitation.problem import DesignProblem
 from armid_ros.excitation.search.functions import Constraints, Objective, Part
 from armid_ros.motion import FloatArray
-from armid_ros.robots.robot import position_range
 import numpy as np
 import scipy.optimize
 
@@ -154,7 +153,7 @@ class Search:
         objective, watched = Objective(self.problem, self.prior), self.clearance
         if watched is not None:  # ignore pairs of bodies that are far apart in many poses
             limits = self.problem.limits
-            lower, upper = position_range(limits.lower, limits.upper)
+            lower, upper = limits.position_range()
             # The solver ignores pairs of bodies that stay 1 cm beyond the margin in 1000 random
             # poses, and adds 1 mm to it. The proof of clearance checks all pairs.
             poses = self.rng.uniform(lower, upper, (1000, len(lower)))
@@ -182,7 +181,7 @@ class _Branch:
     def __post_init__(self) -> None:
         """Set the bounds of coefficients, in units of the value that alone reaches a limit."""
         limits, settings = self.search.problem.limits, self.search.problem.settings
-        low, high = position_range(limits.lower, limits.upper)
+        low, high = limits.position_range()
         half = 0.5 * (high - low)[:, np.newaxis]
         k = 2.0 * np.pi / settings.period * np.arange(1, settings.harmonics + 1)
         rates = np.minimum(limits.velocity[:, np.newaxis], limits.acceleration[:, np.newaxis] / k)

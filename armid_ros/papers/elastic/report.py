@@ -7,8 +7,7 @@ from __future__ import annotations
 from collections.abc import Callable, Iterator, Sequence
 from typing import Any
 
-from armid_ros.arm import parameter_table
-from armid_ros.estimate import name_in_words
+from armid_ros.estimate import measured, name_in_words, parameter_table
 from armid_ros.identification.fitting.identifiability import HALF_WIDTH
 from armid_ros.motion import FloatArray
 from armid_ros.papers.elastic.identification.interaction import (
@@ -36,7 +35,7 @@ from armid_ros.report.blocks import (
     VerdictSection,
 )
 from armid_ros.report.charts import Chart, Role, Series
-from armid_ros.report.notation import counted, digits, measured, pretty
+from armid_ros.report.notation import counted, digits, pretty
 from armid_ros.report.page import Page, Section, Templated
 from armid_ros.report.provenance import Provenance
 from armid_ros.robots.two_link import TwoLinkParameters

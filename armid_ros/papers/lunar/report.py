@@ -8,6 +8,7 @@ from collections.abc import Sequence
 from dataclasses import asdict
 from typing import Any
 
+from armid_ros.estimate import measured
 from armid_ros.identification.fitting.identifiability import HALF_WIDTH
 from armid_ros.motion import FloatArray
 from armid_ros.papers.lunar.reproduction import Composite, LOAD, Repeated, Reproduction
@@ -21,7 +22,7 @@ from armid_ros.report.blocks import (
     VerdictSection,
 )
 from armid_ros.report.charts import Chart, Series, thinned
-from armid_ros.report.notation import digits, measured
+from armid_ros.report.notation import digits
 from armid_ros.report.page import Page, Section
 from armid_ros.report.provenance import Provenance
 import numpy as np

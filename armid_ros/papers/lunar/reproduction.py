@@ -19,7 +19,7 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 
-from armid_ros.arm import ArmModel
+from armid_ros import ArmModel
 from armid_ros.excitation import (
     ClearanceModel,
     design,

@@ -6,6 +6,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 
+from armid_ros.estimate import measured
 from armid_ros.identification.fitting.identifiability import HALF_WIDTH
 from armid_ros.identification.ties.stiffness import Interaction
 from armid_ros.motion import FloatArray
@@ -23,7 +24,6 @@ from armid_ros.report.blocks import (
     VerdictSection,
 )
 from armid_ros.report.charts import Chart, Role, Series
-from armid_ros.report.notation import measured
 from armid_ros.report.page import Page, Section
 from armid_ros.report.provenance import Provenance
 import numpy as np
