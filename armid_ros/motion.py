@@ -195,6 +195,28 @@ class Motion:
         return replace(self, tau=None if tau is None else read_only(tau))
 
 
+@dataclass(frozen=True)
+class BlurredMotion(Motion):
+    """
+    Motion whose direction is smoothed at reversals, as tanh(dq / width).
+
+    The sign of a velocity has no useful gradient for a search for trajectories.
+
+    Attributes
+    ----------
+    width : ndarray, shape (n,)
+        Velocity below which the direction is blurred [rad/s or m/s].
+
+    """
+
+    width: FloatArray = field(kw_only=True)
+
+    def __post_init__(self) -> None:
+        """Freeze the arrays."""
+        super().__post_init__()
+        object.__setattr__(self, 'width', read_only(self.width))
+
+
 @dataclass(frozen=True, eq=False)
 class ElasticRun:
     """

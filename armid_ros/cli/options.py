@@ -31,7 +31,7 @@ from armid_ros.files import (
     write_file,
 )
 from armid_ros.files.cells import listed, parted
-from armid_ros.files.output import written_by
+from armid_ros.files.output import hash_files, written_by
 from armid_ros.identification import write_document
 from armid_ros.motion import FloatArray
 from armid_ros.recording import read_robot_description, ReadSettings, Recording
@@ -39,7 +39,7 @@ from armid_ros.recording.anything import is_table, read_anything
 from armid_ros.recording.columns import numbers
 from armid_ros.recording.columns import per_joint as values_per_joint
 from armid_ros.report.blocks import VerdictSection
-from armid_ros.report.provenance import hash_files, Provenance, ResultOrigin, versions
+from armid_ros.report.provenance import Provenance, ResultOrigin, versions
 from armid_ros.robots import driven_in_words, load_robot, parse_gravity, Robot, robot_from_urdf
 import click
 from click.core import ParameterSource

@@ -12,11 +12,11 @@ sides have the same motion.
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from typing import NamedTuple
 
 from armid_ros.effects.slipping import Hysteresis
-from armid_ros.motion import FloatArray, Motion, read_only
+from armid_ros.motion import BlurredMotion, FloatArray, Motion
 from armid_ros.robots import Robot
 import numpy as np
 
@@ -85,28 +85,6 @@ class DryFriction:
         if self.load_share is None:
             return np.zeros((*load.shape[:-1], len(self.lower)))
         return np.asarray(self.load_share * np.abs(load @ self.directions.T))
-
-
-@dataclass(frozen=True)
-class BlurredMotion(Motion):
-    """
-    Motion whose direction is smoothed at reversals, as tanh(dq / width).
-
-    The sign of a velocity has no useful gradient for a search for trajectories.
-
-    Attributes
-    ----------
-    width : ndarray, shape (n,)
-        Velocity below which the direction is blurred [rad/s or m/s].
-
-    """
-
-    width: FloatArray = field(kw_only=True)
-
-    def __post_init__(self) -> None:
-        """Freeze the arrays."""
-        super().__post_init__()
-        object.__setattr__(self, 'width', read_only(self.width))
 
 
 def direction(motion: Motion, joints: Sequence[int] | None = None) -> FloatArray:

@@ -4,11 +4,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Collection
 from dataclasses import dataclass, field, replace
 
 from armid_ros.arm import ArmModel
-from armid_ros.effects import Effect
 from armid_ros.errors import TrajectoryError
 from armid_ros.excitation.fourier import FourierTrajectory, MARGIN
 from armid_ros.excitation.limits import Limits
@@ -245,7 +244,7 @@ class DesignProblem:
                 raise TrajectoryError(
                     f"focus: the arm has no effect '{name}'; it has {', '.join(names) or 'none'}"
                 )
-            focused = marked(whole, lambda effect: effect.name in settings.focus)
+            focused = marked(whole, settings.focus)
             wanted = focused[base.independent]
         criterion = Criterion(settings.criterion, scale, wanted, values, settings.balance)
         problem = cls(whole, settings, limits, base, read_only(noise), read_only(scale), criterion)
@@ -345,8 +344,8 @@ def _joined(arm: ArmModel, rival: ArmModel) -> ArmModel:
     return joined
 
 
-def marked(arm: ArmModel, which: Callable[[Effect], bool]) -> npt.NDArray[np.bool_]:
-    """Mark the parameters of some effects, shape (P,)."""
+def marked(arm: ArmModel, names: Collection[str]) -> npt.NDArray[np.bool_]:
+    """Return the mask of the parameters of the named effects, shape (P,)."""
     marks = [np.zeros(len(arm.robot.rigid_parameters), dtype=bool)]
-    marks += [np.full(len(one.parameters(arm.robot)), which(one)) for one in arm.effects]
+    marks += [np.full(len(one.parameters(arm.robot)), one.name in names) for one in arm.effects]
     return np.concatenate(marks)

@@ -15,10 +15,11 @@ results if a document or a page is in the same folder.
 
 from __future__ import annotations
 
-from collections.abc import Collection, Iterator, Sequence
+from collections.abc import Collection, Iterable, Iterator, Sequence
 from contextlib import contextmanager, suppress
 import fcntl
 from fnmatch import fnmatch
+import hashlib
 import json
 import math
 import os
@@ -29,6 +30,7 @@ from typing import Any
 from armid_ros.errors import OutputError
 from armid_ros.files.documents import load_yaml, reading
 from armid_ros.files.regular import open_regular, read_text
+from armid_ros.version import GENERATOR
 
 #: Model file that may be in a folder without a document; schemas of results that replace it.
 _MODEL = 'model.yaml'
@@ -87,8 +89,6 @@ DOCUMENTS = tuple(
 )
 #: Folder in which a run writes until its result is complete.
 STAGING = '.armid-part'
-#: Element in the head of each page of this package.
-GENERATOR = '<meta name="generator" content="armid_ros">'
 #: Pattern of message types in metadata.yaml, and message types of a bag with a planned motion.
 _KIND = re.compile(r'^ *type: *(\S+)', re.MULTILINE)
 _OF_A_PLAN = {'trajectory_msgs/msg/JointTrajectory', 'std_msgs/msg/String'}
@@ -258,6 +258,18 @@ def _representable(value: Any) -> Any:
 def settled(path: Path) -> Path:
     """Return the final path of a staged file; other paths unchanged."""
     return Path(*(part for part in path.parts if part != STAGING))
+
+
+def hash_files(paths: Iterable[str | Path]) -> tuple[tuple[str, int, str], ...]:
+    """Hash files, and all files in folders such as bags; skip other paths."""
+    found = []
+    for path in map(Path, paths):
+        inside = sorted(path.rglob('*')) if path.is_dir() else [path]
+        for file in filter(Path.is_file, inside):
+            with file.open('rb') as stream:
+                digest = hashlib.file_digest(stream, 'sha256').hexdigest()
+            found.append((str(settled(file)), file.stat().st_size, digest))
+    return tuple(found)
 
 
 def written_by(schema: str, also: Collection[str] = ()) -> tuple[str, ...]:

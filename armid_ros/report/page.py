@@ -17,7 +17,6 @@ from importlib.resources import files
 import re
 from typing import Any, ClassVar
 
-from armid_ros.files.output import GENERATOR
 from armid_ros.report.notation import (
     common_prefix,
     counted,
@@ -28,6 +27,7 @@ from armid_ros.report.notation import (
     pretty,
     without_prefix,
 )
+from armid_ros.version import GENERATOR
 from jinja2 import Environment, PackageLoader, StrictUndefined
 from markupsafe import Markup
 

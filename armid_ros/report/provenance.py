@@ -4,14 +4,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping
+from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
-import hashlib
 from importlib import metadata
-from pathlib import Path
 import platform
-
-from armid_ros.files import settled
 
 #: Packages whose version can change a result.
 _PACKAGES = ('armid_ros', 'numpy', 'scipy', 'pin', 'clarabel', 'mcap')
@@ -77,18 +73,6 @@ class ResultOrigin:
 
 #: Shipped names and paths, without provenance.
 DEFAULT_ORIGIN = ResultOrigin()
-
-
-def hash_files(paths: Iterable[str | Path]) -> tuple[tuple[str, int, str], ...]:
-    """Hash files, and all files in folders such as bags; skip other paths."""
-    found = []
-    for path in map(Path, paths):
-        inside = sorted(path.rglob('*')) if path.is_dir() else [path]
-        for file in filter(Path.is_file, inside):
-            with file.open('rb') as stream:
-                digest = hashlib.file_digest(stream, 'sha256').hexdigest()
-            found.append((str(settled(file)), file.stat().st_size, digest))
-    return tuple(found)
 
 
 def versions() -> dict[str, str]:

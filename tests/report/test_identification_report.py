@@ -8,6 +8,7 @@ from html.parser import HTMLParser
 import re
 from xml.sax.saxutils import quoteattr
 
+from armid_ros.files.output import hash_files
 from armid_ros.identification import (
     IdentificationSettings,
     identify,
@@ -18,7 +19,7 @@ from armid_ros.motion import Motion
 from armid_ros.report.families import parameter_section
 from armid_ros.report.identification_report import Assessment, identification_report
 from armid_ros.report.judgement import judge
-from armid_ros.report.provenance import hash_files, Provenance, ResultOrigin, versions
+from armid_ros.report.provenance import Provenance, ResultOrigin, versions
 from armid_ros.report.sections.data_quality import repeatability
 from armid_ros.report.sections.fit import fit_section
 import numpy as np

@@ -20,12 +20,11 @@ from collections.abc import Callable, Sequence
 from dataclasses import replace
 
 from armid_ros.arm import TorqueSlope
-from armid_ros.effects.action import BlurredMotion
 from armid_ros.excitation.fourier import fourier_basis, FourierTrajectory, MARGIN
 from armid_ros.excitation.geometry.clearance import ClearanceModel
 from armid_ros.excitation.problem import DesignProblem, marked
 from armid_ros.model import regressor
-from armid_ros.motion import FloatArray, Motion
+from armid_ros.motion import BlurredMotion, FloatArray, Motion
 import numpy as np
 import numpy.typing as npt
 
@@ -53,7 +52,8 @@ class Objective:
         velocity = problem.limits.velocity
         # the direction of motion is smoothed below 5 % of the velocity limit
         self.width = 0.05 * np.where(np.isfinite(velocity), velocity, 1.0)
-        past = marked(problem.arm, lambda effect: not effect.instantaneous)
+        arm = problem.arm
+        past = marked(arm, {one.name for one in arm.effects if not one.instantaneous})
         # indices of the standard parameters among the columns; columns that depend on the past
         # come last
         self._order = np.argsort(np.argsort(past, kind='stable'))
