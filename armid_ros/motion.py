@@ -233,8 +233,7 @@ class ElasticRun:
         Initial value of the integral of the loop [rad]; None for zero. If a motor sticks, the
         integral stays from one experiment to the next.
     felt : ndarray, shape (n, N, 3), or None
-        Readings of the accelerometers on the links [m/s^2]; None for readings computed from the
-        motion of the links.
+        Readings of the accelerometers on the links [m/s^2]; None if they were not read.
 
     """
 

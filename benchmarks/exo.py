@@ -19,7 +19,6 @@ from armid_ros.identification.ties.problem import (
     interaction_problem,
     InteractionProblem,
 )
-from armid_ros.model.spring_ties import SEGMENTS
 from armid_ros.motion import FloatArray, Motion
 from armid_ros.papers.exo.plant.gait import read_gait
 from armid_ros.papers.exo.plant.gait_cycle import driving_torque, gait_cycle
@@ -34,6 +33,7 @@ from armid_ros.papers.exo.plant.leg_pair import (
 )
 from armid_ros.papers.exo.plant.torque_driven import splined
 from armid_ros.papers.exo.plant.walkers import walking_pair
+from armid_ros.robots.ties import SEGMENTS
 import numpy as np
 
 from benchmarks.exo_noise import find_springs, TORQUE_NOISE, with_torques

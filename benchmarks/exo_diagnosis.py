@@ -21,10 +21,10 @@ from armid_ros.identification.ties.recorded import (
     together_interaction_problem,
 )
 from armid_ros.identification.ties.stiffness import identify_interaction
-from armid_ros.model.spring_ties import SEGMENTS
 from armid_ros.papers.exo.plant.leg_pair import leg_pair
 from armid_ros.recording import recorded_together, Recording
 from armid_ros.robots import load_robot
+from armid_ros.robots.ties import SEGMENTS
 import numpy as np
 
 from tests.hidden.leg_pair import Straps, walks

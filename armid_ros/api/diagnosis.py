@@ -39,6 +39,7 @@ from armid_ros.effects.tied import Partner
 from armid_ros.errors import IdentificationError
 from armid_ros.excitation import save_excitation
 from armid_ros.files import json_text, write_file
+from armid_ros.files.cells import csv_text
 from armid_ros.identification import SignalSettings
 from armid_ros.identification.assess.verification import ForwardValidation, simulate_held_out
 from armid_ros.identification.rows.signals import conditioning
@@ -198,7 +199,7 @@ class DiagnosisResult(ShownModel):
         save_model(folder / 'model.yaml', self.arm, source, self.core.estimate, self.misfit)
         write_file(folder / 'diagnosis.json', json_text(document, indent=1))
         if self.residual is not None:
-            write_file(folder / self.residual.table_file, self.residual.table())
+            write_file(folder / self.residual.table_file, csv_text(self.residual.table()))
         if self.next_run is not None:
             save_excitation(self.next_run.excitation, folder / self.plan_file)
         write_file(folder / 'report.html', self.page(origin))

@@ -10,6 +10,7 @@ from pathlib import Path
 from typing import Any, TYPE_CHECKING
 
 from armid_ros.api.arguments import (
+    arm_of,
     RecordingLike,
     recordings_of,
     Rng,
@@ -178,7 +179,8 @@ def inspect(
     else:
         topics = topics_of(Path(recording)) if topics is None else topics
         read = read_anything(recording, topics=topics)
-    found = look(read, described, topics=topics or (), rng=np.random.default_rng(rng))
+    arm = None if described is None else arm_of(described)
+    found = look(read, arm, topics=topics or (), rng=np.random.default_rng(rng))
     return InspectionResult(found)
 
 

@@ -19,9 +19,9 @@ import click
 if TYPE_CHECKING:
     from armid_ros.arm import ArmModel
     from armid_ros.effects.tied import Partner
-    from armid_ros.model.spring_ties import Tie
     from armid_ros.recording import Recording
     from armid_ros.robots import Robot
+    from armid_ros.robots.ties import Tie
 
 
 def share_of_percent(
@@ -255,8 +255,8 @@ def open_partner(
 
     """
     from armid_ros.effects.tied import Partner
-    from armid_ros.model.spring_ties import centroid_ties, leg_ties
     from armid_ros.robots import load_robot
+    from armid_ros.robots.ties import centroid_ties, leg_ties
 
     if source is None:
         if ties:
@@ -300,7 +300,7 @@ def read_together(
 
 
 def _tie(text: str, robot: Robot, other: Robot) -> Tie:
-    from armid_ros.model.spring_ties import centroid_ties
+    from armid_ros.robots.ties import centroid_ties
 
     ends = [[*listed(end, '@'), ''] for end in parted(text, '=')]
     if len(ends) != 2:

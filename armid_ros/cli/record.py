@@ -125,7 +125,7 @@ def simulate(
             )
             run = record(elastic, reference, rate=rate, progress=tick)
             assert run.sides is not None
-            write_runs(out, [run.sides], elastic.plant.robot, elastic.accelerometers)
+            write_runs(out, [run.sides], elastic.plant.robot)
             sides = ' on both sides'
         else:
             run = simulated(arm, reference, rng=rng, sensors=sensors, rate=rate, progress=tick)
@@ -136,8 +136,9 @@ def simulate(
 
 
 def _of_some_size(text: str, robot: Robot) -> tuple[Effect, FloatArray]:
-    """Parse --effect; raise a ModelError if its quantities are all zero."""
+    """Parse --effect; raise a ModelError if its size is zero, warn of an impossible payload."""
     from armid_ros.effects import parse_effect
+    from armid_ros.simulation.plant import possible_loads
 
     effect, values = parse_effect(text, robot)
     if not any(values):
@@ -149,29 +150,14 @@ def _of_some_size(text: str, robot: Robot) -> tuple[Effect, FloatArray]:
             + (f', and the shape {shapes}' if shapes else '')
             + f'; write {text.partition(":")[0]}:{first}=0.1'
         )
-    if effect.traits.weighs:
-        _warn_impossible(text, values, robot)
+    if effect.traits.weighs and not possible_loads(robot, values):
+        say(
+            f"warning: --effect '{text}': no body within reach of the arm has these values. "
+            'payload_mx etc. are payload_m times distance; payload_Ixx etc. are about the '
+            'joint, with payload_m times distance squared',
+            'yellow',
+        )
     return effect, values
-
-
-def _warn_impossible(text: str, values: FloatArray, robot: Robot) -> None:
-    """Warn of a payload that is physically inconsistent, or out of reach of the arm."""
-    from armid_ros.model.pseudo_inertia import Consistency
-    from armid_ros.robots.robot import PER_LINK
-    import numpy as np
-
-    places = [placement.translation for placement in robot.model.jointPlacements]
-    length = max(1.0, float(np.sum(np.linalg.norm(places, axis=1))))
-    for body in np.reshape(values, (-1, PER_LINK)):
-        found = Consistency.of('', body)
-        possible = found.eigenvalues[0] >= -1e-9 * found.eigenvalues[-1]
-        if not possible or np.linalg.norm(found.center) > length:
-            say(
-                f"warning: --effect '{text}': no body within reach of the arm has these values. "
-                'payload_mx etc. are payload_m times distance; payload_Ixx etc. are about the '
-                'joint, with payload_m times distance squared',
-                'yellow',
-            )
 
 
 @click.command(epilog='Example: armid recover crashed/crashed_0.mcap --out whole')

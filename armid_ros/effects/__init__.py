@@ -5,7 +5,7 @@ Effects: causes of joint torque besides the rigid body, one family per file.
 
 A user-defined effect derives from ``Effect``. ``register`` adds it to the catalogue.
 ``joint_columns`` and ``scatter`` arrange the columns and values of an effect that acts on each
-joint separately. ``armid_ros.effects.testing`` checks a user-defined class.
+joint separately. ``armid_ros.arm.testing`` checks a user-defined class.
 
 """
 

@@ -15,9 +15,6 @@ from armid_ros.motion import FloatArray, Motion
 from armid_ros.robots import Robot
 import numpy as np
 
-#: Assumed distance of a link's mass from its joint if the description has none [m].
-_REACH = 0.1
-
 
 @dataclass(frozen=True)
 class _LinkBody(Effect):
@@ -43,7 +40,7 @@ class _LinkBody(Effect):
 
     def spread(self, robot: Robot) -> FloatArray:
         """Return the largest expected errors of the description of the links, shape (P,)."""
-        return described_spread(robot).ravel()[list(self.adds_to(robot))]
+        return robot.described_spread.ravel()[list(self.adds_to(robot))]
 
     def adds_to(self, robot: Robot) -> tuple[int, ...]:
         """Return the indices of the rigid-body parameters of the links."""
@@ -53,19 +50,6 @@ class _LinkBody(Effect):
     @classmethod
     def _possible_joints(cls, robot: Robot) -> tuple[str, ...]:
         return robot.moving
-
-
-def described_spread(robot: Robot) -> FloatArray:
-    """
-    Return the largest expected errors of the described rigid parameters, shape (m, 10).
-
-    A described value may be wrong by as much as its own size. For a missing value, a tenth of a
-    mean link is assumed.
-
-    """
-    body = np.abs(robot.rigid_parameters.reshape(-1, len(LINK_PARAMETERS)))
-    mass = body[:, :1] + 0.1 * np.mean(body[:, :1])
-    return np.asarray(body + mass * np.array([[1.0] + 3 * [_REACH] + 6 * [_REACH**2]]))
 
 
 @dataclass(frozen=True)
@@ -125,7 +109,8 @@ class Payload(_LinkBody):
         if std[0] == 0.0:  # noqa: RUF069 - set exactly to zero if no motion identifies it, as for an inner link
             return bool(np.any(values[1:4]))
         places = [placement.translation for placement in arm.robot.model.jointPlacements]
-        length = float(np.sum(np.linalg.norm(places, axis=1))) + _REACH
+        # a tool carries its mass within 0.1 m
+        length = float(np.sum(np.linalg.norm(places, axis=1))) + 0.1
         heaviest = float(values[0] + SURELY * std[0])
         return bool(heaviest > 0.0 and np.linalg.norm(values[1:4]) < length * heaviest)
 
@@ -137,7 +122,8 @@ class Payload(_LinkBody):
 
         """
         mass = float(robot.rigid_parameters[:: len(LINK_PARAMETERS)].sum())
-        return np.asarray(mass * np.array([1.0] + 3 * [_REACH] + 6 * [_REACH**2]))
+        reach = 0.1  # of a mass from its joint [m]
+        return np.asarray(mass * np.array([1.0] + 3 * [reach] + 6 * [reach**2]))
 
 
 @dataclass(frozen=True)

@@ -18,9 +18,9 @@ from armid_ros.effects.base import Arm, Effect, Unexplained
 from armid_ros.effects.interaction import Anchor, Attached, HumanInteraction, InterfaceSlack
 from armid_ros.errors import ModelError
 from armid_ros.files import finite
-from armid_ros.model.spring_ties import Tie
 from armid_ros.motion import FloatArray, Motion
 from armid_ros.robots import Robot
+from armid_ros.robots.ties import Tie
 import numpy as np
 from scipy.interpolate import CubicHermiteSpline
 

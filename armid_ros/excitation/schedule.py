@@ -14,14 +14,13 @@ coefficient of the trajectory; comment lines contain the run.
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
-import io
 from pathlib import Path
 from typing import Any
 
 from armid_ros.errors import TrajectoryError
 from armid_ros.excitation.fourier import FourierTrajectory
 from armid_ros.files import finite, load_yaml, read_text, reading, write_file
-from armid_ros.files.cells import csv_cell
+from armid_ros.files.cells import csv_text
 from armid_ros.motion import FloatArray, Motion
 import numpy as np
 import numpy.typing as npt
@@ -301,15 +300,16 @@ def excitation_text(excitation: Excitation) -> str:
 
 def _to_csv(excitation: Excitation) -> str:
     trajectory = excitation.trajectory
-    text = io.StringIO()
-    text.write(f'# {SCHEMA}: Fourier coefficients of excitation.yaml, no samples of positions\n')
-    text.write(f'# period [s],{trajectory.period!r}\n')
-    text.write(f'# n_periods,{excitation.n_periods}\n')
-    text.write(f'# run_in [s],{excitation.run_in!r}\n')
+    head = (
+        f'# {SCHEMA}: Fourier coefficients of excitation.yaml, no samples of positions\n'
+        f'# period [s],{trajectory.period!r}\n'
+        f'# n_periods,{excitation.n_periods}\n'
+        f'# run_in [s],{excitation.run_in!r}\n'
+    )
     numbers = range(1, trajectory.harmonics + 1)
-    head = ['joint', 'q0', *(f'a{k}' for k in numbers), *(f'b{k}' for k in numbers)]
-    text.write(','.join(head) + '\n')
-    for j, joint in enumerate(trajectory.joints):
-        values = [trajectory.q0[j], *trajectory.a[j], *trajectory.b[j]]
-        text.write(','.join([csv_cell(joint), *(repr(float(value)) for value in values)]) + '\n')
-    return text.getvalue()
+    rows = [['joint', 'q0', *(f'a{k}' for k in numbers), *(f'b{k}' for k in numbers)]]
+    values = np.column_stack([trajectory.q0, trajectory.a, trajectory.b]).tolist()
+    rows += [
+        [joint, *map(repr, row)] for joint, row in zip(trajectory.joints, values, strict=True)
+    ]
+    return head + csv_text(rows)

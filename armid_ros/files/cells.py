@@ -4,18 +4,27 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable, Sequence
 import re
 
 #: First characters of formulas and comments; such a cell gets an apostrophe as prefix.
 _GUARDED = ('=', '+', '-', '@', '#', '\t', '\r', "'")
 
 
-def csv_cell(name: str) -> str:
-    """Format a name as a CSV cell, with an apostrophe before a formula, and quotes if needed."""
-    text = f"'{name}" if name.startswith(_GUARDED) else name
-    if any(char in text for char in ',"\r\n'):
-        text = '"' + text.replace('"', '""') + '"'
-    return text
+def csv_text(rows: Iterable[Sequence[str]]) -> str:
+    """
+    Return rows as CSV; the first cell of each row is a name.
+
+    A name that begins like a formula gets an apostrophe as prefix; quotes are added if needed.
+
+    """
+    lines = []
+    for name, *cells in rows:
+        text = f"'{name}" if name.startswith(_GUARDED) else name
+        if any(char in text for char in ',"\r\n'):
+            text = '"' + text.replace('"', '""') + '"'
+        lines.append(','.join([text, *cells]) + '\n')
+    return ''.join(lines)
 
 
 def parted(text: str, separator: str = ',') -> list[str]:

@@ -17,10 +17,8 @@ from dataclasses import dataclass, replace
 from itertools import product
 
 from armid_ros.arm import ArmModel
-from armid_ros.effects.load import described_spread
 from armid_ros.identification import Identification, Score
 from armid_ros.inspection.inspect import notes_on, Remark, worst_first
-from armid_ros.model import inverse_dynamics
 from armid_ros.motion import FloatArray, Motion
 from armid_ros.robots import NO_MASS, Robot
 from armid_ros.robots.description import MOVABLE, parse_xml
@@ -178,7 +176,7 @@ def _largest_weight(robot: Robot) -> FloatArray:
     high = np.where(np.isfinite(robot.upper), robot.upper, np.pi)
     q = np.random.default_rng(0).uniform(low, high, (200, robot.n_joints))
     still = Motion.of_states(robot.joints, q, 0.0, 0.0)
-    return np.asarray(np.abs(inverse_dynamics(robot, still)).max(axis=0))
+    return np.asarray(np.abs(ArmModel(robot).load(still)).max(axis=0))
 
 
 def _of_shapes(robot: Robot) -> Iterator[Remark]:
@@ -261,7 +259,7 @@ def check_links(found: Identification, described: ArmModel, grade: str, fault: s
     nuisance, _ = np.linalg.qr(rows[:, rigid:-1])
     rows = np.delete(rows, np.s_[rigid:-1], axis=1)
     rows -= nuisance @ (nuisance.T @ rows)
-    spread = described_spread(robot).ravel()
+    spread = robot.described_spread.ravel()
     total = float(rows[:, -1] @ rows[:, -1])
     error, fitted_error = _errors(found, described)
     wrong = [] if error - fitted_error < _MATERIAL else _selected(rows, spread, total)

@@ -7,7 +7,6 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 from armid_ros.arm import ArmModel
-from armid_ros.effects import USUAL_EFFECTS
 from armid_ros.errors import ArmidError
 from armid_ros.identification import identify, Score
 from armid_ros.identification.assess.grade import beyond_noise, grade
@@ -20,7 +19,6 @@ from armid_ros.motion import FloatArray
 from armid_ros.recording import Recording
 from armid_ros.recording.recording import GAP_PERIODS
 from armid_ros.recording.series import NOTHING
-from armid_ros.robots import Robot
 import numpy as np
 from scipy.signal import savgol_filter
 
@@ -240,21 +238,21 @@ class TrialFit:
     faults: tuple[str, ...] = ()
 
 
-def try_identification(robot: Robot, recording: Recording, rng: np.random.Generator) -> TrialFit:
+def try_identification(arm: ArmModel, recording: Recording, rng: np.random.Generator) -> TrialFit:
     """
     Try an identification and collect measures of its quality.
 
     Parameters
     ----------
-    robot : Robot
-        Description.
+    arm : ArmModel
+        Description, with the effects to fit.
     recording : Recording
-        Recording of the joints of the robot.
+        Recording of the joints of the arm.
     rng : numpy.random.Generator
         Random numbers for the identification.
 
     """
-    arm = ArmModel.of(robot, effects=USUAL_EFFECTS)
+    robot = arm.robot
     try:
         result = identify(arm, [recording], rng=rng)
         graded = grade(result, arm, [recording], {})

@@ -8,6 +8,7 @@ from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import asdict, dataclass
 from typing import Any, get_args, Literal
 
+from armid_ros.arm import ArmModel
 from armid_ros.identification.assess.sensor_faults import encoder_faults, velocity_faults
 from armid_ros.identification.rows.checks import beyond_limits, SILENT, too_short_to_tell
 from armid_ros.identification.rows.stamps import rounded_stamps, two_senders
@@ -107,7 +108,7 @@ class Inspection:
 
 def inspect(
     recording: Recording,
-    robot: Robot | None = None,
+    arm: ArmModel | None = None,
     *,
     topics: tuple[Topic, ...] = (),
     rng: np.random.Generator,
@@ -118,9 +119,9 @@ def inspect(
     Parameters
     ----------
     recording : Recording
-        The recording. With a robot, its joints are those of the robot, in the same order.
-    robot : Robot, optional
-        Description, for the check of limits and units and for a trial identification.
+        The recording. With an arm, its joints are those of the arm, in the same order.
+    arm : ArmModel, optional
+        Description, for the check of limits and units, and effects for a trial identification.
     topics : tuple of Topic, optional
         Topics of the bag.
     rng : numpy.random.Generator
@@ -128,7 +129,8 @@ def inspect(
 
     """
     sampling, joints = Sampling.of(recording), joint_facts(recording)
-    trial = None if robot is None else try_identification(robot, recording, rng)
+    robot = None if arm is None else arm.robot
+    trial = None if arm is None else try_identification(arm, recording, rng)
     found = [
         *_of_time(recording, sampling),
         *_of_units(recording, joints, robot),

@@ -14,45 +14,17 @@ Source: the human-exoskeleton leg pair, equations (16), (18), (23), (25), physic
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from typing import NamedTuple
 
-from armid_ros.errors import ModelError
 from armid_ros.model.kinematics import points_motion
 from armid_ros.motion import FloatArray
 from armid_ros.robots import Robot
+from armid_ros.robots.ties import Tie
 import numpy as np
 
 #: Step of the central differences of spring columns [rad or m].
 _STEP = 1e-5
-
-#: Tied segments of the leg pair, in the order of the source, F1 to F4.
-SEGMENTS = ('swing_shank', 'swing_thigh', 'stance_thigh', 'stance_shank')
-#: Joint that moves each segment.
-_MOVED_BY = ('swing_knee', 'swing_hip', 'stance_knee', 'stance_ankle')
-
-
-@dataclass(frozen=True)
-class Tie:
-    """
-    Place of a spring between two machines.
-
-    Attributes
-    ----------
-    name : str
-        Name of the tied segment, such as 'swing_shank'.
-    joint, other_joint : str
-        The joints that move the two links.
-    point, other_point : tuple of float, length 3
-        The ends of the spring in the frames of these joints [m].
-
-    """
-
-    name: str
-    joint: str
-    other_joint: str
-    point: tuple[float, float, float]
-    other_point: tuple[float, float, float]
 
 
 @dataclass(frozen=True)
@@ -113,35 +85,6 @@ def extension(way: FloatArray, slack: float | FloatArray) -> FloatArray:
     # the direction of a vector shorter than this [m] is undefined
     length = np.maximum(np.linalg.norm(way, axis=-1), 1e-12)
     return np.asarray(np.maximum(1.0 - slack / length, 0.0)[..., np.newaxis] * way)
-
-
-def centroid_ties(robot: Robot, other: Robot, joints: Sequence[tuple[str, str]]) -> list[Tie]:
-    """
-    Return ties between the centroids of links.
-
-    Parameters
-    ----------
-    robot, other : Robot
-        The machines; they have the same base frame.
-    joints : sequence of (str, str)
-        Joint of the machine and joint of the other one for every tie.
-
-    Returns
-    -------
-    list of Tie
-        The ties, named after the machine's links.
-
-    """
-    return [
-        Tie(
-            robot.links[robot.index(own)],
-            own,
-            far,
-            tuple(robot.model.inertias[robot.index(own) + 1].lever.tolist()),
-            tuple(other.model.inertias[other.index(far) + 1].lever.tolist()),
-        )
-        for own, far in joints
-    ]
 
 
 def tie_geometry(
@@ -217,21 +160,3 @@ def tie_columns_derivatives(
         return by_q, by_other
     here = tie_geometry(robot, q, other, other_q, ties)
     return by_q, -np.einsum('nsxi,nsxj->nisj', here.jacobian, here.other_jacobian)
-
-
-def leg_ties(exo: Robot, human: Robot, segments: Sequence[str] = SEGMENTS) -> tuple[Tie, ...]:
-    """
-    Return the ties of the shipped exoskeleton to its wearer, at the springs of the source.
-
-    Raises
-    ------
-    ModelError
-        If a segment does not exist.
-
-    """
-    unknown = [segment for segment in segments if segment not in SEGMENTS]
-    if unknown:
-        raise ModelError(f"no segment '{unknown[0]}'; there are {', '.join(SEGMENTS)}")
-    joints = [_MOVED_BY[SEGMENTS.index(segment)] for segment in segments]
-    ties = centroid_ties(exo, human, [(f'exo_{j}', f'human_{j}') for j in joints])
-    return tuple(replace(tie, name=s) for tie, s in zip(ties, segments, strict=True))

@@ -21,7 +21,6 @@ from armid_ros import ArmModel
 from armid_ros.api.arguments import motion_of
 from armid_ros.errors import IdentificationError
 from armid_ros.estimate import ParameterName
-from armid_ros.model import inverse_dynamics
 from armid_ros.motion import FloatArray
 from armid_ros.positions.loop import CommandedMotion, LoopModel, Window, windows_of
 from armid_ros.recording import Recording
@@ -147,9 +146,10 @@ def start_values(
     robot, n = model.robot, model.robot.n_joints
     motions = [motion_of(recording) for recording, _ in runs]
     motions = [one.select(slice(None, None, len(one) // _THINNED + 1)) for one in motions]
-    load = np.concatenate([inverse_dynamics(robot, motion) for motion in motions])
+    body = ArmModel(robot)
+    load = np.concatenate([body.load(motion) for motion in motions])
     if model.compensated:
-        load = load - np.concatenate([inverse_dynamics(robot, m.at_rest()) for m in motions])
+        load = load - np.concatenate([body.load(m.at_rest()) for m in motions])
     q, dq, ddq = (np.concatenate([getattr(m, x) for m in motions]) for x in ('q', 'dq', 'ddq'))
     side = np.sign(dq) * (np.abs(dq) > 0.05 * np.abs(dq).max(axis=0))
     free = np.array([gains is None, gains is None, True, True, True])

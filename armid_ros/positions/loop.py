@@ -20,7 +20,6 @@ from itertools import pairwise
 from armid_ros import ArmModel
 from armid_ros.errors import ModelError
 from armid_ros.estimate import ParameterName
-from armid_ros.model import inverse_dynamics
 from armid_ros.motion import FloatArray, Motion
 from armid_ros.recording import Recording
 from armid_ros.recording.recording import GAP_PERIODS
@@ -216,7 +215,8 @@ class LoopModel:
         tau = x[1 : n + 1] * (u - q) + x[n + 1 : 2 * n + 1] * (du - dq)
         if self.compensated:
             still = np.zeros_like(q)
-            tau += inverse_dynamics(self.robot, Motion(self.robot.joints, t, q, still, still))
+            weight = ArmModel(self.robot).load(Motion(self.robot.joints, t, q, still, still))
+            tau += weight
         return replace(recording, t=t, q=q, dq=None, tau=tau)
 
     def simulated(self, x: FloatArray, windows: Sequence[Window]) -> list[FloatArray]:

@@ -7,7 +7,6 @@ from __future__ import annotations
 from collections.abc import Sequence
 from pathlib import Path
 import re
-from typing import TYPE_CHECKING
 
 from armid_ros.errors import RecordingError
 from armid_ros.motion import ElasticRun, FloatArray
@@ -19,9 +18,6 @@ from armid_ros.recording.writer import whole_bag
 from armid_ros.robots import Robot
 import numpy as np
 
-if TYPE_CHECKING:
-    from armid_ros.simulation.sensors import LinkAccelerometers
-
 #: Topics of the motor positions (converted to the joint side), the link positions, and the
 #: references of the control loops.
 MOTOR, LINK, REFERENCE = '/joint_states', '/link/joint_states', '/reference/joint_states'
@@ -31,11 +27,11 @@ IMU = 'sensor_msgs/msg/Imu'
 _ACCELERATION = slice(25, 28)
 
 
-def write_runs(
-    path: str | Path, runs: Sequence[ElasticRun], robot: Robot, sensors: LinkAccelerometers
-) -> None:
+def write_runs(path: str | Path, runs: Sequence[ElasticRun], robot: Robot) -> None:
     """
     Write experiments to one bag, one after the other with a pause of 1 s.
+
+    The experiments have readings of accelerometers.
 
     Raises
     ------
@@ -56,8 +52,8 @@ def write_runs(
             write_joint_states(writer, MOTOR, joints, stamps, motor.q, motor.dq, motor.tau)
             write_joint_states(writer, LINK, joints, stamps, link.q, link.dq)
             write_joint_states(writer, REFERENCE, joints, stamps, asked, run.reference)
-            felt = sensors.readings(link) if run.felt is None else run.felt
-            for name, values in zip(robot.links, felt, strict=True):
+            assert run.felt is not None
+            for name, values in zip(robot.links, run.felt, strict=True):
                 topic, frame = imu_topic(name), name.encode()
                 layout = _layout(len(frame) + 1, '<')
                 rows = np.zeros(len(stamps), layout)

@@ -18,7 +18,7 @@ import numpy.typing as npt
 from scipy.interpolate import CubicSpline
 
 if TYPE_CHECKING:
-    from armid_ros.model.spring_ties import Tie
+    from armid_ros.robots.ties import Tie
 
 Clock = Literal['header', 'receive']
 

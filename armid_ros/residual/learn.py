@@ -17,7 +17,6 @@ from armid_ros.diagnosis.diagnose import OPEN
 from armid_ros.diagnosis.settings import DiagnosisSettings
 from armid_ros.effects.learned import LearnedTorque, TorqueMap
 from armid_ros.errors import IdentificationError
-from armid_ros.files.cells import csv_cell
 from armid_ros.motion import FloatArray
 from armid_ros.report.blocks import (
     ContentSection,
@@ -187,18 +186,18 @@ class Residual:
             ],
         )
 
-    def table(self) -> str:
+    def table(self) -> list[tuple[str, ...]]:
         """
-        Return the maps as CSV on a grid over the range of the data, in SI units.
+        Return the maps as a table on a grid over the range of the data, in SI units.
 
         Returns
         -------
-        str
-            Joint, position, velocity, load, torque and its standard deviation; the load is empty
-            if the map does not depend on load. Position varies slowest.
+        list of tuple of str
+            Heads, then joint, position, velocity, load, torque and its standard deviation; the
+            load is empty if the map does not depend on load. Position varies slowest.
 
         """
-        lines = ['joint,position,velocity,load,torque,std']
+        rows: list[tuple[str, ...]] = [('joint', 'position', 'velocity', 'load', 'torque', 'std')]
         for one in self.joints:
             # points along position, velocity and load
             axes = [one.axis(number, count) for number, count in enumerate((41, 31, 9))]
@@ -207,12 +206,17 @@ class Residual:
                 axes[2] = np.zeros(1)
             inputs = np.array(list(product(*axes)))
             torque, std = one.learned.torque(inputs), one.learned.std(inputs)
-            name = csv_cell(one.joint)
-            lines += [
-                f'{name},{q:.6g},{dq:.6g},{f"{w:.6g}" if loaded else ""},{tau:.6g},{s:.4g}'
+            rows += [
+                (
+                    one.joint,
+                    *(f'{x:.6g}' for x in (q, dq)),
+                    f'{w:.6g}' if loaded else '',
+                    f'{tau:.6g}',
+                    f'{s:.4g}',
+                )
                 for (q, dq, w), tau, s in zip(inputs, torque, std, strict=True)
             ]
-        return '\n'.join(lines) + '\n'
+        return rows
 
     def document(self) -> dict[str, Any]:
         """Return the entry of diagnosis.json."""

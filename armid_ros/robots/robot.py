@@ -242,6 +242,19 @@ class Robot:
         return read_only(np.concatenate([body.toDynamicParameters() for body in bodies]))
 
     @property
+    def described_spread(self) -> FloatArray:
+        """
+        Largest expected errors of the described rigid parameters, shape (m, 10).
+
+        A described value may be wrong by as much as its own size. A missing value gets a tenth of
+        a mean link, at 0.1 m from the joint.
+
+        """
+        body = np.abs(self.rigid_parameters.reshape(-1, PER_LINK))
+        mass = body[:, :1] + 0.1 * np.mean(body[:, :1])
+        return np.asarray(body + mass * np.array([1.0] + 3 * [0.1] + 6 * [0.1**2]))
+
+    @property
     def position_units(self) -> tuple[str, ...]:
         """Return the unit of each joint position: 'rad' or 'm'."""
         return tuple('m' if slides else 'rad' for slides in self.prismatic)

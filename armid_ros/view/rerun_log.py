@@ -25,8 +25,7 @@ from armid_ros.errors import ArmidError, RobotError
 from armid_ros.identification import SignalSettings
 from armid_ros.identification.rows.regression import predictions
 from armid_ros.identification.rows.signals import conditioning
-from armid_ros.model.kinematics import LinkFrames
-from armid_ros.motion import FloatArray
+from armid_ros.motion import FloatArray, Motion
 from armid_ros.robots import Robot
 from armid_ros.robots.geometry import all_in_one, LinkShape, shapes_of, sticks
 from armid_ros.robots.meshes import load_mesh
@@ -135,7 +134,7 @@ def log_recording(
     rr, robot = rerun(), arm.robot
     notes = _log_bodies(stream, robot, marked)
     t, q = poses(recording)
-    frames = LinkFrames.of(robot, q).frames
+    frames = ArmModel(robot).link_frames(Motion.of_states(robot.joints, q, 0.0, 0.0)).frames
     curves = [('position/{}', recording.t, recording.q)]
     if recording.dq is not None:
         curves.append(('velocity/{}', recording.t, recording.dq))

@@ -16,10 +16,8 @@ from collections.abc import Collection, Mapping, Sequence
 from dataclasses import asdict, dataclass
 from typing import Any, NamedTuple
 
-from armid_ros import ArmModel, Robot
+from armid_ros import ArmModel, make_effect, Robot
 from armid_ros.api.table import Summary
-from armid_ros.effects import CATALOGUE
-from armid_ros.effects.load import described_spread
 from armid_ros.estimate import measured
 from armid_ros.motion import FloatArray, Motion
 import numpy as np
@@ -122,7 +120,7 @@ def arm_at_rest(robot: Robot, known: Collection[str] = ()) -> ArmModel:
     arm = ArmModel(robot, quasi_static=True)
     for name in names:
         if name not in {KNOWN[one] for one in known}:
-            arm = arm.with_effect(CATALOGUE.find(name).on(robot))
+            arm = arm.with_effect(make_effect(name, robot))
     return arm
 
 
@@ -179,7 +177,7 @@ def fit_rests(
     scales = np.maximum(np.abs(y), 0.05 * np.abs(y).max()).max(axis=0)
     units = dict(zip(rests[0].joints, scales, strict=True))
     units[''] = float(robots[0].rigid_parameters[::10].sum()) or 10.0  # [kg], a common arm
-    links = link_error * described_spread(robots[0])
+    links = link_error * robots[0].described_spread
     links[:, 4:] = 0.0  # inertia
     prior = [*links.ravel()]
     for name in arms[0].parameters[links.size :]:

@@ -3,8 +3,8 @@
 """What every effect of the catalogue keeps to, tested for each of them."""
 
 from armid_ros.arm import ArmModel
+from armid_ros.arm.testing import CHECKS, EffectCase
 from armid_ros.effects import CATALOGUE, make_effect, parse_effect
-from armid_ros.effects.testing import CHECKS, EffectCase
 from armid_ros.errors import ModelError
 import numpy as np
 import pytest

@@ -3,9 +3,9 @@
 """A learned torque is what its maps say near their points, and nothing far from them."""
 
 from armid_ros.arm import ArmModel, load_model, save_model
+from armid_ros.arm.testing import CHECKS, EffectCase, sines
 from armid_ros.effects import CATALOGUE
 from armid_ros.effects.learned import LearnedTorque, TorqueMap, weight
-from armid_ros.effects.testing import CHECKS, EffectCase, sines
 from armid_ros.errors import ModelError
 from armid_ros.model import inverse_dynamics
 from armid_ros.motion import Motion

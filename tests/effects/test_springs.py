@@ -8,8 +8,8 @@ from armid_ros.arm import ArmModel
 from armid_ros.effects import make_effect
 from armid_ros.effects.tied import TiedInteraction
 from armid_ros.model import LinkFrames
-from armid_ros.model.spring_ties import Tie
 from armid_ros.motion import Motion, MovingPoints
+from armid_ros.robots.ties import Tie
 import numpy as np
 import pytest
 

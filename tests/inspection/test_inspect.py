@@ -4,6 +4,7 @@
 
 from dataclasses import replace
 
+from armid_ros.api.arguments import arm_of
 from armid_ros.arm import ArmModel
 from armid_ros.effects import make_effect, USUAL_EFFECTS
 from armid_ros.identification import identify
@@ -45,12 +46,12 @@ def clean(robot):
 
 def remarks(recording, robot=None):
     """Return what an inspection remarks, each with its weight in front."""
-    found = inspect(recording, robot, rng=np.random.default_rng(0))
+    found = inspect(recording, robot and arm_of(robot), rng=np.random.default_rng(0))
     return [f'{remark.weight}: {remark.text}' for remark in found.remarks]
 
 
 def test_of_a_clean_recording_nothing_is_said(clean, robot):
-    found = inspect(clean, robot, rng=np.random.default_rng(0))
+    found = inspect(clean, arm_of(robot), rng=np.random.default_rng(0))
     assert found.remarks == ()
     assert found.trial.rank == found.trial.theory
     assert found.trial.relative_error_percent < 3.0
@@ -160,7 +161,7 @@ def test_what_identify_calls_unusable_is_not_taken(clean, robot):
     arm = ArmModel.of(robot, effects=USUAL_EFFECTS)
     result = identify(arm, [other], rng=np.random.default_rng(0))
     graded = grade(result, arm, [other], {})
-    found = inspect(other, robot, rng=np.random.default_rng(0))
+    found = inspect(other, arm_of(robot), rng=np.random.default_rng(0))
     assert graded.word != 'good'
     assert (found.trial.grade, found.trial.reasons) == (graded.word, graded.reasons)
     assert graded.word in found.verdict and graded.reasons[0] in found.verdict

@@ -98,7 +98,7 @@ def test_it_is_saved_and_loaded(results):
 
 
 def test_its_author_can_check_it(root, installed):
-    lines = 'import armid_hose as m, armid_ros.effects.testing as t; t.check_effect(m.Hose)'
+    lines = 'import armid_hose as m, armid_ros.arm.testing as t; t.check_effect(m.Hose)'
     paths = os.pathsep.join([str(root), str(installed)])
     subprocess.run(
         [sys.executable, '-c', lines], env={**os.environ, 'PYTHONPATH': paths}, check=True

@@ -111,9 +111,9 @@ def test_what_has_no_name_is_learned_and_becomes_part_of_the_model(unknown, lear
     part = unknown.data[0]
     before, after = (part.residual(arm)[:, 1] for arm in (learned.base, learned.arm))
     assert np.std(after) < 0.7 * np.std(before)
-    table = learned.table().splitlines()
-    assert table[0] == 'joint,position,velocity,load,torque,std'
-    first = [float(x or 0.0) for x in table[1].split(',')[1:]]
+    heads, row, *_ = learned.table()
+    assert ','.join(heads) == 'joint,position,velocity,load,torque,std'
+    first = [float(x or 0.0) for x in row[1:]]
     at = np.array(first[:3])
     assert learned.joints[0].learned.torque(at) == pytest.approx(first[3], abs=1e-5)
 

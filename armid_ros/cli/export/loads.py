@@ -10,9 +10,9 @@ from itertools import permutations
 
 from armid_ros.arm import ArmModel
 from armid_ros.errors import meant, ModelError
-from armid_ros.model import LINK_PARAMETERS
 from armid_ros.motion import FloatArray
 from armid_ros.robots import NO_MASS
+from armid_ros.robots.robot import PER_LINK
 import numpy as np
 import pinocchio as pin
 
@@ -70,9 +70,9 @@ def load_of(arm: ArmModel, joint: str | None = None, frame: str | None = None) -
     """
     payloads: dict[str, FloatArray] = {}
     for effect, values in zip(arm.effects, arm.values, strict=True):
-        if effect.traits.weighs and len(effect.quantities) == len(LINK_PARAMETERS):
+        if effect.traits.weighs and len(effect.quantities) == PER_LINK:
             for owner, ten in zip(effect.joints, values.reshape(-1, 10), strict=True):
-                payloads[owner] = payloads.get(owner, np.zeros(len(LINK_PARAMETERS))) + ten
+                payloads[owner] = payloads.get(owner, np.zeros(PER_LINK)) + ten
     if not payloads:
         raise ModelError(
             f'the model of {arm.robot.name} has no payload to write: find it with armid diagnose '

@@ -5,17 +5,15 @@
 from __future__ import annotations
 
 from armid_ros.arm import ArmModel
-from armid_ros.effects.load import described_spread
 from armid_ros.estimate import Estimate, ParameterName
 from armid_ros.identification.fitting.least_squares import scaled_inverse
 from armid_ros.identification.parameters_file import ParameterFile
-from armid_ros.model import LINK_PARAMETERS
 from armid_ros.motion import FloatArray
 from armid_ros.robots import NO_MASS
+from armid_ros.robots.robot import PER_LINK
 import numpy as np
 import yaml
 
-_SIZE = len(LINK_PARAMETERS)
 #: Prior standard deviation of a parameter of an effect, as a share of its value or in its unit.
 #: It is so large that only the recordings determine the parameter.
 _VAGUE = 1e3
@@ -43,7 +41,7 @@ def ranges_text(arm: ArmModel, known: ParameterFile, spread: float, source: str)
     if information is None:
         stds = [known.values.get(name, (0.0, 0.0))[1] for name in arm.parameters]
         information = np.diag([1.0 / std**2 if std > 0.0 else 0.0 for std in stds])
-    rigid = np.maximum(0.5 * spread * described_spread(arm.robot).ravel(), NO_MASS)
+    rigid = np.maximum(0.5 * spread * arm.robot.described_spread.ravel(), NO_MASS)
     others = _VAGUE * np.maximum(np.abs(arm.theta[len(rigid) :]), 1.0)
     prior = np.concatenate([rigid, others])
     covariance = scaled_inverse(information + np.diag(prior**-2.0))
@@ -79,12 +77,14 @@ def _masses_and_centres(
     """Return names (D,), values (D,), their derivatives (D, P), and the lowest values (D,)."""
     names, found = list(arm.parameters), arm.theta.copy()
     slopes, kept = np.eye(len(found)), np.ones(len(found), dtype=bool)
-    rigid = np.tile(np.where(np.arange(_SIZE) == 0, 0.0, -np.inf), len(arm.robot.links))
+    rigid = np.tile(np.where(np.arange(PER_LINK) == 0, 0.0, -np.inf), len(arm.robot.links))
     lowest = np.concatenate([rigid, *(effect.bounds()[0] for effect in arm.effects)])
-    for first in range(0, len(rigid), _SIZE):
+    for first in range(0, len(rigid), PER_LINK):
         joint, mass = names[first].joint, found[first]
         names[first] = ParameterName('mass', joint, 'kg')
-        kept[first + 4 : first + _SIZE] = False  # inertia, which a simulator scales with the mass
+        kept[first + 4 : first + PER_LINK] = (
+            False  # inertia, which a simulator scales with the mass
+        )
         for k, axis in enumerate('xyz', start=first + 1):
             kept[k] = mass > NO_MASS
             if kept[k]:

@@ -25,7 +25,6 @@ from armid_ros.diagnosis.data.trajectory import (
     trajectories,
     Trajectory,
 )
-from armid_ros.effects.load import described_spread
 from armid_ros.identification.fitting.least_squares import informative_solution, scaled_inverse
 from armid_ros.identification.rows.signals import Conditioning
 from armid_ros.model import BaseParameters, group_columns
@@ -111,7 +110,7 @@ def _described_spread(arm: ArmModel) -> FloatArray:
     known = np.abs(arm.theta[size:])
     own = np.concatenate([[], *(effect.spread(arm.robot) for effect in arm.effects)])
     effects = np.where(known > 0.0, known, own)
-    return np.concatenate([described_spread(arm.robot).ravel(), effects])
+    return np.concatenate([arm.robot.described_spread.ravel(), effects])
 
 
 @dataclass(frozen=True)

@@ -20,8 +20,8 @@ from armid_ros.diagnosis.verdict.where import Where
 from armid_ros.effects import CATALOGUE, Effect
 from armid_ros.errors import IdentificationError
 from armid_ros.estimate import Estimate, name_in_words, ParameterName
-from armid_ros.model.spring_ties import Tie
 from armid_ros.motion import FloatArray
+from armid_ros.robots.ties import Tie
 import numpy as np
 import scipy.linalg
 

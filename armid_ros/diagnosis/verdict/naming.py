@@ -19,8 +19,8 @@ from armid_ros.effects import Effect
 from armid_ros.effects.tied import Tied
 from armid_ros.estimate import ParameterName
 from armid_ros.identification.fitting.identifiability import excludes_zero
-from armid_ros.model.spring_ties import Tie
 from armid_ros.motion import FloatArray
+from armid_ros.robots.ties import Tie
 import numpy as np
 
 #: Slope above which a translated value depends on an undetermined fitted value.

@@ -17,7 +17,6 @@ from dataclasses import dataclass, replace
 from typing import Literal
 
 from armid_ros.arm import ArmModel
-from armid_ros.effects.load import described_spread
 from armid_ros.estimate import Estimate, ParameterName
 from armid_ros.identification.fitting.least_squares import (
     factored,
@@ -242,7 +241,7 @@ def base_spread(arm: ArmModel, base: BaseParameters) -> FloatArray:
 
     """
     effects = [effect.spread(arm.robot) for effect in arm.effects]
-    spread = np.concatenate([described_spread(arm.robot).ravel(), *effects])
+    spread = np.concatenate([arm.robot.described_spread.ravel(), *effects])
     unknown = np.any(base.grouping[:, ~np.isfinite(spread)], axis=1)
     known = np.where(np.isfinite(spread), spread, 0.0)
     size = np.linalg.norm(base.grouping * known, axis=1)
@@ -251,4 +250,4 @@ def base_spread(arm: ArmModel, base: BaseParameters) -> FloatArray:
 
 def near_deviation(robot: Robot) -> FloatArray:
     """Return the prior standard deviation of rigid parameters, shape (10 n,)."""
-    return np.asarray(described_spread(robot).ravel() / np.sqrt(3.0))
+    return np.asarray(robot.described_spread.ravel() / np.sqrt(3.0))

@@ -8,7 +8,6 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from typing import Literal
 
-from armid_ros.effects.load import described_spread
 from armid_ros.errors import IdentificationError
 from armid_ros.estimate import ParameterName
 from armid_ros.identification.rows.signals import Conditioning, decimate, decimated_samples
@@ -203,7 +202,7 @@ def interaction_problem(
         body_by = _placed(_regressor_by_motion(robot, slow, base.independent), count)
         columns = np.concatenate([springs, body], axis=2)
         columns_by = np.concatenate([springs_by, body_by], axis=2)
-        spread = base.grouping * described_spread(robot).ravel()
+        spread = base.grouping * robot.described_spread.ravel()
     tau, alone = motion.tau, np.zeros(springs.shape[2])  # springs have no prior
     passed, left = _passed(used)
     if used is not None:

@@ -97,7 +97,8 @@ def simulate(
             tick(number / len(plan), f'simulating {path.name}')
             runs.append(run_elastic(plant, loop, experiment))
         runs = [noise.measure(run, rng) for run in runs]
-        write_runs(path, runs, robot, sensors)
+        runs = [replace(run, felt=sensors.readings(run.link)) for run in runs]
+        write_runs(path, runs, robot)
     return [resonances], [steps]
 
 

@@ -10,14 +10,13 @@ import textwrap
 from typing import Any
 
 from armid_msgs.msg import Diagnosis
-from armid_ros.model.kinematics import LinkFrames
-from armid_ros.motion import FloatArray
+from armid_ros import ArmModel, load_robot, Robot
+from armid_ros.motion import FloatArray, Motion
 from armid_ros.nodes.listening import ListeningNode
 from armid_ros.nodes.messages.joint_states import JointSample
 from armid_ros.nodes.parameters.table import NodeParameter
 from armid_ros.nodes.qos import DEPTH, LATCHED, STREAM
 from armid_ros.nodes.running.process import run
-from armid_ros.robots import load_robot, Robot, robot_from_urdf
 from builtin_interfaces.msg import Duration
 from geometry_msgs.msg import Point
 import numpy as np
@@ -60,7 +59,7 @@ class ResidualMarkersNode(ListeningNode):
     def __init__(self, **kwargs: Any) -> None:
         """Make the node with keyword arguments of rclpy's Node."""
         super().__init__('residual_markers', **kwargs)
-        self._told = ''
+        self._summary = ''
         self._markers = self.create_publisher(MarkerArray, '~/markers', STREAM)
         if self.value('robot'):
             self._draw_on(load_robot(self.value('robot'), joints=self.value('joints') or None))
@@ -88,8 +87,8 @@ class ResidualMarkersNode(ListeningNode):
             return
         stamp = self.get_clock().now().to_msg()
         markers = [*self._of_joints(self.robot)]
-        if self._told:
-            lines = '\n'.join(textwrap.wrap(self._told, 60))
+        if self._summary:
+            lines = '\n'.join(textwrap.wrap(self._summary, 60))
             above = np.array([0.0, 0.0, 1.3 * self._reach])
             markers.append(self._text('diagnosis', lines, above, 1.4))
         for number, marker in enumerate(markers):
@@ -99,7 +98,8 @@ class ResidualMarkersNode(ListeningNode):
         self._markers.publish(MarkerArray(markers=markers))
 
     def _of_joints(self, robot: Robot) -> Sequence[Marker]:
-        frames = LinkFrames.of(robot, self._q[np.newaxis]).frames
+        pose = Motion.of_states(robot.joints, self._q, 0.0, 0.0)
+        frames = ArmModel(robot).link_frames(pose).frames
         full = max(
             2.0 * float(np.sqrt(self._residual.max())), 1e-9
         )  # residual of the longest arrow
@@ -137,7 +137,7 @@ class ResidualMarkersNode(ListeningNode):
 
     def take_description(self, urdf: str) -> None:
         """Use the robot of robot_description."""
-        self._draw_on(robot_from_urdf(urdf, joints=self.value('joints') or None))
+        self._draw_on(load_robot(urdf, joints=self.value('joints') or None))
 
     def _draw_on(self, robot: Robot) -> None:
         n = robot.n_joints
@@ -146,7 +146,8 @@ class ResidualMarkersNode(ListeningNode):
         self._q, self._now = np.full(n, np.nan), np.zeros(n)
         self._residual, self._torque = np.zeros(n), np.zeros(n)
         self._seen = {'residual': 0.0, 'torque': 0.0}
-        frames = LinkFrames.of(robot, np.zeros((1, n))).frames
+        pose = Motion.of_states(robot.joints, np.zeros(n), 0.0, 0.0)
+        frames = ArmModel(robot).link_frames(pose).frames
         places = [frames[j].origin[:, 0] for j in range(n)]
         steps = np.diff(np.vstack([np.zeros(3), *places]), axis=0)
         self._reach = max(float(np.linalg.norm(steps, axis=1).sum()), 0.1)
@@ -165,7 +166,7 @@ class ResidualMarkersNode(ListeningNode):
         self._residual = self._averaged('residual', t, self._residual, self._now)
 
     def _on_diagnosis(self, message: Diagnosis) -> None:
-        self._told = f'{message.verdict.replace("_", " ")}: {message.summary}'
+        self._summary = f'{message.verdict.replace("_", " ")}: {message.summary}'
 
     def _averaged(self, what: str, t: float, before: FloatArray, values: FloatArray) -> FloatArray:
         """Update a running mean square with a sample."""

@@ -2,6 +2,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """`armid elastic`, from simulated bags to parameters."""
 
+from dataclasses import replace
 import json
 
 from armid_ros.errors import RecordingError, RobotError
@@ -37,7 +38,8 @@ def read(folder):
 def test_experiments_without_steps_leave_out_the_tuning(runs, truth, tmp_path) -> None:
     robot = load_robot('two_link_elastic')
     sensors = LinkAccelerometers(robot, np.outer([0.4, 0.4], [1.0, 0.0, 0.0]))
-    write_runs(tmp_path / 'resonances', runs[:4], robot, sensors)
+    runs = [replace(run, felt=sensors.readings(run.link)) for run in runs[:4]]
+    write_runs(tmp_path / 'resonances', runs, robot)
     said = run(tmp_path / 'resonances', '--out', tmp_path / 'out')
     assert 'antiresonance' in said
     document, stiffness = read(tmp_path / 'out')

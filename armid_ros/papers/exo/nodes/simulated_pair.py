@@ -10,7 +10,6 @@ import math
 from pathlib import Path
 from typing import Any
 
-from armid_ros.model.spring_ties import SEGMENTS
 from armid_ros.nodes.base import ArmidNode
 from armid_ros.nodes.parameters.table import NodeParameter
 from armid_ros.nodes.qos import SAMPLES
@@ -19,6 +18,7 @@ from armid_ros.nodes.running.real_time import RealTime
 from armid_ros.papers.exo.plant.gait import read_gait
 from armid_ros.papers.exo.plant.leg_pair import leg_pair
 from armid_ros.papers.exo.plant.torque_driven import SimulatedPair
+from armid_ros.robots.ties import SEGMENTS
 import numpy as np
 from rclpy.time import Time
 from sensor_msgs.msg import JointState

@@ -20,14 +20,7 @@ from typing import NamedTuple
 
 from armid_ros.errors import ModelError
 from armid_ros.model import inverse_dynamics
-from armid_ros.model.spring_ties import (
-    extension,
-    leg_ties,
-    SEGMENTS,
-    tie_geometry,
-    TiedMachines,
-    TieGeometry,
-)
+from armid_ros.model.spring_ties import extension, tie_geometry, TiedMachines, TieGeometry
 from armid_ros.motion import FloatArray, Motion, read_only
 from armid_ros.papers.exo.plant.gait import (
     Gait,
@@ -36,6 +29,7 @@ from armid_ros.papers.exo.plant.gait import (
     stance_motion,
 )
 from armid_ros.robots import load_robot
+from armid_ros.robots.ties import leg_ties, SEGMENTS
 import numpy as np
 import numpy.typing as npt
 

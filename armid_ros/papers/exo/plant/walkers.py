@@ -22,12 +22,12 @@ from __future__ import annotations
 
 from dataclasses import dataclass, replace
 
-from armid_ros.model.spring_ties import centroid_ties
 from armid_ros.motion import FloatArray
 from armid_ros.papers.exo.plant.gait import Gait, read_assumptions
 from armid_ros.papers.exo.plant.leg_pair import TiedPair
 from armid_ros.robots import load_robot, Robot
 from armid_ros.robots.load import robot_from_urdf
+from armid_ros.robots.ties import centroid_ties
 import numpy as np
 import numpy.typing as npt
 import pinocchio as pin

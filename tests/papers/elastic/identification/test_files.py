@@ -2,6 +2,8 @@
 # SPDX-License-Identifier: Apache-2.0
 """Experiments survive the way through a bag, accelerometers and all."""
 
+from dataclasses import replace
+
 from armid_ros.errors import RecordingError
 from armid_ros.papers.elastic.identification.files import read_runs
 from armid_ros.recording import BagWriter, write_joint_states
@@ -19,7 +21,8 @@ RADIUS = [0.4, 0.3]
 def bag(tmp_path, clean_steps):
     """Write the steps to a bag."""
     sensors = LinkAccelerometers(ROBOT, np.outer(RADIUS, [1.0, 0.0, 0.0]))
-    write_runs(tmp_path / 'steps', clean_steps, ROBOT, sensors)
+    runs = [replace(run, felt=sensors.readings(run.link)) for run in clean_steps]
+    write_runs(tmp_path / 'steps', runs, ROBOT)
     return tmp_path / 'steps'
 
 

@@ -56,7 +56,7 @@ def bag(tmp_path_factory):
     live = make_elastic_arm(arm, rng=np.random.default_rng(0), sensors=sensors)
     runs = [record(live, Reference.of(swing(seed)), rate=500.0).sides for seed in (1, 2)]
     path = tmp_path_factory.mktemp('springs') / 'bag'
-    write_runs(path, runs, live.plant.robot, live.accelerometers)
+    write_runs(path, runs, live.plant.robot)
     return path
 
 

@@ -5,7 +5,7 @@ Checks of the contract of effects, for tests of user-defined effects.
 
 In a test of a package that provides an effect::
 
-    from armid_ros.effects.testing import check_effect
+    from armid_ros.arm.testing import check_effect
 
     def test_hose_keeps_the_contract():
         check_effect(Hose)
@@ -142,7 +142,7 @@ def check_effect(kind: type[Effect], robot: Robot | None = None) -> None:
     Examples
     --------
     >>> from armid_ros.effects import CATALOGUE
-    >>> from armid_ros.effects.testing import check_effect
+    >>> from armid_ros.arm.testing import check_effect
     >>> check_effect(CATALOGUE['viscous_friction'])
 
     """
