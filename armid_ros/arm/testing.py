@@ -21,7 +21,7 @@ from collections.abc import Callable
 from dataclasses import dataclass, replace
 import pickle
 
-from armid_ros.arm import ArmModel
+from armid_ros.arm.arm_model import ArmModel
 from armid_ros.effects.base import Effect, Unexplained
 from armid_ros.effects.catalogue import check_kind
 from armid_ros.motion import FloatArray, Motion, Temperatures

@@ -87,13 +87,7 @@ def simulate(
     from armid_ros.recording import write_recording
     from armid_ros.recording.elastic import write_runs
     from armid_ros.simulation import Sensors
-    from armid_ros.simulation import simulate as simulated
-    from armid_ros.simulation.elastic import (
-        elastic_joints,
-        make_elastic_arm,
-        no_rotor,
-        shipped_arm,
-    )
+    from armid_ros.simulation.elastic import make_simulated_arm, shipped_arm
     from armid_ros.simulation.plant import require_masses
     from armid_ros.simulation.run import record
     from armid_ros.simulation.warm_up import at_temperature, temperature_course
@@ -108,10 +102,6 @@ def simulate(
         arm, drives = options.model_of(model, robot), None
     for text in texts:
         arm = arm.with_effect(*_of_some_size(text, robot))
-    springs, rotorless = elastic_joints(arm)
-    if rotorless:
-        say(no_rotor(rotorless))
-    sensors, sides = Sensors(**noise), ''
     with progress('designing a trajectory') as tick:
         reference = reference_of(robot, trajectory, rng, options.read_settings())
         course = None
@@ -119,18 +109,16 @@ def simulate(
             course = temperature_course(temperature, robot.n_joints, reference.duration)
             arm = at_temperature(arm, course)
         tick(0.0, 'simulating')
-        if springs and not rotorless:
-            elastic = make_elastic_arm(
-                arm, rng=rng, drives=drives, gain=loop_gain, sensors=sensors
-            )
-            run = record(elastic, reference, rate=rate, progress=tick)
-            assert run.sides is not None
-            write_runs(out, [run.sides], elastic.plant.robot)
-            sides = ' on both sides'
-        else:
-            run = simulated(arm, reference, rng=rng, sensors=sensors, rate=rate, progress=tick)
+        plant = make_simulated_arm(
+            arm, rng=rng, warn=say, drives=drives, gain=loop_gain, sensors=Sensors(**noise)
+        )
+        run = record(plant, reference, rate=rate, progress=tick)
+        if run.sides is None:
             run = replace(run, truth=replace(run.truth, temperature=course))
             write_recording(out, run, robot_description=robot.urdf)
+        else:
+            write_runs(out, [run.sides], plant.plant.robot)
+    sides = '' if run.sides is None else ' on both sides'
     done = f'{len(run.t)} samples of {robot.n_joints} joints{sides}'
     say(f'{out}: {done}, {reference.duration:.1f} s')
 

@@ -4,7 +4,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 from dataclasses import replace
 
 from armid_ros.arm import ArmModel
@@ -91,19 +91,11 @@ def elastic_joints(arm: ArmModel) -> tuple[tuple[str, ...], tuple[str, ...]]:
     return with_rotor, tuple(joints[j] for j in springs if rotor[j] <= 0.0)
 
 
-def no_rotor(joints: Sequence[str]) -> str:
-    """Return a note on the simulation of springs whose motors have no inertia."""
-    return (
-        f'{", ".join(joints)}: joint_elasticity without rotor_inertia, so no motor moves '
-        'independently. All joints are simulated as rigid, with encoders that read the twist '
-        'under load; for vibrations, add rotor_inertia'
-    )
-
-
-def make_elastic_arm(
+def make_simulated_arm(
     arm: ArmModel,
     *,
     rng: np.random.Generator,
+    warn: Callable[[str], object],
     drives: TwoLinkSet | None = None,
     gain: float = 1.0,
     dt: float = 1e-3,
@@ -111,30 +103,36 @@ def make_elastic_arm(
     start: npt.ArrayLike | None = None,
 ) -> SimulatedArm:
     """
-    Make a simulated arm with elastic joints.
+    Make a simulated arm; its joints are elastic if they have joint_elasticity and rotor_inertia.
 
     Parameters
     ----------
     arm : ArmModel
-        Arm model with joint_elasticity and rotor_inertia.
+        Arm model.
     rng : numpy.random.Generator
         Source of the sensors' noise.
+    warn : callable
+        Called with a note if elastic joints are simulated as rigid.
     drives : TwoLinkSet, optional
         Velocity loops, friction of the links and places of the accelerometers of the two-link arm.
         By default, loops are designed from the model of the arm.
     gain : float
-        Factor on the gains of the loops.
+        Factor on the gains of the loops of elastic joints.
     dt : float
         Step of plant and loops [s].
     sensors, start
         As for `SimulatedArm`.
 
-    Raises
-    ------
-    ModelError
-        If no joint is elastic, or the motor of an elastic joint has no inertia.
-
     """
+    springs, rotorless = elastic_joints(arm)
+    if rotorless:
+        warn(
+            f'{", ".join(rotorless)}: joint_elasticity without rotor_inertia, so no motor moves '
+            'independently. All joints are simulated as rigid, with encoders that read the twist '
+            'under load; for vibrations, add rotor_inertia'
+        )
+    if rotorless or not springs:
+        return SimulatedArm(Plant(arm, dt=dt), rng=rng, sensors=sensors, start=start)
     if drives is None:
         plant, places = Plant(arm, dt, elasticity=Elasticity()), None
         control = MotorControl.of(plant)

@@ -5,8 +5,8 @@
 from collections.abc import Callable
 from functools import partial
 
-from armid_ros.arm import ArmModel
-from armid_ros.effects import make_effect, testing
+from armid_ros.arm import ArmModel, testing
+from armid_ros.effects import make_effect
 from armid_ros.motion import Motion
 from armid_ros.robots import load_robot, Robot
 import numpy as np

@@ -6,8 +6,9 @@ from dataclasses import replace
 import doctest
 
 import armid_ros as ar
+from armid_ros.arm import testing
 from armid_ros.arm.testing import check_effect
-from armid_ros.effects import Action, CATALOGUE, joint_columns, scatter, testing
+from armid_ros.effects import Action, CATALOGUE, joint_columns, scatter
 import numpy as np
 import pytest
 

@@ -15,13 +15,8 @@ from armid_ros.nodes.parameters.table import NodeParameter, Values
 from armid_ros.recording.columns import numbers, per_joint
 from armid_ros.robots import load_robot, parse_gravity
 from armid_ros.robots.two_link import TwoLinkSet
-from armid_ros.simulation import Plant, Sensors, SimulatedArm
-from armid_ros.simulation.elastic import (
-    elastic_joints,
-    make_elastic_arm,
-    no_rotor,
-    shipped_arm,
-)
+from armid_ros.simulation import Sensors, SimulatedArm
+from armid_ros.simulation.elastic import make_simulated_arm, shipped_arm
 import numpy as np
 
 ARM_PARAMETERS = (
@@ -96,27 +91,21 @@ def make_arm(
 
     """
     arm = with_effects(arm, value('effects'))
-    n, dt = arm.robot.n_joints, value('time_step')
-    rng = np.random.default_rng(value('seed'))
+    n = arm.robot.n_joints
     with reading("parameter 'start'", RobotError):
         start = numbers(value('start'))
         if start and len(start) != n:
             raise RobotError(f'{len(start)} numbers, for {n} joints')
-    sensors = sensors_of(value, arm.robot.joints)
-    springs, rotorless = elastic_joints(arm)
-    if rotorless:
-        warn(no_rotor(rotorless))
-    elif springs:
-        return make_elastic_arm(
-            arm,
-            rng=rng,
-            drives=drives,
-            gain=value('loop_gain'),
-            dt=dt,
-            sensors=sensors,
-            start=start or None,
-        )
-    return SimulatedArm(Plant(arm, dt=dt), rng=rng, sensors=sensors, start=start or None)
+    return make_simulated_arm(
+        arm,
+        rng=np.random.default_rng(value('seed')),
+        warn=warn,
+        drives=drives,
+        gain=value('loop_gain'),
+        dt=value('time_step'),
+        sensors=sensors_of(value, arm.robot.joints),
+        start=start or None,
+    )
 
 
 def sensors_of(value: Values, joints: Sequence[str]) -> Sensors:

@@ -15,7 +15,7 @@ from armid_ros.recording.elastic import write_runs
 from armid_ros.robots import load_robot
 from armid_ros.robots.two_link import planar_pair
 from armid_ros.simulation import Reference, Sensors
-from armid_ros.simulation.elastic import make_elastic_arm
+from armid_ros.simulation.elastic import make_simulated_arm
 from armid_ros.simulation.run import record
 from click.testing import CliRunner
 import numpy as np
@@ -53,7 +53,7 @@ def bag(tmp_path_factory):
     ):
         arm = arm.with_effect(*parse_effect(text, ROBOT))
     sensors = Sensors(torque_noise=0.01, resolution=2.0 * np.pi / 2**20)
-    live = make_elastic_arm(arm, rng=np.random.default_rng(0), sensors=sensors)
+    live = make_simulated_arm(arm, rng=np.random.default_rng(0), warn=pytest.fail, sensors=sensors)
     runs = [record(live, Reference.of(swing(seed)), rate=500.0).sides for seed in (1, 2)]
     path = tmp_path_factory.mktemp('springs') / 'bag'
     write_runs(path, runs, live.plant.robot)

@@ -14,7 +14,7 @@ from armid_ros.robots.two_link import two_link_set
 from armid_ros.simulation import Reference
 from armid_ros.simulation.elastic import (
     elastic_joints,
-    make_elastic_arm,
+    make_simulated_arm,
     shipped_arm,
     two_link_loop,
     two_link_plant,
@@ -29,10 +29,16 @@ TWO_LINKS = load_robot('two_link_elastic')
 HUMANOID = load_robot('humanoid_arm')
 
 
+def made(arm, **options):
+    """Return a simulated arm with elastic joints."""
+    rng = np.random.default_rng(0)
+    return make_simulated_arm(arm, rng=rng, warn=pytest.fail, **options)
+
+
 def two_links(**options):
     """Return the shipped arm with its drives."""
     arm, drives = shipped_arm(TWO_LINKS)
-    return make_elastic_arm(arm, rng=np.random.default_rng(0), drives=drives, **options)
+    return made(arm, drives=drives, **options)
 
 
 def humanoid(*more, **options):
@@ -46,7 +52,7 @@ def humanoid(*more, **options):
         *more,
     ):
         arm = arm.with_effect(*parse_effect(text, HUMANOID))
-    return make_elastic_arm(arm, rng=np.random.default_rng(0), **options)
+    return made(arm, **options)
 
 
 def ramp(q, velocity, duration, tau=None):
@@ -72,10 +78,7 @@ def test_a_ramp_of_position_is_a_step_of_velocity():
 
 def test_torque_of_a_trajectory_comes_on_top_of_the_loop():
     pose, torque = np.zeros(2), np.array([[20.0, 0.0], [20.0, 0.0]])
-    loop = make_elastic_arm(
-        shipped_arm(TWO_LINKS)[0], rng=np.random.default_rng(0), drives=SHIPPED, gain=1e-9,
-        start=pose,
-    )  # fmt: skip
+    loop = made(shipped_arm(TWO_LINKS)[0], drives=SHIPPED, gain=1e-9, start=pose)
     loop.set_trajectory(ramp(pose, np.zeros(2), 0.1, torque))
     for _ in range(99):
         sample = loop.advance()
