@@ -23,8 +23,6 @@ import numpy as np
 #: Torque of the actuators [N m] as a function of time, position and velocity.
 TorqueLaw = Callable[[FloatArray, FloatArray, FloatArray], FloatArray]
 
-#: Step of the finite differences of a torque law [rad or m, rad/s or m/s].
-_STEP = 1e-6
 #: Dry friction [N m], or a share of the load [-], below this is zero.
 NO_FRICTION = 1e-12
 
@@ -217,14 +215,15 @@ class Action:
 def law_derivatives(law: TorqueLaw, motion: Motion) -> tuple[FloatArray, FloatArray]:
     """Differentiate a torque law by q and dq, by central differences, each (N, n, n)."""
     n = motion.n_joints
+    size = 1e-6  # of the differences [rad, m, rad/s or m/s]
     slopes = np.empty((2, len(motion), n, n))
     for argument, joint in np.ndindex(2, n):
         ends = []
-        for step in (_STEP, -_STEP):
+        for step in (size, -size):
             state = [motion.q.copy(), motion.dq.copy()]
             state[argument][:, joint] += step
             ends.append(law(motion.t, *state))
-        slopes[argument, :, :, joint] = (ends[0] - ends[1]) / (2.0 * _STEP)
+        slopes[argument, :, :, joint] = (ends[0] - ends[1]) / (2.0 * size)
     return slopes[0], slopes[1]
 
 

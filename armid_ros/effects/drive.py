@@ -42,9 +42,7 @@ class RotorInertia(Effect):
 
 
 #: Lowest order of a ripple [1/rev]; gravity has lower orders.
-_SLOWEST = 1.5
-#: Number of returned orders.
-_MOST_PEAKS = 3
+_MIN_RIPPLE_ORDER = 1.5
 
 
 @dataclass(frozen=True)
@@ -68,7 +66,12 @@ class TorqueRipple(Effect):
     )
     shapes = (
         Shape(
-            'ripple_order', '1/rev', _SLOWEST, 1e5, 20.0, (4.0, 6.0, 8.0, 12.0, 20.0, 50.0, 100.0)
+            'ripple_order',
+            '1/rev',
+            _MIN_RIPPLE_ORDER,
+            1e5,
+            20.0,
+            (4.0, 6.0, 8.0, 12.0, 20.0, 50.0, 100.0),
         ),
     )
 
@@ -87,7 +90,7 @@ class TorqueRipple(Effect):
 
     def plausible(self, values: FloatArray, std: FloatArray, arm: Arm) -> bool:
         """Return whether the order is above the range that other causes explain."""
-        return bool(np.all(self.shape_values > 1.05 * _SLOWEST))
+        return bool(np.all(self.shape_values > 1.05 * _MIN_RIPPLE_ORDER))
 
     def columns(self, motion: Motion, arm: Arm) -> FloatArray:
         """Return dtau/d(A, B) = (sin(n q), cos(n q)) [-], shape (N, n, P)."""
@@ -124,10 +127,11 @@ def wave_orders(unexplained: Unexplained, joint: int, between: tuple[float, floa
         The lowest and the highest order [1/rad or 1/m].
 
     """
+    count = 3  # of returned orders
     weight = unexplained.weight[:, joint]
     rows = weight > 0.0
     if not rows.any():
-        return np.full(_MOST_PEAKS, between[0])
+        return np.full(count, between[0])
     angle, scale = unexplained.q[rows, joint], weight[rows]
     rest = unexplained.residual[rows, joint] * scale
     step = 0.5 * np.pi / max(float(np.ptp(angle)), 0.3 / between[0])
@@ -139,8 +143,8 @@ def wave_orders(unexplained: Unexplained, joint: int, between: tuple[float, floa
     likely = likely if len(likely) else orders[:1]
     fine = likely[:, np.newaxis] + step * np.linspace(-1.0, 1.0, 2 * 8 + 1)
     gain = wave_gains(angle, rest, scale, fine.ravel()).reshape(fine.shape)
-    best = np.argsort(-gain.max(axis=1))[:_MOST_PEAKS]
-    return np.resize(fine[best, np.argmax(gain[best], axis=1)], _MOST_PEAKS)
+    best = np.argsort(-gain.max(axis=1))[:count]
+    return np.resize(fine[best, np.argmax(gain[best], axis=1)], count)
 
 
 def wave_gains(

@@ -16,10 +16,8 @@ from armid_ros.files import finite
 from armid_ros.motion import FloatArray, Motion, Temperatures
 import numpy as np
 
-#: Largest change of friction over its size [1/K]; greases have 0.01 to 0.03.
-_STEEPEST = 0.05
 #: Reference temperature unless another one is given [degC].
-_REFERENCE = 25.0
+_REFERENCE_TEMPERATURE = 25.0
 
 
 @dataclass(frozen=True)
@@ -303,7 +301,7 @@ class TemperatureDependentFriction(Effect):
     def __post_init__(self) -> None:
         """Fill in the reference temperatures."""
         super().__post_init__()
-        known = dict.fromkeys(self.joints, _REFERENCE) | dict(self.reference)
+        known = dict.fromkeys(self.joints, _REFERENCE_TEMPERATURE) | dict(self.reference)
         object.__setattr__(self, 'reference', tuple(known.items()))
 
     def along(self, motion: Motion) -> Self:
@@ -339,7 +337,8 @@ class TemperatureDependentFriction(Effect):
             known[1] = action.dry_friction.largest(np.zeros(n))
         known = np.where(known > 0.0, known, np.inf)
         slopes, doubts = (scatter(self, each, arm.robot) for each in (values, SURELY * std))
-        steep = np.abs(slopes) > _STEEPEST * known + doubts
+        # friction with grease changes by 0.01 to 0.03 of its size per kelvin
+        steep = np.abs(slopes) > 0.05 * known + doubts
         return not (steep.any() or np.any(slopes[0] > doubts[0]))
 
     def columns(self, motion: Motion, arm: Arm) -> FloatArray:
@@ -366,5 +365,5 @@ class TemperatureDependentFriction(Effect):
         if self.course is None:
             return np.zeros((np.size(t), len(joints)))
         known = dict(self.reference)
-        reference = [known.get(joint, _REFERENCE) for joint in joints]
+        reference = [known.get(joint, _REFERENCE_TEMPERATURE) for joint in joints]
         return np.nan_to_num(self.course.at(t) - reference)

@@ -21,9 +21,6 @@ from armid_ros.robots import Robot
 import numpy as np
 from scipy.spatial.transform import Rotation
 
-#: Step of the differences of a rotation [rad].
-_STEP = 1e-5
-
 
 class _GravityEffect(Effect):
     """An effect on the whole arm."""
@@ -91,11 +88,11 @@ class BaseTilt(_GravityEffect):
 
     def columns(self, motion: Motion, arm: Arm) -> FloatArray:
         """Return dtau/dtilt [N m/rad], shape (N, n, 2), at the tilt of the arm model."""
-        values = arm.values_of(self)
+        values, size = arm.values_of(self), 1e-5  # step of the differences [rad]
         turned = [
             (_turned(arm.robot.gravity, values + step) - _turned(arm.robot.gravity, values - step))
-            / (2.0 * _STEP)
-            for step in _STEP * np.eye(2)
+            / (2.0 * size)
+            for step in size * np.eye(2)
         ]
         return np.asarray(arm.gravity_columns(motion) @ np.transpose(turned))
 

@@ -28,13 +28,8 @@ import numpy as np
 #: Positions and velocities of all k anchors [m, m/s] at times of shape (N,), each (N or 1, k, 3).
 Anchor = Callable[[FloatArray], tuple[FloatArray, FloatArray]]
 
-#: Candidate anchors of straps: distances from the mean position of the attachment, relative to
-#: the spread of its positions, in all directions of a cube. Slacks are quantiles of the strap
-#: length.
-_DISTANCES, _SLACKS = (0.0, 0.7, 1.5, 3.0), (0.0, 0.2, 0.4, 0.6, 0.8)
-
 _AXES = ('x', 'y', 'z')
-_ATTACHMENT = tuple(
+_ATTACHMENT_SHAPES = tuple(
     Shape(f'attachment_{axis}', 'm', -100.0, 100.0, 0.0, (-0.1, 0.0, 0.1)) for axis in _AXES
 )
 
@@ -123,7 +118,7 @@ class HumanInteraction(Attached):
         Quantity('interaction_damping', 'N s/m', lower=0.0, typical=(0.5, 500.0)),
         *(Quantity(f'interaction_force_{axis}', 'N', typical=(0.5, 200.0)) for axis in _AXES),
     )
-    shapes = _ATTACHMENT
+    shapes = _ATTACHMENT_SHAPES
 
     def _anchor(self, arm: Arm) -> Anchor:
         points = zip(self.joints, self._attachments, strict=True)
@@ -160,7 +155,7 @@ class InterfaceSlack(Attached):
     smooth = True
     quantities = (Quantity('slack_stiffness', 'N/m', lower=0.0, typical=(50.0, 50000.0)),)
     shapes = (
-        *_ATTACHMENT,
+        *_ATTACHMENT_SHAPES,
         *(
             Shape(f'anchor_{axis}', 'm', -100.0, 100.0, 0.0, (-0.3, -0.1, 0.0, 0.1, 0.3))
             for axis in _AXES
@@ -225,8 +220,10 @@ def _proposals(places: FloatArray) -> tuple[FloatArray, FloatArray]:
     middle, spread = places.mean(axis=0), float(places.std(axis=0).max())
     ways = np.array([way for way in product((-1.0, 0.0, 1.0), repeat=3) if any(way)])
     ways /= np.linalg.norm(ways, axis=1, keepdims=True)
-    around = [middle + d * spread * ways for d in _DISTANCES if d]
-    anchors = np.concatenate([middle[np.newaxis], *around])
+    # distances from the mean position, relative to the spread of the positions
+    shells = [middle + distance * spread * ways for distance in (0.7, 1.5, 3.0)]
+    anchors = np.concatenate([middle[np.newaxis], *shells])
     lengths = np.linalg.norm(places - anchors[:, np.newaxis], axis=2)
-    slacks = np.quantile(lengths, _SLACKS, axis=1).T * (np.array(_SLACKS) > 0.0)
-    return np.repeat(anchors, len(_SLACKS), axis=0), slacks.ravel()
+    shares = np.array([0.0, 0.2, 0.4, 0.6, 0.8])  # slacks are quantiles of the strap length
+    slacks = np.quantile(lengths, shares, axis=1).T * (shares > 0.0)
+    return np.repeat(anchors, len(shares), axis=0), slacks.ravel()

@@ -21,9 +21,6 @@ from armid_ros.motion import FloatArray
 from armid_ros.robots import CollisionModel
 import numpy as np
 
-#: Number of points of the period at which a run can enter the trajectory.
-_ENTRIES = 48
-
 
 @dataclass(frozen=True)
 class DesignProgress:
@@ -200,16 +197,16 @@ def placed(problem: DesignProblem, trajectory: FourierTrajectory) -> Excitation:
         acceleration = np.abs(way.ddq) / limits.acceleration
         return float(max(velocity.max(), acceleration.max()))
 
-    run_in = settings.run_in
-    last = ''
+    run_in, last = settings.run_in, ''
+    entries = 48  # points of the period at which a run can enter the trajectory
     for _ in range(12):  # run-ins of increasing duration
         runs = [
             Excitation(
-                trajectory.shifted(k * trajectory.period / _ENTRIES),
+                trajectory.shifted(k * trajectory.period / entries),
                 settings.n_periods,
                 run_in,
             )
-            for k in range(_ENTRIES)
+            for k in range(entries)
         ]
         for run in sorted(runs, key=effort)[:6]:
             faults = excitation_faults(problem.arm, limits, run)

@@ -111,9 +111,6 @@ def _outward(values: FloatArray, periodic: bool) -> FloatArray:
     return np.asarray(values + np.sign(values - values.mean(axis=0)) * size / 8.0)
 
 
-#: Largest number of amplitude reductions to make a trajectory feasible.
-_SHRINKS = 6
-
 #: Samples per period and harmonic for the first check of a drawn trajectory.
 _SAMPLES = 40
 
@@ -157,13 +154,13 @@ def random_feasible(
     """
     for _ in range(60):
         trajectory = _draw(limits, period, harmonics, rng)
-        found = _shrunk(arm, limits, trajectory, clearance, _SHRINKS)
+        found = _shrunk(arm, limits, trajectory, clearance, 6)
         if found is not None:
             return found
     centre = feasible_pose(arm, limits, rng, clearance)
     trajectory = _draw(limits, period, harmonics, rng)
     around = FourierTrajectory(limits.joints, period, centre, trajectory.a, trajectory.b)
-    found = _shrunk(arm, limits, around, clearance, 8 * _SHRINKS)
+    found = _shrunk(arm, limits, around, clearance, 48)
     if found is None:
         raise TrajectoryError(
             f'no motion around this pose is feasible: {", ".join(f"{x:.2f}" for x in centre)}'
@@ -257,7 +254,7 @@ def _shrunk(
     clearance: ClearanceModel | None,
     shrinks: int,
 ) -> FourierTrajectory | None:
-    """Reduce the amplitudes of a trajectory until it is feasible."""
+    """Reduce the amplitudes of a trajectory until it is feasible, a number of times at most."""
 
     def clear(q: FloatArray) -> bool:
         if clearance is None:

@@ -17,10 +17,6 @@ from armid_ros.excitation.transfer import TransferPlanner
 from armid_ros.motion import FloatArray, Motion
 import numpy as np
 
-#: Factor by which a stop is extended while it exceeds an acceleration limit. Largest duration,
-#: as a multiple of the desired one, or of that of a stop at the acceleration limit if longer.
-_LONGER, _LONGEST = 1.25, 4.8
-
 
 @dataclass(frozen=True)
 class MotionGate:
@@ -110,10 +106,11 @@ class MotionGate:
         # half a cosine takes pi / 2 times as long as constant deceleration; the duration of a
         # run within its limits suffices for a stop
         needed = float((np.abs(path.dq[0]) / self.limits.acceleration).max()) * np.pi / 2.0
-        longest = _LONGEST * max(duration, min(needed, self.run.duration))
+        longest = 4.8 * max(duration, min(needed, self.run.duration))
+        longer = 1.25  # factor on the duration while an acceleration limit is exceeded
         motion = slowed(self.run, phase, duration, self.run.rate)
-        while check_limits(self.limits, motion) and _LONGER * duration <= longest:
-            duration *= _LONGER
+        while check_limits(self.limits, motion) and longer * duration <= longest:
+            duration *= longer
             motion = slowed(self.run, phase, duration, self.run.rate)
         step = np.nan_to_num(np.abs(measured - path.q[0]))
         lead = self._time_of(step, np.nan_to_num(np.abs(velocity - path.dq[0])))
@@ -194,7 +191,7 @@ class MotionGate:
 
 
 #: Time for which the measured arm has to be at rest [s].
-_REST = 0.1
+_REST_TIME = 0.1
 
 
 @dataclass(frozen=True)
@@ -240,7 +237,7 @@ class Ending:
         if not 0.0 <= phase < self.gate.run.duration:
             return None
         away = np.abs(monitor.pose.q - self.gate.run.at([phase]).q[0]).max()
-        if not away <= tolerance or not monitor.unsteady(_REST, 2):
+        if not away <= tolerance or not monitor.unsteady(_REST_TIME, 2):
             return None
         return self.gate.stop(phase, duration, monitor.pose.q, monitor.velocity())
 
@@ -278,7 +275,7 @@ class Ending:
             Message to report; empty if none.
 
         """
-        if self.last is not None and self.blocked and monitor.unsteady(_REST) == '':
+        if self.last is not None and self.blocked and monitor.unsteady(_REST_TIME) == '':
             # hold the arm at its measured position if this step of the set point is allowed
             ending, measured = replace(self, blocked=False), monitor.pose.q
             row = int(np.searchsorted(self.last.t, now - self.sent))
@@ -299,7 +296,7 @@ class Ending:
                 )
             return replace(ending, last=motion, sent=now), motion, ''
         lasts = 0.0 if self.last is None else float(self.last.t[-1])
-        moving = monitor.unsteady(_REST, 2)
+        moving = monitor.unsteady(_REST_TIME, 2)
         if now - self.sent < lasts + patience or moving is None:
             return self, None, ''
         if not moving:

@@ -29,9 +29,6 @@ SLOW_VELOCITY = 0.5
 #: Largest share of the velocity and acceleration limits in a run of each speed class.
 SPEED_CLASSES = {'slow': 0.15, 'medium': 0.4, 'fast': 0.9}
 
-#: Relative tolerance of the comparison of positions and rates with limits.
-_ROUNDING = 1e-9
-
 
 @dataclass(frozen=True)
 class Limits:
@@ -223,7 +220,8 @@ def check_limits(
             f'the motion has joints {", ".join(motion.joints)}, '
             f'but the limits are for {", ".join(limits.joints)}'
         )
-    slack = _ROUNDING * np.where(np.isfinite(limits.upper), np.abs(limits.upper) + 1.0, 1.0)
+    tolerance = 1e-9  # relative, for rounding
+    slack = tolerance * np.where(np.isfinite(limits.upper), np.abs(limits.upper) + 1.0, 1.0)
     checks = [
         ('lower position', motion.q, limits.lower, limits.lower - slack - motion.q),
         ('upper position', motion.q, limits.upper, motion.q - limits.upper - slack),
@@ -232,7 +230,7 @@ def check_limits(
     for name, values in (('velocity', motion.dq), ('acceleration', motion.ddq), ('torque', tau)):
         if values is not None:
             bound = getattr(limits, name)
-            checks.append((name, values, bound, np.abs(values) - (1.0 + _ROUNDING) * bound))
+            checks.append((name, values, bound, np.abs(values) - (1.0 + tolerance) * bound))
     found = []
     for name, values, bound, excess in checks:
         for j in np.flatnonzero((excess > 0.0).any(axis=0)):

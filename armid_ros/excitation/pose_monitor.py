@@ -19,9 +19,7 @@ AGREEING = 5
 #: Velocity below which a joint is at rest [rad/s or m/s].
 AT_REST = 0.02
 #: Time window in which rejected positions are counted [s].
-_WINDOW = 0.5
-#: Largest valid position of a joint without position limits [rad or m].
-_FARTHEST = 1e4
+_REJECTION_WINDOW = 0.5
 
 
 class _State(NamedTuple):
@@ -74,8 +72,9 @@ class PoseMonitor:
         self._units = robot.position_units
         # without a limit in the description, a turn per second is assumed
         self._velocity = np.where(np.isfinite(limit) & (limit > 0.0), limit, 2.0 * np.pi)
-        self._lower = np.maximum(robot.lower - tolerance, -_FARTHEST)
-        self._upper = np.minimum(robot.upper + tolerance, _FARTHEST)
+        farthest = 1e4  # valid position of a joint without position limits [rad or m]
+        self._lower = np.maximum(robot.lower - tolerance, -farthest)
+        self._upper = np.minimum(robot.upper + tolerance, farthest)
         self._sources: dict[tuple[str, ...], _Source] = {}
         self._rejections: deque[tuple[float, str]] = deque(maxlen=4 * AGREEING)
         self.rejected = 0
@@ -145,7 +144,7 @@ class PoseMonitor:
         source.rivals.clear()
         states = source.states
         states.append(state)
-        while len(states) > AGREEING and state.arrived - states[1].arrived > _WINDOW:
+        while len(states) > AGREEING and state.arrived - states[1].arrived > _REJECTION_WINDOW:
             states.popleft()
         q = np.full(len(self.pose.joints), np.nan)
         q[source.joints] = state.q
@@ -153,7 +152,9 @@ class PoseMonitor:
 
     def contradiction(self, now: float, count: int = AGREEING) -> str:
         """Return why many positions of the last 0.5 s were rejected; empty if only few were."""
-        recent = [fault for arrived, fault in self._rejections if now - arrived <= _WINDOW]
+        recent = [
+            fault for arrived, fault in self._rejections if now - arrived <= _REJECTION_WINDOW
+        ]
         return recent[-1] if len(recent) >= count else ''
 
     def velocity(self) -> FloatArray:

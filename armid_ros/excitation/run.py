@@ -18,9 +18,6 @@ from armid_ros.robots.reference import Reference
 import numpy as np
 import numpy.typing as npt
 
-#: Largest distance between the curve through the waypoints and the checked path [rad or m].
-_OFF_PATH = 0.001
-
 
 @dataclass(frozen=True)
 class Run:
@@ -114,7 +111,7 @@ class Run:
         between = motion.t[:-1] + 0.4 / self.rate
         away = np.abs(Reference.of(motion).sample(between).q - self.at(between).q).max(axis=0)
         j = int(np.argmax(away))
-        if away[j] > _OFF_PATH:
+        if away[j] > 0.001:  # [rad or m]
             raise TrajectoryError(
                 f"joint '{self.joints[j]}' would be {away[j]:.2g} rad or m off its path between "
                 f'{self.rate:g} waypoints per second: send more (rate), or take fewer harmonics'

@@ -27,7 +27,7 @@ import numpy.typing as npt
 import yaml
 
 #: Largest difference between period * rate and a whole number, for identical periods.
-_WHOLE_SAMPLES = 1e-6
+_SAMPLE_TOLERANCE = 1e-6
 #: The longest run [s]. Its samples are kept in memory, 1 GB for six joints at 50 Hz.
 MAX_DURATION = 86400.0
 
@@ -142,7 +142,7 @@ class Excitation:
         if not 0.0 < share <= 1.0:
             raise TrajectoryError(f'speed share {share:g}: has to be above 0 and at most 1')
         samples = self._period_samples(rate)
-        longer = float(np.ceil(samples / share - _WHOLE_SAMPLES)) / samples
+        longer = float(np.ceil(samples / share - _SAMPLE_TOLERANCE)) / samples
         path = self.trajectory.stretched(self.trajectory.period * longer)
         return replace(self, trajectory=path, run_in=self.run_in * longer)
 
@@ -178,12 +178,12 @@ class Excitation:
         return samples / rate
 
     def _run_in_samples(self, rate: float) -> int:
-        return int(np.ceil(self.run_in * rate - _WHOLE_SAMPLES))
+        return int(np.ceil(self.run_in * rate - _SAMPLE_TOLERANCE))
 
     def _period_samples(self, rate: float) -> int:
         samples = self.trajectory.period * rate
         whole = max(round(samples), 1)
-        if abs(samples - whole) > _WHOLE_SAMPLES * whole:
+        if abs(samples - whole) > _SAMPLE_TOLERANCE * whole:
             raise TrajectoryError(
                 f'a period of {self.trajectory.period:g} s is {samples:g} samples at {rate:g} Hz; '
                 f'it has to be a whole number: take {whole / self.trajectory.period:.9g} Hz'

@@ -26,17 +26,13 @@ from armid_ros.robots.geometry import all_in_one, collision_geometry
 from armid_ros.robots.robot import PER_LINK
 import numpy as np
 
-#: Size of a shape [m] above which its unit is probably wrong.
-_LONGEST = 10.0
+#: Length above which the unit of a shape is probably wrong [m].
+_MAX_LENGTH = 10.0
 #: Smallest reduction of the torque error by fitted links that indicates a wrong link [%].
-_MATERIAL = 1.0
-#: Effort limit over the torque that holds the arm: arms have 1.3 to 7. Half of one and ten are
-#: doubtful. Limit of a joint over those of the others from which it is doubtful.
-_HOLDS, _TENFOLD, _APART = 0.5, 10.0, 4.0
-#: Speed of the last joint [m/s] that is doubtful, as is a hundredth of it; arms have 1 to 6.
-_FASTEST = 24.0
-#: Smallest share of the residual for a further link, and largest remaining chi-squared per row.
-_FURTHER, _REMAINS = 0.5, 10.0
+_MIN_IMPROVEMENT = 1.0
+#: Smallest share of chi-squared that a further link explains, and chi-squared per row from which
+#: a further link is searched for.
+_MIN_SHARE, _MAX_CHI_SQUARED = 0.5, 10.0
 
 
 @dataclass(frozen=True, eq=False)
@@ -93,7 +89,7 @@ class LinkCheck:
     @property
     def agrees(self) -> bool:
         """Whether fitted links reduce the torque error by less than 1 % of the torque."""
-        return self.error_percent - self.fitted_error_percent < _MATERIAL
+        return self.error_percent - self.fitted_error_percent < _MIN_IMPROVEMENT
 
 
 def description_remarks(robot: Robot) -> tuple[Remark, ...]:
@@ -141,6 +137,7 @@ def _of_sizes(robot: Robot) -> Iterator[Remark]:
         return
     weight, speeds, efforts = _largest_weight(robot), robot.velocity_limit, robot.torque_limit
     turns = [k for k in range(robot.n_joints) if not robot.prismatic[k]]
+    apart = 4.0  # ratio to the limits of other joints from which a limit is doubtful
     for k in turns:
         effort, speed = float(efforts[k]), float(speeds[k])
         others = [j for j in turns if j != k]
@@ -149,13 +146,14 @@ def _of_sizes(robot: Robot) -> Iterator[Remark]:
         heaviest = weight[k] == max(weight[turns])
         limit = f'effort limit {effort:g} N m'
         doubt = ''
-        if _HOLDS * weight[k] > effort:
+        # in arms, the effort limit is 1.3 to 7 times the torque that holds the arm
+        if 0.5 * weight[k] > effort:
             doubt = f'{limit}, but holding the arm takes up to {weight[k]:.3g}'
-        elif heaviest and NO_MASS < _TENFOLD * weight[k] < effort < np.inf:
+        elif heaviest and NO_MASS < 10.0 * weight[k] < effort < np.inf:
             doubt = f'{limit}, but holding the arm takes at most {weight[k]:.3g}'
-        elif _APART * most < effort < np.inf:
+        elif apart * most < effort < np.inf:
             doubt = f'{limit}, but other joints have at most {most:g}'
-        elif max(speed, usual) < np.inf and not usual / _APART < speed < usual * _APART:
+        elif max(speed, usual) < np.inf and not usual / apart < speed < usual * apart:
             doubt = f'velocity limit {speed:g} rad/s, but the median joint has {usual:g}'
         if doubt:
             yield Remark('doubt', f"joint '{robot.joints[k]}': {doubt}; is it off by ten?")
@@ -163,7 +161,7 @@ def _of_sizes(robot: Robot) -> Iterator[Remark]:
     if turns and parents == [0, *range(len(parents) - 1)] and np.isfinite(speeds[turns]).all():
         steps = np.array([np.linalg.norm(p.translation) for p in robot.model.jointPlacements])
         tip = max(float(speeds[k] * steps[k + 2 :].sum()) for k in turns)
-        if tip > _FASTEST or 0.0 < tip < _FASTEST / 100.0:
+        if tip > 24.0 or 0.0 < tip < 0.24:  # [m/s]; arms have 1 to 6
             yield Remark(
                 'doubt',
                 f'velocity limits move the last joint at {tip:.3g} m/s; are they off by ten?',
@@ -193,9 +191,9 @@ def _of_shapes(robot: Robot) -> Iterator[Remark]:
             for corner in product(*zip(box.min_, box.max_, strict=True))
         ]
         volume[link] += abs(float(one.geometry.computeVolume()))
-        if max(box.width(), box.height(), box.depth()) > _LONGEST:
+        if max(box.width(), box.height(), box.depth()) > _MAX_LENGTH:
             yield Remark(
-                'bad', f"link '{link}': shape above {_LONGEST:g} m; is it in millimetres?"
+                'bad', f"link '{link}': shape above {_MAX_LENGTH:g} m; is it in millimetres?"
             )
     for link, inertial in robot.description.links.items():
         if inertial is not None and link not in missing:
@@ -227,8 +225,10 @@ def _of_shapes(robot: Robot) -> Iterator[Remark]:
 def _of_centre(link: str, centre: FloatArray, corners: Sequence[FloatArray]) -> Iterator[Remark]:
     """Check that a centre of mass is not far from the box of the shapes of its link."""
     if not corners:
-        if np.linalg.norm(centre) > _LONGEST:
-            yield Remark('bad', f"link '{link}': centre above {_LONGEST:g} m away; millimetres?")
+        if np.linalg.norm(centre) > _MAX_LENGTH:
+            yield Remark(
+                'bad', f"link '{link}': centre above {_MAX_LENGTH:g} m away; millimetres?"
+            )
         return
     low, high = np.min(corners, axis=0), np.max(corners, axis=0)
     outside = float(np.linalg.norm(centre - np.clip(centre, low, high)))
@@ -262,14 +262,14 @@ def check_links(found: Identification, described: ArmModel, grade: str, fault: s
     spread = robot.described_spread.ravel()
     total = float(rows[:, -1] @ rows[:, -1])
     error, fitted_error = _errors(found, described)
-    wrong = [] if error - fitted_error < _MATERIAL else _selected(rows, spread, total)
+    wrong = [] if error - fitted_error < _MIN_IMPROVEMENT else _selected(rows, spread, total)
     changes, covariance, rest = _fit(rows, spread, wrong)
     freedom = max(1, len(rows) - nuisance.shape[1] - size * len(wrong))
     # the Birge ratio accounts for the unexplained residual
     covariance = covariance * max(1.0, rest / freedom)
     alone = [_fit(rows, spread, [k])[2] for k in range(len(robot.links))]
     # if two links have the same motion, each of them explains the difference alone
-    most = max(rest / _FURTHER, _REMAINS * len(rows)) if len(wrong) == 1 else 0.0
+    most = max(rest / _MIN_SHARE, _MAX_CHI_SQUARED * len(rows)) if len(wrong) == 1 else 0.0
     body = robot.rigid_parameters.reshape(-1, size)[:, :4]
     measured, std = np.full((2, len(robot.links), 4), np.nan)
     for position, k in enumerate(wrong):
@@ -324,15 +324,15 @@ def _selected(rows: FloatArray, spread: FloatArray, total: float) -> list[int]:
     wrong: list[int] = []
     rest = total
     # with more wrong links, the cause may be the model itself
-    while len(wrong) < min(3, len(every)) and rest > _REMAINS * len(rows):
+    while len(wrong) < min(3, len(every)) and rest > _MAX_CHI_SQUARED * len(rows):
         left = {k: _fit(rows, spread, [*wrong, k])[2] for k in every if k not in wrong}
         best = min(left, key=left.__getitem__)
-        if left[best] > (1.0 - _FURTHER) * rest:
+        if left[best] > (1.0 - _MIN_SHARE) * rest:
             break
         wrong, rest = [*wrong, best], left[best]
     for k in wrong[:-1]:
         fewer = [one for one in wrong if one != k]
-        if _fit(rows, spread, fewer)[2] < max(rest / _FURTHER, _REMAINS * len(rows)):
+        if _fit(rows, spread, fewer)[2] < max(rest / _MIN_SHARE, _MAX_CHI_SQUARED * len(rows)):
             return fewer
     return wrong
 

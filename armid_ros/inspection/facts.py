@@ -12,7 +12,7 @@ from armid_ros.identification import identify, Score
 from armid_ros.identification.assess.grade import beyond_noise, grade
 from armid_ros.identification.assess.grade_limits import LIMITS
 from armid_ros.identification.assess.sensor_faults import held_elsewhere, velocity_ratio
-from armid_ros.identification.rows.checks import MIN_CORRELATION, torque_factors
+from armid_ros.identification.rows.checks import MIN_CORRELATION, REST_RANGE, torque_factors
 from armid_ros.identification.rows.period import find_period, mean_change, parabola_minimum
 from armid_ros.identification.rows.regression import REST_SPEED
 from armid_ros.motion import FloatArray
@@ -21,9 +21,6 @@ from armid_ros.recording.recording import GAP_PERIODS
 from armid_ros.recording.series import NOTHING
 import numpy as np
 from scipy.signal import savgol_filter
-
-#: Range of a joint below which it is at rest [rad or m].
-STILL = 1e-3
 
 
 @dataclass(frozen=True)
@@ -140,7 +137,7 @@ class JointFacts:
     @property
     def still(self) -> bool:
         """Whether the joint is at rest throughout."""
-        return self.upper - self.lower < STILL
+        return self.upper - self.lower < REST_RANGE
 
 
 def joint_facts(recording: Recording) -> tuple[JointFacts, ...]:
@@ -153,7 +150,7 @@ def joint_facts(recording: Recording) -> tuple[JointFacts, ...]:
         q, top = recording.q[:, j], float(np.percentile(speeds[:, j], 99))
         moves = speeds[:, j] > REST_SPEED * max(top, 1e-12)
         changes = np.abs(np.diff(q))
-        still = float(np.ptp(q)) < STILL
+        still = float(np.ptp(q)) < REST_RANGE
         tau = None if recording.tau is None else recording.tau[:, j]
         facts = JointFacts(
             name=name,

@@ -33,10 +33,6 @@ from armid_ros.nodes.trajectory_controller import TrajectoryController, write_tr
 import numpy as np
 from std_msgs.msg import String
 
-#: Largest distance between the measured positions at planning and at sending of a run [rad or
-#: m]. A controller covers it before the first waypoint, within `HANDOVER`.
-_MOVED = 0.01
-
 
 class ExcitationPublisherNode(ArmidNode):
     """
@@ -200,7 +196,8 @@ class ExcitationPublisherNode(ArmidNode):
         self._arm.catch_up()
         pose, units = self._arm.monitor.pose, self._planner.arm.robot.position_units
         fault = self._arm.monitor.contradiction(self._arm.now(), 1)
-        fault = fault or tracking_fault(pose.joints, units, begin, pose.q, _MOVED)
+        # a controller covers 0.01 rad or m before the first waypoint, within `HANDOVER`
+        fault = fault or tracking_fault(pose.joints, units, begin, pose.q, 0.01)
         if fault:
             raise TrajectoryError(f'{fault}, during planning; the arm is not started')
         now = self.get_clock().now()

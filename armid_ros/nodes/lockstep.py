@@ -45,8 +45,6 @@ AnyNode = TypeVar('AnyNode', bound=ArmidNode)
 PATIENCE = 20.0
 #: First time of the clock [ns]; zero would mean a missing stamp.
 EPOCH_NS = 1_000 * 10**9
-#: Time for which the arm rests before the run, as the publisher requires [s].
-_SEEN = 0.26
 
 
 class Progress:
@@ -164,7 +162,8 @@ def run_lockstep(
             return stamp
 
         stage.spin_until(connected, 'discovery')
-        for _ in range(max(math.ceil(_SEEN * rate), AGREEING) + 1):
+        # the publisher requires an arm at rest for 0.25 s
+        for _ in range(max(math.ceil(0.26 * rate), AGREEING) + 1):
             begun = step()
             stage.spin_until(lambda begun=begun: publisher.last_stamp_ns == begun, 'joint_states')
         publisher.start()

@@ -23,9 +23,6 @@ from armid_ros.nodes.running.process import run
 from armid_ros.recording import BagWriter
 from armid_ros.recording.message_types import header_stamp
 
-#: Period of the check of the disk [s].
-_WATCH_PERIOD = 1.0
-
 
 class RecorderNode(ArmidNode):
     """
@@ -97,7 +94,7 @@ class RecorderNode(ArmidNode):
         self.offer('~/stop', self.stop)
         self.look_every(LOOK_PERIOD, self.look)
         self.look_every(0.1, self._flush)  # limits the loss after a kill
-        self.look_every(_WATCH_PERIOD, self.watch)
+        self.look_every(1.0, self.watch)
         if self.value('record'):
             self.start()
 
@@ -185,7 +182,7 @@ class RecorderNode(ArmidNode):
         least = self.value('min_free') * 1e6
         if free < least:
             self._give_up(f'{writer.path}: {size_text(free)} are left on the disk')
-        rate = writer.size / max(time.monotonic() - self._begun, _WATCH_PERIOD)
+        rate = writer.size / max(time.monotonic() - self._begun, 1.0)  # [B/s]
         if free - least < 60.0 * rate:
             text = f'the disk of {writer.path} will be full in less than 60 s'
             self.complaints.say('disk', text)

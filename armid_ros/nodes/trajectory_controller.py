@@ -28,11 +28,9 @@ from unique_identifier_msgs.msg import UUID
 ANYWHERE = -1.0
 #: Timeout of the answer to a goal [s]; a controller first checks every waypoint.
 _ANSWER = 5.0
-#: Error code of an accepted goal that another goal replaced.
-_REPLACED = -1
 #: Texts of the error codes of control_msgs/action/FollowJointTrajectory.
 _ERRORS = {
-    _REPLACED: 'the goal is not valid',
+    -1: 'the goal is not valid',
     -2: 'the joints are not those of the controller',
     -3: 'the stamp is in the past: where clocks differ, use zero_stamp',
     -4: 'a joint was outside its path tolerance',
@@ -317,7 +315,7 @@ class TrajectoryController:
         status, result = response.status, response.result
         if status == GoalStatus.STATUS_SUCCEEDED and not result.error_code:
             self._end(goal, '')
-        elif status == GoalStatus.STATUS_CANCELED or result.error_code == _REPLACED:
+        elif status == GoalStatus.STATUS_CANCELED or result.error_code == -1:  # replaced
             self._end(goal, self._replacement_message())
         else:
             why = _ERRORS.get(result.error_code, 'without a reason')

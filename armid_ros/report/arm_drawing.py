@@ -24,28 +24,22 @@ import numpy as np
 import pinocchio as pin
 from scipy.spatial import ConvexHull
 
-#: Space around a drawing [m].
-_MARGIN = 0.03
-#: Corners of the outline of a ball.
-_ROUND = 16
+#: Corners of the outline of a circle.
+_CIRCLE_CORNERS = 16
 #: Colour of obstacles.
 OBSTACLE = 'var(--line)'
-#: Largest size of the bodies that represent links without a body; they are not drawn [m].
-_POINT = 1e-3
-#: Height of a line of text [px].
-_LINE = 16.0
+#: Smallest size of a body that is drawn; links without a body have smaller ones [m].
+_MIN_SIZE = 1e-3
 
 
-def _view(azimuth: float, elevation: float) -> FloatArray:
-    """Return right, up and towards the eye (3, 3), for azimuth and height of the eye [rad]."""
+def _view() -> FloatArray:
+    """Return right, up and towards the eye (3, 3), seen from the front right and above."""
+    azimuth, elevation = np.radians(-55.0), np.radians(18.0)
     (sa, ca), (se, ce) = ((np.sin(x), np.cos(x)) for x in (azimuth, elevation))
     return np.array([[-sa, ca, 0.0], [-ca * se, -sa * se, ce], [ca * ce, sa * ce, se]])
 
 
-#: View from the left: x to the right, z up.
-SIDE = _view(-np.pi / 2.0, 0.0)
-#: View from the front right and above.
-CORNER = _view(np.radians(-55.0), np.radians(18.0))
+_VIEW = _view()
 
 
 @dataclass(frozen=True)
@@ -111,14 +105,14 @@ def draw_poses(
     last = max(solids, key=lambda solid: solid.joint)
     middle = last.points.mean(axis=0)
     places = collision.robot.positions(way)
-    track = np.array([flat(CORNER, _frames(model, q)[last.joint].act(middle)) for q in places])
+    track = np.array([_flat(_frames(model, q)[last.joint].act(middle)) for q in places])
     strip = _strip(solids, frames, (190.0, 230.0), track)
     bodies = []
     for solid, points in _outlines(solids, frames, strip):
         share = round(100.0 * solid.joint / len(collision.robot.links))
         colour = f'color-mix(in srgb, var(--residual) {share}%, var(--measured))'
         bodies.append((points, colour if solid.of_arm else OBSTACLE))
-    tips = [flat(CORNER, frame[last.joint].act(middle)) for frame in frames]
+    tips = [_flat(frame[last.joint].act(middle)) for frame in frames]
     return ArmDrawing(
         *strip.size,
         tuple(bodies),
@@ -155,25 +149,25 @@ def draw_arm(
         kept = np.linspace(0, len(q) - 1, min(12, len(q))).astype(np.intp)
         poses = list(robot.positions(q[kept]))
     tried = [[_frames(model, pose)] for pose in poses]
-    seen = [np.array([flat(CORNER, one.translation) for one in frames]) for (frames,) in tried]
-    frames = tried[int(np.argmax([np.prod(np.ptp(one, axis=0) + _POINT) for one in seen]))]
+    seen = [np.array([_flat(one.translation) for one in frames]) for (frames,) in tried]
+    frames = tried[int(np.argmax([np.prod(np.ptp(one, axis=0) + _MIN_SIZE) for one in seen]))]
     strip = _strip(solids, frames, (300.0, 240.0))
     bodies = []
     for solid, points in _outlines(solids, frames, strip):
         chosen = solid.joint > 0 and robot.moving[solid.joint - 1] in marked
         bodies.append((points, 'var(--predicted)' if chosen else 'var(--faint)'))
     dots = [
-        (*strip.place(flat(CORNER, frames[0][k].translation), 0).tolist(), name)
+        (*strip.place(_flat(frames[0][k].translation), 0).tolist(), name)
         for k, name in enumerate(robot.moving, start=1)
     ]
-    labels, y = [], 0.0
+    labels, y, line = [], 0.0, 16.0  # height of a line of text [px]
     for x, top, name in sorted((dot for dot in dots if dot[2] in marked), key=lambda dot: dot[1]):
-        y = max(top, y + _LINE)
+        y = max(top, y + line)
         labels.append((x, top, round(strip.pitch, 1), round(y, 1), name))
     letters = max((len(name) for *_, name in labels), default=0)
     return ArmDrawing(
         round(strip.pitch + 9.5 * letters, 1),  # a letter is 9.5 px wide
-        round(max(strip.height, y + _LINE), 1),
+        round(max(strip.height, y + line), 1),
         tuple(bodies),
         tuple(
             (x, top, 'var(--predicted)' if name in marked else 'var(--measured)', name)
@@ -197,12 +191,12 @@ class _Solid:
     def seen(self, frame: pin.SE3) -> tuple[FloatArray, float]:
         """Return the projected outline, shape (K, 2) [m], and its depth."""
         points = self.points @ frame.rotation.T + frame.translation
-        turn = np.linspace(0.0, 2.0 * np.pi, _ROUND, endpoint=False)
+        turn = np.linspace(0.0, 2.0 * np.pi, _CIRCLE_CORNERS, endpoint=False)
         ring = max(self.radius, 1e-4) * np.column_stack([np.cos(turn), np.sin(turn)])
-        seen = flat(CORNER, points)
-        seen = seen[ConvexHull(seen).vertices] if len(seen) > _ROUND else seen
+        seen = _flat(points)
+        seen = seen[ConvexHull(seen).vertices] if len(seen) > _CIRCLE_CORNERS else seen
         cloud = (seen[:, np.newaxis] + ring).reshape(-1, 2)
-        return cloud[ConvexHull(cloud).vertices], float((points @ CORNER[2]).mean())
+        return cloud[ConvexHull(cloud).vertices], float((points @ _VIEW[2]).mean())
 
 
 def _strip(
@@ -214,9 +208,10 @@ def _strip(
     """Return one frame per pose [px], all large enough for all bodies."""
     hulls = [solid.seen(frame[solid.joint])[0] for frame in frames for solid in solids]
     every = np.concatenate([*others, *hulls])
-    size = np.ptp(every, axis=0) + 2.0 * _MARGIN
+    margin = 0.03  # around a drawing [m]
+    size = np.ptp(every, axis=0) + 2.0 * margin
     scale = float(min(room[0] / size[0], room[1] / size[1]))
-    return Strip.around(every, len(frames), _MARGIN, scale)
+    return Strip.around(every, len(frames), margin, scale)
 
 
 def _outlines(
@@ -235,13 +230,13 @@ def _solids(collision: CollisionModel) -> list[_Solid]:
     for body in collision.geometry.geometryObjects:
         shape = body.geometry
         if isinstance(shape, coal.Cylinder):
-            turn = np.linspace(0.0, 2.0 * np.pi, _ROUND, endpoint=False)
+            turn = np.linspace(0.0, 2.0 * np.pi, _CIRCLE_CORNERS, endpoint=False)
             rim = shape.radius * np.column_stack([np.cos(turn), np.sin(turn), 0.0 * turn])
             up = np.array([0.0, 0.0, shape.halfLength])
             points, radius = np.concatenate([rim + up, rim - up]), 0.0
         else:
             points, radius = outline(shape)  # unbounded shapes have no points
-        if len(points) and (radius > _POINT or np.ptp(points, axis=0).max() > _POINT):
+        if len(points) and (radius > _MIN_SIZE or np.ptp(points, axis=0).max() > _MIN_SIZE):
             placed = points @ body.placement.rotation.T + body.placement.translation
             solids.append(_Solid(int(body.parentJoint), body.parentFrame > 0, placed, radius))
     if any(solid.joint > 0 for solid in solids):
@@ -261,9 +256,9 @@ def _frames(model: pin.Model, q: FloatArray) -> list[pin.SE3]:
     return [upright * placement for placement in data.oMi]
 
 
-def flat(seen: FloatArray, points: FloatArray) -> FloatArray:
-    """Project points onto the right and up axes of a view, (..., 3) to (..., 2) [m]."""
-    return np.asarray(points @ seen[:2].T)
+def _flat(points: FloatArray) -> FloatArray:
+    """Project points onto the right and up axes of the view, (..., 3) to (..., 2) [m]."""
+    return np.asarray(points @ _VIEW[:2].T)
 
 
 @dataclass(frozen=True)

@@ -58,7 +58,7 @@ import numpy as np
 #: Colour of each verdict; the others are bad.
 _TONES = {'consistent': 'good', 'named': 'good', 'ambiguous': 'fair', 'partial': 'fair'}
 #: Largest number of joints with a gap that are listed one by one.
-_JOINTS = 2
+_MAX_LISTED_JOINTS = 2
 
 
 def tone_of(diagnosis: Diagnosis, worse: Sequence[str] = ()) -> str:
@@ -260,7 +260,9 @@ class Story(Section):
             f'{one.source} from {one.start:.1f} to {one.stop:.1f} s'
             for one in self.diagnosis.spans
         ]
-        unexplained = [f'{w.joint}: {w.signature}' for w in self.diagnosis.left[:_JOINTS]]
+        unexplained = [
+            f'{w.joint}: {w.signature}' for w in self.diagnosis.left[:_MAX_LISTED_JOINTS]
+        ]
         answers = [
             ('When', spans),
             ('Where', self._where()),
@@ -274,11 +276,11 @@ class Story(Section):
         places, whole = self.diagnosis.where, share_of(self.diagnosis)
         lines = [
             f'{place.joint}: {percent(place.share_of_gap)} of {whole}, {place.signature}'
-            for place in places[:_JOINTS]
+            for place in places[:_MAX_LISTED_JOINTS]
         ]
-        if len(places) > _JOINTS:
-            rest = sum(place.share_of_gap for place in places[_JOINTS:])
-            others = ', '.join(place.joint for place in places[_JOINTS:])
+        if len(places) > _MAX_LISTED_JOINTS:
+            rest = sum(place.share_of_gap for place in places[_MAX_LISTED_JOINTS:])
+            others = ', '.join(place.joint for place in places[_MAX_LISTED_JOINTS:])
             lines.append(f'{others}: {percent(rest)}')
         if not lines and self.diagnosis.verdict != 'consistent':
             return ['No joint is far above its floor.']

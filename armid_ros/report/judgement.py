@@ -14,7 +14,7 @@ from armid_ros.identification.assess.grade_limits import LIMITS
 from armid_ros.identification.fitting.identifiability import excludes_zero
 from armid_ros.recording import Recording
 from armid_ros.report.notation import counted, digits, plain
-from armid_ros.report.statistics import explained_shares, TELLING_SHARE, Whiteness
+from armid_ros.report.statistics import explained_shares, MIN_TREND_SHARE, Whiteness
 import numpy as np
 
 #: Condition numbers: an excitation is good below the first (Presse and Gautier 1993), and weak
@@ -158,7 +158,7 @@ def residual_trends(joints: Sequence[str], fits: Sequence[Fit]) -> tuple[str, ..
     matters = [(joint, name) for joint, name in enumerate(joints) if errors[joint] >= least]
     for joint, name in matters:
         for key, share in explained_shares(fits, joint).items():
-            if share > TELLING_SHARE:
+            if share > MIN_TREND_SHARE:
                 depends.setdefault(key, []).append(name)
     parts = [
         f'{key} ({", ".join(names) if len(names) <= 3 else f"{len(names)} joints"})'

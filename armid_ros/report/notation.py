@@ -18,7 +18,7 @@ from markupsafe import escape, Markup
 #: Text for a missing number.
 DASH = '\N{EN DASH}'
 #: Larger than all quantities of an arm in SI units.
-_NO_NUMBER = 1e12
+_MAX_NUMBER = 1e12
 #: Terms with a tooltip.
 TERMS = {
     'floor': 'Error that a perfect model would have: noise, or the error of the previous model.',
@@ -35,7 +35,7 @@ def pretty(unit: str) -> str:
 
 def digits(value: float, count: int = 2) -> str:
     """Return a number with significant digits, zeros kept: '2.0', not '2'; 178, not 1.8e+02."""
-    if not abs(value) < _NO_NUMBER:
+    if not abs(value) < _MAX_NUMBER:
         return DASH
     if 10.0**count <= abs(value) < 1e7:
         return f'{value:.0f}'
@@ -51,7 +51,7 @@ def plain(value: float, count: int = 3) -> str:
 def with_interval(value: float, std: float, unit: str) -> str:
     """Return a value with its 95 % interval and unit, an angle in degrees as well."""
     text = _plus_minus(value, std, f' {pretty(unit)}'.rstrip())
-    if unit == 'rad' and abs(value) < _NO_NUMBER:
+    if unit == 'rad' and abs(value) < _MAX_NUMBER:
         turn = 180.0 / math.pi
         text += f' ({_plus_minus(turn * value, turn * std, "°")})'
     return text
@@ -65,10 +65,10 @@ def value_of(finding: Finding, parameter: ParameterName, value: float, std: floa
 
 
 def _plus_minus(value: float, std: float, unit: str) -> str:
-    if not abs(value) < _NO_NUMBER:
+    if not abs(value) < _MAX_NUMBER:
         return DASH
     wide = HALF_WIDTH * std
-    if not 0.0 < wide < _NO_NUMBER:
+    if not 0.0 < wide < _MAX_NUMBER:
         return f'{value:.4g}{unit}'
     centre, half = measured(value, wide)
     return f'{centre} ± {half}{unit}'

@@ -24,7 +24,7 @@ from armid_ros.robots import Robot
 import numpy as np
 
 #: Share of a joint's residual explained by one variable, above which the trend is reported.
-TELLING_SHARE = 0.15
+MIN_TREND_SHARE = 0.15
 
 
 @dataclass(frozen=True)
@@ -141,7 +141,7 @@ def residual_section(robot: Robot, fits: Sequence[Fit], role: str) -> ContentSec
     for joint in np.argsort(-np.array(most), kind='stable'):
         name = robot.joints[joint]
         cells: Cells = [
-            TableCell(f'{100 * share:.0f} %', 'telling' if share > TELLING_SHARE else '')
+            TableCell(f'{100 * share:.0f} %', 'telling' if share > MIN_TREND_SHARE else '')
             for share in shares[joint]
         ]
         rows.append([name, *(cells or ('too few samples in motion', '', ''))])
@@ -156,7 +156,7 @@ def residual_section(robot: Robot, fits: Sequence[Fit], role: str) -> ContentSec
             _cloud(x, residual, label, f'residual [{torque}]')
             for x, label in zip(axes.values(), labels, strict=True)
         ]
-        opened = most[joint] == max(most) or most[joint] > TELLING_SHARE
+        opened = most[joint] == max(most) or most[joint] > MIN_TREND_SHARE
         panels = Panels([('', '', [chart]) for chart in charts], three=True)
         folds.append(Fold(name, [panels], opened))
     return ContentSection(

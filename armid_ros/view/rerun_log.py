@@ -35,7 +35,6 @@ from scipy.spatial.transform import Rotation
 TIMELINE = 'time'
 #: Address of the viewer; by default, rerun would listen on all interfaces.
 _HOST, _PORT = '127.0.0.1', 9876
-_LINK, _MARKED = (175, 182, 190), (230, 60, 40)
 
 
 def rerun() -> ModuleType:
@@ -186,13 +185,14 @@ def _log_bodies(stream: Any, robot: Robot, marked: Sequence[str]) -> list[str]:
     rr, drawn = rerun(), 0
     notes: list[str] = []
     absent: list[str] = []
+    grey, red = (175, 182, 190), (230, 60, 40)
     stream.log('arm', rr.ViewCoordinates.RIGHT_HAND_Z_UP, static=True)
 
     def place(joint: int) -> tuple[str, tuple[int, int, int]]:
         if joint == 0:
-            return 'arm/base', _LINK
+            return 'arm/base', grey
         name = robot.moving[joint - 1]
-        return f'arm/{_part(name)}', _MARKED if name in marked else _LINK
+        return f'arm/{_part(name)}', red if name in marked else grey
 
     for shape in shapes_of(robot, 'visual', 'collision'):
         where, colour = place(int(robot.model.frames[shape.frame].parentJoint))

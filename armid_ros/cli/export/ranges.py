@@ -14,11 +14,6 @@ from armid_ros.robots.robot import PER_LINK
 import numpy as np
 import yaml
 
-#: Prior standard deviation of a parameter of an effect, as a share of its value or in its unit.
-#: It is so large that only the recordings determine the parameter.
-_VAGUE = 1e3
-#: The recordings determine a parameter if they reduce its prior standard deviation to this share.
-_DETERMINED = 0.5
 _HEAD = """\
 # Ranges of {robot} for domain randomisation, written by armid export, from {source}.
 # low, high: 95 %. from: recordings, or description with {spread:g} of the described value as std.
@@ -42,7 +37,8 @@ def ranges_text(arm: ArmModel, known: ParameterFile, spread: float, source: str)
         stds = [known.values.get(name, (0.0, 0.0))[1] for name in arm.parameters]
         information = np.diag([1.0 / std**2 if std > 0.0 else 0.0 for std in stds])
     rigid = np.maximum(0.5 * spread * arm.robot.described_spread.ravel(), NO_MASS)
-    others = _VAGUE * np.maximum(np.abs(arm.theta[len(rigid) :]), 1.0)
+    # only the recordings determine the parameters of effects
+    others = 1e3 * np.maximum(np.abs(arm.theta[len(rigid) :]), 1.0)
     prior = np.concatenate([rigid, others])
     covariance = scaled_inverse(information + np.diag(prior**-2.0))
     names, values, slopes, lowest = _masses_and_centres(arm)
@@ -50,7 +46,7 @@ def ranges_text(arm: ArmModel, known: ParameterFile, spread: float, source: str)
     before = np.sqrt(slopes**2 @ prior**2)
     rows = []
     for k, name in enumerate(names):
-        determined = bool(estimate.std[k] < _DETERMINED * before[k])
+        determined = bool(estimate.std[k] < 0.5 * before[k])  # of the prior
         described = slopes[k, : len(rigid)].any()
         own = float(estimate.std[k]) if determined or described else None
         low, high = estimate.interval()[k].tolist()

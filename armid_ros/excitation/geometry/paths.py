@@ -20,9 +20,8 @@ from armid_ros.motion import FloatArray, Motion
 from armid_ros.robots.robot import UNLIMITED_HALF_RANGE
 import numpy as np
 
-#: Longest straight line of a tree, and the initial interval of the proof of its clearance [rad or
-#: m].
-_STEP, _INTERVAL = 0.6, 0.1
+#: Initial interval of the proof of the clearance of a straight line [rad or m].
+_PROOF_INTERVAL = 0.1
 
 #: Callback: is the static torque of poses, (N, n), within the limits?
 Held = Callable[[FloatArray], bool]
@@ -67,7 +66,7 @@ def find_path(
     start, goal = ends
 
     def free(first: FloatArray, second: FloatArray) -> bool:
-        count = int(np.ceil(np.abs(second - first).max() / _INTERVAL)) + 1
+        count = int(np.ceil(np.abs(second - first).max() / _PROOF_INTERVAL)) + 1
         poses = np.linspace(first, second, count + 1)
         return held(poses) and clear_line(clearance, first, second) is None
 
@@ -102,7 +101,7 @@ def clear_line(
     if clearance is None:
         return None
     way = goal - start
-    count = int(np.ceil(np.abs(way).max() / _INTERVAL)) + 1
+    count = int(np.ceil(np.abs(way).max() / _PROOF_INTERVAL)) + 1
 
     def path(share: FloatArray) -> Motion:
         q = start + share[:, np.newaxis] * way
@@ -128,7 +127,8 @@ class _Tree:
         reach = float(np.abs(way).max())
         if not reach > 0.0:
             return nearest
-        step = target if reach <= _STEP else self.poses[nearest] + way * (_STEP / reach)
+        longest = 0.6  # straight line of a tree [rad or m]
+        step = target if reach <= longest else self.poses[nearest] + way * (longest / reach)
         if not self.free(self.poses[nearest], step):
             return None
         self.poses.append(step)

@@ -32,7 +32,7 @@ CRITERIA = {
 
 
 #: Smallest eigenvalue of an identifiable direction, with parameters scaled to unit information.
-_BLIND = 1e-13
+_MIN_EIGENVALUE = 1e-13
 
 
 @dataclass(frozen=True)
@@ -87,9 +87,9 @@ class Information:
         std = np.full(len(diagonal), np.inf)
         scaled = self.matrix[np.ix_(seen, seen)] / np.outer(diagonal[seen], diagonal[seen])
         values, vectors = np.linalg.eigh(scaled)
-        visible = values > _BLIND
+        visible = values > _MIN_EIGENVALUE
         variance = (vectors[:, visible] ** 2 / values[visible]).sum(axis=1)
-        blind = (vectors[:, ~visible] ** 2).sum(axis=1) > np.sqrt(_BLIND)
+        blind = (vectors[:, ~visible] ** 2).sum(axis=1) > np.sqrt(_MIN_EIGENVALUE)
         std[seen] = np.where(blind, np.inf, np.sqrt(variance)) / diagonal[seen]
         return read_only(std)
 
@@ -158,8 +158,10 @@ class Criterion:
             size = np.sqrt(np.maximum(np.diag(block), 0.0))
             unit = np.divide(1.0, size, out=np.zeros_like(size), where=size > 0.0)
             shares, axes = np.linalg.eigh(block * np.outer(unit, unit))
-            along = unit[:, np.newaxis] * axes[:, shares > _BLIND]
-            projection[:, nuisance] = -(reach.T @ along / shares[shares > _BLIND]) @ along.T
+            along = unit[:, np.newaxis] * axes[:, shares > _MIN_EIGENVALUE]
+            projection[:, nuisance] = (
+                -(reach.T @ along / shares[shares > _MIN_EIGENVALUE]) @ along.T
+            )
         units = self.scale[wanted] if self.name in 'AE' else np.ones(len(wanted))
         projection *= units[:, np.newaxis]
         left = projection @ matrix @ projection.T

@@ -154,16 +154,9 @@ def _weighted(blocks: Sequence[FloatArray], weights: FloatArray) -> FloatArray:
     return np.asarray(total)
 
 
-#: Change of the clearance that changes a constraint by one unit [m].
-_CLEARANCE_UNIT = 0.1
-
-#: Distance beyond the margin, in units of the constant above, from which bodies are ignored. At a
-#: sharpness of 60, their weight in the soft maximum is exp(-36).
-_CLEARANCE_REACH = 0.6
-
 #: Number of parts of the period, each with one clearance constraint. A solver step can then
 #: avoid several close approaches together.
-_STRETCHES = 20
+_CLEARANCE_PARTS = 20
 
 
 #: Values of some constraints, and a function that computes their gradients.
@@ -292,20 +285,22 @@ class Constraints:
     def _clear(self, motion: Motion) -> Part:
         """Return one clearance constraint for every stretch of the period."""
         assert self.clearance is not None
-        margin = self.clearance.margin
-        near = self.clearance.near(motion.q, margin + _CLEARANCE_REACH * _CLEARANCE_UNIT)
-        stretch = self.t[near.sample] * (_STRETCHES / self.problem.settings.period)
-        totals = np.full(_STRETCHES, -_CLEARANCE_REACH)
+        # unit of the constraint [m]; bodies that are 0.6 units beyond the margin are ignored. At a
+        # sharpness of 60, their weight in the soft maximum is exp(-36)
+        margin, unit, ignored = self.clearance.margin, 0.1, 0.6
+        near = self.clearance.near(motion.q, margin + ignored * unit)
+        stretch = self.t[near.sample] * (_CLEARANCE_PARTS / self.problem.settings.period)
+        totals = np.full(_CLEARANCE_PARTS, -ignored)
         weighted: list[tuple[int, npt.NDArray[np.intp], FloatArray]] = []
-        for number in range(_STRETCHES):
+        for number in range(_CLEARANCE_PARTS):
             rows = np.flatnonzero(stretch.astype(int) == number)
             if len(rows):
-                lack = (margin - near.distance[rows]) / _CLEARANCE_UNIT
+                lack = (margin - near.distance[rows]) / unit
                 totals[number], weights = self._soft_maximum(lack)
-                weighted.append((number, rows, -weights[:, np.newaxis] / _CLEARANCE_UNIT))
+                weighted.append((number, rows, -weights[:, np.newaxis] / unit))
 
         def gradients() -> FloatArray:
-            result = np.zeros((_STRETCHES, motion.n_joints, self.basis[0].shape[1]))
+            result = np.zeros((_CLEARANCE_PARTS, motion.n_joints, self.basis[0].shape[1]))
             for number, rows, weights in weighted:
                 result[number] = (weights * near.by_q[rows]).T @ self.basis[0][near.sample[rows]]
             return result

@@ -36,13 +36,13 @@ INTERRUPTED, OUT_OF_TIME = 'interrupted', 'time budget'
 _SHARPNESS = (60.0, 300.0)
 
 #: Iterations of a round.
-_ROUND = 25
+_ROUND_ITERATIONS = 25
 
 #: Rounds after which the worse half of the searches ends.
-_ROUNDS = 2
+_ROUNDS_PER_HALVING = 2
 
 #: Half width of the box of a round, in units of the coefficients' scale.
-_BOX = 0.5
+_BOX_HALF_WIDTH = 0.5
 
 
 class _OutOfTime(Exception):
@@ -91,7 +91,7 @@ class Search:
         # arms of more than ten joints get fewer candidates
         share = min(1.0, 10 / problem.arm.robot.n_joints)
         self._candidates = max(math.ceil(share * settings.candidates), settings.starts)
-        others = 2 * _ROUNDS * _ROUND * (settings.starts - 1)
+        others = 2 * _ROUNDS_PER_HALVING * _ROUND_ITERATIONS * (settings.starts - 1)
         self._work = self._candidates + settings.iterations + others
 
     def run(self) -> str:
@@ -149,7 +149,7 @@ class Search:
             raise _OutOfTime
 
     def _improve(self, starts: list[FourierTrajectory]) -> None:
-        """Optimise several trajectories in rounds; drop the worse half after every `_ROUNDS`."""
+        """Optimise several trajectories in rounds; drop the worse half after some rounds."""
         objective, watched = Objective(self.problem, self.prior), self.clearance
         if watched is not None:  # ignore pairs of bodies that are far apart in many poses
             limits = self.problem.limits
@@ -162,7 +162,7 @@ class Search:
         branches = [_Branch(self, objective, watched, start) for start in starts]
         while branches:
             for branch in branches:
-                for _ in range(_ROUNDS):
+                for _ in range(_ROUNDS_PER_HALVING):
                     branch.advance()
             branches = sorted(branches, key=lambda branch: branch.cost)[: -(-len(branches) // 2)]
             branches = [branch for branch in branches if branch.left > 0]
@@ -192,7 +192,7 @@ class _Branch:
         self.lower = -self.upper
         self.lower[:, 0], self.upper[:, 0] = low / self.scale[:, 0], high / self.scale[:, 0]
         self.left = settings.iterations
-        self.times, self.box, self.sharpness = np.empty(0), _BOX, _SHARPNESS[0]
+        self.times, self.box, self.sharpness = np.empty(0), _BOX_HALF_WIDTH, _SHARPNESS[0]
 
     def advance(self) -> None:
         """Run the solver for a round, within a box about the last feasible trajectory."""
@@ -208,7 +208,7 @@ class _Branch:
             sharpness=self.sharpness,
             more_times=self.times,
         )
-        z, used = self._solve(constraints, min(_ROUND, self.left))
+        z, used = self._solve(constraints, min(_ROUND_ITERATIONS, self.left))
         self.left -= used
         trajectory = FourierTrajectory.of(problem.limits.joints, settings.period, z * self.scale)
         # the times of the worst torque or clearance faults between the samples
@@ -226,7 +226,7 @@ class _Branch:
             return
         cost = self.search.offer(feasible)
         gain, self.cost = self.cost - cost, min(cost, self.cost)
-        self.trajectory, self.box = feasible, min(2.0 * self.box, _BOX)
+        self.trajectory, self.box = feasible, min(2.0 * self.box, _BOX_HALF_WIDTH)
         # gain of a round below which the search has converged
         if gain < 0.005:
             self.left = 0 if self.sharpness == _SHARPNESS[-1] else self.left

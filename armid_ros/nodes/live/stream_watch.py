@@ -7,14 +7,6 @@ from __future__ import annotations
 from armid_ros.motion import FloatArray
 import numpy as np
 
-#: A longer step back in time is a jump of the clock, and not a late sample [s].
-_OUT_OF_ORDER = 0.1
-#: Time without a change of positions after which the arm is at rest [s].
-_STILL = 2.0
-#: Limits of the range of an effort at rest: a share of its range in motion, and a multiple of its
-#: mean change per sample. Noise of a million samples has a range of 9 mean changes.
-_SWING, _NOISE = 0.5, 10.0
-
 
 class StreamWatch:
     """
@@ -45,7 +37,8 @@ class StreamWatch:
     def take(self, t: float, q: FloatArray, tau: FloatArray) -> None:
         """Check a sample: time [s], position [rad or m] and torque [N m or N], each (n,)."""
         if self._last is not None and t <= self._last:
-            back = self._last - t > _OUT_OF_ORDER
+            # a step back of more than 0.1 s is a jump of the clock, and not a late sample
+            back = self._last - t > 0.1
             self._seen.add('jump_back' if back else 'out_of_order')
             if not back:
                 return
@@ -60,10 +53,11 @@ class StreamWatch:
         if self._tau is not None:
             self._changes += np.abs(tau - self._tau)
         self._tau, self._count = tau, self._count + 1
-        if t - self._since > _STILL:
-            swing = _range(self._at_rest)
-            much = swing > _SWING * _range(self._in_motion)
-            if np.any(much & (swing > _NOISE * self._changes / self._count)):
+        if t - self._since > 2.0:  # without a change of positions [s]
+            # noise of a million samples has a range of 9 mean changes per sample
+            effort = _range(self._at_rest)
+            moves = effort > 0.5 * _range(self._in_motion)
+            if np.any(moves & (effort > 10.0 * self._changes / self._count)):
                 self._seen.add('frozen')
 
     def news(self) -> frozenset[str]:

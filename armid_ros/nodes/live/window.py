@@ -8,12 +8,8 @@ from armid_ros.recording import Recording
 import numpy as np
 import numpy.typing as npt
 
-#: Largest share of the period by which a due sample may be early.
-_EARLY = 0.25
-#: Velocity of all joints below which the arm is at rest [rad/s or m/s].
-_REST_VELOCITY = 0.01
-#: Longest gap, and longest step back in time, without a restart of the window [periods].
-_LONGEST_GAP = 20.0
+#: Shortest time between kept samples, as a share of the period.
+_MIN_SPACING = 0.75
 
 
 class SampleWindow:
@@ -44,7 +40,7 @@ class SampleWindow:
         self.joints = joints
         self.moved = 0.0
         self._period = period
-        self._capacity = int(np.ceil(duration / (period * (1.0 - _EARLY)))) + 1
+        self._capacity = int(np.ceil(duration / (period * _MIN_SPACING))) + 1
         n = len(joints)
         # twice the capacity: the window is one slice, and is moved to the front when the end is
         # reached
@@ -91,10 +87,11 @@ class SampleWindow:
             Whether the sample was kept.
 
         """
-        since = t - self.end
-        if len(self) and abs(since) > _LONGEST_GAP * self._period:
+        step = t - self.end
+        # longest gap, and longest step back in time, without a restart
+        if len(self) and abs(step) > 20.0 * self._period:
             self._first = self._end = 0
-        elif since < (1.0 - _EARLY) * self._period:
+        elif step < _MIN_SPACING * self._period:
             return False
         if self._end == len(self._rows):
             kept = self._rows[self._first : self._end].copy()
@@ -107,7 +104,8 @@ class SampleWindow:
         if len(self):
             before = self._rows[self._end - 1]
             step = row[0] - before[0]
-            if np.abs(row[1 : n + 1] - before[1 : n + 1]).max() > _REST_VELOCITY * step:
+            # at rest, no joint is faster than 0.01 rad/s or m/s
+            if np.abs(row[1 : n + 1] - before[1 : n + 1]).max() > 0.01 * step:
                 self.moved += step
         self._end += 1
         self._first = max(self._first, self._end - self._capacity)

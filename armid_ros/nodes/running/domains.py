@@ -12,8 +12,6 @@ import socket
 from armid_ros.errors import ArmidError
 from rclpy.context import Context
 
-#: Domains with ports below the ephemeral ports of Linux; 0 is the default domain.
-_DOMAINS = range(1, 102)
 _RANGE = 'ROS_AUTOMATIC_DISCOVERY_RANGE'
 
 
@@ -61,9 +59,10 @@ def reserved_domain() -> Iterator[int]:
         If all domains are in use.
 
     """
-    first = os.getpid() % len(_DOMAINS)
-    for shift in range(len(_DOMAINS)):
-        domain = _DOMAINS[(first + shift) % len(_DOMAINS)]
+    # their ports are below the ephemeral ports of Linux; 0 is the default domain
+    domains = range(1, 102)
+    first = os.getpid() % len(domains)
+    for domain in (*domains[first:], *domains[:first]):
         # The name of an abstract socket is free again when its process ends.
         with socket.socket(socket.AF_UNIX) as reservation:
             try:
@@ -72,4 +71,4 @@ def reserved_domain() -> Iterator[int]:
                 continue
             yield domain
             return
-    raise ArmidError(f'all {len(_DOMAINS)} private ROS domains of this machine are in use')
+    raise ArmidError(f'all {len(domains)} private ROS domains of this machine are in use')

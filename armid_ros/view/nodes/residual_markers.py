@@ -24,8 +24,8 @@ from sensor_msgs.msg import JointState
 from std_msgs.msg import ColorRGBA
 from visualization_msgs.msg import Marker, MarkerArray
 
-#: Sizes of longest arrow, shaft and letters, as shares of the reach of the arm.
-_ARROW, _SHAFT, _LETTER = 0.25, 0.015, 0.05
+#: Sizes of shafts and letters, as shares of the reach of the arm.
+_SHAFT, _LETTER = 0.015, 0.05
 
 
 class ResidualMarkersNode(ListeningNode):
@@ -103,7 +103,8 @@ class ResidualMarkersNode(ListeningNode):
         full = max(
             2.0 * float(np.sqrt(self._residual.max())), 1e-9
         )  # residual of the longest arrow
-        lengths = _ARROW * self._reach * np.clip(self._now / full, -1.0, 1.0)
+        # the longest arrow is a quarter of the reach
+        lengths = 0.25 * self._reach * np.clip(self._now / full, -1.0, 1.0)
         markers = []
         for j, (joint, share) in enumerate(zip(robot.joints, self._shares(), strict=True)):
             body = robot.body_of(joint)
