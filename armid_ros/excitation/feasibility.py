@@ -63,8 +63,7 @@ def trajectory_faults(
         return Faults(violations)
     # initial number of intervals of the proof
     times = np.linspace(0.0, trajectory.period, 20 * trajectory.harmonics + 1)
-    _, acceleration, _ = trajectory.bounds()
-    approach = clearance.first_fault(trajectory.motion, acceleration, times)
+    approach = clearance.first_fault(trajectory.motion, trajectory.acceleration_bound(), times)
     return Faults(violations if approach is None else (*violations, approach))
 
 

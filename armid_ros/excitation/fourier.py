@@ -155,16 +155,10 @@ class FourierTrajectory:
         ratio = self.period / period
         return replace(self, period=period, a=self.a * ratio, b=self.b * ratio)
 
-    def bounds(self) -> tuple[FloatArray, FloatArray, FloatArray]:
-        """
-        Return bounds on speed, acceleration and jerk over the whole period, each of shape (n,).
-
-        The bounds are sums of the amplitudes, which the trajectory rarely reaches.
-
-        """
-        amplitude = np.hypot(self.a, self.b)
+    def acceleration_bound(self) -> FloatArray:
+        """Return a bound on the acceleration, shape (n,): the sum of its amplitudes."""
         k = self.angular_frequency * np.arange(1, self.harmonics + 1)
-        return amplitude.sum(1), (k * amplitude).sum(1), (k**2 * amplitude).sum(1)
+        return np.asarray((k * np.hypot(self.a, self.b)).sum(axis=1))
 
 
 def fourier_basis(

@@ -170,9 +170,8 @@ def _of_sizes(robot: Robot) -> Iterator[Remark]:
 
 def _largest_weight(robot: Robot) -> FloatArray:
     """Return the largest torque of each joint that holds the arm in random poses, (n,) [N m]."""
-    low = np.where(np.isfinite(robot.lower), robot.lower, -np.pi)
-    high = np.where(np.isfinite(robot.upper), robot.upper, np.pi)
-    q = np.random.default_rng(0).uniform(low, high, (200, robot.n_joints))
+    size = (200, robot.n_joints)
+    q = np.random.default_rng(0).uniform(*robot.position_range(), size)
     still = Motion.of_states(robot.joints, q, 0.0, 0.0)
     return np.asarray(np.abs(ArmModel(robot).load(still)).max(axis=0))
 

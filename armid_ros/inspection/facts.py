@@ -13,7 +13,7 @@ from armid_ros.identification.assess.grade import beyond_noise, grade
 from armid_ros.identification.assess.grade_limits import LIMITS
 from armid_ros.identification.assess.sensor_faults import held_elsewhere, velocity_ratio
 from armid_ros.identification.rows.checks import MIN_CORRELATION, REST_RANGE, torque_factors
-from armid_ros.identification.rows.period import find_period, mean_change, parabola_minimum
+from armid_ros.identification.rows.period import find_period, refined_period
 from armid_ros.identification.rows.regression import REST_SPEED
 from armid_ros.motion import FloatArray
 from armid_ros.recording import Recording
@@ -85,9 +85,7 @@ def find_repetition(recording: Recording) -> float | None:
     found = find_period(t, q)
     if found is None:
         return None
-    lag, where = found
-    before, least, after = (mean_change(q, lag + shift, where) for shift in (-1, 0, 1))
-    return (lag + parabola_minimum(before, least, after)) / rate
+    return refined_period(q, *found) / rate
 
 
 @dataclass(frozen=True)

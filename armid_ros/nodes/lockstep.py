@@ -23,11 +23,9 @@ from armid_ros.errors import ArmidError
 from armid_ros.excitation import Excitation, Limits, TransferPlanner
 from armid_ros.excitation.pose_monitor import AGREEING
 from armid_ros.identification.online.identifier import OnlineIdentifier
-from armid_ros.nodes.bag_player import BagPlayerNode
 from armid_ros.nodes.base import ArmidNode
 from armid_ros.nodes.excitation_publisher import ExcitationPublisherNode
 from armid_ros.nodes.online_identifier import OnlineIdentifierNode
-from armid_ros.nodes.qos import STREAM
 from armid_ros.nodes.recorder import RecorderNode
 from armid_ros.nodes.running.domains import private_context
 from armid_ros.nodes.running.process import steady
@@ -36,8 +34,6 @@ from armid_ros.simulation import SimulatedArm
 from rclpy.experimental import EventsExecutor
 from rclpy.logging import LoggingSeverity
 from rclpy.parameter import Parameter
-from rclpy.time import Time
-from rosgraph_msgs.msg import Clock
 
 AnyNode = TypeVar('AnyNode', bound=ArmidNode)
 
@@ -143,7 +139,7 @@ def run_lockstep(
             plant.publish_clock()
             return (
                 not recorder.missing
-                and all(map(_matched, learners))
+                and all(map(matched, learners))
                 and plant.readers >= len(listeners)
                 and publisher.readers >= 1
                 and all(node.get_clock().now().nanoseconds for node in listeners)
@@ -173,60 +169,6 @@ def run_lockstep(
         while run.t < run.duration:
             run.see(step())
         return run
-
-
-def replay_lockstep(
-    bag: Path,
-    identifier: OnlineIdentifier,
-    *,
-    duration: float,
-    on_progress: OnProgress | None = None,
-) -> Progress:
-    """
-    Play a bag to an online identifier in lock step with /clock.
-
-    The nodes are bag_player and online_identifier.
-
-    Parameters
-    ----------
-    bag : Path
-        Recording with joint_states.
-    identifier : OnlineIdentifier
-        Identifies the arm.
-    duration : float
-        Time of the bag to play [s].
-    on_progress : callable, optional
-        As for `run_lockstep`.
-
-    Returns
-    -------
-    Progress
-        At the end.
-
-    """
-    with Stage() as stage:
-        topic = 'joint_states'
-        player = stage.add(
-            BagPlayerNode, bag=str(bag), topics=[topic], subscriber_timeout=PATIENCE
-        )
-        learner = stage.add(OnlineIdentifierNode, identifier)
-        clock = player.create_publisher(Clock, '/clock', STREAM)
-        full_topic = player.resolve_topic_name(topic)
-        stage.spin_until(
-            lambda: clock.get_subscription_count() >= 2 and _matched(learner), full_topic
-        )
-        played, now, step = Progress(duration, on_progress), EPOCH_NS, 2_000_000
-        while played.t < duration and not player.finished:
-            now += step
-            clock.publish(Clock(clock=Time(nanoseconds=now).to_msg()))
-            due = (now - EPOCH_NS - step - 1) * 1e-9
-            stage.spin_until(
-                lambda due=due: not player.waiting and player.position >= due, '/clock'
-            )
-            count = player.published[full_topic]
-            stage.spin_until(lambda count=count: learner.received >= count, full_topic)
-            played.see(now)
-        return played
 
 
 class Stage:
@@ -274,6 +216,7 @@ class Stage:
             self._executor.spin_once(timeout_sec=0.1)
 
 
-def _matched(learner: OnlineIdentifierNode) -> bool:
+def matched(learner: OnlineIdentifierNode) -> bool:
+    """Subscribe to joint states that are published; return whether there is a publisher."""
     learner.joint_states.match()
     return learner.joint_states.publishers > 0

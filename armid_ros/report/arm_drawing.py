@@ -106,7 +106,7 @@ def draw_poses(
     middle = last.points.mean(axis=0)
     places = collision.robot.positions(way)
     track = np.array([_flat(_frames(model, q)[last.joint].act(middle)) for q in places])
-    strip = _strip(solids, frames, (190.0, 230.0), track)
+    strip = Strip.of(solids, frames, (190.0, 230.0), track)
     bodies = []
     for solid, points in _outlines(solids, frames, strip):
         share = round(100.0 * solid.joint / len(collision.robot.links))
@@ -151,7 +151,7 @@ def draw_arm(
     tried = [[_frames(model, pose)] for pose in poses]
     seen = [np.array([_flat(one.translation) for one in frames]) for (frames,) in tried]
     frames = tried[int(np.argmax([np.prod(np.ptp(one, axis=0) + _MIN_SIZE) for one in seen]))]
-    strip = _strip(solids, frames, (300.0, 240.0))
+    strip = Strip.of(solids, frames, (300.0, 240.0))
     bodies = []
     for solid, points in _outlines(solids, frames, strip):
         chosen = solid.joint > 0 and robot.moving[solid.joint - 1] in marked
@@ -197,21 +197,6 @@ class _Solid:
         seen = seen[ConvexHull(seen).vertices] if len(seen) > _CIRCLE_CORNERS else seen
         cloud = (seen[:, np.newaxis] + ring).reshape(-1, 2)
         return cloud[ConvexHull(cloud).vertices], float((points @ _VIEW[2]).mean())
-
-
-def _strip(
-    solids: Sequence[_Solid],
-    frames: Sequence[list[pin.SE3]],
-    room: tuple[float, float],
-    *others: FloatArray,
-) -> Strip:
-    """Return one frame per pose [px], all large enough for all bodies."""
-    hulls = [solid.seen(frame[solid.joint])[0] for frame in frames for solid in solids]
-    every = np.concatenate([*others, *hulls])
-    margin = 0.03  # around a drawing [m]
-    size = np.ptp(every, axis=0) + 2.0 * margin
-    scale = float(min(room[0] / size[0], room[1] / size[1]))
-    return Strip.around(every, len(frames), margin, scale)
 
 
 def _outlines(
@@ -287,11 +272,21 @@ class Strip:
     count: int
 
     @classmethod
-    def around(cls, points: FloatArray, count: int, margin: float, scale: float) -> Strip:
-        """Make frames that hold all points, shape (K, 2), with a margin [m]."""
+    def of(
+        cls,
+        solids: Sequence[_Solid],
+        frames: Sequence[list[pin.SE3]],
+        room: tuple[float, float],
+        *others: FloatArray,
+    ) -> Strip:
+        """Return frames, at most as large as a room [px], that hold all bodies in all poses."""
+        hulls = [solid.seen(frame[solid.joint])[0] for frame in frames for solid in solids]
+        points, margin = np.concatenate([*others, *hulls]), 0.03  # around a drawing [m]
         left, low = (points.min(axis=0) - margin).tolist()
         right, high = (points.max(axis=0) + margin).tolist()
-        return cls(left, high, (right - left) * scale, (high - low) * scale, scale, count)
+        width, height = right - left, high - low
+        scale = min(room[0] / width, room[1] / height)
+        return cls(left, high, width * scale, height * scale, scale, len(frames))
 
     @property
     def size(self) -> tuple[float, float]:

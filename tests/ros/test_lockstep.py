@@ -9,12 +9,16 @@ from armid_ros.effects import make_effect, parse_effect
 from armid_ros.errors import ArmidError
 from armid_ros.excitation import Excitation, Limits, random_feasible
 from armid_ros.identification.online.identifier import OnlineIdentifier
-from armid_ros.nodes.lockstep import EPOCH_NS, replay_lockstep, run_lockstep
+from armid_ros.nodes.bag_player import BagPlayerNode
+from armid_ros.nodes.lockstep import EPOCH_NS, matched, PATIENCE, run_lockstep, Stage
+from armid_ros.nodes.online_identifier import OnlineIdentifierNode
 from armid_ros.recording import read_recording, topics
 from armid_ros.robots import load_robot
 from armid_ros.simulation import Sensors, SimulatedArm
 import numpy as np
 import pytest
+from rclpy.time import Time
+from rosgraph_msgs.msg import Clock
 
 RATE = 200.0
 AT_REST = 0.27  # what the publisher sees of the arm before it starts
@@ -87,9 +91,27 @@ def test_the_arm_is_where_the_excitation_is(first_run, robot, excitation):
 
 
 def test_a_replay_learns_the_same(first_run, robot):
+    """The bag is played in lock step with /clock, in steps of 2 ms."""
     bag, result, learner = first_run
-    again = identifier(robot)
-    replay_lockstep(bag, again, duration=result.t)
+    again, step, now = identifier(robot), 2_000_000, EPOCH_NS
+    with Stage() as stage:
+        player = stage.add(
+            BagPlayerNode, bag=str(bag), topics=['joint_states'], subscriber_timeout=PATIENCE
+        )
+        node = stage.add(OnlineIdentifierNode, again)
+        clock = player.create_publisher(Clock, '/clock', 10)
+        stage.spin_until(
+            lambda: clock.get_subscription_count() >= 2 and matched(node), 'joint_states'
+        )
+        while now < EPOCH_NS + round(result.t * 1e9) and not player.finished:
+            now += step
+            clock.publish(Clock(clock=Time(nanoseconds=now).to_msg()))
+            due = (now - EPOCH_NS - step - 1) * 1e-9
+            stage.spin_until(
+                lambda due=due: not player.waiting and player.position >= due, '/clock'
+            )
+            count = player.published['/joint_states']
+            stage.spin_until(lambda count=count: node.received >= count, 'joint_states')
     assert again.samples == learner.samples
     np.testing.assert_allclose(again.estimate().values, learner.estimate().values, rtol=1e-9)
 

@@ -61,18 +61,19 @@ def find_period(t: FloatArray, positions: FloatArray) -> tuple[int, slice] | Non
     lag, start, stop = (value * stride for value in best)
     part = slice(start, min(stop, len(t) - lag - stride))
     lags = range(max(1, lag - 2 * stride), lag + 2 * stride + 1)
-    lag = lags[int(np.argmin([mean_change(positions, shift, part) for shift in lags]))]
+    lag = lags[int(np.argmin([_mean_change(positions, shift, part) for shift in lags]))]
     return lag, slice(part.start, min(part.stop, len(t) - lag))
 
 
-def mean_change(positions: FloatArray, lag: int, where: slice) -> float:
+def refined_period(positions: FloatArray, lag: int, where: slice) -> float:
+    """Return a period of `find_period` with a fraction of a sample, from a parabola [samples]."""
+    before, least, after = (_mean_change(positions, lag + shift, where) for shift in (-1, 0, 1))
+    bend = before - 2.0 * least + after
+    return lag + float(0.5 * (before - after) / bend) if 0.0 < bend < np.inf else float(lag)
+
+
+def _mean_change(positions: FloatArray, lag: int, where: slice) -> float:
     """Return the mean square change of positions (N, n) after a lag, from some samples on."""
     end = min(where.stop, len(positions) - lag)
     gap = positions[where.start + lag : end + lag] - positions[where.start : end]
     return float(np.mean(gap**2))
-
-
-def parabola_minimum(before: float, least: float, after: float) -> float:
-    """Return the minimum of a parabola through values at -1, 0 and 1; 0 if it has none."""
-    bend = before - 2.0 * least + after
-    return float(0.5 * (before - after) / bend) if 0.0 < bend < np.inf else 0.0

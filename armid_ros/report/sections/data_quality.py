@@ -7,7 +7,7 @@ from __future__ import annotations
 from collections.abc import Collection, Mapping, Sequence
 
 from armid_ros.identification import Fit
-from armid_ros.identification.rows.period import find_period, mean_change, parabola_minimum
+from armid_ros.identification.rows.period import find_period, refined_period
 from armid_ros.motion import FloatArray
 from armid_ros.recording import Recording
 from armid_ros.recording.recording import GAP_PERIODS
@@ -156,6 +156,5 @@ def repeatability(fits: Sequence[Fit]) -> tuple[float, FloatArray, FloatArray] |
     one, other = fit.residual[first], fit.residual[second]
     apart = np.sum((other - one) ** 2, axis=0, where=used) / pairs
     both = np.sum(one**2 + other**2, axis=0, where=used) / pairs
-    changes = [mean_change(motion.q, lag + shift, where) for shift in (-1, 0, 1)]
-    period = (lag + parabola_minimum(*changes)) * float(motion.t[1] - motion.t[0])
+    period = refined_period(motion.q, lag, where) * float(motion.t[1] - motion.t[0])
     return period, np.sqrt(0.5 * apart), np.sqrt(0.5 * both)

@@ -106,7 +106,7 @@ def fit_section(
         worst = next(name for name, own, _ in errors if own == role)
         score = Score.of(group[worst])
         panels = []
-        for joint in _worst_first(score):
+        for joint in map(int, np.argsort(-score.joint_relative_error_percent)):
             unit = robot.torque_units[joint]
             share = digits(score.joint_relative_error_percent[joint])
             text = f'residual {digits(score.rms[joint])} {unit} rms, {share} %'
@@ -133,11 +133,6 @@ def fit_section(
         )
     )
     return ContentSection('Torque', blocks)
-
-
-def _worst_first(score: Score) -> list[int]:
-    """Return the joints by decreasing relative error."""
-    return [int(joint) for joint in np.argsort(-score.joint_relative_error_percent)]
 
 
 def _fit_charts(fits: Sequence[Fit], joint: int, unit: str, link: str) -> tuple[Chart, Chart]:

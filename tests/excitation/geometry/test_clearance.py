@@ -96,7 +96,7 @@ def test_post_between_two_samples_is_found(two_link):
     path = sweep(two_link)
     coarse = np.linspace(0.0, 4.0, 9)
     assert clearance.smallest(path.motion(coarse).q).min() > 0.05
-    fault = clearance.first_fault(path.motion, path.bounds()[1], coarse)
+    fault = clearance.first_fault(path.motion, path.acceleration_bound(), coarse)
     assert {fault.first, fault.second} == {'lower', 'post'}
     assert fault.distance < 0.01
     there = clearance.smallest(path.motion(np.array([fault.time])).q)
