@@ -13,7 +13,13 @@ from armid_ros.api.table import data_frame, Shown, Summary
 from armid_ros.identification.assess.compare import compare as run
 from armid_ros.identification.assess.comparison import Comparison, SCHEMA
 from armid_ros.identification.parameters_file import ParameterFile, parameters_of, read_parameters
-from armid_ros.report.compare_report import change_rows, compare_report, HEADS, tell, verdict
+from armid_ros.report.compare_report import (
+    change_rows,
+    change_sentences,
+    compare_report,
+    HEADS,
+    verdict,
+)
 from armid_ros.report.provenance import DEFAULT_ORIGIN, ResultOrigin
 
 if TYPE_CHECKING:
@@ -70,7 +76,7 @@ class ComparisonResult(Shown):
     def summary(self) -> Summary:
         """Return the changes, most significant first."""
         rows = change_rows(self.core)
-        first, *more = tell(self.core)
+        first, *more = change_sentences(self.core)
         then = 'diagnose' if self.anything else 'identify'
         heads = HEADS if rows else ()
         return Summary(first, verdict(self.core)[0], heads, rows, lines=more, then=then)

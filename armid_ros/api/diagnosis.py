@@ -19,8 +19,8 @@ from armid_ros.api.arguments import (
     source_of,
     with_sources_apart,
 )
+from armid_ros.api.baseline import baseline_recordings, diagnosed_model
 from armid_ros.api.identification import IdentificationResult
-from armid_ros.api.since import model_in_question, recordings_since
 from armid_ros.api.table import data_frame, ResidualPart, ShownModel, Summary
 from armid_ros.arm import ArmModel, Misfit, save_model
 from armid_ros.diagnosis import diagnose as run
@@ -383,10 +383,10 @@ def diagnose(
     """
     if residual is not None:
         require_residual()
-    arm, model, known, simulated = model_in_question(arm, effects, against, baseline, rng)
+    arm, model, known, simulated = diagnosed_model(arm, effects, against, baseline, rng)
     robot = model.robot
     diagnosed, held_out = some_recordings_of(recordings, robot), recordings_of(validate, robot)
-    before = recordings_since(arm, model, baseline, [*diagnosed, *held_out])
+    before = baseline_recordings(arm, model, baseline, [*diagnosed, *held_out])
     diagnosed, held_out, before = with_sources_apart(diagnosed, held_out, before)
     require_once([*diagnosed, *before], held_out)
     misfit = misfit or known

@@ -380,7 +380,7 @@ class Unexplained:
         Residual torque [N m].
     weight : ndarray, shape (M, n)
         One over the standard deviation of the noise, zero for a row without information [1/(N m)].
-    beside : ndarray, shape (M, n, f)
+    nuisance : ndarray, shape (M, n, f)
         Columns of parameters that are fitted together with any effect.
 
     """
@@ -389,7 +389,7 @@ class Unexplained:
     q: FloatArray
     residual: FloatArray
     weight: FloatArray
-    beside: FloatArray
+    nuisance: FloatArray
 
 
 class Arm(Protocol):

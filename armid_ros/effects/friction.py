@@ -11,7 +11,7 @@ from typing import Any, ClassVar, Self
 from armid_ros.effects.action import Action, direction, DryFriction, merge_actions
 from armid_ros.effects.base import Arm, Effect
 from armid_ros.effects.layout import joint_columns, scatter
-from armid_ros.effects.quantities import Quantity, Shape, SURELY
+from armid_ros.effects.quantities import MIN_Z_SCORE, Quantity, Shape
 from armid_ros.files import finite
 from armid_ros.motion import FloatArray, Motion, Temperatures
 import numpy as np
@@ -96,7 +96,7 @@ class AsymmetricFriction(Effect):
             return True
         known = friction.largest(np.zeros(arm.robot.n_joints))
         shift, doubt = (np.abs(scatter(self, each, arm.robot)[0]) for each in (values, std))
-        return bool(np.all(shift <= known + SURELY * doubt))
+        return bool(np.all(shift <= known + MIN_Z_SCORE * doubt))
 
     def columns(self, motion: Motion, arm: Arm) -> FloatArray:
         """Return dtau/d(dFc, dFv) = (|sign(dq)|, |dq|), shape (N, n, P)."""
@@ -336,7 +336,7 @@ class TemperatureDependentFriction(Effect):
         if action.dry_friction is not None:
             known[1] = action.dry_friction.largest(np.zeros(n))
         known = np.where(known > 0.0, known, np.inf)
-        slopes, doubts = (scatter(self, each, arm.robot) for each in (values, SURELY * std))
+        slopes, doubts = (scatter(self, each, arm.robot) for each in (values, MIN_Z_SCORE * std))
         # friction with grease changes by 0.01 to 0.03 of its size per kelvin
         steep = np.abs(slopes) > 0.05 * known + doubts
         return not (steep.any() or np.any(slopes[0] > doubts[0]))

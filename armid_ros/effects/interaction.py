@@ -175,7 +175,7 @@ class InterfaceSlack(Attached):
         """Return the anchors and slacks that explain most of the residual."""
         rows = np.unique(np.linspace(0, len(unexplained.q) - 1, 400).astype(int))
         weight = unexplained.weight[rows, :, np.newaxis]
-        basis = np.linalg.qr((unexplained.beside[rows] * weight).reshape(weight.size, -1))[0]
+        basis = np.linalg.qr((unexplained.nuisance[rows] * weight).reshape(weight.size, -1))[0]
 
         target = (unexplained.residual[rows, :, np.newaxis] * weight).ravel()
         target -= basis @ (basis.T @ target)
@@ -186,7 +186,7 @@ class InterfaceSlack(Attached):
             pulls = extension(positions - anchors, slacks)
             straps = jacobians[:, 0].swapaxes(1, 2) @ pulls.swapaxes(1, 2)
             columns = (straps * weight).reshape(weight.size, -1)
-            # squares and products of the parts of the columns beyond `beside`
+            # squares and products of the parts of the columns beyond `nuisance`
             own = np.sum(columns**2, axis=0) - np.sum((basis.T @ columns) ** 2, axis=0)
             aim = columns.T @ target
             gain = np.maximum(aim, 0.0) ** 2 / np.maximum(own, max(1e-12 * own.max(), 1e-300))
@@ -218,10 +218,12 @@ class InterfaceSlack(Attached):
 def _proposals(places: FloatArray) -> tuple[FloatArray, FloatArray]:
     """Return anchors (A, 3) and slacks (A,) around the positions of an attachment."""
     middle, spread = places.mean(axis=0), float(places.std(axis=0).max())
-    ways = np.array([way for way in product((-1.0, 0.0, 1.0), repeat=3) if any(way)])
-    ways /= np.linalg.norm(ways, axis=1, keepdims=True)
+    directions = np.array(
+        [direction for direction in product((-1.0, 0.0, 1.0), repeat=3) if any(direction)]
+    )
+    directions /= np.linalg.norm(directions, axis=1, keepdims=True)
     # distances from the mean position, relative to the spread of the positions
-    shells = [middle + distance * spread * ways for distance in (0.7, 1.5, 3.0)]
+    shells = [middle + distance * spread * directions for distance in (0.7, 1.5, 3.0)]
     anchors = np.concatenate([middle[np.newaxis], *shells])
     lengths = np.linalg.norm(places - anchors[:, np.newaxis], axis=2)
     shares = np.array([0.0, 0.2, 0.4, 0.6, 0.8])  # slacks are quantiles of the strap length

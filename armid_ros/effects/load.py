@@ -8,7 +8,7 @@ from dataclasses import dataclass, replace
 
 from armid_ros.effects.action import Action
 from armid_ros.effects.base import Arm, Effect
-from armid_ros.effects.quantities import Quantity, SURELY
+from armid_ros.effects.quantities import MIN_Z_SCORE, Quantity
 from armid_ros.estimate import ParameterName
 from armid_ros.model.rigid_body import LINK_PARAMETERS, LINK_UNITS
 from armid_ros.motion import FloatArray, Motion
@@ -99,9 +99,11 @@ class Payload(_LinkBody):
         share = np.array([x * x, 2.0 * x * y, y * y, 2.0 * x * z, 2.0 * y * z, z * z])
         if not np.all(std[4:][share != 0.0] > 0.0) or not axis.any():  # noqa: RUF069 - exact zero from the description
             return True
-        aside = np.linalg.norm(np.cross(axis, values[1:4])) - SURELY * np.linalg.norm(std[1:4])
-        most = share @ values[4:] + SURELY * np.abs(share) @ std[4:]
-        heaviest = np.maximum(values[0] + SURELY * std[0], 0.0)
+        aside = np.linalg.norm(np.cross(axis, values[1:4])) - MIN_Z_SCORE * np.linalg.norm(
+            std[1:4]
+        )
+        most = share @ values[4:] + MIN_Z_SCORE * np.abs(share) @ std[4:]
+        heaviest = np.maximum(values[0] + MIN_Z_SCORE * std[0], 0.0)
         return not most * heaviest < np.maximum(aside, 0.0) ** 2
 
     def _weighs(self, values: FloatArray, std: FloatArray, arm: Arm) -> bool:
@@ -111,7 +113,7 @@ class Payload(_LinkBody):
         places = [placement.translation for placement in arm.robot.model.jointPlacements]
         # a tool carries its mass within 0.1 m
         length = float(np.sum(np.linalg.norm(places, axis=1))) + 0.1
-        heaviest = float(values[0] + SURELY * std[0])
+        heaviest = float(values[0] + MIN_Z_SCORE * std[0])
         return bool(heaviest > 0.0 and np.linalg.norm(values[1:4]) < length * heaviest)
 
     def spread(self, robot: Robot) -> FloatArray:
@@ -183,5 +185,7 @@ class LinkInertia(_LinkBody):
         (link,) = self.indices(arm.robot.moving)
         own = arm.robot.rigid_parameters.reshape(-1, len(LINK_PARAMETERS))[link]
         # Ixx, Iyy, Izz
-        there, left = (each[[4, 6, 9]] for each in (own, own + values + SURELY * std))
-        return bool(np.all(left > 0.0) or np.any(there <= 0.0))
+        described, remaining = (
+            each[[4, 6, 9]] for each in (own, own + values + MIN_Z_SCORE * std)
+        )
+        return bool(np.all(remaining > 0.0) or np.any(described <= 0.0))

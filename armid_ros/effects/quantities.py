@@ -37,7 +37,7 @@ _MIXED_UNITS = {
 }
 
 #: Number of standard deviations of a significant difference.
-SURELY = 3.0
+MIN_Z_SCORE = 3.0
 
 
 @dataclass(frozen=True)

@@ -40,9 +40,9 @@ class Hysteresis:
 
     def advance(self, state: FloatArray, dq: FloatArray) -> FloatArray:
         """Return the state, (m,), after a displacement of the joints, (n,), in one direction."""
-        way = self.directions @ dq
-        end = np.sign(way)
-        return np.asarray(end - (end - state) * np.exp(-np.abs(way) / self.distance))
+        travel = self.directions @ dq
+        end = np.sign(travel)
+        return np.asarray(end - (end - state) * np.exp(-np.abs(travel) / self.distance))
 
     def torque(self, state: FloatArray) -> FloatArray:
         """Return the joint torques, shape (..., n) [N m], of states of shape (..., m)."""
@@ -58,12 +58,12 @@ class Hysteresis:
             Joint positions, in order of time, and velocities.
 
         """
-        way = q @ self.directions.T
-        states = np.empty_like(way)
+        travel = q @ self.directions.T
+        states = np.empty_like(travel)
         moves = np.abs(dq[0]) > 0.02 * np.abs(dq).max(axis=0)  # slower motion is sensor noise
         states[0] = self.start(np.where(moves, dq[0], 0.0))
         for element, distance in enumerate(self.distance):
-            own, state = way[:, element], states[:, element]
+            own, state = travel[:, element], states[:, element]
             for first, last, end in _stretches(own):
                 decay = np.exp(-np.abs(own[first + 1 : last + 1] - own[first]) / float(distance))
                 state[first + 1 : last + 1] = end - (end - state[first]) * decay
@@ -86,25 +86,25 @@ class Hysteresis:
             Derivative by q.
 
         """
-        way, states = q @ self.directions.T, self.along(q, dq)
+        travel, states = q @ self.directions.T, self.along(q, dq)
         by_state = (weights @ self.directions.T) * self.level
-        by_way = np.zeros_like(way)
+        by_travel = np.zeros_like(travel)
         for element in np.flatnonzero(by_state.any(axis=0)):
-            path, state, distance = way[:, element], states[:, element], self.distance[element]
+            path, state, distance = travel[:, element], states[:, element], self.distance[element]
             # backwards, because a stretch starts in the final state of the previous one
             for first, last, end in reversed(_stretches(path)):
                 own = slice(first + 1, last + 1)
                 decay = np.exp(-np.abs(path[own] - path[first]) / distance)
                 slope = by_state[own, element] * (end - state[own]) * end / distance
-                by_way[own, element] += slope
-                by_way[first, element] -= slope.sum()
+                by_travel[own, element] += slope
+                by_travel[first, element] -= slope.sum()
                 by_state[first, element] += by_state[own, element] @ decay
-        return np.asarray(by_way @ self.directions)
+        return np.asarray(by_travel @ self.directions)
 
 
-def _stretches(way: FloatArray) -> list[tuple[int, int, float]]:
+def _stretches(travel: FloatArray) -> list[tuple[int, int, float]]:
     """Return first and last sample of every stretch between reversals, and its direction."""
-    step = np.sign(np.diff(way))
+    step = np.sign(np.diff(travel))
     turns = np.flatnonzero(np.diff(step)) + 1
     ends = zip(np.append(0, turns), np.append(turns, len(step)), strict=True)
     return [(int(a), int(b), float(step[a])) for a, b in ends if b > a]

@@ -9,7 +9,7 @@ from dataclasses import dataclass
 from armid_ros.effects.action import Action
 from armid_ros.effects.base import Arm, Effect, Unexplained
 from armid_ros.effects.layout import joint_columns, scatter
-from armid_ros.effects.quantities import Quantity, Shape, SURELY
+from armid_ros.effects.quantities import MIN_Z_SCORE, Quantity, Shape
 from armid_ros.motion import FloatArray, Motion
 from armid_ros.robots import Robot
 import numpy as np
@@ -49,7 +49,7 @@ class JointSpring(Effect):
 
     def plausible(self, values: FloatArray, std: FloatArray, arm: Arm) -> bool:
         """Return whether the stiffness is significant; a preload alone is an offset."""
-        return bool(values[0] > SURELY * std[0])
+        return bool(values[0] > MIN_Z_SCORE * std[0])
 
 
 @dataclass(frozen=True)

@@ -60,15 +60,15 @@ class Tied(Attached):
             If the points of the other machine were not recorded with the motion.
 
         """
-        beside, names = motion.partner, self.points
-        if beside is None or not set(names) <= set(beside.names):
+        partner, names = motion.partner, self.points
+        if partner is None or not set(names) <= set(partner.names):
             raise ModelError(
                 f'{self.name} of {", ".join(self.joints)}: the motion of its anchor points on '
                 f'{self.partner or "another machine"} ({", ".join(names)}) was not recorded; name '
                 f'that machine with --partner'
             )
-        columns = [beside.names.index(name) for name in names]
-        position, velocity = beside.position[:, columns], beside.velocity[:, columns]
+        columns = [partner.names.index(name) for name in names]
+        position, velocity = partner.position[:, columns], partner.velocity[:, columns]
         curve = CubicHermiteSpline(motion.t, position, velocity)
         return replace(self, anchor=lambda t: (curve(t), curve(t, 1)))
 

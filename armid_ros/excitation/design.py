@@ -192,9 +192,9 @@ def placed(problem: DesignProblem, trajectory: FourierTrajectory) -> Excitation:
 
     def effort(run: Excitation) -> float:
         """Return the largest share of a velocity or acceleration limit during the run-in."""
-        way = run.at(np.linspace(0.0, run.run_in, 40))
-        velocity = np.abs(way.dq) / limits.velocity
-        acceleration = np.abs(way.ddq) / limits.acceleration
+        path = run.at(np.linspace(0.0, run.run_in, 40))
+        velocity = np.abs(path.dq) / limits.velocity
+        acceleration = np.abs(path.ddq) / limits.acceleration
         return float(max(velocity.max(), acceleration.max()))
 
     run_in, last = settings.run_in, ''

@@ -23,7 +23,7 @@ from armid_ros.motion import FloatArray, Motion
 import numpy as np
 
 #: Samples per period and harmonic.
-_DENSITY = 200
+_CHECK_SAMPLES = 200
 
 
 class Faults(tuple[Violation | Approach, ...]):
@@ -57,7 +57,7 @@ def trajectory_faults(
         Bodies to keep apart.
 
     """
-    motion = trajectory.one_period(_DENSITY * trajectory.harmonics)
+    motion = trajectory.one_period(_CHECK_SAMPLES * trajectory.harmonics)
     violations = _violations(arm, limits, motion, periodic=True)
     if clearance is None:
         return Faults(violations)
@@ -74,12 +74,12 @@ def excitation_faults(arm: ArmModel, limits: Limits, excitation: Excitation) -> 
     `trajectory_faults` proves the clearance of this path.
 
     """
-    step = excitation.trajectory.period / (_DENSITY * excitation.trajectory.harmonics)
+    step = excitation.trajectory.period / (_CHECK_SAMPLES * excitation.trajectory.harmonics)
     count = max(int(np.ceil(excitation.run_in / step)), 20)
     violations: list[Violation] = []
     for start in (0.0, excitation.duration - excitation.run_in):
-        way = excitation.at(start + np.linspace(0.0, excitation.run_in, count + 1))
-        violations += _violations(arm, limits, way, periodic=False)
+        path = excitation.at(start + np.linspace(0.0, excitation.run_in, count + 1))
+        violations += _violations(arm, limits, path, periodic=False)
     return Faults(violations)
 
 
@@ -111,7 +111,7 @@ def _outward(values: FloatArray, periodic: bool) -> FloatArray:
 
 
 #: Samples per period and harmonic for the first check of a drawn trajectory.
-_SAMPLES = 40
+_DRAW_SAMPLES = 40
 
 
 def random_feasible(
@@ -158,12 +158,12 @@ def random_feasible(
             return found
     centre = feasible_pose(arm, limits, rng, clearance)
     trajectory = _draw(limits, period, harmonics, rng)
-    around = FourierTrajectory(limits.joints, period, centre, trajectory.a, trajectory.b)
-    found = _shrunk(arm, limits, around, clearance, 48)
+    centred = FourierTrajectory(limits.joints, period, centre, trajectory.a, trajectory.b)
+    found = _shrunk(arm, limits, centred, clearance, 48)
     if found is None:
         raise TrajectoryError(
-            f'no motion around this pose is feasible: {", ".join(f"{x:.2f}" for x in centre)}'
-            f': {trajectory_faults(arm, limits, around.scaled(0.01), clearance)}'
+            f'no motion centred this pose is feasible: {", ".join(f"{x:.2f}" for x in centre)}'
+            f': {trajectory_faults(arm, limits, centred.scaled(0.01), clearance)}'
         )
     return found
 
@@ -230,7 +230,7 @@ def _draw(
         k * rng.normal(size=(n, harmonics)),
         k * rng.normal(size=(n, harmonics)),
     )
-    motion = raw.one_period(_SAMPLES * harmonics)
+    motion = raw.one_period(_DRAW_SAMPLES * harmonics)
     low, high = motion.q.min(axis=0), motion.q.max(axis=0)
     lower, upper = limits.position_range()
     largest = np.minimum.reduce(
@@ -262,7 +262,7 @@ def _shrunk(
 
     for _ in range(shrinks):
         # most colliding trajectories collide already in a few samples
-        coarse = trajectory.one_period(_SAMPLES * trajectory.harmonics).q
+        coarse = trajectory.one_period(_DRAW_SAMPLES * trajectory.harmonics).q
         if clear(trajectory.q0[np.newaxis]) and clear(coarse):
             if not trajectory_faults(arm, limits, trajectory, clearance):
                 return trajectory
@@ -338,7 +338,7 @@ class Template:
 
 
 #: Motions of all joints: slow, medium, fast, and with the largest accelerations.
-_WHOLE = (
+_WHOLE_ARM = (
     Template('slow motion of all joints', 0.1, 12.0, 3),
     Template('motion of all joints at medium speed', 0.4, 10.0, 5),
     Template('fast motion of all joints', 0.9, 8.0, 6),
@@ -348,7 +348,7 @@ _WHOLE = (
 
 def templates(joints: Sequence[str]) -> tuple[Template, ...]:
     """Return motions that identify effects on some joints; without joints, on the arm."""
-    chosen = list(_WHOLE)
+    chosen = list(_WHOLE_ARM)
     if joints:
         names, alone = ', '.join(joints), tuple(joints)
         chosen += [
@@ -358,6 +358,6 @@ def templates(joints: Sequence[str]) -> tuple[Template, ...]:
         ]
     loaded = [
         replace(t, name=f'{t.name}, without and with a known payload', loaded=True)
-        for t in _WHOLE[:3]
+        for t in _WHOLE_ARM[:3]
     ]
     return (*chosen, *loaded)

@@ -12,7 +12,7 @@ from armid_ros.excitation.geometry.paths import clear_line
 from armid_ros.excitation.limits import check_limits, Limits, SLOW_VELOCITY
 from armid_ros.excitation.pose_monitor import PoseMonitor
 from armid_ros.excitation.run import Run
-from armid_ros.excitation.supervision import HANDOVER, slowed
+from armid_ros.excitation.supervision import HANDOVER_TIME, slowed
 from armid_ros.excitation.transfer import TransferPlanner
 from armid_ros.motion import FloatArray, Motion
 import numpy as np
@@ -153,8 +153,8 @@ class MotionGate:
             raise TrajectoryError(
                 f'{near.first} and {near.second} would be {near.distance:.4f} m apart'
             )
-        needed = max(self._time_of(step, speed), HANDOVER)
-        t, still = needed + np.array([0.0, HANDOVER / 2.0]), np.zeros((2, len(step)))
+        needed = max(self._time_of(step, speed), HANDOVER_TIME)
+        t, still = needed + np.array([0.0, HANDOVER_TIME / 2.0]), np.zeros((2, len(step)))
         return Motion(self.limits.joints, t, np.vstack([inside, inside]), still, still)
 
     def overload(self, effort: FloatArray, factor: float) -> str:

@@ -15,9 +15,9 @@ import numpy as np
 import numpy.typing as npt
 
 #: Number of joint states that have to agree before an unexpected position is accepted.
-AGREEING = 5
+MIN_AGREEING = 5
 #: Velocity below which a joint is at rest [rad/s or m/s].
-AT_REST = 0.02
+REST_SPEED = 0.02
 #: Time window in which rejected positions are counted [s].
 _REJECTION_WINDOW = 0.5
 
@@ -47,8 +47,8 @@ class PoseMonitor:
 
     A position is accepted if it is finite, within the position limits, newer than the last
     accepted one, and reachable from it at the velocity limit. Positions that contradict the last
-    accepted one are accepted when `AGREEING` of them agree with each other and no other position
-    was accepted meanwhile.
+    accepted one are accepted when `MIN_AGREEING` of them agree with each other and no other
+    position was accepted meanwhile.
 
     Parameters
     ----------
@@ -76,7 +76,7 @@ class PoseMonitor:
         self._lower = np.maximum(robot.lower - tolerance, -farthest)
         self._upper = np.minimum(robot.upper + tolerance, farthest)
         self._sources: dict[tuple[str, ...], _Source] = {}
-        self._rejections: deque[tuple[float, str]] = deque(maxlen=4 * AGREEING)
+        self._rejections: deque[tuple[float, str]] = deque(maxlen=4 * MIN_AGREEING)
         self.rejected = 0
 
     @property
@@ -138,19 +138,19 @@ class PoseMonitor:
                 source.rivals.clear()
             source.rivals.append(state)
             seen = self.pose.seen[source.joints].max()
-            if len(source.rivals) < AGREEING or seen >= source.rivals[0].arrived:
+            if len(source.rivals) < MIN_AGREEING or seen >= source.rivals[0].arrived:
                 return
             source.states.clear()
         source.rivals.clear()
         states = source.states
         states.append(state)
-        while len(states) > AGREEING and state.arrived - states[1].arrived > _REJECTION_WINDOW:
+        while len(states) > MIN_AGREEING and state.arrived - states[1].arrived > _REJECTION_WINDOW:
             states.popleft()
         q = np.full(len(self.pose.joints), np.nan)
         q[source.joints] = state.q
         self.pose = self.pose.updated(q, state.stamp_ns, state.arrived)
 
-    def contradiction(self, now: float, count: int = AGREEING) -> str:
+    def contradiction(self, now: float, count: int = MIN_AGREEING) -> str:
         """Return why many positions of the last 0.5 s were rejected; empty if only few were."""
         recent = [
             fault for arrived, fault in self._rejections if now - arrived <= _REJECTION_WINDOW
@@ -171,7 +171,7 @@ class PoseMonitor:
                     break
         return velocity
 
-    def unsteady(self, span: float, count: int = AGREEING) -> str | None:
+    def unsteady(self, span: float, count: int = MIN_AGREEING) -> str | None:
         """
         Return a message if the arm is not at rest.
 
@@ -205,7 +205,7 @@ class PoseMonitor:
                 # range of the positions of a joint at rest, encoder noise included [rad or m]
                 speed = distance / covered if distance > 0.004 else 0.0
                 speed = max(speed, abs(velocity))
-                if speed > AT_REST:
+                if speed > REST_SPEED:
                     unit = f'{self._units[j]}/s'
                     return f"joint '{self.pose.joints[j]}' moves at {speed:.2g} {unit}"
             decided.update(source.joints.tolist())

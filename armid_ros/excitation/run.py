@@ -45,15 +45,15 @@ class Run:
     def __post_init__(self) -> None:
         """Round the transfers to whole numbers of samples; check that they meet the excitation."""
         ends = self.excitation.at([0.0, self.excitation.duration]).q
-        for way, own, end in ((self.approach, -1, 0), (self.back, 0, 1)):
+        for transfer, own, end in ((self.approach, -1, 0), (self.back, 0, 1)):
             # [rad or m]; rounding
-            if way is not None and np.abs(way.q[own] - ends[end]).max() > 1e-9:
+            if transfer is not None and np.abs(transfer.q[own] - ends[end]).max() > 1e-9:
                 raise TrajectoryError('run: a transfer and the excitation do not meet')
         for name in ('approach', 'back'):
-            way = getattr(self, name)
-            if way is not None:
-                whole = max(math.ceil(way.duration * self.rate - 1e-6), 1)
-                object.__setattr__(self, name, way.lasting(whole / self.rate))
+            transfer = getattr(self, name)
+            if transfer is not None:
+                whole = max(math.ceil(transfer.duration * self.rate - 1e-6), 1)
+                object.__setattr__(self, name, transfer.lasting(whole / self.rate))
 
     @property
     def joints(self) -> tuple[str, ...]:

@@ -81,10 +81,10 @@ class CollisionScene:
         """
         require_radians(robot)
         collision = collision_model(robot, progress=progress)
-        around = load_environment(environment, robot) if environment else ()
-        found = find_floor(collision, floor, around)
-        around = (*around, *floor_obstacles(collision, found, clearance))
-        return cls(collision, found, around, clearance)
+        obstacles = load_environment(environment, robot) if environment else ()
+        found = find_floor(collision, floor, obstacles)
+        obstacles = (*obstacles, *floor_obstacles(collision, found, clearance))
+        return cls(collision, found, obstacles, clearance)
 
     @property
     def bodies(self) -> CollisionModel:

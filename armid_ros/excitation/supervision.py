@@ -14,7 +14,7 @@ import numpy as np
 import numpy.typing as npt
 
 #: Largest delay of a controller before it begins a stop trajectory [s].
-HANDOVER = 0.05
+HANDOVER_TIME = 0.05
 
 
 class Path(Protocol):
@@ -178,7 +178,7 @@ def slowed(path: Path, phase: float, duration: float, rate: float) -> Motion:
 
     """
     count = int(np.ceil(duration * rate)) + 1
-    t = np.linspace(min(HANDOVER, duration / 2.0), duration, count)
+    t = np.linspace(min(HANDOVER_TIME, duration / 2.0), duration, count)
     x = np.pi * t / duration
     motion = path.at(phase + (t + np.sin(x) * duration / np.pi) / 2.0)
     speed = ((1.0 + np.cos(x)) / 2.0)[:, np.newaxis]

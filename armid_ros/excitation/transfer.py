@@ -107,12 +107,12 @@ class TransferPlanner:
             np.random.default_rng(seed),
         )
         # the path with the duration that the limits require
-        way = np.abs(np.diff(poses, axis=0))
+        distance = np.abs(np.diff(poses, axis=0))
         velocity = np.where(np.isfinite(limits.velocity), limits.velocity, SLOW_VELOCITY)
         # largest velocity and acceleration of a quintic from 0 to 1 in unit time
         needed = np.maximum(
-            (1.875 * way / velocity).max(axis=1),
-            np.sqrt((10.0 / np.sqrt(3.0)) * way / limits.acceleration).max(axis=1),
+            (1.875 * distance / velocity).max(axis=1),
+            np.sqrt((10.0 / np.sqrt(3.0)) * distance / limits.acceleration).max(axis=1),
         )
         # the duration is positive for a transfer without motion, too
         t = np.append(0.0, np.cumsum(np.maximum(needed, 1e-6)))

@@ -297,7 +297,9 @@ def check_links(found: Identification, described: ArmModel, grade: str, fault: s
         fitted_error_percent=fitted_error,
         grade=grade,
         fault=fault,
-        rivals=tuple(k for k, left in enumerate(alone) if left < most and wrong not in ([k], [])),
+        rivals=tuple(
+            k for k, remaining in enumerate(alone) if remaining < most and wrong not in ([k], [])
+        ),
     )
 
 
@@ -324,11 +326,11 @@ def _selected(rows: FloatArray, spread: FloatArray, total: float) -> list[int]:
     rest = total
     # with more wrong links, the cause may be the model itself
     while len(wrong) < min(3, len(every)) and rest > _MAX_CHI_SQUARED * len(rows):
-        left = {k: _fit(rows, spread, [*wrong, k])[2] for k in every if k not in wrong}
-        best = min(left, key=left.__getitem__)
-        if left[best] > (1.0 - _MIN_SHARE) * rest:
+        remaining = {k: _fit(rows, spread, [*wrong, k])[2] for k in every if k not in wrong}
+        best = min(remaining, key=remaining.__getitem__)
+        if remaining[best] > (1.0 - _MIN_SHARE) * rest:
             break
-        wrong, rest = [*wrong, best], left[best]
+        wrong, rest = [*wrong, best], remaining[best]
     for k in wrong[:-1]:
         fewer = [one for one in wrong if one != k]
         if _fit(rows, spread, fewer)[2] < max(rest / _MIN_SHARE, _MAX_CHI_SQUARED * len(rows)):

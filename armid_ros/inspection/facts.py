@@ -269,8 +269,8 @@ def try_identification(arm: ArmModel, recording: Recording, rng: np.random.Gener
         elsewhere=tuple(one.text for one in held_elsewhere(robot, [recording], motions)),
         poor=tuple(
             f'{error:.0f} % of the efforts of {joint}'
-            for joint, error, left in zip(robot.joints, errors, beyond, strict=True)
-            if left > LIMITS.poor
+            for joint, error, excess in zip(robot.joints, errors, beyond, strict=True)
+            if excess > LIMITS.poor
         ),
         grade=graded.word,
         reasons=graded.reasons,

@@ -90,8 +90,8 @@ class Inspection:
             return 'Refused by `armid identify`.'
         if self.trial.grade != 'good':
             reason = self.trial.reasons[0]
-            said = _contains_any(reason, [remark.text for remark in self.remarks])
-            why = '.' if said else f': {reason}'
+            stated = _contains_any(reason, [remark.text for remark in self.remarks])
+            why = '.' if stated else f': {reason}'
             return f'Graded {self.trial.grade} by `armid identify`{why}'
         return (
             f'Ready for `armid identify`: {self.trial.rank} of {self.trial.theory} parameters are '
@@ -149,8 +149,8 @@ def inspect(
     elif trial is not None:
         found += _of_fit(trial, [remark.text for remark in found])
         found += [Remark('doubt', text) for text in trial.elsewhere]
-        said = {remark.text for remark in found}
-        found += [Remark('note', note) for note in trial.notes if note not in said]
+        known = {remark.text for remark in found}
+        found += [Remark('note', note) for note in trial.notes if note not in known]
     if robot is not None:
         found += [Remark('note', note) for note in notes_on(robot)]
     return Inspection(recording, topics, robot, sampling, joints, trial, worst_first(found))
@@ -201,10 +201,10 @@ def _contains_any(text: str, others: Iterable[str]) -> bool:
     return any(other.casefold() in text.casefold() for other in others)
 
 
-def _of_fit(trial: TrialFit, said: Sequence[str]) -> Iterator[Remark]:
+def _of_fit(trial: TrialFit, known: Sequence[str]) -> Iterator[Remark]:
     """Yield the faults found by identify that are in no remark yet."""
     weight: Weight = 'bad' if trial.grade == 'unusable' else 'doubt'
-    others = [*said, *trial.elsewhere]
+    others = [*known, *trial.elsewhere]
     yield from (
         Remark(weight, fault) for fault in trial.faults if not _contains_any(fault, others)
     )

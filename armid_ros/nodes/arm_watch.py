@@ -8,7 +8,7 @@ from collections.abc import Callable, Iterable
 import math
 from typing import Any
 
-from armid_ros.excitation.pose_monitor import AGREEING, PoseMonitor
+from armid_ros.excitation.pose_monitor import MIN_AGREEING, PoseMonitor
 from armid_ros.motion import FloatArray
 from armid_ros.nodes.base import ArmidNode
 from armid_ros.nodes.messages.timeliness import StampDifference
@@ -125,8 +125,8 @@ class ArmWatch:
         fault = monitor.contradiction(now, 1) or self.staleness(timeout) or monitor.unsteady(rest)
         if fault is None:
             fault = (
-                f'fewer than {AGREEING} new joint states, or less than {rest:g} s of them, were '
-                'received: whether the arm is at rest is unknown'
+                f'fewer than {MIN_AGREEING} new joint states, or less than {rest:g} s of them, '
+                'were received: whether the arm is at rest is unknown'
             )
         if fault:
             return f'{topic}: {fault}'

@@ -15,7 +15,7 @@ from armid_ros.errors import ArmidError, TrajectoryError
 from armid_ros.excitation import Excitation, plan_run, TransferPlanner
 from armid_ros.excitation.gate import Ending, MotionGate
 from armid_ros.excitation.schedule import load_excitation, read_excitation
-from armid_ros.excitation.supervision import HANDOVER, Rehearsal, tracking_fault
+from armid_ros.excitation.supervision import HANDOVER_TIME, Rehearsal, tracking_fault
 from armid_ros.files import reading
 from armid_ros.nodes.arm_watch import ArmWatch
 from armid_ros.nodes.base import ArmidNode
@@ -190,13 +190,13 @@ class ExcitationPublisherNode(ArmidNode):
         gate = MotionGate.of(planned, self._planner)
         motion = planned.motion()
         # the run starts at the set point, which differs from the measured position
-        first = max(math.ceil(HANDOVER * self._rate), 1)
+        first = max(math.ceil(HANDOVER_TIME * self._rate), 1)
         message = write_trajectory(motion.select(slice(first, None)))
         self._controller.discover()  # no time passes between the stamp and the sending
         self._arm.catch_up()
         pose, units = self._arm.monitor.pose, self._planner.arm.robot.position_units
         fault = self._arm.monitor.contradiction(self._arm.now(), 1)
-        # a controller covers 0.01 rad or m before the first waypoint, within `HANDOVER`
+        # a controller covers 0.01 rad or m before the first waypoint, within `HANDOVER_TIME`
         fault = fault or tracking_fault(pose.joints, units, begin, pose.q, 0.01)
         if fault:
             raise TrajectoryError(f'{fault}, during planning; the arm is not started')

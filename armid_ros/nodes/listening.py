@@ -12,7 +12,7 @@ from armid_ros.nodes.messages.joint_states import (
     DISTURBANCES,
     JointSample,
     JointStateReader,
-    OF_TWO,
+    SENDER_CONFLICTS,
 )
 from armid_ros.nodes.messages.timeliness import Freshness, StampDifference
 from armid_ros.nodes.qos import LATCHED, MatchedSubscription
@@ -118,7 +118,7 @@ class ListeningNode(ArmidNode):
             Text for a reason that is not a key.
 
         """
-        several = self.joint_states.several if reason in OF_TWO else ''
+        several = self.joint_states.several if reason in SENDER_CONFLICTS else ''
         parts = text or DISTURBANCES[reason], several
         self.complaints.say(reason, '; '.join(filter(None, parts)))
 

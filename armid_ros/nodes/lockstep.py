@@ -21,7 +21,7 @@ from typing import Any, TypeVar
 from armid_ros.arm import ArmModel
 from armid_ros.errors import ArmidError
 from armid_ros.excitation import Excitation, Limits, TransferPlanner
-from armid_ros.excitation.pose_monitor import AGREEING
+from armid_ros.excitation.pose_monitor import MIN_AGREEING
 from armid_ros.identification.online.identifier import OnlineIdentifier
 from armid_ros.nodes.base import ArmidNode
 from armid_ros.nodes.excitation_publisher import ExcitationPublisherNode
@@ -38,7 +38,7 @@ from rclpy.parameter import Parameter
 AnyNode = TypeVar('AnyNode', bound=ArmidNode)
 
 #: Timeout of a message [s]; discovery takes up to 3 s.
-PATIENCE = 20.0
+MESSAGE_TIMEOUT = 20.0
 #: First time of the clock [ns]; zero would mean a missing stamp.
 EPOCH_NS = 1_000 * 10**9
 
@@ -159,7 +159,7 @@ def run_lockstep(
 
         stage.spin_until(connected, 'discovery')
         # the publisher requires an arm at rest for 0.25 s
-        for _ in range(max(math.ceil(0.26 * rate), AGREEING) + 1):
+        for _ in range(max(math.ceil(0.26 * rate), MIN_AGREEING) + 1):
             begun = step()
             stage.spin_until(lambda begun=begun: publisher.last_stamp_ns == begun, 'joint_states')
         publisher.start()
@@ -206,12 +206,12 @@ class Stage:
         return node
 
     def spin_until(self, done: Callable[[], object], what: str) -> None:
-        deadline = time.monotonic() + PATIENCE
+        deadline = time.monotonic() + MESSAGE_TIMEOUT
         while not done():
             if time.monotonic() > deadline:  # after the timeout, done() is checked once more
                 raise ArmidError(
-                    f'{what}: no message for {PATIENCE:g} s; is UDP on the loopback interface '
-                    'blocked?'
+                    f'{what}: no message for {MESSAGE_TIMEOUT:g} s; is UDP on the loopback '
+                    'interface blocked?'
                 )
             self._executor.spin_once(timeout_sec=0.1)
 

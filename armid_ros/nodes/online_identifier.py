@@ -285,8 +285,8 @@ class OnlineIdentifierNode(ListeningNode):
             self._counted += 1
             self._publish_effort(self._predictions, learned.predicted)
             self._publish_effort(self._residuals, learned.residual)
-        for change in identifier.changes[self._told :]:
-            self._told += 1
+        for change in identifier.changes[self._n_reported :]:
+            self._n_reported += 1
             self._progress.reset()  # a new estimate has the same time until a warning
             self.get_logger().warning(str(change))
             self._publish(self._changes, change.size, change.t)
@@ -312,7 +312,7 @@ class OnlineIdentifierNode(ListeningNode):
         self.adopt(robot)
         self.identifier = identifier
         self._names = list(robot.joints)
-        self._last_sample, self._published, self._told = 0.0, -1, len(identifier.changes)
+        self._last_sample, self._published, self._n_reported = 0.0, -1, len(identifier.changes)
         self._disturbed: Counter[str] = Counter()
         self._progress = LearningProgress(
             identifier.arm, identifier.base, np.random.default_rng(0)

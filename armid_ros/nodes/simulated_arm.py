@@ -43,7 +43,7 @@ from std_msgs.msg import String
 from trajectory_msgs.msg import JointTrajectory
 
 #: Longest trajectory [s]; all its steps are checked against the limits at its start.
-LONGEST = 3600.0
+MAX_DURATION = 3600.0
 
 
 def _samples(node: Node, kind: type, topic: str) -> Publisher:
@@ -326,10 +326,10 @@ class SimulatedArmNode(ArmidNode):
     def _on_trajectory(self, message: JointTrajectory) -> None:
         try:
             reference = waypoints_of(message).for_robot(self._arm.plant.robot)
-            if reference.duration > LONGEST:
+            if reference.duration > MAX_DURATION:
                 raise TrajectoryError(
                     f'trajectory: it lasts {reference.duration:.4g} s; the longest accepted one '
-                    f'lasts {LONGEST:g} s'
+                    f'lasts {MAX_DURATION:g} s'
                 )
             stamp = message.header.stamp
             start_ns = stamp.sec * 10**9 + stamp.nanosec or self.stamp_ns

@@ -25,9 +25,9 @@ from trajectory_msgs.msg import JointTrajectory, JointTrajectoryPoint
 from unique_identifier_msgs.msg import UUID
 
 #: Tolerance that permits any joint position; zero means the default of the controller.
-ANYWHERE = -1.0
+NO_TOLERANCE = -1.0
 #: Timeout of the answer to a goal [s]; a controller first checks every waypoint.
-_ANSWER = 5.0
+_ANSWER_TIMEOUT = 5.0
 #: Texts of the error codes of control_msgs/action/FollowJointTrajectory.
 _ERRORS = {
     -1: 'the goal is not valid',
@@ -185,7 +185,7 @@ class TrajectoryController:
     def bring_to_rest(self, trajectory: JointTrajectory) -> None:
         """Send the trajectory that stops a run, without tolerances."""
         if self._by_action:
-            self._send_goal(trajectory, ANYWHERE, ANYWHERE)
+            self._send_goal(trajectory, NO_TOLERANCE, NO_TOLERANCE)
         else:
             self._publisher.publish(trajectory)
 
@@ -204,8 +204,8 @@ class TrajectoryController:
             self._seen = now
         if now - self._seen > patience:
             return f'{self.action} is gone: its controller was stopped or restarted'
-        if goal.handle is None and now - goal.sent > _ANSWER:
-            return f'{self.action} did not answer the goal within {_ANSWER:g} s'
+        if goal.handle is None and now - goal.sent > _ANSWER_TIMEOUT:
+            return f'{self.action} did not answer the goal within {_ANSWER_TIMEOUT:g} s'
         return ''
 
     def settle(self, patience: float) -> None:
@@ -268,7 +268,7 @@ class TrajectoryController:
             Motion for the arm.
         path, end : float
             Tolerance of each joint on the path, and at its end [rad or m]. 0: default of the
-            controller, `ANYWHERE`: no limit.
+            controller, `NO_TOLERANCE`: no limit.
         late : float
             Largest delay of the end [s]; 0: default of the controller.
 

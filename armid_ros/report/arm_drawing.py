@@ -83,7 +83,7 @@ class ArmDrawing(Templated):
 
 
 def draw_poses(
-    collision: CollisionModel, poses: FloatArray, captions: Sequence[str], way: FloatArray
+    collision: CollisionModel, poses: FloatArray, captions: Sequence[str], path: FloatArray
 ) -> ArmDrawing:
     """
     Draw an arm and the obstacles around it in several poses.
@@ -96,7 +96,7 @@ def draw_poses(
         Poses to draw [rad or m].
     captions : sequence of str, length K
         Text below each pose.
-    way : ndarray, shape (N, n)
+    path : ndarray, shape (N, n)
         Poses between which the last body moves.
 
     """
@@ -104,7 +104,7 @@ def draw_poses(
     frames = [_frames(model, q) for q in map(collision.robot.positions, poses)]
     last = max(solids, key=lambda solid: solid.joint)
     middle = last.points.mean(axis=0)
-    places = collision.robot.positions(way)
+    places = collision.robot.positions(path)
     track = np.array([_flat(_frames(model, q)[last.joint].act(middle)) for q in places])
     strip = Strip.of(solids, frames, (190.0, 230.0), track)
     bodies = []

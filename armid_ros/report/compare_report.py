@@ -62,7 +62,10 @@ def compare_report(comparison: Comparison, origin: ResultOrigin) -> str:
     rows = change_rows(comparison)
     sections: list[Section] = [
         VerdictSection(
-            *verdict(comparison), tell(comparison), _beware(comparison), step=origin.step
+            *verdict(comparison),
+            change_sentences(comparison),
+            _beware(comparison),
+            step=origin.step,
         ),
         *([ContentSection('What changed', [DataTable(HEADS, rows, kind='both')])] if rows else []),
         changes_section(comparison),
@@ -106,7 +109,7 @@ def change_rows(comparison: Comparison) -> list[tuple[str, ...]]:
     return rows
 
 
-def tell(comparison: Comparison) -> tuple[str, ...]:
+def change_sentences(comparison: Comparison) -> tuple[str, ...]:
     """Return sentences on the changes, the headline first, the details last."""
     lines = []
     for one in comparison.unusable:
@@ -126,7 +129,7 @@ def tell(comparison: Comparison) -> tuple[str, ...]:
         return tuple(lines)
     if comparison.load is not None:
         lines += _load(comparison, comparison.load)
-    lines += [_sum(comparison), *_residuals(comparison), *_tell_not_compared(comparison)]
+    lines += [_count_sentence(comparison), *_residuals(comparison), *_not_compared(comparison)]
     changed = comparison.changed
     for group in comparison.changed_together:
         what = f'Effects at {group.joint}' if group.joint else 'The rigid body'
@@ -145,7 +148,7 @@ def tell(comparison: Comparison) -> tuple[str, ...]:
     return tuple(lines)
 
 
-def _sum(comparison: Comparison) -> str:
+def _count_sentence(comparison: Comparison) -> str:
     """Return a sentence on the number of changed parameters."""
     changed, others = comparison.changed, len(comparison.not_compared)
     count = counted(len(comparison.changes), 'parameter') + ' that both have' * bool(others)
@@ -222,7 +225,7 @@ def _least_visible(changes: Sequence[ParameterChange]) -> str:
     )
 
 
-def _tell_not_compared(comparison: Comparison) -> tuple[str, ...]:
+def _not_compared(comparison: Comparison) -> tuple[str, ...]:
     """Return a sentence for each reason why parameters of a side are not compared."""
     lines = []
     if comparison.left_out:

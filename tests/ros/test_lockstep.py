@@ -10,7 +10,7 @@ from armid_ros.errors import ArmidError
 from armid_ros.excitation import Excitation, Limits, random_feasible
 from armid_ros.identification.online.identifier import OnlineIdentifier
 from armid_ros.nodes.bag_player import BagPlayerNode
-from armid_ros.nodes.lockstep import EPOCH_NS, matched, PATIENCE, run_lockstep, Stage
+from armid_ros.nodes.lockstep import EPOCH_NS, matched, MESSAGE_TIMEOUT, run_lockstep, Stage
 from armid_ros.nodes.online_identifier import OnlineIdentifierNode
 from armid_ros.recording import read_recording, topics
 from armid_ros.robots import load_robot
@@ -96,7 +96,10 @@ def test_a_replay_learns_the_same(first_run, robot):
     again, step, now = identifier(robot), 2_000_000, EPOCH_NS
     with Stage() as stage:
         player = stage.add(
-            BagPlayerNode, bag=str(bag), topics=['joint_states'], subscriber_timeout=PATIENCE
+            BagPlayerNode,
+            bag=str(bag),
+            topics=['joint_states'],
+            subscriber_timeout=MESSAGE_TIMEOUT,
         )
         node = stage.add(OnlineIdentifierNode, again)
         clock = player.create_publisher(Clock, '/clock', 10)

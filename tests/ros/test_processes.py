@@ -209,7 +209,7 @@ def test_a_process_that_cannot_leave_is_ended_and_says_where_it_hangs(tmp_path):
         'import threading\n'
         'from armid_ros.nodes.recorder import RecorderNode\n'
         'from armid_ros.nodes.running import process\n'
-        'process.LEAVING = 1.0\n'
+        'process.SHUTDOWN_TIMEOUT = 1.0\n'
         'RecorderNode.destroy_node = lambda self: threading.Event().wait()\n'
         'RecorderNode.finished = property(lambda self: True)\n'
         f"process.run(RecorderNode, ['--ros-args', '-p', 'bag:={tmp_path / 'bag'}'])\n"

@@ -86,7 +86,7 @@ def test_a_goal_that_is_refused_or_not_answered_is_no_run(
     bench, arm, excitation, monkeypatch, deaf, fact
 ):
     if not deaf:
-        monkeypatch.setattr('armid_ros.nodes.trajectory_controller._ANSWER', 0.0)
+        monkeypatch.setattr('armid_ros.nodes.trajectory_controller._ANSWER_TIMEOUT', 0.0)
     node = publisher(bench, arm, excitation)
     arm.faults.deaf = deaf
     node.start()

@@ -13,7 +13,7 @@ from dataclasses import replace
 
 from armid_ros.diagnosis.search.explanation import as_bodies, Explanation
 from armid_ros.diagnosis.search.trial import Trial
-from armid_ros.effects.quantities import SURELY
+from armid_ros.effects.quantities import MIN_Z_SCORE
 from armid_ros.model import LINK_PARAMETERS
 from armid_ros.motion import FloatArray
 from armid_ros.robots import Robot
@@ -38,9 +38,9 @@ def is_same_body(one: Trial, other: Trial, robot: Robot) -> bool:
     if tree.model.parents[after + 1] != before + 1 or not axis.any():
         return False
     (load, std), (same, same_std) = (_values(trial) for trial in (outer, inner))
-    alike = abs(load[0] - same[0]) <= SURELY * np.hypot(std[0], same_std[0])
+    alike = abs(load[0] - same[0]) <= MIN_Z_SCORE * np.hypot(std[0], same_std[0])
     aside = np.linalg.norm(np.cross(axis, load[1:4]))
-    return bool(alike and aside <= SURELY * np.linalg.norm(std[1:4]))
+    return bool(alike and aside <= MIN_Z_SCORE * np.linalg.norm(std[1:4]))
 
 
 def _values(trial: Trial) -> tuple[FloatArray, FloatArray]:

@@ -179,8 +179,8 @@ class ClearanceModel:
             axes[..., sample].transpose(2, 0, 1) for axes in (frames.lines, frames.turns)
         )
         motion = lines + np.cross(turns, moved)
-        along = np.einsum('mjc,mc->mj', motion, normal)
-        by_q = along * self.between[pair]
+        speed = np.einsum('mjc,mc->mj', motion, normal)
+        by_q = speed * self.between[pair]
         if frames.coupling is not None:
             by_q = np.einsum('km,kmn->kn', by_q, frames.coupling[sample])
         return NearPairs(sample, pair, distance, by_q)

@@ -143,9 +143,9 @@ def outline(shape: coal.CollisionGeometry) -> tuple[FloatArray, float]:
 def _support(shape: coal.CollisionGeometry, direction: FloatArray) -> FloatArray:
     """Return the extent of a shape along unit vectors in its frame, shape (N, 3) to (N,) [m]."""
     if isinstance(shape, coal.Cylinder):
-        along = np.abs(direction[:, 2])
-        across = np.sqrt(np.maximum(1.0 - along**2, 0.0))
-        return np.asarray(shape.halfLength * along + shape.radius * across)
+        axial = np.abs(direction[:, 2])
+        radial = np.sqrt(np.maximum(1.0 - axial**2, 0.0))
+        return np.asarray(shape.halfLength * axial + shape.radius * radial)
     points, skin = outline(shape)
     if not len(points):
         return np.full(len(direction), np.inf)

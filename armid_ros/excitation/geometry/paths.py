@@ -100,16 +100,16 @@ def clear_line(
     """Prove that a straight line between two poses (n,) is clear, or return an approach."""
     if clearance is None:
         return None
-    way = goal - start
-    count = int(np.ceil(np.abs(way).max() / _PROOF_INTERVAL)) + 1
+    difference = goal - start
+    count = int(np.ceil(np.abs(difference).max() / _PROOF_INTERVAL)) + 1
 
     def path(share: FloatArray) -> Motion:
-        q = start + share[:, np.newaxis] * way
-        dq = np.broadcast_to(way, q.shape)
+        q = start + share[:, np.newaxis] * difference
+        dq = np.broadcast_to(difference, q.shape)
         return Motion(clearance.collision.robot.joints, share, q, dq, np.zeros_like(q))
 
     times = np.linspace(0.0, 1.0, count + 1)
-    return clearance.first_fault(path, np.zeros(len(way)), times)
+    return clearance.first_fault(path, np.zeros(len(difference)), times)
 
 
 @dataclass
@@ -123,12 +123,12 @@ class _Tree:
     def grow(self, target: FloatArray) -> int | None:
         """Step towards a pose from the nearest pose of the tree; return the pose reached."""
         nearest = int(np.argmin([np.linalg.norm(target - q) for q in self.poses]))
-        way = target - self.poses[nearest]
-        reach = float(np.abs(way).max())
+        difference = target - self.poses[nearest]
+        reach = float(np.abs(difference).max())
         if not reach > 0.0:
             return nearest
         longest = 0.6  # straight line of a tree [rad or m]
-        step = target if reach <= longest else self.poses[nearest] + way * (longest / reach)
+        step = target if reach <= longest else self.poses[nearest] + difference * (longest / reach)
         if not self.free(self.poses[nearest], step):
             return None
         self.poses.append(step)

@@ -158,20 +158,20 @@ class Criterion:
             size = np.sqrt(np.maximum(np.diag(block), 0.0))
             unit = np.divide(1.0, size, out=np.zeros_like(size), where=size > 0.0)
             shares, axes = np.linalg.eigh(block * np.outer(unit, unit))
-            along = unit[:, np.newaxis] * axes[:, shares > _MIN_EIGENVALUE]
+            directions = unit[:, np.newaxis] * axes[:, shares > _MIN_EIGENVALUE]
             projection[:, nuisance] = (
-                -(reach.T @ along / shares[shares > _MIN_EIGENVALUE]) @ along.T
+                -(reach.T @ directions / shares[shares > _MIN_EIGENVALUE]) @ directions.T
             )
         units = self.scale[wanted] if self.name in 'AE' else np.ones(len(wanted))
         projection *= units[:, np.newaxis]
-        left = projection @ matrix @ projection.T
+        schur = projection @ matrix @ projection.T
         if self.name == 'T':
             direction = projection.T @ self.values[wanted]
-            power = float(self.values[wanted] @ left @ self.values[wanted])
+            power = float(self.values[wanted] @ schur @ self.values[wanted])
             if power <= 0.0:
                 return float(np.inf), np.zeros_like(matrix)
             return float(-np.log(power)), -np.outer(direction, direction) / power
-        values, vectors = np.linalg.eigh(left)
+        values, vectors = np.linalg.eigh(schur)
         if values[0] <= 0.0:
             return float(np.inf), np.zeros_like(matrix)
         cost, slope = self._of_eigenvalues(values, norm)

@@ -165,7 +165,7 @@ class Search:
                 for _ in range(_ROUNDS_PER_HALVING):
                     branch.advance()
             branches = sorted(branches, key=lambda branch: branch.cost)[: -(-len(branches) // 2)]
-            branches = [branch for branch in branches if branch.left > 0]
+            branches = [branch for branch in branches if branch.remaining > 0]
 
 
 @dataclass
@@ -191,12 +191,12 @@ class _Branch:
         self.upper = np.full_like(self.scale, 4.0 / np.pi * np.sqrt(settings.harmonics))
         self.lower = -self.upper
         self.lower[:, 0], self.upper[:, 0] = low / self.scale[:, 0], high / self.scale[:, 0]
-        self.left = settings.iterations
+        self.remaining = settings.iterations
         self.times, self.box, self.sharpness = np.empty(0), _BOX_HALF_WIDTH, _SHARPNESS[0]
 
     def advance(self) -> None:
         """Run the solver for a round, within a box about the last feasible trajectory."""
-        if self.left <= 0:
+        if self.remaining <= 0:
             return
         problem, clearance = self.search.problem, self.search.clearance
         settings = problem.settings
@@ -208,8 +208,8 @@ class _Branch:
             sharpness=self.sharpness,
             more_times=self.times,
         )
-        z, used = self._solve(constraints, min(_ROUND_ITERATIONS, self.left))
-        self.left -= used
+        z, used = self._solve(constraints, min(_ROUND_ITERATIONS, self.remaining))
+        self.remaining -= used
         trajectory = FourierTrajectory.of(problem.limits.joints, settings.period, z * self.scale)
         # the times of the worst torque or clearance faults between the samples
         motion = trajectory.one_period(200 * trajectory.harmonics)
@@ -229,7 +229,7 @@ class _Branch:
         self.trajectory, self.box = feasible, min(2.0 * self.box, _BOX_HALF_WIDTH)
         # gain of a round below which the search has converged
         if gain < 0.005:
-            self.left = 0 if self.sharpness == _SHARPNESS[-1] else self.left
+            self.remaining = 0 if self.sharpness == _SHARPNESS[-1] else self.remaining
             self.sharpness = _SHARPNESS[-1]
 
     def _solve(self, constraints: Constraints, iterations: int) -> tuple[FloatArray, int]:

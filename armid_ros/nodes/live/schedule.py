@@ -19,7 +19,7 @@ import numpy as np
 import numpy.typing as npt
 
 #: Verdicts that name an effect.
-NAMING = ('named', 'ambiguous', 'partial')
+NAMING_VERDICTS = ('named', 'ambiguous', 'partial')
 
 
 class LiveDiagnosis:
@@ -179,7 +179,7 @@ class LiveDiagnosis:
             return False
         self.latest = answer
         before = self.model
-        if answer.verdict in NAMING and answer.named:
+        if answer.verdict in NAMING_VERDICTS and answer.named:
             # count the diagnoses in a row with the same first effect
             named = answer.named[0]
             if self._agreed and self._agreed[-1] != named:

@@ -111,20 +111,20 @@ class SampleWindow:
         self._first = max(self._first, self._end - self._capacity)
         return True
 
-    def recording(self, since: float = -np.inf, source: str = 'window') -> Recording:
+    def recording(self, first: float = -np.inf, source: str = 'window') -> Recording:
         """
         Return the samples from a given time on as a recording.
 
         Parameters
         ----------
-        since : float
+        first : float
             Time of the first sample [s].
         source : str
             Name of the recording.
 
         """
         rows = self._rows[self._first : self._end]
-        rows = rows[rows[:, 0] >= since].copy()
+        rows = rows[rows[:, 0] >= first].copy()
         n = len(self.joints)
         dq = rows[:, n + 1 : 2 * n + 1]
         begin = rows[0, 0] if len(rows) else 0.0

@@ -36,7 +36,9 @@ DISTURBANCES = {
     'the encoders',
 }
 #: Reasons that two publishers of the same joints can cause.
-OF_TWO = frozenset({'out_of_order', 'stamp', 'erratic', 'jump_back', 'position_step', 'spike'})
+SENDER_CONFLICTS = frozenset(
+    {'out_of_order', 'stamp', 'erratic', 'jump_back', 'position_step', 'spike'}
+)
 
 
 class JointSample(NamedTuple):

@@ -30,7 +30,7 @@ from threadpoolctl import threadpool_limits
 #: Syntax of ROS arguments.
 _SYNTAX = 'write --ros-args -p NAME:=VALUE -r NAME:=OTHER_NAME --params-file FILE, and see --help'
 #: Timeout of the shutdown of DDS [s].
-LEAVING = 20.0
+SHUTDOWN_TIMEOUT = 20.0
 
 
 @contextmanager
@@ -173,7 +173,7 @@ def _leave(node: ArmidNode | None) -> list[str]:
             trouble.append(str(error))
     # Fast DDS waits for other processes with shared memory, and never ends if one was killed.
     # The watchdog, a thread in C, prints the stack of the process and ends it.
-    faulthandler.dump_traceback_later(LEAVING, exit=True, file=sys.__stderr__)
+    faulthandler.dump_traceback_later(SHUTDOWN_TIMEOUT, exit=True, file=sys.__stderr__)
     if node is not None:
         node.destroy_node()
     rclpy.try_shutdown()

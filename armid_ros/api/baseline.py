@@ -1,6 +1,6 @@
 # Copyright 2026 The armid_ros developers
 # SPDX-License-Identifier: Apache-2.0
-"""Misfit and recordings of the identification of a model, and the model of a simulator."""
+"""The model that is diagnosed, its misfit, and its baseline recordings."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ from armid_ros.simulation.plant import require_any_mass
 import numpy as np
 
 
-def recordings_since(
+def baseline_recordings(
     arm: RobotLike | IdentificationResult,
     model: ArmModel,
     baseline: RecordingLike | Sequence[RecordingLike] | None,
@@ -49,7 +49,7 @@ def recordings_since(
     return found
 
 
-def model_in_question(
+def diagnosed_model(
     arm: RobotLike | IdentificationResult,
     effects: str,
     against: RecordingLike | Sequence[RecordingLike],
