@@ -261,8 +261,12 @@ class DiagnosisResult(ShownModel):
         steps = next_steps(self.core, self.next_run, self.no_run, model, tuple(worse), learned)
         return list(map(pretty, steps))
 
-    def _lines(self) -> list[str]:
-        """Return sentences on references, shares, minor effects, consequences and notes."""
+    def summary(self, model: str = MODEL, every: bool = True) -> Summary:
+        """Return verdict, values that differ from zero, notes, and next steps for a model file."""
+        rows: list[Sequence[str]] = [*named_rows(self.core.findings, certain=True)]
+        most = 6  # number of rows without --all
+        if not every and len(rows) > most + 1:
+            rows[most:] = [(f'... and {len(rows) - most} more: --all, or report.html',)]
         lines = [] if self.simulated is None else [f'simulator: {self.simulated.fitted_to}']
         if self.baseline:
             lines.append(f'baseline: {", ".join(one.source for one in self.baseline)}')
@@ -271,14 +275,7 @@ class DiagnosisResult(ShownModel):
         lines += [pair.sentence() for pair in self.forward]
         if self.verdict == 'consistent':
             lines.append('note: report.html has the detectable size of each effect')
-        return [*lines, *(f'note: {note}' for note in (*self.core.notes, *self.notes))]
-
-    def summary(self, model: str = MODEL, every: bool = True) -> Summary:
-        """Return verdict, values that differ from zero, notes, and next steps for a model file."""
-        rows: list[Sequence[str]] = [*named_rows(self.core.findings, certain=True)]
-        most = 6  # number of rows without --all
-        if not every and len(rows) > most + 1:
-            rows[most:] = [(f'... and {len(rows) - most} more: --all, or report.html',)]
+        lines += [f'note: {note}' for note in (*self.core.notes, *self.notes)]
         if self.verdict in ('bad_data', 'not_repeatable'):
             then = 'inspect'
         elif self.verdict in OPEN and self.residual is None:
@@ -286,14 +283,14 @@ class DiagnosisResult(ShownModel):
         elif self.verdict == 'ambiguous' and self.next_run is None:
             then = ''  # the user has to decide between the named effects
         else:
-            anew = self.core.doubt or self.core.harmful or self.verdict in OPEN
-            then = 'identify' if anew else 'simulate'
+            doubtful = self.core.doubt or self.core.harmful or self.verdict in OPEN
+            then = 'identify' if doubtful else 'simulate'
         return Summary(
             pretty(self.core.summary),
             self.core.verdict.replace('_', ' '),
             ('effect', 'parameter', 'joint', 'value, 95 %') if rows else (),
             rows,
-            self._lines(),
+            lines,
             self._steps(model),
             then,
         )

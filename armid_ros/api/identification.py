@@ -53,10 +53,10 @@ from armid_ros.identification.rows.checks import check_held_out
 from armid_ros.identification.rows.temperature import friction_per_kelvin
 from armid_ros.recording import Recording, require_once
 from armid_ros.recording.curves import draw_joints
-from armid_ros.report.families import estimate_text, full_label, joint_columns
 from armid_ros.report.identification_report import Assessment, identification_report
 from armid_ros.report.judgement import judge, residual_trends
 from armid_ros.report.notation import counted, digits, plain, pretty
+from armid_ros.report.parameter_tables import estimate_text, full_label, joint_columns
 from armid_ros.report.provenance import DEFAULT_ORIGIN, ResultOrigin
 import numpy as np
 import numpy.typing as npt

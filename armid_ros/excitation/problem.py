@@ -108,13 +108,7 @@ class DesignSettings:
 
     def _require_numbers(self) -> None:
         """Raise a TrajectoryError for an impossible count, time or size."""
-        for name in (
-            'harmonics',
-            'n_periods',
-            'starts',
-            'candidates',
-            'iterations',
-        ):
+        for name in ('harmonics', 'n_periods', 'starts', 'candidates', 'iterations'):
             if getattr(self, name) < 1:
                 raise TrajectoryError(f'{name}: {getattr(self, name)}; at least 1 is needed')
         for name in ('period', 'run_in', 'rate'):

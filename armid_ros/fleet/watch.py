@@ -35,7 +35,7 @@ from armid_ros.fleet.bags import DAY_NS
 from armid_ros.fleet.plan import document, kind_arm
 from armid_ros.fleet.store import Store
 from armid_ros.identification.fitting.identifiability import HALF_WIDTH
-from armid_ros.report.families import full_label
+from armid_ros.report.parameter_tables import full_label
 import numpy as np
 import pyarrow as pa
 import pyarrow.compute as pc

@@ -100,9 +100,9 @@ class OnlineIdentifierNode(ListeningNode):
         self.offer('~/reset', self.reset)
         self.offer('~/save', self.save)
         self._timer: Timer | None = None
-        self._keep_pace()
+        self._restart_timer()
 
-    def _keep_pace(self) -> None:
+    def _restart_timer(self) -> None:
         # a new period of a timer takes effect only after the old one has passed
         if self._timer is not None:
             self.destroy_timer(self._timer)
@@ -233,7 +233,7 @@ class OnlineIdentifierNode(ListeningNode):
     def changed(self, names: frozenset[str]) -> None:
         """Apply changed settings."""
         if 'estimate_rate' in names:
-            self._keep_pace()
+            self._restart_timer()
         if self.identifier is not None:
             self.identifier.use(self._settings({}))
 

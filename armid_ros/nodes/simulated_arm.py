@@ -144,10 +144,10 @@ class SimulatedArmNode(ArmidNode):
 
         """
         super().__init__('simulated_arm', **kwargs)
-        self._bare: ArmModel | None = None
+        self._without_effects: ArmModel | None = None
         if arm is None:
-            self._bare, drives = described_arm(self.value)
-            arm = make_arm(self.value, self._bare, drives, self.get_logger().warn)
+            self._without_effects, drives = described_arm(self.value)
+            arm = make_arm(self.value, self._without_effects, drives, self.get_logger().warn)
         self._arm = arm
         self._dt_ns = round(self._arm.plant.dt * 1e9)
         self._stride = self._steps_at(self.value('rate'))  # refused before publishers are made
@@ -157,15 +157,15 @@ class SimulatedArmNode(ArmidNode):
             self._origin_ns = self.get_clock().now().nanoseconds
         self._pending: tuple[int, Reference] | None = None
         self.real_time = RealTime(lambda: self._arm.state.t, self.step)
-        self._owed = 0.0
+        self._skipped = 0.0
         self._states = _samples(self, JointState, 'joint_states')
         self._message = JointState(name=list(self._arm.joints))
-        self._sides = None
+        self._elastic_topics = None
         if self._arm.plant.springs is not None:
-            self._sides = _ElasticTopics(self, self._arm)
+            self._elastic_topics = _ElasticTopics(self, self._arm)
         self._clock_publisher: Publisher | None = None
         self._timer: Timer | None = None
-        self._keep_pace()
+        self._set_rates()
         description = self.create_publisher(String, 'robot_description', LATCHED)
         description.publish(String(data=self._arm.plant.robot.urdf))
         self.create_subscription(JointTrajectory, 'joint_trajectory', self._on_trajectory, STREAM)
@@ -176,7 +176,7 @@ class SimulatedArmNode(ArmidNode):
         """Return the number of plant steps between two samples."""
         return whole_steps(1.0 / rate, self._arm.plant.dt, f'a rate of {rate:g} Hz')
 
-    def _keep_pace(self) -> None:
+    def _set_rates(self) -> None:
         """Set the rates of the simulation and of /clock from the parameters."""
         rate = self.value('rate')
         self._stride = self._steps_at(rate)
@@ -241,8 +241,8 @@ class SimulatedArmNode(ArmidNode):
         message.velocity = sample.dq.tolist()
         message.effort = sample.tau.tolist()
         self._states.publish(message)
-        if self._sides is not None and sample.link is not None:
-            self._sides.publish(sample.link, stamp)
+        if self._elastic_topics is not None and sample.link is not None:
+            self._elastic_topics.publish(sample.link, stamp)
         return stamp_ns
 
     def publish_clock(self) -> None:
@@ -262,11 +262,11 @@ class SimulatedArmNode(ArmidNode):
 
     def catch_up(self) -> None:
         """Simulate until real time times the factor; skip time that cannot be caught up."""
-        self._owed += self.real_time.catch_up(self._factor, self._stride * self._arm.plant.dt)
+        self._skipped += self.real_time.catch_up(self._factor, self._stride * self._arm.plant.dt)
         # set the stamps to the system clock again, but not during a trajectory
-        if self._owed and self._clock_publisher is None and not self.moving:
-            self._origin_ns = (self._origin_ns or 0) + round(self._owed * 1e9)
-            self._owed = 0.0
+        if self._skipped and self._clock_publisher is None and not self.moving:
+            self._origin_ns = (self._origin_ns or 0) + round(self._skipped * 1e9)
+            self._skipped = 0.0
 
     def reset(self) -> str:
         """Set the arm to its initial state; time continues."""
@@ -299,29 +299,29 @@ class SimulatedArmNode(ArmidNode):
     def changed(self, names: frozenset[str]) -> None:
         """Apply changed effects, rates and sensors to the moving arm."""
         if 'effects' in names:
-            self._become(self._with_effects(self.value('effects')))
+            self._replace_model(self._with_effects(self.value('effects')))
         if names & {'rate', 'real_time_factor', 'clock_rate'}:
             self.real_time.given_up = 0.0
-            self._keep_pace()
+            self._set_rates()
         described = sensors_of(self.value, self._arm.joints)
         known = {name: getattr(described, name) for name in names & set(SENSOR_PARAMETERS)}
         self._arm.sensors = replace(self._arm.sensors, **known)
 
     def _with_effects(self, texts: Sequence[str]) -> ArmModel:
         """Return the arm of the parameters with other effects."""
-        if self._bare is None:
+        if self._without_effects is None:
             raise ModelError(
                 'this arm was made by a program, so that the parameter cannot change its effects'
             )
-        return with_effects(self._bare, texts)
+        return with_effects(self._without_effects, texts)
 
-    def _become(self, arm: ArmModel) -> None:
+    def _replace_model(self, arm: ArmModel) -> None:
         self._arm.become(arm)
         named = ', '.join(effect.name for effect in arm.effects) or 'no effect'
         self.get_logger().info(f'goes on with {named}')
 
     def _on_model(self, message: String) -> None:
-        self._become(read_model(message.data, self._arm.plant.arm.robot, 'model'))
+        self._replace_model(read_model(message.data, self._arm.plant.arm.robot, 'model'))
 
     def _on_trajectory(self, message: JointTrajectory) -> None:
         try:

@@ -22,9 +22,9 @@ from armid_ros.report.blocks import (
     TableCell,
     VerdictSection,
 )
-from armid_ros.report.families import estimate_text, full_label, parameter_folds
 from armid_ros.report.notation import counted, digits, pretty, robot_label
 from armid_ros.report.page import Page, Section
+from armid_ros.report.parameter_tables import estimate_text, full_label, parameter_folds
 from armid_ros.report.provenance import ResultOrigin
 
 #: Columns of the table of changes.

@@ -43,10 +43,10 @@ from armid_ros.report.blocks import (
     VerdictSection,
 )
 from armid_ros.report.charts import Chart, Role, Series
-from armid_ros.report.families import effects_in_words, full_label, parameter_folds
 from armid_ros.report.judgement import GOOD_CONDITION, WEAK_CONDITION
 from armid_ros.report.notation import counted, digits, plain, pretty, robot_label
 from armid_ros.report.page import Page, Section, Templated
+from armid_ros.report.parameter_tables import effects_in_words, full_label, parameter_folds
 from armid_ros.report.provenance import ResultOrigin
 from armid_ros.report.sections.diagnosed import isolability_section
 from armid_ros.report.sections.fit import ZOOM
@@ -124,11 +124,11 @@ def excitation_report(
             step=origin.step,
         ),
         ContentSection('Poses', [poses, Legend(colours)]),
-        _foreseen_section(design, arm.robot.links),
+        _accuracy_section(design, arm.robot.links),
         *([] if isolability is None else [isolability_section(isolability)]),
         _motion_section(limits, motion, shares),
         _clearance_section(motion.t, curves, design.settings.clearance, remarks),
-        _asked(design, arm, origin.robot, obstacles, run),
+        _input_section(design, arm, origin.robot, obstacles, run),
         Origin(origin.provenance),
     ]
     subtitle = (
@@ -213,7 +213,7 @@ def identifiable(design: Design, links: Sequence[str]) -> list[str]:
     ]
 
 
-def _asked(
+def _input_section(
     design: Design,
     arm: ArmModel,
     robot: str,
@@ -331,7 +331,7 @@ def _clearance_section(
     return ContentSection('Clearance', blocks)
 
 
-def _foreseen_section(design: Design, links: Sequence[str] = ()) -> ContentSection:
+def _accuracy_section(design: Design, links: Sequence[str] = ()) -> ContentSection:
     """Return the predicted uncertainty of every parameter, best known first."""
     information, described = design.information, design.described
     size = information.std / information.scale

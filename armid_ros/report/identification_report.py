@@ -31,15 +31,15 @@ from armid_ros.report.blocks import (
     VerdictSection,
 )
 from armid_ros.report.charts import Chart, Series
-from armid_ros.report.families import (
+from armid_ros.report.judgement import judge
+from armid_ros.report.notation import counted, digits, plain, pretty, robot_label
+from armid_ros.report.page import Page, Section
+from armid_ros.report.parameter_tables import (
     effects_in_words,
     full_label,
     not_as_described,
     parameter_section,
 )
-from armid_ros.report.judgement import judge
-from armid_ros.report.notation import counted, digits, plain, pretty, robot_label
-from armid_ros.report.page import Page, Section
 from armid_ros.report.provenance import DEFAULT_ORIGIN, ResultOrigin
 from armid_ros.report.sections.data_quality import data_quality_section
 from armid_ros.report.sections.fit import by_recording, error_bars, fit_section, forward_section
@@ -156,7 +156,7 @@ def identification_report(
         *([] if noise is None else [_noise_section(described, noise)]),
         *assessment.sections,
         data_quality_section(read, described),
-        _asked(result, origin.robot, list(training), list(validation)),
+        _input_section(result, origin.robot, list(training), list(validation)),
         Origin(origin.provenance),
     ]
     subtitle = f'{robot_label(origin.robot)} · {counted(len(training), "training recording")}'
@@ -177,7 +177,7 @@ def _contradictions(result: Identification, description: ArmModel) -> list[str]:
     ] * bool(joints)
 
 
-def _asked(
+def _input_section(
     result: Identification, robot: str, training: Sequence[str], validation: Sequence[str]
 ) -> ContentSection:
     gravity = ', '.join(f'{g:.4g}' for g in result.arm.robot.gravity)

@@ -3,8 +3,8 @@
 """The convergence of an online estimate is drawn with its intervals and the true values."""
 
 from armid_ros.estimate import Estimate
-from armid_ros.report.families import full_label
 from armid_ros.report.identification_report import convergence_section
+from armid_ros.report.parameter_tables import full_label
 import numpy as np
 
 

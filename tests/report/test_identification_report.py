@@ -16,9 +16,9 @@ from armid_ros.identification import (
     verify,
 )
 from armid_ros.motion import Motion
-from armid_ros.report.families import parameter_section
 from armid_ros.report.identification_report import Assessment, identification_report
 from armid_ros.report.judgement import judge
+from armid_ros.report.parameter_tables import parameter_section
 from armid_ros.report.provenance import Provenance, ResultOrigin, versions
 from armid_ros.report.sections.data_quality import repeatability
 from armid_ros.report.sections.fit import fit_section

@@ -59,7 +59,7 @@ class _Ending:
     # its context. During the construction of a node, SIGINT and SIGTERM end the process at once.
 
     def __init__(self) -> None:
-        self._asked = self._at_once = self.with_parent = self.hung_up = False
+        self._requested = self._at_once = self.with_parent = self.hung_up = False
         self._parent = os.getppid()
         for number in (signal.SIGINT, signal.SIGTERM):
             signal.signal(number, self._on_signal)
@@ -71,7 +71,7 @@ class _Ending:
     def due(self) -> bool:
         """Return whether the process must end, by a signal or because its parent has ended."""
         ended = self.with_parent and os.getppid() != self._parent
-        return self._asked or self.hung_up or ended
+        return self._requested or self.hung_up or ended
 
     @contextmanager
     def at_once(self) -> Iterator[None]:
@@ -86,7 +86,7 @@ class _Ending:
         if number == signal.SIGHUP:
             self.hung_up = True
             return
-        self._asked = True
+        self._requested = True
         if self._at_once:
             self._at_once = False  # `ros2 launch` sends a second one
             raise _EndedAtOnce

@@ -3,7 +3,12 @@
 """Parameters that share an axis have one unit, which a heading says once."""
 
 from armid_ros.estimate import Estimate, ParameterName
-from armid_ros.report.families import full_label, grouping, parameter_folds, parameter_section
+from armid_ros.report.parameter_tables import (
+    full_label,
+    grouping,
+    parameter_folds,
+    parameter_section,
+)
 import numpy as np
 import pytest
 
