@@ -15,12 +15,27 @@ from armid_ros.nodes.messages.joint_states import (
     SENDER_CONFLICTS,
 )
 from armid_ros.nodes.messages.timeliness import Freshness, StampDifference
+from armid_ros.nodes.parameters.table import NodeParameter, Values
 from armid_ros.nodes.qos import LATCHED, MatchedSubscription
 from armid_ros.recording.message_types import header_stamp
-from armid_ros.robots import Robot
+from armid_ros.robots import load_robot, parse_gravity, Robot, robot_from_urdf
 from diagnostic_msgs.msg import DiagnosticStatus
 from sensor_msgs.msg import JointState
 from std_msgs.msg import String
+
+#: Parameters of nodes that can take the robot from robot_description.
+ROBOT_PARAMETERS = (
+    NodeParameter(
+        'robot', '', 'A shipped robot, or a path; empty: the robot of robot_description.'
+    ),
+    NodeParameter(
+        'gravity',
+        'earth',
+        'earth, moon, or x,y,z in the base frame [m/s^2]; that of the model where there is one.',
+        check=parse_gravity,
+    ),
+    NodeParameter('joints', [''], 'Driven joints; if empty, all joints except those of grippers.'),
+)
 
 
 class ListeningNode(ArmidNode):
@@ -143,3 +158,11 @@ class ListeningNode(ArmidNode):
         if message.data != self._description:
             self.take_description(message.data)
             self._description = message.data
+
+
+def robot_of(value: Values, description: str | None) -> Robot:
+    """Return the robot of a URDF, or without a URDF the robot that parameters name."""
+    given = {'gravity': value('gravity'), 'joints': value('joints') or None}
+    if description is None:
+        return load_robot(value('robot'), **given)
+    return robot_from_urdf(description, **given)

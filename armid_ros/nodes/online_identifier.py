@@ -14,6 +14,8 @@ import time
 from typing import Any
 
 from armid_msgs.msg import ParameterEstimate
+from armid_ros.api.arguments import USUAL
+from armid_ros.arm import ArmModel
 from armid_ros.arm.model_file import read_model, save_model
 from armid_ros.errors import ArmidError, IdentificationError, ModelError
 from armid_ros.estimate import Estimate, parameter_table
@@ -23,15 +25,10 @@ from armid_ros.identification.online.identifier import OnlineIdentifier, OnlineS
 from armid_ros.identification.online.learning_progress import LearningProgress, too_little_motion
 from armid_ros.motion import FloatArray
 from armid_ros.nodes.base import key_values
-from armid_ros.nodes.listening import ListeningNode
+from armid_ros.nodes.listening import ListeningNode, robot_of, ROBOT_PARAMETERS
 from armid_ros.nodes.messages.estimates import estimate_message, estimate_values
 from armid_ros.nodes.messages.joint_states import DISTURBANCES, JointSample
-from armid_ros.nodes.parameters.identifier import (
-    IDENTIFIER_PARAMETERS,
-    make_identifier,
-    settings_of,
-)
-from armid_ros.nodes.parameters.table import NodeParameter
+from armid_ros.nodes.parameters.table import NodeParameter, Values
 from armid_ros.nodes.qos import LATCHED, STREAM
 from armid_ros.nodes.running.process import run
 from diagnostic_msgs.msg import DiagnosticStatus
@@ -62,7 +59,50 @@ class OnlineIdentifierNode(ListeningNode):
     """
 
     table = (
-        *IDENTIFIER_PARAMETERS,
+        *ROBOT_PARAMETERS,
+        NodeParameter(
+            'effects',
+            USUAL.split(','),
+            'Effects to estimate with the rigid body, each as NAME[@joint+joint].',
+        ),
+        NodeParameter(
+            'cutoff',
+            5.0,
+            'Cut-off of the low-pass filter of torque and regressor.',
+            'Hz',
+            limits=(0.01, 1000.0),
+        ),
+        NodeParameter(
+            'forgetting',
+            1.0,
+            'Forgetting factor per used sample; 1: no forgetting.',
+            limits=(0.9, 1.0),
+            read_only=False,
+        ),
+        NodeParameter(
+            'torque_noise',
+            [0.0],
+            'Standard deviation of a torque sample, one per joint; [0.0]: from the residuals.',
+            'N m or N',
+        ),
+        NodeParameter(
+            'max_gap',
+            10,
+            'Longest gap that is interpolated.',
+            limits=(1, 1000),
+            read_only=False,
+        ),
+        NodeParameter(
+            'measured_velocity', False, 'Differentiate the measured velocity, not the position.'
+        ),
+        NodeParameter(
+            'false_alarm_time',
+            360000.0,
+            'Mean time between false reports of a change; 0: no search for changes.',
+            's',
+            limits=(0.0, 1e9),
+            read_only=False,
+        ),
         NodeParameter(
             'estimate_rate',
             10.0,
@@ -331,6 +371,42 @@ class OnlineIdentifierNode(ListeningNode):
         if self.identifier is None:
             raise IdentificationError('no robot is known: robot_description was not received')
         return self.identifier
+
+
+def make_identifier(value: Values, description: str | None = None) -> OnlineIdentifier:
+    """
+    Make the identifier that parameters describe.
+
+    Parameters
+    ----------
+    value : callable
+        Returns the value of a parameter of `OnlineIdentifierNode.table`.
+    description : str, optional
+        URDF that replaces the robot of the parameter.
+
+    Raises
+    ------
+    ArmidError
+        If robot, effects or settings are not valid or do not fit each other.
+
+    """
+    arm = ArmModel.of(robot_of(value, description), effects=value('effects'))
+    return OnlineIdentifier(arm, settings_of(value, arm), rng=np.random.default_rng(0))
+
+
+def settings_of(value: Values, arm: ArmModel) -> OnlineSettings:
+    """Return the settings that parameters describe."""
+    noise = tuple(value('torque_noise'))
+    if len(noise) == 1:
+        noise = noise * arm.robot.n_joints
+    return OnlineSettings(
+        cutoff=value('cutoff'),
+        forgetting=value('forgetting'),
+        torque_noise=noise if any(noise) else None,
+        max_gap=value('max_gap'),
+        measured_velocity=value('measured_velocity'),
+        false_alarm_time=value('false_alarm_time') or None,
+    )
 
 
 main = partial(run, OnlineIdentifierNode)
