@@ -35,6 +35,7 @@ from armid_ros.identification.rows.signals import conditioning
 from armid_ros.model import BaseParameters, random_motion
 from armid_ros.recording import ReadSettings, Recording
 from armid_ros.recording.reader import read_pieces
+from armid_ros.robots import robot_from_urdf
 import numpy as np
 
 
@@ -286,12 +287,10 @@ def kind_arm(store: Store, facts: Mapping[str, Any], key: str) -> ArmModel:
     urdf = store.read(f'robots/{key}.urdf')
     if urdf is None:
         raise FleetError(f'{store.url}/robots/{key}.urdf: there is no such description')
-    return ArmModel.of(
-        urdf.decode(),
-        effects=facts['effects'],
-        gravity=facts['gravity'],
-        joints=facts['joints'],
+    robot = robot_from_urdf(
+        urdf.decode(), gravity=facts['gravity'], joints=facts['joints'], source=facts['robot']
     )
+    return ArmModel.of(robot, effects=facts['effects'])
 
 
 def document(store: Store) -> dict[str, Any]:

@@ -17,6 +17,7 @@ from armid_ros.nodes.messages.joint_states import JointSample
 from armid_ros.nodes.parameters.table import NodeParameter
 from armid_ros.nodes.qos import DEPTH, LATCHED, STREAM
 from armid_ros.nodes.running.process import run
+from armid_ros.robots import robot_from_urdf
 from builtin_interfaces.msg import Duration
 from geometry_msgs.msg import Point
 import numpy as np
@@ -138,7 +139,7 @@ class ResidualMarkersNode(ListeningNode):
 
     def take_description(self, urdf: str) -> None:
         """Use the robot of robot_description."""
-        self._draw_on(load_robot(urdf, joints=self.value('joints') or None))
+        self._draw_on(robot_from_urdf(urdf, joints=self.value('joints') or None))
 
     def _draw_on(self, robot: Robot) -> None:
         n = robot.n_joints
