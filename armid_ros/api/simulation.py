@@ -10,11 +10,11 @@ from armid_ros.api.arguments import arm_of, Rng, RobotLike
 from armid_ros.api.excitation import ExcitationResult
 from armid_ros.arm import ArmModel
 from armid_ros.excitation import design, DesignSettings, Excitation, load_excitation
-from armid_ros.motion import Motion
+from armid_ros.motion import Motion, Temperatures
 from armid_ros.recording import read_waypoints, ReadReport, ReadSettings, Recording
 from armid_ros.recording.source import DEFAULT
 from armid_ros.robots import collision_model, Robot
-from armid_ros.simulation import Reference, Sensors
+from armid_ros.simulation import Reference, Sensors, SimulatedRun
 from armid_ros.simulation import simulate as run
 import numpy as np
 
@@ -76,15 +76,20 @@ def simulate(
         resolution=resolution,
     )
     reference = reference_of(model.robot, trajectory, source)
-    measured = run(model, reference, rng=source, sensors=sensors, rate=rate)
+    return recording_of(run(model, reference, rng=source, sensors=sensors, rate=rate))
+
+
+def recording_of(run: SimulatedRun, temperature: Temperatures | None = None) -> Recording:
+    """Return the readings of the sensors in a simulated run, with temperatures of the joints."""
     return Recording(
-        joints=measured.joints,
-        t=measured.t,
-        q=measured.q,
-        dq=measured.dq,
-        tau=measured.tau,
+        joints=run.joints,
+        t=run.t,
+        q=run.q,
+        dq=run.dq,
+        tau=run.tau,
+        temperature=temperature,
         source='simulation',
-        report=ReadReport(messages=len(measured.t), samples=len(measured.t)),
+        report=ReadReport(messages=len(run.t), samples=len(run.t)),
     )
 
 

@@ -4,7 +4,6 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
 from pathlib import Path
 from typing import Any, TYPE_CHECKING
 
@@ -82,7 +81,7 @@ def simulate(
     such an arm is recorded on both sides of its springs.
 
     """
-    from armid_ros.api.simulation import reference_of
+    from armid_ros.api.simulation import recording_of, reference_of
     from armid_ros.cli import options
     from armid_ros.recording import write_recording
     from armid_ros.recording.elastic import write_runs
@@ -114,8 +113,7 @@ def simulate(
         )
         run = record(plant, reference, rate=rate, progress=tick)
         if run.sides is None:
-            run = replace(run, truth=replace(run.truth, temperature=course))
-            write_recording(out, run, robot_description=robot.urdf)
+            write_recording(out, recording_of(run, course), robot_description=robot.urdf)
         else:
             write_runs(out, [run.sides], plant.plant.robot)
     sides = '' if run.sides is None else ' on both sides'

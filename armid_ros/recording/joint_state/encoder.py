@@ -6,40 +6,18 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 from pathlib import Path
-from typing import Protocol
 
 from armid_ros.errors import RecordingError
-from armid_ros.motion import FloatArray, Temperatures
+from armid_ros.motion import Motion
 from armid_ros.recording.joint_state.layout import JointStateLayout
 from armid_ros.recording.mcap.writer import Compression
 from armid_ros.recording.message_types import JOINT_STATE, QUANTITIES
+from armid_ros.recording.recording import Recording
 from armid_ros.recording.source import IntArray
 from armid_ros.recording.temperature import write_temperatures
 from armid_ros.recording.writer import BagWriter, DEFAULT_CHUNK_SIZE, whole_bag
 import numpy as np
 import numpy.typing as npt
-
-
-class _Sampled(Protocol):
-    """Signals of n joints over time: a recording, a motion or a simulated run."""
-
-    @property
-    def joints(self) -> tuple[str, ...]: ...
-
-    @property
-    def t(self) -> FloatArray: ...
-
-    @property
-    def q(self) -> FloatArray: ...
-
-    @property
-    def dq(self) -> FloatArray | None: ...
-
-    @property
-    def tau(self) -> FloatArray | None: ...
-
-    @property
-    def temperature(self) -> Temperatures | None: ...
 
 
 def joint_state_cdr(
@@ -103,7 +81,7 @@ def write_joint_states(
 
 def write_recording(
     path: str | Path,
-    measured: _Sampled,
+    measured: Recording | Motion,
     *,
     topic: str = '/joint_states',
     start_ns: int | None = None,
@@ -118,7 +96,7 @@ def write_recording(
     ----------
     path : str or Path
         Bag directory to create; it must not exist.
-    measured : Recording, Motion or SimulatedRun
+    measured : Recording or Motion
         Measured or simulated motion; velocities and torques may be None.
     topic : str
         Topic of the messages.
