@@ -5,7 +5,6 @@
 from dataclasses import replace
 import re
 
-from armid_ros.api.arguments import arm_of
 from armid_ros.arm import ArmModel
 from armid_ros.effects import make_effect
 from armid_ros.identification import grade, identify
@@ -144,11 +143,11 @@ def test_identification_grades_the_one_as_unusable_and_not_the_other(structure, 
 
 
 def test_inspection_says_so_with_and_without_a_robot(arm, blind, locked):
-    for robot in (arm.robot, None):
-        found = inspect(blind, arm_of(robot), rng=np.random.default_rng(0))
+    for known in (arm, None):
+        found = inspect(blind, known, rng=np.random.default_rng(0))
         assert found.remarks[0].weight == 'bad'
         assert 'dead' in found.remarks[0].text
-        sound = inspect(locked, arm_of(robot), rng=np.random.default_rng(0))
+        sound = inspect(locked, known, rng=np.random.default_rng(0))
         assert not any(remark.weight == 'bad' for remark in sound.remarks)
 
 
